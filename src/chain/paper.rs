@@ -1,0 +1,1 @@
+//! The paper's solver, with its rules and its errors.

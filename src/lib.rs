@@ -1,0 +1,23 @@
+//! A bench dragon, live: where every handle of a coiling chain of benches is, published at a fixed rate.
+//!
+//! Data flows one way, and each module uses only those above it in this list:
+//!
+//! - [`messages`]: the memory layouts that go over the wire.
+//! - [`geometry`]: the path, the board, the separation of two boards. Pure functions.
+//! - [`chain`]: from the head's travel to the state of every handle; several solvers behind one interface.
+//! - [`scene`]: the file a user writes, checked and turned into the types above.
+//! - [`show`]: from a scene and a tick to one frame, deterministic.
+//! - [`live`]: the fixed-rate loop, its clock, its statistics.
+//! - [`transports`]: iceoryx2 shared memory and ROS 2 topics, as publishers of the loop.
+//! - [`subscribers`]: the terminal monitor and the stage picture; they know the messages only.
+
+#![deny(missing_docs)]
+
+pub mod chain;
+pub mod geometry;
+pub mod live;
+pub mod messages;
+pub mod scene;
+pub mod show;
+pub mod subscribers;
+pub mod transports;

@@ -1,0 +1,60 @@
+//! The command line: reads arguments, sets up logging, runs one subcommand, turns its error into an exit code.
+
+mod commands;
+
+use std::io::IsTerminal;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use commands::{CommandError, Common};
+
+/// Publishes a bench dragon live: handle poses and collision alerts at a fixed rate, over iceoryx2 shared memory and,
+/// when asked, as ROS 2 topics.
+#[derive(Debug, Parser)]
+#[command(version, propagate_version = true, arg_required_else_help = true)]
+struct CommandLine {
+    #[command(flatten)]
+    common: Common,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Watch a running publisher from another process
+    Watch(commands::watch::WatchArguments),
+}
+
+fn main() -> ExitCode {
+    let CommandLine { common, command } = CommandLine::parse();
+    set_up_logging(&common);
+    let done = match &command {
+        Command::Watch(arguments) => commands::watch::watch(&common, arguments),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(CommandError::BadInput(sentence)) => {
+            eprintln!("{}: {sentence}", error_label());
+            ExitCode::from(2)
+        }
+        Err(CommandError::Failed(sentence)) => {
+            eprintln!("{}: {sentence}", error_label());
+            ExitCode::FAILURE
+        }
+        Err(CommandError::NegativeVerdict) => ExitCode::FAILURE,
+    }
+}
+
+fn error_label() -> &'static str {
+    if std::io::stderr().is_terminal() { "\x1b[1;31merror\x1b[0m" } else { "error" }
+}
+
+fn set_up_logging(common: &Common) {
+    let level = match (common.quiet, common.verbose) {
+        (true, _) => log::LevelFilter::Error,
+        (false, 0) => log::LevelFilter::Warn,
+        (false, 1) => log::LevelFilter::Info,
+        (false, _) => log::LevelFilter::Debug,
+    };
+    env_logger::Builder::new().filter_level(level).filter_module("rustdds", log::LevelFilter::Error).init();
+}

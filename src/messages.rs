@@ -1,0 +1,242 @@
+//! What goes over the wire: the fixed memory layouts that publishers write and subscribers in any language read.
+//!
+//! This room depends on nothing else in the crate. Transports write these types, subscribers read them, and
+//! `examples/python/bench_dragon_messages.py` and `msgs/` describe the same bytes for other languages. Everything is
+//! little-endian, `#[repr(C)]` and without implicit padding. A type's name ends in the version of its layout, so that
+//! a subscriber built for another layout is refused instead of reading nonsense.
+
+use iceoryx2::prelude::ZeroCopySend;
+use serde::Serialize;
+
+/// The bench number that means "no bench".
+pub const NO_BENCH: u32 = u32::MAX;
+
+/// What the dragon is doing: the `state` of a [`FrameHeader`] and, up to [`State::Lock`], the `level` of a
+/// [`CollisionAlert`] (where 0 is called `clear`).
+///
+/// A state is the latest event passed and stays until the show ends or loops.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[repr(u32)]
+pub enum State {
+    /// Nothing has happened and nothing is near.
+    Moving = 0,
+    /// An event is near in time, or two boards are near each other.
+    Approaching = 1,
+    /// Two boards that share no handle have touched.
+    Contact = 2,
+    /// A link stands square to the path at its front handle: what follows is pushed backwards.
+    Stall = 3,
+    /// A link stands square to the path at its rear handle: the motion cannot go on.
+    Lock = 4,
+    /// The head has reached the end of the path.
+    PathEnd = 5,
+}
+
+impl State {
+    /// The state of a number on the wire, or `None` for a number this layout does not know.
+    pub fn from_wire(number: u32) -> Option<Self> {
+        [Self::Moving, Self::Approaching, Self::Contact, Self::Stall, Self::Lock, Self::PathEnd]
+            .into_iter()
+            .find(|state| *state as u32 == number)
+    }
+
+    /// The name used in JSON and on the terminal for a frame's state: `moving`, `approaching`, ...
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Moving => "moving",
+            Self::Approaching => "approaching",
+            Self::Contact => "contact",
+            Self::Stall => "stall",
+            Self::Lock => "lock",
+            Self::PathEnd => "path_end",
+        }
+    }
+
+    /// The name used for an alert's level: as [`State::name`], but 0 is `clear`.
+    pub fn level_name(self) -> &'static str {
+        match self {
+            Self::Moving => "clear",
+            other => other.name(),
+        }
+    }
+}
+
+/// Where one handle is and how it moves. Payload of `<name>/poses` is a slice of these, head first.
+#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend)]
+#[type_name("bench_dragon/HandlePose/1")]
+#[repr(C)]
+pub struct HandlePose {
+    /// Metres to the right of the spiral's centre, frame `stage`.
+    pub x: f64,
+    /// Metres up from the spiral's centre, frame `stage`.
+    pub y: f64,
+    /// Radians in (-pi, pi]: the direction of the bench this handle leads (from handle i+1 to handle i); the last
+    /// handle takes the last bench's.
+    pub heading: f64,
+    /// Velocity along x in simulation, metres per simulated second; NaN where the scene asks for no velocities.
+    pub vx: f64,
+    /// Velocity along y in simulation, metres per simulated second; NaN where the scene asks for no velocities.
+    pub vy: f64,
+}
+
+/// What is true of a whole frame. User header of `<name>/poses`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend)]
+#[type_name("bench_dragon/FrameHeader/1")]
+#[repr(C)]
+pub struct FrameHeader {
+    /// New for every start of a publisher: a change means that it was started again.
+    pub run_id: u64,
+    /// Counts the frames published in this run from 0, without gaps: a gap means that frames were missed.
+    pub sequence: u64,
+    /// The number of the period; jumps over periods that were skipped.
+    pub tick: u64,
+    /// CLOCK_REALTIME in nanoseconds when the frame was begun: for people and for ROS.
+    pub stamp_ns: u64,
+    /// CLOCK_MONOTONIC in nanoseconds just before the frame was sent: for latencies.
+    pub sent_ns: u64,
+    /// CLOCK_MONOTONIC in nanoseconds at which this period should have begun: for lateness.
+    pub deadline_ns: u64,
+    /// Simulated seconds since the start of the scene.
+    pub sim_time: f64,
+    /// Simulated seconds per second of wall time.
+    pub time_scale: f64,
+    /// Metres between the nearest two boards that share no handle, negative when they overlap; NaN where the scene
+    /// has no `[alerts]` or fewer than three benches.
+    pub min_clearance: f64,
+    /// The number of handles in the payload.
+    pub handles: u32,
+    /// A [`State`] as its number.
+    pub state: u32,
+}
+
+/// A change of the alert level, or the countdown towards one. Payload of `<name>/alerts`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend)]
+#[type_name("bench_dragon/CollisionAlert/1")]
+#[repr(C)]
+pub struct CollisionAlert {
+    /// The run this alert belongs to, as in [`FrameHeader::run_id`].
+    pub run_id: u64,
+    /// The tick of the frame this alert goes with.
+    pub tick: u64,
+    /// CLOCK_REALTIME in nanoseconds of that frame.
+    pub stamp_ns: u64,
+    /// Simulated seconds of that frame.
+    pub sim_time: f64,
+    /// Simulated seconds at which the event happens or happened; NaN where there is none.
+    pub event_time: f64,
+    /// `event_time - sim_time`, simulated seconds; negative once it has passed; NaN where there is no event.
+    pub time_to_event: f64,
+    /// Metres between the nearest two boards in that frame, as [`FrameHeader::min_clearance`].
+    pub clearance: f64,
+    /// Where it happens, metres right of the centre; NaN where there is no place.
+    pub x: f64,
+    /// Where it happens, metres up from the centre; NaN where there is no place.
+    pub y: f64,
+    /// A [`State`] up to `Lock` as its number; 0 is called clear.
+    pub level: u32,
+    /// The first bench concerned, or [`NO_BENCH`].
+    pub bench_a: u32,
+    /// The second bench concerned, or [`NO_BENCH`].
+    pub bench_b: u32,
+    /// Always 0.
+    pub reserved: u32,
+}
+
+/// Bytes kept for a scene's name in [`LoopStatus`].
+pub const SCENE_NAME_BYTES: usize = 64;
+
+/// How the loop is doing, once a second. Payload of `<name>/status`.
+///
+/// `_second` figures are of the last second alone, `_total` figures since the start of the run; all durations are in
+/// nanoseconds.
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[type_name("bench_dragon/LoopStatus/1")]
+#[repr(C)]
+pub struct LoopStatus {
+    /// The run, as in [`FrameHeader::run_id`].
+    pub run_id: u64,
+    /// The tick of the latest frame.
+    pub tick: u64,
+    /// The sequence of the latest frame.
+    pub sequence: u64,
+    /// CLOCK_REALTIME in nanoseconds when this was written.
+    pub stamp_ns: u64,
+    /// Simulated seconds of the latest frame.
+    pub sim_time: f64,
+    /// The rate asked for, frames per second.
+    pub rate: f64,
+    /// Frames published in the last second, divided by its true length.
+    pub measured_rate: f64,
+    /// Incidents in which at least one period was skipped, since the start.
+    pub overruns: u64,
+    /// Periods skipped, since the start.
+    pub skipped: u64,
+    /// Times the show has been played to its end and begun again.
+    pub shows_played: u64,
+    /// Wake-up lateness of the last second: median, ns.
+    pub lateness_p50_second: u64,
+    /// Wake-up lateness of the last second: 99th percentile, ns.
+    pub lateness_p99_second: u64,
+    /// Wake-up lateness of the last second: maximum, ns.
+    pub lateness_max_second: u64,
+    /// Wake-up lateness since the start: median, ns.
+    pub lateness_p50_total: u64,
+    /// Wake-up lateness since the start: 99th percentile, ns.
+    pub lateness_p99_total: u64,
+    /// Wake-up lateness since the start: 99.9th percentile, ns.
+    pub lateness_p999_total: u64,
+    /// Wake-up lateness since the start: maximum, ns.
+    pub lateness_max_total: u64,
+    /// Step cost of the last second: median, ns.
+    pub step_p50_second: u64,
+    /// Step cost of the last second: 99th percentile, ns.
+    pub step_p99_second: u64,
+    /// Step cost of the last second: maximum, ns.
+    pub step_max_second: u64,
+    /// Step cost since the start: median, ns.
+    pub step_p50_total: u64,
+    /// Step cost since the start: 99th percentile, ns.
+    pub step_p99_total: u64,
+    /// Step cost since the start: 99.9th percentile, ns.
+    pub step_p999_total: u64,
+    /// Step cost since the start: maximum, ns.
+    pub step_max_total: u64,
+    /// Resident memory of the publisher, bytes.
+    pub resident_bytes: u64,
+    /// Subscribers of `<name>/poses` that are connected.
+    pub subscribers: u32,
+    /// Open file descriptors of the publisher.
+    pub file_descriptors: u32,
+    /// The scene's name as UTF-8, cut at a character's end and padded with zeros.
+    pub scene: [u8; SCENE_NAME_BYTES],
+}
+
+/// Benches whose lengths differ from each other at most: the head, and all that follow.
+///
+/// What a subscriber needs to draw the stage. Payload of `<name>/stage`, sent at the start and kept for late joiners.
+#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend)]
+#[type_name("bench_dragon/Stage/1")]
+#[repr(C)]
+pub struct Stage {
+    /// The run, as in [`FrameHeader::run_id`].
+    pub run_id: u64,
+    /// CLOCK_REALTIME in nanoseconds when this was written.
+    pub stamp_ns: u64,
+    /// Metres per turn of the spiral.
+    pub pitch: f64,
+    /// The turn on which the head starts (theta = 2 pi start_turn).
+    pub start_turn: f64,
+    /// Metres from the centre of a handle's hole to the nearest end of the board.
+    pub hole_inset: f64,
+    /// Metres along the head's board.
+    pub head_length: f64,
+    /// Metres along every other board.
+    pub body_length: f64,
+    /// Metres across every board.
+    pub width: f64,
+    /// The number of benches; one less than the number of handles.
+    pub benches: u32,
+    /// Always 0.
+    pub reserved: u32,
+}

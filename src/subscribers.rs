@@ -1,0 +1,1 @@
+//! Programs that watch a running publisher from another process. They know the messages only.

@@ -1,0 +1,1 @@
+//! Where frames go: each transport implements [`Publisher`](crate::live::Publisher); none knows another, nor a solver.
