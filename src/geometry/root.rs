@@ -21,7 +21,7 @@ pub fn increasing_root(function: impl Fn(f64) -> (f64, f64), low: f64, high: f64
             high = x;
         }
         let newton = x - value / slope;
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        let next = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
         let step = (next - x).abs();
         // The second test ends the jitter of the last digits where the function is nearly flat.
         if step <= f64::EPSILON * x.abs() || (step < 1e-10 * x.abs() && step > 0.5 * last_step) {
