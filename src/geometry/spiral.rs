@@ -156,7 +156,7 @@ impl Spiral {
     /// Where the square of the chord to the point `increment` radians behind a handle at radius `r` stands against
     /// the square of the link, and its derivative by the increment d:
     /// G = (a d)^2 + 4 r (r + a d) sin^2(d/2) - link^2 (law of cosines).
-    fn chord_excess(&self, r: f64, link: f64) -> impl Fn(f64) -> (f64, f64) {
+    pub(crate) fn chord_excess(&self, r: f64, link: f64) -> impl Fn(f64) -> (f64, f64) {
         let a = self.growth();
         move |increment| {
             let (sine, cosine) = (0.5 * increment).sin_cos();
@@ -169,7 +169,7 @@ impl Spiral {
     }
 
     /// The increment from a handle at radius `r` to its follower, radians.
-    fn increment(&self, r: f64, link: f64) -> Result<f64, Fold> {
+    pub(crate) fn increment(&self, r: f64, link: f64) -> Result<f64, Fold> {
         let a = self.growth();
         let excess = self.chord_excess(r, link);
         // Up to half a turn every term of the slope is positive: the root there is single.
