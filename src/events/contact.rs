@@ -1,0 +1,1 @@
+//! The first touch of two boards that share no handle.
