@@ -15,6 +15,7 @@
 #![deny(missing_docs)]
 
 pub mod chain;
+pub mod clearance;
 pub mod events;
 pub mod geometry;
 pub mod live;
