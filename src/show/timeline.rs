@@ -34,9 +34,9 @@ impl Timeline {
         Self::timed(scene, events)
     }
 
-    /// The end of a scene's motion alone: all that a show without alerts needs.
-    pub fn end_of(scene: &Scene) -> Self {
-        Self::timed(scene, stall_and_end(&scene.path, &scene.team)).end_only()
+    /// The events of a scene but for the contact, which costs a search.
+    pub fn without_contact(scene: &Scene) -> Self {
+        Self::timed(scene, stall_and_end(&scene.path, &scene.team))
     }
 
     fn timed(scene: &Scene, events: Vec<Event>) -> Self {
