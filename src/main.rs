@@ -21,6 +21,8 @@ struct CommandLine {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Publish a scene live
+    Run(commands::run::RunArguments),
     /// Watch a running publisher from another process
     Watch(commands::watch::WatchArguments),
     /// Solve a scene offline and print every handle as a table
@@ -37,6 +39,7 @@ fn main() -> ExitCode {
     let CommandLine { common, command } = CommandLine::parse();
     set_up_logging(&common);
     let done = match &command {
+        Command::Run(arguments) => commands::run::run(&common, arguments),
         Command::Watch(arguments) => commands::watch::watch(&common, arguments),
         Command::Solve(arguments) => commands::solve::solve(&common, arguments),
         Command::Events => commands::events::events(&common),
