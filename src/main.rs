@@ -71,5 +71,11 @@ fn set_up_logging(common: &Common) {
         (false, 1) => log::LevelFilter::Info,
         (false, _) => log::LevelFilter::Debug,
     };
+    iceoryx2::prelude::set_log_level(match level {
+        log::LevelFilter::Debug => iceoryx2::prelude::LogLevel::Debug,
+        log::LevelFilter::Info => iceoryx2::prelude::LogLevel::Warn,
+        // What iceoryx2 refuses is reported in this program's own words.
+        _ => iceoryx2::prelude::LogLevel::Fatal,
+    });
     env_logger::Builder::new().filter_level(level).filter_module("rustdds", log::LevelFilter::Error).init();
 }

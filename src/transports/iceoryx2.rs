@@ -67,6 +67,11 @@ pub enum OpenError {
          stop that, or choose another name with --name"
     )]
     Incompatible(String),
+    /// The service admits no more subscribers.
+    #[error(
+        "\"{0}\" has {MAX_SUBSCRIBERS} subscribers, which is as many as a publisher admits (MAX_SUBSCRIBERS): end one first"
+    )]
+    TooManySubscribers(String),
     /// Anything else.
     #[error("iceoryx2 could not open \"{service}\": {reason}")]
     Failed {
