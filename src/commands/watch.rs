@@ -220,6 +220,7 @@ impl Screen<'_> {
         let style = self.style(level);
         let benches = match (alert.bench_a, alert.bench_b) {
             (NO_BENCH, _) => String::new(),
+            _ if level == State::Moving => String::new(),
             (a, NO_BENCH) => format!(", bench {} (counting from 1)", a + 1),
             (a, b) => format!(", benches {} and {} (counting from 1)", a + 1, b + 1),
         };
