@@ -4,7 +4,9 @@
 //! [`crate::events`] call it. Points and vectors are nalgebra's, in metres, frame `stage` (x right, y up).
 
 pub mod path;
+pub mod rectangle;
 pub mod root;
+pub mod separation;
 pub mod spiral;
 
 /// A place on the stage, metres.
