@@ -17,10 +17,13 @@ pub struct LeastClearance {
     pub bench_a: usize,
     /// The higher bench.
     pub bench_b: usize,
-    /// The point of `bench_a`'s board nearest to the other.
-    pub point_a: Point,
-    /// The point of `bench_b`'s board nearest to the other.
-    pub point_b: Point,
+}
+
+impl LeastClearance {
+    /// The closest points of the two boards, the first on `bench_a`'s; `chain` is the one this was found for.
+    pub fn closest_points(&self, chain: &Chain, team: &Team) -> (Point, Point) {
+        closest_points_board_board(&board(chain, team, self.bench_a), &board(chain, team, self.bench_b))
+    }
 }
 
 /// The board of one bench of a chain. Panics if there is no such bench.
@@ -39,7 +42,7 @@ pub fn least_clearance_all_pairs(chain: &Chain, team: &Team) -> Option<LeastClea
             nearest.offer(value, a, b);
         }
     }
-    nearest.finish(chain, team)
+    nearest.finish()
 }
 
 /// The nearest pair so far.
@@ -60,13 +63,9 @@ impl Nearest {
         }
     }
 
-    fn finish(self, chain: &Chain, team: &Team) -> Option<LeastClearance> {
+    fn finish(self) -> Option<LeastClearance> {
         let (bench_a, bench_b) = self.pair;
-        if bench_b == usize::MAX {
-            return None;
-        }
-        let (point_a, point_b) = closest_points_board_board(&board(chain, team, bench_a), &board(chain, team, bench_b));
-        Some(LeastClearance { value: self.value, bench_a, bench_b, point_a, point_b })
+        (bench_b < usize::MAX).then_some(LeastClearance { value: self.value, bench_a, bench_b })
     }
 }
 
@@ -105,6 +104,9 @@ pub struct ClearanceMonitor {
     team: Team,
     ground: Ground,
     last_pair: Option<(usize, usize)>,
+    proven: SpiralBound,
+    /// A body board's length over its link's.
+    stretch: f64,
     tree: BoxTree,
     counters: ClearanceCounters,
 }
@@ -115,7 +117,15 @@ const LEADING_BENCHES: usize = 24;
 impl ClearanceMonitor {
     /// A monitor for the chains of `team`.
     pub fn new(team: Team, ground: Ground) -> Self {
-        Self { team, ground, last_pair: None, tree: BoxTree::new(team.benches), counters: ClearanceCounters::default() }
+        Self {
+            team,
+            ground,
+            last_pair: None,
+            proven: SpiralBound::NONE,
+            stretch: 1.0 + 2.0 * team.hole_inset / team.link(1),
+            tree: BoxTree::new(team.benches),
+            counters: ClearanceCounters::default(),
+        }
     }
 
     /// How much work has been done so far.
@@ -144,7 +154,7 @@ impl ClearanceMonitor {
             self.tree.visit(chain, &self.team, (0, 0), (0, 0), &mut nearest, &mut self.counters.pairs);
         }
         self.last_pair = (nearest.pair.1 < self.team.benches).then_some(nearest.pair);
-        nearest.finish(chain, &self.team)
+        nearest.finish()
     }
 
     fn ask(&mut self, chain: &Chain, board_a: &Board, a: usize, b: usize, nearest: &mut Nearest) {
@@ -155,13 +165,25 @@ impl ClearanceMonitor {
     }
 
     /// Whether no pair of benches from `front` on can be as near as `limit`.
-    fn excluded_from(&self, chain: &Chain, front: usize, limit: f64) -> bool {
+    fn excluded_from(&mut self, chain: &Chain, front: usize, limit: f64) -> bool {
         let Ground::Spiral { pitch } = self.ground else { return false };
         // The bound is for equal links, and only the head's can differ.
         if front == 0 {
             return false;
         }
-        spiral_bound(chain.x[front].hypot(chain.y[front]), pitch, &self.team) > limit
+        let r = (chain.x[front] * chain.x[front] + chain.y[front] * chain.y[front]).sqrt();
+        if self.proven.excludes(r, limit) {
+            return true;
+        }
+        // A little further in than needed, it serves for many frames.
+        for radius in [0.98 * r, r] {
+            let bound = SpiralBound { radius, bound: spiral_bound(radius, pitch, &self.team) };
+            if bound.excludes(r, limit) {
+                self.proven = bound;
+                return true;
+            }
+        }
+        false
     }
 
     /// Asks `a` against every later bench whose circle about its board is within the limit of that about `a`'s.
@@ -171,7 +193,6 @@ impl ClearanceMonitor {
         let (x, y) = (board_a.centre.x, board_a.centre.y);
         let end = self.end_within(chain, a, x.hypot(y) + radii + nearest.value);
         let mut start = a + 2;
-        // The last pair may be asked twice, which is cheaper than to find out.
         while start < end {
             let stop = end.min(start + CHUNK);
             let limit = padded_square(radii + nearest.value, radii, x.abs() + y.abs());
@@ -180,16 +201,35 @@ impl ClearanceMonitor {
                 let dy = 0.5 * (chain.y[b] + chain.y[b + 1]) - y;
                 dx * dx + dy * dy
             };
-            let least = (start..stop).map(squared).fold(f64::INFINITY, f64::min);
-            if least <= limit {
+            if (start..stop).fold(false, |near, b| near | (squared(b) <= limit)) {
                 for b in start..stop {
-                    if squared(b) <= limit {
+                    if squared(b) <= limit
+                        && Some((a, b)) != self.last_pair
+                        && self.gap_bound(chain, &board_a, b) <= nearest.value
+                    {
                         self.ask(chain, &board_a, a, b, nearest);
                     }
                 }
             }
             start = stop;
         }
+    }
+
+    /// A lower bound of the separation of `board_a` and bench `b`, from the gaps along `board_a`'s sides and without a
+    /// square root: the half link of `b` is stretched to its half board, and its width taken as if across.
+    fn gap_bound(&self, chain: &Chain, board_a: &Board, b: usize) -> f64 {
+        let (rear, front) = ((chain.x[b + 1], chain.y[b + 1]), (chain.x[b], chain.y[b]));
+        let half_link = (0.5 * (front.0 - rear.0), 0.5 * (front.1 - rear.1));
+        let offset = (rear.0 + half_link.0 - board_a.centre.x, rear.1 + half_link.1 - board_a.centre.y);
+        let axis = board_a.axis;
+        let along = |v: (f64, f64)| (axis.x * v.0 + axis.y * v.1).abs();
+        let across = |v: (f64, f64)| (axis.x * v.1 - axis.y * v.0).abs();
+        let stretch = self.stretch;
+        let gap_along = along(offset) - along(half_link) * stretch - board_a.half_length;
+        let gap_across = across(offset) - across(half_link) * stretch - board_a.half_width;
+        let half_width = 0.5 * self.team.width;
+        let rounding = 1e-9 * board_a.half_length + 1e-12 * (offset.0.abs() + front.0.abs() + front.1.abs());
+        gap_along.max(gap_across) - half_width - rounding
     }
 
     /// One past the last bench that can be within `distance` of the origin: on a spiral the handles' distances grow.
@@ -226,6 +266,21 @@ fn padded_square(limit: f64, length: f64, coordinate: f64) -> f64 {
 
 fn circle_radius(team: &Team, bench: usize) -> f64 {
     (0.5 * team.link(bench) + team.hole_inset).hypot(0.5 * team.width)
+}
+
+/// A value of [`spiral_bound`], which holds from its radius outward.
+#[derive(Debug, Clone, Copy)]
+struct SpiralBound {
+    radius: f64,
+    bound: f64,
+}
+
+impl SpiralBound {
+    const NONE: Self = Self { radius: f64::INFINITY, bound: f64::NEG_INFINITY };
+
+    fn excludes(&self, r: f64, limit: f64) -> bool {
+        r >= self.radius && self.bound > limit
+    }
 }
 
 /// A lower bound of the clearance of every two boards that share no handle, among benches of equal links whose handles
