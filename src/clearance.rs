@@ -104,7 +104,9 @@ pub struct ClearanceMonitor {
     team: Team,
     ground: Ground,
     last_pair: Option<(usize, usize)>,
+    /// The last bound that excluded benches, and the last that did not.
     proven: SpiralBound,
+    failed: SpiralBound,
     /// A body board's length over its link's.
     stretch: f64,
     tree: BoxTree,
@@ -122,6 +124,7 @@ impl ClearanceMonitor {
             ground,
             last_pair: None,
             proven: SpiralBound::NONE,
+            failed: SpiralBound { radius: 0.0, bound: f64::NEG_INFINITY },
             stretch: 1.0 + 2.0 * team.hole_inset / team.link(1),
             tree: BoxTree::new(team.benches),
             counters: ClearanceCounters::default(),
@@ -175,6 +178,10 @@ impl ClearanceMonitor {
         if self.proven.excludes(r, limit) {
             return true;
         }
+        // The bound only falls further in.
+        if r <= self.failed.radius && self.failed.bound <= limit {
+            return false;
+        }
         // A little further in than needed, it serves for many frames.
         for radius in [0.98 * r, r] {
             let bound = SpiralBound { radius, bound: spiral_bound(radius, pitch, &self.team) };
@@ -182,6 +189,7 @@ impl ClearanceMonitor {
                 self.proven = bound;
                 return true;
             }
+            self.failed = bound;
         }
         false
     }
@@ -503,6 +511,37 @@ mod tests {
             assert!(compared >= 60, "{team:?}: {compared}");
             assert_eq!(counters.frames as usize, compared);
         }
+    }
+
+    /// The closest points are on the boards' outlines and as far apart as the clearance says.
+    #[test]
+    fn the_closest_points_are_the_clearance_apart() {
+        let team = team(223, 0.3);
+        let mut chain = Chain::new(team.handles());
+        let spiral = Spiral::new(0.55, 16.0);
+        let solver = Newton::new(spiral, team, 1.0, Velocities::Omitted);
+        for travelled in [0.0, 300.0, 412.0, 412.48] {
+            solver.solve_from(Spiral::new(0.55, 16.0).place_at(travelled), &mut chain).unwrap();
+            let least = least_clearance_all_pairs(&chain, &team).unwrap();
+            let (on_a, on_b) = least.closest_points(&chain, &team);
+            assert!(((on_a - on_b).norm() - least.value.abs()).abs() < 1e-13);
+        }
+    }
+
+    /// The paper scene: the boards of benches 0 and 8 touch when the head has travelled 412.473837682115 m.
+    #[test]
+    fn the_paper_scene_touches_where_it_should() {
+        let team = team(223, 0.3);
+        let mut chain = Chain::new(team.handles());
+        let solver = Newton::new(Spiral::new(0.55, 16.0), team, 1.0, Velocities::Omitted);
+        let mut monitor = ClearanceMonitor::new(team, Ground::Spiral { pitch: 0.55 });
+        let mut at = |travelled: f64| {
+            solver.solve_from(Spiral::new(0.55, 16.0).place_at(travelled), &mut chain).unwrap();
+            monitor.least_clearance(&chain).unwrap()
+        };
+        let (before, after) = (at(412.473837682115 - 1e-9), at(412.473837682115 + 1e-9));
+        assert!(before.value > 0.0 && after.value < 0.0, "{before:?} {after:?}");
+        assert_eq!((after.bench_a, after.bench_b), (0, 8));
     }
 
     #[test]
