@@ -93,8 +93,8 @@ pub struct ClearanceCounters {
 
 /// The live way: the same answer as [`least_clearance_all_pairs`], from a few pairs.
 ///
-/// It keeps nothing from frame to frame but the last nearest pair, whose clearance now is a first limit, so a jump of
-/// the show cannot mislead it. All memory is reserved by the constructor.
+/// It keeps from frame to frame the last nearest pair, whose clearance now is a first limit, and bounds that hold for
+/// every frame alike, so a jump of the show cannot mislead it. All memory is reserved by the constructor.
 ///
 /// The leading benches are asked one by one, each against those whose circles are within the limit. On a spiral this
 /// ends at the first bench beyond which the shape of the spiral itself excludes a nearer pair (usually the second).
