@@ -7,7 +7,7 @@ use bench_dragon::chain::newton::Newton;
 use bench_dragon::chain::{Chain, Team, Velocities};
 use bench_dragon::clearance::{ClearanceMonitor, Ground, board, least_clearance_all_pairs};
 use bench_dragon::geometry::path::Path;
-use bench_dragon::geometry::separation::{clearance_board_board, separation_board_board};
+use bench_dragon::geometry::separation::{separation_board_board, signed_distance_board_board};
 use bench_dragon::geometry::spiral::Spiral;
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
@@ -69,10 +69,10 @@ fn separation_of_one_pair(bencher: Bencher) {
 }
 
 #[divan::bench]
-fn clearance_of_one_pair(bencher: Bencher) {
+fn signed_distance_of_one_pair(bencher: Bencher) {
     let chain = chains(team(223), 99).swap_remove(0);
     let (a, b) = (board(&chain, &team(223), 0), board(&chain, &team(223), 8));
-    bencher.bench_local(|| clearance_board_board(black_box(&a), black_box(&b)));
+    bencher.bench_local(|| signed_distance_board_board(black_box(&a), black_box(&b)));
 }
 
 fn main() {

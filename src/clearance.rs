@@ -5,25 +5,22 @@
 
 use crate::chain::{Chain, Team};
 use crate::geometry::Point;
-use crate::geometry::rectangle::{Board, reach};
-use crate::geometry::separation::{clearance_board_board, clearance_within, closest_points_board_board};
+use crate::geometry::rectangle::Board;
+use crate::geometry::separation::{closest_points_board_board, signed_distance_board_board, signed_distance_within};
 
 /// The nearest two boards that share no handle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LeastClearance {
+pub struct PairClearance {
     /// Metres between them; negative where they overlap.
     pub value: f64,
     /// The lower bench, counted from 0.
     pub bench_a: usize,
     /// The higher bench.
     pub bench_b: usize,
-}
-
-impl LeastClearance {
-    /// The closest points of the two boards, the first on `bench_a`'s; `chain` is the one this was found for.
-    pub fn closest_points(&self, chain: &Chain, team: &Team) -> (Point, Point) {
-        closest_points_board_board(&board(chain, team, self.bench_a), &board(chain, team, self.bench_b))
-    }
+    /// The point of `bench_a`'s board nearest to the other.
+    pub point_a: Point,
+    /// The point of `bench_b`'s board nearest to the other.
+    pub point_b: Point,
 }
 
 /// The board of one bench of a chain. Panics if there is no such bench.
@@ -33,16 +30,16 @@ pub fn board(chain: &Chain, team: &Team, bench: usize) -> Board {
 }
 
 /// The nearest two boards, by asking all pairs; of several, the lowest (a, b). `None` under three benches.
-pub fn least_clearance_all_pairs(chain: &Chain, team: &Team) -> Option<LeastClearance> {
+pub fn least_clearance_all_pairs(chain: &Chain, team: &Team) -> Option<PairClearance> {
     let mut nearest = Nearest::none();
     for a in 0..team.benches {
         let board_a = board(chain, team, a);
         for b in a + 2..team.benches {
-            let value = clearance_board_board(&board_a, &board(chain, team, b));
+            let value = signed_distance_board_board(&board_a, &board(chain, team, b));
             nearest.offer(value, a, b);
         }
     }
-    nearest.finish()
+    nearest.finish(chain, team)
 }
 
 /// The nearest pair so far.
@@ -63,9 +60,13 @@ impl Nearest {
         }
     }
 
-    fn finish(self) -> Option<LeastClearance> {
+    fn finish(self, chain: &Chain, team: &Team) -> Option<PairClearance> {
         let (bench_a, bench_b) = self.pair;
-        (bench_b < usize::MAX).then_some(LeastClearance { value: self.value, bench_a, bench_b })
+        if bench_b == usize::MAX {
+            return None;
+        }
+        let (point_a, point_b) = closest_points_board_board(&board(chain, team, bench_a), &board(chain, team, bench_b));
+        Some(PairClearance { value: self.value, bench_a, bench_b, point_a, point_b })
     }
 }
 
@@ -103,6 +104,7 @@ pub struct ClearanceCounters {
 pub struct ClearanceMonitor {
     team: Team,
     ground: Ground,
+    latest: Option<PairClearance>,
     last_pair: Option<(usize, usize)>,
     /// The last bound that excluded benches, and the last that did not.
     proven: SpiralBound,
@@ -122,6 +124,7 @@ impl ClearanceMonitor {
         Self {
             team,
             ground,
+            latest: None,
             last_pair: None,
             proven: SpiralBound::NONE,
             failed: SpiralBound { radius: 0.0, bound: f64::NEG_INFINITY },
@@ -131,14 +134,20 @@ impl ClearanceMonitor {
         }
     }
 
+    /// The clearance of the latest frame.
+    pub fn latest(&self) -> Option<PairClearance> {
+        self.latest
+    }
+
     /// How much work has been done so far.
     pub fn counters(&self) -> ClearanceCounters {
         self.counters
     }
 
     /// The nearest two boards of `chain`; of several, the lowest (a, b). `None` under three benches.
-    pub fn least_clearance(&mut self, chain: &Chain) -> Option<LeastClearance> {
+    pub fn least_clearance(&mut self, chain: &Chain) -> Option<PairClearance> {
         self.counters.frames += 1;
+        self.latest = None;
         if self.team.benches < 3 {
             return None;
         }
@@ -157,12 +166,13 @@ impl ClearanceMonitor {
             self.tree.visit(chain, &self.team, (0, 0), (0, 0), &mut nearest, &mut self.counters.pairs);
         }
         self.last_pair = (nearest.pair.1 < self.team.benches).then_some(nearest.pair);
-        nearest.finish()
+        self.latest = nearest.finish(chain, &self.team);
+        self.latest
     }
 
     fn ask(&mut self, chain: &Chain, board_a: &Board, a: usize, b: usize, nearest: &mut Nearest) {
         self.counters.pairs += 1;
-        if let Some(value) = clearance_within(board_a, &board(chain, &self.team, b), nearest.value) {
+        if let Some(value) = signed_distance_within(board_a, &board(chain, &self.team, b), nearest.value) {
             nearest.offer(value, a, b);
         }
     }
@@ -340,7 +350,7 @@ fn spiral_bound(r: f64, pitch: f64, team: &Team) -> f64 {
         return f64::NEG_INFINITY;
     }
     // The handles are on the spiral up to the solver's accuracy and the last digits of their coordinates.
-    let rounding = (1e-9 + 64.0 * f64::EPSILON * r) * 2.0 * reach(link, inset, team.width);
+    let rounding = (1e-9 + 64.0 * f64::EPSILON * r) * 2.0 * Board::reach(link, inset, team.width);
     next_turn.min(gap * (1.0 - ratio * ratio / 6.0)) - rounding
 }
 
@@ -446,7 +456,7 @@ fn ask_leaves(chain: &Chain, team: &Team, left: usize, right: usize, nearest: &m
         let board_a = board(chain, team, a);
         for b in benches(right).filter(|&b| b >= a + 2) {
             *pairs += 1;
-            if let Some(value) = clearance_within(&board_a, &board(chain, team, b), nearest.value) {
+            if let Some(value) = signed_distance_within(&board_a, &board(chain, team, b), nearest.value) {
                 nearest.offer(value, a, b);
             }
         }
@@ -523,8 +533,7 @@ mod tests {
         for travelled in [0.0, 300.0, 412.0, 412.48] {
             solver.solve_from(Spiral::new(0.55, 16.0).place_at(travelled), &mut chain).unwrap();
             let least = least_clearance_all_pairs(&chain, &team).unwrap();
-            let (on_a, on_b) = least.closest_points(&chain, &team);
-            assert!(((on_a - on_b).norm() - least.value.abs()).abs() < 1e-13);
+            assert!(((least.point_a - least.point_b).norm() - least.value.abs()).abs() < 1e-13);
         }
     }
 

@@ -1,8 +1,22 @@
 //! The subcommands, one file each: what a person types becomes calls of the library. Called by `main` only.
 
+pub mod check;
+pub mod draw;
+pub mod events;
+pub mod run;
+pub mod solve;
 pub mod watch;
 
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
 use bench_dragon::scene::{Scene, SceneError};
+use bench_dragon::show::timeline::Timeline;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
 
 /// What stands before or after every subcommand.
 #[derive(Debug, Clone, clap::Args)]
@@ -44,6 +58,8 @@ pub enum CommandError {
     BadInput(String),
     /// Anything else, in one sentence. Exit code 1.
     Failed(String),
+    /// Whoever read the output has gone: the command ends quietly. Exit code 0.
+    ClosedPipe,
     /// The command did its work and its verdict is negative; it has said so itself. Exit code 1.
     NegativeVerdict,
 }
@@ -54,8 +70,99 @@ impl From<SceneError> for CommandError {
     }
 }
 
-impl From<std::io::Error> for CommandError {
-    fn from(error: std::io::Error) -> Self {
-        Self::Failed(error.to_string())
+impl From<io::Error> for CommandError {
+    fn from(error: io::Error) -> Self {
+        if error.kind() == io::ErrorKind::BrokenPipe { Self::ClosedPipe } else { Self::Failed(error.to_string()) }
+    }
+}
+
+/// Where a command's result goes: standard output, or a file that the user named.
+pub struct Output {
+    writer: BufWriter<Box<dyn Write>>,
+}
+
+impl Output {
+    /// Standard output.
+    pub fn standard() -> Self {
+        Self { writer: BufWriter::new(Box::new(io::stdout().lock())) }
+    }
+
+    /// A file, made anew.
+    ///
+    /// # Errors
+    /// Bad input: the file cannot be written.
+    pub fn file(file: &Path) -> Result<Self, CommandError> {
+        let refused = |error| CommandError::BadInput(format!("{}: {error}, expected a file to write", file.display()));
+        Ok(Self { writer: BufWriter::new(Box::new(File::create(file).map_err(refused)?)) })
+    }
+
+    /// Writes a line.
+    pub fn line(&mut self, text: &str) -> Result<(), CommandError> {
+        Ok(writeln!(self.writer, "{text}")?)
+    }
+
+    /// Writes a JSON line. Numbers that are not numbers become null.
+    pub fn json(&mut self, value: &impl Serialize) -> Result<(), CommandError> {
+        serde_json::to_writer(&mut self.writer, value).map_err(io::Error::from)?;
+        Ok(writeln!(self.writer)?)
+    }
+
+    /// Writes what is left.
+    pub fn finish(mut self) -> Result<(), CommandError> {
+        Ok(self.writer.flush()?)
+    }
+}
+
+/// A number with the fewest digits that read back to the same bits.
+pub fn number(value: f64) -> String {
+    let plain = format!("{value}");
+    // Beyond this Rust writes out every zero.
+    if plain.len() > 24 { format!("{value:e}") } else { plain }
+}
+
+/// A progress bar on standard error, hidden where that is no terminal.
+pub fn progress_bar(length: u64, common: &Common) -> ProgressBar {
+    if common.quiet {
+        return ProgressBar::hidden();
+    }
+    // The template is a constant that a test has parsed; the default bar would do as well.
+    let style = ProgressStyle::with_template("{msg} {wide_bar} {percent} % {eta}");
+    ProgressBar::new(length).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+/// All events of a scene, with a progress bar for the long searches.
+pub fn search_timeline(scene: &Scene, common: &Common) -> Timeline {
+    let bar = progress_bar(1000, common).with_message("searching for contact");
+    let timeline = Timeline::of(scene, &mut |share| bar.set_position((1000.0 * share) as u64));
+    bar.finish_and_clear();
+    timeline
+}
+
+/// A flag that SIGINT and SIGTERM set.
+pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CommandError> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        signal_hook::flag::register(signal, Arc::clone(&stop))?;
+    }
+    Ok(stop)
+}
+
+/// Wall time as a person writes it: `60`, `90s`, `5m`, `8h`. Seconds.
+///
+/// # Errors
+/// One sentence for anything else, for clap to print.
+pub fn wall_seconds(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let (digits, unit) = match text.char_indices().last() {
+        Some((at, 's')) => (&text[..at], 1.0),
+        Some((at, 'm')) => (&text[..at], 60.0),
+        Some((at, 'h')) => (&text[..at], 3600.0),
+        _ => (text, 1.0),
+    };
+    let seconds = digits.parse::<f64>().map(|number| number * unit).unwrap_or(f64::NAN);
+    if seconds > 0.0 && seconds <= 1e9 {
+        Ok(seconds)
+    } else {
+        Err("expected a time above 0 such as 60, 90s, 5m or 8h".to_owned())
     }
 }

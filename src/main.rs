@@ -21,18 +21,33 @@ struct CommandLine {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Publish a scene live
+    Run(commands::run::RunArguments),
     /// Watch a running publisher from another process
     Watch(commands::watch::WatchArguments),
+    /// Solve a scene offline and print every handle as a table
+    Solve(commands::solve::SolveArguments),
+    /// Find contact, stall, lock and path end
+    Events,
+    /// Draw the stage at a time as an SVG
+    Draw(commands::draw::DrawArguments),
+    /// Validate a scene and say what it would model
+    Check,
 }
 
 fn main() -> ExitCode {
     let CommandLine { common, command } = CommandLine::parse();
     set_up_logging(&common);
     let done = match &command {
+        Command::Run(arguments) => commands::run::run(&common, arguments),
         Command::Watch(arguments) => commands::watch::watch(&common, arguments),
+        Command::Solve(arguments) => commands::solve::solve(&common, arguments),
+        Command::Events => commands::events::events(&common),
+        Command::Draw(arguments) => commands::draw::draw(&common, arguments),
+        Command::Check => commands::check::check(&common),
     };
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) | Err(CommandError::ClosedPipe) => ExitCode::SUCCESS,
         Err(CommandError::BadInput(sentence)) => {
             eprintln!("{}: {sentence}", error_label());
             ExitCode::from(2)

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::chain::newton::Newton;
-use crate::chain::paper::{Paper, PaperRules};
+use crate::chain::paper::{self, Paper, PaperRules};
 use crate::chain::{Solver, Team, Velocities};
 use crate::geometry::path::Path;
 use crate::geometry::root::first_true;
@@ -186,6 +186,18 @@ impl Scene {
         let raw: RawScene = serde_path_to_error::deserialize(deserializer)
             .map_err(|error| source.refused(error.inner(), &error.path().to_string()))?;
         raw.validated(&source, stem)
+    }
+
+    /// Simulated seconds after which the head has travelled so many metres along the path, by the motion this scene's
+    /// solver follows.
+    pub fn time_of(&self, travelled: f64) -> f64 {
+        match self.method {
+            Method::Named(SolverName::Paper) => {
+                let theta = self.path.place_at(travelled).radians();
+                paper::time_of_theta(&self.path, self.head_speed, theta)
+            }
+            _ => travelled / self.head_speed,
+        }
     }
 
     /// The solver this scene asks for, and in words why it is that one.

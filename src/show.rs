@@ -3,8 +3,17 @@
 //! Knows the solver, the events and the alert rules; knows no clock and no transport. The live loop and the offline
 //! commands call it.
 
-use crate::chain::Chain;
+pub mod alerts;
+pub mod timeline;
+
+use crate::chain::{Chain, Solver, Velocities};
+use crate::clearance::{ClearanceMonitor, Ground};
+use crate::geometry::path::Fold;
 use crate::messages::State;
+use crate::scene::{AtEnd, OnContact, Scene};
+
+use alerts::{Alert, AlertLevel};
+use timeline::Timeline;
 
 /// One moment of the show.
 #[derive(Debug, Clone)]
@@ -25,24 +34,183 @@ pub struct Frame {
     pub shows_played: u64,
 }
 
-/// A change of the alert level or a step of the countdown: what of a
-/// [`CollisionAlert`](crate::messages::CollisionAlert) does not depend on clocks and runs.
+/// How a scene is played: what the command line may override.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Alert {
-    /// The level, up to `Lock`; `Moving` is called clear.
-    pub level: State,
-    /// Simulated seconds of the event, NaN where there is none.
-    pub event_time: f64,
-    /// `event_time` minus the frame's time.
-    pub time_to_event: f64,
-    /// Metres between the nearest two boards.
-    pub clearance: f64,
-    /// The place, metres; NaN where there is none.
-    pub x: f64,
-    /// The place, metres; NaN where there is none.
-    pub y: f64,
-    /// The first bench concerned.
-    pub bench_a: Option<u32>,
-    /// The second bench concerned.
-    pub bench_b: Option<u32>,
+pub struct Playback {
+    /// Simulated seconds at which the show begins.
+    pub start: f64,
+    /// Simulated seconds per second of wall time.
+    pub time_scale: f64,
+    /// Frames per second.
+    pub rate: f64,
+    /// What happens at a contact.
+    pub on_contact: OnContact,
+    /// What happens once the show has frozen.
+    pub at_end: AtEnd,
+}
+
+impl Playback {
+    /// The playback a scene asks for: from its start, in real time.
+    pub fn of(scene: &Scene) -> Self {
+        Self { start: 0.0, time_scale: 1.0, rate: scene.rate, on_contact: scene.on_contact, at_end: scene.at_end }
+    }
+
+    /// Simulated seconds of a tick, unclamped: from integers, so that nothing drifts.
+    fn sim_time(&self, tick: u64) -> f64 {
+        self.start + self.time_scale * tick as f64 / self.rate
+    }
+
+    /// The ticks of one showing: up to and including the first whose time is at or past `freeze`.
+    fn ticks_per_show(&self, freeze: f64) -> u64 {
+        let estimate = ((freeze - self.start) * self.rate / self.time_scale).max(0.0) as u64;
+        // The estimate is off by rounding; the clock itself decides.
+        let mut tick = estimate.saturating_sub(2 + estimate / (1 << 50));
+        while self.sim_time(tick) < freeze {
+            tick += 1;
+        }
+        tick + 1
+    }
+}
+
+/// A start that cannot be played, in one sentence.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct StartError(String);
+
+/// A scene being played.
+pub struct Show {
+    playback: Playback,
+    solver: Box<dyn Solver>,
+    velocities: Velocities,
+    timeline: Timeline,
+    freeze_time: f64,
+    ticks_per_show: u64,
+    clearance: Option<ClearanceMonitor>,
+    level: Option<AlertLevel>,
+    solved_time: Option<f64>,
+    frame: Frame,
+}
+
+impl Show {
+    /// A show of `scene`, whose events `timeline` holds.
+    ///
+    /// # Errors
+    /// A start before the scene's own or after the motion's end.
+    pub fn new(scene: &Scene, timeline: Timeline, playback: Playback) -> Result<Self, StartError> {
+        let end = timeline.end();
+        if !(playback.start >= 0.0 && playback.start < end.time) {
+            let (name, time, start) = (end.event.kind.name(), end.time, playback.start);
+            return Err(StartError(format!(
+                "--start is {start} s, expected at least 0 and less than {time} s, at which the motion ends ({name})"
+            )));
+        }
+        let timeline = if scene.alerts.is_some() { timeline } else { timeline.end_only() };
+        let freeze_time = timeline.freeze_time(playback.on_contact);
+        let clearance =
+            scene.alerts.map(|_| ClearanceMonitor::new(scene.team, Ground::Spiral { pitch: scene.path.pitch() }));
+        let level = scene.alerts.map(|rules| AlertLevel::new(rules, playback.rate));
+        let frame = Frame {
+            tick: 0,
+            sim_time: playback.start,
+            state: State::Moving,
+            chain: Chain::new(scene.team.handles()),
+            min_clearance: f64::NAN,
+            alerts: Vec::with_capacity(alerts::MOST_PER_FRAME),
+            shows_played: 0,
+        };
+        Ok(Self {
+            ticks_per_show: playback.ticks_per_show(freeze_time),
+            playback,
+            solver: scene.solver().0,
+            velocities: scene.velocities,
+            timeline,
+            freeze_time,
+            clearance,
+            level,
+            solved_time: None,
+            frame,
+        })
+    }
+
+    /// The events of this show, in order.
+    pub fn timeline(&self) -> &Timeline {
+        &self.timeline
+    }
+
+    /// Simulated seconds at which the show freezes.
+    pub fn freeze_time(&self) -> f64 {
+        self.freeze_time
+    }
+
+    /// The frame of a tick: time, chain, clearance, state, alerts.
+    ///
+    /// Ticks are asked in increasing order; some may be left out. The same sequence of ticks gives the same bits.
+    pub fn frame(&mut self, tick: u64) -> &Frame {
+        let shows_played = match self.playback.at_end {
+            AtEnd::Hold => 0,
+            AtEnd::Loop => tick / self.ticks_per_show,
+        };
+        let tick_of_show = tick - shows_played * self.ticks_per_show;
+        let restarted = shows_played != self.frame.shows_played;
+        let sim_time = self.playback.sim_time(tick_of_show).min(self.freeze_time);
+        self.frame.tick = tick;
+        self.frame.shows_played = shows_played;
+        self.frame.sim_time = sim_time;
+        self.solve(sim_time);
+        self.measure_clearance();
+        self.judge(tick_of_show, restarted);
+        &self.frame
+    }
+
+    /// Brings the chain to a time. A frozen show is solved once.
+    fn solve(&mut self, sim_time: f64) {
+        if self.solved_time == Some(sim_time) {
+            return;
+        }
+        self.solved_time = Some(sim_time);
+        solve_at_or_just_before(self.solver.as_mut(), sim_time, &mut self.frame.chain);
+        if sim_time >= self.freeze_time && self.velocities == Velocities::Computed {
+            let Chain { speed, vx, vy, .. } = &mut self.frame.chain;
+            [speed, vx, vy].into_iter().for_each(|numbers| numbers.fill(0.0));
+        }
+    }
+
+    fn measure_clearance(&mut self) {
+        let Some(monitor) = &mut self.clearance else { return };
+        let least = monitor.least_clearance(&self.frame.chain);
+        self.frame.min_clearance = least.map_or(f64::NAN, |least| least.value);
+    }
+
+    fn judge(&mut self, tick_of_show: u64, restarted: bool) {
+        let frame = &mut self.frame;
+        frame.alerts.clear();
+        let passed = self.timeline.latest_passed(frame.sim_time);
+        frame.state = passed.map_or(State::Moving, |passed| passed.event.kind);
+        let Some(level) = &mut self.level else { return };
+        if restarted {
+            level.restart();
+        }
+        let closest = self.clearance.as_ref().and_then(ClearanceMonitor::latest);
+        level.update(tick_of_show, frame.sim_time, &self.timeline, closest, &mut frame.alerts);
+        if passed.is_none() {
+            frame.state = level.current();
+        }
+    }
+}
+
+/// Solves at `time`, or at the latest moment before it at which there is a solution.
+///
+/// The time of a lock, multiplied by the speed again, can lie past the lock by the last digit; the paper's solver is
+/// one of its own time steps ahead. Nothing else steps back, and nothing does so by more than 1e-4 of the time.
+pub fn solve_at_or_just_before(solver: &mut dyn Solver, time: f64, chain: &mut Chain) {
+    let mut back = f64::EPSILON * time;
+    let mut at = time;
+    while let Err(Fold) = solver.solve(at, chain) {
+        at = time - back;
+        back *= 2.0;
+        if back > 1e-4 * time {
+            log::error!("there is no solution at {time} s: the last one is shown instead");
+            return;
+        }
+    }
 }

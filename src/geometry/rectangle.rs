@@ -31,7 +31,7 @@ impl Board {
 
     /// The board whose front handle is at `front` and whose rear handle is `link` metres behind it against the unit
     /// `direction`. Far from the origin this keeps the direction's digits, which two handle points have lost.
-    pub fn from_front_handle(front: Point, direction: Vector, link: f64, hole_inset: f64, width: f64) -> Self {
+    pub fn from_front(front: Point, direction: Vector, link: f64, hole_inset: f64, width: f64) -> Self {
         Self {
             centre: front - 0.5 * link * direction,
             axis: direction,
@@ -61,16 +61,16 @@ impl Board {
     pub fn circle_radius(&self) -> f64 {
         (self.half_length * self.half_length + self.half_width * self.half_width).sqrt()
     }
-}
 
-/// How far any point of a board moves at most, per metre that its two handles move at most.
-///
-/// With p = rear + s (front - rear) + w n, s in [-inset / link, 1 + inset / link], |w| <= width / 2 and n the unit
-/// normal of the link: the handles' displacements u and v move the first two terms by |(1 - s) u + s v|
-/// <= (|1 - s| + |s|) D <= (1 + 2 inset / link) D. The link keeps its length and its vector changes by at most 2 D, so
-/// its unit normal changes by at most 2 D / link, and the last term by at most (width / link) D.
-pub fn reach(link: f64, hole_inset: f64, width: f64) -> f64 {
-    1.0 + 2.0 * hole_inset / link + width / link
+    /// How far any point of a board moves at most, per metre that its two handles move at most.
+    ///
+    /// With p = rear + s (front - rear) + w n, s in [-inset / link, 1 + inset / link], |w| <= width / 2 and n the unit
+    /// normal of the link: the handles' displacements u and v move the first two terms by |(1 - s) u + s v|
+    /// <= (|1 - s| + |s|) D <= (1 + 2 inset / link) D. The link keeps its length and its vector changes by at most 2 D, so
+    /// its unit normal changes by at most 2 D / link, and the last term by at most (width / link) D.
+    pub fn reach(link: f64, hole_inset: f64, width: f64) -> f64 {
+        1.0 + 2.0 * hole_inset / link + width / link
+    }
 }
 
 #[cfg(test)]
@@ -86,7 +86,7 @@ mod tests {
         for (corner, (x, y)) in board.corners().iter().zip(by_hand) {
             assert!((corner - Point::new(x, y)).norm() < 1e-14, "{corner}");
         }
-        let same = Board::from_front_handle(Point::new(4.0, 3.0), Vector::new(0.8, 0.6), 5.0, 2.5, 2.0);
+        let same = Board::from_front(Point::new(4.0, 3.0), Vector::new(0.8, 0.6), 5.0, 2.5, 2.0);
         for (one, other) in board.corners().iter().zip(same.corners()) {
             assert!((one - other).norm() < 1e-14);
         }
@@ -106,7 +106,7 @@ mod tests {
             let (moved_front, moved_rear, after) = board(Point::new(x, y), heading + turn);
             let most = (moved_front - front).norm().max((moved_rear - rear).norm());
             for (one, other) in before.corners().iter().zip(after.corners()) {
-                prop_assert!((other - one).norm() <= reach(link, inset, width) * most + 1e-12);
+                prop_assert!((other - one).norm() <= Board::reach(link, inset, width) * most + 1e-12);
             }
         }
     }

@@ -3,7 +3,7 @@
 //! - [`separation_board_board`]: the largest gap along an edge normal (the separating axis theorem). Overlapping: minus
 //!   the least translation that parts the boards. Apart: at most the distance, and equal to it unless two corners are
 //!   nearest.
-//! - [`clearance_board_board`]: the Euclidean distance apart, the separation overlapping.
+//! - [`signed_distance_board_board`] (with its points: [`clearance_board_board`]): the Euclidean distance apart, the separation overlapping.
 //!
 //! Positions are subtracted before anything else, so that the error is a few units in the last place of the boards'
 //! size and of their distance, plus what the centres themselves have lost. Swapping the boards gives the same bits.
@@ -65,7 +65,7 @@ impl Relative {
     }
 }
 
-/// A lower bound of [`clearance_board_board`] from the circles about the boards, for callers that can skip a pair.
+/// A lower bound of [`signed_distance_board_board`] from the circles about the boards, for callers that can skip a pair.
 pub fn circle_bound_board_board(a: &Board, b: &Board) -> f64 {
     (b.centre - a.centre).norm() - (a.circle_radius() + b.circle_radius())
 }
@@ -85,23 +85,23 @@ pub fn separation_board_board(a: &Board, b: &Board) -> f64 {
 ///
 /// The nearest points of two convex polygons that are apart include a corner of one of them.
 #[inline]
-pub fn clearance_board_board(a: &Board, b: &Board) -> f64 {
-    clearance_from_separation(a, b, separation_board_board(a, b))
+pub fn signed_distance_board_board(a: &Board, b: &Board) -> f64 {
+    distance_from_separation(a, b, separation_board_board(a, b))
 }
 
 /// The clearance when it is at most `limit`, else `None`: most pairs are dismissed by the separation alone.
 #[inline]
-pub fn clearance_within(a: &Board, b: &Board, limit: f64) -> Option<f64> {
+pub fn signed_distance_within(a: &Board, b: &Board, limit: f64) -> Option<f64> {
     let separation = separation_board_board(a, b);
     if separation > limit {
         return None;
     }
-    let clearance = clearance_from_separation(a, b, separation);
+    let clearance = distance_from_separation(a, b, separation);
     (clearance <= limit).then_some(clearance)
 }
 
 #[inline]
-fn clearance_from_separation(a: &Board, b: &Board, separation: f64) -> f64 {
+fn distance_from_separation(a: &Board, b: &Board, separation: f64) -> f64 {
     if separation <= 0.0 {
         return separation;
     }
@@ -109,6 +109,23 @@ fn clearance_from_separation(a: &Board, b: &Board, separation: f64) -> f64 {
     let from_b = Relative::new(a, b).nearest_corner_squared(b, a);
     // Rounding must not make the distance less than its lower bound, nor a gap a touch.
     from_a.min(from_b).sqrt().max(separation)
+}
+
+/// The clearance of two boards and where it is taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clearance {
+    /// Metres: the [`signed_distance_board_board`].
+    pub value: f64,
+    /// The closest point of the first board.
+    pub point_a: Point,
+    /// The closest point of the second board.
+    pub point_b: Point,
+}
+
+/// The clearance of two boards with the points at which it is taken.
+pub fn clearance_board_board(a: &Board, b: &Board) -> Clearance {
+    let (point_a, point_b) = closest_points_board_board(a, b);
+    Clearance { value: signed_distance_board_board(a, b), point_a, point_b }
 }
 
 /// The two closest points, the first on `a`, the second on `b`.
@@ -170,13 +187,17 @@ fn deepest(relative: &Relative, own: &Board, other: &Board) -> (Point, Point) {
     }
 }
 
-/// The centre of area of what two boards have in common, or `None` where they are apart.
+/// The centre of area of what two boards have in common; where that is nothing, the middle of their closest points.
 ///
 /// One board clipped by the other's four edges (Sutherland and Hodgman, 1974), then the centroid of the polygon; where
 /// the boards only touch, the middle of the touching points.
-pub fn overlap_centre_board_board(a: &Board, b: &Board) -> Option<Point> {
+pub fn overlap_centre(a: &Board, b: &Board) -> Point {
+    let middle = || {
+        let (on_a, on_b) = closest_points_board_board(a, b);
+        nalgebra::center(&on_a, &on_b)
+    };
     if separation_board_board(a, b) > 0.0 {
-        return None;
+        return middle();
     }
     // Each of the four half-planes can add one corner.
     let mut polygon = [Vector::zeros(); 8];
@@ -196,11 +217,10 @@ pub fn overlap_centre_board_board(a: &Board, b: &Board) -> Option<Point> {
     }
     if count == 0 {
         // Touching to the last digit, and clipped away by its rounding.
-        let (on_a, on_b) = closest_points_board_board(a, b);
-        return Some(nalgebra::center(&on_a, &on_b));
+        return middle();
     }
     let centre = centroid(&polygon[..count]);
-    Some(in_stage(a, centre.x, centre.y))
+    in_stage(a, centre.x, centre.y)
 }
 
 /// Keeps what of the polygon's first `count` corners lies where `normal` . p <= `offset`; returns the new count.
@@ -289,7 +309,7 @@ mod tests {
         let tolerance = 1e-12 * size;
         // What the stage's own coordinates have lost, far from the origin.
         let lost = tolerance + 8.0 * f64::EPSILON * (a.centre.coords.norm() + b.centre.coords.norm());
-        let ours = clearance_board_board(a, b);
+        let ours = signed_distance_board_board(a, b);
         let separation = separation_board_board(a, b);
         let distance = judge(a, b, size);
         let message = format!("{a:?} {b:?} ours {ours}, separation {separation}, parry {distance}");
@@ -299,7 +319,7 @@ mod tests {
         if ours < -1e-9 * size && lost < 1e-11 * size {
             check_depth(a, b, ours, size);
         }
-        assert_eq!(ours, clearance_board_board(b, a), "{message}");
+        assert_eq!(ours, signed_distance_board_board(b, a), "{message}");
         let (on_a, on_b) = closest_points_board_board(a, b);
         assert!(((on_a - on_b).norm() - ours.abs()).abs() <= lost, "{message} {on_a} {on_b}");
         for (point, board) in [(on_a, a), (on_b, b)] {
@@ -307,14 +327,12 @@ mod tests {
             assert!(offset.dot(&board.axis).abs() <= board.half_length + lost, "{message} {point}");
             assert!(offset.dot(&board.across()).abs() <= board.half_width + lost, "{message} {point}");
         }
-        match overlap_centre_board_board(a, b) {
-            None => assert!(separation > 0.0),
-            Some(centre) => {
-                for board in [a, b] {
-                    let offset = centre - board.centre;
-                    assert!(offset.dot(&board.axis).abs() <= board.half_length + lost, "{message} {centre}");
-                    assert!(offset.dot(&board.across()).abs() <= board.half_width + lost, "{message} {centre}");
-                }
+        if ours <= 0.0 {
+            let centre = overlap_centre(a, b);
+            for board in [a, b] {
+                let offset = centre - board.centre;
+                assert!(offset.dot(&board.axis).abs() <= board.half_length + lost, "{message} {centre}");
+                assert!(offset.dot(&board.across()).abs() <= board.half_width + lost, "{message} {centre}");
             }
         }
         ours < 0.0
@@ -361,15 +379,15 @@ mod tests {
         let square = board(0.0, 0.0, 0.0, 1.0, 1.0);
         // Corner to corner, 3-4-5.
         let corner = board(5.0, 6.0, 0.0, 1.0, 1.0);
-        assert_eq!(clearance_board_board(&square, &corner), 5.0);
+        assert_eq!(signed_distance_board_board(&square, &corner), 5.0);
         assert_eq!(separation_board_board(&square, &corner), 4.0);
         assert_eq!(closest_points_board_board(&square, &corner), (Point::new(1.0, 1.0), Point::new(4.0, 5.0)));
         // Touching, and a hundredth deep.
-        assert_eq!(clearance_board_board(&square, &board(2.0, 0.0, 0.0, 1.0, 1.0)), 0.0);
+        assert_eq!(signed_distance_board_board(&square, &board(2.0, 0.0, 0.0, 1.0, 1.0)), 0.0);
         let deep = board(1.75, 1.0, 0.0, 1.0, 1.0);
-        assert_eq!(clearance_board_board(&square, &deep), -0.25);
-        assert_eq!(overlap_centre_board_board(&square, &deep), Some(Point::new(0.875, 0.5)));
-        assert_eq!(overlap_centre_board_board(&square, &corner), None);
+        assert_eq!(signed_distance_board_board(&square, &deep), -0.25);
+        assert_eq!(overlap_centre(&square, &deep), Point::new(0.875, 0.5));
+        assert_eq!(overlap_centre(&square, &corner), Point::new(2.5, 3.0));
     }
 
     fn any_board() -> impl Strategy<Value = Board> {
@@ -386,7 +404,7 @@ mod tests {
             let moved = |board: Board| Board {
                 centre: rotation * board.centre + Vector::new(x, y), axis: rotation * board.axis, ..board
             };
-            for query in [separation_board_board, clearance_board_board] {
+            for query in [separation_board_board, signed_distance_board_board] {
                 prop_assert_eq!(query(&a, &b), query(&b, &a));
                 prop_assert!((query(&a, &b) - query(&moved(a), &moved(b))).abs() < 1e-13);
             }
@@ -408,7 +426,7 @@ mod tests {
                 }
             }
             if count > 200.0 {
-                let centre = overlap_centre_board_board(&a, &b).unwrap();
+                let centre = overlap_centre(&a, &b);
                 prop_assert!((centre.coords - sum / count).norm() < 0.05 * a.circle_radius());
             }
         }

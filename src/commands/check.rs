@@ -1,0 +1,68 @@
+//! `check`: what a scene would model, what it leaves out, and which solver it would use and why.
+
+use bench_dragon::chain::Velocities;
+use bench_dragon::messages::State;
+use bench_dragon::scene::{AtEnd, OnContact};
+
+use super::events::sentence;
+use super::{CommandError, Common, Output, number, search_timeline};
+
+/// Validates the scene and says what it would do.
+pub fn check(common: &Common) -> Result<(), CommandError> {
+    let scene = common.load_scene()?;
+    let timeline = search_timeline(&scene, common);
+    let mut output = Output::standard();
+    let team = &scene.team;
+    output.line(&format!("Scene \"{}\" is valid.", scene.name))?;
+    output.line(&format!(
+        "  Team: {} benches, {} handles; head board {} m, the others {} m, {} m wide, holes {} m from the ends.",
+        team.benches,
+        team.handles(),
+        team.head_length,
+        team.body_length,
+        team.width,
+        team.hole_inset
+    ))?;
+    output.line(&format!(
+        "  Path: inward spiral, {} m per turn, the head starting on turn {} at {} m/s.",
+        scene.path.pitch(),
+        scene.start_turn,
+        scene.head_speed
+    ))?;
+    output.line(&format!("  Solver: {}.", scene.solver().1))?;
+    output.line(match scene.velocities {
+        Velocities::Computed => "  Velocities: computed for every handle.",
+        Velocities::Omitted => "  Velocities: not computed; vx and vy are NaN.",
+    })?;
+    match scene.alerts {
+        Some(rules) => output.line(&format!(
+            "  Alerts: the clearance of every frame, contact and stall; a warning {} s or {} m ahead.",
+            rules.approach_time, rules.approach_clearance
+        ))?,
+        None => output.line(
+            "  Alerts: none. `run` computes no rectangle, no clearance, no contact and no stall, and has no alerts \
+             service: add an [alerts] table for those.",
+        )?,
+    }
+    output.line(&format!(
+        "  At a contact the show {}; at its end it {}.",
+        match (scene.alerts, scene.on_contact) {
+            (Some(_), OnContact::Stop) => "freezes",
+            (Some(_), OnContact::Continue) => "goes on",
+            (None, _) => "goes on, unnoticed",
+        },
+        match scene.at_end {
+            AtEnd::Hold => "holds the last frame",
+            AtEnd::Loop => "begins again",
+        }
+    ))?;
+    output.line(&format!("  Publishing: {} frames per second.", number(scene.rate)))?;
+    output.line("  Ahead, in simulated time:")?;
+    for timed in timeline.events() {
+        output.line(&format!("  {}", sentence(&scene, timed)))?;
+    }
+    if timeline.find(State::Contact).is_some_and(|contact| contact.time == 0.0) {
+        log::warn!("boards overlap at the start of scene \"{}\": widen the pitch or narrow the boards", scene.name);
+    }
+    output.finish()
+}

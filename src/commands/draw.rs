@@ -1,0 +1,170 @@
+//! `draw`: an SVG of the stage at a time: the path, every bench as its rectangle, the head, and where boards touch.
+
+use std::path::PathBuf;
+
+use bench_dragon::chain::Chain;
+use bench_dragon::geometry::path::Path;
+use bench_dragon::geometry::rectangle::Board;
+use bench_dragon::geometry::{Point, Vector};
+use bench_dragon::messages::State;
+use bench_dragon::scene::Scene;
+use bench_dragon::show::solve_at_or_just_before;
+use bench_dragon::show::timeline::{TimedEvent, Timeline};
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+
+use super::solve::{time_at, title};
+use super::{CommandError, Common, Output, search_timeline};
+
+/// Arguments of `draw`.
+#[derive(Debug, clap::Args)]
+pub struct DrawArguments {
+    /// Simulated seconds, or contact, stall, lock
+    #[arg(long, value_name = "TIME", default_value = "0", allow_negative_numbers = true)]
+    at: String,
+    /// Write to a file instead of standard output
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Metres from the centre to the edge of the picture; by default all of the team
+    #[arg(long, value_name = "METRES")]
+    radius: Option<f64>,
+}
+
+type Stage<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+const HEAD: RGBColor = RGBColor(192, 57, 43);
+const BODY: RGBColor = RGBColor(212, 160, 60);
+const TAIL: RGBColor = RGBColor(46, 110, 150);
+const TOUCH: RGBColor = RGBColor(142, 36, 170);
+const CURVE: RGBColor = RGBColor(170, 170, 170);
+
+/// Draws the stage.
+pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandError> {
+    let scene = common.load_scene()?;
+    if let Some(radius) = arguments.radius
+        && !(radius.is_finite() && radius > 0.0)
+    {
+        return Err(CommandError::BadInput(format!("--radius is {radius}, expected a number of metres above 0")));
+    }
+    let timeline = search_timeline(&scene, common);
+    let time = time_at(&arguments.at, &timeline)?;
+    let mut chain = Chain::new(scene.team.handles());
+    solve_at_or_just_before(scene.solver().0.as_mut(), time, &mut chain);
+    let picture = picture(&scene, &timeline, time, &chain, arguments.radius)
+        .map_err(|error| CommandError::Failed(format!("the picture could not be drawn: {error}")))?;
+    let mut output = match &arguments.output {
+        Some(file) => Output::file(file)?,
+        None => Output::standard(),
+    };
+    output.line(&picture)?;
+    output.finish()
+}
+
+/// The SVG's text.
+fn picture(
+    scene: &Scene,
+    timeline: &Timeline,
+    time: f64,
+    chain: &Chain,
+    radius: Option<f64>,
+) -> Result<String, Box<dyn std::error::Error>> {
+    let reach = chain.x.iter().zip(&chain.y).map(|(x, y)| x.hypot(*y)).fold(0.0, f64::max);
+    let radius = radius.unwrap_or(1.05 * reach + scene.team.head_length);
+    let mut text = String::new();
+    {
+        let area = SVGBackend::with_string(&mut text, (900, 940)).into_drawing_area();
+        area.fill(&WHITE)?;
+        let mut stage = ChartBuilder::on(&area)
+            .caption(title(scene, time), ("sans-serif", 22))
+            .margin(16)
+            .x_label_area_size(36)
+            .y_label_area_size(48)
+            .build_cartesian_2d(-radius..radius, -radius..radius)?;
+        stage.configure_mesh().x_desc("x, metres").y_desc("y, metres").light_line_style(WHITE).draw()?;
+        draw_path(&mut stage, scene, radius)?;
+        draw_benches(&mut stage, scene, timeline, time, chain)?;
+        stage.configure_series_labels().background_style(WHITE.mix(0.85)).border_style(CURVE).draw()?;
+        area.present()?;
+    }
+    Ok(text)
+}
+
+fn draw_path(stage: &mut Stage, scene: &Scene, radius: f64) -> Result<(), Box<dyn std::error::Error>> {
+    let theta = (1.42 * radius / scene.path.growth()).min(1e5);
+    let points = (0..=(theta * 12.0) as usize).map(|step| {
+        let point = scene.path.point(scene.path.place_of_theta(step as f64 / 12.0));
+        (point.x, point.y)
+    });
+    let visible = points.filter(|(x, y)| x.abs() <= radius && y.abs() <= radius);
+    // One line for each stretch inside the picture: what lies outside must not be bridged.
+    let mut stretches: Vec<Vec<(f64, f64)>> = Vec::new();
+    for point in visible {
+        match stretches.last_mut() {
+            Some(stretch) if near(stretch.last(), point, scene.path.growth() + radius / 10.0) => stretch.push(point),
+            _ => stretches.push(vec![point]),
+        }
+    }
+    for stretch in stretches {
+        stage.draw_series(LineSeries::new(stretch, CURVE.stroke_width(1)))?;
+    }
+    Ok(())
+}
+
+fn near(previous: Option<&(f64, f64)>, point: (f64, f64), distance: f64) -> bool {
+    previous.is_some_and(|(x, y)| (x - point.0).hypot(y - point.1) < distance)
+}
+
+fn draw_benches(
+    stage: &mut Stage,
+    scene: &Scene,
+    timeline: &Timeline,
+    time: f64,
+    chain: &Chain,
+) -> Result<(), Box<dyn std::error::Error>> {
+    let contact = timeline.find(State::Contact).filter(|contact| contact.time <= time);
+    let touching = |bench: usize| contact.is_some_and(|contact| is_of(contact, bench));
+    let kinds: [(&str, RGBColor, Box<dyn Fn(usize) -> bool>); 4] = [
+        ("body", BODY, Box::new(|bench| bench > 0 && bench + 1 < scene.team.benches && !touching(bench))),
+        ("tail", TAIL, Box::new(|bench| bench > 0 && bench + 1 == scene.team.benches && !touching(bench))),
+        ("head", HEAD, Box::new(|bench| bench == 0 && !touching(bench))),
+        ("the two benches that touch", TOUCH, Box::new(touching)),
+    ];
+    for (name, colour, belongs) in kinds {
+        let boards: Vec<_> = (0..scene.team.benches).filter(|bench| belongs(*bench)).collect();
+        if boards.is_empty() {
+            continue;
+        }
+        for bench in &boards {
+            let corners = board(scene, chain, *bench).corners().map(|corner| (corner.x, corner.y));
+            stage.draw_series([Polygon::new(corners.to_vec(), colour.mix(0.75))])?;
+            let outline = corners.into_iter().chain([corners[0]]).collect::<Vec<_>>();
+            stage.draw_series([PathElement::new(outline, colour.stroke_width(1))])?;
+        }
+        stage
+            .draw_series(std::iter::empty::<Circle<(f64, f64), i32>>())?
+            .label(name)
+            .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 14, y + 5)], colour.mix(0.75).filled()));
+    }
+    stage
+        .draw_series([Circle::new((chain.x[0], chain.y[0]), 4, HEAD.filled())])?
+        .label("front handle of the head")
+        .legend(|(x, y)| Circle::new((x + 7, y), 4, HEAD.filled()));
+    if let Some(place) = contact.and_then(|contact| contact.event.place) {
+        stage
+            .draw_series([Circle::new((place.x, place.y), 9, TOUCH.stroke_width(3))])?
+            .label("where they touch")
+            .legend(|(x, y)| Circle::new((x + 7, y), 6, TOUCH.stroke_width(2)));
+    }
+    Ok(())
+}
+
+fn is_of(contact: &TimedEvent, bench: usize) -> bool {
+    [contact.event.bench_a, contact.event.bench_b].contains(&Some(bench as u32))
+}
+
+fn board(scene: &Scene, chain: &Chain, bench: usize) -> Board {
+    let (sine, cosine) = chain.heading[bench].sin_cos();
+    let front = Point::new(chain.x[bench], chain.y[bench]);
+    let team = &scene.team;
+    Board::from_front(front, Vector::new(cosine, sine), team.link(bench), team.hole_inset, team.width)
+}

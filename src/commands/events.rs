@@ -1,0 +1,77 @@
+//! `events`: everything that ends the show, in order.
+
+use bench_dragon::messages::State;
+use bench_dragon::scene::Scene;
+use bench_dragon::show::timeline::TimedEvent;
+use serde::Serialize;
+
+use super::{CommandError, Common, Output, number, search_timeline};
+
+/// One line of `events --json`.
+#[derive(Serialize)]
+struct EventLine {
+    event: State,
+    time: f64,
+    bench_a: Option<u32>,
+    bench_b: Option<u32>,
+    x: Option<f64>,
+    y: Option<f64>,
+}
+
+/// Prints the events of the scene.
+pub fn events(common: &Common) -> Result<(), CommandError> {
+    let scene = common.load_scene()?;
+    let timeline = search_timeline(&scene, common);
+    let mut output = Output::standard();
+    for timed in timeline.events() {
+        if common.json {
+            let TimedEvent { event, time } = *timed;
+            output.json(&EventLine {
+                event: event.kind,
+                time,
+                bench_a: event.bench_a,
+                bench_b: event.bench_b,
+                x: event.place.map(|place| place.x),
+                y: event.place.map(|place| place.y),
+            })?;
+        } else {
+            output.line(&sentence(&scene, timed))?;
+        }
+    }
+    if !common.json {
+        for kind in [State::Contact, State::Stall] {
+            if timeline.find(kind).is_none() {
+                output.line(&format!("There is no {} before the motion ends.", kind.name()))?;
+            }
+        }
+    }
+    output.finish()
+}
+
+/// An event for people; benches are counted from 1, and the sentence says so.
+pub fn sentence(scene: &Scene, timed: &TimedEvent) -> String {
+    let TimedEvent { event, time } = *timed;
+    let bench = |bench: Option<u32>| bench.map_or("no bench".to_owned(), |bench| bench_name(scene, bench));
+    let place = event.place.map_or(String::new(), |place| format!(" at ({:.6}, {:.6}) m", place.x, place.y));
+    let (first, second) = (bench(event.bench_a), bench(event.bench_b));
+    let what = match event.kind {
+        State::Contact if time == 0.0 => format!("{first} and {second} overlap from the start, most deeply{place}"),
+        State::Contact => format!("{first} and {second} touch{place}"),
+        State::Stall => format!("{first} stalls: from the handle{place} on, the team is pushed backwards"),
+        State::Lock => format!("{first} locks, its rear handle{place}: the motion cannot go on"),
+        State::PathEnd => "the head reaches the end of the path".to_owned(),
+        State::Moving | State::Approaching => "nothing".to_owned(),
+    };
+    format!("{:>9}  t = {} s: {what} (counting from 1).", event.kind.name(), number(time))
+        .replace("path (counting from 1)", "path")
+}
+
+/// A bench as people call it, counted from 1.
+pub fn bench_name(scene: &Scene, bench: u32) -> String {
+    let count = bench as usize + 1;
+    match count {
+        1 => "bench 1 (the head)".to_owned(),
+        _ if count == scene.team.benches => format!("bench {count} (the tail)"),
+        _ => format!("bench {count}"),
+    }
+}

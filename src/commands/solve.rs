@@ -1,0 +1,157 @@
+//! `solve`: the show's own solver offline, as a table.
+
+use std::path::PathBuf;
+
+use bench_dragon::chain::Chain;
+use bench_dragon::messages::State;
+use bench_dragon::scene::Scene;
+use bench_dragon::show::solve_at_or_just_before;
+use bench_dragon::show::timeline::Timeline;
+use serde::Serialize;
+
+use super::{CommandError, Common, Output, number, progress_bar, search_timeline};
+
+/// Arguments of `solve`.
+#[derive(Debug, clap::Args)]
+#[command(group = clap::ArgGroup::new("times").required(true))]
+pub struct SolveArguments {
+    /// Simulated seconds, or contact, stall, lock; several divided by commas
+    #[arg(long, value_name = "TIMES", value_delimiter = ',', group = "times", allow_negative_numbers = true)]
+    at: Vec<String>,
+    /// Simulated seconds between two rows; with --until
+    #[arg(long, value_name = "SECONDS", group = "times", requires = "until", allow_negative_numbers = true)]
+    every: Option<f64>,
+    /// The first time of --every
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, requires = "every", allow_negative_numbers = true)]
+    from: f64,
+    /// The last time of --every, inclusive
+    #[arg(long, value_name = "SECONDS", requires = "every", allow_negative_numbers = true)]
+    until: Option<f64>,
+    /// Write to a file instead of standard output
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+/// One line of `solve --json`.
+#[derive(Serialize)]
+struct TimeLine {
+    t: f64,
+    /// x, y, heading, vx, vy, speed; NaN becomes null.
+    handles: Vec<[f64; 6]>,
+}
+
+/// Solves the scene at the times asked for and prints the table.
+pub fn solve(common: &Common, arguments: &SolveArguments) -> Result<(), CommandError> {
+    let scene = common.load_scene()?;
+    let wants_contact = arguments.at.iter().any(|time| time.trim() == State::Contact.name());
+    let timeline = if wants_contact { search_timeline(&scene, common) } else { Timeline::without_contact(&scene) };
+    let times = arguments.times(&timeline)?;
+    let (mut solver, _) = scene.solver();
+    let mut chain = Chain::new(scene.team.handles());
+    let mut output = match &arguments.output {
+        Some(file) => Output::file(file)?,
+        None => Output::standard(),
+    };
+    if !common.json {
+        output.line("t,handle,x,y,heading,vx,vy,speed")?;
+    }
+    let bar = progress_bar(times.len() as u64, common);
+    for time in times {
+        solve_at_or_just_before(solver.as_mut(), time, &mut chain);
+        if common.json {
+            output.json(&TimeLine { t: time, handles: (0..chain.handles()).map(|i| numbers(&chain, i)).collect() })?;
+        } else {
+            for handle in 0..chain.handles() {
+                let columns =
+                    numbers(&chain, handle).map(|value| if value.is_nan() { String::new() } else { number(value) });
+                output.line(&format!("{},{handle},{}", number(time), columns.join(",")))?;
+            }
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    output.finish()
+}
+
+fn numbers(chain: &Chain, handle: usize) -> [f64; 6] {
+    let Chain { x, y, heading, speed, vx, vy } = chain;
+    [x, y, heading, vx, vy, speed].map(|column| column[handle])
+}
+
+impl SolveArguments {
+    /// The times asked for, all of them within the motion.
+    fn times(&self, timeline: &Timeline) -> Result<Vec<f64>, CommandError> {
+        match (self.every, self.until) {
+            (Some(every), Some(until)) => self.regular_times(every, until, timeline),
+            _ => self.at.iter().map(|text| time_at(text, timeline)).collect(),
+        }
+    }
+
+    fn regular_times(&self, every: f64, until: f64, timeline: &Timeline) -> Result<Vec<f64>, CommandError> {
+        let from = self.from;
+        if !(every.is_finite() && every > 0.0) {
+            return Err(CommandError::BadInput(format!("--every is {every}, expected a number of seconds above 0")));
+        }
+        if !(from.is_finite() && from >= 0.0) {
+            return Err(CommandError::BadInput(format!("--from is {from}, expected a number of seconds, at least 0")));
+        }
+        if !(until.is_finite() && until >= from) {
+            return Err(CommandError::BadInput(format!(
+                "--until is {until}, expected a number of seconds from {from} on"
+            )));
+        }
+        // A last row that rounding has pushed past --until by less than a part in 10^9 of a step still counts.
+        let steps = ((until - from) / every + 1e-9).floor();
+        if steps >= 1e9 {
+            return Err(CommandError::BadInput(format!(
+                "--every {every} gives {steps:e} rows, expected fewer than 1e9"
+            )));
+        }
+        let times = (0..=steps as u64).map(|step| from + step as f64 * every);
+        let end = timeline.end();
+        let within: Vec<f64> = times.take_while(|time| *time <= end.time).collect();
+        if (within.len() as f64) <= steps {
+            eprintln!(
+                "The motion ends at {} s ({}): the table ends at its last row before that.",
+                number(end.time),
+                end.event.kind.name()
+            );
+        }
+        Ok(within)
+    }
+}
+
+/// A time as `--at` takes it: seconds, or the name of an event.
+///
+/// # Errors
+/// Bad input: not a number, an event that does not happen, or a time after the motion's end.
+pub fn time_at(text: &str, timeline: &Timeline) -> Result<f64, CommandError> {
+    let text = text.trim();
+    let named =
+        [State::Contact, State::Stall, State::Lock, State::PathEnd].into_iter().find(|kind| kind.name() == text);
+    if let Some(kind) = named {
+        return timeline.find(kind).map(|timed| timed.time).ok_or_else(|| {
+            CommandError::BadInput(format!("--at {text}: this scene has no {text}; `events` lists what it has"))
+        });
+    }
+    let time: f64 = text.parse().map_err(|_| {
+        CommandError::BadInput(format!("--at {text}: expected seconds, or one of contact, stall, lock, path_end"))
+    })?;
+    let end = timeline.end();
+    if !(time.is_finite() && time >= 0.0) {
+        return Err(CommandError::BadInput(format!("--at {text}: expected a number of seconds, at least 0")));
+    }
+    if time > end.time {
+        return Err(CommandError::BadInput(format!(
+            "--at {text}: the motion ends at {} s ({}), expected a time up to that",
+            number(end.time),
+            end.event.kind.name()
+        )));
+    }
+    Ok(time)
+}
+
+/// The name of a scene and a time, for titles.
+pub fn title(scene: &Scene, time: f64) -> String {
+    format!("{} at {} s", scene.name, number(time))
+}

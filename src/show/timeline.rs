@@ -1,0 +1,89 @@
+//! The events of a scene with their times.
+//!
+//! The scene and its path give the places; this room turns them into simulated seconds. The show, `events`, `solve`
+//! and `draw` use it.
+
+use crate::events::contact::first_contact;
+use crate::events::{Event, stall_and_end};
+use crate::messages::State;
+use crate::scene::{OnContact, Scene};
+
+/// An event and when it happens.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimedEvent {
+    /// What happens and where.
+    pub event: Event,
+    /// Simulated seconds since the start of the scene.
+    pub time: f64,
+}
+
+/// The first event of each kind that happens, in order of time; the last one ends the motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Timeline {
+    events: Vec<TimedEvent>,
+}
+
+impl Timeline {
+    /// All events of a scene, contact included. `progress` is told which share of the search is done, from 0 to 1.
+    pub fn of(scene: &Scene, progress: &mut dyn FnMut(f64)) -> Self {
+        let mut events = stall_and_end(&scene.path, &scene.team);
+        // The motion always has an end: that is the last of these.
+        let end = events[events.len() - 1].travelled;
+        let stall = events.iter().find(|event| event.kind == State::Stall).map(|event| event.travelled);
+        events.extend(first_contact(&scene.path, &scene.team, stall, end, progress));
+        Self::timed(scene, events)
+    }
+
+    /// The events of a scene but for the contact, which costs a search.
+    pub fn without_contact(scene: &Scene) -> Self {
+        Self::timed(scene, stall_and_end(&scene.path, &scene.team))
+    }
+
+    fn timed(scene: &Scene, events: Vec<Event>) -> Self {
+        let timed = |event: Event| TimedEvent { event, time: scene.time_of(event.travelled) };
+        let mut events: Vec<_> = events.into_iter().map(timed).collect();
+        // At one time, the order of the states.
+        events.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.event.kind.cmp(&b.event.kind)));
+        Self { events }
+    }
+
+    /// Without all but the last event.
+    pub fn end_only(mut self) -> Self {
+        self.events.drain(..self.events.len() - 1);
+        self
+    }
+
+    /// The events in order of time.
+    pub fn events(&self) -> &[TimedEvent] {
+        &self.events
+    }
+
+    /// The event of a kind, if it happens.
+    pub fn find(&self, kind: State) -> Option<&TimedEvent> {
+        self.events.iter().find(|timed| timed.event.kind == kind)
+    }
+
+    /// The lock or path end with which the motion ends.
+    pub fn end(&self) -> &TimedEvent {
+        // Every constructor leaves the end in place.
+        &self.events[self.events.len() - 1]
+    }
+
+    /// Simulated seconds at which a show freezes.
+    pub fn freeze_time(&self, on_contact: OnContact) -> f64 {
+        match (on_contact, self.find(State::Contact)) {
+            (OnContact::Stop, Some(contact)) => contact.time,
+            _ => self.end().time,
+        }
+    }
+
+    /// The latest event at or before a time.
+    pub fn latest_passed(&self, sim_time: f64) -> Option<&TimedEvent> {
+        self.events.iter().rev().find(|timed| timed.time <= sim_time)
+    }
+
+    /// The next contact, stall or lock after a time.
+    pub fn next_danger(&self, sim_time: f64) -> Option<&TimedEvent> {
+        self.events.iter().find(|timed| timed.time > sim_time && timed.event.kind != State::PathEnd)
+    }
+}
