@@ -7,7 +7,7 @@ pub mod alerts;
 pub mod timeline;
 
 use crate::chain::{Chain, Solver, Velocities};
-use crate::clearance::ClearanceMonitor;
+use crate::clearance::{ClearanceMonitor, Ground};
 use crate::geometry::path::Fold;
 use crate::messages::State;
 use crate::scene::{AtEnd, OnContact, Scene};
@@ -106,7 +106,8 @@ impl Show {
         }
         let timeline = if scene.alerts.is_some() { timeline } else { timeline.end_only() };
         let freeze_time = timeline.freeze_time(playback.on_contact);
-        let clearance = scene.alerts.map(|_| ClearanceMonitor::new(scene.team, scene.path.pitch()));
+        let clearance =
+            scene.alerts.map(|_| ClearanceMonitor::new(scene.team, Ground::Spiral { pitch: scene.path.pitch() }));
         let level = scene.alerts.map(|rules| AlertLevel::new(rules, playback.rate));
         let frame = Frame {
             tick: 0,
