@@ -60,8 +60,6 @@ pub enum CommandError {
     Failed(String),
     /// Whoever read the output has gone: the command ends quietly. Exit code 0.
     ClosedPipe,
-    /// The command did its work and its verdict is negative; it has said so itself. Exit code 1.
-    NegativeVerdict,
 }
 
 impl From<SceneError> for CommandError {

@@ -146,19 +146,19 @@ fn alerts_come_once_each_and_in_order_in_rust_and_in_python() {
     let scene = scene_file("continue", &[("on_contact = \"stop\"", "on_contact = \"continue\"")]);
     for rate in ["60", "1000"] {
         let name = format!("alerts{rate}");
-        let monitor = Process::start(program(&name).args(["watch", "--json", "--duration", "9"]));
-        let arguments = ["examples/python/subscribe.py", "--json", "--seconds", "8", "--name"];
+        let monitor = Process::start(program(&name).args(["watch", "--json", "--duration", "12"]));
+        let arguments = ["examples/python/subscribe.py", "--json", "--seconds", "11", "--name"];
         let listener = Process::start(python().args(arguments).arg(unique(&name)));
         wait(1.5);
         let publisher = Process::start(program(&name).arg("--scene").arg(&scene).args([
             "run",
             "--json",
             "--start",
-            "395",
+            "380",
             "--time-scale",
-            "10",
+            "8",
             "--duration",
-            "5",
+            "8",
             "--rate",
             rate,
         ]));
@@ -174,8 +174,8 @@ fn alerts_come_once_each_and_in_order_in_rust_and_in_python() {
         let (watched, count) =
             levels(json_lines(&monitor.output_within(30)), &|line| line["level"].as_str().unwrap().into());
         assert_eq!(watched, expected);
-        // One for each level, and one more for the second of wall time that passes while approaching.
-        assert_eq!(count, expected.len() + 1, "at {rate} Hz");
+        // One for each level, and the countdown: 3.57 s of wall time pass while approaching.
+        assert_eq!(count, expected.len() + 3, "at {rate} Hz");
         let (heard, of_python) = levels(json_lines(&listener.output_within(30)), &|line| {
             names[line["level"].as_u64().unwrap() as usize].to_owned()
         });

@@ -13,7 +13,7 @@ use super::connection::{Connection, Subscription};
 /// How long a publisher may be silent before it is looked for: at least this, and three periods.
 const SILENCE: Duration = Duration::from_millis(700);
 /// How often services are looked for that were not there yet.
-const COMPLETION: Duration = Duration::from_millis(500);
+const COMPLETION: Duration = Duration::from_millis(100);
 
 /// Whether there is a publisher.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
