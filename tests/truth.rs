@@ -145,3 +145,35 @@ fn paper_tends_to_the_limit_of_its_own_model() {
         assert!(position < 1.5e-5, "t = {time} s: {position:e} m");
     }
 }
+
+#[test]
+fn whole_chain_agrees_with_50_digits_on_every_code_path() {
+    use bench_dragon::chain::whole_chain::{Instructions, WholeChain};
+    let rows = table(include_str!("truth/paper_scene_exact.csv"));
+    let mut times: Vec<f64> = rows.iter().map(|row| row.time).collect();
+    times.dedup();
+    for instructions in Instructions::available() {
+        let solver = WholeChain::new(Spiral::new(0.55, 16.0), paper_team(), 1.0, Velocities::Computed);
+        let mut solver = solver.with_instructions(instructions).unwrap();
+        let mut chain = Chain::new(224);
+        for &time in &times {
+            // A few frames before each, so that it is a warm frame that is judged.
+            for k in (0..=20).rev() {
+                solver.solve((time - f64::from(k) / 60.0).max(0.0), &mut chain).unwrap();
+            }
+            let (mut position, mut speed) = (0f64, 0f64);
+            for row in rows.iter().filter(|row| row.time == time) {
+                let i = row.handle;
+                position = position.max((chain.x[i] - row.x).hypot(chain.y[i] - row.y));
+                speed = speed.max(((chain.speed[i] - row.speed) / row.speed).abs());
+            }
+            println!(
+                "{}: t = {time} s: position {position:.1e} m, speed {speed:.1e}, restarts {}",
+                instructions.name(),
+                solver.restarts()
+            );
+            let bound = if time < 412.5 { 1e-12 } else { 1e-9 };
+            assert!(position < bound && speed < bound, "t = {time} s: {position:e} m, {speed:e}");
+        }
+    }
+}

@@ -1,0 +1,386 @@
+//! One correction of the whole chain and what follows from it, over flat arrays, in blocks that keep vector units busy.
+//!
+//! Called by the whole-chain solver only, through [`correct`]. Everything is in turns, tau = theta / 2 pi, so that the
+//! pitch p leaves the equations. With u_i = tau_{i+1} - tau_i the link between handles i and i+1 has its length where
+//!
+//! g(tau, u) = (u/2)^2 + tau (tau + u) sin^2(pi u) - (link / 2p)^2 = 0,
+//!
+//! the law of cosines divided by 4 p^2, without a difference of near numbers. Newton's correction of all unknowns is
+//! one bidiagonal substitution, d tau_{i+1} = m_i d tau_i - g_i / g_u with m = 1 - g_tau / g_u; the same m at the
+//! solution gives the rates, tau'_{i+1} = m_i tau'_i. The angles are summed as fixed-point numbers, so that nothing is
+//! lost along the chain and whole turns come off by themselves.
+
+use std::f64::consts::{PI, TAU};
+
+use super::arithmetic::{
+    Arithmetic, Fused, SHORT_ARC_TANGENT, Separate, fixed_point, from_small, short_arc_tangent, signed_fraction,
+    sine_cosine_of_fraction, sine_cosine_of_half,
+};
+use crate::chain::{Chain, Velocities};
+
+/// Handles per block. Long enough that the processor overlaps one block's recurrences with the next one's sines.
+pub(super) const BLOCK: usize = 16;
+
+type Numbers = [f64; BLOCK];
+
+/// The unknowns of all benches and what is known of their motion. All arrays but `rate*` have one length, a multiple
+/// of [`BLOCK`] that is greater than the number of benches: the chain is solved a little further than it is long.
+/// The `rate*` arrays have one more.
+#[derive(Debug, Clone, Default)]
+pub(super) struct State {
+    /// (link / 2 pitch)^2 of each bench.
+    pub link_term: Vec<f64>,
+    /// u: turns from a bench's front handle to its rear one.
+    pub increment: Vec<f64>,
+    /// tau: turns of a bench's front handle.
+    pub turns: Vec<f64>,
+    /// tau' of each handle, turns per metre of the head's travel.
+    pub rate: Vec<f64>,
+    /// `rate` of the frame before.
+    pub rate_before: Vec<f64>,
+    /// `rate` of the frame being computed.
+    pub rate_next: Vec<f64>,
+}
+
+/// What one correction needs to know besides the state.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Step {
+    /// Turns of the head, in units of 2^-64.
+    pub head: u128,
+    /// tau' of the head.
+    pub head_rate: f64,
+    /// Metres per turn.
+    pub pitch: f64,
+    /// Metres per second of the head.
+    pub head_speed: f64,
+    /// The prediction is `ahead` times the rate and `ahead_before` times the rate before, metres.
+    pub ahead: f64,
+    /// See `ahead`.
+    pub ahead_before: f64,
+    /// Whether velocities are wanted.
+    pub velocities: Velocities,
+}
+
+/// The instructions that a code path may use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Instructions {
+    /// 512-bit vectors with fused multiply-add.
+    Avx512,
+    /// 256-bit vectors with fused multiply-add.
+    Avx2,
+    /// What every processor of the architecture has.
+    Portable,
+}
+
+impl Instructions {
+    /// All code paths that this processor can run, the fastest first.
+    pub fn available() -> Vec<Self> {
+        #[cfg(target_arch = "x86_64")]
+        {
+            let mut available = Vec::new();
+            if is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512dq")
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("fma")
+            {
+                available.push(Self::Avx512);
+            }
+            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+                available.push(Self::Avx2);
+            }
+            available.push(Self::Portable);
+            available
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        vec![Self::Portable]
+    }
+
+    /// The name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Avx512 => "AVX-512",
+            Self::Avx2 => "AVX2 and FMA",
+            Self::Portable => "portable",
+        }
+    }
+}
+
+/// Predicts, corrects once and writes the chain. Returns a bound of the position error left by the correction, metres:
+/// the second order of g, summed along the chain; infinite or NaN where the correction cannot be trusted at all.
+///
+/// `instructions` must be among [`Instructions::available`].
+pub(super) fn correct(instructions: Instructions, state: &mut State, step: &Step, chain: &mut Chain) -> f64 {
+    match instructions {
+        // SAFETY: a solver is only made with instructions that this processor was found to have.
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx512 => unsafe { correct_with_avx512(state, step, chain) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx2 => unsafe { correct_with_avx2(state, step, chain) },
+        _ => correct_with::<Separate>(state, step, chain),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
+fn correct_with_avx512(state: &mut State, step: &Step, chain: &mut Chain) -> f64 {
+    correct_with::<Fused>(state, step, chain)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn correct_with_avx2(state: &mut State, step: &Step, chain: &mut Chain) -> f64 {
+    correct_with::<Fused>(state, step, chain)
+}
+
+/// What runs along the chain from block to block.
+struct Running {
+    /// The correction of tau at the next handle.
+    correction: f64,
+    /// tau' of the next handle.
+    rate: f64,
+    /// tau of the next handle, in units of 2^-64 turns.
+    turns: u128,
+    /// The error bound so far, by lane.
+    bound: Numbers,
+}
+
+#[inline(always)]
+fn correct_with<A: Arithmetic>(state: &mut State, step: &Step, chain: &mut Chain) -> f64 {
+    let fraction = (step.head as u64) as f64 / 18_446_744_073_709_551_616.0;
+    let head = (step.head >> 64) as f64 + fraction;
+    let predicted = state.turns[0] + step.ahead * state.rate[0] + step.ahead_before * state.rate_before[0];
+    let mut running =
+        Running { correction: head - predicted, rate: step.head_rate, turns: step.head, bound: [0.0; BLOCK] };
+    let handles = chain.handles();
+    let mut first = 0;
+    while first < state.increment.len() {
+        let bench = Block::solved::<A>(state, step, first, &mut running);
+        let count = BLOCK.min(handles - first);
+        bench.write::<A>(step, chain, first, count);
+        first += BLOCK;
+    }
+    state.rate_next[first] = running.rate;
+    let last = handles - 1;
+    chain.heading[last] = chain.heading[last - 1];
+    running.bound.iter().sum()
+}
+
+/// The solved benches of one block and their front handles.
+struct Block {
+    increment: Numbers,
+    half_sine: Numbers,
+    half_cosine: Numbers,
+    rate: Numbers,
+    /// Whole turns of the front handle.
+    whole: [u64; BLOCK],
+    /// Its fraction of a turn, in units of 2^-64.
+    fraction: [u64; BLOCK],
+    /// The increment in the same units.
+    fixed: [u64; BLOCK],
+}
+
+impl Block {
+    #[inline(always)]
+    fn solved<A: Arithmetic>(state: &mut State, step: &Step, first: usize, running: &mut Running) -> Self {
+        let range = first..first + BLOCK;
+        let link_term: &Numbers = window(&state.link_term[range.clone()]);
+        let (rate_front, rate_rear) = neighbours(&state.rate, first);
+        let (before_front, before_rear) = neighbours(&state.rate_before, first);
+        let increment: &mut Numbers = window_mut(&mut state.increment[range.clone()]);
+        let turns: &mut Numbers = window_mut(&mut state.turns[range.clone()]);
+
+        let mut half_sine = [0.0; BLOCK];
+        let mut half_cosine = [0.0; BLOCK];
+        let mut ratio = [0.0; BLOCK];
+        let mut shift = [0.0; BLOCK];
+        for k in 0..BLOCK {
+            let front_ahead = A::multiply_add(step.ahead, rate_front[k], step.ahead_before * before_front[k]);
+            let rear_ahead = A::multiply_add(step.ahead, rate_rear[k], step.ahead_before * before_rear[k]);
+            let u = increment[k] + (rear_ahead - front_ahead);
+            let tau = turns[k] + front_ahead;
+            let (s, c) = sine_cosine_of_half::<A>(u);
+            let slopes = Slopes::at::<A>(tau, u, s, c);
+            let half = 0.5 * u;
+            let g = A::multiply_add(tau * (tau + u), s * s, A::multiply_add(half, half, -link_term[k]));
+            let reciprocal = 1.0 / slopes.by_increment;
+            increment[k] = u;
+            turns[k] = tau;
+            half_sine[k] = s;
+            half_cosine[k] = c;
+            ratio[k] = -slopes.by_turns * reciprocal;
+            shift[k] = -g * reciprocal;
+        }
+
+        let mut correction = [0.0; BLOCK];
+        let mut delta = running.correction;
+        for k in 0..BLOCK {
+            correction[k] = delta;
+            delta = A::multiply_add(1.0 + ratio[k], delta, shift[k]);
+        }
+        running.correction = delta;
+
+        let mut fixed = [0; BLOCK];
+        for k in 0..BLOCK {
+            let change = A::multiply_add(ratio[k], correction[k], shift[k]);
+            let u = increment[k] + change;
+            let tau = turns[k] + correction[k];
+            // Sine and cosine turned by the small angle pi times the change.
+            let angle = PI * change;
+            let shrink = -0.5 * angle * angle;
+            let (s, c) = (half_sine[k], half_cosine[k]);
+            let sine = s + A::multiply_add(angle, c, shrink * s);
+            let cosine = c + A::multiply_add(-angle, s, shrink * c);
+            let slopes = Slopes::at::<A>(tau, u, sine, cosine);
+            let reciprocal = 1.0 / slopes.by_increment;
+            ratio[k] = A::multiply_add(-slopes.by_turns, reciprocal, 1.0);
+            increment[k] = u;
+            turns[k] = tau;
+            half_sine[k] = sine;
+            half_cosine[k] = cosine;
+            fixed[k] = fixed_point(u);
+            running.bound[k] += second_order::<A>(tau + u, sine, change, correction[k], reciprocal, step.pitch)
+                + if slopes.by_increment > 0.0 && u > 0.0 && u < LARGEST_INCREMENT { 0.0 } else { f64::INFINITY };
+        }
+
+        let mut whole = [0; BLOCK];
+        let mut fraction = [0; BLOCK];
+        let rate: &mut Numbers = window_mut(&mut state.rate_next[range]);
+        for k in 0..BLOCK {
+            rate[k] = running.rate;
+            running.rate *= ratio[k];
+            whole[k] = (running.turns >> 64) as u64;
+            fraction[k] = running.turns as u64;
+            running.turns += u128::from(fixed[k]);
+        }
+        Self { increment: *increment, half_sine, half_cosine, rate: *rate, whole, fraction, fixed }
+    }
+
+    /// Writes `count` handles of the chain from `first` on. The heading of the chain's last handle is not its own.
+    #[inline(always)]
+    fn write<A: Arithmetic>(&self, step: &Step, chain: &mut Chain, first: usize, count: usize) {
+        let mut x = [0.0; BLOCK];
+        let mut y = [0.0; BLOCK];
+        let mut heading = [0.0; BLOCK];
+        let mut tangent = [0.0; BLOCK];
+        let mut speed = [0.0; BLOCK];
+        let mut vx = [0.0; BLOCK];
+        let mut vy = [0.0; BLOCK];
+        let growth = step.pitch * step.head_speed;
+        let mut widest = [0.0f64; BLOCK];
+        for k in 0..BLOCK {
+            let (sine, cosine, part) = sine_cosine_of_fraction::<A>(self.fraction[k]);
+            let tau = from_small(self.whole[k]) + part;
+            let r = step.pitch * tau;
+            x[k] = r * cosine;
+            y[k] = r * sine;
+            // The bench against the perpendicular of the middle angle: p u cos(pi u) against p (2 tau + u) sin(pi u).
+            let u = self.increment[k];
+            tangent[k] = u * self.half_cosine[k] / (A::multiply_add(2.0, tau, u) * self.half_sine[k]);
+            widest[k] = tangent[k].abs();
+            let middle = self.fraction[k].wrapping_add(self.fixed[k] >> 1).wrapping_sub(1 << 62);
+            heading[k] = TAU * signed_fraction(middle);
+            // d/dt of r (cos theta, sin theta).
+            let outward = growth * self.rate[k];
+            let theta = TAU * tau;
+            vx[k] = outward * A::multiply_add(-theta, sine, cosine);
+            vy[k] = outward * A::multiply_add(theta, cosine, sine);
+            speed[k] = -outward * A::multiply_add(theta, theta, 1.0).sqrt();
+        }
+        if widest.iter().all(|tangent| *tangent <= SHORT_ARC_TANGENT) {
+            for k in 0..BLOCK {
+                heading[k] = within_half_turn(heading[k] - short_arc_tangent::<A>(tangent[k]));
+            }
+        } else {
+            for k in 0..BLOCK {
+                heading[k] = within_half_turn(heading[k] - tangent[k].atan());
+            }
+        }
+        copy(&x, &mut chain.x, first, count);
+        copy(&y, &mut chain.y, first, count);
+        copy(&heading, &mut chain.heading, first, count);
+        if step.velocities == Velocities::Computed {
+            copy(&speed, &mut chain.speed, first, count);
+            copy(&vx, &mut chain.vx, first, count);
+            copy(&vy, &mut chain.vy, first, count);
+        }
+    }
+}
+
+/// An increment above which a link spans so much of a turn that the kernel's fixed-point sum would overflow.
+const LARGEST_INCREMENT: f64 = 0.99;
+
+/// The derivatives of g by the front handle's turns and by the increment.
+struct Slopes {
+    by_turns: f64,
+    by_increment: f64,
+}
+
+impl Slopes {
+    #[inline(always)]
+    fn at<A: Arithmetic>(tau: f64, u: f64, sine: f64, cosine: f64) -> Self {
+        let outer = tau + u;
+        let square = sine * sine;
+        let radial = A::multiply_add(tau, square, 0.5 * u);
+        Self {
+            by_turns: (tau + outer) * square,
+            by_increment: A::multiply_add(TAU * tau * outer, sine * cosine, radial),
+        }
+    }
+}
+
+/// A bound of what one correction leaves of an increment, as metres along the path.
+///
+/// The second order of g over g_u: its three derivatives are at most 2 pi^2 tau tau' + 4 pi tau' s + 1/2 by u twice,
+/// 4 pi tau' s + s^2 mixed and 2 s^2 by tau twice, with tau' = tau + u, which the sum below exceeds.
+#[inline(always)]
+fn second_order<A: Arithmetic>(
+    outer: f64,
+    sine: f64,
+    change: f64,
+    correction: f64,
+    reciprocal: f64,
+    pitch: f64,
+) -> f64 {
+    let around = PI * outer * change.abs();
+    let along = sine * correction.abs();
+    let both = A::multiply_add(2.0, along, around);
+    let square = A::multiply_add(both, both, along * along);
+    let rest = A::multiply_add(8.0, outer, 2.0) * change * change;
+    (square + rest) * reciprocal * (TAU * pitch * outer)
+}
+
+/// An angle from -3 pi to 3 pi brought into (-pi, pi].
+#[inline(always)]
+fn within_half_turn(angle: f64) -> f64 {
+    let raised = if angle <= -PI { angle + TAU } else { angle };
+    if raised > PI { raised - TAU } else { raised }
+}
+
+/// `rate` at the front and the rear handles of a block.
+#[inline(always)]
+fn neighbours(rate: &[f64], first: usize) -> (&Numbers, &Numbers) {
+    (window(&rate[first..first + BLOCK]), window(&rate[first + 1..first + 1 + BLOCK]))
+}
+
+#[inline(always)]
+fn window(numbers: &[f64]) -> &Numbers {
+    // Every caller slices exactly BLOCK numbers.
+    numbers.try_into().expect("a block")
+}
+
+#[inline(always)]
+fn window_mut(numbers: &mut [f64]) -> &mut Numbers {
+    // Every caller slices exactly BLOCK numbers.
+    numbers.try_into().expect("a block")
+}
+
+#[inline(always)]
+fn copy(from: &Numbers, to: &mut [f64], first: usize, count: usize) {
+    if count == BLOCK {
+        to[first..first + BLOCK].copy_from_slice(from);
+    } else {
+        to[first..first + count].copy_from_slice(&from[..count]);
+    }
+}
