@@ -153,25 +153,47 @@ fn correct_with<A: Arithmetic>(state: &mut State, step: &Step, chain: &mut Chain
     let predicted = state.turns[0] + step.ahead * state.rate[0] + step.ahead_before * state.rate_before[0];
     let mut running =
         Running { correction: head - predicted, rate: step.head_rate, turns: step.head, bound: [0.0; BLOCK] };
-    let handles = chain.handles();
-    let mut first = 0;
-    while first < state.increment.len() {
-        let bench = Block::solved::<A>(state, step, first, &mut running);
-        let count = BLOCK.min(handles - first);
-        bench.write::<A>(step, chain, first, count);
-        first += BLOCK;
+    let blocks = state.increment.len() / BLOCK;
+    // Three blocks are under way at once: what runs along the chain one number at a time (substitute, sum) is then
+    // overlapped by the processor with the vector work of the others, and its results are read only when they have
+    // left the store buffer.
+    let mut ring = [const { Block::EMPTY }; 3];
+    for turn in 0..blocks + 2 {
+        let (newest, middle, oldest) = (turn % 3, (turn + 2) % 3, (turn + 1) % 3);
+        if turn < blocks {
+            ring[newest].predict::<A>(state, step, turn * BLOCK);
+        }
+        if turn >= 1 && turn <= blocks {
+            ring[middle].refine::<A>(state, step, (turn - 1) * BLOCK, &mut running);
+        }
+        if turn >= 2 {
+            ring[oldest].write::<A>(step, chain, (turn - 2) * BLOCK);
+        }
+        if turn < blocks {
+            ring[newest].substitute::<A>(&mut running);
+        }
+        if turn >= 1 && turn <= blocks {
+            ring[middle].sum(state, (turn - 1) * BLOCK, &mut running);
+        }
     }
-    state.rate_next[first] = running.rate;
-    let last = handles - 1;
+    state.rate_next[blocks * BLOCK] = running.rate;
+    let last = chain.handles() - 1;
     chain.heading[last] = chain.heading[last - 1];
     running.bound.iter().sum()
 }
 
-/// The solved benches of one block and their front handles.
+/// The benches of one block and their front handles, while they are being solved.
 struct Block {
     increment: Numbers,
+    turns: Numbers,
     half_sine: Numbers,
     half_cosine: Numbers,
+    /// -g_tau / g_u, then m.
+    ratio: Numbers,
+    /// -g / g_u.
+    shift: Numbers,
+    /// The correction of the front handle's tau.
+    correction: Numbers,
     rate: Numbers,
     /// Whole turns of the front handle.
     whole: [u64; BLOCK],
@@ -182,19 +204,28 @@ struct Block {
 }
 
 impl Block {
+    const EMPTY: Self = Self {
+        increment: [0.0; BLOCK],
+        turns: [0.0; BLOCK],
+        half_sine: [0.0; BLOCK],
+        half_cosine: [0.0; BLOCK],
+        ratio: [0.0; BLOCK],
+        shift: [0.0; BLOCK],
+        correction: [0.0; BLOCK],
+        rate: [0.0; BLOCK],
+        whole: [0; BLOCK],
+        fraction: [0; BLOCK],
+        fixed: [0; BLOCK],
+    };
+
+    /// Predicts the unknowns and evaluates g and its slopes there.
     #[inline(always)]
-    fn solved<A: Arithmetic>(state: &mut State, step: &Step, first: usize, running: &mut Running) -> Self {
-        let range = first..first + BLOCK;
-        let link_term: &Numbers = window(&state.link_term[range.clone()]);
+    fn predict<A: Arithmetic>(&mut self, state: &State, step: &Step, first: usize) {
         let (rate_front, rate_rear) = neighbours(&state.rate, first);
         let (before_front, before_rear) = neighbours(&state.rate_before, first);
-        let increment: &mut Numbers = window_mut(&mut state.increment[range.clone()]);
-        let turns: &mut Numbers = window_mut(&mut state.turns[range.clone()]);
-
-        let mut half_sine = [0.0; BLOCK];
-        let mut half_cosine = [0.0; BLOCK];
-        let mut ratio = [0.0; BLOCK];
-        let mut shift = [0.0; BLOCK];
+        let link_term = window(&state.link_term, first);
+        let increment = window(&state.increment, first);
+        let turns = window(&state.turns, first);
         for k in 0..BLOCK {
             let front_ahead = A::multiply_add(step.ahead, rate_front[k], step.ahead_before * before_front[k]);
             let rear_ahead = A::multiply_add(step.ahead, rate_rear[k], step.ahead_before * before_rear[k]);
@@ -205,107 +236,147 @@ impl Block {
             let half = 0.5 * u;
             let g = A::multiply_add(tau * (tau + u), s * s, A::multiply_add(half, half, -link_term[k]));
             let reciprocal = 1.0 / slopes.by_increment;
-            increment[k] = u;
-            turns[k] = tau;
-            half_sine[k] = s;
-            half_cosine[k] = c;
-            ratio[k] = -slopes.by_turns * reciprocal;
-            shift[k] = -g * reciprocal;
+            self.increment[k] = u;
+            self.turns[k] = tau;
+            self.half_sine[k] = s;
+            self.half_cosine[k] = c;
+            self.ratio[k] = -slopes.by_turns * reciprocal;
+            self.shift[k] = -g * reciprocal;
         }
+    }
 
-        let mut correction = [0.0; BLOCK];
+    /// The bidiagonal substitution.
+    #[inline(always)]
+    fn substitute<A: Arithmetic>(&mut self, running: &mut Running) {
         let mut delta = running.correction;
         for k in 0..BLOCK {
-            correction[k] = delta;
-            delta = A::multiply_add(1.0 + ratio[k], delta, shift[k]);
+            self.correction[k] = delta;
+            delta = A::multiply_add(1.0 + self.ratio[k], delta, self.shift[k]);
         }
         running.correction = delta;
+    }
 
-        let mut fixed = [0; BLOCK];
+    /// Corrects the unknowns and evaluates m there.
+    #[inline(always)]
+    fn refine<A: Arithmetic>(&mut self, state: &mut State, step: &Step, first: usize, running: &mut Running) {
+        let increment = window_mut(&mut state.increment, first);
+        let turns = window_mut(&mut state.turns, first);
         for k in 0..BLOCK {
-            let change = A::multiply_add(ratio[k], correction[k], shift[k]);
-            let u = increment[k] + change;
-            let tau = turns[k] + correction[k];
+            let change = A::multiply_add(self.ratio[k], self.correction[k], self.shift[k]);
+            let u = self.increment[k] + change;
+            let tau = self.turns[k] + self.correction[k];
             // Sine and cosine turned by the small angle pi times the change.
             let angle = PI * change;
             let shrink = -0.5 * angle * angle;
-            let (s, c) = (half_sine[k], half_cosine[k]);
+            let (s, c) = (self.half_sine[k], self.half_cosine[k]);
             let sine = s + A::multiply_add(angle, c, shrink * s);
             let cosine = c + A::multiply_add(-angle, s, shrink * c);
             let slopes = Slopes::at::<A>(tau, u, sine, cosine);
             let reciprocal = 1.0 / slopes.by_increment;
-            ratio[k] = A::multiply_add(-slopes.by_turns, reciprocal, 1.0);
+            let left = second_order::<A>(tau + u, sine, change, self.correction[k], reciprocal, step.pitch);
+            let sound = slopes.by_increment > 0.0 && u > 0.0 && u < LARGEST_INCREMENT;
+            running.bound[k] += if sound { left } else { f64::INFINITY };
+            self.ratio[k] = A::multiply_add(-slopes.by_turns, reciprocal, 1.0);
+            self.increment[k] = u;
+            self.half_sine[k] = sine;
+            self.half_cosine[k] = cosine;
+            self.fixed[k] = fixed_point(u);
             increment[k] = u;
             turns[k] = tau;
-            half_sine[k] = sine;
-            half_cosine[k] = cosine;
-            fixed[k] = fixed_point(u);
-            running.bound[k] += second_order::<A>(tau + u, sine, change, correction[k], reciprocal, step.pitch)
-                + if slopes.by_increment > 0.0 && u > 0.0 && u < LARGEST_INCREMENT { 0.0 } else { f64::INFINITY };
         }
-
-        let mut whole = [0; BLOCK];
-        let mut fraction = [0; BLOCK];
-        let rate: &mut Numbers = window_mut(&mut state.rate_next[range]);
-        for k in 0..BLOCK {
-            rate[k] = running.rate;
-            running.rate *= ratio[k];
-            whole[k] = (running.turns >> 64) as u64;
-            fraction[k] = running.turns as u64;
-            running.turns += u128::from(fixed[k]);
-        }
-        Self { increment: *increment, half_sine, half_cosine, rate: *rate, whole, fraction, fixed }
     }
 
-    /// Writes `count` handles of the chain from `first` on. The heading of the chain's last handle is not its own.
+    /// Sums the increments to angles and multiplies the ratios to rates.
     #[inline(always)]
-    fn write<A: Arithmetic>(&self, step: &Step, chain: &mut Chain, first: usize, count: usize) {
-        let mut x = [0.0; BLOCK];
-        let mut y = [0.0; BLOCK];
-        let mut heading = [0.0; BLOCK];
+    fn sum(&mut self, state: &mut State, first: usize, running: &mut Running) {
+        for k in 0..BLOCK {
+            self.rate[k] = running.rate;
+            running.rate *= self.ratio[k];
+            self.whole[k] = (running.turns >> 64) as u64;
+            self.fraction[k] = running.turns as u64;
+            running.turns += u128::from(self.fixed[k]);
+        }
+        *window_mut(&mut state.rate_next, first) = self.rate;
+    }
+
+    /// Writes the handles that the chain has. The heading of its last handle is not its own.
+    #[inline(always)]
+    fn write<A: Arithmetic>(&self, step: &Step, chain: &mut Chain, first: usize) {
+        let count = chain.handles() - first;
+        if count >= BLOCK {
+            self.evaluate::<A>(
+                step,
+                Poses {
+                    x: window_mut(&mut chain.x, first),
+                    y: window_mut(&mut chain.y, first),
+                    heading: window_mut(&mut chain.heading, first),
+                    speed: window_mut(&mut chain.speed, first),
+                    vx: window_mut(&mut chain.vx, first),
+                    vy: window_mut(&mut chain.vy, first),
+                },
+            );
+            return;
+        }
+        let mut part = [[f64::NAN; BLOCK]; 6];
+        let [x, y, heading, speed, vx, vy] = &mut part;
+        self.evaluate::<A>(step, Poses { x, y, heading, speed, vx, vy });
+        let arrays = [&mut chain.x, &mut chain.y, &mut chain.heading, &mut chain.speed, &mut chain.vx, &mut chain.vy];
+        for (numbers, part) in arrays.into_iter().zip(&part) {
+            numbers[first..].copy_from_slice(&part[..count]);
+        }
+    }
+
+    #[inline(always)]
+    fn evaluate<A: Arithmetic>(&self, step: &Step, poses: Poses) {
         let mut tangent = [0.0; BLOCK];
-        let mut speed = [0.0; BLOCK];
-        let mut vx = [0.0; BLOCK];
-        let mut vy = [0.0; BLOCK];
-        let growth = step.pitch * step.head_speed;
-        let mut widest = [0.0f64; BLOCK];
+        let mut turns = [0.0; BLOCK];
+        let mut sines = [0.0; BLOCK];
+        let mut cosines = [0.0; BLOCK];
+        let mut short = 0;
         for k in 0..BLOCK {
             let (sine, cosine, part) = sine_cosine_of_fraction::<A>(self.fraction[k]);
             let tau = from_small(self.whole[k]) + part;
             let r = step.pitch * tau;
-            x[k] = r * cosine;
-            y[k] = r * sine;
+            poses.x[k] = r * cosine;
+            poses.y[k] = r * sine;
             // The bench against the perpendicular of the middle angle: p u cos(pi u) against p (2 tau + u) sin(pi u).
             let u = self.increment[k];
             tangent[k] = u * self.half_cosine[k] / (A::multiply_add(2.0, tau, u) * self.half_sine[k]);
-            widest[k] = tangent[k].abs();
+            short += u64::from(tangent[k].abs() <= SHORT_ARC_TANGENT);
             let middle = self.fraction[k].wrapping_add(self.fixed[k] >> 1).wrapping_sub(1 << 62);
-            heading[k] = TAU * signed_fraction(middle);
+            let middle = TAU * signed_fraction(middle);
+            poses.heading[k] = within_half_turn(middle - short_arc_tangent::<A>(tangent[k]));
+            (turns[k], sines[k], cosines[k]) = (tau, sine, cosine);
+        }
+        if short < BLOCK as u64 {
+            for k in 0..BLOCK {
+                let middle = self.fraction[k].wrapping_add(self.fixed[k] >> 1).wrapping_sub(1 << 62);
+                poses.heading[k] = within_half_turn(TAU * signed_fraction(middle) - tangent[k].atan());
+            }
+        }
+        if step.velocities == Velocities::Omitted {
+            return;
+        }
+        let growth = step.pitch * step.head_speed;
+        for k in 0..BLOCK {
             // d/dt of r (cos theta, sin theta).
             let outward = growth * self.rate[k];
-            let theta = TAU * tau;
-            vx[k] = outward * A::multiply_add(-theta, sine, cosine);
-            vy[k] = outward * A::multiply_add(theta, cosine, sine);
-            speed[k] = -outward * A::multiply_add(theta, theta, 1.0).sqrt();
-        }
-        if widest.iter().all(|tangent| *tangent <= SHORT_ARC_TANGENT) {
-            for k in 0..BLOCK {
-                heading[k] = within_half_turn(heading[k] - short_arc_tangent::<A>(tangent[k]));
-            }
-        } else {
-            for k in 0..BLOCK {
-                heading[k] = within_half_turn(heading[k] - tangent[k].atan());
-            }
-        }
-        copy(&x, &mut chain.x, first, count);
-        copy(&y, &mut chain.y, first, count);
-        copy(&heading, &mut chain.heading, first, count);
-        if step.velocities == Velocities::Computed {
-            copy(&speed, &mut chain.speed, first, count);
-            copy(&vx, &mut chain.vx, first, count);
-            copy(&vy, &mut chain.vy, first, count);
+            let theta = TAU * turns[k];
+            poses.vx[k] = outward * A::multiply_add(-theta, sines[k], cosines[k]);
+            poses.vy[k] = outward * A::multiply_add(theta, cosines[k], sines[k]);
+            poses.speed[k] = -outward * A::multiply_add(theta, theta, 1.0).sqrt();
         }
     }
+}
+
+/// Where the handles of a block go.
+struct Poses<'a> {
+    x: &'a mut Numbers,
+    y: &'a mut Numbers,
+    heading: &'a mut Numbers,
+    speed: &'a mut Numbers,
+    vx: &'a mut Numbers,
+    vy: &'a mut Numbers,
 }
 
 /// An increment above which a link spans so much of a turn that the kernel's fixed-point sum would overflow.
@@ -361,26 +432,18 @@ fn within_half_turn(angle: f64) -> f64 {
 /// `rate` at the front and the rear handles of a block.
 #[inline(always)]
 fn neighbours(rate: &[f64], first: usize) -> (&Numbers, &Numbers) {
-    (window(&rate[first..first + BLOCK]), window(&rate[first + 1..first + 1 + BLOCK]))
+    (window(rate, first), window(rate, first + 1))
+}
+
+/// The numbers of the block that begins at `first`.
+#[inline(always)]
+fn window(numbers: &[f64], first: usize) -> &Numbers {
+    // The slice has just that length.
+    numbers[first..first + BLOCK].try_into().expect("a block")
 }
 
 #[inline(always)]
-fn window(numbers: &[f64]) -> &Numbers {
-    // Every caller slices exactly BLOCK numbers.
-    numbers.try_into().expect("a block")
-}
-
-#[inline(always)]
-fn window_mut(numbers: &mut [f64]) -> &mut Numbers {
-    // Every caller slices exactly BLOCK numbers.
-    numbers.try_into().expect("a block")
-}
-
-#[inline(always)]
-fn copy(from: &Numbers, to: &mut [f64], first: usize, count: usize) {
-    if count == BLOCK {
-        to[first..first + BLOCK].copy_from_slice(from);
-    } else {
-        to[first..first + count].copy_from_slice(&from[..count]);
-    }
+fn window_mut(numbers: &mut [f64], first: usize) -> &mut Numbers {
+    // The slice has just that length.
+    (&mut numbers[first..first + BLOCK]).try_into().expect("a block")
 }
