@@ -22,7 +22,7 @@ use crate::geometry::spiral::Spiral;
 const CORRECTIONS: usize = 3;
 
 /// The error that a correction may leave, as a distance: far below the rounding of the coordinates themselves.
-const LEFT_OVER: f64 = 1e-14;
+const LEFT_OVER: f64 = 1e-13;
 
 /// Newton's method on the whole chain, warm from frame to frame.
 ///
@@ -39,6 +39,7 @@ pub struct WholeChain {
     history: History,
     head_span: f64,
     restarts: u64,
+    repeats: u64,
 }
 
 /// What is known of the frames before.
@@ -62,6 +63,9 @@ impl WholeChain {
             link_term: (0..padded).map(link_term).collect(),
             increment: vec![0.0; padded],
             turns: vec![0.0; padded],
+            by_turns: vec![0.0; padded],
+            by_increment: vec![0.0; padded],
+            reciprocal: vec![0.0; padded],
             rate: vec![0.0; padded + 1],
             rate_before: vec![0.0; padded + 1],
             rate_next: vec![0.0; padded + 1],
@@ -78,6 +82,7 @@ impl WholeChain {
             history: History::None,
             head_span: 0.0,
             restarts: 0,
+            repeats: 0,
         }
     }
 
@@ -96,6 +101,11 @@ impl WholeChain {
         self.restarts
     }
 
+    /// How often one correction was not enough and another was made.
+    pub fn repeats(&self) -> u64 {
+        self.repeats
+    }
+
     /// Tries `corrections` corrections; true if the last one left no more than rounding.
     fn corrected(&mut self, step: &mut Step, corrections: usize, chain: &mut Chain) -> bool {
         let left_over = LEFT_OVER.max(0.5 * f64::EPSILON * step.pitch * (step.head as f64 / 2f64.powi(64)));
@@ -107,6 +117,7 @@ impl WholeChain {
             if !bound.is_finite() {
                 return false;
             }
+            self.repeats += 1;
             (step.ahead, step.ahead_before) = (0.0, 0.0);
         }
         false
@@ -135,6 +146,7 @@ impl WholeChain {
             self.state.increment[bench] = rear.minus(front) / TAU;
             front = rear;
         }
+        self.state.renew_slopes();
         Ok(())
     }
 }

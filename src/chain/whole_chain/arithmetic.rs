@@ -44,7 +44,7 @@ fn polynomial<A: Arithmetic, const N: usize>(x: f64, coefficients: [f64; N]) -> 
 /// Minimax coefficients of fdlibm's `__kernel_sin` and `__kernel_cos` (Sun Microsystems, 1993).
 #[inline(always)]
 #[allow(clippy::excessive_precision, reason = "the digits as published")]
-fn sine_cosine<A: Arithmetic>(angle: f64) -> (f64, f64) {
+pub(super) fn sine_cosine<A: Arithmetic>(angle: f64) -> (f64, f64) {
     let square = angle * angle;
     let sine = polynomial::<A, 6>(
         square,

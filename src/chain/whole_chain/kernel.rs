@@ -6,7 +6,8 @@
 //! g(tau, u) = (u/2)^2 + tau (tau + u) sin^2(pi u) - (link / 2p)^2 = 0,
 //!
 //! the law of cosines divided by 4 p^2, without a difference of near numbers. Newton's correction of all unknowns is
-//! one bidiagonal substitution, d tau_{i+1} = m_i d tau_i - g_i / g_u with m = 1 - g_tau / g_u; the same m at the
+//! one bidiagonal substitution, d tau_{i+1} = m_i d tau_i - g_i / g_u with m = 1 - g_tau / g_u, the slopes taken from the frame
+//! before (the error bound counts how much they have changed); the same m at the
 //! solution gives the rates, tau'_{i+1} = m_i tau'_i. The angles are summed as fixed-point numbers, so that nothing is
 //! lost along the chain and whole turns come off by themselves.
 
@@ -14,7 +15,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::arithmetic::{
     Arithmetic, Fused, SHORT_ARC_TANGENT, Separate, fixed_point, from_small, short_arc_tangent, signed_fraction,
-    sine_cosine_of_fraction, sine_cosine_of_half,
+    sine_cosine, sine_cosine_of_fraction, sine_cosine_of_half,
 };
 use crate::chain::{Chain, Velocities};
 
@@ -34,12 +35,32 @@ pub(super) struct State {
     pub increment: Vec<f64>,
     /// tau: turns of a bench's front handle.
     pub turns: Vec<f64>,
+    /// g_tau of each bench at the last solution.
+    pub by_turns: Vec<f64>,
+    /// g_u of each bench at the last solution.
+    pub by_increment: Vec<f64>,
+    /// 1 / g_u of each bench at the last solution.
+    pub reciprocal: Vec<f64>,
     /// tau' of each handle, turns per metre of the head's travel.
     pub rate: Vec<f64>,
     /// `rate` of the frame before.
     pub rate_before: Vec<f64>,
     /// `rate` of the frame being computed.
     pub rate_next: Vec<f64>,
+}
+
+impl State {
+    /// Sets the slopes of all benches to those at the present unknowns.
+    pub(super) fn renew_slopes(&mut self) {
+        for bench in 0..self.increment.len() {
+            let (tau, u) = (self.turns[bench], self.increment[bench]);
+            let (sine, cosine) = (PI * u).sin_cos();
+            let slopes = Slopes::at::<Separate>(tau, u, sine, cosine);
+            self.by_turns[bench] = slopes.by_turns;
+            self.by_increment[bench] = slopes.by_increment;
+            self.reciprocal[bench] = 1.0 / slopes.by_increment;
+        }
+    }
 }
 
 /// What one correction needs to know besides the state.
@@ -224,24 +245,35 @@ impl Block {
         let (rate_front, rate_rear) = neighbours(&state.rate, first);
         let (before_front, before_rear) = neighbours(&state.rate_before, first);
         let link_term = window(&state.link_term, first);
+        let by_turns = window(&state.by_turns, first);
+        let reciprocal = window(&state.reciprocal, first);
         let increment = window(&state.increment, first);
         let turns = window(&state.turns, first);
+        let mut wide = 0;
         for k in 0..BLOCK {
             let front_ahead = A::multiply_add(step.ahead, rate_front[k], step.ahead_before * before_front[k]);
             let rear_ahead = A::multiply_add(step.ahead, rate_rear[k], step.ahead_before * before_rear[k]);
             let u = increment[k] + (rear_ahead - front_ahead);
-            let tau = turns[k] + front_ahead;
-            let (s, c) = sine_cosine_of_half::<A>(u);
-            let slopes = Slopes::at::<A>(tau, u, s, c);
+            wide += u64::from(u > 0.25);
+            self.increment[k] = u;
+            self.turns[k] = turns[k] + front_ahead;
+        }
+        // Far from the centre no bench spans a quarter of a turn.
+        if wide == 0 {
+            for k in 0..BLOCK {
+                (self.half_sine[k], self.half_cosine[k]) = sine_cosine::<A>(PI * self.increment[k]);
+            }
+        } else {
+            for k in 0..BLOCK {
+                (self.half_sine[k], self.half_cosine[k]) = sine_cosine_of_half::<A>(self.increment[k]);
+            }
+        }
+        for k in 0..BLOCK {
+            let (u, tau, s) = (self.increment[k], self.turns[k], self.half_sine[k]);
             let half = 0.5 * u;
             let g = A::multiply_add(tau * (tau + u), s * s, A::multiply_add(half, half, -link_term[k]));
-            let reciprocal = 1.0 / slopes.by_increment;
-            self.increment[k] = u;
-            self.turns[k] = tau;
-            self.half_sine[k] = s;
-            self.half_cosine[k] = c;
-            self.ratio[k] = -slopes.by_turns * reciprocal;
-            self.shift[k] = -g * reciprocal;
+            self.ratio[k] = -by_turns[k] * reciprocal[k];
+            self.shift[k] = -g * reciprocal[k];
         }
     }
 
@@ -259,12 +291,16 @@ impl Block {
     /// Corrects the unknowns and evaluates m there.
     #[inline(always)]
     fn refine<A: Arithmetic>(&mut self, state: &mut State, step: &Step, first: usize, running: &mut Running) {
-        let increment = window_mut(&mut state.increment, first);
-        let turns = window_mut(&mut state.turns, first);
+        // Copies, since a loop over slices that might overlap is not vectorised.
+        let by_turns = *window(&state.by_turns, first);
+        let by_increment = *window(&state.by_increment, first);
+        let mut next = [[0.0; BLOCK]; 4];
+        let mut bound = running.bound;
         for k in 0..BLOCK {
-            let change = A::multiply_add(self.ratio[k], self.correction[k], self.shift[k]);
+            let correction = self.correction[k];
+            let change = A::multiply_add(self.ratio[k], correction, self.shift[k]);
             let u = self.increment[k] + change;
-            let tau = self.turns[k] + self.correction[k];
+            let tau = self.turns[k] + correction;
             // Sine and cosine turned by the small angle pi times the change.
             let angle = PI * change;
             let shrink = -0.5 * angle * angle;
@@ -273,17 +309,31 @@ impl Block {
             let cosine = c + A::multiply_add(-angle, s, shrink * c);
             let slopes = Slopes::at::<A>(tau, u, sine, cosine);
             let reciprocal = 1.0 / slopes.by_increment;
-            let left = second_order::<A>(tau + u, sine, change, self.correction[k], reciprocal, step.pitch);
-            let sound = slopes.by_increment > 0.0 && u > 0.0 && u < LARGEST_INCREMENT;
-            running.bound[k] += if sound { left } else { f64::INFINITY };
+            let by_old_slopes = A::multiply_add(
+                (slopes.by_increment - by_increment[k]).abs(),
+                change.abs(),
+                (slopes.by_turns - by_turns[k]).abs() * correction.abs(),
+            );
+            let left = by_old_slopes + second_order::<A>(tau + u, sine, change, correction);
+            let sound = (slopes.by_increment > 0.0) & (u > 0.0) & (u < LARGEST_INCREMENT);
+            let metres = left * reciprocal * (TAU * step.pitch * (tau + u));
+            bound[k] += if sound { metres } else { f64::INFINITY };
             self.ratio[k] = A::multiply_add(-slopes.by_turns, reciprocal, 1.0);
             self.increment[k] = u;
             self.half_sine[k] = sine;
             self.half_cosine[k] = cosine;
             self.fixed[k] = fixed_point(u);
-            increment[k] = u;
-            turns[k] = tau;
+            next[0][k] = tau;
+            next[1][k] = slopes.by_turns;
+            next[2][k] = slopes.by_increment;
+            next[3][k] = reciprocal;
         }
+        running.bound = bound;
+        *window_mut(&mut state.increment, first) = self.increment;
+        *window_mut(&mut state.turns, first) = next[0];
+        *window_mut(&mut state.by_turns, first) = next[1];
+        *window_mut(&mut state.by_increment, first) = next[2];
+        *window_mut(&mut state.reciprocal, first) = next[3];
     }
 
     /// Sums the increments to angles and multiplies the ratios to rates.
@@ -302,32 +352,21 @@ impl Block {
     /// Writes the handles that the chain has. The heading of its last handle is not its own.
     #[inline(always)]
     fn write<A: Arithmetic>(&self, step: &Step, chain: &mut Chain, first: usize) {
-        let count = chain.handles() - first;
-        if count >= BLOCK {
-            self.evaluate::<A>(
-                step,
-                Poses {
-                    x: window_mut(&mut chain.x, first),
-                    y: window_mut(&mut chain.y, first),
-                    heading: window_mut(&mut chain.heading, first),
-                    speed: window_mut(&mut chain.speed, first),
-                    vx: window_mut(&mut chain.vx, first),
-                    vy: window_mut(&mut chain.vy, first),
-                },
-            );
-            return;
-        }
-        let mut part = [[f64::NAN; BLOCK]; 6];
-        let [x, y, heading, speed, vx, vy] = &mut part;
-        self.evaluate::<A>(step, Poses { x, y, heading, speed, vx, vy });
-        let arrays = [&mut chain.x, &mut chain.y, &mut chain.heading, &mut chain.speed, &mut chain.vx, &mut chain.vy];
-        for (numbers, part) in arrays.into_iter().zip(&part) {
-            numbers[first..].copy_from_slice(&part[..count]);
+        let count = BLOCK.min(chain.handles() - first);
+        let poses = self.evaluate::<A>(step);
+        copy(&poses.x, &mut chain.x, first, count);
+        copy(&poses.y, &mut chain.y, first, count);
+        copy(&poses.heading, &mut chain.heading, first, count);
+        if step.velocities == Velocities::Computed {
+            copy(&poses.speed, &mut chain.speed, first, count);
+            copy(&poses.vx, &mut chain.vx, first, count);
+            copy(&poses.vy, &mut chain.vy, first, count);
         }
     }
 
     #[inline(always)]
-    fn evaluate<A: Arithmetic>(&self, step: &Step, poses: Poses) {
+    fn evaluate<A: Arithmetic>(&self, step: &Step) -> Poses {
+        let mut poses = Poses::EMPTY;
         let mut tangent = [0.0; BLOCK];
         let mut turns = [0.0; BLOCK];
         let mut sines = [0.0; BLOCK];
@@ -355,7 +394,7 @@ impl Block {
             }
         }
         if step.velocities == Velocities::Omitted {
-            return;
+            return poses;
         }
         let growth = step.pitch * step.head_speed;
         for k in 0..BLOCK {
@@ -366,17 +405,29 @@ impl Block {
             poses.vy[k] = outward * A::multiply_add(theta, cosines[k], sines[k]);
             poses.speed[k] = -outward * A::multiply_add(theta, theta, 1.0).sqrt();
         }
+        poses
     }
 }
 
-/// Where the handles of a block go.
-struct Poses<'a> {
-    x: &'a mut Numbers,
-    y: &'a mut Numbers,
-    heading: &'a mut Numbers,
-    speed: &'a mut Numbers,
-    vx: &'a mut Numbers,
-    vy: &'a mut Numbers,
+/// The handles of a block as they go into the chain.
+struct Poses {
+    x: Numbers,
+    y: Numbers,
+    heading: Numbers,
+    speed: Numbers,
+    vx: Numbers,
+    vy: Numbers,
+}
+
+impl Poses {
+    const EMPTY: Self = Self {
+        x: [0.0; BLOCK],
+        y: [0.0; BLOCK],
+        heading: [0.0; BLOCK],
+        speed: [0.0; BLOCK],
+        vx: [0.0; BLOCK],
+        vy: [0.0; BLOCK],
+    };
 }
 
 /// An increment above which a link spans so much of a turn that the kernel's fixed-point sum would overflow.
@@ -401,25 +452,17 @@ impl Slopes {
     }
 }
 
-/// A bound of what one correction leaves of an increment, as metres along the path.
+/// A bound of the second order of g over a correction.
 ///
-/// The second order of g over g_u: its three derivatives are at most 2 pi^2 tau tau' + 4 pi tau' s + 1/2 by u twice,
-/// 4 pi tau' s + s^2 mixed and 2 s^2 by tau twice, with tau' = tau + u, which the sum below exceeds.
+/// Its three derivatives are at most 2 pi^2 tau tau' + 4 pi tau' s + 1/2 by u twice, 4 pi tau' s + s^2 mixed and 2 s^2
+/// by tau twice, with tau' = tau + u, which the sum below exceeds.
 #[inline(always)]
-fn second_order<A: Arithmetic>(
-    outer: f64,
-    sine: f64,
-    change: f64,
-    correction: f64,
-    reciprocal: f64,
-    pitch: f64,
-) -> f64 {
+fn second_order<A: Arithmetic>(outer: f64, sine: f64, change: f64, correction: f64) -> f64 {
     let around = PI * outer * change.abs();
     let along = sine * correction.abs();
     let both = A::multiply_add(2.0, along, around);
     let square = A::multiply_add(both, both, along * along);
-    let rest = A::multiply_add(8.0, outer, 2.0) * change * change;
-    (square + rest) * reciprocal * (TAU * pitch * outer)
+    A::multiply_add(A::multiply_add(8.0, outer, 2.0), change * change, square)
 }
 
 /// An angle from -3 pi to 3 pi brought into (-pi, pi].
@@ -446,4 +489,13 @@ fn window(numbers: &[f64], first: usize) -> &Numbers {
 fn window_mut(numbers: &mut [f64], first: usize) -> &mut Numbers {
     // The slice has just that length.
     (&mut numbers[first..first + BLOCK]).try_into().expect("a block")
+}
+
+#[inline(always)]
+fn copy(from: &Numbers, to: &mut [f64], first: usize, count: usize) {
+    if count == BLOCK {
+        *window_mut(to, first) = *from;
+    } else {
+        to[first..first + count].copy_from_slice(&from[..count]);
+    }
 }
