@@ -372,20 +372,25 @@ impl Block {
         let mut sines = [0.0; BLOCK];
         let mut cosines = [0.0; BLOCK];
         let mut short = 0;
+        // Several short loops, so that the processor has many of their steps under way at once.
         for k in 0..BLOCK {
             let (sine, cosine, part) = sine_cosine_of_fraction::<A>(self.fraction[k]);
             let tau = from_small(self.whole[k]) + part;
-            let r = step.pitch * tau;
-            poses.x[k] = r * cosine;
-            poses.y[k] = r * sine;
+            (turns[k], sines[k], cosines[k]) = (tau, sine, cosine);
+            poses.x[k] = step.pitch * tau * cosine;
+            poses.y[k] = step.pitch * tau * sine;
+        }
+        for k in 0..BLOCK {
             // The bench against the perpendicular of the middle angle: p u cos(pi u) against p (2 tau + u) sin(pi u).
             let u = self.increment[k];
-            tangent[k] = u * self.half_cosine[k] / (A::multiply_add(2.0, tau, u) * self.half_sine[k]);
-            short += u64::from(tangent[k].abs() <= SHORT_ARC_TANGENT);
+            let aside = u * self.half_cosine[k] / (A::multiply_add(2.0, turns[k], u) * self.half_sine[k]);
+            short += u64::from(aside.abs() <= SHORT_ARC_TANGENT);
+            tangent[k] = aside;
+        }
+        for k in 0..BLOCK {
             let middle = self.fraction[k].wrapping_add(self.fixed[k] >> 1).wrapping_sub(1 << 62);
             let middle = TAU * signed_fraction(middle);
             poses.heading[k] = within_half_turn(middle - short_arc_tangent::<A>(tangent[k]));
-            (turns[k], sines[k], cosines[k]) = (tau, sine, cosine);
         }
         if short < BLOCK as u64 {
             for k in 0..BLOCK {
