@@ -3,12 +3,15 @@
 pub mod check;
 pub mod draw;
 pub mod events;
+pub mod run;
 pub mod solve;
 pub mod watch;
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use bench_dragon::scene::{Scene, SceneError};
 use bench_dragon::show::timeline::Timeline;
@@ -57,8 +60,6 @@ pub enum CommandError {
     Failed(String),
     /// Whoever read the output has gone: the command ends quietly. Exit code 0.
     ClosedPipe,
-    /// The command did its work and its verdict is negative; it has said so itself. Exit code 1.
-    NegativeVerdict,
 }
 
 impl From<SceneError> for CommandError {
@@ -133,4 +134,33 @@ pub fn search_timeline(scene: &Scene, common: &Common) -> Timeline {
     let timeline = Timeline::of(scene, &mut |share| bar.set_position((1000.0 * share) as u64));
     bar.finish_and_clear();
     timeline
+}
+
+/// A flag that SIGINT and SIGTERM set.
+pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CommandError> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        signal_hook::flag::register(signal, Arc::clone(&stop))?;
+    }
+    Ok(stop)
+}
+
+/// Wall time as a person writes it: `60`, `90s`, `5m`, `8h`. Seconds.
+///
+/// # Errors
+/// One sentence for anything else, for clap to print.
+pub fn wall_seconds(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let (digits, unit) = match text.char_indices().last() {
+        Some((at, 's')) => (&text[..at], 1.0),
+        Some((at, 'm')) => (&text[..at], 60.0),
+        Some((at, 'h')) => (&text[..at], 3600.0),
+        _ => (text, 1.0),
+    };
+    let seconds = digits.parse::<f64>().map(|number| number * unit).unwrap_or(f64::NAN);
+    if seconds > 0.0 && seconds <= 1e9 {
+        Ok(seconds)
+    } else {
+        Err("expected a time above 0 such as 60, 90s, 5m or 8h".to_owned())
+    }
 }

@@ -5,6 +5,7 @@
 //! - [`messages`]: the memory layouts that go over the wire.
 //! - [`geometry`]: the path, the board, the separation of two boards. Pure functions.
 //! - [`chain`]: from the head's travel to the state of every handle; several solvers behind one interface.
+//! - [`clearance`]: which two boards of a chain are nearest.
 //! - [`events`]: when, exactly, something ends the show.
 //! - [`scene`]: the file a user writes, checked and turned into the types above.
 //! - [`show`]: from a scene and a tick to one frame, deterministic.

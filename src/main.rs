@@ -21,6 +21,8 @@ struct CommandLine {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Publish a scene live
+    Run(commands::run::RunArguments),
     /// Watch a running publisher from another process
     Watch(commands::watch::WatchArguments),
     /// Solve a scene offline and print every handle as a table
@@ -37,6 +39,7 @@ fn main() -> ExitCode {
     let CommandLine { common, command } = CommandLine::parse();
     set_up_logging(&common);
     let done = match &command {
+        Command::Run(arguments) => commands::run::run(&common, arguments),
         Command::Watch(arguments) => commands::watch::watch(&common, arguments),
         Command::Solve(arguments) => commands::solve::solve(&common, arguments),
         Command::Events => commands::events::events(&common),
@@ -53,7 +56,6 @@ fn main() -> ExitCode {
             eprintln!("{}: {sentence}", error_label());
             ExitCode::FAILURE
         }
-        Err(CommandError::NegativeVerdict) => ExitCode::FAILURE,
     }
 }
 
@@ -68,5 +70,11 @@ fn set_up_logging(common: &Common) {
         (false, 1) => log::LevelFilter::Info,
         (false, _) => log::LevelFilter::Debug,
     };
+    iceoryx2::prelude::set_log_level(match level {
+        log::LevelFilter::Debug => iceoryx2::prelude::LogLevel::Debug,
+        log::LevelFilter::Info => iceoryx2::prelude::LogLevel::Warn,
+        // What iceoryx2 refuses is reported in this program's own words.
+        _ => iceoryx2::prelude::LogLevel::Fatal,
+    });
     env_logger::Builder::new().filter_level(level).filter_module("rustdds", log::LevelFilter::Error).init();
 }

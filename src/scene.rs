@@ -230,8 +230,12 @@ impl Source<'_> {
     /// What the TOML reader refused, in one sentence.
     fn refused(&self, error: &toml::de::Error, field: &str) -> SceneError {
         let place = error.span().map_or(String::new(), |span| format!(", line {}", self.line(span.start)));
+        // What carries its place in the text is wrapped in a field that no user wrote.
+        let field = field.replace(".$__serde_spanned_private_value", "");
         let field = if field.is_empty() || field == "." { String::new() } else { format!("{field}: ") };
         let message = error.message().trim().replace('\n', ", ");
+        let message =
+            message.replace("expected i64", "expected an integer").replace("expected f64", "expected a number");
         SceneError(format!("{}{place}: {field}{message}", self.file))
     }
 

@@ -7,10 +7,10 @@ pub mod alerts;
 pub mod timeline;
 
 use crate::chain::{Chain, Solver, Velocities};
-use crate::clearance::ClearanceMonitor;
+use crate::clearance::{ClearanceMonitor, Ground};
 use crate::geometry::path::Fold;
 use crate::messages::State;
-use crate::scene::{AtEnd, OnContact, Scene};
+use crate::scene::{AtEnd, Method, OnContact, Scene, SolverName};
 
 use alerts::{Alert, AlertLevel};
 use timeline::Timeline;
@@ -106,7 +106,12 @@ impl Show {
         }
         let timeline = if scene.alerts.is_some() { timeline } else { timeline.end_only() };
         let freeze_time = timeline.freeze_time(playback.on_contact);
-        let clearance = scene.alerts.map(|_| ClearanceMonitor::new(scene.team, scene.path.pitch()));
+        // The paper's bisection can be told to be coarser than the spiral's bounds allow for.
+        let ground = match scene.method {
+            Method::Named(SolverName::Paper) => Ground::Unknown,
+            _ => Ground::Spiral { pitch: scene.path.pitch() },
+        };
+        let clearance = scene.alerts.map(|_| ClearanceMonitor::new(scene.team, ground));
         let level = scene.alerts.map(|rules| AlertLevel::new(rules, playback.rate));
         let frame = Frame {
             tick: 0,
@@ -139,6 +144,11 @@ impl Show {
     /// Simulated seconds at which the show freezes.
     pub fn freeze_time(&self) -> f64 {
         self.freeze_time
+    }
+
+    /// Pairs of boards asked for their separation so far: none where the scene has no alerts.
+    pub fn pairs_asked(&self) -> u64 {
+        self.clearance.as_ref().map_or(0, |monitor| monitor.counters().pairs)
     }
 
     /// The frame of a tick: time, chain, clearance, state, alerts.

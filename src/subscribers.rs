@@ -1,1 +1,4 @@
-//! Programs that watch a running publisher from another process. They know the messages only.
+//! Programs that watch a running publisher from another process. They know the messages only, never the solver.
+
+pub mod connection;
+pub mod monitor;

@@ -24,7 +24,7 @@ use crate::chain::Team;
 use crate::geometry::path::Path;
 use crate::geometry::rectangle::Board;
 use crate::geometry::root::first_true;
-use crate::geometry::separation::{clearance_board_board, overlap_centre};
+use crate::geometry::separation::{circle_bound_board_board, clearance_board_board, overlap_centre};
 use crate::geometry::spiral::{Angle, Spiral};
 use crate::messages::State;
 
@@ -262,7 +262,7 @@ impl Search<'_> {
                 // One look ends before this board: it was out of reach there, with more room than a step takes.
                 return false;
             }
-            let apart = |look: &Look| look.boards[a].least_distance(&look.boards[b]);
+            let apart = |look: &Look| circle_bound_board_board(&look.boards[a], &look.boards[b]);
             let nearest = apart(before) + apart(after);
             if nearest > 0.0 && nearest > self.relative_motion(before, after, a, b) {
                 return false;
@@ -323,7 +323,7 @@ fn touching(look: &Look, pairs: &[(usize, usize)]) -> Option<Event> {
 /// All pairs that share no handle and whose centres lie in the same or adjoining cells of a grid as wide as the
 /// longest board with a link to spare.
 fn near_pairs(boards: &[Board]) -> Vec<(usize, usize)> {
-    let cell = 1.5 * boards.iter().map(|board| 2.0 * board.radius()).fold(0.0, f64::max);
+    let cell = 1.5 * boards.iter().map(|board| 2.0 * board.circle_radius()).fold(0.0, f64::max);
     let key = |board: &Board| ((board.centre.x / cell).floor() as i64, (board.centre.y / cell).floor() as i64);
     let mut cells: Vec<((i64, i64), usize)> = boards.iter().map(key).zip(0..).collect();
     cells.sort_unstable();

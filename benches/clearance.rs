@@ -1,0 +1,80 @@
+//! What the least clearance of a frame costs: all pairs against the live way, and one pair.
+//!
+//! Every case averages over a run of consecutive 60 Hz frames at one place of the show, given in hundredths of the
+//! head's way to the contact (of the way that leaves it 4 m from the centre, for longer teams).
+
+use bench_dragon::chain::newton::Newton;
+use bench_dragon::chain::{Chain, Team, Velocities};
+use bench_dragon::clearance::{ClearanceMonitor, Ground, board, least_clearance_all_pairs};
+use bench_dragon::geometry::path::Path;
+use bench_dragon::geometry::separation::{separation_board_board, signed_distance_board_board};
+use bench_dragon::geometry::spiral::Spiral;
+use divan::counter::ItemsCount;
+use divan::{Bencher, black_box};
+
+const PITCH: f64 = 0.55;
+const FRAMES: usize = 60;
+
+fn team(benches: usize) -> Team {
+    Team { benches, head_length: 3.41, body_length: 2.2, width: 0.3, hole_inset: 0.275 }
+}
+
+fn chains(team: Team, percent: usize) -> Vec<Chain> {
+    let solver = Newton::new(Spiral::new(PITCH, 16.0), team, 1.0, Velocities::Omitted);
+    let start = 4.12 * percent as f64;
+    let frame = |k: usize| {
+        let mut chain = Chain::new(team.handles());
+        let head = Spiral::new(PITCH, 16.0).place_at(start + k as f64 / 60.0);
+        solver.solve_from(head, &mut chain).expect("the paper's head travels this far before any link locks");
+        chain
+    };
+    (0..FRAMES).map(frame).collect()
+}
+
+fn run(bencher: Bencher, benches: usize, percent: usize, ground: Ground) {
+    let chains = chains(team(benches), percent);
+    let mut monitor = ClearanceMonitor::new(team(benches), ground);
+    bencher.counter(ItemsCount::new(FRAMES)).bench_local(|| {
+        for chain in &chains {
+            black_box(monitor.least_clearance(black_box(chain)));
+        }
+    });
+}
+
+const CASES: [(usize, usize); 6] = [(223, 0), (223, 50), (223, 90), (223, 99), (1_000, 50), (10_000, 50)];
+
+#[divan::bench(args = CASES)]
+fn live(bencher: Bencher, (benches, percent): (usize, usize)) {
+    run(bencher, benches, percent, Ground::Spiral { pitch: PITCH });
+}
+
+#[divan::bench(args = CASES)]
+fn live_on_unknown_ground(bencher: Bencher, (benches, percent): (usize, usize)) {
+    run(bencher, benches, percent, Ground::Unknown);
+}
+
+#[divan::bench(args = [(223, 50), (1_000, 50), (10_000, 50)], sample_count = 3, sample_size = 1)]
+fn all_pairs(bencher: Bencher, (benches, percent): (usize, usize)) {
+    let chain = chains(team(benches), percent).swap_remove(0);
+    bencher
+        .counter(ItemsCount::new(1usize))
+        .bench_local(|| least_clearance_all_pairs(black_box(&chain), &team(benches)));
+}
+
+#[divan::bench]
+fn separation_of_one_pair(bencher: Bencher) {
+    let chain = chains(team(223), 99).swap_remove(0);
+    let (a, b) = (board(&chain, &team(223), 0), board(&chain, &team(223), 8));
+    bencher.bench_local(|| separation_board_board(black_box(&a), black_box(&b)));
+}
+
+#[divan::bench]
+fn signed_distance_of_one_pair(bencher: Bencher) {
+    let chain = chains(team(223), 99).swap_remove(0);
+    let (a, b) = (board(&chain, &team(223), 0), board(&chain, &team(223), 8));
+    bencher.bench_local(|| signed_distance_board_board(black_box(&a), black_box(&b)));
+}
+
+fn main() {
+    divan::main();
+}

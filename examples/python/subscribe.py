@@ -1,0 +1,100 @@
+"""Prints the head's place once a second: `pip install iceoryx2==0.10.0 numpy`, start a publisher, run this.
+
+    python3 examples/python/subscribe.py [--name bench_dragon] [--seconds 10] [--json]
+
+The frames are read where the publisher wrote them: nothing is copied. With --json every frame is a line.
+"""
+
+import argparse
+import json
+import time
+
+import iceoryx2 as iox2
+import numpy as np
+from bench_dragon_messages import STATES, CollisionAlert, FrameHeader, HandlePose, handles_of
+
+iox2.set_log_level(iox2.LogLevel.Fatal)
+
+
+def wait_for(opening):
+    """Opens a service as soon as its publisher has made it."""
+    while True:
+        try:
+            return opening()
+        except iox2.PublishSubscribeOpenError:
+            time.sleep(0.1)
+        except iox2.EventOpenError:
+            time.sleep(0.1)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--name", default="bench_dragon")
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--json", action="store_true", help="a line for every frame and alert")
+    arguments = parser.parse_args()
+
+    # The node and its ports stay inside this function: as globals they would leave files behind.
+    node = iox2.NodeBuilder.new().signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
+
+    def service(suffix):
+        return node.service_builder(iox2.ServiceName.new(f"{arguments.name}/{suffix}"))
+
+    poses = wait_for(
+        lambda: service("poses").publish_subscribe(iox2.Slice[HandlePose]).user_header(FrameHeader).open()
+    )
+    subscriber = poses.subscriber_builder().create()
+    tick = wait_for(lambda: service("tick").event().open()).listener_builder().create()
+    try:
+        alerts = service("alerts").publish_subscribe(CollisionAlert).open().subscriber_builder().create()
+    except iox2.PublishSubscribeOpenError:
+        alerts = None  # The scene has none.
+
+    end = time.monotonic() + arguments.seconds
+    printed = 0.0
+    received = missed = 0
+    sequence = None
+    while time.monotonic() < end:
+        tick.timed_wait(iox2.Duration.from_millis(200))
+        while (sample := subscriber.receive()) is not None:
+            header = sample.user_header().contents
+            handles = handles_of(sample)
+            if sequence is not None:
+                missed += header.sequence - sequence - 1
+            sequence = header.sequence
+            received += 1
+            if arguments.json:
+                # How far the second link is from 1.65 m tells whether the content is whole.
+                link = float(np.hypot(handles["x"][2] - handles["x"][1], handles["y"][2] - handles["y"][1]))
+                line = {
+                    "type": "frame",
+                    "sequence": header.sequence,
+                    "tick": header.tick,
+                    "sim_time": header.sim_time,
+                    "state": STATES[header.state],
+                    "handles": len(handles),
+                    "head": [float(handles["x"][0]), float(handles["y"][0])],
+                    "link": link,
+                }
+                print(json.dumps(line), flush=False)
+            elif time.monotonic() >= printed + 1.0:
+                printed = time.monotonic()
+                print(
+                    f"t = {header.sim_time:8.3f} s  {STATES[header.state]:<11} "
+                    f"head ({handles['x'][0]:+.3f}, {handles['y'][0]:+.3f}) m  {len(handles)} handles  missed {missed}",
+                    flush=True,
+                )
+            sample.delete()
+        while alerts is not None and (alert := alerts.receive()) is not None:
+            message = alert.payload().contents
+            if arguments.json:
+                print(json.dumps({"type": "alert", "level": message.level, "tick": message.tick}))
+            alert.delete()
+    if arguments.json:
+        print(json.dumps({"type": "end", "received": received, "missed": missed}))
+    else:
+        print(f"{received} frames received, {missed} missed.")
+
+
+if __name__ == "__main__":
+    main()

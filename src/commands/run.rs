@@ -1,0 +1,308 @@
+//! `run`: the live publisher.
+
+use std::collections::hash_map::RandomState;
+use std::hash::BuildHasher;
+use std::io::IsTerminal;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+
+use anstyle::{AnsiColor, Style};
+use bench_dragon::live::clock::realtime_ns;
+use bench_dragon::live::statistics::{self, Announcement, Inbox, Percentiles, Run, Summary};
+use bench_dragon::live::{Counts, End, LoopOptions, Publisher, realtime, run_loop};
+use bench_dragon::messages::State;
+use bench_dragon::scene::{Accepted, AtEnd, Scene};
+use bench_dragon::show::timeline::Timeline;
+use bench_dragon::show::{Playback, Show};
+use bench_dragon::transports::iceoryx2::{self, Offer, OpenError, SharedMemoryPublisher, StatusSender};
+use serde::Serialize;
+
+use super::events::{bench_name, sentence};
+use super::{CommandError, Common, Output, number, search_timeline, stop_on_signals};
+
+/// Arguments of `run`.
+#[derive(Debug, clap::Args)]
+pub struct RunArguments {
+    /// Frames per second; by default the scene's
+    #[arg(long, value_name = "HZ", help_heading = "The show", allow_negative_numbers = true)]
+    rate: Option<f64>,
+    /// Simulated seconds per second of wall time
+    #[arg(long, value_name = "X", default_value_t = 1.0, help_heading = "The show", allow_negative_numbers = true)]
+    time_scale: f64,
+    /// Simulated seconds at which the show begins
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 0.0,
+        help_heading = "The show",
+        allow_negative_numbers = true
+    )]
+    start: f64,
+    /// Wall time after which to end: 60, 90s, 5m, 8h
+    #[arg(long, value_name = "TIME", value_parser = super::wall_seconds, help_heading = "The show")]
+    duration: Option<f64>,
+    /// Begin again whenever the show has ended
+    #[arg(long = "loop", help_heading = "The show")]
+    looping: bool,
+    /// Run the loop with this real-time priority, 1 to 99 (SCHED_FIFO), and lock its memory
+    #[arg(long, value_name = "PRIORITY", value_parser = clap::value_parser!(u8).range(1..=99), help_heading = "Punctuality")]
+    realtime: Option<u8>,
+    /// Keep the loop on this CPU
+    #[arg(long, value_name = "N", help_heading = "Punctuality")]
+    cpu: Option<usize>,
+}
+
+/// The line of `run --json`.
+#[derive(Serialize)]
+struct SummaryLine {
+    frames: u64,
+    overruns: u64,
+    skipped: u64,
+    wakeup_ns: Percentiles,
+    step_ns: Percentiles,
+    end: End,
+}
+
+/// Publishes the scene until its duration is over or a signal comes.
+pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError> {
+    let scene = common.load_scene()?;
+    let playback = arguments.playback(&scene)?;
+    iceoryx2::service_name(&common.name, "poses")?;
+    let timeline =
+        if scene.alerts.is_some() { search_timeline(&scene, common) } else { Timeline::without_contact(&scene) };
+    let show = Show::new(&scene, timeline, playback).map_err(|error| CommandError::BadInput(error.to_string()))?;
+    let stop = stop_on_signals()?;
+    let run_id = RandomState::new().hash_one(realtime_ns());
+    let timeline = show.timeline().clone();
+    let performance = Performance { common, arguments, scene: &scene, playback, run_id };
+    let (counts, summary) = performance.perform(show, &timeline, &stop)?;
+    performance.print_summary(&counts, &summary)
+}
+
+/// All that the threads of a run have in common.
+struct Performance<'a> {
+    common: &'a Common,
+    arguments: &'a RunArguments,
+    scene: &'a Scene,
+    playback: Playback,
+    run_id: u64,
+}
+
+impl Performance<'_> {
+    /// Runs the loop on one thread and the statistics on another.
+    fn perform(
+        &self,
+        mut show: Show,
+        timeline: &Timeline,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<(Counts, Summary), CommandError> {
+        let (reports, inbox) = statistics::queues();
+        let done = AtomicBool::new(false);
+        let (opened, opening) = mpsc::channel();
+        std::thread::scope(|threads| {
+            let looping = threads.spawn(|| {
+                let ready = self.prepare();
+                let publisher = match ready {
+                    Ok(publisher) => publisher,
+                    Err(error) => {
+                        let _ = opened.send(Err(error));
+                        return None;
+                    }
+                };
+                let _ = opened.send(Ok(()));
+                let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(publisher)];
+                Some(run_loop(&mut show, &mut publishers, self.loop_options(), reports, stop))
+            });
+            // The thread sends exactly once; should it have died, joining it tells.
+            let ready = opening.recv().unwrap_or(Ok(()));
+            let summary = ready.and_then(|()| {
+                self.print_start(timeline)?;
+                let collecting = threads.spawn(|| {
+                    // Without statistics the loop would run unseen.
+                    self.collect(inbox, &done).inspect_err(|_| stop.store(true, Ordering::Relaxed))
+                });
+                let outcome = looping.join();
+                done.store(true, Ordering::Release);
+                let summary = collecting.join().map_err(|_| lost("statistics"))??;
+                Ok((outcome.map_err(|_| lost("loop's"))?, summary))
+            });
+            match summary? {
+                (Some(Ok(counts)), summary) => Ok((counts, summary)),
+                (Some(Err((counts, error))), summary) => {
+                    self.print_summary(&counts, &summary)?;
+                    Err(CommandError::Failed(error.to_string()))
+                }
+                (None, _) => Err(lost("loop's")),
+            }
+        })
+    }
+
+    /// What has to be done on the loop's own thread before it starts.
+    fn prepare(&self) -> Result<SharedMemoryPublisher, CommandError> {
+        if let Some(cpu) = self.arguments.cpu {
+            realtime::pin_to_cpu(cpu).map_err(CommandError::BadInput)?;
+        }
+        realtime::set_timer_slack();
+        if let Some(priority) = self.arguments.realtime {
+            realtime::become_realtime(priority);
+        }
+        let scene = self.scene;
+        let handles = scene.team.handles();
+        Ok(SharedMemoryPublisher::open(&Offer {
+            name: self.common.name.clone(),
+            handles,
+            queue: self.queue(),
+            alerts: scene.alerts.is_some(),
+            stage: iceoryx2::stage(self.run_id, realtime_ns(), &scene.team, scene.path.pitch(), scene.start_turn),
+        })?)
+    }
+
+    fn queue(&self) -> usize {
+        self.scene.queue.unwrap_or_else(|| iceoryx2::default_queue(self.scene.team.handles()))
+    }
+
+    fn loop_options(&self) -> LoopOptions {
+        let Playback { rate, time_scale, .. } = self.playback;
+        let periods = self.arguments.duration.map(|seconds| LoopOptions::periods_of(seconds, rate));
+        LoopOptions { run_id: self.run_id, rate, time_scale, periods }
+    }
+
+    fn collect(&self, inbox: Inbox, done: &AtomicBool) -> Result<Summary, CommandError> {
+        let run = Run {
+            run_id: self.run_id,
+            rate: self.playback.rate,
+            scene: &self.scene.name,
+            sinks: vec![Box::new(StatusSender::open(&self.common.name)?)],
+            announce: Box::new(|announcement| self.print_alert(announcement)),
+        };
+        Ok(statistics::collect(inbox, run, done))
+    }
+
+    /// What a person wants to know at the start, on standard error: standard output is for the summary.
+    fn print_start(&self, timeline: &Timeline) -> Result<(), CommandError> {
+        if self.common.quiet || self.common.json {
+            return Ok(());
+        }
+        let (scene, name, playback) = (self.scene, &self.common.name, self.playback);
+        eprintln!("Scene \"{}\": {} benches, {} handles.", scene.name, scene.team.benches, scene.team.handles());
+        eprintln!("Solver {}.", scene.solver().1);
+        let scale = if playback.time_scale == 1.0 {
+            String::new()
+        } else {
+            format!(", {} simulated seconds per second", number(playback.time_scale))
+        };
+        eprintln!("{} frames per second{scale}, from {} s.", number(playback.rate), number(playback.start));
+        let alerts = if scene.alerts.is_some() { ", /alerts" } else { "" };
+        eprintln!(
+            "iceoryx2 services: {name}/poses{alerts}, /status, /stage, /tick (queues of {} frames).",
+            self.queue()
+        );
+        match scene.alerts {
+            Some(_) => eprintln!("Ahead, in simulated time:"),
+            None => eprintln!("No alerts: contact and stall are not computed. Ahead, in simulated time:"),
+        }
+        for timed in timeline.events() {
+            eprintln!("{}", sentence(scene, timed));
+        }
+        if timeline.find(State::Contact).is_some_and(|contact| contact.time == 0.0) {
+            log::warn!("boards overlap at the start of this scene");
+        }
+        Ok(())
+    }
+
+    /// One line an alert, with the countdown in wall time.
+    fn print_alert(&self, announcement: &Announcement) {
+        if self.common.quiet || self.common.json {
+            return;
+        }
+        let alert = &announcement.alert;
+        let colour = match alert.level {
+            State::Moving => AnsiColor::Green,
+            State::Approaching => AnsiColor::Yellow,
+            _ => AnsiColor::Red,
+        };
+        let style =
+            if std::io::stderr().is_terminal() { Style::new().fg_color(Some(colour.into())) } else { Style::new() };
+        let benches: Vec<_> =
+            [alert.bench_a, alert.bench_b].into_iter().flatten().map(|bench| bench_name(self.scene, bench)).collect();
+        let what = match (alert.level, alert.time_to_event.is_nan()) {
+            (State::Approaching, false) => {
+                format!("next event in {:.1} s", alert.time_to_event / self.playback.time_scale)
+            }
+            (State::Approaching, true) => "two boards are near each other".to_owned(),
+            (State::Moving, _) => "nothing near".to_owned(),
+            _ => format!("at {} s", number(alert.event_time)),
+        };
+        eprintln!(
+            "{:>10.3} s  {style}{:<11}{style:#} {what}; nearest boards {:.4} m apart; {} (from 1)",
+            announcement.sim_time,
+            alert.level.level_name(),
+            alert.clearance,
+            benches.join(", ")
+        );
+    }
+
+    fn print_summary(&self, counts: &Counts, summary: &Summary) -> Result<(), CommandError> {
+        let Counts { frames, overruns, skipped, end } = *counts;
+        let Summary { wakeup_ns, step_ns, lost_samples } = *summary;
+        let mut output = Output::standard();
+        if lost_samples > 0 {
+            log::warn!("{lost_samples} frames are missing from the percentiles: the machine left them no time");
+        }
+        if self.common.json {
+            output.json(&SummaryLine { frames, overruns, skipped, wakeup_ns, step_ns, end })?;
+        } else {
+            output.line(&format!(
+                "{frames} frames published, {overruns} overruns, {skipped} periods skipped (ended by {}).",
+                match end {
+                    End::Duration => "its duration",
+                    End::Signal => "a signal",
+                    End::Error => "an error",
+                }
+            ))?;
+            for (name, of) in [("wake-up lateness", wakeup_ns), ("step cost", step_ns)] {
+                let us = |ns: u64| ns as f64 / 1000.0;
+                output.line(&format!(
+                    "  {name:<17} p50 {:>9.1} us   p99 {:>9.1} us   p99.9 {:>9.1} us   max {:>9.1} us",
+                    us(of.p50),
+                    us(of.p99),
+                    us(of.p999),
+                    us(of.max)
+                ))?;
+            }
+        }
+        output.finish()
+    }
+}
+
+/// A thread of this program panicked, which it says itself.
+fn lost(thread: &str) -> CommandError {
+    CommandError::Failed(format!("the {thread} thread ended early"))
+}
+
+impl RunArguments {
+    fn playback(&self, scene: &Scene) -> Result<Playback, CommandError> {
+        let checked = |accepted: Accepted, name, value| accepted.check(name, value).map_err(CommandError::BadInput);
+        if let Some(rate) = self.rate {
+            checked(Accepted::RATE, "--rate", rate)?;
+        }
+        checked(Accepted::TIME_SCALE, "--time-scale", self.time_scale)?;
+        Ok(Playback {
+            start: self.start,
+            time_scale: self.time_scale,
+            rate: self.rate.unwrap_or(scene.rate),
+            at_end: if self.looping { AtEnd::Loop } else { scene.at_end },
+            ..Playback::of(scene)
+        })
+    }
+}
+
+impl From<OpenError> for CommandError {
+    fn from(error: OpenError) -> Self {
+        match error {
+            OpenError::Name { .. } => Self::BadInput(error.to_string()),
+            _ => Self::Failed(error.to_string()),
+        }
+    }
+}

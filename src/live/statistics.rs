@@ -1,0 +1,231 @@
+//! What the loop has done: lateness and step cost as histograms, the status once a second, the summary at the end.
+//!
+//! Runs on a thread of its own, which takes samples from a queue, so that no percentile is computed, no file read and
+//! no line printed on the loop's thread.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use hdrhistogram::Histogram;
+use serde::Serialize;
+
+use super::clock::realtime_ns;
+use super::{Counts, StatusPublisher};
+use crate::messages::{LoopStatus, SCENE_NAME_BYTES};
+use crate::show::alerts::Alert;
+
+/// Seconds at the highest rate that the queue of samples holds.
+const QUEUED_SAMPLES: usize = 1 << 16;
+const QUEUED_ANNOUNCEMENTS: usize = 1 << 10;
+/// The longest lateness and step cost that is told apart: an hour.
+const LONGEST_NS: u64 = 3_600_000_000_000;
+
+/// One frame, as the loop saw it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// The frame's tick.
+    pub tick: u64,
+    /// The frame's simulated seconds.
+    pub sim_time: f64,
+    /// Shows played so far.
+    pub shows_played: u64,
+    /// What was counted so far, this frame included.
+    pub counts: Counts,
+    /// How late the thread woke after the intended deadline.
+    pub lateness_ns: u64,
+    /// From waking to the frame's being published everywhere.
+    pub step_ns: u64,
+    /// Subscribers connected.
+    pub subscribers: u32,
+}
+
+/// An alert, for printing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Announcement {
+    /// Simulated seconds of its frame.
+    pub sim_time: f64,
+    /// The alert.
+    pub alert: Alert,
+}
+
+/// The queues between the loop and this thread.
+pub fn queues() -> (super::Reports, Inbox) {
+    let (samples, sample_inbox) = rtrb::RingBuffer::new(QUEUED_SAMPLES);
+    let (announcements, announcement_inbox) = rtrb::RingBuffer::new(QUEUED_ANNOUNCEMENTS);
+    let reports = super::Reports { samples, announcements };
+    (reports, Inbox { samples: sample_inbox, announcements: announcement_inbox })
+}
+
+/// This thread's ends of the queues.
+pub struct Inbox {
+    samples: rtrb::Consumer<Sample>,
+    announcements: rtrb::Consumer<Announcement>,
+}
+
+/// Percentiles of a duration, nanoseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Percentiles {
+    /// Half are at most this.
+    pub p50: u64,
+    /// 99 % are at most this.
+    pub p99: u64,
+    /// 99.9 % are at most this.
+    pub p999: u64,
+    /// All are at most this.
+    pub max: u64,
+}
+
+impl Percentiles {
+    fn of(histogram: &Histogram<u64>) -> Self {
+        let at = |quantile| histogram.value_at_quantile(quantile);
+        Self { p50: at(0.5), p99: at(0.99), p999: at(0.999), max: histogram.max() }
+    }
+}
+
+/// What is known of a run at its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Summary {
+    /// Wake-up lateness against the intended deadlines; skipped periods count with the lateness they would have had.
+    pub wakeup_ns: Percentiles,
+    /// Cost of a step: frame, publishing and waking subscribers.
+    pub step_ns: Percentiles,
+    /// Samples that the queue could not hold, which the percentiles do not know of.
+    pub lost_samples: u64,
+}
+
+/// The same two durations over some stretch of time.
+struct Stretch {
+    lateness: Histogram<u64>,
+    step: Histogram<u64>,
+}
+
+impl Stretch {
+    fn new() -> Self {
+        // 1 ns to an hour with three digits are bounds the constructor accepts.
+        let histogram = || Histogram::new_with_bounds(1, LONGEST_NS, 3).expect("valid bounds");
+        Self { lateness: histogram(), step: histogram() }
+    }
+
+    /// Counts a sample. A late wake-up delays every period it covers: those are counted with what was left of it
+    /// (HdrHistogram's correction for coordinated omission).
+    fn record(&mut self, sample: &Sample, period_ns: u64) {
+        let interval = if sample.lateness_ns / period_ns < 100_000 { period_ns } else { 0 };
+        let late = sample.lateness_ns.min(LONGEST_NS);
+        // Both are within the histograms' bounds.
+        let _ = self.lateness.record_correct(late, interval);
+        self.step.saturating_record(sample.step_ns);
+    }
+
+    fn clear(&mut self) {
+        self.lateness.reset();
+        self.step.reset();
+    }
+}
+
+/// What the statistics thread is told of the run.
+pub struct Run<'a> {
+    /// The run's number.
+    pub run_id: u64,
+    /// Frames per second asked for.
+    pub rate: f64,
+    /// The scene's name.
+    pub scene: &'a str,
+    /// Where the status goes.
+    pub sinks: Vec<Box<dyn StatusPublisher>>,
+    /// What is done with each alert.
+    pub announce: Box<dyn FnMut(&Announcement) + 'a>,
+}
+
+/// Collects until `done` is set and the queues are empty.
+pub fn collect(mut inbox: Inbox, mut run: Run, done: &AtomicBool) -> Summary {
+    let (mut total, mut second) = (Stretch::new(), Stretch::new());
+    let period_ns = (1e9 / run.rate) as u64;
+    let mut frames_before = 0;
+    let mut latest: Option<Sample> = None;
+    let mut received = 0;
+    let mut second_began = Instant::now();
+    loop {
+        // Read before the queues are emptied: what was pushed before it was set is then still seen.
+        let ending = done.load(Ordering::Acquire);
+        while let Ok(announcement) = inbox.announcements.pop() {
+            (run.announce)(&announcement);
+        }
+        while let Ok(sample) = inbox.samples.pop() {
+            total.record(&sample, period_ns);
+            second.record(&sample, period_ns);
+            received += 1;
+            latest = Some(sample);
+        }
+        let elapsed = second_began.elapsed();
+        if let Some(sample) = latest.filter(|_| elapsed >= Duration::from_secs(1) || ending) {
+            let frames = sample.counts.frames - frames_before;
+            let status = status(&run, &sample, frames as f64 / elapsed.as_secs_f64(), &second, &total);
+            run.sinks.iter_mut().for_each(|sink| sink.publish_status(&status));
+            frames_before = sample.counts.frames;
+            second.clear();
+            second_began = Instant::now();
+        }
+        if ending {
+            let lost_samples = latest.map_or(0, |sample| sample.counts.frames) - received;
+            let (wakeup_ns, step_ns) = (Percentiles::of(&total.lateness), Percentiles::of(&total.step));
+            return Summary { wakeup_ns, step_ns, lost_samples };
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+fn status(run: &Run, sample: &Sample, measured_rate: f64, second: &Stretch, total: &Stretch) -> LoopStatus {
+    let [late, late_total] = [second, total].map(|stretch| Percentiles::of(&stretch.lateness));
+    let [step, step_total] = [second, total].map(|stretch| Percentiles::of(&stretch.step));
+    LoopStatus {
+        run_id: run.run_id,
+        tick: sample.tick,
+        sequence: sample.counts.frames - 1,
+        stamp_ns: realtime_ns(),
+        sim_time: sample.sim_time,
+        rate: run.rate,
+        measured_rate,
+        overruns: sample.counts.overruns,
+        skipped: sample.counts.skipped,
+        shows_played: sample.shows_played,
+        lateness_p50_second: late.p50,
+        lateness_p99_second: late.p99,
+        lateness_max_second: late.max,
+        lateness_p50_total: late_total.p50,
+        lateness_p99_total: late_total.p99,
+        lateness_p999_total: late_total.p999,
+        lateness_max_total: late_total.max,
+        step_p50_second: step.p50,
+        step_p99_second: step.p99,
+        step_max_second: step.max,
+        step_p50_total: step_total.p50,
+        step_p99_total: step_total.p99,
+        step_p999_total: step_total.p999,
+        step_max_total: step_total.max,
+        resident_bytes: resident_bytes(),
+        subscribers: sample.subscribers,
+        file_descriptors: file_descriptors(),
+        scene: padded(run.scene),
+    }
+}
+
+/// Resident memory of this process, bytes; 0 where /proc does not tell.
+fn resident_bytes() -> u64 {
+    let pages = std::fs::read_to_string("/proc/self/statm").ok();
+    let resident = pages.and_then(|text| text.split_whitespace().nth(1)?.parse::<u64>().ok()).unwrap_or(0);
+    let page = nix::unistd::sysconf(nix::unistd::SysconfVar::PAGE_SIZE).ok().flatten();
+    resident * page.unwrap_or(4096) as u64
+}
+
+/// Open file descriptors of this process; 0 where /proc does not tell.
+fn file_descriptors() -> u32 {
+    std::fs::read_dir("/proc/self/fd").map_or(0, |entries| entries.count() as u32)
+}
+
+/// A name as UTF-8 bytes, cut at a character's end.
+fn padded(name: &str) -> [u8; SCENE_NAME_BYTES] {
+    let mut bytes = [0; SCENE_NAME_BYTES];
+    let end = (0..=name.len().min(SCENE_NAME_BYTES)).rev().find(|end| name.is_char_boundary(*end)).unwrap_or(0);
+    bytes[..end].copy_from_slice(&name.as_bytes()[..end]);
+    bytes
+}

@@ -1,0 +1,145 @@
+//! A subscriber's ends of a publisher's services, opened when they appear and kept while publishers come and go.
+//!
+//! The monitor reads through it.
+
+use std::time::Duration;
+
+use iceoryx2::port::listener::Listener;
+use iceoryx2::port::subscriber::Subscriber as Port;
+use iceoryx2::prelude::*;
+use iceoryx2::service::port_factory::PortFactory as _;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+
+use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
+use crate::transports::iceoryx2::{OpenError, node, service_name};
+
+type Receiver<Payload, Header> = Port<ipc::Service, Payload, Header>;
+
+/// A publisher's services, as far as they exist.
+pub struct Connection {
+    poses: Receiver<[HandlePose], FrameHeader>,
+    poses_service: PortFactory<ipc::Service, [HandlePose], FrameHeader>,
+    alerts: Option<Receiver<CollisionAlert, ()>>,
+    status: Option<Receiver<LoopStatus, ()>>,
+    stage: Option<Receiver<Stage, ()>>,
+    tick: Option<Listener<ipc::Service>>,
+}
+
+/// A subscriber's node, with which it opens services.
+pub struct Subscription {
+    node: Node<ipc::Service>,
+    name: String,
+}
+
+impl Subscription {
+    /// A subscription to the services of `name`, none of which need exist yet.
+    ///
+    /// # Errors
+    /// [`OpenError`] for a name that iceoryx2 cannot take.
+    pub fn new(name: &str) -> Result<Self, OpenError> {
+        service_name(name, "poses")?;
+        Ok(Self { node: node()?, name: name.to_owned() })
+    }
+
+    /// Connects to the publisher, or `None` while there is none.
+    ///
+    /// # Errors
+    /// [`OpenError`] where its services exist and cannot be used.
+    pub fn connect(&self) -> Result<Option<Connection>, OpenError> {
+        let name = service_name(&self.name, "poses")?;
+        let opened =
+            self.node.service_builder(&name).publish_subscribe::<[HandlePose]>().user_header::<FrameHeader>().open();
+        use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError as Open;
+        let poses_service = match opened {
+            Ok(service) => service,
+            // Not there yet, or just coming or going.
+            Err(Open::DoesNotExist | Open::HangsInCreation | Open::IsMarkedForDestruction) => return Ok(None),
+            Err(Open::IncompatibleTypes | Open::VersionMismatch) => {
+                return Err(OpenError::Incompatible(name.to_string()));
+            }
+            Err(error) => {
+                return Err(OpenError::Failed { service: name.to_string(), reason: format!("{error:?}") });
+            }
+        };
+        use iceoryx2::port::subscriber::SubscriberCreateError;
+        let poses = poses_service.subscriber_builder().create().map_err(|error| match error {
+            SubscriberCreateError::ExceedsMaxSupportedSubscribers => OpenError::TooManySubscribers(name.to_string()),
+            other => OpenError::Failed { service: name.to_string(), reason: format!("{other:?}") },
+        })?;
+        Ok(Some(Connection {
+            poses,
+            poses_service,
+            alerts: self.receiver("alerts"),
+            status: self.receiver("status"),
+            stage: self.receiver("stage"),
+            tick: self.listener(),
+        }))
+    }
+
+    /// Opens what was not there when the connection was made: a publisher makes its services one after another, and
+    /// one without alerts never makes that one.
+    pub fn complete(&self, connection: &mut Connection) {
+        connection.alerts = connection.alerts.take().or_else(|| self.receiver("alerts"));
+        connection.status = connection.status.take().or_else(|| self.receiver("status"));
+        connection.stage = connection.stage.take().or_else(|| self.receiver("stage"));
+        connection.tick = connection.tick.take().or_else(|| self.listener());
+    }
+
+    /// Whether a publisher is there and alive. Cleans up after one that was killed.
+    pub fn publisher_is_alive(&self, connection: &Connection) -> bool {
+        let _ = self.node.try_cleanup_dead_nodes();
+        connection.poses_service.dynamic_config().number_of_publishers() > 0
+    }
+
+    /// A port of a service that may be absent: the scene has no alerts, say.
+    fn receiver<Message: ZeroCopySend + std::fmt::Debug>(&self, service: &str) -> Option<Receiver<Message, ()>> {
+        let name = service_name(&self.name, service).ok()?;
+        let factory = self.node.service_builder(&name).publish_subscribe::<Message>().open().ok()?;
+        factory.subscriber_builder().create().ok()
+    }
+
+    fn listener(&self) -> Option<Listener<ipc::Service>> {
+        let name = service_name(&self.name, "tick").ok()?;
+        self.node.service_builder(&name).event().open().ok()?.listener_builder().create().ok()
+    }
+}
+
+impl Connection {
+    /// Waits until a frame is announced, or for `timeout`.
+    pub fn wait(&self, timeout: Duration) {
+        let waited = self.tick.as_ref().map(|tick| tick.timed_wait(|_| (), timeout));
+        if !matches!(waited, Some(Ok(_))) {
+            // Without the event service there is nothing to wake on.
+            std::thread::sleep(timeout.min(Duration::from_millis(20)));
+        }
+    }
+
+    /// Hands every frame that has come to `each`, oldest first; how many there were.
+    pub fn frames(&self, mut each: impl FnMut(&FrameHeader, &[HandlePose])) -> usize {
+        let mut count = 0;
+        while let Ok(Some(sample)) = self.poses.receive() {
+            each(sample.user_header(), sample.payload());
+            count += 1;
+        }
+        count
+    }
+
+    /// The next alert, if one has come.
+    pub fn alert(&self) -> Option<CollisionAlert> {
+        next(self.alerts.as_ref())
+    }
+
+    /// The next status, if one has come.
+    pub fn status(&self) -> Option<LoopStatus> {
+        next(self.status.as_ref())
+    }
+
+    /// The next stage, if one has come.
+    pub fn stage(&self) -> Option<Stage> {
+        next(self.stage.as_ref())
+    }
+}
+
+fn next<Message: ZeroCopySend + std::fmt::Debug + Copy>(port: Option<&Receiver<Message, ()>>) -> Option<Message> {
+    port?.receive().ok().flatten().map(|sample| *sample)
+}

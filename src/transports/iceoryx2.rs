@@ -1,0 +1,375 @@
+//! iceoryx2: frames, alerts, status and stage in shared memory, for any number of processes on this machine.
+//!
+//! [`SharedMemoryPublisher`] lives on the loop's thread, [`StatusSender`] on the statistics thread; both are made there,
+//! since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/alerts`, `/status`,
+//! `/stage` and the event service `<name>/tick`.
+
+use ::iceoryx2::port::notifier::Notifier;
+use ::iceoryx2::port::publisher::Publisher as Port;
+use ::iceoryx2::port::publisher::PublisherCreateError;
+use ::iceoryx2::port::update_connections::UpdateConnections;
+use ::iceoryx2::prelude::*;
+use ::iceoryx2::service::builder::publish_subscribe::{
+    PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
+};
+use ::iceoryx2::service::port_factory::{event, publish_subscribe};
+
+use crate::chain::Team;
+use crate::live::clock::monotonic_ns;
+use crate::live::{PublishError, Publisher, StatusPublisher};
+use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, NO_BENCH, Stage};
+use crate::show::Frame;
+use crate::show::alerts::Alert;
+
+/// Subscribers that each service admits at once.
+pub const MAX_SUBSCRIBERS: usize = 8;
+/// Processes that may have a service open at once.
+const MAX_NODES: usize = 40;
+/// Alerts and statuses that a subscriber may fall behind.
+const SMALL_QUEUE: usize = 16;
+/// The shared memory that the queues of frames may take by default.
+const QUEUE_BYTES: usize = 64_000_000;
+/// Where Linux keeps shared memory.
+const SHARED_MEMORY: &str = "/dev/shm";
+
+/// Why the shared memory cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// iceoryx2 has no services of such a name.
+    #[error("--name is \"{name}\", expected a name for services of iceoryx2: not empty, at most {most} bytes")]
+    Name {
+        /// The name given.
+        name: String,
+        /// The most bytes a name may have.
+        most: usize,
+    },
+    /// Somebody publishes under this name already.
+    #[error(
+        "another publisher is running under the name \"{0}\": stop it, or choose another name for this one with --name"
+    )]
+    AlreadyPublished(String),
+    /// The queues would not fit.
+    #[error(
+        "the queues of {queue} frames for {MAX_SUBSCRIBERS} subscribers need {needed} bytes of shared memory and \
+         {SHARED_MEMORY} has {free} left: lower publish.queue in the scene, or make {SHARED_MEMORY} larger"
+    )]
+    NoRoom {
+        /// Frames in a queue.
+        queue: usize,
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes left.
+        free: u64,
+    },
+    /// A service of this name exists with other properties.
+    #[error(
+        "the service \"{0}\" exists with another layout or other limits: a program of another version has it open; \
+         stop that, or choose another name with --name"
+    )]
+    Incompatible(String),
+    /// The service admits no more subscribers.
+    #[error(
+        "\"{0}\" has {MAX_SUBSCRIBERS} subscribers, which is as many as a publisher admits (MAX_SUBSCRIBERS): end one first"
+    )]
+    TooManySubscribers(String),
+    /// Anything else.
+    #[error("iceoryx2 could not open \"{service}\": {reason}")]
+    Failed {
+        /// The service.
+        service: String,
+        /// What iceoryx2 says.
+        reason: String,
+    },
+}
+
+/// The name of one of a publisher's services.
+///
+/// # Errors
+/// [`OpenError::Name`] where iceoryx2 takes no such name.
+pub fn service_name(name: &str, service: &str) -> Result<ServiceName, OpenError> {
+    let refused = || OpenError::Name { name: name.to_owned(), most: ServiceName::max_len() - "/status".len() };
+    if name.is_empty() {
+        return Err(refused());
+    }
+    ServiceName::new(&format!("{name}/{service}")).map_err(|_| refused())
+}
+
+/// A node that leaves signals to this program.
+///
+/// # Errors
+/// [`OpenError::Failed`] where iceoryx2 cannot make one.
+pub fn node() -> Result<Node<ipc::Service>, OpenError> {
+    NodeBuilder::new()
+        .signal_handling_mode(SignalHandlingMode::Disabled)
+        .create::<ipc::Service>()
+        .map_err(|error| OpenError::Failed { service: "a node".to_owned(), reason: format!("{error:?}") })
+}
+
+/// Frames a subscriber may fall behind, where the scene does not say: at most 64 MB for all subscribers together.
+pub fn default_queue(handles: usize) -> usize {
+    (QUEUE_BYTES / frame_bytes(handles) / MAX_SUBSCRIBERS).clamp(2, 64)
+}
+
+fn frame_bytes(handles: usize) -> usize {
+    size_of::<FrameHeader>() + handles * size_of::<HandlePose>()
+}
+
+/// What a publisher offers.
+#[derive(Debug, Clone)]
+pub struct Offer {
+    /// The name under which services appear.
+    pub name: String,
+    /// Handles in a frame.
+    pub handles: usize,
+    /// Frames a subscriber may fall behind.
+    pub queue: usize,
+    /// Whether there is an alerts service.
+    pub alerts: bool,
+    /// The stage, sent once and kept for late subscribers.
+    pub stage: Stage,
+}
+
+/// The stage of a team on a spiral.
+pub fn stage(run_id: u64, stamp_ns: u64, team: &Team, pitch: f64, start_turn: f64) -> Stage {
+    Stage {
+        run_id,
+        stamp_ns,
+        pitch,
+        start_turn,
+        hole_inset: team.hole_inset,
+        head_length: team.head_length,
+        body_length: team.body_length,
+        width: team.width,
+        benches: team.benches as u32,
+        reserved: 0,
+    }
+}
+
+type Service<Payload, Header> = publish_subscribe::PortFactory<ipc::Service, Payload, Header>;
+type Sender<Payload, Header> = Port<ipc::Service, Payload, Header>;
+
+/// Publishes frames, alerts and the stage.
+pub struct SharedMemoryPublisher {
+    poses: Sender<[HandlePose], FrameHeader>,
+    poses_service: Service<[HandlePose], FrameHeader>,
+    alerts: Option<Sender<CollisionAlert, ()>>,
+    stage: Sender<Stage, ()>,
+    tick: Notifier<ipc::Service>,
+    tick_service: event::PortFactory<ipc::Service>,
+    // Dropped last: the ports above belong to it.
+    _node: Node<ipc::Service>,
+}
+
+impl SharedMemoryPublisher {
+    /// Opens the services and sends the stage. To be called on the thread that will publish.
+    ///
+    /// # Errors
+    /// [`OpenError`]: each names what is in the way and what to do.
+    pub fn open(offer: &Offer) -> Result<Self, OpenError> {
+        let name = offer.name.as_str();
+        service_name(name, "poses")?;
+        check_room(offer)?;
+        let node = node()?;
+        let frame_service = frames(&node, name, offer.queue)?;
+        let poses = frame_service
+            .publisher_builder()
+            .initial_max_slice_len(offer.handles)
+            .allocation_strategy(AllocationStrategy::Static)
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .create()
+            .map_err(|error| port_error(name, "poses", error))?;
+        let alerts = if offer.alerts { Some(sender(&node, name, "alerts")?) } else { None };
+        let stage = sender(&node, name, "stage")?;
+        stage.send_copy(offer.stage).map_err(|error| failed(name, "stage", error))?;
+        let tick_service = node
+            .service_builder(&service_name(name, "tick")?)
+            .event()
+            .open_or_create()
+            .map_err(|error| failed(name, "tick", error))?;
+        let tick = tick_service.notifier_builder().create().map_err(|error| failed(name, "tick", error))?;
+        Ok(Self { poses, poses_service: frame_service, alerts, stage, tick, tick_service, _node: node })
+    }
+
+    fn send_frame(&self, header: &FrameHeader, frame: &Frame) -> Result<(), String> {
+        let sample = self.poses.loan_slice_uninit(frame.chain.handles()).map_err(|error| error.to_string())?;
+        let mut sample = sample.write_from_fn(|handle| frame.chain.pose(handle));
+        *sample.user_header_mut() = FrameHeader { sent_ns: monotonic_ns(), ..*header };
+        sample.send().map(|_| ()).map_err(|error| error.to_string())
+    }
+
+    fn send_alerts(&self, header: &FrameHeader, frame: &Frame) -> Result<(), String> {
+        let Some(port) = &self.alerts else { return Ok(()) };
+        for alert in &frame.alerts {
+            port.send_copy(message(header, alert)).map_err(|error| error.to_string())?;
+        }
+        Ok(())
+    }
+}
+
+impl Publisher for SharedMemoryPublisher {
+    fn publish(&mut self, header: &FrameHeader, frame: &Frame) -> Result<(), PublishError> {
+        let sent = self.send_frame(header, frame).and_then(|()| self.send_alerts(header, frame));
+        sent.map_err(|reason| PublishError(format!("the shared memory failed: {reason}")))?;
+        // Waking costs a socket write per listener, several times what sending does: it is left out for nobody.
+        if self.tick_service.dynamic_config().number_of_listeners() > 0 {
+            // A listener that died or does not drain is its own loss: the frame is in its queue.
+            let _ = self.tick.notify();
+        }
+        Ok(())
+    }
+
+    fn maintain(&mut self) {
+        // A late subscriber gets the history of a service only when its publisher looks for new connections.
+        if let Some(alerts) = &self.alerts {
+            let _ = alerts.update_connections();
+        }
+        let _ = self.stage.update_connections();
+        let _ = self.poses.update_connections();
+    }
+
+    fn subscribers(&self) -> u32 {
+        self.poses_service.dynamic_config().number_of_subscribers() as u32
+    }
+}
+
+/// Publishes the loop's status; to be made on the statistics thread.
+pub struct StatusSender {
+    status: Sender<LoopStatus, ()>,
+    _node: Node<ipc::Service>,
+}
+
+impl StatusSender {
+    /// Opens `<name>/status`.
+    ///
+    /// # Errors
+    /// As [`SharedMemoryPublisher::open`].
+    pub fn open(name: &str) -> Result<Self, OpenError> {
+        let node = node()?;
+        Ok(Self { status: sender(&node, name, "status")?, _node: node })
+    }
+}
+
+impl StatusPublisher for StatusSender {
+    fn publish_status(&mut self, status: &LoopStatus) {
+        if let Err(error) = self.status.send_copy(*status) {
+            log::warn!("the status could not be sent: {error}");
+        }
+    }
+}
+
+/// The message of an alert that goes with a frame.
+pub fn message(header: &FrameHeader, alert: &Alert) -> CollisionAlert {
+    CollisionAlert {
+        run_id: header.run_id,
+        tick: header.tick,
+        stamp_ns: header.stamp_ns,
+        sim_time: header.sim_time,
+        event_time: alert.event_time,
+        time_to_event: alert.time_to_event,
+        clearance: alert.clearance,
+        x: alert.x,
+        y: alert.y,
+        level: alert.level as u32,
+        bench_a: alert.bench_a.unwrap_or(NO_BENCH),
+        bench_b: alert.bench_b.unwrap_or(NO_BENCH),
+        reserved: 0,
+    }
+}
+
+/// Refuses queues that the shared memory has no room for: the pages are reserved first and touched later, and touching
+/// one that is not there ends the process with SIGBUS.
+fn check_room(offer: &Offer) -> Result<(), OpenError> {
+    // Two frames that a subscriber may hold, two loans, the history, and a little for bookkeeping.
+    let frames = MAX_SUBSCRIBERS * (offer.queue + 2) + 4;
+    let needed = (frames * frame_bytes(offer.handles)) as u64 + 2_000_000;
+    // Where there is no such folder iceoryx2 itself will say what is wrong.
+    let Ok(space) = nix::sys::statvfs::statvfs(SHARED_MEMORY) else { return Ok(()) };
+    let free = space.blocks_available() * space.fragment_size();
+    if needed > free { Err(OpenError::NoRoom { queue: offer.queue, needed, free }) } else { Ok(()) }
+}
+
+/// The service of frames. One left by a watcher can have shorter queues than this publisher would make: it is used as
+/// it is.
+fn frames(
+    node: &Node<ipc::Service>,
+    name: &str,
+    queue: usize,
+) -> Result<Service<[HandlePose], FrameHeader>, OpenError> {
+    let full_name = service_name(name, "poses")?;
+    let builder = || {
+        node.service_builder(&full_name)
+            .publish_subscribe::<[HandlePose]>()
+            .user_header::<FrameHeader>()
+            .max_publishers(1)
+            .enable_safe_overflow(true)
+    };
+    let made = builder()
+        .max_subscribers(MAX_SUBSCRIBERS)
+        .max_nodes(MAX_NODES)
+        .subscriber_max_buffer_size(queue)
+        .open_or_create();
+    match made {
+        Err(PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
+            PublishSubscribeOpenError::DoesNotSupportRequestedMinBufferSize,
+        )) => {
+            log::warn!(
+                "a subscriber keeps \"{full_name}\" open with shorter queues than {queue} frames: those are used"
+            );
+            builder().open().map_err(|error| service_error(&full_name, PublishSubscribeOpenOrCreateError::from(error)))
+        }
+        other => other.map_err(|error| service_error(&full_name, error)),
+    }
+}
+
+/// A port for messages that are sent seldom; the last one is kept for late subscribers.
+fn sender<Message: ZeroCopySend + std::fmt::Debug + Copy>(
+    node: &Node<ipc::Service>,
+    name: &str,
+    service: &str,
+) -> Result<Sender<Message, ()>, OpenError> {
+    let full_name = service_name(name, service)?;
+    node.service_builder(&full_name)
+        .publish_subscribe::<Message>()
+        .max_publishers(1)
+        .max_subscribers(MAX_SUBSCRIBERS)
+        .max_nodes(MAX_NODES)
+        .subscriber_max_buffer_size(SMALL_QUEUE)
+        .history_size(1)
+        .enable_safe_overflow(true)
+        .open_or_create()
+        .map_err(|error| service_error(&full_name, error))?
+        .publisher_builder()
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .create()
+        .map_err(|error| port_error(name, service, error))
+}
+
+fn service_error(service: &ServiceName, error: PublishSubscribeOpenOrCreateError) -> OpenError {
+    use PublishSubscribeOpenError as Open;
+    let incompatible = match &error {
+        PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(open) => !matches!(
+            open,
+            Open::DoesNotExist | Open::InternalFailure | Open::Interrupt | Open::InsufficientPermissions
+        ),
+        PublishSubscribeOpenOrCreateError::PublishSubscribeCreateError(create) => {
+            matches!(create, PublishSubscribeCreateError::AlreadyExists)
+        }
+        _ => false,
+    };
+    if incompatible {
+        OpenError::Incompatible(format!("{service} ({error:?})"))
+    } else {
+        OpenError::Failed { service: service.to_string(), reason: format!("{error:?}") }
+    }
+}
+
+fn port_error(name: &str, service: &str, error: PublisherCreateError) -> OpenError {
+    match error {
+        PublisherCreateError::ExceedsMaxSupportedPublishers => OpenError::AlreadyPublished(name.to_owned()),
+        other => failed(name, service, other),
+    }
+}
+
+fn failed(name: &str, service: &str, error: impl std::fmt::Debug) -> OpenError {
+    OpenError::Failed { service: format!("{name}/{service}"), reason: format!("{error:?}") }
+}

@@ -1,0 +1,356 @@
+//! The live publisher as users meet it: real processes, the real shared memory, subscribers in Rust and in Python.
+//!
+//! Every process is ended by a deadline, and nothing asserts a speed.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+/// A process that does not outlive its test.
+struct Process(Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+impl Process {
+    fn start(command: &mut Command) -> Self {
+        Self(command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap())
+    }
+
+    fn signal(&self, signal: nix::sys::signal::Signal) {
+        nix::sys::signal::kill(nix::unistd::Pid::from_raw(self.0.id() as i32), signal).unwrap();
+    }
+
+    /// What the process printed, once it has ended by itself within `seconds`.
+    fn output_within(mut self, seconds: u64) -> Output {
+        let deadline = Instant::now() + Duration::from_secs(seconds);
+        // Read beside waiting: a full pipe would stop the process.
+        let [stdout, stderr] = [
+            std::thread::spawn(reading(self.0.stdout.take().unwrap())),
+            std::thread::spawn(reading(self.0.stderr.take().unwrap())),
+        ];
+        let status = loop {
+            if let Some(status) = self.0.try_wait().unwrap() {
+                break status;
+            }
+            assert!(Instant::now() < deadline, "the process did not end within {seconds} s");
+            std::thread::sleep(Duration::from_millis(10));
+        };
+        Output { status, stdout: stdout.join().unwrap(), stderr: stderr.join().unwrap() }
+    }
+}
+
+fn reading(mut pipe: impl Read) -> impl FnOnce() -> Vec<u8> {
+    move || {
+        let mut bytes = Vec::new();
+        pipe.read_to_end(&mut bytes).unwrap();
+        bytes
+    }
+}
+
+/// The program with a service name that no other test has.
+fn program(name: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    command.args(["--name", &unique(name)]);
+    command
+}
+
+fn unique(name: &str) -> String {
+    format!("test_{}_{name}", std::process::id())
+}
+
+fn python() -> Command {
+    let interpreter = std::env::var_os("BENCH_DRAGON_PYTHON").unwrap_or("python3".into());
+    let mut command = Command::new(interpreter);
+    command.current_dir(env!("CARGO_MANIFEST_DIR"));
+    command
+}
+
+fn example(name: &str) -> Command {
+    let target = std::env::current_exe().unwrap();
+    Command::new(target.ancestors().nth(2).unwrap().join("examples").join(name))
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn json_lines(output: &Output) -> Vec<Value> {
+    text(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+fn summary(output: &Output) -> Value {
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    json_lines(output).pop().unwrap()
+}
+
+fn wait(seconds: f64) {
+    std::thread::sleep(Duration::from_secs_f64(seconds));
+}
+
+#[test]
+fn every_subscriber_gets_every_frame_at_60_hz() {
+    let publisher = Process::start(program("sixty").args(["run", "--json", "--start", "300", "--duration", "8"]));
+    wait(1.0);
+    let rust = [1, 2].map(|_| Process::start(example("subscriber").args([&unique("sixty"), "3"])));
+    let python = Process::start(python().args([
+        "examples/python/subscribe.py",
+        "--json",
+        "--seconds",
+        "3",
+        "--name",
+        &unique("sixty"),
+    ]));
+    let monitor = Process::start(program("sixty").args(["watch", "--json", "--duration", "3"]));
+    for subscriber in rust {
+        let output = subscriber.output_within(20);
+        let said = text(&output.stdout);
+        let words: Vec<_> = said.split_whitespace().collect();
+        let number = |index: usize| words[index].parse::<u64>().unwrap_or_else(|_| panic!("{said}"));
+        assert!(said.trim().ends_with("in order true"), "{said}");
+        assert_eq!(number(1), number(5) - number(3) + 1, "frames are missing: {said}");
+        assert!(number(1) > 120, "{said}");
+    }
+    let output = python.output_within(30);
+    let lines = json_lines(&output);
+    let frames: Vec<_> = lines.iter().filter(|line| line["type"] == "frame").collect();
+    assert!(frames.len() > 120, "{} frames; {}", frames.len(), text(&output.stderr));
+    for pair in frames.windows(2) {
+        assert_eq!(pair[1]["sequence"].as_u64(), pair[0]["sequence"].as_u64().map(|sequence| sequence + 1));
+    }
+    for frame in frames {
+        assert_eq!(frame["handles"], 224);
+        assert!((frame["link"].as_f64().unwrap() - 1.65).abs() < 1e-12, "{frame}");
+        let sim_time = 300.0 + frame["tick"].as_f64().unwrap() / 60.0;
+        assert_eq!(frame["sim_time"].as_f64(), Some(sim_time));
+    }
+    let seconds: Vec<_> = json_lines(&monitor.output_within(20));
+    let last = seconds.iter().rfind(|line| line["type"] == "second").unwrap();
+    assert_eq!(last["missed"], 0, "{last}");
+    assert!(last["received"].as_u64().unwrap() > 100, "{last}");
+    assert_eq!(last["state"], "moving");
+    let summary = summary(&publisher.output_within(30));
+    assert_eq!(summary["frames"].as_u64().unwrap() + summary["skipped"].as_u64().unwrap(), 480);
+    assert_eq!(summary["end"], "duration");
+}
+
+#[test]
+fn alerts_come_once_each_and_in_order_in_rust_and_in_python() {
+    let scene = scene_file("continue", &[("on_contact = \"stop\"", "on_contact = \"continue\"")]);
+    for rate in ["60", "1000"] {
+        let name = format!("alerts{rate}");
+        let monitor = Process::start(program(&name).args(["watch", "--json", "--duration", "12"]));
+        let arguments = ["examples/python/subscribe.py", "--json", "--seconds", "11", "--name"];
+        let listener = Process::start(python().args(arguments).arg(unique(&name)));
+        wait(1.5);
+        let publisher = Process::start(program(&name).arg("--scene").arg(&scene).args([
+            "run",
+            "--json",
+            "--start",
+            "380",
+            "--time-scale",
+            "8",
+            "--duration",
+            "8",
+            "--rate",
+            rate,
+        ]));
+        let levels = |lines: Vec<Value>, of: &dyn Fn(&Value) -> String| {
+            let mut levels: Vec<_> = lines.iter().filter(|line| line["type"] == "alert").map(of).collect();
+            let all = levels.len();
+            levels.dedup();
+            (levels, all)
+        };
+        let names = ["clear", "approaching", "contact", "stall", "lock"];
+        let expected: Vec<_> = names.map(str::to_owned).into();
+        summary(&publisher.output_within(30));
+        let (watched, count) =
+            levels(json_lines(&monitor.output_within(30)), &|line| line["level"].as_str().unwrap().into());
+        assert_eq!(watched, expected);
+        // One for each level, and the countdown: 3.57 s of wall time pass while approaching.
+        assert_eq!(count, expected.len() + 3, "at {rate} Hz");
+        let (heard, of_python) = levels(json_lines(&listener.output_within(30)), &|line| {
+            names[line["level"].as_u64().unwrap() as usize].to_owned()
+        });
+        assert_eq!((heard, of_python), (watched, count));
+    }
+}
+
+#[test]
+fn a_late_subscriber_gets_the_contact_that_has_happened() {
+    let _publisher = Process::start(program("late").args(["run", "--json", "--start", "412", "--duration", "30"]));
+    wait(3.0);
+    let lines =
+        json_lines(&Process::start(program("late").args(["watch", "--json", "--duration", "2"])).output_within(20));
+    let alerts: Vec<_> = lines.iter().filter(|line| line["type"] == "alert").collect();
+    assert_eq!(alerts.len(), 1, "{alerts:?}");
+    assert_eq!(alerts[0]["level"], "contact");
+    assert_eq!((alerts[0]["bench_a"].as_u64(), alerts[0]["bench_b"].as_u64()), (Some(0), Some(8)));
+    assert!((alerts[0]["event_time"].as_f64().unwrap() - 412.473837682115).abs() < 1e-10);
+    let second = lines.iter().rfind(|line| line["type"] == "second").unwrap();
+    assert_eq!(second["sim_time"], alerts[0]["event_time"], "the show is frozen at the contact");
+}
+
+#[test]
+fn a_scene_without_alerts_has_no_alerts_service() {
+    let scene = scene_file("silent", &[("[alerts]", "# [alerts]"), ("approach_", "# approach_")]);
+    let monitor = Process::start(program("silent").args(["watch", "--json", "--duration", "4"]));
+    let publisher = Process::start(program("silent").arg("--scene").arg(&scene).args([
+        "run",
+        "--json",
+        "--start",
+        "410",
+        "--time-scale",
+        "10",
+        "--duration",
+        "3",
+    ]));
+    summary(&publisher.output_within(30));
+    let lines = json_lines(&monitor.output_within(20));
+    assert!(lines.iter().all(|line| line["type"] == "second"));
+    let states: Vec<_> = lines.iter().filter_map(|line| line["state"].as_str()).collect();
+    assert!(states.contains(&"lock") && !states.contains(&"contact") && !states.contains(&"stall"), "{states:?}");
+}
+
+#[test]
+fn a_second_publisher_of_one_name_is_refused() {
+    let _first = Process::start(program("twice").args(["run", "--json", "--duration", "20"]));
+    wait(1.0);
+    let second = Process::start(program("twice").args(["run", "--json", "--duration", "1"])).output_within(20);
+    assert_eq!(second.status.code(), Some(1));
+    let said = text(&second.stderr);
+    assert!(said.contains("another publisher") && said.contains("--name") && said.lines().count() == 1, "{said}");
+}
+
+#[test]
+fn a_watcher_notices_the_death_of_a_publisher_and_picks_up_the_next() {
+    let monitor = Process::start(program("death").args(["watch", "--duration", "9"]));
+    wait(0.5);
+    let first = Process::start(program("death").args(["run", "--json", "--duration", "30"]));
+    wait(3.0);
+    first.signal(nix::sys::signal::Signal::SIGKILL);
+    wait(2.0);
+    let second = Process::start(program("death").args(["run", "--json", "--duration", "2"]));
+    summary(&second.output_within(20));
+    let said = text(&monitor.output_within(20).stdout);
+    let count = |what: &str| said.lines().filter(|line| line.contains(what)).count();
+    assert_eq!(count("is running"), 2, "{said}");
+    assert_eq!(count("has ended"), 2, "{said}");
+    assert!(said.lines().all(|line| !line.contains("rate") || line.contains("missed 0")), "{said}");
+}
+
+#[test]
+fn killed_subscribers_leave_the_publisher_alone() {
+    let publisher = Process::start(program("killed").args(["run", "--json", "--duration", "8"]));
+    wait(0.7);
+    for _ in 0..20 {
+        let watcher = Process::start(program("killed").args(["watch", "--json"]));
+        wait(0.2);
+        watcher.signal(nix::sys::signal::Signal::SIGKILL);
+    }
+    let last = Process::start(program("killed").args(["watch", "--json", "--duration", "2"])).output_within(20);
+    let lines = json_lines(&last);
+    assert!(lines.iter().rfind(|line| line["type"] == "second").unwrap()["received"].as_u64() > Some(30), "{lines:?}");
+    let summary = summary(&publisher.output_within(30));
+    assert_eq!(summary["frames"].as_u64().unwrap() + summary["skipped"].as_u64().unwrap(), 480);
+}
+
+#[test]
+fn a_stopped_publisher_skips_whole_periods_and_catches_nothing_up() {
+    let publisher = Process::start(program("stopped").args(["run", "--json", "--rate", "100", "--duration", "6"]));
+    wait(1.5);
+    publisher.signal(nix::sys::signal::Signal::SIGSTOP);
+    wait(2.0);
+    publisher.signal(nix::sys::signal::Signal::SIGCONT);
+    let summary = summary(&publisher.output_within(30));
+    let [frames, skipped, overruns] = ["frames", "skipped", "overruns"].map(|key| summary[key].as_u64().unwrap());
+    assert_eq!(frames + skipped, 600, "{summary}");
+    // The machine itself may add a stall of a period or two.
+    assert!((195..260).contains(&skipped) && (1..20).contains(&overruns), "{summary}");
+    assert!(summary["wakeup_ns"]["max"].as_u64() > Some(1_900_000_000), "{summary}");
+}
+
+#[test]
+fn signals_end_a_run_cleanly_and_leave_nothing_behind() {
+    use nix::sys::signal::Signal::{SIGINT, SIGTERM};
+    for (signal, rate) in [(SIGINT, "60"), (SIGTERM, "0.1")] {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("config")).unwrap();
+        let prefix = unique(rate).replace('.', "_");
+        let settings = format!("[global]\nroot-path = \"{}/root/\"\nprefix = \"{prefix}\"\n", folder.path().display());
+        std::fs::write(folder.path().join("config/iceoryx2.toml"), settings).unwrap();
+        let publisher =
+            Process::start(program("signals").current_dir(folder.path()).args(["run", "--json", "--rate", rate]));
+        wait(1.5);
+        assert!(left_behind(folder.path(), &prefix) > 1, "the publisher runs in its own place");
+        publisher.signal(signal);
+        let summary = summary(&publisher.output_within(5));
+        assert_eq!(summary["end"], "signal");
+        // One small file of iceoryx2's own stays.
+        assert!(left_behind(folder.path(), &prefix) <= 1);
+    }
+}
+
+/// Files of an isolated iceoryx2 that exist.
+fn left_behind(folder: &Path, prefix: &str) -> usize {
+    let shared = std::fs::read_dir("/dev/shm").unwrap().flatten();
+    let memory = shared.filter(|file| file.file_name().to_string_lossy().starts_with(prefix)).count();
+    memory + files_below(&folder.join("root"))
+}
+
+fn files_below(folder: &Path) -> usize {
+    let Ok(entries) = std::fs::read_dir(folder) else { return 0 };
+    entries.flatten().map(|entry| if entry.path().is_dir() { files_below(&entry.path()) } else { 1 }).sum()
+}
+
+/// The paper's scene with some text replaced, in a file.
+fn scene_file(name: &str, replacements: &[(&str, &str)]) -> PathBuf {
+    let mut scene = include_str!("../config/paper.toml").to_owned();
+    for (from, to) in replacements {
+        assert!(scene.contains(from));
+        scene = scene.replace(from, to);
+    }
+    let file = std::env::temp_dir().join(format!("{}.toml", unique(name)));
+    std::fs::write(&file, scene).unwrap();
+    file
+}
+
+#[test]
+fn python_sees_the_same_layouts() {
+    use bench_dragon::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
+    use std::mem::offset_of;
+    let code = "import sys; sys.path.insert(0, 'examples/python')\n\
+                from bench_dragon_messages import *\n\
+                for m in MESSAGES:\n\
+                \x20   print(m.__name__, m.type_name(), ctypes.sizeof(m), *(f'{n}={getattr(m, n).offset}' for n, *_ in m._fields_))\n\
+                print(HANDLE_POSE.itemsize)";
+    let output = Process::start(python().args(["-c", code])).output_within(60);
+    let said = text(&output.stdout);
+    macro_rules! layout {
+        ($type:ident: $($field:ident)*) => {{
+            let offsets = [$(format!("{}={}", stringify!($field), offset_of!($type, $field))),*];
+            let name = stringify!($type);
+            format!("{name} bench_dragon/{name}/1 {} {}", size_of::<$type>(), offsets.join(" "))
+        }};
+    }
+    let expected = [
+        layout!(HandlePose: x y heading vx vy),
+        layout!(FrameHeader: run_id sequence tick stamp_ns sent_ns deadline_ns sim_time time_scale min_clearance handles state),
+        layout!(CollisionAlert: run_id tick stamp_ns sim_time event_time time_to_event clearance x y level bench_a bench_b reserved),
+        layout!(LoopStatus: run_id tick sequence stamp_ns sim_time rate measured_rate overruns skipped shows_played
+            lateness_p50_second lateness_p99_second lateness_max_second lateness_p50_total lateness_p99_total
+            lateness_p999_total lateness_max_total step_p50_second step_p99_second step_max_second step_p50_total
+            step_p99_total step_p999_total step_max_total resident_bytes subscribers file_descriptors scene),
+        layout!(Stage: run_id stamp_ns pitch start_turn hole_inset head_length body_length width benches reserved),
+        "40".to_owned(),
+    ];
+    assert_eq!(said.lines().collect::<Vec<_>>(), expected, "{}", text(&output.stderr));
+    assert_eq!([size_of::<HandlePose>(), size_of::<FrameHeader>(), size_of::<CollisionAlert>()], [40, 80, 88]);
+}

@@ -1,0 +1,143 @@
+//! The show: deterministic, without drift, frozen and looped as the scene says, and with levels that do not depend on
+//! how often it is looked at.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use bench_dragon::messages::State;
+use bench_dragon::scene::{AtEnd, OnContact, Scene};
+use bench_dragon::show::timeline::Timeline;
+use bench_dragon::show::{Frame, Playback, Show};
+use proptest::prelude::*;
+
+fn paper_timeline() -> Timeline {
+    Timeline::of(&Scene::paper(), &mut |_| ())
+}
+
+fn show(playback: Playback) -> Show {
+    Show::new(&Scene::paper(), paper_timeline(), playback).unwrap()
+}
+
+fn playback() -> Playback {
+    Playback::of(&Scene::paper())
+}
+
+fn hash(frame: &Frame) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    (frame.tick, frame.state as u32, frame.sim_time.to_bits(), frame.min_clearance.to_bits()).hash(&mut hasher);
+    for column in [&frame.chain.x, &frame.chain.y, &frame.chain.heading, &frame.chain.vx, &frame.chain.vy] {
+        column.iter().for_each(|value| value.to_bits().hash(&mut hasher));
+    }
+    hasher.finish()
+}
+
+#[test]
+fn two_shows_have_the_same_bits() {
+    let hashes = || {
+        let mut show = show(Playback { start: 400.0, at_end: AtEnd::Loop, ..playback() });
+        (0..2000).step_by(3).map(|tick| hash(show.frame(tick))).collect::<Vec<_>>()
+    };
+    assert_eq!(hashes(), hashes());
+}
+
+#[test]
+fn time_does_not_drift_in_a_billion_ticks() {
+    let playback = Playback { rate: 1000.0, time_scale: 1e-6, ..playback() };
+    let mut show = show(playback);
+    for tick in [1u64, 999, 1_000_000_000, 10_000_000_000] {
+        let frame = show.frame(tick);
+        // A thousandth of a microsecond a tick, from exact integers.
+        assert_eq!(frame.sim_time, 1e-6 * tick as f64 / 1000.0);
+    }
+}
+
+#[test]
+fn the_show_freezes_exactly_at_the_contact() {
+    let mut show = show(Playback { start: 412.0, ..playback() });
+    let moving = show.frame(28).clone();
+    assert_eq!(moving.state, State::Approaching);
+    for tick in [29, 30, 1_000_000] {
+        let frame = show.frame(tick);
+        assert_eq!(frame.state, State::Contact);
+        assert!((frame.sim_time - 412.473837682115).abs() < 1e-10);
+        assert!(frame.min_clearance.abs() < 1e-9, "{}", frame.min_clearance);
+        assert!(frame.chain.vx.iter().chain(&frame.chain.vy).all(|velocity| *velocity == 0.0));
+    }
+}
+
+#[test]
+fn a_loop_begins_again_where_it_began() {
+    let mut show = show(Playback { start: 412.0, at_end: AtEnd::Loop, ..playback() });
+    let first = show.frame(0).clone();
+    assert_eq!(show.frame(29).state, State::Contact);
+    let again = show.frame(30);
+    assert_eq!((again.sim_time, again.shows_played), (412.0, 1));
+    assert_eq!(again.chain, first.chain);
+    assert_eq!(again.state, State::Approaching);
+}
+
+#[test]
+fn a_start_after_the_contact_is_in_contact_at_once() {
+    let mut stopped = show(Playback { start: 420.0, ..playback() });
+    assert_eq!(stopped.frame(0).state, State::Contact);
+    assert!((stopped.frame(1).sim_time - 412.473837682115).abs() < 1e-10);
+    let mut going_on = show(Playback { start: 420.0, on_contact: OnContact::Continue, ..playback() });
+    let frame = going_on.frame(0);
+    assert_eq!((frame.state, frame.sim_time), (State::Contact, 420.0));
+    assert_eq!(frame.alerts.iter().map(|alert| alert.level).collect::<Vec<_>>(), [State::Contact]);
+}
+
+#[test]
+fn without_alerts_and_velocities_neither_is_computed() {
+    let text = include_str!("../config/paper.toml").replace("[alerts]", "").replace("approach_", "# approach_");
+    let scene = Scene::parse(&text.replace("velocities = true", "velocities = false"), "test", "test").unwrap();
+    let timeline = Timeline::without_contact(&scene);
+    let mut show = Show::new(&scene, timeline, Playback { start: 412.0, ..Playback::of(&scene) }).unwrap();
+    for tick in 0..100 {
+        let frame = show.frame(tick);
+        assert!(frame.min_clearance.is_nan() && frame.alerts.is_empty());
+        assert_eq!(frame.state, State::Moving);
+        let chain = &frame.chain;
+        assert!(chain.vx.iter().chain(&chain.vy).chain(&chain.speed).all(|velocity| velocity.is_nan()));
+    }
+    assert_eq!(show.pairs_asked(), 0, "a pair was asked for its clearance");
+}
+
+/// The levels announced over a whole show, repeats left out, and the times of the events as announced.
+fn levels(rate: f64, time_scale: f64, start: f64, on_contact: OnContact) -> (Vec<State>, Vec<(State, f64)>) {
+    let mut show = show(Playback { rate, time_scale, start, on_contact, at_end: AtEnd::Hold });
+    let ticks = ((show.freeze_time() - start) * rate / time_scale).ceil() as u64 + 2;
+    let (mut levels, mut events) = (Vec::new(), Vec::new());
+    for tick in 0..ticks {
+        for alert in &show.frame(tick).alerts {
+            if levels.last() != Some(&alert.level) {
+                levels.push(alert.level);
+            }
+            if alert.level >= State::Contact {
+                events.push((alert.level, alert.event_time));
+            }
+        }
+    }
+    (levels, events)
+}
+
+#[test]
+fn the_paper_scene_never_flickers() {
+    use State::{Approaching, Contact, Lock, Moving, Stall};
+    assert_eq!(levels(60.0, 1.0, 0.0, OnContact::Stop).0, [Moving, Approaching, Contact]);
+    assert_eq!(levels(60.0, 1.0, 0.0, OnContact::Continue).0, [Moving, Approaching, Contact, Stall, Lock]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(12) })]
+
+    /// What is announced depends neither on the rate nor on the time scale.
+    #[test]
+    fn events_do_not_depend_on_the_rate(exponent in -0.3f64..3.7, time_scale in 0.5f64..2.0) {
+        use State::{Approaching, Contact, Lock, Moving, Stall};
+        let (levels, events) = levels(10f64.powf(exponent), time_scale, 380.0, OnContact::Continue);
+        prop_assert_eq!(levels, [Moving, Approaching, Contact, Stall, Lock]);
+        for ((_, time), truth) in events.iter().zip([412.473837682115, 432.758134083656, 432.917924228383]) {
+            prop_assert!((time - truth).abs() < 1e-10);
+        }
+    }
+}
