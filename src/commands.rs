@@ -5,6 +5,7 @@ pub mod draw;
 pub mod events;
 pub mod run;
 pub mod solve;
+pub mod trade;
 pub mod watch;
 
 use std::fs::File;

@@ -96,6 +96,11 @@ impl WholeChain {
         self.instructions
     }
 
+    /// Bytes this solver holds.
+    pub fn memory_bytes(&self) -> usize {
+        size_of::<Self>() + 9 * size_of::<f64>() * self.state.increment.len()
+    }
+
     /// How often the chain had to be found anew, handle by handle; once for the first frame.
     pub fn restarts(&self) -> u64 {
         self.restarts
