@@ -34,5 +34,8 @@ fn main() {
     let whole = a_sample * (overlap * 100.0) as u32;
     println!("exact: contact at {contact:.12} s, with stall and lock, in {exact:.1?}");
     println!("sampled: first overlap seen at {overlap} s, {:.1} ms late", 1000.0 * (overlap - contact));
-    println!("sampling from the start takes {whole:.1?}: {:.0} times as long", whole.as_secs_f64() / exact.as_secs_f64());
+    println!(
+        "sampling from the start takes {whole:.1?}: {:.0} times as long",
+        whole.as_secs_f64() / exact.as_secs_f64()
+    );
 }
