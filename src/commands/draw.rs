@@ -72,7 +72,7 @@ fn picture(
     let radius = radius.unwrap_or(1.05 * reach + scene.team.head_length);
     let mut text = String::new();
     {
-        let area = SVGBackend::with_string(&mut text, (900, 940)).into_drawing_area();
+        let area = SVGBackend::with_string(&mut text, (900, 918)).into_drawing_area();
         area.fill(&WHITE)?;
         let mut stage = ChartBuilder::on(&area)
             .caption(title(scene, time), ("sans-serif", 22))
@@ -82,8 +82,13 @@ fn picture(
             .build_cartesian_2d(-radius..radius, -radius..radius)?;
         stage.configure_mesh().x_desc("x, metres").y_desc("y, metres").light_line_style(WHITE).draw()?;
         draw_path(&mut stage, scene, radius)?;
-        draw_benches(&mut stage, scene, timeline, time, chain)?;
-        stage.configure_series_labels().background_style(WHITE.mix(0.85)).border_style(CURVE).draw()?;
+        draw_benches(&mut stage, scene, timeline, time, chain, radius)?;
+        stage
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperRight)
+            .background_style(WHITE.mix(0.85))
+            .border_style(CURVE)
+            .draw()?;
         area.present()?;
     }
     Ok(text)
@@ -120,22 +125,23 @@ fn draw_benches(
     timeline: &Timeline,
     time: f64,
     chain: &Chain,
+    radius: f64,
 ) -> Result<(), Box<dyn std::error::Error>> {
     let contact = timeline.find(State::Contact).filter(|contact| contact.time <= time);
     let touching = |bench: usize| contact.is_some_and(|contact| is_of(contact, bench));
-    let kinds: [(&str, RGBColor, Box<dyn Fn(usize) -> bool>); 4] = [
-        ("body", BODY, Box::new(|bench| bench > 0 && bench + 1 < scene.team.benches && !touching(bench))),
-        ("tail", TAIL, Box::new(|bench| bench > 0 && bench + 1 == scene.team.benches && !touching(bench))),
-        ("head", HEAD, Box::new(|bench| bench == 0 && !touching(bench))),
-        ("the two benches that touch", TOUCH, Box::new(touching)),
-    ];
-    for (name, colour, belongs) in kinds {
-        let boards: Vec<_> = (0..scene.team.benches).filter(|bench| belongs(*bench)).collect();
-        if boards.is_empty() {
-            continue;
-        }
-        for bench in &boards {
-            let corners = board(scene, chain, *bench).corners().map(|corner| (corner.x, corner.y));
+    let last = scene.team.benches - 1;
+    let (touch, others): (Vec<_>, Vec<_>) = (0..=last).partition(|bench| touching(*bench));
+    let (head, followers): (Vec<_>, Vec<_>) = others.into_iter().partition(|bench| *bench == 0);
+    let (tail, body): (Vec<_>, Vec<_>) = followers.into_iter().partition(|bench| *bench == last);
+    let kinds =
+        [("body", BODY, body), ("tail", TAIL, tail), ("head", HEAD, head), ("the two that touch", TOUCH, touch)];
+    for (name, colour, benches) in kinds.into_iter().filter(|(.., benches)| !benches.is_empty()) {
+        for bench in benches {
+            let corners = board(scene, chain, bench).corners().map(|corner| (corner.x, corner.y));
+            if corners.iter().any(|(x, y)| x.abs() > radius || y.abs() > radius) {
+                // The plot would bend what sticks out of it along its border.
+                continue;
+            }
             stage.draw_series([Polygon::new(corners.to_vec(), colour.mix(0.75))])?;
             let outline = corners.into_iter().chain([corners[0]]).collect::<Vec<_>>();
             stage.draw_series([PathElement::new(outline, colour.stroke_width(1))])?;
