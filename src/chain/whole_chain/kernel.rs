@@ -365,6 +365,7 @@ impl Block {
     }
 
     #[inline(always)]
+    #[allow(clippy::needless_range_loop, reason = "one index for several arrays, as in the loops beside it")]
     fn evaluate<A: Arithmetic>(&self, step: &Step) -> Poses {
         let mut poses = Poses::EMPTY;
         let mut tangent = [0.0; BLOCK];
