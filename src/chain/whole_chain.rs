@@ -53,6 +53,16 @@ enum History {
     Two { at: f64, step: f64 },
 }
 
+impl History {
+    /// Whether the frames before were of a later moment.
+    fn is_after(self, travelled: f64) -> bool {
+        match self {
+            Self::None => false,
+            Self::One { at } | Self::Two { at, .. } => travelled < at,
+        }
+    }
+}
+
 impl WholeChain {
     /// A solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve, with the
     /// fastest instructions this processor has.
@@ -143,6 +153,9 @@ impl WholeChain {
     /// Finds every increment from scratch, as the safe solver does.
     fn restart(&mut self, head: <Spiral as Path>::Place) -> Result<(), Fold> {
         self.restarts += 1;
+        // Multiplied by a step of zero they must give zero, which infinity would not.
+        self.state.rate.fill(0.0);
+        self.state.rate_before.fill(0.0);
         let mut front = head;
         for bench in 0..self.state.increment.len() {
             let link = self.team.link(bench.min(self.team.benches - 1));
@@ -163,6 +176,10 @@ impl Solver for WholeChain {
 
     fn solve(&mut self, time: f64, chain: &mut Chain) -> Result<(), Fold> {
         let travelled = self.head_speed * time;
+        if self.history.is_after(travelled) {
+            // A show that begins again gives the same bits as the first time.
+            self.history = History::None;
+        }
         let (guess, ahead, ahead_before) = match self.history {
             History::None => (0.0, 0.0, 0.0),
             History::One { at } => (self.head_ahead(travelled - at), travelled - at, 0.0),
