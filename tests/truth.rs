@@ -187,9 +187,10 @@ fn the_reference_agrees_with_50_digits() {
         let handles = reference.handles(rows[0].time).unwrap();
         for row in rows {
             let handle = &handles[row.handle];
-            // The table was made from decimal lengths and times; the doubles nearest to them move a handle so far.
+            // The table was made from decimal lengths and times; the doubles nearest to them move a handle so far,
+            // the faster it goes the further.
             let error = handle.x.error_of(row.x).hypot(handle.y.error_of(row.y));
-            assert!(error < 6e-14, "t = {} s, handle {}: {error:e} m", row.time, row.handle);
+            assert!(error < 6e-14 * row.speed.abs().max(1.0), "t = {} s, handle {}: {error:e} m", row.time, row.handle);
             let bound = if row.time < 430.0 { 1e-14 } else { 1e-11 };
             assert!(((handle.speed - row.speed) / row.speed).abs() < bound, "{} {}", row.time, row.handle);
         }
