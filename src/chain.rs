@@ -5,6 +5,8 @@
 
 pub mod newton;
 pub mod paper;
+pub mod reference;
+pub mod whole_chain;
 
 use crate::geometry::path::Fold;
 use crate::messages::HandlePose;

@@ -83,8 +83,14 @@ impl Motion<'_> {
     fn last_before_fold(&self, theta: f64) -> f64 {
         let nominal = self.travelled_at(theta);
         let locked = |travelled: f64| self.second(travelled).is_infinite();
-        let margin = 1e-9 * (nominal + self.team.link(0));
-        first_true(locked, (nominal - margin).max(0.0), nominal + margin).next_down().max(0.0)
+        // What the rounding of distance and angle can make of the fold's place.
+        let margin = 64.0 * f64::EPSILON * (nominal + self.spiral.radius(self.spiral.start()));
+        let (low, high) = ((nominal - margin).max(0.0), (nominal + margin).min(self.spiral.length()));
+        match (locked(low), locked(high)) {
+            (true, _) => low,
+            (false, true) => first_true(locked, low, high).next_down().max(0.0),
+            (false, false) => nominal,
+        }
     }
 
     fn body_fold(&self) -> Option<f64> {

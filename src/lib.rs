@@ -11,6 +11,7 @@
 //! - [`show`]: from a scene and a tick to one frame, deterministic.
 //! - [`live`]: the fixed-rate loop, its clock, its statistics.
 //! - [`transports`]: iceoryx2 shared memory and ROS 2 topics, as publishers of the loop.
+//! - [`trade`]: accuracy against cost, measured for every solver on a scene and this machine.
 //! - [`subscribers`]: the terminal monitor and the stage picture; they know the messages only.
 
 #![deny(missing_docs)]
@@ -24,4 +25,5 @@ pub mod messages;
 pub mod scene;
 pub mod show;
 pub mod subscribers;
+pub mod trade;
 pub mod transports;

@@ -10,6 +10,7 @@ use toml::Spanned;
 
 use crate::chain::newton::Newton;
 use crate::chain::paper::{self, Paper, PaperRules};
+use crate::chain::whole_chain::WholeChain;
 use crate::chain::{Solver, Team, Velocities};
 use crate::geometry::path::Path;
 use crate::geometry::root::first_true;
@@ -86,6 +87,8 @@ pub enum Method {
 pub enum SolverName {
     /// Exact motion, each follower bracketed.
     Newton,
+    /// Exact motion, all handles at once from the frame before.
+    WholeChain,
     /// The paper's rules.
     Paper,
 }
@@ -203,9 +206,21 @@ impl Scene {
     /// The solver this scene asks for, and in words why it is that one.
     pub fn solver(&self) -> (Box<dyn Solver>, String) {
         let newton = || Box::new(Newton::new(self.path, self.team, self.head_speed, self.velocities));
+        let whole_chain = || {
+            let solver = WholeChain::new(self.path, self.team, self.head_speed, self.velocities);
+            let instructions = solver.instructions().name();
+            (solver, instructions)
+        };
         match self.method {
             Method::Accuracy(accuracy) => {
-                (newton(), format!("newton: the cheapest that meets an accuracy of {accuracy:e} m"))
+                let (solver, instructions) = whole_chain();
+                let why =
+                    format!("whole_chain ({instructions}): the cheapest that meets an accuracy of {accuracy:e} m");
+                (Box::new(solver), why)
+            }
+            Method::Named(SolverName::WholeChain) => {
+                let (solver, instructions) = whole_chain();
+                (Box::new(solver), format!("whole_chain ({instructions}): named by the scene"))
             }
             Method::Named(SolverName::Newton) => (newton(), "newton: named by the scene".to_owned()),
             Method::Named(SolverName::Paper) => {

@@ -2,6 +2,8 @@
 
 use bench_dragon::chain::newton::Newton;
 use bench_dragon::chain::paper::{Paper, PaperRules};
+use bench_dragon::chain::reference::Reference;
+use bench_dragon::chain::whole_chain::{Instructions, WholeChain};
 use bench_dragon::chain::{Chain, Solver, Team, Velocities};
 use bench_dragon::geometry::spiral::Spiral;
 
@@ -143,5 +145,54 @@ fn paper_tends_to_the_limit_of_its_own_model() {
     let rows = table(include_str!("truth/paper_scene_as_printed_model.csv"));
     for (time, position, _) in errors(&mut paper_solver(), &rows) {
         assert!(position < 1.5e-5, "t = {time} s: {position:e} m");
+    }
+}
+
+#[test]
+fn whole_chain_agrees_with_50_digits_on_every_code_path() {
+    let rows = table(include_str!("truth/paper_scene_exact.csv"));
+    let mut times: Vec<f64> = rows.iter().map(|row| row.time).collect();
+    times.dedup();
+    for instructions in Instructions::available() {
+        let solver = WholeChain::new(Spiral::new(0.55, 16.0), paper_team(), 1.0, Velocities::Computed);
+        let mut solver = solver.with_instructions(instructions).unwrap();
+        let mut chain = Chain::new(224);
+        for &time in &times {
+            // A few frames before each, so that it is a warm frame that is judged.
+            for k in (0..=20).rev() {
+                solver.solve((time - f64::from(k) / 60.0).max(0.0), &mut chain).unwrap();
+            }
+            let (mut position, mut speed) = (0f64, 0f64);
+            for row in rows.iter().filter(|row| row.time == time) {
+                let i = row.handle;
+                position = position.max((chain.x[i] - row.x).hypot(chain.y[i] - row.y));
+                speed = speed.max(((chain.speed[i] - row.speed) / row.speed).abs());
+            }
+            println!(
+                "{}: t = {time} s: position {position:.1e} m, speed {speed:.1e}, restarts {}",
+                instructions.name(),
+                solver.restarts()
+            );
+            let bound = if time < 412.5 { 1e-12 } else { 1e-9 };
+            assert!(position < bound && speed < bound, "t = {time} s: {position:e} m, {speed:e}");
+        }
+    }
+}
+
+#[test]
+fn the_reference_agrees_with_50_digits() {
+    let rows = table(include_str!("truth/paper_scene_exact.csv"));
+    let mut reference = Reference::new(paper_team(), 0.55, 16.0, 1.0).unwrap();
+    for rows in rows.chunk_by(|a, b| a.time == b.time) {
+        let handles = reference.handles(rows[0].time).unwrap();
+        for row in rows {
+            let handle = &handles[row.handle];
+            // The table was made from decimal lengths and times; the doubles nearest to them move a handle so far,
+            // the faster it goes the further.
+            let error = handle.x.error_of(row.x).hypot(handle.y.error_of(row.y));
+            assert!(error < 6e-14 * row.speed.abs().max(1.0), "t = {} s, handle {}: {error:e} m", row.time, row.handle);
+            let bound = if row.time < 430.0 { 1e-14 } else { 1e-11 };
+            assert!(((handle.speed - row.speed) / row.speed).abs() < bound, "{} {}", row.time, row.handle);
+        }
     }
 }

@@ -82,7 +82,7 @@ fn picture(
             .build_cartesian_2d(-radius..radius, -radius..radius)?;
         stage.configure_mesh().x_desc("x, metres").y_desc("y, metres").light_line_style(WHITE).draw()?;
         draw_path(&mut stage, scene, radius)?;
-        draw_benches(&mut stage, scene, timeline, time, chain)?;
+        draw_benches(&mut stage, scene, timeline, time, chain, radius)?;
         stage
             .configure_series_labels()
             .position(SeriesLabelPosition::UpperRight)
@@ -125,6 +125,7 @@ fn draw_benches(
     timeline: &Timeline,
     time: f64,
     chain: &Chain,
+    radius: f64,
 ) -> Result<(), Box<dyn std::error::Error>> {
     let contact = timeline.find(State::Contact).filter(|contact| contact.time <= time);
     let touching = |bench: usize| contact.is_some_and(|contact| is_of(contact, bench));
@@ -137,6 +138,10 @@ fn draw_benches(
     for (name, colour, benches) in kinds.into_iter().filter(|(.., benches)| !benches.is_empty()) {
         for bench in benches {
             let corners = board(scene, chain, bench).corners().map(|corner| (corner.x, corner.y));
+            if corners.iter().any(|(x, y)| x.abs() > radius || y.abs() > radius) {
+                // The plot would bend what sticks out of it along its border.
+                continue;
+            }
             stage.draw_series([Polygon::new(corners.to_vec(), colour.mix(0.75))])?;
             let outline = corners.into_iter().chain([corners[0]]).collect::<Vec<_>>();
             stage.draw_series([PathElement::new(outline, colour.stroke_width(1))])?;

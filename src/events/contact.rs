@@ -45,7 +45,10 @@ pub fn first_contact(
     if team.benches < 3 {
         return None;
     }
-    let search = Search { spiral, team, stall: stall.unwrap_or(limit) };
+    let mut search = Search { spiral, team, stall: stall.unwrap_or(limit), loud_radius: f64::INFINITY };
+    // No team reaches further out than if it were stretched along a radius.
+    let reach = team.link(0) + team.link(1) * (team.benches - 1) as f64;
+    search.loud_radius = search.loud_radius(spiral.radius(spiral.start()) + reach);
     let start = search.quiet_until(limit);
     if start == 0.0
         && let Some(event) = search.overlap_at_start()
@@ -68,6 +71,8 @@ struct Search<'a> {
     spiral: &'a Spiral,
     team: &'a Team,
     stall: f64,
+    /// No two boards whose handles lie beyond this can touch.
+    loud_radius: f64,
 }
 
 /// The foremost part of the team at one place of the head: every board that can touch one of those asked for.
@@ -92,30 +97,51 @@ impl Search<'_> {
 
     /// Whether no two boards can touch while the head is at radius `r` or further out: a bound that holds for every
     /// larger radius if it holds for one.
-    ///
-    /// A chord of length l on a curve of curvature 1/r lies within l^2/8r of it, and a board's end, its inset e beyond
-    /// the handle, within e (l + e)/2r; a quarter is added for the spiral's own curvature, and half the width, leaning
-    /// by at most a tenth. Two boards on neighbouring turns are as far apart as the turns, less all that. Two on one
-    /// turn have a whole bench between them, less two insets and the lean of their ends.
     fn is_quiet(&self, r: f64) -> bool {
-        let Team { hole_inset, width, benches, .. } = *self.team;
-        let longest = self.team.link(0).max(self.team.link(1));
-        let pitch = self.spiral.pitch();
-        if r < 5.0 * (longest + hole_inset + width).max(pitch) {
-            return false;
-        }
-        let bulge = 1.25 * (longest * longest / 8.0 + hole_inset * (longest + hole_inset)) / r;
-        let along = self.team.link(1) - 2.0 * hole_inset - 2.0 * (width + bulge) * (longest + hole_inset) / r;
-        if along <= 1e-3 * longest {
-            return false;
-        }
-        let turns_apart = pitch - 1.01 * width - bulge > 0.0;
         // Each arc is at most a twentieth longer than its chord.
-        let length = 1.05 * (self.team.link(0) + self.team.link(1) * (benches - 1) as f64);
+        let length = 1.05 * (self.team.link(0) + self.team.link(1) * (self.team.benches - 1) as f64);
         let theta = r / self.spiral.growth();
         let last = (theta * theta + 2.0 * length / self.spiral.growth()).sqrt();
         let within_a_turn = last - theta < std::f64::consts::PI;
-        turns_apart || within_a_turn
+        let bulge = self.bulge(r);
+        self.keeps_apart_along(r, bulge) && (within_a_turn || self.keeps_apart_across(bulge))
+    }
+
+    /// How far boards on a turn of radius `r` stick out of the curve, inward and outward together.
+    ///
+    /// A chord of length l on a curve of curvature 1/r lies within l^2/8r of it, and a board's end, its inset e beyond
+    /// the handle, within e (l + e)/2r; a quarter is added for the spiral's own curvature. Only for radii of at least
+    /// five boards; infinite within.
+    fn bulge(&self, r: f64) -> f64 {
+        let Team { hole_inset, width, .. } = *self.team;
+        let longest = self.team.link(0).max(self.team.link(1));
+        if r < 5.0 * (longest + hole_inset + width).max(self.spiral.pitch()) {
+            return f64::INFINITY;
+        }
+        1.25 * (longest * longest / 8.0 + hole_inset * (longest + hole_inset)) / r
+    }
+
+    /// Whether two boards on one turn have room between them: a whole bench, less two insets and the lean of their ends.
+    fn keeps_apart_along(&self, r: f64, bulge: f64) -> bool {
+        let Team { hole_inset, width, .. } = *self.team;
+        let longest = self.team.link(0).max(self.team.link(1));
+        let lean = 2.0 * (width + bulge) * (longest + hole_inset) / r;
+        self.team.link(1) - 2.0 * hole_inset - lean > 1e-3 * longest
+    }
+
+    /// Whether two boards on neighbouring turns have room between them: the pitch, less the width, which leans by at
+    /// most a tenth, and what sticks out.
+    fn keeps_apart_across(&self, bulge: f64) -> bool {
+        self.spiral.pitch() - 1.01 * self.team.width - bulge > 0.0
+    }
+
+    /// The radius beyond which no two boards can ever touch; infinite where the turns are too narrow for the boards.
+    fn loud_radius(&self, tail: f64) -> f64 {
+        let clear = |r: f64| {
+            let bulge = self.bulge(r);
+            self.keeps_apart_along(r, bulge) && self.keeps_apart_across(bulge)
+        };
+        if clear(tail) { first_true(clear, 0.0, tail) } else { f64::INFINITY }
     }
 
     /// Metres of travel after which the third handle is where the second one started; at most `limit`.
@@ -155,10 +181,13 @@ impl Search<'_> {
     fn look(&self, travelled: f64, pairs: Pairs) -> Option<Look> {
         let mut places = vec![self.spiral.place_at(travelled)];
         let mut boards = Vec::new();
-        let mut least_needed = f64::INFINITY;
+        let mut least_needed = match pairs {
+            Pairs::WithFirstTwo => f64::INFINITY,
+            Pairs::All => self.out_of_reach(self.loud_radius),
+        };
         for bench in 0..self.team.benches {
             let (front, link) = (places[bench], self.team.link(bench));
-            if pairs == Pairs::WithFirstTwo && bench > 2 && self.spiral.radius(front) > least_needed {
+            if bench > 2 && self.spiral.radius(front) > least_needed {
                 break;
             }
             let rear = self.spiral.follower(front, link).ok()?;
@@ -166,7 +195,7 @@ impl Search<'_> {
             let Team { hole_inset, width, .. } = *self.team;
             boards.push(Board::from_front(self.spiral.point(front), direction, link, hole_inset, width));
             places.push(rear);
-            if bench == 1 {
+            if bench == 1 && pairs == Pairs::WithFirstTwo {
                 least_needed = self.out_of_reach(self.spiral.radius(rear));
             }
         }
@@ -184,20 +213,29 @@ impl Search<'_> {
         (outermost + 2.0 * hole_inset + width + half).hypot(half)
     }
 
+    /// What the choice of candidates leaves each handle to move within a step.
+    fn room(&self) -> f64 {
+        0.25 * self.team.link(0).min(self.team.link(1))
+    }
+
     /// The pairs of this look that share no handle and whose boards could be near each other.
     fn candidates(&self, look: &Look, pairs: Pairs) -> Vec<(usize, usize)> {
         let count = look.boards.len();
         match pairs {
             Pairs::WithFirstTwo => (0..2).flat_map(|a| (a + 2..count).map(move |b| (a, b))).collect(),
-            Pairs::All => near_pairs(&look.boards),
+            Pairs::All => {
+                let Team { hole_inset, width, .. } = *self.team;
+                let shortest = self.team.link(0).min(self.team.link(1));
+                // Both boards of a pair move, each by what its handles make of their room.
+                near_pairs(&look.boards, 2.0 * Board::reach(shortest, hole_inset, width) * self.room())
+            }
         }
     }
 
     /// The first contact between two places of the head.
     fn between(&self, from: f64, to: f64, pairs: Pairs, progress: &mut dyn FnMut(f64)) -> Option<Event> {
         let mut step = 0.1 * self.team.link(0).min(self.team.link(1));
-        // What the choice of candidates leaves each board to move within a step.
-        let room = 0.25 * self.team.link(0).min(self.team.link(1));
+        let room = self.room();
         let mut before = (from < to).then(|| self.look(from, pairs)).flatten()?;
         while before.travelled < to {
             progress(before.travelled / to);
@@ -320,24 +358,26 @@ fn touching(look: &Look, pairs: &[(usize, usize)]) -> Option<Event> {
     })
 }
 
-/// All pairs that share no handle and whose centres lie in the same or adjoining cells of a grid as wide as the
-/// longest board with a link to spare.
-fn near_pairs(boards: &[Board]) -> Vec<(usize, usize)> {
-    let cell = 1.5 * boards.iter().map(|board| 2.0 * board.circle_radius()).fold(0.0, f64::max);
+/// All pairs that share no handle and are not certain to stay apart while both together move by at most `motion`.
+///
+/// Found with a grid whose cells are no narrower than the longest board and that motion.
+fn near_pairs(boards: &[Board], motion: f64) -> Vec<(usize, usize)> {
+    let widest = boards.iter().map(|board| 2.0 * board.circle_radius()).fold(0.0, f64::max);
+    let cell = widest + motion;
     let key = |board: &Board| ((board.centre.x / cell).floor() as i64, (board.centre.y / cell).floor() as i64);
     let mut cells: Vec<((i64, i64), usize)> = boards.iter().map(key).zip(0..).collect();
     cells.sort_unstable();
-    let members = |wanted: (i64, i64)| {
-        let from = cells.partition_point(|(key, _)| *key < wanted);
-        cells[from..].iter().take_while(move |(key, _)| *key == wanted).map(|(_, bench)| *bench)
+    let row_of = |wanted: (i64, i64)| {
+        // Three neighbouring cells of a column lie side by side in the sorted list.
+        let from = cells.partition_point(|(key, _)| *key < (wanted.0, wanted.1 - 1));
+        cells[from..].iter().take_while(move |(key, _)| *key <= (wanted.0, wanted.1 + 1)).map(|(_, bench)| *bench)
     };
     let mut pairs = Vec::new();
     for (a, board) in boards.iter().enumerate() {
         let (column, row) = key(board);
-        for dx in -1..=1 {
-            for dy in -1..=1 {
-                pairs.extend(members((column + dx, row + dy)).filter(|b| *b >= a + 2).map(|b| (a, b)));
-            }
+        for neighbour in column - 1..=column + 1 {
+            let others = row_of((neighbour, row)).filter(|b| *b >= a + 2);
+            pairs.extend(others.filter(|b| circle_bound_board_board(board, &boards[*b]) <= motion).map(|b| (a, b)));
         }
     }
     pairs

@@ -81,6 +81,14 @@ impl Angle {
         self.turns + (self.remainder + self.low) / TAU
     }
 
+    /// The angle in turns as a fixed-point number with 64 bits below the point; what is less is rounded away.
+    pub(crate) fn in_fixed_point_turns(self) -> i128 {
+        let scale = 2f64.powi(64);
+        let part = self.remainder / TAU;
+        let part_low = (TAU.mul_add(-part, self.remainder) - TAU_LOW * part + self.low) / TAU;
+        ((self.turns as i128) << 64) + (part * scale) as i128 + (part_low * scale).round() as i128
+    }
+
     /// Sine and cosine.
     pub fn sin_cos(self) -> (f64, f64) {
         let (sine, cosine) = self.remainder.sin_cos();
@@ -151,6 +159,28 @@ impl Spiral {
         let algebraic = span * (w + inner * (theta + inner) / (w + w_inner));
         let logarithmic = (span * (theta + inner) / (theta * w_inner + inner * w)).asinh();
         0.5 * self.growth() * (algebraic + logarithmic)
+    }
+
+    /// The place of [`Path::place_at`] and how far the angle has turned by then, radians, from a guess of the latter.
+    ///
+    /// One Newton step from a guess that is right to half the digits; from a poor one as many as it takes.
+    pub(crate) fn place_near(&self, travelled: f64, guess: f64) -> (Angle, f64) {
+        let mut span = guess;
+        for _ in 0..4 {
+            let theta = self.start_theta - span;
+            if !(theta > 0.0 && span > 0.0 && travelled < self.length) {
+                break;
+            }
+            let slope = self.growth() * 1f64.hypot(theta);
+            let step = (travelled - self.arc_length(self.start_theta, span)) / slope;
+            span += step;
+            // The step leaves step^2 / 2 times the relative change of the slope, which is at most 1 / theta.
+            if step * step < f64::EPSILON * span * theta {
+                return (self.start.plus(-span), span);
+            }
+        }
+        let place = self.place_at(travelled);
+        (place, self.start.minus(place))
     }
 
     /// Where the square of the chord to the point `increment` radians behind a handle at radius `r` stands against

@@ -1,0 +1,193 @@
+//! What a frame costs: each solver at 60 Hz and 1 kHz, with and without velocities, for teams of 10 to 100,000; the
+//! floor below which no solver can go; and the safe solver beside it in the same run.
+//!
+//! `cargo bench --bench frame`
+
+use std::f64::consts::TAU;
+
+use bench_dragon::chain::newton::Newton;
+use bench_dragon::chain::paper::{Paper, PaperRules};
+use bench_dragon::chain::whole_chain::{Instructions, WholeChain};
+use bench_dragon::chain::{Chain, Solver, Team, Velocities};
+use bench_dragon::geometry::spiral::Spiral;
+use divan::Bencher;
+use divan::counter::ItemsCount;
+
+fn main() {
+    divan::main();
+}
+
+fn team(benches: usize) -> Team {
+    Team { benches, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 }
+}
+
+fn spiral() -> Spiral {
+    Spiral::new(0.55, 16.0)
+}
+
+/// Plays the paper scene from 200 s on, over and over, a frame per call.
+fn play(bencher: Bencher, solver: &mut dyn Solver, handles: usize, rate: f64) {
+    let mut chain = Chain::new(handles);
+    let mut tick = 0.0;
+    bencher.counter(ItemsCount::new(handles)).bench_local(|| {
+        let time = 200.0 + tick / rate;
+        tick = if time < 400.0 { tick + 1.0 } else { 0.0 };
+        solver.solve(time, &mut chain).unwrap();
+        divan::black_box(&chain);
+    });
+}
+
+#[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
+fn newton_cold(bencher: Bencher, rate: f64) {
+    play(bencher, &mut Newton::new(spiral(), team(223), 1.0, Velocities::Computed), 224, rate);
+}
+
+/// Newton's method from no guess but the link's length over the radius, on theta in one double, with the system's sine
+/// and cosine: what a careful person writes first.
+#[divan::bench(sample_count = 500, sample_size = 20)]
+fn newton_cold_without_care(bencher: Bencher) {
+    let (growth, team) = (0.55 / TAU, team(223));
+    let mut chain = Chain::new(224);
+    let mut tick = 0u32;
+    bencher.counter(ItemsCount::new(224usize)).bench_local(|| {
+        tick = (tick + 1) % 12_000;
+        let mut theta = (32.0 * TAU * 8.0 * TAU - 2.0 * f64::from(tick) / 60.0 / growth).sqrt();
+        let mut speed = 1.0;
+        for bench in 0..223 {
+            let link = team.link(bench);
+            let mut rear = theta + link / (growth * theta);
+            let (sine, cosine) = theta.sin_cos();
+            let (x, y) = (growth * theta * cosine, growth * theta * sine);
+            let mut across = (0.0, 0.0, 0.0, 0.0);
+            for _ in 0..20 {
+                let (sine, cosine) = rear.sin_cos();
+                let (dx, dy) = (x - growth * rear * cosine, y - growth * rear * sine);
+                let excess = dx * dx + dy * dy - link * link;
+                let (tx, ty) = (growth * (cosine - rear * sine), growth * (sine + rear * cosine));
+                across = (dx, dy, tx, ty);
+                let step = excess / (-2.0 * (dx * tx + dy * ty));
+                rear -= step;
+                if step.abs() < 1e-14 * rear {
+                    break;
+                }
+            }
+            let (dx, dy, tx, ty) = across;
+            let (fx, fy) = (growth * (cosine - theta * sine), growth * (sine + theta * cosine));
+            chain.x[bench] = x;
+            chain.y[bench] = y;
+            chain.heading[bench] = dy.atan2(dx);
+            chain.speed[bench] = speed;
+            let length = fx.hypot(fy);
+            chain.vx[bench] = -speed * fx / length;
+            chain.vy[bench] = -speed * fy / length;
+            speed *= (fx * dx + fy * dy) / length / ((tx * dx + ty * dy) / tx.hypot(ty));
+            theta = rear;
+        }
+        divan::black_box(&chain);
+    });
+}
+
+#[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
+fn whole_chain(bencher: Bencher, rate: f64) {
+    play(bencher, &mut WholeChain::new(spiral(), team(223), 1.0, Velocities::Computed), 224, rate);
+}
+
+#[divan::bench(sample_count = 500, sample_size = 20)]
+fn whole_chain_without_velocities(bencher: Bencher) {
+    play(bencher, &mut WholeChain::new(spiral(), team(223), 1.0, Velocities::Omitted), 224, 60.0);
+}
+
+#[divan::bench(sample_count = 500, sample_size = 20)]
+fn whole_chain_portable(bencher: Bencher) {
+    let solver = WholeChain::new(spiral(), team(223), 1.0, Velocities::Computed);
+    let mut solver = solver.with_instructions(Instructions::Portable).expect("every processor has it");
+    play(bencher, &mut solver, 224, 60.0);
+}
+
+#[divan::bench(args = [10, 223, 1_000, 5_000, 20_000, 100_000], sample_count = 200, sample_size = 4)]
+fn whole_chain_by_benches(bencher: Bencher, benches: usize) {
+    play(bencher, &mut WholeChain::new(spiral(), team(benches), 1.0, Velocities::Computed), benches + 1, 60.0);
+}
+
+#[divan::bench(sample_count = 20, sample_size = 1)]
+fn paper(bencher: Bencher) {
+    let mut solver = Paper::new(spiral(), team(223), 1.0, Velocities::Computed, PaperRules::default());
+    play(bencher, &mut solver, 224, 60.0);
+}
+
+/// The floor: the sine and cosine of 224 angles, vectorised, and writing as many bytes as a frame has.
+#[divan::bench(sample_count = 500, sample_size = 20)]
+fn floor(bencher: Bencher) {
+    let angles: Vec<f64> = (0..224).map(|k| f64::from(k) * 0.19).collect();
+    let mut chain = Chain::new(224);
+    bencher.counter(ItemsCount::new(224usize)).bench_local(|| {
+        floor::frame(divan::black_box(&angles), &mut chain);
+        divan::black_box(&chain);
+    });
+}
+
+mod floor {
+    //! The least that any frame does, with the same instructions as the solver under measurement.
+
+    use super::Chain;
+
+    pub fn frame(angles: &[f64], chain: &mut Chain) {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            // SAFETY: the processor has just been found to have both.
+            return unsafe { frame_with_avx2(angles, chain) };
+        }
+        written(angles, chain);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    fn frame_with_avx2(angles: &[f64], chain: &mut Chain) {
+        written(angles, chain);
+    }
+
+    #[inline(always)]
+    fn written(angles: &[f64], chain: &mut Chain) {
+        let count = angles.len();
+        let (x, y, heading) = (&mut chain.x[..count], &mut chain.y[..count], &mut chain.heading[..count]);
+        let (speed, vx, vy) = (&mut chain.speed[..count], &mut chain.vx[..count], &mut chain.vy[..count]);
+        for k in 0..count {
+            let (sine, cosine) = sine_cosine(angles[k]);
+            x[k] = cosine;
+            y[k] = sine;
+            heading[k] = angles[k];
+            speed[k] = 1.0;
+            vx[k] = -sine;
+            vy[k] = cosine;
+        }
+    }
+
+    /// Cody and Waite's reduction and the polynomials of fdlibm.
+    #[inline(always)]
+    #[allow(clippy::excessive_precision, reason = "the digits as published")]
+    fn sine_cosine(angle: f64) -> (f64, f64) {
+        const ROUNDER: f64 = 6_755_399_441_055_744.0;
+        let shifted = angle.mul_add(std::f64::consts::FRAC_2_PI, ROUNDER);
+        let quadrant = shifted.to_bits();
+        let whole = shifted - ROUNDER;
+        let z = whole.mul_add(-6.123_233_995_736_766e-17, whole.mul_add(-std::f64::consts::FRAC_PI_2, angle));
+        let square = z * z;
+        let sine = [2.75573137070700676789e-06, -1.98412698298579493134e-04, 8.33333333332248946124e-03]
+            .into_iter()
+            .fold(1.58969099521155010221e-10f64.mul_add(square, -2.50507602534068634195e-08), |value, next| {
+                value.mul_add(square, next)
+            })
+            .mul_add(square, -1.66666666666666324348e-01);
+        let cosine = [-2.75573143513906633035e-07, 2.48015872894767294178e-05, -1.38888888888741095749e-03]
+            .into_iter()
+            .fold((-1.13596475577881948265e-11f64).mul_add(square, 2.08757232129817482790e-09), |value, next| {
+                value.mul_add(square, next)
+            })
+            .mul_add(square, 4.16666666666666019037e-02);
+        let sine = (z * square).mul_add(sine, z);
+        let cosine = (square * square).mul_add(cosine, 1.0 - 0.5 * square);
+        let (s, c) = if quadrant & 1 == 1 { (cosine, sine) } else { (sine, cosine) };
+        let negate = |number: f64, quadrant: u64| f64::from_bits(number.to_bits() ^ ((quadrant & 2) << 62));
+        (negate(s, quadrant), negate(c, quadrant.wrapping_add(1)))
+    }
+}

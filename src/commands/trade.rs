@@ -1,0 +1,113 @@
+//! `trade`: what accuracy costs on this scene and machine, for every solver.
+
+use std::path::{Path, PathBuf};
+
+use bench_dragon::trade::{LAST_SECOND_MOMENTS, Measurement, SPREAD_MOMENTS, measure};
+use plotters::prelude::*;
+
+use super::{CommandError, Common, Output, progress_bar, search_timeline};
+
+/// What `trade` takes.
+#[derive(Debug, Clone, clap::Args)]
+pub struct TradeArguments {
+    /// Draw error against cost as an SVG
+    #[arg(long, value_name = "FILE")]
+    pub plot: Option<PathBuf>,
+}
+
+/// Measures every solver and prints a table or JSON lines.
+pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandError> {
+    let scene = common.load_scene()?;
+    let timeline = search_timeline(&scene, common);
+    let bar = progress_bar(1000, common).with_message("measuring");
+    let measured = measure(&scene, &timeline, &mut |share| bar.set_position((1000.0 * share) as u64));
+    bar.finish_and_clear();
+    let measurements = measured.map_err(CommandError::Failed)?;
+    if let Some(file) = &arguments.plot {
+        draw(file, &scene.name, &measurements)?;
+    }
+    let mut output = Output::standard();
+    if common.json {
+        for measurement in &measurements {
+            output.json(measurement)?;
+        }
+    } else {
+        print(&mut output, &measurements)?;
+    }
+    output.finish()
+}
+
+fn print(output: &mut Output, measurements: &[Measurement]) -> Result<(), CommandError> {
+    let width = measurements.iter().map(|measurement| measurement.solver.len()).max().unwrap_or(6);
+    output.line(&format!(
+        "  {:width$} {:>11} {:>11} {:>10} {:>10} {:>10} {:>10} {:>9}",
+        "solver", "frame us", "p99 us", "position m", "speed rel", "contact s", "link m", "bytes"
+    ))?;
+    let or_dash = |number: Option<f64>| number.map_or("-".to_owned(), |number| format!("{number:.1e}"));
+    for m in measurements {
+        output.line(&format!(
+            "{} {:width$} {:>11.2} {:>11.2} {:>10.1e} {:>10} {:>10} {:>10.1e} {:>9}",
+            if m.on_front { "*" } else { " " },
+            m.solver,
+            m.frame_ns / 1e3,
+            m.frame_ns_p99 / 1e3,
+            m.max_position_error,
+            or_dash(m.max_speed_error),
+            or_dash(m.contact_time_error),
+            m.max_link_error,
+            m.memory_bytes
+        ))?;
+    }
+    output.line(&format!(
+        "* no other is both faster and more exact. Errors: the largest over all handles at {SPREAD_MOMENTS} moments of \
+         the show and {LAST_SECOND_MOMENTS} of its last second, against a reference of more than 30 digits."
+    ))
+}
+
+/// The least error that is drawn: below it all is rounding.
+const LEAST_ERROR: f64 = 1e-15;
+
+fn draw(file: &Path, scene: &str, measurements: &[Measurement]) -> Result<(), CommandError> {
+    let mut svg = String::new();
+    plot(&mut svg, scene, measurements).map_err(|error| CommandError::Failed(format!("the plot: {error}")))?;
+    let mut output = Output::file(file)?;
+    output.line(&svg)?;
+    output.finish()
+}
+
+fn plot(svg: &mut String, scene: &str, measurements: &[Measurement]) -> Result<(), Box<dyn std::error::Error>> {
+    let error = |m: &Measurement| m.max_position_error.max(LEAST_ERROR);
+    let area = SVGBackend::with_string(svg, (860, 520)).into_drawing_area();
+    area.fill(&WHITE)?;
+    let cost = |m: &Measurement| m.frame_ns / 1e3;
+    let (mut least, mut most) = (f64::INFINITY, 0f64);
+    for measurement in measurements {
+        (least, most) = (least.min(cost(measurement)), most.max(cost(measurement)));
+    }
+    let mut chart = ChartBuilder::on(&area)
+        .caption(format!("Error against cost, scene {scene}"), ("sans-serif", 20))
+        .margin(14)
+        .x_label_area_size(44)
+        .y_label_area_size(70)
+        .build_cartesian_2d((0.5 * least..20.0 * most).log_scale(), (LEAST_ERROR..10.0).log_scale())?;
+    chart
+        .configure_mesh()
+        .x_desc("microseconds per frame (median)")
+        .y_desc("largest position error, metres")
+        .x_label_formatter(&|x| format!("{x}"))
+        .y_label_formatter(&|y| format!("{y:.0e}"))
+        .light_line_style(TRANSPARENT)
+        .draw()?;
+    let mut front: Vec<(f64, f64)> = measurements.iter().filter(|m| m.on_front).map(|m| (cost(m), error(m))).collect();
+    front.sort_by(|a, b| a.0.total_cmp(&b.0));
+    chart.draw_series(LineSeries::new(front, &BLUE))?;
+    for measurement in measurements {
+        let colour = if measurement.solver.starts_with("paper") { RED } else { BLUE };
+        let at = (cost(measurement), error(measurement));
+        let style = if measurement.on_front { colour.filled() } else { colour.stroke_width(1) };
+        chart.draw_series([Circle::new(at, 4, style)])?;
+        chart.draw_series([Text::new(format!("  {}", measurement.solver), at, ("sans-serif", 12))])?;
+    }
+    area.present()?;
+    Ok(())
+}

@@ -1,0 +1,279 @@
+//! Accuracy against cost, measured: every solver on one scene and this machine, against the high-precision reference.
+//!
+//! In: a scene and its timeline. Out: one [`Measurement`] per solver. The `trade` command prints and draws them.
+
+use std::time::Instant;
+
+use serde::Serialize;
+
+use crate::chain::newton::Newton;
+use crate::chain::paper::{Paper, PaperRules};
+use crate::chain::reference::{Reference, ReferenceHandle};
+use crate::chain::whole_chain::{Instructions, WholeChain};
+use crate::chain::{Chain, Solver, Velocities};
+use crate::geometry::Point;
+use crate::geometry::path::Path;
+use crate::geometry::rectangle::Board;
+use crate::geometry::separation::separation_board_board;
+use crate::geometry::spiral::Spiral;
+use crate::messages::State;
+use crate::scene::{Method, Scene, SolverName};
+use crate::show::timeline::Timeline;
+
+/// Moments at which the error is taken, spread evenly over the show.
+pub const SPREAD_MOMENTS: usize = 200;
+/// Further moments, spread evenly over its last second.
+pub const LAST_SECOND_MOMENTS: usize = 10;
+/// Frames of warming up before each moment: it is a running show that is judged.
+const LEAD_IN: usize = 4;
+/// The most frames that are timed, so that slow solvers and long shows end too.
+const TIMED_FRAMES: usize = 26_000;
+/// The longest time spent timing one solver, seconds.
+const TIMING_LIMIT: f64 = 4.0;
+
+/// What one solver costs and how far it is off.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Measurement {
+    /// The solver and its settings.
+    pub solver: String,
+    /// Nanoseconds per frame, the median over the show.
+    pub frame_ns: f64,
+    /// Nanoseconds per frame that 99 of 100 frames stay below.
+    pub frame_ns_p99: f64,
+    /// Frames that were timed, evenly over the show in runs.
+    pub frames_timed: usize,
+    /// The largest distance of a handle from the truth, metres.
+    pub max_position_error: f64,
+    /// The largest relative error of a handle's speed; `None` without velocities.
+    pub max_speed_error: Option<f64>,
+    /// Seconds by which this solver's contact is off; `None` where there is no contact.
+    pub contact_time_error: Option<f64>,
+    /// The largest error of a link's length, metres.
+    pub max_link_error: f64,
+    /// Bytes that the solver holds.
+    pub memory_bytes: usize,
+    /// Whether no other solver is both faster and more exact.
+    pub on_front: bool,
+}
+
+/// A solver to be measured.
+struct Candidate {
+    name: String,
+    solver: Box<dyn Solver>,
+    contact_time_error: Option<f64>,
+    memory_bytes: usize,
+}
+
+/// The truth at one moment.
+struct Moment {
+    time: f64,
+    handles: Vec<ReferenceHandle>,
+}
+
+/// Measures every solver on `scene`. `progress` is told which share of the work is done, from 0 to 1.
+///
+/// # Errors
+/// A sentence where the reference cannot be had.
+pub fn measure(scene: &Scene, timeline: &Timeline, progress: &mut dyn FnMut(f64)) -> Result<Vec<Measurement>, String> {
+    let end = timeline.end().time;
+    let moments = truth(scene, end, &mut |share| progress(0.5 * share))?;
+    let candidates = candidates(scene, contact_errors(scene, timeline)?);
+    let count = candidates.len() as f64;
+    let mut measurements = Vec::new();
+    for (index, candidate) in candidates.into_iter().enumerate() {
+        measurements.push(measured(scene, candidate, &moments, end));
+        progress(0.5 + 0.5 * (index + 1) as f64 / count);
+    }
+    mark_front(&mut measurements);
+    Ok(measurements)
+}
+
+/// The reference at all moments. At the lock itself there is a solution only up to rounding, so the last moment is a
+/// thousandth of a second earlier.
+fn truth(scene: &Scene, end: f64, progress: &mut dyn FnMut(f64)) -> Result<Vec<Moment>, String> {
+    let mut reference = Reference::new(scene.team, scene.path.pitch(), scene.start_turn, scene.head_speed)?;
+    let last_second = 1f64.min(0.5 * end);
+    let spread = (0..SPREAD_MOMENTS).map(|k| (end - last_second) * k as f64 / SPREAD_MOMENTS as f64);
+    let last = (0..LAST_SECOND_MOMENTS)
+        .map(|k| end - last_second + (last_second * 0.999) * k as f64 / (LAST_SECOND_MOMENTS - 1) as f64);
+    let total = (SPREAD_MOMENTS + LAST_SECOND_MOMENTS) as f64;
+    let mut moments = Vec::new();
+    for time in spread.chain(last) {
+        let handles = reference.handles(time).map_err(|fold| format!("the reference at {time} s: {fold}"))?;
+        moments.push(Moment { time, handles });
+        progress(moments.len() as f64 / total);
+    }
+    Ok(moments)
+}
+
+/// By how much the contact times of the exact motion and of the paper's rule are off, seconds.
+#[derive(Debug, Clone, Copy)]
+struct ContactErrors {
+    exact: f64,
+    paper: f64,
+}
+
+/// The gap of the two boards in the reference, at the time found for the contact, over the speed at which it closes.
+/// `None` without a contact or with one at the very start.
+fn contact_errors(scene: &Scene, timeline: &Timeline) -> Result<Option<ContactErrors>, String> {
+    let Some(contact) = timeline.find(State::Contact) else { return Ok(None) };
+    let (Some(a), Some(b)) = (contact.event.bench_a, contact.event.bench_b) else { return Ok(None) };
+    let time = contact.event.travelled / scene.head_speed;
+    if time == 0.0 {
+        return Ok(None);
+    }
+    let mut reference = Reference::new(scene.team, scene.path.pitch(), scene.start_turn, scene.head_speed)?;
+    let mut gap = |time: f64| {
+        let handles = reference.handles(time).map_err(|fold| format!("the reference at {time} s: {fold}"))?;
+        let board = |bench: u32| {
+            let point = |handle: usize| Point::new(handles[handle].x.high, handles[handle].y.high);
+            let (front, rear) = (point(bench as usize), point(bench as usize + 1));
+            Board::from_handles(front, rear, scene.team.hole_inset, scene.team.width)
+        };
+        Ok::<f64, String>(separation_board_board(&board(a), &board(b)))
+    };
+    let interval = 1e-7 * time;
+    let closing = (gap(time - interval)? - gap(time)?) / interval;
+    let exact = (gap(time)? / closing).abs();
+    let of_paper = Scene { method: Method::Named(SolverName::Paper), ..scene.clone() };
+    let paper = (of_paper.time_of(contact.event.travelled) - time).abs();
+    Ok(Some(ContactErrors { exact, paper }))
+}
+
+fn candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<Candidate> {
+    let Scene { path, team, head_speed, velocities, .. } = *scene;
+    let exact = |name: String, solver: Box<dyn Solver>, memory_bytes| {
+        // All of them follow one motion, whose contact is found once.
+        Candidate { name, solver, contact_time_error: contact.map(|errors| errors.exact), memory_bytes }
+    };
+    let mut candidates = Vec::new();
+    for instructions in Instructions::available() {
+        let solver = WholeChain::new(path, team, head_speed, velocities);
+        let memory = solver.memory_bytes();
+        if let Some(solver) = solver.with_instructions(instructions) {
+            candidates.push(exact(format!("whole_chain ({})", instructions.name()), Box::new(solver), memory));
+        }
+    }
+    let newton = Newton::new(path, team, head_speed, velocities);
+    candidates.push(exact("newton".to_owned(), Box::new(newton), size_of::<Newton<Spiral>>()));
+    // The Euler steps of one show; where there are too many, the finest would take minutes.
+    let steps_to_end = |time_step: f64| scene.path.length() / head_speed / time_step;
+    let standard = PaperRules::default();
+    let mut rules: Vec<(String, PaperRules)> = [1e-2, 1e-3, 1e-4, 1e-5]
+        .into_iter()
+        .filter(|time_step| steps_to_end(*time_step) < 1e8)
+        .map(|time_step| (format!("paper (time step {time_step:e} s)"), PaperRules { time_step, ..standard }))
+        .collect();
+    let coarse = PaperRules { time_step: 1e-3, ..standard };
+    for bisection_tolerance in [1e-4, 1e-8] {
+        let name = format!("paper (time step 1e-3 s, tolerance {bisection_tolerance:e})");
+        rules.push((name, PaperRules { bisection_tolerance, ..coarse }));
+    }
+    for difference_interval in [0.02, 2.0] {
+        let name = format!("paper (time step 1e-3 s, differences over {difference_interval} s)");
+        rules.push((name, PaperRules { difference_interval, ..coarse }));
+    }
+    for (name, rules) in rules {
+        let solver = Paper::new(path, team, head_speed, velocities, rules);
+        let memory_bytes = size_of::<Paper>() + 3 * 8 * team.handles();
+        candidates.push(Candidate {
+            name,
+            solver: Box::new(solver),
+            contact_time_error: contact.map(|errors| errors.paper),
+            memory_bytes,
+        });
+    }
+    candidates
+}
+
+fn measured(scene: &Scene, mut candidate: Candidate, moments: &[Moment], end: f64) -> Measurement {
+    let errors = errors(scene, candidate.solver.as_mut(), moments);
+    let mut times = frame_times(scene, candidate.solver.as_mut(), end);
+    times.sort_unstable();
+    let quantile = |share: f64| times.get((share * times.len() as f64) as usize).map_or(f64::NAN, |ns| *ns as f64);
+    Measurement {
+        solver: candidate.name,
+        frame_ns: quantile(0.5),
+        frame_ns_p99: quantile(0.99),
+        frames_timed: times.len(),
+        max_position_error: errors.position,
+        max_speed_error: (scene.velocities == Velocities::Computed).then_some(errors.speed),
+        contact_time_error: candidate.contact_time_error,
+        max_link_error: errors.link,
+        memory_bytes: candidate.memory_bytes,
+        on_front: false,
+    }
+}
+
+#[derive(Default)]
+struct Errors {
+    position: f64,
+    speed: f64,
+    link: f64,
+}
+
+fn errors(scene: &Scene, solver: &mut dyn Solver, moments: &[Moment]) -> Errors {
+    let mut chain = Chain::new(scene.team.handles());
+    let mut worst = Errors::default();
+    for moment in moments {
+        for frame in (0..=LEAD_IN).rev() {
+            let time = (moment.time - frame as f64 / scene.rate).max(0.0);
+            // The paper's solver runs ahead of the truth and so locks a little earlier; that moment is left out.
+            if solver.solve(time, &mut chain).is_err() {
+                return worst;
+            }
+        }
+        for (i, truth) in moment.handles.iter().enumerate() {
+            let error = truth.x.error_of(chain.x[i]).hypot(truth.y.error_of(chain.y[i]));
+            worst.position = worst.position.max(error);
+            worst.speed = worst.speed.max(((chain.speed[i] - truth.speed) / truth.speed).abs());
+        }
+        for bench in 0..scene.team.benches {
+            let (dx, dy) = (chain.x[bench + 1] - chain.x[bench], chain.y[bench + 1] - chain.y[bench]);
+            worst.link = worst.link.max((dx.hypot(dy) - scene.team.link(bench)).abs());
+        }
+    }
+    worst
+}
+
+/// Nanoseconds of each frame. Where the show has too many frames, or the solver is too slow for all, runs of frames
+/// evenly over the show are timed.
+fn frame_times(scene: &Scene, solver: &mut dyn Solver, end: f64) -> Vec<u64> {
+    const RUN: usize = 50;
+    let mut chain = Chain::new(scene.team.handles());
+    let frames = (end * scene.rate) as usize;
+    let began = Instant::now();
+    let _ = solver.solve(0.0, &mut chain);
+    for frame in 1..=20 {
+        let _ = solver.solve(frame as f64 / scene.rate, &mut chain);
+    }
+    let each = began.elapsed().as_secs_f64() / 21.0;
+    let wanted = TIMED_FRAMES.min((TIMING_LIMIT / each) as usize).clamp(RUN, frames.max(RUN));
+    let runs = wanted.div_ceil(RUN);
+    let mut times = Vec::with_capacity(runs * RUN);
+    for run in 0..runs {
+        let first = frames.saturating_sub(RUN) * run / runs.max(2).saturating_sub(1);
+        for k in 0..RUN + 3 {
+            let time = (first + k) as f64 / scene.rate;
+            let begun = Instant::now();
+            let solved = time <= end && solver.solve(time, &mut chain).is_ok();
+            let nanoseconds = begun.elapsed().as_nanos() as u64;
+            // The first frames of a run follow a jump.
+            if solved && (k >= 3 || run == 0) {
+                times.push(nanoseconds);
+            }
+        }
+        if began.elapsed().as_secs_f64() > 2.0 * TIMING_LIMIT {
+            break;
+        }
+    }
+    times
+}
+
+fn mark_front(measurements: &mut [Measurement]) {
+    let points: Vec<(f64, f64)> = measurements.iter().map(|m| (m.frame_ns, m.max_position_error)).collect();
+    for (measurement, (cost, error)) in measurements.iter_mut().zip(&points) {
+        let beaten = |(c, e): &(f64, f64)| c <= cost && e <= error && (c < cost || e < error);
+        measurement.on_front = !points.iter().any(beaten);
+    }
+}
