@@ -1,37 +1,42 @@
-//! The live stage picture: reads a publisher's frames on a thread of its own and serves them to browsers.
+//! The live stage picture: reads a publisher's frames and serves them to browsers, with the page that draws them.
 //!
-//! Called by the `view` command. Ports cannot leave the thread that made them, so the reader hands the newest picture
-//! over through a watch channel: a slow browser skips frames and never gathers a backlog.
+//! Called by the `view` command. [`reader`] reads the shared memory on a thread of its own, since ports cannot leave the
+//! thread that made them, and hands the newest picture over; [`browser`] sends it to one browser at that one's pace;
+//! [`wire`] says how it looks on the way.
 
+mod browser;
+mod reader;
 mod wire;
 
 use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use axum::Router;
 use axum::body::Bytes;
-use axum::extract::State as Shared;
-use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::extract::ws::{Utf8Bytes, WebSocketUpgrade};
+use axum::extract::{Query, State as Shared};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+use serde::Deserialize;
 use tokio::sync::watch;
 
-use super::connection::{Connection, Subscription};
-use crate::transports::iceoryx2::OpenError;
+use super::connection::{Subscription, Wake};
+use crate::transports::iceoryx2::{OpenError, service_name};
 
-/// How often a silent publisher is looked for, and missing services are opened.
-const LOOK: Duration = Duration::from_millis(200);
+/// Browsers send questions of a few letters.
+const LONGEST_QUESTION: usize = 1024;
 
-/// The newest of everything a browser needs.
+/// The newest of everything a browser needs, each as it goes over the wire; empty where there is none.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Picture {
+    /// Set while there is no publisher.
+    waiting: Utf8Bytes,
+    stage: Utf8Bytes,
+    alert: Utf8Bytes,
     frame: Bytes,
-    stage: String,
-    alert: String,
-    present: bool,
 }
 
 #[derive(Clone)]
@@ -47,7 +52,10 @@ pub enum ViewError {
     #[error(transparent)]
     Open(#[from] OpenError),
     /// The address cannot be listened on.
-    #[error("cannot serve the stage picture at {address}: {source}")]
+    #[error(
+        "cannot serve the stage picture at {address}: {source}; choose a free port with --port and an address of this \
+         machine with --listen"
+    )]
     Listen {
         /// The address asked for.
         address: SocketAddr,
@@ -61,32 +69,29 @@ pub enum ViewError {
 ///
 /// # Errors
 /// [`ViewError`] for a name or an address that cannot be used.
-pub fn serve(
+pub fn serve<Refused: From<ViewError>>(
     name: &str,
     address: SocketAddr,
     stop: &Arc<AtomicBool>,
-    ready: impl FnOnce(SocketAddr),
-) -> Result<(), ViewError> {
+    ready: impl FnOnce(SocketAddr) -> Result<(), Refused>,
+) -> Result<(), Refused> {
+    service_name(name, "poses").map_err(ViewError::from)?;
     let listen = |source| ViewError::Listen { address, source };
-    let (sender, pictures) = watch::channel(Picture::default());
+    // One thread for all browsers: they must not take the cores a publisher on this machine needs.
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(listen)?;
     let listener = runtime.block_on(tokio::net::TcpListener::bind(address)).map_err(listen)?;
-    ready(listener.local_addr().map_err(listen)?);
+    let address = listener.local_addr().map_err(listen)?;
+    ready(address)?;
+    let (sender, pictures) = watch::channel(Picture::default());
     let reader = std::thread::spawn({
         let (name, stop) = (name.to_owned(), Arc::clone(stop));
         move || {
-            let read = read(&name, &sender, &stop);
+            let read = Subscription::with_wake(&name, Wake::Never).map(|to| reader::read(&to, &sender, &stop));
             stop.store(true, Ordering::Relaxed);
             read
         }
     });
-    let server = Server { pictures, loopback: address.ip().is_loopback() };
-    let router = Router::new()
-        .route("/", get(|| async { file("text/html; charset=utf-8", include_str!("view/index.html")) }))
-        .route("/stage.js", get(|| async { file("text/javascript", include_str!("view/stage.js")) }))
-        .route("/style.css", get(|| async { file("text/css", include_str!("view/style.css")) }))
-        .route("/frames", get(frames))
-        .with_state(server);
+    let router = router(Server { pictures, loopback: address.ip().is_loopback() });
     let served = runtime.block_on(async {
         tokio::select! {
             served = async { axum::serve(listener, router).await } => served,
@@ -94,9 +99,22 @@ pub fn serve(
         }
     });
     stop.store(true, Ordering::Relaxed);
-    served.map_err(listen)?;
     // A panic of the reader has already been printed.
-    reader.join().unwrap_or(Ok(())).map_err(ViewError::from)
+    let read = reader.join().unwrap_or(Ok(()));
+    served.map_err(listen)?;
+    Ok(read.map_err(ViewError::from)?)
+}
+
+fn router(server: Server) -> Router {
+    let file = |kind, text| get(move || async move { file(kind, text) });
+    Router::new()
+        .route("/", file("text/html; charset=utf-8", include_str!("view/index.html")))
+        .route("/stage.js", file("text/javascript; charset=utf-8", include_str!("view/stage.js")))
+        .route("/drawing.js", file("text/javascript; charset=utf-8", include_str!("view/drawing.js")))
+        .route("/stream.js", file("text/javascript; charset=utf-8", include_str!("view/stream.js")))
+        .route("/style.css", file("text/css; charset=utf-8", include_str!("view/style.css")))
+        .route("/frames", get(frames))
+        .with_state(server)
 }
 
 async fn stopped(stop: &AtomicBool) {
@@ -105,58 +123,40 @@ async fn stopped(stop: &AtomicBool) {
     }
 }
 
+/// A file of the page, which fetches nothing from anywhere else.
 fn file(kind: &'static str, text: &'static str) -> Response {
-    ([(header::CONTENT_TYPE, kind), (header::CACHE_CONTROL, "no-cache")], text).into_response()
+    let headers = [
+        (header::CONTENT_TYPE, kind),
+        (header::CACHE_CONTROL, "no-cache"),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::CONTENT_SECURITY_POLICY, "default-src 'self'; connect-src 'self' ws:; img-src data:"),
+    ];
+    (headers, text).into_response()
 }
 
-fn read(name: &str, sender: &watch::Sender<Picture>, stop: &AtomicBool) -> Result<(), OpenError> {
-    let subscription = Subscription::new(name)?;
-    while !stop.load(Ordering::Relaxed) {
-        match subscription.connect()? {
-            Some(connection) => follow(&subscription, connection, sender, stop),
-            None => std::thread::sleep(LOOK),
-        }
-        sender.send_replace(Picture::default());
-    }
-    Ok(())
+/// What may stand behind `/frames?`.
+#[derive(Debug, Deserialize)]
+struct Wish {
+    /// At most so many frames a second; without it, all that the server reads.
+    rate: Option<f64>,
 }
 
-/// Hands on what comes until the publisher is gone.
-fn follow(subscription: &Subscription, mut connection: Connection, sender: &watch::Sender<Picture>, stop: &AtomicBool) {
-    let mut picture = Picture { present: true, ..Picture::default() };
-    let (mut heard, mut looked) = (Instant::now(), Instant::now());
-    while !stop.load(Ordering::Relaxed) {
-        connection.wait(LOOK);
-        let mut newest = None;
-        if connection.frames(|header, handles| newest = Some(wire::frame(header, handles))) > 0 {
-            heard = Instant::now();
-        }
-        while let Some(stage) = connection.stage() {
-            picture.stage = wire::stage(&stage);
-        }
-        while let Some(alert) = connection.alert() {
-            picture.alert = wire::alert(&alert);
-        }
-        if let Some(frame) = newest {
-            picture.frame = frame.into();
-            sender.send_replace(picture.clone());
-        }
-        if looked.elapsed() > LOOK {
-            looked = Instant::now();
-            subscription.complete(&mut connection);
-            if heard.elapsed() > LOOK && !subscription.publisher_is_alive(&connection) {
-                return;
-            }
-        }
-    }
-}
-
-async fn frames(Shared(server): Shared<Server>, headers: HeaderMap, upgrade: WebSocketUpgrade) -> Response {
+async fn frames(
+    Shared(server): Shared<Server>,
+    headers: HeaderMap,
+    Query(wish): Query<Wish>,
+    upgrade: WebSocketUpgrade,
+) -> Response {
     let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
     if !is_welcome(text(header::ORIGIN), text(header::HOST), server.loopback) {
-        return (StatusCode::FORBIDDEN, "this page may not watch the stage picture").into_response();
+        return (StatusCode::FORBIDDEN, "a page from elsewhere may not watch the stage picture").into_response();
     }
-    upgrade.on_upgrade(move |socket| send(socket, server.pictures))
+    let gap = match wish.rate {
+        None => Duration::ZERO,
+        Some(rate) if (1.0..=1e6).contains(&rate) => Duration::from_secs_f64(rate.recip()),
+        Some(_) => return (StatusCode::BAD_REQUEST, "rate: expected 1 to 1000000 frames a second").into_response(),
+    };
+    upgrade.max_message_size(LONGEST_QUESTION).on_upgrade(move |socket| browser::serve(socket, server.pictures, gap))
 }
 
 /// Whether a WebSocket may be opened: by this server's own page or by a program, which sends no origin. On loopback
@@ -176,37 +176,6 @@ fn is_loopback_name(host: &str) -> bool {
     bare.eq_ignore_ascii_case("localhost") || address.is_ok_and(|address| address.is_loopback())
 }
 
-async fn send(mut socket: WebSocket, mut pictures: watch::Receiver<Picture>) {
-    pictures.mark_changed();
-    let mut known = Picture { present: true, ..Picture::default() };
-    loop {
-        tokio::select! {
-            changed = pictures.changed() => if changed.is_err() { return },
-            // A closed socket, or one that talks: nothing is expected of it.
-            message = socket.recv() => match message { Some(Ok(_)) => continue, _ => return },
-        }
-        let picture = pictures.borrow_and_update().clone();
-        let mut messages = Vec::new();
-        if !picture.present && known.present {
-            messages.push(Message::text(r#"{"type":"waiting"}"#));
-        }
-        for (new, old) in [(&picture.stage, &known.stage), (&picture.alert, &known.alert)] {
-            if new != old && !new.is_empty() {
-                messages.push(Message::text(new.clone()));
-            }
-        }
-        if !picture.frame.is_empty() {
-            messages.push(Message::Binary(picture.frame.clone()));
-        }
-        for message in messages {
-            if socket.send(message).await.is_err() {
-                return;
-            }
-        }
-        known = picture;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::is_welcome;
@@ -216,9 +185,12 @@ mod tests {
         assert!(is_welcome(Some("http://127.0.0.1:8080"), Some("127.0.0.1:8080"), true));
         assert!(is_welcome(Some("http://[::1]:8080"), Some("[::1]:8080"), true));
         assert!(is_welcome(None, Some("localhost:8080"), true));
+        assert!(is_welcome(Some("http://10.1.2.3:8080"), Some("10.1.2.3:8080"), false));
         assert!(!is_welcome(Some("http://evil.example"), Some("127.0.0.1:8080"), true));
         assert!(!is_welcome(Some("http://127.0.0.1:9"), Some("127.0.0.1:8080"), true));
         assert!(!is_welcome(Some("http://evil.example:8080"), Some("evil.example:8080"), true));
+        assert!(!is_welcome(Some("http://evil.example"), Some("10.1.2.3:8080"), false));
+        assert!(!is_welcome(Some("null"), Some("127.0.0.1:8080"), true));
         assert!(!is_welcome(None, None, true));
     }
 }

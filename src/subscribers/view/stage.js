@@ -1,112 +1,271 @@
-// Draws the frames that /frames sends. Motion is interpolated one arrival interval behind the newest frame.
-"use strict";
+// The page: puts the stream into the drawing and into words, and takes the user's hand.
+
+import { Stream } from "./stream.js";
+import { Camera, benchAt, draw, interpolated, paletteOf, spiral } from "./drawing.js";
+
+const STATES = ["moving", "approaching", "contact", "stall", "lock", "path_end"];
+const SIGNS = { moving: "○", approaching: "△", contact: "✖", stall: "■", lock: "■", path_end: "●" };
 const element = (id) => document.getElementById(id);
-const canvas = element("stage"), context = canvas.getContext("2d");
-const STATES = ["○ moving", "△ approaching", "✖ contact", "■ stall", "■ lock", "● path end"];
-const SHADES = 24;
-const view = { x: 0, y: 0, zoom: 1, follow: false };
-let stage = null, alertNow = null, previous = null, newest = null, interval = 50, chosen = -1, retry = 250;
-const picture = { frames: 0, drawn: 0, head: null, state: null, connected: false };
+const canvas = element("stage"), context = canvas.getContext("2d", { alpha: false });
+const stream = new Stream(), camera = new Camera();
+let palette = paletteOf(canvas), places = null, path = null, pathOf = null, chosen = -1, range = null, last = "";
+
+/** For tests and measurements: what the page has received and drawn. */
+const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, latency: [], toPixel: (x, y) => camera.toPixel(x, y) };
 window.picture = picture;
 
-function connect() {
-  const socket = new WebSocket(`ws://${location.host}/frames`);
-  socket.binaryType = "arraybuffer";
-  socket.onopen = () => { picture.connected = true; retry = 250; };
-  socket.onmessage = ({ data }) => typeof data === "string" ? tell(JSON.parse(data)) : receive(data);
-  socket.onclose = () => { picture.connected = false; wait("○ waiting for the server"); setTimeout(connect, retry); retry = Math.min(5000, retry * 2); };
+function put(id, text) {
+  if (element(id).textContent !== text) element(id).textContent = text;
 }
-function wait(text) { previous = newest = alertNow = null; picture.state = null; element("state").textContent = text; element("countdown").textContent = ""; element("alert").textContent = ""; }
-function tell(message) {
-  if (message.type === "stage") { stage = message; return; }
-  if (message.type === "waiting") { wait("○ waiting for a publisher"); return; }
-  const pair = message.bench_b !== null ? `benches ${message.bench_a + 1} and ${message.bench_b + 1}` : message.bench_a !== null ? `bench ${message.bench_a + 1}` : "";
-  const text = message.level === "clear" ? "" : `${message.level}${pair ? `: ${pair} (counted from 1)` : ""}`;
-  if (element("alert").textContent !== text) element("alert").textContent = text;
-  alertNow = message;
+
+// The drawing.
+
+function fitCanvas() {
+  const { width, height } = canvas.getBoundingClientRect(), ratio = devicePixelRatio;
+  Object.assign(camera, { width, height, ratio });
+  const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
+  if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
 }
-function receive(data) {
-  const bytes = new DataView(data);
-  if (bytes.getUint8(0) !== 1) { wait("! this page is for another version: load it again"); return; }
-  const frame = { at: performance.now(), state: bytes.getUint8(1), time: bytes.getFloat64(8, true), scale: bytes.getFloat64(16, true),
-    clearance: bytes.getFloat32(32, true), handles: new Float32Array(data, 40) };
-  if (newest) interval += 0.1 * (Math.min(1000, frame.at - newest.at) - interval);
-  previous = newest && newest.handles.length === frame.handles.length && frame.time >= newest.time ? newest : frame;
-  newest = frame; picture.frames++; picture.state = frame.state;
+
+/** How far from the centre the outermost bench is. */
+function reachOf(stage, handles) {
+  let most = 0;
+  for (let k = 0; k < handles.length; k += 4) most = Math.max(most, Math.hypot(handles[k], handles[k + 1]));
+  return most + stage.width + stage.hole_inset || 1;
 }
-function draw() {
-  requestAnimationFrame(draw);
-  const ratio = devicePixelRatio, wide = Math.round(innerWidth * ratio), high = Math.round(innerHeight * ratio);
-  if (canvas.width !== wide || canvas.height !== high) { canvas.width = wide; canvas.height = high; }
-  context.setTransform(1, 0, 0, 1, 0, 0); context.clearRect(0, 0, wide, high);
-  if (!stage || !newest) return;
-  const part = Math.min(1, (performance.now() - newest.at) / interval), a = previous.handles, b = newest.handles;
-  const at = (k) => a[k] + (b[k] - a[k]) * part;
-  if (view.follow) { view.x = at(0); view.y = at(1); }
-  const scale = Math.min(wide, high) / (2.3 * stage.pitch * (stage.start_turn + 1)) * view.zoom;
-  context.setTransform(scale, 0, 0, -scale, wide / 2 - view.x * scale, high / 2 + view.y * scale);
-  const ink = getComputedStyle(canvas).color, danger = getComputedStyle(element("countdown")).color;
-  context.strokeStyle = ink; context.globalAlpha = 0.25; context.lineWidth = 1 / scale; context.beginPath();
-  for (let turn = 0, end = stage.start_turn + 1; turn < end; turn += Math.max(0.02, end / 4000)) {
-    context.lineTo(stage.pitch * turn * Math.cos(2 * Math.PI * turn), stage.pitch * turn * Math.sin(2 * Math.PI * turn));
+
+/** The colours' scale holds all speeds and changes gently; none while nothing moves or no speeds are sent. */
+function widen(speeds) {
+  let [low, high] = [Infinity, -Infinity];
+  for (let k = 3; k < speeds.length; k += 4) if (speeds[k] > 0) [low, high] = [Math.min(low, speeds[k]), Math.max(high, speeds[k])];
+  if (!(high > 0)) return null;
+  // A hair's breadth is not worth a colour.
+  [low, high] = [Math.min(low, 0.98 * speeds[3]), Math.max(high, 1.02 * speeds[3])];
+  const slowly = (old, now) => (range ? old + 0.05 * (now - old) : now);
+  return { low: Math.min(low, slowly(range?.low, low)), high: Math.max(high, slowly(range?.high, high)) };
+}
+
+function pass() {
+  requestAnimationFrame(pass);
+  picture.passes++;
+  fitCanvas();
+  const now = performance.now(), { playback, stage, alert } = stream, { newest } = playback;
+  picture.received = stream.received;
+  tell(now);
+  if (!newest || !stage) {
+    if (last !== "") context.clearRect(0, 0, canvas.width, canvas.height);
+    if (last !== "" || picture.passes === 1) [context.fillStyle, last] = [palette.ground, ""];
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    Object.assign(picture, { state: null, run: null, sequence: null, head: null });
+    return;
   }
-  context.stroke(); context.globalAlpha = 1;
-  const count = b.length / 4 - 1;
-  let slow = Infinity, fast = -Infinity;
-  for (let i = 0; i <= count; i++) { const v = b[4 * i + 3]; if (v < slow) slow = v; if (v > fast) fast = v; }
-  const paths = Array.from({ length: SHADES }, () => new Path2D()), outline = (path, i) => {
-    const x = at(4 * i), y = at(4 * i + 1), u = at(4 * i + 4), w = at(4 * i + 5), link = Math.hypot(x - u, y - w) || 1;
-    const c = (x - u) / link, s = (y - w) / link, e = stage.hole_inset, h = stage.width / 2, p = e * c, q = e * s;
-    path.moveTo(x + p - h * s, y + q + h * c); path.lineTo(u - p - h * s, w - q + h * c);
-    path.lineTo(u - p + h * s, w - q - h * c); path.lineTo(x + p + h * s, y + q - h * c); path.closePath();
-  };
-  for (let i = 0; i < count; i++) outline(paths[Math.min(SHADES - 1, Math.floor((b[4 * i + 3] - slow) / (fast - slow || 1) * SHADES)) || 0], i);
-  paths.forEach((path, k) => { context.fillStyle = `hsl(${260 - 220 * k / SHADES} 75% 50%)`; context.fill(path); });
-  const mark = (i, colour, width) => { const path = new Path2D(); outline(path, i); context.strokeStyle = colour; context.lineWidth = width / scale; context.stroke(path); };
-  mark(0, ink, 3 * ratio); context.setLineDash([4 * ratio / scale, 3 * ratio / scale]); mark(count - 1, ink, 2 * ratio); context.setLineDash([]);
-  if (chosen >= 0 && chosen < count) mark(chosen, ink, 4 * ratio);
-  if (alertNow && alertNow.level !== "clear") {
-    for (const i of [alertNow.bench_a, alertNow.bench_b]) if (i !== null && i < count) mark(i, danger, 5 * ratio);
-    if (alertNow.x !== null) { context.beginPath(); context.arc(alertNow.x, alertNow.y, 14 * ratio / scale, 0, 7); context.strokeStyle = danger; context.lineWidth = 3 * ratio / scale; context.stroke(); }
+  const between = playback.between(now);
+  places = interpolated(between, places);
+  const reach = reachOf(stage, newest.handles);
+  if (pathOf !== newest.run) [camera.reach, range] = [reach, null];
+  if (reach > camera.reach || pathOf !== newest.run) {
+    camera.reach = Math.max(reach, camera.reach);
+    path = spiral(stage.pitch, Math.max(stage.start_turn, camera.reach / stage.pitch));
+    pathOf = newest.run;
   }
-  picture.head = [wide / 2 + (at(0) - view.x) * scale, high / 2 - (at(1) - view.y) * scale]; picture.scale = scale / ratio; picture.drawn++;
-  show(slow, fast);
+  if (camera.follow) [camera.x, camera.y] = places;
+  range = widen(newest.handles) ?? range;
+  const { a, b, part } = between;
+  // Nothing is drawn twice: a show that stands still costs nothing.
+  const all = [newest.run, newest.state, newest.handles[3], a.due, b.due, part, camera.x, camera.y, camera.zoom, camera.reach, camera.width, camera.height, camera.ratio, range?.low, range?.high, alert?.level, alert?.x, alert?.bench_a, alert?.bench_b, chosen, palette.ground].join();
+  if (all !== last) {
+    draw(context, camera, palette, { stage, places, speeds: newest.handles, range, path, alert, chosen });
+    last = all;
+    picture.drawn++;
+    if (stream.clock !== null && a !== b) {
+      picture.latency.push(performance.now() + stream.clock - (a.sent + (b.sent - a.sent) * part));
+      if (picture.latency.length > 600) picture.latency.shift();
+    }
+  }
+  const head = camera.toPixel(places[0], places[1]);
+  Object.assign(picture, { state: newest.state, run: newest.run, sequence: newest.sequence, time: newest.time, head });
 }
-function show(slow, fast) {
-  const put = (id, text) => { if (element(id).textContent !== text) element(id).textContent = text; };
-  put("state", STATES[newest.state] ?? "? unknown");
-  const left = newest.state === 1 && alertNow?.event_time != null ? Math.max(0, (alertNow.event_time - newest.time) / newest.scale) : NaN;
-  put("countdown", newest.state >= 2 && newest.state <= 4 ? STATES[newest.state].toUpperCase() : left >= 0 ? `${left.toFixed(1)} s` : "");
-  put("time", `t = ${newest.time.toFixed(2)} s`); put("slow", slow.toFixed(2)); put("fast", fast.toFixed(2));
-  element("clearance").value = newest.clearance || 0; put("metres", Number.isNaN(newest.clearance) ? "not computed" : `${newest.clearance.toFixed(3)} m`);
-  const b = newest.handles, k = 4 * chosen;
-  put("bench", chosen >= 0 && k < b.length ? `Bench ${chosen + 1} (counted from 1): front handle (${b[k].toFixed(2)}, ${b[k + 1].toFixed(2)}) m, ${b[k + 3].toFixed(3)} m/s` : "");
+
+// The words.
+
+/** Seconds as a person reads them off from afar. */
+function remaining(seconds) {
+  if (seconds < 100) return [seconds.toFixed(1), "s"];
+  const whole = Math.floor(seconds), pad = (number) => String(number).padStart(2, "0");
+  const hours = Math.floor(whole / 3600), minutes = Math.floor(whole / 60) % 60;
+  return hours ? [`${hours}:${pad(minutes)}:${pad(whole % 60)}`, "h"] : [`${minutes}:${pad(whole % 60)}`, "min"];
 }
-const fingers = new Map(); let moved = 0;
-const pan = (x, y) => { view.follow = false; press(); view.x -= x / picture.scale; view.y += y / picture.scale; };
-const zoom = (by) => { view.zoom = Math.min(1000, Math.max(0.2, view.zoom * by)); };
-const press = () => element("follow").setAttribute("aria-pressed", view.follow);
-const whole = () => { Object.assign(view, { x: 0, y: 0, zoom: 1, follow: false }); press(); };
-const follow = () => { view.follow = !view.follow; if (view.follow && view.zoom < 3) view.zoom = 3; press(); };
-canvas.onpointerdown = (event) => { canvas.setPointerCapture(event.pointerId); fingers.set(event.pointerId, event); moved = 0; };
+
+function pairOf(alert) {
+  const benches = [alert?.bench_a, alert?.bench_b].filter((bench) => bench != null).map((bench) => bench + 1);
+  return benches.length === 2 ? `benches ${benches[0]} and ${benches[1]}` : benches.length ? `bench ${benches[0]}` : "";
+}
+
+function sentence(level, alert) {
+  const pair = pairOf(alert), place = alert?.x != null ? ` at (${alert.x.toFixed(2)}, ${alert.y.toFixed(2)}) m` : "";
+  switch (level) {
+    case "approaching":
+      return pair ? `Closest: ${pair}.` : "An event is near.";
+    case "contact":
+      return pair ? `Contact: ${pair} touch${place}.` : "Two benches touch.";
+    case "stall":
+      return `Stall: ${pair || "a bench"} stands square to the path and pushes back all behind it.`;
+    case "lock":
+      return `Lock: ${pair || "a bench"} is folded, the motion cannot go on.`;
+    case "path_end":
+      return "The head has reached the end of the path.";
+    default:
+      return "";
+  }
+}
+
+let spokenAt = Infinity;
+function speak(seconds) {
+  const mark = [10, 5, 3].findLast((mark) => seconds <= mark) ?? Infinity;
+  if (mark < spokenAt) put("spoken", `${Math.ceil(seconds)} seconds`);
+  spokenAt = mark;
+}
+
+function countdown(level, alert, now) {
+  const { playback } = stream, { newest } = playback;
+  const seconds = alert?.event_time != null ? (alert.event_time - playback.time(now)) / newest.scale : NaN;
+  const ahead = (level === "moving" || level === "approaching") && seconds > -1;
+  const [number, unit] = ahead ? remaining(Math.max(0, seconds)) : ["", ""];
+  put("until", ahead ? (level === "approaching" ? "danger in" : "next danger in") : "");
+  if (element("left").dataset.text !== number + unit) {
+    element("left").dataset.text = number + unit;
+    element("left").textContent = number;
+    element("left").append(Object.assign(document.createElement("small"), { textContent: unit }));
+  }
+  speak(level === "approaching" && ahead ? seconds : Infinity);
+}
+
+function meter(stage, clearance) {
+  const known = Number.isFinite(clearance), most = Math.max(stage.pitch - stage.width, 2 * stage.width);
+  put("metres", !known ? "not computed" : clearance < 0 ? `${clearance.toFixed(3)} m: overlap` : `${clearance.toFixed(3)} m`);
+  const bar = element("meter"), share = known ? Math.min(1, Math.max(0, clearance / most)) : 0;
+  bar.firstElementChild.style.width = `${(100 * share).toFixed(1)}%`;
+  bar.setAttribute("aria-valuemax", most.toFixed(3));
+  bar.setAttribute("aria-valuenow", (share * most).toFixed(3));
+  bar.setAttribute("aria-valuetext", element("metres").textContent);
+}
+
+function detail(stage, handles) {
+  const count = handles.length / 4 - 1;
+  element("pick").max = count;
+  const there = chosen >= 0 && chosen < count, k = 4 * chosen;
+  element("bench").classList.toggle("chosen", there);
+  if (!there) return put("bench", "Click a bench, or type its number.");
+  const name = chosen === 0 ? ", the head" : chosen === count - 1 ? ", the tail" : "", speed = handles[k + 3];
+  const degrees = ((handles[k + 2] * 180) / Math.PI).toFixed(1);
+  put("bench", `Bench ${chosen + 1} of ${count}${name}: front handle at (${handles[k].toFixed(3)}, ${handles[k + 1].toFixed(3)}) m, ${Number.isNaN(speed) ? "speed not sent" : `${speed.toFixed(3)} m/s`}, heading ${degrees}°`);
+}
+
+let told = 0, counted = { at: 0, received: 0 }, perSecond = 0;
+function tell(now) {
+  const { playback, stage, alert } = stream, { newest } = playback;
+  const level = newest && stage ? STATES[newest.state] ?? "moving" : "waiting";
+  if (document.body.dataset.level !== level) document.body.dataset.level = level;
+  if (level === "waiting") {
+    put("state", `○ ${stream.trouble ?? "waiting for the stage"}`);
+    for (const id of ["alert", "until", "left", "metres", "speeds", "time", "rate", "spoken"]) put(id, "");
+    element("left").dataset.text = "";
+    return;
+  }
+  countdown(level, alert, now);
+  const words = level.replace("_", " "), silent = now - newest.at > Math.max(2000, 3 * playback.interval);
+  put("state", silent ? `… no frames for ${Math.floor((now - newest.at) / 1000)} s` : `${SIGNS[level]} ${words}`);
+  put("alert", sentence(level, alert));
+  // The rest changes too often to be read at every pass.
+  if (now - told < 100) return;
+  told = now;
+  meter(stage, newest.clearance);
+  put("speeds", Number.isNaN(newest.handles[3]) ? "not sent" : range ? `${range.low.toFixed(2)} – ${range.high.toFixed(2)}` : "all stand still");
+  put("time", `t = ${playback.time(now).toFixed(1)} s${newest.scale === 1 ? "" : ` (× ${+newest.scale.toPrecision(3)})`}`);
+  detail(stage, newest.handles);
+  if (now - counted.at > 1000) {
+    perSecond = ((stream.received - counted.received) * 1000) / (now - counted.at);
+    counted = { at: now, received: stream.received };
+    const late = picture.latency.slice(-60).sort((a, b) => a - b), behind = late.length ? `, ${late[late.length >> 1].toFixed(0)} ms behind the publisher` : "";
+    put("rate", `${perSecond.toFixed(perSecond < 10 ? 1 : 0)} frames/s${behind}`);
+  }
+}
+
+// The user's hand.
+
+function showFollow() {
+  element("follow").setAttribute("aria-pressed", camera.follow);
+}
+function follow() {
+  camera.follow = !camera.follow;
+  if (camera.follow && camera.zoom < 2.5) camera.zoom = 2.5;
+  showFollow();
+}
+function whole() {
+  camera.whole();
+  if (stream.stage) camera.reach = reachOf(stream.stage, stream.playback.newest.handles);
+  showFollow();
+}
+function pan(x, y) {
+  camera.pan(x, y);
+  showFollow();
+}
+function choose(bench) {
+  chosen = bench;
+  element("pick").value = bench >= 0 ? bench + 1 : "";
+}
+function darken() {
+  const root = document.documentElement, dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+  root.dataset.theme = dark ? "light" : "dark";
+  palette = paletteOf(canvas);
+}
+async function fill() {
+  if (document.fullscreenElement) return document.exitFullscreen();
+  await document.documentElement.requestFullscreen();
+  // A projector must not go to sleep; a browser that cannot promise that still shows the picture.
+  await navigator.wakeLock?.request("screen").catch(() => null);
+}
+
+const fingers = new Map();
+let moved = 0;
+canvas.onpointerdown = (event) => {
+  canvas.setPointerCapture(event.pointerId);
+  if (!fingers.size) moved = 0;
+  fingers.set(event.pointerId, { x: event.offsetX, y: event.offsetY });
+};
 canvas.onpointermove = (event) => {
-  const old = fingers.get(event.pointerId); if (!old) return;
-  const x = event.clientX - old.clientX, y = event.clientY - old.clientY; moved += Math.hypot(x, y);
-  const other = [...fingers.values()].find((finger) => finger.pointerId !== event.pointerId);
-  const apart = (one) => Math.hypot(one.clientX - other.clientX, one.clientY - other.clientY) || 1;
-  if (other) zoom(apart(event) / apart(old)); else if (picture.scale) pan(x, y);
-  fingers.set(event.pointerId, event);
+  const old = fingers.get(event.pointerId);
+  if (!old) return;
+  const now = { x: event.offsetX, y: event.offsetY }, x = now.x - old.x, y = now.y - old.y;
+  moved += Math.hypot(x, y);
+  const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
+  if (other) {
+    const apart = (one) => Math.hypot(one.x - other.x, one.y - other.y) || 1;
+    camera.zoomAt(apart(now) / apart(old), (now.x + other.x) / 2, (now.y + other.y) / 2);
+    if (!camera.follow) pan(x / 2, y / 2);
+  } else if (moved > 6) pan(x, y);
+  fingers.set(event.pointerId, now);
 };
 canvas.onpointercancel = (event) => fingers.delete(event.pointerId);
 canvas.onpointerup = (event) => {
-  fingers.delete(event.pointerId); if (moved > 6 || !newest || !picture.scale) return;
-  const x = view.x + (event.clientX - innerWidth / 2) / picture.scale, y = view.y - (event.clientY - innerHeight / 2) / picture.scale, b = newest.handles;
-  let best = 1.5; chosen = -1;
-  for (let i = 0; i + 1 < b.length / 4; i++) { const away = Math.hypot((b[4 * i] + b[4 * i + 4]) / 2 - x, (b[4 * i + 1] + b[4 * i + 5]) / 2 - y); if (away < best) { best = away; chosen = i; } }
+  fingers.delete(event.pointerId);
+  if (moved > 6 || fingers.size || !stream.stage || !places) return;
+  choose(benchAt(stream.stage, places, ...camera.toStage(event.offsetX, event.offsetY), 16 / camera.scale));
 };
-canvas.onwheel = (event) => { event.preventDefault(); zoom(Math.exp(-event.deltaY / 500)); };
-const keys = { "+": () => zoom(1.25), "=": () => zoom(1.25), "-": () => zoom(0.8), 0: whole, f: follow, ArrowLeft: () => pan(40, 0), ArrowRight: () => pan(-40, 0), ArrowUp: () => pan(0, 40), ArrowDown: () => pan(0, -40) };
-onkeydown = (event) => { if (!event.ctrlKey && !event.metaKey && picture.scale) keys[event.key]?.(); };
-element("follow").onclick = follow; element("whole").onclick = whole;
-element("theme").onclick = () => { const root = document.documentElement; const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches; root.dataset.theme = dark ? "light" : "dark"; };
-connect(); draw();
+canvas.addEventListener("wheel", (event) => {
+  event.preventDefault();
+  camera.zoomAt(Math.exp(-event.deltaY / (event.deltaMode ? 20 : 500)), event.offsetX, event.offsetY);
+}, { passive: false });
+const keys = {
+  "+": () => camera.zoomAt(1.25), "=": () => camera.zoomAt(1.25), "-": () => camera.zoomAt(0.8), 0: whole, Home: whole,
+  f: follow, t: darken, p: fill, Escape: () => choose(-1),
+  ArrowLeft: () => pan(60, 0), ArrowRight: () => pan(-60, 0), ArrowUp: () => pan(0, 60), ArrowDown: () => pan(0, -60),
+};
+onkeydown = (event) => {
+  if (event.ctrlKey || event.metaKey || event.altKey || event.target === element("pick")) return;
+  keys[event.key.length === 1 ? event.key.toLowerCase() : event.key]?.();
+};
+element("pick").oninput = ({ target }) => (chosen = target.value === "" ? -1 : Math.floor(target.value) - 1);
+Object.entries({ follow, whole, theme: darken, full: fill, nearer: keys["+"], farther: keys["-"] }).forEach(([id, act]) => (element(id).onclick = act));
+matchMedia("(prefers-color-scheme: dark)").onchange = () => (palette = paletteOf(canvas));
+pass();
