@@ -5,8 +5,8 @@ pub mod draw;
 pub mod events;
 pub mod run;
 pub mod solve;
-pub mod view;
 pub mod trade;
+pub mod view;
 pub mod watch;
 
 use std::fs::File;

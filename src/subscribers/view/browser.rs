@@ -96,7 +96,10 @@ fn ping(count: u64) -> Message {
     Message::Ping(count.to_le_bytes().to_vec().into())
 }
 
-async fn send(sink: &mut (impl Sink<Message, Error = axum::Error> + Unpin), messages: Vec<Message>) -> Result<(), axum::Error> {
+async fn send(
+    sink: &mut (impl Sink<Message, Error = axum::Error> + Unpin),
+    messages: Vec<Message>,
+) -> Result<(), axum::Error> {
     for message in messages {
         sink.feed(message).await?;
     }

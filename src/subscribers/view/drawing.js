@@ -1,7 +1,11 @@
-// The drawing: one picture of the stage on a canvas. Knows nothing of the network and keeps nothing but the camera.
+// The drawing: one picture of the stage on a canvas. Knows nothing of the network; keeps the camera and the ground.
 
 /** Steps of the colour scale. */
 const SHADES = 32;
+/** Rectangles filled at once: with thousands in one path, filling it takes six times as long. */
+const BATCH = 100;
+/** Beyond so many turns the lines of the path lie closer together than pixels. */
+const MOST_TURNS = 1500;
 
 const colour = (style, name) => style.getPropertyValue(name).trim();
 const channels = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
@@ -34,7 +38,7 @@ export class Camera {
 
   /** Pixels of the screen (not of the canvas) for a metre. */
   get scale() {
-    return (Math.min(this.width, this.height) / (2.08 * this.reach)) * this.zoom;
+    return (Math.min(this.width, this.height) / (2.14 * this.reach)) * this.zoom;
   }
 
   toPixel(x, y) {
@@ -110,9 +114,14 @@ function outline(context, { x, y, c, s, l, w }) {
   context.closePath();
 }
 
-/** The spiral r = pitch * turn out to a turn, as cubic curves that take its tangents over. */
-export function spiral(pitch, turns) {
-  const path = new Path2D(), a = pitch / (2 * Math.PI), steps = Math.min(20000, Math.ceil(12 * turns)), step = (2 * Math.PI * turns) / steps;
+/**
+ * The path of a stage as far out as `reach`, in metres: the spiral r = pitch * turn, as cubic curves that take its
+ * tangents over.
+ */
+export function pathOf({ pitch, start_turn }, reach) {
+  const path = new Path2D(), turns = Math.max(start_turn, reach / pitch);
+  if (turns > MOST_TURNS) return path;
+  const a = pitch / (2 * Math.PI), steps = Math.ceil(12 * turns), step = (2 * Math.PI * turns) / steps;
   let [x, y, dx, dy] = [0, 0, a, 0];
   path.moveTo(0, 0);
   for (let k = 1; k <= steps; k++) {
@@ -124,18 +133,45 @@ export function spiral(pitch, turns) {
   return path;
 }
 
+/** Lets a context draw in metres. */
+function inMetres(context, camera) {
+  const [left, top] = camera.toPixel(0, 0), { ratio, scale } = camera;
+  context.setTransform(ratio * scale, 0, 0, -ratio * scale, ratio * left, ratio * top);
+}
+
+/** The ground with the path on it, kept until it looks different: a long path takes longer than all its benches. */
+export class Ground {
+  constructor() {
+    this.canvas = document.createElement("canvas");
+    this.context = this.canvas.getContext("2d", { alpha: false });
+    this.path = this.look = null;
+  }
+
+  /** The ground as large as a canvas. */
+  picture({ width, height }, camera, palette, path) {
+    const { canvas, context } = this, { x, y, scale, ratio } = camera;
+    const look = [width, height, x, y, scale, ratio, palette.ground].join();
+    if (this.path === path && this.look === look) return canvas;
+    Object.assign(this, { path, look });
+    Object.assign(canvas, { width, height });
+    context.fillStyle = palette.ground;
+    context.fillRect(0, 0, width, height);
+    inMetres(context, camera);
+    context.lineWidth = 1.2 / scale;
+    context.strokeStyle = palette.faint;
+    context.stroke(path);
+    return canvas;
+  }
+}
+
 /** Draws everything. `scene` has: stage, places, speeds (of the newest frame), scale of speeds, path, alert, chosen. */
 export function draw(context, camera, palette, scene) {
-  const { stage, places, path, alert, chosen } = scene, { ratio, scale } = camera, pixel = 1 / scale;
-  const [left, top] = camera.toPixel(0, 0), world = () => context.setTransform(ratio * scale, 0, 0, -ratio * scale, ratio * left, ratio * top);
+  const { stage, places, ground, path, alert, chosen } = scene, { ratio, scale } = camera, pixel = 1 / scale;
+  const world = () => inMetres(context, camera);
   context.setTransform(1, 0, 0, 1, 0, 0);
-  context.fillStyle = palette.ground;
-  context.fillRect(0, 0, context.canvas.width, context.canvas.height);
+  context.drawImage(ground.picture(context.canvas, camera, palette, path), 0, 0);
   world();
   context.lineJoin = "miter";
-  context.lineWidth = 1.2 * pixel;
-  context.strokeStyle = palette.faint;
-  context.stroke(path);
   benches(context, camera, palette, scene);
   const count = places.length / 2 - 1, head = rectangle(stage, places, 0), tail = rectangle(stage, places, count - 1);
   const mark = (bench, ink, width, dashes = []) => {
@@ -157,7 +193,8 @@ export function draw(context, camera, palette, scene) {
     context.lineWidth = 5;
     context.strokeStyle = palette.ground;
     // Outward from the centre of the stage, where there is most room.
-    const tx = px + (away * 1.6 * x) / out, ty = py - (away * y) / out;
+    const half = context.measureText(text).width / 2 + 6, within = (at, least, most) => Math.min(Math.max(at, least), most);
+    const tx = within(px + (away * 1.6 * x) / out, half, camera.width - half), ty = within(py - (away * y) / out, 14, camera.height - 14);
     context.strokeText(text, tx, ty);
     context.fillStyle = ink;
     context.fillText(text, tx, ty);
@@ -203,12 +240,13 @@ function benches(context, camera, palette, { stage, places, speeds, range }) {
   context.strokeStyle = palette.ground;
   context.lineWidth = 1 / camera.scale;
   shown.forEach((all, shade) => {
-    if (!all.length) return;
-    context.beginPath();
-    for (const bench of all) outline(context, rectangle(stage, places, bench));
     context.fillStyle = palette.shades[shade] ?? palette.still;
-    context.fill();
-    if (edged) context.stroke();
+    for (let first = 0; first < all.length; first += BATCH) {
+      context.beginPath();
+      for (const bench of all.slice(first, first + BATCH)) outline(context, rectangle(stage, places, bench));
+      context.fill();
+      if (edged) context.stroke();
+    }
   });
   if (stage.width * camera.scale < 14) return;
   // Close by, the handles show.

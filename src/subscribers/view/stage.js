@@ -1,17 +1,17 @@
 // The page: puts the stream into the drawing and into words, and takes the user's hand.
 
 import { Stream } from "./stream.js";
-import { Camera, benchAt, draw, interpolated, paletteOf, spiral } from "./drawing.js";
+import { Camera, Ground, benchAt, draw, interpolated, paletteOf, pathOf } from "./drawing.js";
 
 const STATES = ["moving", "approaching", "contact", "stall", "lock", "path_end"];
 const SIGNS = { moving: "○", approaching: "△", contact: "✖", stall: "■", lock: "■", path_end: "●" };
 const element = (id) => document.getElementById(id);
 const canvas = element("stage"), context = canvas.getContext("2d", { alpha: false });
-const stream = new Stream(), camera = new Camera();
-let palette = paletteOf(canvas), places = null, path = null, pathOf = null, chosen = -1, range = null, last = "";
+const stream = new Stream(), camera = new Camera(), ground = new Ground();
+let palette = paletteOf(canvas), places = null, path = null, pathRun = null, chosen = -1, range = null, last = null;
 
-/** For tests and measurements: what the page has received and drawn. */
-const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, latency: [], toPixel: (x, y) => camera.toPixel(x, y) };
+/** For tests and measurements: what the page has received and drawn; `latency` and `ways` in ms since the frame was sent. */
+const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, latency: [], ways: stream.ways, toPixel: (x, y) => camera.toPixel(x, y) };
 window.picture = picture;
 
 function put(id, text) {
@@ -52,21 +52,16 @@ function pass() {
   const now = performance.now(), { playback, stage, alert } = stream, { newest } = playback;
   picture.received = stream.received;
   tell(now);
-  if (!newest || !stage) {
-    if (last !== "") context.clearRect(0, 0, canvas.width, canvas.height);
-    if (last !== "" || picture.passes === 1) [context.fillStyle, last] = [palette.ground, ""];
-    context.fillRect(0, 0, canvas.width, canvas.height);
-    Object.assign(picture, { state: null, run: null, sequence: null, head: null });
-    return;
-  }
+  if (!newest || !stage) return drawNothing();
   const between = playback.between(now);
   places = interpolated(between, places);
   const reach = reachOf(stage, newest.handles);
-  if (pathOf !== newest.run) [camera.reach, range] = [reach, null];
-  if (reach > camera.reach || pathOf !== newest.run) {
-    camera.reach = Math.max(reach, camera.reach);
-    path = spiral(stage.pitch, Math.max(stage.start_turn, camera.reach / stage.pitch));
-    pathOf = newest.run;
+  if (pathRun !== newest.run || reach > camera.reach) {
+    // A team that moves outward is given room ahead.
+    camera.reach = pathRun === newest.run ? 1.1 * reach : reach;
+    path = pathOf(stage, camera.reach);
+    if (pathRun !== newest.run) range = null;
+    pathRun = newest.run;
   }
   if (camera.follow) [camera.x, camera.y] = places;
   range = widen(newest.handles) ?? range;
@@ -74,7 +69,7 @@ function pass() {
   // Nothing is drawn twice: a show that stands still costs nothing.
   const all = [newest.run, newest.state, newest.handles[3], a.due, b.due, part, camera.x, camera.y, camera.zoom, camera.reach, camera.width, camera.height, camera.ratio, range?.low, range?.high, alert?.level, alert?.x, alert?.bench_a, alert?.bench_b, chosen, palette.ground].join();
   if (all !== last) {
-    draw(context, camera, palette, { stage, places, speeds: newest.handles, range, path, alert, chosen });
+    draw(context, camera, palette, { stage, places, speeds: newest.handles, range, ground, path, alert, chosen });
     last = all;
     picture.drawn++;
     if (stream.clock !== null && a !== b) {
@@ -84,6 +79,16 @@ function pass() {
   }
   const head = camera.toPixel(places[0], places[1]);
   Object.assign(picture, { state: newest.state, run: newest.run, sequence: newest.sequence, time: newest.time, head });
+}
+
+function drawNothing() {
+  const blank = [palette.ground, canvas.width, canvas.height].join();
+  if (blank === last) return;
+  last = blank;
+  context.setTransform(1, 0, 0, 1, 0, 0);
+  context.fillStyle = palette.ground;
+  context.fillRect(0, 0, canvas.width, canvas.height);
+  Object.assign(picture, { state: null, run: null, sequence: null, head: null });
 }
 
 // The words.
@@ -105,7 +110,7 @@ function sentence(level, alert) {
   const pair = pairOf(alert), place = alert?.x != null ? ` at (${alert.x.toFixed(2)}, ${alert.y.toFixed(2)}) m` : "";
   switch (level) {
     case "approaching":
-      return pair ? `Closest: ${pair}.` : "An event is near.";
+      return pair ? `Approaching: ${pair} are closest.` : "Approaching.";
     case "contact":
       return pair ? `Contact: ${pair} touch${place}.` : "Two benches touch.";
     case "stall":
@@ -134,6 +139,8 @@ function countdown(level, alert, now) {
   put("until", ahead ? (level === "approaching" ? "danger in" : "next danger in") : "");
   if (element("left").dataset.text !== number + unit) {
     element("left").dataset.text = number + unit;
+    // The number is made as large as the panel is wide.
+    element("left").style.setProperty("--letters", number.length + 0.5 * unit.length);
     element("left").textContent = number;
     element("left").append(Object.assign(document.createElement("small"), { textContent: unit }));
   }
@@ -164,11 +171,12 @@ function detail(stage, handles) {
 let told = 0, counted = { at: 0, received: 0 }, perSecond = 0;
 function tell(now) {
   const { playback, stage, alert } = stream, { newest } = playback;
-  const level = newest && stage ? STATES[newest.state] ?? "moving" : "waiting";
-  if (document.body.dataset.level !== level) document.body.dataset.level = level;
+  const level = newest && stage ? STATES[newest.state] ?? "moving" : "waiting", before = document.body.dataset.level;
+  if (before !== level) document.body.dataset.level = level;
   if (level === "waiting") {
     put("state", `○ ${stream.trouble ?? "waiting for the stage"}`);
-    for (const id of ["alert", "until", "left", "metres", "speeds", "time", "rate", "spoken"]) put(id, "");
+    put("spoken", stream.trouble ?? "");
+    for (const id of ["alert", "until", "left", "metres", "speeds", "time", "rate"]) put(id, "");
     element("left").dataset.text = "";
     return;
   }
@@ -176,6 +184,7 @@ function tell(now) {
   const words = level.replace("_", " "), silent = now - newest.at > Math.max(2000, 3 * playback.interval);
   put("state", silent ? `… no frames for ${Math.floor((now - newest.at) / 1000)} s` : `${SIGNS[level]} ${words}`);
   put("alert", sentence(level, alert));
+  if (level === "moving" && before !== level) put("spoken", before === "waiting" ? "The dragon moves." : "Clear again.");
   // The rest changes too often to be read at every pass.
   if (now - told < 100) return;
   told = now;
@@ -214,10 +223,13 @@ function choose(bench) {
   chosen = bench;
   element("pick").value = bench >= 0 ? bench + 1 : "";
 }
-function darken() {
-  const root = document.documentElement, dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-  root.dataset.theme = dark ? "light" : "dark";
+function wear(theme) {
+  document.documentElement.dataset.theme = theme;
   palette = paletteOf(canvas);
+}
+function darken() {
+  const theme = document.documentElement.dataset.theme ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+  wear(theme === "dark" ? "light" : "dark");
 }
 async function fill() {
   if (document.fullscreenElement) return document.exitFullscreen();
@@ -268,4 +280,7 @@ onkeydown = (event) => {
 element("pick").oninput = ({ target }) => (chosen = target.value === "" ? -1 : Math.floor(target.value) - 1);
 Object.entries({ follow, whole, theme: darken, full: fill, nearer: keys["+"], farther: keys["-"] }).forEach(([id, act]) => (element(id).onclick = act));
 matchMedia("(prefers-color-scheme: dark)").onchange = () => (palette = paletteOf(canvas));
+// The address may say how the picture begins, for a screen without a keyboard: #dark, #light,follow and so on.
+const begin = { dark: () => wear("dark"), light: () => wear("light"), follow };
+location.hash.slice(1).split(",").forEach((word) => begin[word]?.());
 pass();

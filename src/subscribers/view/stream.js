@@ -100,6 +100,8 @@ export class Stream {
     this.alerts = null;
     this.trouble = "waiting for the server";
     this.received = 0;
+    /** How long the last frames were on their way, ms. */
+    this.ways = [];
     this.clock = null;
     this.retry = 250;
     this.open();
@@ -110,12 +112,22 @@ export class Stream {
     const socket = new WebSocket(`${scheme}://${location.host}/frames?rate=${MOST_FRAMES}`);
     socket.binaryType = "arraybuffer";
     let asked = null, nearest = Infinity;
+    const again = () => {
+      clearInterval(asking);
+      socket.onopen = socket.onmessage = socket.onclose = null;
+      socket.close();
+      this.forget("waiting for the server");
+      setTimeout(() => this.open(), this.retry);
+      this.retry = Math.min(4000, 2 * this.retry);
+    };
     const ask = () => {
-      if (asked !== null) return socket.close();
+      // Without waiting for a goodbye: a machine that was switched off says none.
+      if (asked !== null || socket.readyState !== WebSocket.OPEN) return again();
       asked = performance.now();
-      if (socket.readyState === WebSocket.OPEN) socket.send("clock");
+      socket.send("clock");
     };
     const asking = setInterval(ask, ASK);
+    socket.onclose = again;
     socket.onopen = () => {
       this.retry = 250;
       this.trouble = "waiting for a publisher";
@@ -133,12 +145,6 @@ export class Stream {
           this.clock = Number(message.monotonic_ns) / 1e6 - (now - way / 2);
         }
       } else this.tell(message);
-    };
-    socket.onclose = () => {
-      clearInterval(asking);
-      this.forget("waiting for the server");
-      setTimeout(() => this.open(), this.retry);
-      this.retry = Math.min(4000, 2 * this.retry);
     };
   }
 
@@ -159,6 +165,7 @@ export class Stream {
     if (!frame) return this.forget("this page is for another version of the server: load it again");
     this.trouble = null;
     this.received++;
+    if (this.clock !== null && this.ways.push(frame.at + this.clock - frame.sent) > 600) this.ways.shift();
     this.playback.push(frame);
   }
 

@@ -115,7 +115,8 @@ mod tests {
 
     #[test]
     fn an_alert_without_benches_or_event_has_nulls() {
-        let nothing = CollisionAlert { bench_a: NO_BENCH, bench_b: NO_BENCH, event_time: f64::NAN, ..Default::default() };
+        let nothing =
+            CollisionAlert { bench_a: NO_BENCH, bench_b: NO_BENCH, event_time: f64::NAN, ..Default::default() };
         let text: Value = serde_json::from_str(&alert(&nothing)).unwrap();
         assert_eq!(text["level"], "clear");
         assert!(["bench_a", "bench_b", "event_time"].iter().all(|key| text[key].is_null()), "{text}");
