@@ -56,7 +56,8 @@ function pass() {
   const between = playback.between(now);
   places = interpolated(between, places);
   const reach = reachOf(stage, newest.handles);
-  if (pathRun !== newest.run || reach > camera.reach) {
+  // Positions are rounded to 32 bits, which alone moves the outermost bench a little.
+  if (pathRun !== newest.run || reach > 1.001 * camera.reach) {
     // A team that moves outward is given room ahead.
     camera.reach = pathRun === newest.run ? 1.1 * reach : reach;
     path = pathOf(stage, camera.reach);
