@@ -102,6 +102,23 @@ export function benchAt(stage, places, x, y, most) {
   return found;
 }
 
+/** The middle between the nearest points of two boards: one of the two is always a corner. */
+export function nearest(stage, places, ...pair) {
+  const [a, b] = pair.map((bench) => rectangle(stage, places, bench));
+  let best = Infinity, place = null;
+  for (const [one, other] of [[a, b], [b, a]]) {
+    for (const [along, across] of [[1, 1], [1, -1], [-1, 1], [-1, -1]]) {
+      const x = one.x + along * one.l * one.c - across * one.w * one.s, y = one.y + along * one.l * one.s + across * one.w * one.c;
+      const dx = x - other.x, dy = y - other.y, u = dx * other.c + dy * other.s, v = dy * other.c - dx * other.s;
+      const nu = Math.max(-other.l, Math.min(other.l, u)), nv = Math.max(-other.w, Math.min(other.w, v)), away = Math.hypot(u - nu, v - nv);
+      if (away >= best) continue;
+      best = away;
+      place = { x: (x + other.x + nu * other.c - nv * other.s) / 2, y: (y + other.y + nu * other.s + nv * other.c) / 2 };
+    }
+  }
+  return place;
+}
+
 /** Which shade a speed has. */
 const shadeOf = (speed, { low, high }) => Math.min(SHADES - 1, Math.max(0, Math.floor(((speed - low) / (high - low)) * SHADES)));
 
@@ -133,34 +150,49 @@ export function pathOf({ pitch, start_turn }, reach) {
   return path;
 }
 
-/** Lets a context draw in metres. */
-function inMetres(context, camera) {
+/** Lets a context draw in metres, moved by some of its pixels. */
+function inMetres(context, camera, right = 0, down = 0) {
   const [left, top] = camera.toPixel(0, 0), { ratio, scale } = camera;
-  context.setTransform(ratio * scale, 0, 0, -ratio * scale, ratio * left, ratio * top);
+  context.setTransform(ratio * scale, 0, 0, -ratio * scale, ratio * left + right, ratio * top + down);
 }
 
-/** The ground with the path on it, kept until it looks different: a long path takes longer than all its benches. */
+/**
+ * The ground with the path on it. A long path takes longer to draw than all its benches, so it is kept with a margin
+ * until the camera has moved further than that, or it looks different.
+ */
 export class Ground {
   constructor() {
     this.canvas = document.createElement("canvas");
     this.context = this.canvas.getContext("2d", { alpha: false });
     this.path = this.look = null;
+    this.x = this.y = 0;
   }
 
-  /** The ground as large as a canvas. */
-  picture({ width, height }, camera, palette, path) {
-    const { canvas, context } = this, { x, y, scale, ratio } = camera;
-    const look = [width, height, x, y, scale, ratio, palette.ground].join();
-    if (this.path === path && this.look === look) return canvas;
-    Object.assign(this, { path, look });
-    Object.assign(canvas, { width, height });
+  /** Covers another context's canvas. */
+  cover(other, camera, palette, path) {
+    const { width, height } = other.canvas, scale = camera.scale * camera.ratio, right = width >> 2, down = height >> 2;
+    const look = [width, height, camera.scale, camera.ratio, palette.ground].join();
+    const moved = () => [Math.round((this.x - camera.x) * scale), Math.round((camera.y - this.y) * scale)];
+    const away = moved();
+    if (this.path !== path || this.look !== look || Math.abs(away[0]) > right || Math.abs(away[1]) > down) {
+      Object.assign(this, { path, look, x: camera.x, y: camera.y });
+      this.paint(width + 2 * right, height + 2 * down, () => inMetres(this.context, camera, right, down), palette, camera.scale);
+    }
+    const [x, y] = moved();
+    other.setTransform(1, 0, 0, 1, 0, 0);
+    other.drawImage(this.canvas, x - right, y - down);
+  }
+
+  paint(width, height, metres, palette, scale) {
+    const { canvas, context } = this;
+    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+    context.setTransform(1, 0, 0, 1, 0, 0);
     context.fillStyle = palette.ground;
     context.fillRect(0, 0, width, height);
-    inMetres(context, camera);
+    metres();
     context.lineWidth = 1.2 / scale;
     context.strokeStyle = palette.faint;
-    context.stroke(path);
-    return canvas;
+    context.stroke(this.path);
   }
 }
 
@@ -168,8 +200,7 @@ export class Ground {
 export function draw(context, camera, palette, scene) {
   const { stage, places, ground, path, alert, chosen } = scene, { ratio, scale } = camera, pixel = 1 / scale;
   const world = () => inMetres(context, camera);
-  context.setTransform(1, 0, 0, 1, 0, 0);
-  context.drawImage(ground.picture(context.canvas, camera, palette, path), 0, 0);
+  ground.cover(context, camera, palette, path);
   world();
   context.lineJoin = "miter";
   benches(context, camera, palette, scene);
@@ -185,6 +216,7 @@ export function draw(context, camera, palette, scene) {
   };
   const label = (text, x, y, ink, away = 18) => {
     const [px, py] = camera.toPixel(x, y), out = Math.hypot(x, y) || 1;
+    if (px < 0 || py < 0 || px > camera.width || py > camera.height) return;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.font = "600 15px system-ui, sans-serif";
     context.textAlign = "center";
@@ -214,7 +246,9 @@ export function draw(context, camera, palette, scene) {
     mark(chosen, palette.ground, 7);
     mark(chosen, palette.ink, 4, [7, 4]);
   }
-  if (danger && alert.x !== null) target(context, alert, palette, pixel);
+  // Alerts come once a second, and the place of an approach moves with the boards.
+  const place = alert?.level === "approaching" && pair.length === 2 ? nearest(stage, places, ...pair) : alert;
+  if (danger && place.x !== null) target(context, place, palette, pixel);
   if (!pair.includes(0)) label("HEAD", head.x + head.l * head.c, head.y + head.l * head.s, palette.ink);
   if (count > 1) label("TAIL", tail.x - tail.l * tail.c, tail.y - tail.l * tail.s, palette.ink);
   for (const bench of pair) {

@@ -8,7 +8,7 @@ const SIGNS = { moving: "○", approaching: "△", contact: "✖", stall: "■",
 const element = (id) => document.getElementById(id);
 const canvas = element("stage"), context = canvas.getContext("2d", { alpha: false });
 const stream = new Stream(), camera = new Camera(), ground = new Ground();
-let palette = paletteOf(canvas), places = null, path = null, pathRun = null, chosen = -1, range = null, last = null;
+let palette = paletteOf(canvas), places = null, path = null, pathRun = null, chosen = -1, range = null, still = false, last = null;
 
 /** For tests and measurements: what the page has received and drawn; `latency` and `ways` in ms since the frame was sent. */
 const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, latency: [], ways: stream.ways, toPixel: (x, y) => camera.toPixel(x, y) };
@@ -40,7 +40,8 @@ function widen(speeds) {
   for (let k = 3; k < speeds.length; k += 4) if (speeds[k] > 0) [low, high] = [Math.min(low, speeds[k]), Math.max(high, speeds[k])];
   if (!(high > 0)) return null;
   // A hair's breadth is not worth a colour.
-  [low, high] = [Math.min(low, 0.98 * speeds[3]), Math.max(high, 1.02 * speeds[3])];
+  const wider = Math.max(0, 0.01 * high - (high - low) / 2);
+  [low, high] = [low - wider, high + wider];
   const slowly = (old, now) => (range ? old + 0.05 * (now - old) : now);
   return { low: Math.min(low, slowly(range?.low, low)), high: Math.max(high, slowly(range?.high, high)) };
 }
@@ -65,7 +66,9 @@ function pass() {
     pathRun = newest.run;
   }
   if (camera.follow) [camera.x, camera.y] = places;
-  range = widen(newest.handles) ?? range;
+  const widened = widen(newest.handles);
+  range = widened ?? range;
+  still = !widened;
   const { a, b, part } = between;
   // Nothing is drawn twice: a show that stands still costs nothing.
   const all = [newest.run, newest.state, newest.handles[3], a.due, b.due, part, camera.x, camera.y, camera.zoom, camera.reach, camera.width, camera.height, camera.ratio, range?.low, range?.high, alert?.level, alert?.x, alert?.bench_a, alert?.bench_b, chosen, palette.ground].join();
@@ -137,6 +140,7 @@ function countdown(level, alert, now) {
   const seconds = alert?.event_time != null ? (alert.event_time - playback.time(now)) / newest.scale : NaN;
   const ahead = (level === "moving" || level === "approaching") && seconds > -1;
   const [number, unit] = ahead ? remaining(Math.max(0, seconds)) : ["", ""];
+  element("countdown").hidden = !ahead;
   put("until", ahead ? (level === "approaching" ? "danger in" : "next danger in") : "");
   if (element("left").dataset.text !== number + unit) {
     element("left").dataset.text = number + unit;
@@ -150,7 +154,7 @@ function countdown(level, alert, now) {
 
 function meter(stage, clearance) {
   const known = Number.isFinite(clearance), most = Math.max(stage.pitch - stage.width, 2 * stage.width);
-  put("metres", !known ? "not computed" : clearance < 0 ? `${clearance.toFixed(3)} m: overlap` : `${clearance.toFixed(3)} m`);
+  put("metres", !known ? "not computed" : clearance < -0.0005 ? `${(-clearance).toFixed(3)} m overlap` : `${Math.max(0, clearance).toFixed(3)} m`);
   const bar = element("meter"), share = known ? Math.min(1, Math.max(0, clearance / most)) : 0;
   bar.firstElementChild.style.width = `${(100 * share).toFixed(1)}%`;
   bar.setAttribute("aria-valuemax", most.toFixed(3));
@@ -179,6 +183,9 @@ function tell(now) {
     put("spoken", stream.trouble ?? "");
     for (const id of ["alert", "until", "left", "metres", "speeds", "time", "rate"]) put(id, "");
     element("left").dataset.text = "";
+    element("countdown").hidden = true;
+    put("bench", "");
+    element("meter").firstElementChild.style.width = 0;
     return;
   }
   countdown(level, alert, now);
@@ -190,7 +197,7 @@ function tell(now) {
   if (now - told < 100) return;
   told = now;
   meter(stage, newest.clearance);
-  put("speeds", Number.isNaN(newest.handles[3]) ? "not sent" : range ? `${range.low.toFixed(2)} – ${range.high.toFixed(2)}` : "all stand still");
+  put("speeds", Number.isNaN(newest.handles[3]) ? "not sent" : still ? "at rest" : `${range.low.toFixed(2)}–${range.high.toFixed(2)}`);
   put("time", `t = ${playback.time(now).toFixed(1)} s${newest.scale === 1 ? "" : ` (× ${+newest.scale.toPrecision(3)})`}`);
   detail(stage, newest.handles);
   if (now - counted.at > 1000) {
