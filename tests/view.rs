@@ -115,6 +115,21 @@ fn a_program_reads_the_documented_layout() {
 }
 
 #[test]
+fn the_python_example_reads_the_socket() {
+    let (_server, address) = server("example");
+    let _publisher = publisher("example", &["--start", "300", "--time-scale", "1e-6"]);
+    let url = format!("ws://{address}/frames");
+    let arguments = ["examples/python/stage_socket.py", "--url", &url, "--seconds", "4"];
+    let output = Process::start(python().args(arguments)).output_within(30);
+    let said = text(&output.stdout);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let [x, y, _] = truth_at_300()[0];
+    let expected = format!("t =  300.000 s  moving      head ({x:.3}, {y:.3}) m  1.000 m/s");
+    assert!(said.lines().any(|line| line == expected), "no line is {expected}: {said}");
+    assert!(said.contains("'type': 'stage'") && said.contains("'level': 'clear'"), "{said}");
+}
+
+#[test]
 fn a_slow_reader_gets_the_newest_frame_and_no_backlog() {
     let (_server, address) = server("slow");
     let _publisher = publisher("slow", &["--start", "100", "--rate", "500"]);
