@@ -1,7 +1,8 @@
 """What the stage picture costs the publisher, how far it is behind, and how many pictures a second it reaches.
 
     cargo build --release
-    .venv/bin/python benches/stage_picture.py cost      # lateness and step of a 1 kHz publisher: five browsers against none
+    .venv/bin/python benches/stage_picture.py cost      # lateness and step of a 1 kHz publisher: five browsers against none;
+                                                        # what follows is handed to `run`: cost --realtime 80
     .venv/bin/python benches/stage_picture.py latency   # from sent_ns to received and to drawn, at 20 Hz, 60 Hz and 1 kHz
     .venv/bin/python benches/stage_picture.py long      # pictures a second of a scene of 5,000 benches
 
@@ -68,9 +69,9 @@ def rates(page, seconds):
     return received, drawn, last["ways"], last["latency"]
 
 
-def summary_of_a_run(*arguments):
+def summary_of_a_run():
     """The summary of a 20 s run at 1 kHz."""
-    with started("run", "--quiet", "--json", "--rate", "1000", "--start", "100", "--duration", "20", *arguments) as child:
+    with started("run", "--quiet", "--json", "--rate", "1000", "--start", "100", "--duration", "20", *sys.argv[2:]) as child:
         return json.loads(child.communicate()[0].splitlines()[-1])
 
 

@@ -197,7 +197,7 @@ function tell(now) {
   if (now - told < 100) return;
   told = now;
   meter(stage, newest.clearance);
-  put("speeds", Number.isNaN(newest.handles[3]) ? "not sent" : still ? "at rest" : `${range.low.toFixed(2)}–${range.high.toFixed(2)}`);
+  put("speeds", Number.isNaN(newest.handles[3]) ? "not sent" : still ? "at rest" : range ? `${range.low.toFixed(2)}–${range.high.toFixed(2)}` : "");
   put("time", `t = ${playback.time(now).toFixed(1)} s${newest.scale === 1 ? "" : ` (× ${+newest.scale.toPrecision(3)})`}`);
   detail(stage, newest.handles);
   if (now - counted.at > 1000) {
