@@ -25,7 +25,7 @@ from playwright.sync_api import sync_playwright
 
 TRUTH = pathlib.Path(__file__).resolve().parents[1] / "truth" / "paper_scene_exact.csv"
 CONTACT = 412.473837682115
-PITCH, WIDTH, INSET, HEAD_LENGTH, BODY_LENGTH = 0.55, 0.30, 0.275, 3.41, 2.20
+WIDTH, HEAD_LENGTH, BODY_LENGTH = 0.30, 3.41, 2.20
 # Nothing here may wait for ever; an alarm still lets everything that was started be ended.
 WATCHDOG = 150
 STILL = ["--start", "300", "--time-scale", "1e-6"]
@@ -114,17 +114,20 @@ def is_board(colours):
     return colours.min(axis=-1) < 160
 
 
+def outside_of_board(places, front, rear, length):
+    """The distance from each place to a board whose handles are at `front` and `rear`, 0 inside it."""
+    along = (front - rear) / numpy.linalg.norm(front - rear)
+    offset = places - (front + rear) / 2
+    u = numpy.maximum(numpy.abs(offset @ along) - length / 2, 0)
+    v = numpy.maximum(numpy.abs(offset @ [-along[1], along[0]]) - WIDTH / 2, 0)
+    return numpy.hypot(u, v)
+
+
 def outside_of_boards(places, handles):
-    """The distance from each place to the nearest board, 0 inside one."""
-    nearest = numpy.full(len(places), numpy.inf)
-    for bench, (front, rear) in enumerate(zip(handles, handles[1:])):
-        along = (front - rear) / numpy.linalg.norm(front - rear)
-        offset = places - (front + rear) / 2
-        length = HEAD_LENGTH if bench == 0 else BODY_LENGTH
-        u = numpy.maximum(numpy.abs(offset @ along) - length / 2, 0)
-        v = numpy.maximum(numpy.abs(offset @ [-along[1], along[0]]) - WIDTH / 2, 0)
-        nearest = numpy.minimum(nearest, numpy.hypot(u, v))
-    return nearest
+    """The distance from each place to the nearest board."""
+    lengths = [HEAD_LENGTH] + [BODY_LENGTH] * (len(handles) - 2)
+    boards = zip(handles, handles[1:], lengths)
+    return numpy.min([outside_of_board(places, *board) for board in boards], axis=0)
 
 
 def boards_are_where_the_truth_says():
@@ -305,14 +308,25 @@ def receives_the_stream(page):
 
 
 def danger_is_marked(page):
-    """Around the nearest corner of the head's board and on the edges of both benches there is red."""
+    """A red ring of 13 pixels is around the corner of the head's board that touches bench 8, and nowhere far from it."""
+    rows = subprocess.run([PROGRAM, "solve", "--at", "contact"], capture_output=True, text=True, check=True).stdout.splitlines()
+    handles = numpy.array([[float(row["x"]), float(row["y"])] for row in csv.DictReader(rows)])
+    along = (handles[0] - handles[1]) / numpy.linalg.norm(handles[0] - handles[1])
+    across, middle = numpy.array([-along[1], along[0]]), (handles[0] + handles[1]) / 2
+    corners = [middle + u * HEAD_LENGTH / 2 * along + v * WIDTH / 2 * across for u in (1, -1) for v in (1, -1)]
+    distances = [outside_of_board(corner[None], handles[8], handles[9], BODY_LENGTH)[0] for corner in corners]
+    assert min(distances) < 1e-6, f"the nearest corner of the head is {min(distances)} m from bench 8"
+    touching = corners[int(numpy.argmin(distances))]
     pixels, to_pixel, scale = canvas_pixels(page)
     red = (pixels[:, :, 0] > 150) & (pixels[:, :, 1] < 60) & (pixels[:, :, 2] < 80)
-    assert red.sum() > 100, f"{red.sum()} red pixels"
+    x, y = to_pixel(touching[None])[0]
+    for angle in range(20, 360, 40):
+        at_x, at_y = x + round(13 * math.cos(math.radians(angle))), y + round(13 * math.sin(math.radians(angle)))
+        assert red[at_y - 1 : at_y + 2, at_x - 1 : at_x + 2].any(), f"no ring around {touching}, at {angle} degrees"
     ys, xs = numpy.nonzero(red)
-    middle = to_pixel(numpy.array([0.0, 0.0]))
-    furthest = numpy.hypot(xs - middle[0], ys - middle[1]).max() / scale
-    assert furthest < 6, f"red {furthest} m from the centre, where no bench of the pair is"
+    furthest = numpy.hypot(xs - x, ys - y).max() / scale
+    # The head is 3.41 m long and its name stands at its end.
+    assert furthest < 6, f"red {furthest} m from the contact, where neither bench nor its name is"
 
 
 def publishers_come_and_go():
