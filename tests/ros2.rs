@@ -3,7 +3,7 @@
 
 mod processes;
 
-use std::process::Command;
+use std::process::{Command, Output};
 
 use processes::{Process, json_lines, program, python, scene_file, summary, text, unique, wait};
 use serde_json::Value;
@@ -30,9 +30,10 @@ fn messages<'a>(lines: &'a [Value], topic: &str) -> Vec<&'a Value> {
     lines.iter().filter(|line| line["topic"] == topic).map(|line| &line["message"]).collect()
 }
 
-/// How many messages each topic brought, and from how many publishers at the end.
-fn end(lines: &[Value]) -> &Value {
-    lines.last().filter(|line| line["type"] == "end").expect("the peer's last line")
+/// How many messages each topic brought, and from how many publishers at the end: the peer's last line.
+fn end(output: &Output) -> Value {
+    let last = json_lines(output).pop().filter(|line| line["type"] == "end");
+    last.unwrap_or_else(|| panic!("the peer ended with {}: {}", output.status, text(&output.stderr)))
 }
 
 #[test]
@@ -137,7 +138,7 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_what_msgs_sa
     assert_eq!(status.last().unwrap()["scene"], "paper");
     assert_eq!(status.last().unwrap()["rate"], 60.0);
 
-    let counts = &end(&lines)["counts"];
+    let counts = end(&output)["counts"].clone();
     let frames = counts["handles"].as_u64().unwrap();
     assert!((60..150).contains(&frames), "30 a second were asked for: {counts}");
     let summary = summary(&publisher.output_within(30));
@@ -150,9 +151,8 @@ fn a_clean_end_leaves_the_graph_at_once() {
     let watcher = Process::start(&mut peer("gone", "6", &["poses"]));
     summary(&publisher.output_within(30));
     let output = watcher.output_within(40);
-    let lines = json_lines(&output);
-    assert!(end(&lines)["counts"]["poses"].as_u64().unwrap() > 0, "{}", text(&output.stderr));
-    assert_eq!(end(&lines)["publishers"]["poses"], 0);
+    assert!(end(&output)["counts"]["poses"].as_u64().unwrap() > 0, "{}", text(&output.stderr));
+    assert_eq!(end(&output)["publishers"]["poses"], 0);
 }
 
 #[test]
@@ -163,8 +163,7 @@ fn the_domain_is_the_environments() {
     let other = Process::start(&mut peer("domain", "4", &["poses"]));
     let count = |process: Process| {
         let output = process.output_within(40);
-        let lines = json_lines(&output);
-        end(&lines)["counts"]["poses"].as_u64().unwrap()
+        end(&output)["counts"]["poses"].as_u64().unwrap()
     };
     assert!(count(same) > 60);
     assert_eq!(count(other), 0);
@@ -281,8 +280,7 @@ fn two_hosts_find_each_other_by_multicast_or_where_the_subscriber_names_the_publ
         let subscriber = peer("hosts", "5", &["poses"]);
         let reader = Process::start(on("right", &subscriber).env("CYCLONEDDS_URI", peers));
         let output = reader.output_within(40);
-        let lines = json_lines(&output);
-        let count = end(&lines)["counts"]["poses"].as_u64().unwrap();
+        let count = end(&output)["counts"]["poses"].as_u64().unwrap();
         let case = format!("{range}, multicast {multicast}, peers \"{peers}\": {count} messages on the other host");
         println!("{case}");
         assert_eq!(count > 100, expected, "{case}; {}", text(&output.stderr));
