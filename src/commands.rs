@@ -4,6 +4,7 @@ pub mod check;
 pub mod draw;
 pub mod events;
 pub mod run;
+pub mod soak;
 pub mod solve;
 pub mod trade;
 pub mod watch;

@@ -33,6 +33,11 @@ enum Command {
     Draw(commands::draw::DrawArguments),
     /// Measure accuracy against cost for every solver on this scene and machine
     Trade(commands::trade::TradeArguments),
+    /// Soak-test: publish for hours to real subscriber processes and give a verdict
+    Soak(commands::soak::SoakArguments),
+    /// What soak starts
+    #[command(hide = true)]
+    SoakSubscriber(commands::soak::SoakSubscriberArguments),
     /// Validate a scene and say what it would model
     Check,
 }
@@ -47,6 +52,8 @@ fn main() -> ExitCode {
         Command::Events => commands::events::events(&common),
         Command::Draw(arguments) => commands::draw::draw(&common, arguments),
         Command::Trade(arguments) => commands::trade::trade(&common, arguments),
+        Command::Soak(arguments) => commands::soak::soak(&common, arguments),
+        Command::SoakSubscriber(arguments) => commands::soak::subscribe(&common, arguments),
         Command::Check => commands::check::check(&common),
     };
     match done {

@@ -51,6 +51,9 @@ pub struct RunArguments {
     /// Keep the loop on this CPU
     #[arg(long, value_name = "N", help_heading = "Punctuality")]
     cpu: Option<usize>,
+    /// End when the process that started this one ends
+    #[arg(long, hide = true)]
+    end_with_parent: bool,
 }
 
 /// The line of `run --json`.
@@ -73,6 +76,9 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
         if scene.alerts.is_some() { search_timeline(&scene, common) } else { Timeline::without_contact(&scene) };
     let show = Show::new(&scene, timeline, playback).map_err(|error| CommandError::BadInput(error.to_string()))?;
     let stop = stop_on_signals()?;
+    if arguments.end_with_parent {
+        super::soak::end_with_parent()?;
+    }
     let run_id = RandomState::new().hash_one(realtime_ns());
     let timeline = show.timeline().clone();
     let performance = Performance { common, arguments, scene: &scene, playback, run_id };
