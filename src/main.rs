@@ -45,7 +45,7 @@ enum Command {
 fn main() -> ExitCode {
     let CommandLine { common, command } = CommandLine::parse();
     set_up_logging(&common);
-    let done = match &command {
+    let done = commands::end_when_shared_memory_is_full().and_then(|()| match &command {
         Command::Run(arguments) => commands::run::run(&common, arguments),
         Command::Watch(arguments) => commands::watch::watch(&common, arguments),
         Command::Solve(arguments) => commands::solve::solve(&common, arguments),
@@ -55,7 +55,7 @@ fn main() -> ExitCode {
         Command::Soak(arguments) => commands::soak::soak(&common, arguments),
         Command::SoakSubscriber(arguments) => commands::soak::subscribe(&common, arguments),
         Command::Check => commands::check::check(&common),
-    };
+    });
     match done {
         Ok(()) | Err(CommandError::ClosedPipe) => ExitCode::SUCCESS,
         Err(CommandError::BadInput(sentence)) => {

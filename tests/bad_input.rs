@@ -89,6 +89,7 @@ fn scenes_that_cannot_be_played() {
         ("rate = 60.0", "rate = 20001.0", &["line 27", "publish.rate", "2e4"]),
         ("velocities = true", "velocities = \"yes\"", &["line 28", "velocities", "boolean"]),
         ("velocities = true", "queue = 0", &["line 28", "publish.queue"]),
+        ("velocities = true", "subscribers = 257", &["line 28", "publish.subscribers", "256"]),
     ];
     for (from, to, named) in cases {
         let said = scene_refusal(from, to);

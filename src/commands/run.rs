@@ -187,13 +187,14 @@ impl Performance<'_> {
             name: self.common.name.clone(),
             handles,
             queue: self.queue(),
+            subscribers: scene.subscribers,
             alerts: scene.alerts.is_some(),
             stage: self.stage(),
         })?)
     }
 
     fn queue(&self) -> usize {
-        self.scene.queue.unwrap_or_else(|| iceoryx2::default_queue(self.scene.team.handles()))
+        self.scene.queue.unwrap_or_else(|| iceoryx2::default_queue(self.scene.team.handles(), self.scene.subscribers))
     }
 
     fn loop_options(&self) -> LoopOptions {
@@ -208,7 +209,8 @@ impl Performance<'_> {
         ros2: Option<Box<dyn StatusPublisher + Send>>,
         done: &AtomicBool,
     ) -> Result<Summary, CommandError> {
-        let mut sinks: Vec<Box<dyn StatusPublisher>> = vec![Box::new(StatusSender::open(&self.common.name)?)];
+        let mut sinks: Vec<Box<dyn StatusPublisher>> =
+            vec![Box::new(StatusSender::open(&self.common.name, self.scene.subscribers)?)];
         if let Some(status) = ros2 {
             sinks.push(status);
         }
@@ -238,8 +240,9 @@ impl Performance<'_> {
         eprintln!("{} frames per second{scale}, from {} s.", number(playback.rate), number(playback.start));
         let alerts = if scene.alerts.is_some() { ", /alerts" } else { "" };
         eprintln!(
-            "iceoryx2 services: {name}/poses{alerts}, /status, /stage, /tick (queues of {} frames).",
-            self.queue()
+            "iceoryx2 services: {name}/poses{alerts}, /status, /stage, /tick (queues of {} frames for {} subscribers).",
+            self.queue(),
+            scene.subscribers
         );
         if let Some(sentence) = ros2 {
             eprintln!("{sentence}");

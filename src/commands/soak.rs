@@ -14,7 +14,7 @@ use bench_dragon::subscribers::soak::history::History;
 use bench_dragon::subscribers::soak::observer::Observer;
 use bench_dragon::subscribers::soak::report::{Machine, Report, SubscriberReport};
 use bench_dragon::subscribers::soak::verdict::{Limits, Verdict};
-use bench_dragon::transports::iceoryx2::{self, MAX_SUBSCRIBERS};
+use bench_dragon::transports::iceoryx2;
 use indicatif::ProgressBar;
 
 use super::{CommandError, Common, Output, progress_bar, stop_on_signals, wall_seconds};
@@ -40,6 +40,9 @@ pub struct SoakArguments {
     /// Subscribers that are killed with SIGKILL every 5 s and started again; what they miss is reported and not judged
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "The test")]
     flaky: usize,
+    /// Publish ROS 2 topics too
+    #[arg(long, help_heading = "The test")]
+    ros2: bool,
     /// Write the report to FILE.json and FILE.html
     #[arg(long, value_name = "FILE", help_heading = "The test")]
     report: Option<PathBuf>,
@@ -147,16 +150,16 @@ fn conclude(report: &Report, common: &Common, files: Option<ReportFiles>) -> Res
 
 impl SoakArguments {
     fn check(&self, common: &Common) -> Result<(), CommandError> {
-        common.load_scene()?;
+        let admitted = common.load_scene()?.subscribers;
         iceoryx2::service_name(&common.name, "poses")?;
         if let Some(rate) = self.rate {
             Accepted::RATE.check("--rate", rate).map_err(CommandError::BadInput)?;
         }
         let all = self.subscribers.saturating_add(self.slow).saturating_add(self.flaky);
-        if self.subscribers == 0 || all > MAX_SUBSCRIBERS {
+        if self.subscribers == 0 || all > admitted {
             return Err(CommandError::BadInput(format!(
                 "--subscribers, --slow and --flaky are {}, {} and {}, expected at least 1 and together at most \
-                 {MAX_SUBSCRIBERS} subscribers, which is as many as a publisher admits",
+                 {admitted} subscribers, which is as many as the publisher admits (publish.subscribers in the scene)",
                 self.subscribers, self.slow, self.flaky
             )));
         }
@@ -169,6 +172,7 @@ impl SoakArguments {
             shared.extend(["--scene".into(), scene.into()]);
         }
         let mut publisher: Vec<OsString> = vec!["--loop".into(), "--end-with-parent".into()];
+        publisher.extend(self.ros2.then(|| "--ros2".into()));
         let optional = [
             ("--rate", self.rate.map(|rate| rate.to_string())),
             ("--realtime", self.realtime.map(|priority| priority.to_string())),

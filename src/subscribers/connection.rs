@@ -11,7 +11,7 @@ use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
-use crate::transports::iceoryx2::{OpenError, node, service_name};
+use crate::transports::iceoryx2::{OpenError, check_room_to_subscribe, node, service_name};
 
 type Receiver<Payload, Header> = Port<ipc::Service, Payload, Header>;
 
@@ -38,6 +38,7 @@ impl Subscription {
     /// [`OpenError`] for a name that iceoryx2 cannot take.
     pub fn new(name: &str) -> Result<Self, OpenError> {
         service_name(name, "poses")?;
+        check_room_to_subscribe()?;
         Ok(Self { node: node()?, name: name.to_owned() })
     }
 
@@ -63,7 +64,10 @@ impl Subscription {
         };
         use iceoryx2::port::subscriber::SubscriberCreateError;
         let poses = poses_service.subscriber_builder().create().map_err(|error| match error {
-            SubscriberCreateError::ExceedsMaxSupportedSubscribers => OpenError::TooManySubscribers(name.to_string()),
+            SubscriberCreateError::ExceedsMaxSupportedSubscribers => OpenError::TooManySubscribers {
+                service: name.to_string(),
+                most: poses_service.static_config().max_subscribers(),
+            },
             other => OpenError::Failed { service: name.to_string(), reason: format!("{other:?}") },
         })?;
         Ok(Some(Connection {
@@ -105,8 +109,10 @@ impl Subscription {
 }
 
 impl Connection {
-    /// Waits until a frame is announced, or for `timeout`.
+    /// Waits until a frame is announced, or for `timeout` but at least 1 ms.
     pub fn wait(&self, timeout: Duration) {
+        // iceoryx2 takes less than a microsecond for "for ever".
+        let timeout = timeout.max(Duration::from_millis(1));
         let waited = self.tick.as_ref().map(|tick| tick.timed_wait(|_| (), timeout));
         if !matches!(waited, Some(Ok(_))) {
             // Without the event service there is nothing to wake on.

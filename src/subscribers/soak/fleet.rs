@@ -94,6 +94,20 @@ pub struct RunSummary {
     pub step_ns: Percentiles,
     /// Why it ended.
     pub end: String,
+    /// What the ROS 2 side did, where it was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ros2: Option<Ros2Counts>,
+}
+
+/// What the ROS 2 side of a publisher did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Ros2Counts {
+    /// Frames published.
+    pub frames: u64,
+    /// Frames left out because the ROS 2 thread was behind.
+    pub skipped: u64,
+    /// Messages that a full queue did not take.
+    pub discarded: u64,
 }
 
 /// A subscriber and all its lives.

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::fleet::{Fleet, Role, RunSummary, column_of};
+use super::fleet::{Fleet, Role, Ros2Counts, RunSummary, column_of};
 use super::history::History;
 use super::observer::{Latencies, Observation};
 use super::plots::{Line, Scale, plot};
@@ -107,7 +107,13 @@ impl Report {
             let lives = if subscriber.lives > 1 { format!(" in {} lives", subscriber.lives) } else { String::new() };
             format!("  {}: {} received{lives}, {} missed{latency}", subscriber.label, seen.received, seen.missed)
         }));
+        lines.extend(self.ros2_sentence().map(|sentence| format!("  {sentence}")));
         lines
+    }
+
+    fn ros2_sentence(&self) -> Option<String> {
+        let Ros2Counts { frames, skipped, discarded } = self.publisher.as_ref()?.ros2?;
+        Some(format!("ROS 2: {frames} frames published, {skipped} skipped, {discarded} messages discarded"))
     }
 
     /// One page that needs nothing else.
@@ -119,7 +125,7 @@ impl Report {
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Soak test: {verdict}</title>\n\
              <style>{STYLE}</style></head><body>\n<h1>Soak test: <span class=\"{verdict}\">{verdict}</span></h1>\n\
              <p><code>{command}</code></p>\n<p>{seconds:.1} s on {processor}, {cores} logical processors, Linux {kernel}; \
-             bench-dragon {version}.</p>\n{limits}{subscribers}{plots}<p>Each point stands for {per_row} s and is the \
+             bench-dragon {version}.</p>\n{limits}{subscribers}{ros2}{plots}<p>Each point stands for {per_row} s and is the \
              greatest value of its seconds. All latencies are CLOCK_MONOTONIC; those since the deadline include the \
              periods that were skipped.</p>\n</body></html>\n",
             verdict = self.verdict,
@@ -131,6 +137,7 @@ impl Report {
             version = self.version,
             limits = self.table_of_limits(),
             subscribers = self.table_of_subscribers(),
+            ros2 = self.ros2_sentence().map_or_else(String::new, |sentence| format!("<p>{sentence}.</p>\n")),
             plots = self.plots(),
             per_row = self.history.seconds_per_row(),
         );
