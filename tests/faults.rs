@@ -78,6 +78,9 @@ fn killed_subscribers_take_nothing_with_them() {
     publisher.signal(SIGINT);
     let summary = summary(&publisher.output_within(20));
     assert_nothing_lost(&observed(&steady), &summary);
+    // Even what was killed in its first millisecond leaves nothing once the next program has come, a while later.
+    wait(5.5);
+    Process::start(place.program().args(["watch", "--duration", "0.1"])).output_within(20);
     place.assert_clean();
 }
 
@@ -254,7 +257,7 @@ fn too_little_shared_memory_is_refused_with_figures() {
     }
     let script = "dd if=/dev/zero of=/dev/shm/filler bs=4k 2>/dev/null; exec \"$PROGRAM\" watch --duration 1";
     let said = refusal(&with_shared_memory("1m", script));
-    assert!(said.contains("/dev/shm") && said.contains("500000"), "{said}");
+    assert!(said.contains("/dev/shm") && said.contains("too little"), "{said}");
 }
 
 #[test]
@@ -262,15 +265,17 @@ fn shared_memory_that_others_fill_does_not_stop_a_publisher() {
     // The slow one keeps taking frames out of the pool, so that every page of it is written.
     let output = with_shared_memory(
         "7m",
-        "(\"$PROGRAM\" run --json --rate 200 --duration 8 & publisher=$!; sleep 2;
-          \"$PROGRAM\" soak-subscriber --slow >slow & slow=$!; sleep 0.3
-          \"$PROGRAM\" soak-subscriber >steady & steady=$!; sleep 0.3
+        "(\"$PROGRAM\" run --json --rate 200 --duration 10 & publisher=$!; sleep 1.5
+          \"$PROGRAM\" soak-subscriber --slow >slow & slow=$!
+          \"$PROGRAM\" soak-subscriber >steady & steady=$!; sleep 3
           dd if=/dev/zero of=/dev/shm/filler bs=4k 2>/dev/null
-          wait $publisher || echo failed; kill $slow $steady; wait $slow && wait $steady || echo failed; tail -n 1 steady)",
+          \"$PROGRAM\" watch --duration 1 2>&1 | grep -q 'too little' || echo no refusal
+          wait $publisher || echo publisher failed
+          kill $slow $steady; wait $slow || echo slow failed; wait $steady || echo steady failed; tail -n 1 steady)",
     );
     let lines = json_lines(&output);
     assert_eq!(lines.len(), 2, "{lines:?} {}", text(&output.stderr));
-    assert_eq!(number(&lines[0], "frames") + number(&lines[0], "skipped"), 1600);
+    assert_eq!(number(&lines[0], "frames") + number(&lines[0], "skipped"), 2000);
     assert_nothing_lost(&lines[1], &lines[0]);
 }
 

@@ -4,9 +4,13 @@
 //! since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/alerts`, `/status`,
 //! `/stage` and the event service `<name>/tick`.
 
+mod remains;
+
 use std::collections::BTreeSet;
 use std::fs::OpenOptions;
+use std::io::ErrorKind;
 
+use ::iceoryx2::config::Config;
 use ::iceoryx2::port::notifier::Notifier;
 use ::iceoryx2::port::publisher::Publisher as Port;
 use ::iceoryx2::port::publisher::PublisherCreateError;
@@ -67,14 +71,20 @@ pub enum OpenError {
         /// Bytes left.
         free: u64,
     },
-    /// A subscriber has no room for its own bookkeeping.
-    #[error(
-        "{SHARED_MEMORY} has {free} bytes left and a subscriber needs {SUBSCRIBER_BYTES}: remove what fills it, or make \
-         it larger"
-    )]
+    /// There is no room even for bookkeeping.
+    #[error("{SHARED_MEMORY} has {free} bytes left, which is too little: remove what fills it, or make it larger")]
     Full {
         /// Bytes left.
         free: u64,
+    },
+    /// The services on this machine belong to another user.
+    #[error(
+        "{folder} belongs to another user, who keeps all others out: run as that user, or build every program that is to \
+         take part with the feature any_user"
+    )]
+    AnotherUsers {
+        /// The folder that cannot be entered.
+        folder: String,
     },
     /// A service of this name exists with other properties.
     #[error(
@@ -118,12 +128,18 @@ pub fn service_name(name: &str, service: &str) -> Result<ServiceName, OpenError>
 /// A node that leaves signals to this program.
 ///
 /// # Errors
-/// [`OpenError::Failed`] where iceoryx2 cannot make one.
+/// [`OpenError::AnotherUsers`] where another user's processes keep this one out, [`OpenError::Failed`] where iceoryx2
+/// cannot make one for another reason.
 pub fn node() -> Result<Node<ipc::Service>, OpenError> {
-    NodeBuilder::new()
-        .signal_handling_mode(SignalHandlingMode::Disabled)
-        .create::<ipc::Service>()
-        .map_err(|error| OpenError::Failed { service: "a node".to_owned(), reason: format!("{error:?}") })
+    remains::remove_unfinished_files();
+    let made = NodeBuilder::new().signal_handling_mode(SignalHandlingMode::Disabled).create::<ipc::Service>();
+    made.map_err(|error| {
+        let folder = Config::global_config().global.root_path().to_string();
+        match std::fs::read_dir(&folder) {
+            Err(refused) if refused.kind() == ErrorKind::PermissionDenied => OpenError::AnotherUsers { folder },
+            _ => OpenError::Failed { service: "a node".to_owned(), reason: format!("{error:?}") },
+        }
+    })
 }
 
 /// Frames a subscriber may fall behind, where the scene does not say: at most 64 MB for all subscribers together.
@@ -196,7 +212,7 @@ impl SharedMemoryPublisher {
             .open_or_create()
             .map_err(|error| failed(name, "tick", error))?;
         let tick = tick_service.notifier_builder().create().map_err(|error| failed(name, "tick", error))?;
-        reserve_pages().map_err(|error| failed(name, "poses", error))?;
+        reserve_pages()?;
         Ok(Self { poses, poses_service: frame_service, alerts, stage, tick, tick_service, _node: node })
     }
 
@@ -255,7 +271,9 @@ impl StatusSender {
     /// As [`SharedMemoryPublisher::open`].
     pub fn open(name: &str, subscribers: usize) -> Result<Self, OpenError> {
         let node = node()?;
-        Ok(Self { status: sender(&node, name, "status", subscribers)?, _node: node })
+        let status = sender(&node, name, "status", subscribers)?;
+        reserve_pages()?;
+        Ok(Self { status, _node: node })
     }
 }
 
@@ -298,13 +316,20 @@ fn free_bytes() -> Option<u64> {
 
 /// Has the system set aside every page of the shared memory that this process has mapped. Without this a page is looked
 /// for when it is first written, and should others have filled the memory by then, the process is killed with SIGBUS.
-fn reserve_pages() -> std::io::Result<()> {
-    let maps = std::fs::read_to_string("/proc/self/maps")?;
+///
+/// # Errors
+/// [`OpenError::Full`] where the pages are not there.
+pub fn reserve_pages() -> Result<(), OpenError> {
+    let full = || OpenError::Full { free: free_bytes().unwrap_or(0) };
+    // Linux has this file for every process.
+    let maps = std::fs::read_to_string("/proc/self/maps").unwrap_or_default();
     let mapped: BTreeSet<_> = maps.lines().filter_map(|line| Some(&line[line.find(SHARED_MEMORY)?..])).collect();
     // A file that is removed meanwhile needs no pages.
     for file in mapped.into_iter().filter_map(|file| OpenOptions::new().read(true).write(true).open(file).ok()) {
-        let length = file.metadata()?.len();
-        nix::fcntl::posix_fallocate(&file, 0, length as i64)?;
+        let length = file.metadata().map_or(0, |of| of.len());
+        if length > 0 {
+            nix::fcntl::posix_fallocate(&file, 0, length as i64).map_err(|_| full())?;
+        }
     }
     Ok(())
 }

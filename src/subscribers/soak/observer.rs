@@ -292,7 +292,7 @@ impl Observer {
             self.checks.seen.alerts += 1;
         }
         if self.last_completion.elapsed() >= COMPLETION {
-            self.subscription.complete(connection);
+            self.subscription.complete(connection)?;
             self.last_completion = Instant::now();
         }
         Ok(())
