@@ -12,6 +12,7 @@ import argparse
 import json
 import os
 import signal
+import statistics
 import subprocess
 import time
 
@@ -49,16 +50,19 @@ def main():
     parser.add_argument("--rounds", type=int, default=3)
     arguments = parser.parse_args()
     print(f"{'round':>5} {'':<6} {'received':>9}" + "".join(f"{name + ', us':>12}" for name in PERCENTILES))
-    sums = {"bare": dict.fromkeys(PERCENTILES, 0.0), "live": dict.fromkeys(PERCENTILES, 0.0)}
+    rounds = {"bare": [], "live": []}
     for number in range(1, arguments.rounds + 1):
         for name, measure in (("bare", bare), ("live", live)):
             found = measure(arguments.seconds)
-            for percentile in PERCENTILES:
-                sums[name][percentile] += found[percentile]
+            rounds[name].append(found)
             figures = "".join(f"{found[percentile] / 1000:12.1f}" for percentile in PERCENTILES)
             print(f"{number:>5} {name:<6} {found['received']:>9}{figures}", flush=True)
-    ratios = "".join(f"{sums['live'][percentile] / sums['bare'][percentile]:12.2f}" for percentile in PERCENTILES)
-    print(f"live / bare, mean of the rounds{ratios[9:]}")
+    median = {
+        name: {percentile: statistics.median(one[percentile] for one in found) for percentile in PERCENTILES}
+        for name, found in rounds.items()
+    }
+    ratios = "".join(f"{median['live'][percentile] / median['bare'][percentile]:12.2f}" for percentile in PERCENTILES)
+    print(f"medians: live / bare   {ratios}")
 
 
 if __name__ == "__main__":

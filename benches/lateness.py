@@ -14,6 +14,7 @@ import argparse
 import json
 import os
 import re
+import statistics
 import subprocess
 
 TARGET = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "target", "release")
@@ -61,14 +62,18 @@ def main():
     arguments = parser.parse_args()
     names = [name for name, _ in PERCENTILES] + ["max"]
     print(f"{'round':>5} {'':<11}" + "".join(f"{name + ', us':>12}" for name in names))
-    sums = {"cyclictest": dict.fromkeys(names, 0.0), "live": dict.fromkeys(names, 0.0)}
+    rounds = {"cyclictest": [], "live": []}
     for number in range(1, arguments.rounds + 1):
         for label, measure in (("cyclictest", cyclictest), ("live", live)):
             found = measure(arguments)
-            for name in names:
-                sums[label][name] += found[name]
+            rounds[label].append(found)
             print(f"{number:>5} {label:<11}" + "".join(f"{found[name]:12.1f}" for name in names), flush=True)
-    print(" mean ratio      " + "".join(f"{sums['live'][name] / max(sums['cyclictest'][name], 1):12.2f}" for name in names))
+    median = {
+        label: {name: statistics.median(one[name] for one in found) for name in names}
+        for label, found in rounds.items()
+    }
+    ratios = "".join(f"{median['live'][name] / max(median['cyclictest'][name], 1):12.2f}" for name in names)
+    print(f"live / cyclictest{ratios}   (medians of the rounds)")
 
 
 if __name__ == "__main__":

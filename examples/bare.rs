@@ -18,6 +18,8 @@ type Header = [u64; 10];
 /// Handles in a sample, as in the paper's frames.
 const HANDLES: usize = 224;
 const PERIOD_NS: u64 = 1_000_000;
+/// The longest latency that is told apart: an hour.
+const LONGEST_NS: u64 = 3_600_000_000_000;
 /// Samples that the subscriber may fall behind, as in the live publisher.
 const QUEUE: usize = 64;
 
@@ -26,6 +28,7 @@ type Failure = Box<dyn std::error::Error>;
 fn main() -> Result<(), Failure> {
     let arguments: Vec<_> = std::env::args().collect();
     let [_, role, name, seconds] = &arguments[..] else { return Err("bare publish|subscribe NAME SECONDS".into()) };
+    set_log_level(LogLevel::Error);
     let end = Instant::now() + Duration::from_secs_f64(seconds.parse()?);
     let node = NodeBuilder::new().signal_handling_mode(SignalHandlingMode::Disabled).create::<ipc::Service>()?;
     match role.as_str() {
@@ -68,7 +71,7 @@ fn subscribe(node: &Node<ipc::Service>, name: &str, end: Instant) -> Result<(), 
     let subscriber = service.subscriber_builder().create()?;
     let event = node.service_builder(&format!("{name}/tick").as_str().try_into()?).event().open()?;
     let listener = event.listener_builder().create()?;
-    let mut latency = Histogram::<u64>::new(3)?;
+    let mut latency = Histogram::<u64>::new_with_bounds(1, LONGEST_NS, 3)?;
     while Instant::now() < end {
         listener.timed_wait(|_| (), Duration::from_millis(200))?;
         while let Some(sample) = subscriber.receive()? {

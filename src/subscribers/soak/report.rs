@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::fleet::{Fleet, Role, Ros2Counts, RunSummary, column_of};
 use super::history::History;
 use super::observer::{Latencies, Observation};
-use super::plots::{Line, Scale, plot};
+use super::plots::{Line, Scale, escaped, plot};
 use super::verdict::Verdict;
 
 /// All that is known of a soak test.
@@ -232,12 +232,7 @@ impl Report {
 }
 
 const STYLE: &str = "body{font:15px system-ui,sans-serif;max-width:960px;margin:2em auto;padding:0 1em}\
-                     h2{font-size:1.05em;margin:1.6em 0 0}table{border-collapse:collapse;margin:1em 0}\
+                     h2{font-size:1.05em;margin:1.6em 0 0}.legend{margin:.3em 0;font-size:.85em}.legend span{margin-right:1.2em}table{border-collapse:collapse;margin:1em 0}\
                      td,th{padding:.2em .8em .2em 0;text-align:left;border-bottom:1px solid #ddd}\
                      td:not(:first-child){font-variant-numeric:tabular-nums}svg{max-width:100%;height:auto}\
                      .PASS{color:#00734f}.FAIL{color:#b02a00;font-weight:bold}";
-
-/// Text as HTML takes it.
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
-}
