@@ -145,3 +145,22 @@ fn constants_are_the_states_and_levels() {
     assert_eq!(interface("CollisionAlert").constants, levels);
     assert_eq!(State::from_wire(states.len() as u32), None, "a state that the interface files do not know");
 }
+
+#[test]
+fn viewers_are_set_up_for_topics_that_exist() {
+    use bench_dragon::scene::ros2::Topic;
+    let all = [Topic::Handles, Topic::Poses, Topic::Alerts, Topic::Stage, Topic::Markers, Topic::Status];
+    let topics = all.map(|topic| topic.path("bench_dragon"));
+    let foxglove = include_str!("../examples/foxglove/bench_dragon.json");
+    serde_json::from_str::<serde_json::Value>(foxglove).unwrap();
+    for viewer in [foxglove, include_str!("../examples/rviz/bench_dragon.rviz")] {
+        let named: Vec<String> = viewer
+            .match_indices("/bench_dragon/")
+            .map(|(at, _)| {
+                viewer[at..].chars().take_while(|c| c.is_ascii_alphanumeric() || "/_".contains(*c)).collect()
+            })
+            .collect();
+        assert!(named.contains(&topics[4]), "no markers in {named:?}");
+        assert!(named.iter().all(|topic| topics.contains(topic)), "{named:?}");
+    }
+}

@@ -3,7 +3,7 @@
 
 mod processes;
 
-use std::process::Command;
+use std::process::{Command, Output};
 
 use processes::{Process, json_lines, program, python, scene_file, summary, text, unique, wait};
 use serde_json::Value;
@@ -30,9 +30,10 @@ fn messages<'a>(lines: &'a [Value], topic: &str) -> Vec<&'a Value> {
     lines.iter().filter(|line| line["topic"] == topic).map(|line| &line["message"]).collect()
 }
 
-/// How many messages each topic brought, and from how many publishers at the end.
-fn end(lines: &[Value]) -> &Value {
-    lines.last().filter(|line| line["type"] == "end").expect("the peer's last line")
+/// How many messages each topic brought, and from how many publishers at the end: the peer's last line.
+fn end(output: &Output) -> Value {
+    let last = json_lines(output).pop().filter(|line| line["type"] == "end");
+    last.unwrap_or_else(|| panic!("the peer ended with {}: {}", output.status, text(&output.stderr)))
 }
 
 #[test]
@@ -137,7 +138,7 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_what_msgs_sa
     assert_eq!(status.last().unwrap()["scene"], "paper");
     assert_eq!(status.last().unwrap()["rate"], 60.0);
 
-    let counts = &end(&lines)["counts"];
+    let counts = end(&output)["counts"].clone();
     let frames = counts["handles"].as_u64().unwrap();
     assert!((60..150).contains(&frames), "30 a second were asked for: {counts}");
     let summary = summary(&publisher.output_within(30));
@@ -150,9 +151,8 @@ fn a_clean_end_leaves_the_graph_at_once() {
     let watcher = Process::start(&mut peer("gone", "6", &["poses"]));
     summary(&publisher.output_within(30));
     let output = watcher.output_within(40);
-    let lines = json_lines(&output);
-    assert!(end(&lines)["counts"]["poses"].as_u64().unwrap() > 0, "{}", text(&output.stderr));
-    assert_eq!(end(&lines)["publishers"]["poses"], 0);
+    assert!(end(&output)["counts"]["poses"].as_u64().unwrap() > 0, "{}", text(&output.stderr));
+    assert_eq!(end(&output)["publishers"]["poses"], 0);
 }
 
 #[test]
@@ -163,8 +163,7 @@ fn the_domain_is_the_environments() {
     let other = Process::start(&mut peer("domain", "4", &["poses"]));
     let count = |process: Process| {
         let output = process.output_within(40);
-        let lines = json_lines(&output);
-        end(&lines)["counts"]["poses"].as_u64().unwrap()
+        end(&output)["counts"]["poses"].as_u64().unwrap()
     };
     assert!(count(same) > 60);
     assert_eq!(count(other), 0);
@@ -255,42 +254,59 @@ fn of_process(process: u32) -> (Vec<String>, usize) {
     (threads, sockets)
 }
 
+/// What ROS 2 makes of `ROS_STATIC_PEERS=10.77.0.1` for Cyclone DDS.
+const STATIC_PEER: &str = "<CycloneDDS><Domain><Discovery><ParticipantIndex>auto</ParticipantIndex>\
+    <Peers><Peer Address=\"10.77.0.1\"/></Peers></Discovery></Domain></CycloneDDS>";
+
 #[test]
-fn two_hosts_find_each_other_by_multicast() {
-    let Some(_hosts) = Hosts::new() else { return };
+fn two_hosts_find_each_other_by_multicast_or_where_the_subscriber_names_the_publishers_host() {
+    let Some(hosts) = Hosts::new() else { return };
     let on = |host: &str, command: &Command| {
         let mut inside = Command::new("ip");
         inside.args(["netns", "exec", &unique(host)]).arg(command.get_program()).args(command.get_args());
         inside.current_dir(env!("CARGO_MANIFEST_DIR"));
         inside
     };
-    for (range, expected) in [("SUBNET", true), ("LOCALHOST", false)] {
+    for (range, multicast, peers, expected) in [
+        ("SUBNET", "on", "", true),
+        ("LOCALHOST", "on", "", false),
+        ("SUBNET", "off", "", false),
+        ("SUBNET", "off", STATIC_PEER, true),
+    ] {
+        hosts.set_multicast(multicast);
         let mut run = program("hosts");
-        run.args(["run", "--ros2", "--json", "--duration", "8"]);
+        run.args(["run", "--ros2", "--json", "--duration", "7"]);
         let publisher = Process::start(on("left", &run).env("ROS_AUTOMATIC_DISCOVERY_RANGE", range));
-        let reader = Process::start(&mut on("right", &peer("hosts", "6", &["poses"])));
+        let subscriber = peer("hosts", "5", &["poses"]);
+        let reader = Process::start(on("right", &subscriber).env("CYCLONEDDS_URI", peers));
         let output = reader.output_within(40);
-        let lines = json_lines(&output);
-        let count = end(&lines)["counts"]["poses"].as_u64().unwrap();
-        println!("{range}: {count} messages on the other host");
-        assert_eq!(count > 100, expected, "{range}: {count}; {}", text(&output.stderr));
+        let count = end(&output)["counts"]["poses"].as_u64().unwrap();
+        let case = format!("{range}, multicast {multicast}, peers \"{peers}\": {count} messages on the other host");
+        println!("{case}");
+        assert_eq!(count > 100, expected, "{case}; {}", text(&output.stderr));
         summary(&publisher.output_within(30));
     }
 }
 
 /// Two network namespaces joined by a cable, each with one address.
-struct Hosts;
+struct Hosts {
+    ends: [String; 2],
+}
 
 impl Hosts {
+    /// Whether the cable carries multicast: "on" or "off".
+    fn set_multicast(&self, multicast: &str) {
+        for (host, end) in ["left", "right"].map(unique).iter().zip(&self.ends) {
+            ip(&format!("-n {host} link set {end} multicast {multicast}")).unwrap();
+        }
+    }
+
     /// `None`, with the reason printed, where this process may not make namespaces.
     fn new() -> Option<Self> {
-        let hosts = Self;
+        let ends = ["l", "r"].map(|side| format!("bd{side}{}", std::process::id()));
+        let hosts = Self { ends };
+        let ends = &hosts.ends;
         let [left, right] = ["left", "right"].map(unique);
-        let ends = [format!("bdl{}", std::process::id()), format!("bdr{}", std::process::id())];
-        let ip = |arguments: &str| {
-            let output = Command::new("ip").args(arguments.split_whitespace()).output().map_err(|e| e.to_string())?;
-            if output.status.success() { Ok(()) } else { Err(text(&output.stderr)) }
-        };
         let made = ip(&format!("netns add {left}")).and_then(|()| {
             ip(&format!("netns add {right}"))?;
             ip(&format!("link add {} netns {left} type veth peer name {} netns {right}", ends[0], ends[1]))?;
@@ -312,10 +328,27 @@ impl Hosts {
     }
 }
 
+/// Runs `ip`.
+fn ip(arguments: &str) -> Result<(), String> {
+    let output = Command::new("ip").args(arguments.split_whitespace()).output().map_err(|error| error.to_string())?;
+    if output.status.success() { Ok(()) } else { Err(text(&output.stderr)) }
+}
+
 impl Drop for Hosts {
     fn drop(&mut self) {
         for host in ["left", "right"] {
             let _ = Command::new("ip").args(["netns", "delete", &unique(host)]).output();
         }
     }
+}
+
+#[test]
+fn the_example_that_needs_no_ros_prints_the_frames() {
+    let publisher = Process::start(program("example").args(["run", "--ros2", "--json", "--duration", "7"]));
+    let mut example = python();
+    example.args(["examples/python/cyclone_listener.py", "--name", &unique("example"), "--seconds", "4.5"]);
+    let said = text(&Process::start(&mut example).output_within(40).stdout);
+    assert!(said.lines().count() >= 3, "{said}");
+    assert!(said.lines().last().is_some_and(|line| line.contains("224 handles, head (")), "{said}");
+    summary(&publisher.output_within(30));
 }

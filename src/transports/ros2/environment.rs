@@ -47,8 +47,8 @@ impl Network {
         };
         if let Some(peers) = set("ROS_STATIC_PEERS") {
             return refused(format!(
-                "ROS_STATIC_PEERS is \"{peers}\", which RustDDS cannot honour: unset it; other machines are found by \
-                 multicast"
+                "ROS_STATIC_PEERS is \"{peers}\", which RustDDS cannot honour: unset it here; others find this publisher \
+                 by multicast, or by naming this machine in their own ROS_STATIC_PEERS"
             ));
         }
         let range = match set("ROS_AUTOMATIC_DISCOVERY_RANGE").as_deref().map(str::trim) {
