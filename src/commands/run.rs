@@ -107,6 +107,7 @@ struct Performance<'a> {
 impl Performance<'_> {
     /// Runs the loop on one thread and the statistics on another.
     fn perform(&self, mut show: Show, timeline: &Timeline, stop: &Arc<AtomicBool>) -> Result<(), CommandError> {
+        iceoryx2::remains::keep_removing();
         let ros2 = self.open_ros2()?;
         let (reports, inbox) = statistics::queues();
         let done = AtomicBool::new(false);

@@ -11,7 +11,7 @@ use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
-use crate::transports::iceoryx2::{OpenError, check_room_to_subscribe, node, reserve_pages, service_name};
+use crate::transports::iceoryx2::{OpenError, check_room_to_subscribe, node, remains, reserve_pages, service_name};
 
 type Receiver<Payload, Header> = Port<ipc::Service, Payload, Header>;
 
@@ -39,6 +39,7 @@ impl Subscription {
     pub fn new(name: &str) -> Result<Self, OpenError> {
         service_name(name, "poses")?;
         check_room_to_subscribe()?;
+        remains::keep_removing();
         Ok(Self { node: node()?, name: name.to_owned() })
     }
 

@@ -11,7 +11,7 @@ use crate::transports::iceoryx2::OpenError;
 use super::connection::{Connection, Subscription};
 
 /// How long a publisher may be silent before it is looked for: at least this, and three periods.
-const SILENCE: Duration = Duration::from_millis(700);
+const SILENCE: Duration = Duration::from_millis(500);
 /// How often services are looked for that were not there yet.
 const COMPLETION: Duration = Duration::from_millis(100);
 

@@ -4,7 +4,7 @@
 //! since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/alerts`, `/status`,
 //! `/stage` and the event service `<name>/tick`.
 
-mod remains;
+pub mod remains;
 
 use std::collections::BTreeSet;
 use std::fs::OpenOptions;
