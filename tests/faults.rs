@@ -127,8 +127,7 @@ fn files_of_dead_runs_are_gone_after_the_next() {
     observer(&place).1.until("\"status\":{", 20);
     first.signal(SIGKILL);
     first.lines().rest(20);
-    let files = place.left_behind();
-    assert!(files > 5, "a killed publisher leaves files: {files}");
+    assert!(place.left_behind().len() > 5, "a killed publisher leaves files");
     for start in 0..20 {
         let killed = Process::start(place.program().args(["run", "--rate", "100"]));
         // From before it has opened anything to the first frames.

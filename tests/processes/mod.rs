@@ -102,7 +102,7 @@ pub struct Place {
 
 impl Place {
     pub fn new(name: &str) -> Self {
-        let (folder, prefix) = (tempfile::tempdir().unwrap(), unique(name));
+        let (folder, prefix) = (tempfile::tempdir().unwrap(), format!("{}_", unique(name)));
         std::fs::create_dir(folder.path().join("config")).unwrap();
         let settings = format!("[global]\nroot-path = \"{}/root/\"\nprefix = \"{prefix}\"\n", folder.path().display());
         std::fs::write(folder.path().join("config/iceoryx2.toml"), settings).unwrap();
@@ -121,21 +121,35 @@ impl Place {
     }
 
     /// Files that exist here.
-    pub fn left_behind(&self) -> usize {
-        let shared = std::fs::read_dir("/dev/shm").unwrap().flatten();
-        let memory = shared.filter(|file| file.file_name().to_string_lossy().starts_with(&self.prefix)).count();
-        memory + files_below(&self.folder().join("root"))
+    pub fn left_behind(&self) -> Vec<PathBuf> {
+        let mut files = self.shared_memory();
+        files.extend(files_below(&self.folder().join("root")));
+        files
+    }
+
+    fn shared_memory(&self) -> Vec<PathBuf> {
+        let files = std::fs::read_dir("/dev/shm").unwrap().flatten();
+        let ours = files.filter(|file| file.file_name().to_string_lossy().starts_with(&self.prefix));
+        ours.map(|file| file.path()).collect()
     }
 
     /// Fails if processes that have ended left more than the one small file that iceoryx2 always leaves.
     pub fn assert_clean(&self) {
-        assert!(self.left_behind() <= 1, "{} files are left behind", self.left_behind());
+        let files = self.left_behind();
+        assert!(files.len() <= 1, "{} files are left behind: {files:#?}", files.len());
     }
 }
 
-fn files_below(folder: &Path) -> usize {
-    let Ok(entries) = std::fs::read_dir(folder) else { return 0 };
-    entries.flatten().map(|entry| if entry.path().is_dir() { files_below(&entry.path()) } else { 1 }).sum()
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.shared_memory().iter().for_each(|file| drop(std::fs::remove_file(file)));
+    }
+}
+
+fn files_below(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let below = |file: PathBuf| if file.is_dir() { files_below(&file) } else { vec![file] };
+    entries.flatten().flat_map(|entry| below(entry.path())).collect()
 }
 
 fn reading(mut pipe: impl Read) -> impl FnOnce() -> Vec<u8> {
