@@ -3,3 +3,4 @@
 pub mod connection;
 pub mod monitor;
 pub mod soak;
+pub mod view;
