@@ -6,12 +6,13 @@
 
 mod arithmetic;
 mod kernel;
+mod lanes;
 
 pub use kernel::Instructions;
 
 use std::f64::consts::TAU;
 
-use kernel::{BLOCK, State, Step};
+use kernel::{State, Step};
 
 use super::newton::Newton;
 use super::{Chain, Solver, Team, Velocities};
@@ -67,19 +68,8 @@ impl WholeChain {
     /// A solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve, with the
     /// fastest instructions this processor has.
     pub fn new(path: Spiral, team: Team, head_speed: f64, velocities: Velocities) -> Self {
-        let padded = (team.handles()).next_multiple_of(BLOCK);
         let link_term = |bench: usize| (team.link(bench.min(team.benches - 1)) / (2.0 * path.pitch())).powi(2);
-        let state = State {
-            link_term: (0..padded).map(link_term).collect(),
-            increment: vec![0.0; padded],
-            turns: vec![0.0; padded],
-            by_turns: vec![0.0; padded],
-            by_increment: vec![0.0; padded],
-            reciprocal: vec![0.0; padded],
-            rate: vec![0.0; padded + 1],
-            rate_before: vec![0.0; padded + 1],
-            rate_next: vec![0.0; padded + 1],
-        };
+        let state = State::new(team.handles(), link_term);
         Self {
             path,
             team,
@@ -108,7 +98,7 @@ impl WholeChain {
 
     /// Bytes this solver holds.
     pub fn memory_bytes(&self) -> usize {
-        size_of::<Self>() + 9 * size_of::<f64>() * self.state.increment.len()
+        size_of::<Self>() + self.state.memory_bytes()
     }
 
     /// How often the chain had to be found anew, handle by handle; once for the first frame.
@@ -140,9 +130,7 @@ impl WholeChain {
 
     /// Takes the rates just computed as the newest.
     fn remember(&mut self, travelled: f64) {
-        let State { rate, rate_before, rate_next, .. } = &mut self.state;
-        std::mem::swap(rate_before, rate);
-        std::mem::swap(rate, rate_next);
+        self.state.remember();
         self.history = match self.history {
             History::None => History::One { at: travelled },
             History::One { at } | History::Two { at, .. } if travelled == at => History::One { at },
@@ -153,18 +141,13 @@ impl WholeChain {
     /// Finds every increment from scratch, as the safe solver does.
     fn restart(&mut self, head: <Spiral as Path>::Place) -> Result<(), Fold> {
         self.restarts += 1;
-        // Multiplied by a step of zero they must give zero, which infinity would not.
-        self.state.rate.fill(0.0);
-        self.state.rate_before.fill(0.0);
         let mut front = head;
-        for bench in 0..self.state.increment.len() {
+        for bench in 0..self.state.benches() {
             let link = self.team.link(bench.min(self.team.benches - 1));
             let rear = self.path.follower(front, link)?;
-            self.state.turns[bench] = front.in_turns();
-            self.state.increment[bench] = rear.minus(front) / TAU;
+            self.state.set(bench, front.in_turns(), rear.minus(front) / TAU);
             front = rear;
         }
-        self.state.renew_slopes();
         Ok(())
     }
 }
