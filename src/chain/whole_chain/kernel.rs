@@ -27,7 +27,7 @@ use super::lanes::{Bits, LANES, Lanes, Portable, Row};
 use crate::chain::{Chain, Velocities};
 
 /// The most handles of a strand: as many as stay in the first-level cache from pass to pass.
-const LONGEST_STRAND: usize = 64;
+const LONGEST_STRAND: usize = 28;
 
 /// The unknowns of all benches and what is known of their motion.
 ///
@@ -38,11 +38,13 @@ pub(super) struct State {
     strand: usize,
     /// Chunk after chunk, each with as many fours as a strand has handles.
     fours: Vec<Four>,
+    /// The chunk under way; used again for every chunk, so that it stays in the first-level cache.
+    passing: Vec<Passing>,
     /// Which of the rates are those of the last frame; see [`Four::rate`].
     newest: usize,
 }
 
-/// Four benches and their front handles, one of each strand.
+/// Four benches and their front handles, one of each strand: what is kept from frame to frame.
 #[derive(Debug, Clone)]
 struct Four {
     /// (link / 2 pitch)^2.
@@ -51,15 +53,35 @@ struct Four {
     increment: Row,
     /// tau: turns of the front handle.
     turns: Row,
-    /// tau', turns per metre of the head's travel, in the last three frames: those of the last frame at
-    /// [`State::newest`], of the one before at the index below, modulo 3.
-    rate: [Row; 3],
+    /// tau', turns per metre of the head's travel, in the last two frames: at [`State::newest`] in the last one.
+    rate: [Row; 2],
     /// u' in the same frames.
-    spread: [Row; 3],
+    spread: [Row; 2],
     /// -g_tau / g_u at the last solution.
     ratio: Row,
     /// 1 / g_u at the last solution.
     reciprocal: Row,
+}
+
+impl Four {
+    const ZERO: Self = Self {
+        link_term: Row::ZERO,
+        increment: Row::ZERO,
+        turns: Row::ZERO,
+        rate: [Row::ZERO; 2],
+        spread: [Row::ZERO; 2],
+        ratio: Row::ZERO,
+        reciprocal: Row::ZERO,
+    };
+}
+
+/// What is handed from pass to pass for a [`Four`].
+#[derive(Debug, Clone)]
+struct Passing {
+    /// u, predicted, then corrected.
+    increment: Row,
+    /// tau, predicted, then corrected.
+    turns: Row,
     /// sin(pi u).
     half_sine: Row,
     /// cos(pi u).
@@ -72,15 +94,10 @@ struct Four {
     sum: Row,
 }
 
-impl Four {
+impl Passing {
     const ZERO: Self = Self {
-        link_term: Row::ZERO,
         increment: Row::ZERO,
         turns: Row::ZERO,
-        rate: [Row::ZERO; 3],
-        spread: [Row::ZERO; 3],
-        ratio: Row::ZERO,
-        reciprocal: Row::ZERO,
         half_sine: Row::ZERO,
         half_cosine: Row::ZERO,
         shift: Row::ZERO,
@@ -94,7 +111,7 @@ impl State {
     pub(super) fn new(handles: usize, link_term: impl Fn(usize) -> f64) -> Self {
         let chunks = handles.div_ceil(LANES * LONGEST_STRAND);
         let strand = handles.div_ceil(LANES * chunks).next_multiple_of(LANES);
-        let mut state = Self { strand, fours: vec![Four::ZERO; chunks * strand], newest: 0 };
+        let mut state = Self { strand, fours: vec![Four::ZERO; chunks * strand], passing: vec![Passing::ZERO; strand], newest: 0 };
         for bench in 0..state.benches() {
             let (four, lane) = state.place_of(bench);
             state.fours[four].link_term.0[lane] = link_term(bench);
@@ -109,7 +126,7 @@ impl State {
 
     /// Bytes it holds.
     pub(super) fn memory_bytes(&self) -> usize {
-        size_of_val(self.fours.as_slice())
+        size_of_val(self.fours.as_slice()) + size_of_val(self.passing.as_slice())
     }
 
     fn place_of(&self, bench: usize) -> (usize, usize) {
@@ -136,7 +153,7 @@ impl State {
 
     /// Takes the rates of the last correction as those of the last frame.
     pub(super) fn remember(&mut self) {
-        self.newest = (self.newest + 1) % 3;
+        self.newest = 1 - self.newest;
     }
 }
 
@@ -261,7 +278,8 @@ fn correct_with<L: Lanes>(state: &mut State, step: &Step, chain: &mut Chain) -> 
     // Two halves, since a conversion of all 128 bits is a slow library call.
     let head = (step.head >> 64) as u64 as f64 + (step.head as u64) as f64 / 2f64.powi(64);
     let now = state.newest;
-    let (before, next) = ((now + 2) % 3, (now + 1) % 3);
+    // The rates of the frame before are read before the new ones take their place.
+    let before = 1 - now;
     let front = &state.fours[0];
     let predicted = front.turns.0[0] + step.ahead * front.rate[now].0[0] + step.ahead_before * front.rate[before].0[0];
     let mut running = Running {
@@ -275,9 +293,10 @@ fn correct_with<L: Lanes>(state: &mut State, step: &Step, chain: &mut Chain) -> 
     };
     let mut first = 0;
     for chunk in state.fours.chunks_exact_mut(state.strand) {
-        let corrections = predict(chunk, step, now, before, &mut running);
-        let beginnings = refine(chunk, corrections, &mut running);
-        write(chunk, &beginnings, step, next, first, chain);
+        let passing = &mut state.passing;
+        let corrections = predict(chunk, passing, step, now, &mut running);
+        let beginnings = refine(chunk, passing, corrections, &mut running);
+        write(chunk, passing, &beginnings, step, 1 - now, first, chain);
         first += LANES * chunk.len();
     }
     let last = chain.handles() - 1;
@@ -296,10 +315,17 @@ const NARROW: f64 = 0.25;
 /// Predicts the unknowns, evaluates g there and walks the substitution along the strands. Returns the correction of tau
 /// at the beginning of each.
 #[inline(always)]
-fn predict<L: Lanes>(chunk: &mut [Four], step: &Step, now: usize, before: usize, running: &mut Running<L>) -> L {
+fn predict<L: Lanes>(
+    chunk: &[Four],
+    passing: &mut [Passing],
+    step: &Step,
+    now: usize,
+    running: &mut Running<L>,
+) -> L {
+    let before = 1 - now;
     let (ahead, ahead_before) = (L::all(step.ahead), L::all(step.ahead_before));
     let (mut product, mut sum) = (L::all(1.0), L::all(0.0));
-    for four in chunk {
+    for (four, passing) in chunk.iter().zip(passing) {
         let tau_ahead = ahead.multiply_add(L::load(&four.rate[now]), ahead_before * L::load(&four.rate[before]));
         let u_ahead = ahead.multiply_add(L::load(&four.spread[now]), ahead_before * L::load(&four.spread[before]));
         let u = L::load(&four.increment) + u_ahead;
@@ -310,13 +336,13 @@ fn predict<L: Lanes>(chunk: &mut [Four], step: &Step, now: usize, before: usize,
         let radial = half.multiply_add(half, L::all(0.0) - L::load(&four.link_term));
         let g = (tau * (tau + u)).multiply_add(sine * sine, radial);
         let shift = L::all(0.0) - g * L::load(&four.reciprocal);
-        four.increment = u.row();
-        four.turns = tau.row();
-        four.half_sine = sine.row();
-        four.half_cosine = cosine.row();
-        four.shift = shift.row();
-        four.product = product.row();
-        four.sum = sum.row();
+        passing.increment = u.row();
+        passing.turns = tau.row();
+        passing.half_sine = sine.row();
+        passing.half_cosine = cosine.row();
+        passing.shift = shift.row();
+        passing.product = product.row();
+        passing.sum = sum.row();
         let m = L::all(1.0) + L::load(&four.ratio);
         product = product * m;
         sum = m.multiply_add(sum, shift);
@@ -340,19 +366,24 @@ struct Beginnings<L: Lanes> {
 
 /// Corrects the unknowns, evaluates m there and walks products and sums along the strands.
 #[inline(always)]
-fn refine<L: Lanes>(chunk: &mut [Four], corrections: L, running: &mut Running<L>) -> Beginnings<L> {
+fn refine<L: Lanes>(
+    chunk: &mut [Four],
+    passing: &mut [Passing],
+    corrections: L,
+    running: &mut Running<L>,
+) -> Beginnings<L> {
     let (mut product, mut sum) = (L::all(1.0), L::Bits::all(0));
     let Running { mut bound, mut steepening, mut least, mut most, .. } = *running;
-    for four in &mut *chunk {
+    for (four, passing) in chunk.iter_mut().zip(passing) {
         let (ratio, reciprocal) = (L::load(&four.ratio), L::load(&four.reciprocal));
-        let correction = L::load(&four.product).multiply_add(corrections, L::load(&four.sum));
-        let change = ratio.multiply_add(correction, L::load(&four.shift));
-        let u = L::load(&four.increment) + change;
-        let tau = L::load(&four.turns) + correction;
+        let correction = L::load(&passing.product).multiply_add(corrections, L::load(&passing.sum));
+        let change = ratio.multiply_add(correction, L::load(&passing.shift));
+        let u = L::load(&passing.increment) + change;
+        let tau = L::load(&passing.turns) + correction;
         // Sine and cosine turned by the small angle pi times the change.
         let angle = L::all(PI) * change;
         let shrink = L::all(-0.5) * angle * angle;
-        let (s, c) = (L::load(&four.half_sine), L::load(&four.half_cosine));
+        let (s, c) = (L::load(&passing.half_sine), L::load(&passing.half_cosine));
         let sine = angle.multiply_add(c, shrink.multiply_add(s, s));
         let cosine = angle.negated_multiply_add(s, shrink.multiply_add(c, c));
         let slopes = Slopes::at(tau, u, sine, cosine);
@@ -370,13 +401,14 @@ fn refine<L: Lanes>(chunk: &mut [Four], corrections: L, running: &mut Running<L>
         let reciprocal = L::all(1.0) / slopes.by_increment;
         let by_turns = slopes.by_turns * reciprocal;
         four.increment = u.row();
-        four.turns = tau.row();
-        four.half_sine = sine.row();
-        four.half_cosine = cosine.row();
+        passing.increment = u.row();
+        passing.turns = tau.row();
+        passing.half_sine = sine.row();
+        passing.half_cosine = cosine.row();
         four.ratio = (L::all(0.0) - by_turns).row();
         four.reciprocal = reciprocal.row();
-        four.product = product.row();
-        four.sum = L::from_bits(sum).row();
+        passing.product = product.row();
+        passing.sum = L::from_bits(sum).row();
         product = product * (L::all(1.0) - by_turns);
         sum = sum.plus(fixed_point(u));
     }
@@ -396,6 +428,7 @@ fn refine<L: Lanes>(chunk: &mut [Four], corrections: L, running: &mut Running<L>
 #[inline(always)]
 fn write<L: Lanes>(
     chunk: &mut [Four],
+    passing: &[Passing],
     beginnings: &Beginnings<L>,
     step: &Step,
     next: usize,
@@ -403,52 +436,55 @@ fn write<L: Lanes>(
     chain: &mut Chain,
 ) {
     let strand = chunk.len();
-    let handles = chain.handles();
-    let mut done = 0;
+    let Chain { x, y, heading, speed, vx, vy } = chain;
+    let mut outputs = [x, y, heading, speed, vx, vy].map(|output| output.as_chunks_mut::<LANES>());
+    let wanted = if step.velocities == Velocities::Computed { 6 } else { 3 };
     // As many steps along the strands as there are strands: a square that can be turned into the chain's order.
-    for square in chunk.chunks_exact_mut(LANES) {
+    for (square, (fours, passing)) in chunk.chunks_exact_mut(LANES).zip(passing.chunks_exact(LANES)).enumerate() {
         let mut poses = [[L::all(0.0); LANES]; 6];
-        for (column, four) in square.iter_mut().enumerate() {
-            let numbers = evaluate(four, beginnings, step, next);
+        for (column, (four, passing)) in fours.iter_mut().zip(passing).enumerate() {
+            let numbers = evaluate(four, passing, beginnings, step, next);
             for (row, number) in poses.iter_mut().zip(numbers) {
                 row[column] = number;
             }
         }
-        let Chain { x, y, heading, speed, vx, vy } = &mut *chain;
-        let outputs = [x, y, heading, speed, vx, vy];
-        let wanted = if step.velocities == Velocities::Computed { 6 } else { 3 };
-        for (output, rows) in outputs.into_iter().zip(poses).take(wanted) {
+        for ((whole, rest), rows) in outputs.iter_mut().zip(poses).take(wanted) {
             for (lane, row) in L::transposed(rows).into_iter().enumerate() {
-                let at = first + lane * strand + done;
+                let at = (first + lane * strand) / LANES + square;
                 let row = row.row().0;
-                if let Some(place) = output.get_mut(at..at + LANES) {
-                    place.copy_from_slice(&row);
-                } else if at < handles {
-                    output[at..].copy_from_slice(&row[..handles - at]);
+                if let Some(place) = whole.get_mut(at) {
+                    *place = row;
+                } else if at == whole.len() {
+                    rest.copy_from_slice(&row[..rest.len()]);
                 }
             }
         }
-        done += LANES;
     }
 }
 
 /// x, y, heading, speed, vx and vy of four handles; without velocities the last three are unspecified.
 #[inline(always)]
-fn evaluate<L: Lanes>(four: &mut Four, beginnings: &Beginnings<L>, step: &Step, next: usize) -> [L; 6] {
-    let fraction = L::load(&four.sum).bits().plus(beginnings.fraction);
-    let rate = L::load(&four.product) * beginnings.rate;
+fn evaluate<L: Lanes>(
+    four: &mut Four,
+    passing: &Passing,
+    beginnings: &Beginnings<L>,
+    step: &Step,
+    next: usize,
+) -> [L; 6] {
+    let fraction = L::load(&passing.sum).bits().plus(beginnings.fraction);
+    let rate = L::load(&passing.product) * beginnings.rate;
     four.rate[next] = rate.row();
     four.spread[next] = (rate * L::load(&four.ratio)).row();
     let Quarters { quadrant, quarters, part } = quarters::<L>(fraction);
     let (sine, cosine) = turned_by_quarters(quadrant, sine_cosine(L::all(TAU) * part));
     // The corrected turns are right to a few digits of their last; the sum, to the last.
-    let tau = to_quarter(L::load(&four.turns) - part) + part;
+    let tau = to_quarter(L::load(&passing.turns) - part) + part;
     four.turns = tau.row();
     let r = L::all(step.pitch) * tau;
     // The bench against the perpendicular of the middle angle: p u cos(pi u) against p (2 tau + u) sin(pi u).
-    let u = L::load(&four.increment);
-    let across = L::all(2.0).multiply_add(tau, u) * L::load(&four.half_sine);
-    let aside = u * L::load(&four.half_cosine) / across;
+    let u = L::load(&passing.increment);
+    let across = L::all(2.0).multiply_add(tau, u) * L::load(&passing.half_sine);
+    let aside = u * L::load(&passing.half_cosine) / across;
     let middle = L::all(0.5).multiply_add(u, L::all(0.25).multiply_add(quarters, part)) - L::all(0.25);
     let aside = if aside.abs().any_above(SHORT_ARC_TANGENT) {
         L::load(&Row(aside.row().0.map(|tangent| tangent.atan() / TAU)))
