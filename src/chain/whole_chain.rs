@@ -22,7 +22,10 @@ use crate::geometry::spiral::Spiral;
 /// Corrections tried before the chain is found anew.
 const CORRECTIONS: usize = 3;
 
-/// The error that a correction may leave, as a distance: far below the rounding of the coordinates themselves.
+/// The error that a correction may leave, against the shortest link: a tenth of what links are promised to hold.
+const LEFT_OVER_OF_LINK: f64 = 1e-13;
+
+/// The same as a distance, metres: far below the rounding of the coordinates of a team of usual size.
 const LEFT_OVER: f64 = 1e-13;
 
 /// Newton's method on the whole chain, warm from frame to frame.
@@ -113,7 +116,9 @@ impl WholeChain {
 
     /// Tries `corrections` corrections; true if the last one left no more than rounding.
     fn corrected(&mut self, step: &mut Step, corrections: usize, chain: &mut Chain) -> bool {
-        let left_over = LEFT_OVER.max(0.5 * f64::EPSILON * step.pitch * (step.head as f64 / 2f64.powi(64)));
+        let link = self.team.link(0).min(self.team.link(self.team.benches - 1));
+        let rounding = 0.5 * f64::EPSILON * step.pitch * step.head_turns();
+        let left_over = LEFT_OVER.min(LEFT_OVER_OF_LINK * link).max(rounding);
         for _ in 0..corrections {
             let bound = kernel::correct(self.instructions, &mut self.state, step, chain);
             if bound <= left_over {

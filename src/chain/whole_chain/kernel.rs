@@ -111,7 +111,8 @@ impl State {
     pub(super) fn new(handles: usize, link_term: impl Fn(usize) -> f64) -> Self {
         let chunks = handles.div_ceil(LANES * LONGEST_STRAND);
         let strand = handles.div_ceil(LANES * chunks).next_multiple_of(LANES);
-        let mut state = Self { strand, fours: vec![Four::ZERO; chunks * strand], passing: vec![Passing::ZERO; strand], newest: 0 };
+        let mut state =
+            Self { strand, fours: vec![Four::ZERO; chunks * strand], passing: vec![Passing::ZERO; strand], newest: 0 };
         for bench in 0..state.benches() {
             let (four, lane) = state.place_of(bench);
             state.fours[four].link_term.0[lane] = link_term(bench);
@@ -141,7 +142,8 @@ impl State {
         four.turns.0[lane] = turns;
         four.increment.0[lane] = increment;
         let (sine, cosine) = (PI * increment).sin_cos();
-        let slopes = Slopes::at(Portable::all(turns), Portable::all(increment), Portable::all(sine), Portable::all(cosine));
+        let slopes =
+            Slopes::at(Portable::all(turns), Portable::all(increment), Portable::all(sine), Portable::all(cosine));
         let reciprocal = 1.0 / slopes.by_increment.row().0[0];
         four.reciprocal.0[lane] = reciprocal;
         four.ratio.0[lane] = -slopes.by_turns.row().0[0] * reciprocal;
@@ -174,6 +176,14 @@ pub(super) struct Step {
     pub ahead_before: f64,
     /// Whether velocities are wanted.
     pub velocities: Velocities,
+}
+
+impl Step {
+    /// Turns of the head.
+    pub(super) fn head_turns(&self) -> f64 {
+        // Two halves, since a conversion of all 128 bits is a slow library call.
+        (self.head >> 64) as u64 as f64 + (self.head as u64) as f64 / 2f64.powi(64)
+    }
 }
 
 /// The instructions that a code path may use.
@@ -275,8 +285,7 @@ const LARGEST_INCREMENT: f64 = 0.99;
 
 #[inline(always)]
 fn correct_with<L: Lanes>(state: &mut State, step: &Step, chain: &mut Chain) -> f64 {
-    // Two halves, since a conversion of all 128 bits is a slow library call.
-    let head = (step.head >> 64) as u64 as f64 + (step.head as u64) as f64 / 2f64.powi(64);
+    let head = step.head_turns();
     let now = state.newest;
     // The rates of the frame before are read before the new ones take their place.
     let before = 1 - now;
@@ -315,13 +324,7 @@ const NARROW: f64 = 0.25;
 /// Predicts the unknowns, evaluates g there and walks the substitution along the strands. Returns the correction of tau
 /// at the beginning of each.
 #[inline(always)]
-fn predict<L: Lanes>(
-    chunk: &[Four],
-    passing: &mut [Passing],
-    step: &Step,
-    now: usize,
-    running: &mut Running<L>,
-) -> L {
+fn predict<L: Lanes>(chunk: &[Four], passing: &mut [Passing], step: &Step, now: usize, running: &mut Running<L>) -> L {
     let before = 1 - now;
     let (ahead, ahead_before) = (L::all(step.ahead), L::all(step.ahead_before));
     let (mut product, mut sum) = (L::all(1.0), L::all(0.0));
@@ -330,8 +333,7 @@ fn predict<L: Lanes>(
         let u_ahead = ahead.multiply_add(L::load(&four.spread[now]), ahead_before * L::load(&four.spread[before]));
         let u = L::load(&four.increment) + u_ahead;
         let tau = L::load(&four.turns) + tau_ahead;
-        let (sine, cosine) =
-            if u.any_above(NARROW) { sine_cosine_of_half(u) } else { sine_cosine(L::all(PI) * u) };
+        let (sine, cosine) = if u.any_above(NARROW) { sine_cosine_of_half(u) } else { sine_cosine(L::all(PI) * u) };
         let half = L::all(0.5) * u;
         let radial = half.multiply_add(half, L::all(0.0) - L::load(&four.link_term));
         let g = (tau * (tau + u)).multiply_add(sine * sine, radial);
