@@ -6,6 +6,7 @@ pub mod events;
 pub mod run;
 pub mod solve;
 pub mod trade;
+pub mod view;
 pub mod watch;
 
 use std::fs::File;

@@ -16,6 +16,9 @@
 
 #![deny(missing_docs)]
 
+#[cfg(all(feature = "jazzy", feature = "humble"))]
+compile_error!("choose one ROS 2 distribution: `--no-default-features --features humble` for Humble");
+
 pub mod chain;
 pub mod clearance;
 pub mod events;

@@ -25,6 +25,8 @@ enum Command {
     Run(commands::run::RunArguments),
     /// Watch a running publisher from another process
     Watch(commands::watch::WatchArguments),
+    /// Serve the live stage picture to a browser
+    View(commands::view::ViewArguments),
     /// Solve a scene offline and print every handle as a table
     Solve(commands::solve::SolveArguments),
     /// Find contact, stall, lock and path end
@@ -43,6 +45,7 @@ fn main() -> ExitCode {
     let done = match &command {
         Command::Run(arguments) => commands::run::run(&common, arguments),
         Command::Watch(arguments) => commands::watch::watch(&common, arguments),
+        Command::View(arguments) => commands::view::view(&common, arguments),
         Command::Solve(arguments) => commands::solve::solve(&common, arguments),
         Command::Events => commands::events::events(&common),
         Command::Draw(arguments) => commands::draw::draw(&common, arguments),
@@ -79,5 +82,11 @@ fn set_up_logging(common: &Common) {
         // What iceoryx2 refuses is reported in this program's own words.
         _ => iceoryx2::prelude::LogLevel::Fatal,
     });
-    env_logger::Builder::new().filter_level(level).filter_module("rustdds", log::LevelFilter::Error).init();
+    // What RustDDS and ros2-client complain of (every large message, every end) is no news to a user.
+    let of_dds = if common.verbose > 1 { log::LevelFilter::Warn } else { log::LevelFilter::Off };
+    env_logger::Builder::new()
+        .filter_level(level)
+        .filter_module("rustdds", of_dds)
+        .filter_module("ros2_client", of_dds)
+        .init();
 }

@@ -56,7 +56,15 @@ pub fn check(common: &Common) -> Result<(), CommandError> {
             AtEnd::Loop => "begins again",
         }
     ))?;
-    output.line(&format!("  Publishing: {} frames per second.", number(scene.rate)))?;
+    output.line(&format!("  Publishing: {} frames per second to shared memory.", number(scene.rate)))?;
+    output.line(&match &scene.ros2 {
+        Some(settings) => format!(
+            "  ROS 2: {} at {} frames per second.",
+            settings.topics.keys().map(|topic| topic.name()).collect::<Vec<_>>().join(", "),
+            number(settings.rate_of(scene.rate))
+        ),
+        None => "  ROS 2: nothing and no network socket, unless `run --ros2` asks for it.".to_owned(),
+    })?;
     output.line("  Ahead, in simulated time:")?;
     for timed in timeline.events() {
         output.line(&format!("  {}", sentence(&scene, timed)))?;
