@@ -97,7 +97,7 @@ impl Angle {
 }
 
 /// The rounded sum and its rounding error (Knuth, The Art of Computer Programming, vol. 2, section 4.2.2).
-fn two_sum(x: f64, y: f64) -> (f64, f64) {
+pub(super) fn two_sum(x: f64, y: f64) -> (f64, f64) {
     let sum = x + y;
     let y_part = sum - x;
     (sum, (x - (sum - y_part)) + (y - y_part))
