@@ -79,5 +79,11 @@ fn set_up_logging(common: &Common) {
         // What iceoryx2 refuses is reported in this program's own words.
         _ => iceoryx2::prelude::LogLevel::Fatal,
     });
-    env_logger::Builder::new().filter_level(level).filter_module("rustdds", log::LevelFilter::Error).init();
+    // What RustDDS and ros2-client complain of (every large message, every end) is no news to a user.
+    let of_dds = if common.verbose > 1 { log::LevelFilter::Warn } else { log::LevelFilter::Off };
+    env_logger::Builder::new()
+        .filter_level(level)
+        .filter_module("rustdds", of_dds)
+        .filter_module("ros2_client", of_dds)
+        .init();
 }

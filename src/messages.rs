@@ -6,7 +6,7 @@
 //! a subscriber built for another layout is refused instead of reading nonsense.
 
 use iceoryx2::prelude::ZeroCopySend;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// The bench number that means "no bench".
 pub const NO_BENCH: u32 = u32::MAX;
@@ -63,7 +63,7 @@ impl State {
 }
 
 /// Where one handle is and how it moves. Payload of `<name>/poses` is a slice of these, head first.
-#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/HandlePose/1")]
 #[repr(C)]
 pub struct HandlePose {
@@ -81,7 +81,7 @@ pub struct HandlePose {
 }
 
 /// What is true of a whole frame. User header of `<name>/poses`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/FrameHeader/1")]
 #[repr(C)]
 pub struct FrameHeader {
@@ -111,7 +111,7 @@ pub struct FrameHeader {
 }
 
 /// A change of the alert level, or the countdown towards one. Payload of `<name>/alerts`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/CollisionAlert/1")]
 #[repr(C)]
 pub struct CollisionAlert {
@@ -150,7 +150,7 @@ pub const SCENE_NAME_BYTES: usize = 64;
 ///
 /// `_second` figures are of the last second alone, `_total` figures since the start of the run; all durations are in
 /// nanoseconds.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/LoopStatus/1")]
 #[repr(C)]
 pub struct LoopStatus {
@@ -208,14 +208,32 @@ pub struct LoopStatus {
     pub subscribers: u32,
     /// Open file descriptors of the publisher.
     pub file_descriptors: u32,
-    /// The scene's name as UTF-8, cut at a character's end and padded with zeros.
+    /// The scene's name as UTF-8, cut at a character's end and padded with zeros. In JSON and ROS 2 a plain string.
+    #[serde(serialize_with = "as_text")]
     pub scene: [u8; SCENE_NAME_BYTES],
+}
+
+impl LoopStatus {
+    /// The scene's name.
+    pub fn scene_name(&self) -> &str {
+        text(&self.scene)
+    }
+}
+
+/// What stands before the zeros.
+fn text(bytes: &[u8; SCENE_NAME_BYTES]) -> &str {
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(SCENE_NAME_BYTES);
+    std::str::from_utf8(&bytes[..end]).unwrap_or_default()
+}
+
+fn as_text<S: Serializer>(bytes: &[u8; SCENE_NAME_BYTES], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(text(bytes))
 }
 
 /// Benches whose lengths differ from each other at most: the head, and all that follow.
 ///
 /// What a subscriber needs to draw the stage. Payload of `<name>/stage`, sent at the start and kept for late joiners.
-#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/Stage/1")]
 #[repr(C)]
 pub struct Stage {

@@ -3,11 +3,14 @@
 //! In: TOML text, or what the command line overrides. Out: a [`Scene`], whose existence is the proof that every number
 //! is in range and that the start is legal. Errors name the file, the line, the field and what was expected.
 
+pub mod ros2;
+
 use std::path::Path as FilePath;
 
 use serde::Deserialize;
 use toml::Spanned;
 
+use self::ros2::{RawRos2, Ros2Settings};
 use crate::chain::newton::Newton;
 use crate::chain::paper::{self, Paper, PaperRules};
 use crate::chain::whole_chain::WholeChain;
@@ -51,6 +54,8 @@ impl Accepted {
     pub const BENCHES: Self = Self { least: 1.0, greatest: 1e6, unit: "benches" };
     /// Frames a subscriber may fall behind.
     pub const QUEUE: Self = Self { least: 1.0, greatest: 1e6, unit: "frames" };
+    /// Messages that a ROS 2 topic keeps.
+    pub const DEPTH: Self = Self { least: 1.0, greatest: 1e3, unit: "messages" };
 
     /// The number itself where it is within the range.
     ///
@@ -151,6 +156,8 @@ pub struct Scene {
     pub velocities: Velocities,
     /// Frames a subscriber may fall behind, where the scene says so.
     pub queue: Option<usize>,
+    /// The ROS 2 topics; `None` where the scene asks for none.
+    pub ros2: Option<Ros2Settings>,
 }
 
 impl Scene {
@@ -322,6 +329,7 @@ struct RawPublish {
     rate: Option<Spanned<f64>>,
     velocities: Option<bool>,
     queue: Option<Spanned<i64>>,
+    ros2: Option<RawRos2>,
 }
 
 impl RawScene {
@@ -356,6 +364,7 @@ impl RawScene {
             rate,
             velocities: if velocities { Velocities::Computed } else { Velocities::Omitted },
             queue: queue.transpose()?,
+            ros2: self.publish.ros2.as_ref().map(|ros2| ros2.validated(source)).transpose()?,
         })
     }
 }

@@ -2,98 +2,13 @@
 //!
 //! Every process is ended by a deadline, and nothing asserts a speed.
 
-use std::io::Read;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+mod processes;
+
+use std::path::Path;
 
 use serde_json::Value;
 
-/// A process that does not outlive its test.
-struct Process(Child);
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-impl Process {
-    fn start(command: &mut Command) -> Self {
-        Self(command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap())
-    }
-
-    fn signal(&self, signal: nix::sys::signal::Signal) {
-        nix::sys::signal::kill(nix::unistd::Pid::from_raw(self.0.id() as i32), signal).unwrap();
-    }
-
-    /// What the process printed, once it has ended by itself within `seconds`.
-    fn output_within(mut self, seconds: u64) -> Output {
-        let deadline = Instant::now() + Duration::from_secs(seconds);
-        // Read beside waiting: a full pipe would stop the process.
-        let [stdout, stderr] = [
-            std::thread::spawn(reading(self.0.stdout.take().unwrap())),
-            std::thread::spawn(reading(self.0.stderr.take().unwrap())),
-        ];
-        let status = loop {
-            if let Some(status) = self.0.try_wait().unwrap() {
-                break status;
-            }
-            assert!(Instant::now() < deadline, "the process did not end within {seconds} s");
-            std::thread::sleep(Duration::from_millis(10));
-        };
-        Output { status, stdout: stdout.join().unwrap(), stderr: stderr.join().unwrap() }
-    }
-}
-
-fn reading(mut pipe: impl Read) -> impl FnOnce() -> Vec<u8> {
-    move || {
-        let mut bytes = Vec::new();
-        pipe.read_to_end(&mut bytes).unwrap();
-        bytes
-    }
-}
-
-/// The program with a service name that no other test has.
-fn program(name: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
-    command.args(["--name", &unique(name)]);
-    command
-}
-
-fn unique(name: &str) -> String {
-    format!("test_{}_{name}", std::process::id())
-}
-
-fn python() -> Command {
-    let interpreter = std::env::var_os("BENCH_DRAGON_PYTHON").unwrap_or("python3".into());
-    let mut command = Command::new(interpreter);
-    command.current_dir(env!("CARGO_MANIFEST_DIR"));
-    command
-}
-
-fn example(name: &str) -> Command {
-    let target = std::env::current_exe().unwrap();
-    Command::new(target.ancestors().nth(2).unwrap().join("examples").join(name))
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-fn json_lines(output: &Output) -> Vec<Value> {
-    text(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect()
-}
-
-fn summary(output: &Output) -> Value {
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    json_lines(output).pop().unwrap()
-}
-
-fn wait(seconds: f64) {
-    std::thread::sleep(Duration::from_secs_f64(seconds));
-}
+use processes::{Process, example, json_lines, program, python, scene_file, summary, text, unique, wait};
 
 #[test]
 fn every_subscriber_gets_every_frame_at_60_hz() {
@@ -311,17 +226,6 @@ fn files_below(folder: &Path) -> usize {
 }
 
 /// The paper's scene with some text replaced, in a file.
-fn scene_file(name: &str, replacements: &[(&str, &str)]) -> PathBuf {
-    let mut scene = include_str!("../config/paper.toml").to_owned();
-    for (from, to) in replacements {
-        assert!(scene.contains(from));
-        scene = scene.replace(from, to);
-    }
-    let file = std::env::temp_dir().join(format!("{}.toml", unique(name)));
-    std::fs::write(&file, scene).unwrap();
-    file
-}
-
 #[test]
 fn python_sees_the_same_layouts() {
     use bench_dragon::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};

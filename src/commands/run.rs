@@ -1,5 +1,7 @@
 //! `run`: the live publisher.
 
+mod ros2;
+
 use std::collections::hash_map::RandomState;
 use std::hash::BuildHasher;
 use std::io::IsTerminal;
@@ -10,13 +12,16 @@ use std::sync::mpsc;
 use anstyle::{AnsiColor, Style};
 use bench_dragon::live::clock::realtime_ns;
 use bench_dragon::live::statistics::{self, Announcement, Inbox, Percentiles, Run, Summary};
-use bench_dragon::live::{Counts, End, LoopOptions, Publisher, realtime, run_loop};
-use bench_dragon::messages::State;
+use bench_dragon::live::{Counts, End, LoopOptions, Publisher, StatusPublisher, realtime, run_loop};
+use bench_dragon::messages::{Stage, State};
 use bench_dragon::scene::{Accepted, AtEnd, Scene};
 use bench_dragon::show::timeline::Timeline;
 use bench_dragon::show::{Playback, Show};
+use bench_dragon::transports;
 use bench_dragon::transports::iceoryx2::{self, Offer, OpenError, SharedMemoryPublisher, StatusSender};
 use serde::Serialize;
+
+use self::ros2::{Ros2, Ros2Summary};
 
 use super::events::{bench_name, sentence};
 use super::{CommandError, Common, Output, number, search_timeline, stop_on_signals};
@@ -48,6 +53,9 @@ pub struct RunArguments {
     /// Run the loop with this real-time priority, 1 to 99 (SCHED_FIFO), and lock its memory
     #[arg(long, value_name = "PRIORITY", value_parser = clap::value_parser!(u8).range(1..=99), help_heading = "Punctuality")]
     realtime: Option<u8>,
+    /// Publish ROS 2 topics too, as the scene's [publish.ros2] says or the usual ones
+    #[arg(long)]
+    ros2: bool,
     /// Keep the loop on this CPU
     #[arg(long, value_name = "N", help_heading = "Punctuality")]
     cpu: Option<usize>,
@@ -62,6 +70,8 @@ struct SummaryLine {
     wakeup_ns: Percentiles,
     step_ns: Percentiles,
     end: End,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ros2: Option<Ros2Summary>,
 }
 
 /// Publishes the scene until its duration is over or a signal comes.
@@ -76,8 +86,7 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
     let run_id = RandomState::new().hash_one(realtime_ns());
     let timeline = show.timeline().clone();
     let performance = Performance { common, arguments, scene: &scene, playback, run_id };
-    let (counts, summary) = performance.perform(show, &timeline, &stop)?;
-    performance.print_summary(&counts, &summary)
+    performance.perform(show, &timeline, &stop)
 }
 
 /// All that the threads of a run have in common.
@@ -91,16 +100,18 @@ struct Performance<'a> {
 
 impl Performance<'_> {
     /// Runs the loop on one thread and the statistics on another.
-    fn perform(
-        &self,
-        mut show: Show,
-        timeline: &Timeline,
-        stop: &Arc<AtomicBool>,
-    ) -> Result<(Counts, Summary), CommandError> {
+    fn perform(&self, mut show: Show, timeline: &Timeline, stop: &Arc<AtomicBool>) -> Result<(), CommandError> {
+        let ros2 = self.open_ros2()?;
         let (reports, inbox) = statistics::queues();
         let done = AtomicBool::new(false);
         let (opened, opening) = mpsc::channel();
-        std::thread::scope(|threads| {
+        let (over_ros2, ros2_status, end_ros2, ros2_sentence) = match ros2 {
+            Some(Ros2 { publisher, status, end, sentence }) => {
+                (Some(publisher), Some(status), Some(end), Some(sentence))
+            }
+            None => (None, None, None, None),
+        };
+        let ended = std::thread::scope(|threads| {
             let looping = threads.spawn(|| {
                 let ready = self.prepare();
                 let publisher = match ready {
@@ -112,15 +123,18 @@ impl Performance<'_> {
                 };
                 let _ = opened.send(Ok(()));
                 let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(publisher)];
+                if let Some(publisher) = over_ros2 {
+                    publishers.push(publisher);
+                }
                 Some(run_loop(&mut show, &mut publishers, self.loop_options(), reports, stop))
             });
             // The thread sends exactly once; should it have died, joining it tells.
             let ready = opening.recv().unwrap_or(Ok(()));
             let summary = ready.and_then(|()| {
-                self.print_start(timeline)?;
+                self.print_start(timeline, ros2_sentence.as_deref())?;
                 let collecting = threads.spawn(|| {
                     // Without statistics the loop would run unseen.
-                    self.collect(inbox, &done).inspect_err(|_| stop.store(true, Ordering::Relaxed))
+                    self.collect(inbox, ros2_status, &done).inspect_err(|_| stop.store(true, Ordering::Relaxed))
                 });
                 let outcome = looping.join();
                 done.store(true, Ordering::Release);
@@ -128,14 +142,28 @@ impl Performance<'_> {
                 Ok((outcome.map_err(|_| lost("loop's"))?, summary))
             });
             match summary? {
-                (Some(Ok(counts)), summary) => Ok((counts, summary)),
-                (Some(Err((counts, error))), summary) => {
-                    self.print_summary(&counts, &summary)?;
-                    Err(CommandError::Failed(error.to_string()))
-                }
+                (Some(Ok(counts)), summary) => Ok((counts, summary, None)),
+                (Some(Err((counts, error))), summary) => Ok((counts, summary, Some(error))),
                 (None, _) => Err(lost("loop's")),
             }
-        })
+        });
+        let ros2 = end_ros2.map(|end| end());
+        let (counts, summary, error) = ended?;
+        self.print_summary(&counts, &summary, ros2)?;
+        error.map_or(Ok(()), |error| Err(CommandError::Failed(error.to_string())))
+    }
+
+    /// The ROS 2 topics, where the scene or the command line asks for them.
+    fn open_ros2(&self) -> Result<Option<Ros2>, CommandError> {
+        if !self.arguments.ros2 && self.scene.ros2.is_none() {
+            return Ok(None);
+        }
+        ros2::open(self.scene, &self.common.name, self.playback.rate, self.stage()).map(Some)
+    }
+
+    fn stage(&self) -> Stage {
+        let scene = self.scene;
+        transports::stage(self.run_id, realtime_ns(), &scene.team, scene.path.pitch(), scene.start_turn)
     }
 
     /// What has to be done on the loop's own thread before it starts.
@@ -154,7 +182,7 @@ impl Performance<'_> {
             handles,
             queue: self.queue(),
             alerts: scene.alerts.is_some(),
-            stage: iceoryx2::stage(self.run_id, realtime_ns(), &scene.team, scene.path.pitch(), scene.start_turn),
+            stage: self.stage(),
         })?)
     }
 
@@ -168,19 +196,28 @@ impl Performance<'_> {
         LoopOptions { run_id: self.run_id, rate, time_scale, periods }
     }
 
-    fn collect(&self, inbox: Inbox, done: &AtomicBool) -> Result<Summary, CommandError> {
+    fn collect(
+        &self,
+        inbox: Inbox,
+        ros2: Option<Box<dyn StatusPublisher + Send>>,
+        done: &AtomicBool,
+    ) -> Result<Summary, CommandError> {
+        let mut sinks: Vec<Box<dyn StatusPublisher>> = vec![Box::new(StatusSender::open(&self.common.name)?)];
+        if let Some(status) = ros2 {
+            sinks.push(status);
+        }
         let run = Run {
             run_id: self.run_id,
             rate: self.playback.rate,
             scene: &self.scene.name,
-            sinks: vec![Box::new(StatusSender::open(&self.common.name)?)],
+            sinks,
             announce: Box::new(|announcement| self.print_alert(announcement)),
         };
         Ok(statistics::collect(inbox, run, done))
     }
 
     /// What a person wants to know at the start, on standard error: standard output is for the summary.
-    fn print_start(&self, timeline: &Timeline) -> Result<(), CommandError> {
+    fn print_start(&self, timeline: &Timeline, ros2: Option<&str>) -> Result<(), CommandError> {
         if self.common.quiet || self.common.json {
             return Ok(());
         }
@@ -198,6 +235,9 @@ impl Performance<'_> {
             "iceoryx2 services: {name}/poses{alerts}, /status, /stage, /tick (queues of {} frames).",
             self.queue()
         );
+        if let Some(sentence) = ros2 {
+            eprintln!("{sentence}");
+        }
         match scene.alerts {
             Some(_) => eprintln!("Ahead, in simulated time:"),
             None => eprintln!("No alerts: contact and stall are not computed. Ahead, in simulated time:"),
@@ -243,7 +283,7 @@ impl Performance<'_> {
         );
     }
 
-    fn print_summary(&self, counts: &Counts, summary: &Summary) -> Result<(), CommandError> {
+    fn print_summary(&self, counts: &Counts, summary: &Summary, ros2: Option<Ros2Summary>) -> Result<(), CommandError> {
         let Counts { frames, overruns, skipped, end } = *counts;
         let Summary { wakeup_ns, step_ns, lost_samples } = *summary;
         let mut output = Output::standard();
@@ -251,7 +291,7 @@ impl Performance<'_> {
             log::warn!("{lost_samples} frames are missing from the percentiles: the machine left them no time");
         }
         if self.common.json {
-            output.json(&SummaryLine { frames, overruns, skipped, wakeup_ns, step_ns, end })?;
+            output.json(&SummaryLine { frames, overruns, skipped, wakeup_ns, step_ns, end, ros2 })?;
         } else {
             output.line(&format!(
                 "{frames} frames published, {overruns} overruns, {skipped} periods skipped (ended by {}).",
@@ -269,6 +309,11 @@ impl Performance<'_> {
                     us(of.p99),
                     us(of.p999),
                     us(of.max)
+                ))?;
+            }
+            if let Some(Ros2Summary { frames, skipped, discarded }) = ros2 {
+                output.line(&format!(
+                    "  ROS 2: {frames} frames published, {skipped} skipped, {discarded} messages discarded."
                 ))?;
             }
         }

@@ -248,10 +248,9 @@ impl Screen<'_> {
 
 fn status_line(status: &LoopStatus) -> String {
     let us = |ns: u64| ns as f64 / 1000.0;
-    let name = String::from_utf8_lossy(&status.scene);
     format!(
         "publisher: scene {}  overruns {}  skipped {}  lateness p99 {:.1} us  step p99 {:.1} us  memory {:.1} MB",
-        name.trim_end_matches('\0'),
+        status.scene_name(),
         status.overruns,
         status.skipped,
         us(status.lateness_p99_total),

@@ -14,12 +14,11 @@ use ::iceoryx2::service::builder::publish_subscribe::{
 };
 use ::iceoryx2::service::port_factory::{event, publish_subscribe};
 
-use crate::chain::Team;
+use super::alert_message;
 use crate::live::clock::monotonic_ns;
 use crate::live::{PublishError, Publisher, StatusPublisher};
-use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, NO_BENCH, Stage};
+use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 use crate::show::Frame;
-use crate::show::alerts::Alert;
 
 /// Subscribers that each service admits at once.
 pub const MAX_SUBSCRIBERS: usize = 8;
@@ -129,22 +128,6 @@ pub struct Offer {
     pub stage: Stage,
 }
 
-/// The stage of a team on a spiral.
-pub fn stage(run_id: u64, stamp_ns: u64, team: &Team, pitch: f64, start_turn: f64) -> Stage {
-    Stage {
-        run_id,
-        stamp_ns,
-        pitch,
-        start_turn,
-        hole_inset: team.hole_inset,
-        head_length: team.head_length,
-        body_length: team.body_length,
-        width: team.width,
-        benches: team.benches as u32,
-        reserved: 0,
-    }
-}
-
 type Service<Payload, Header> = publish_subscribe::PortFactory<ipc::Service, Payload, Header>;
 type Sender<Payload, Header> = Port<ipc::Service, Payload, Header>;
 
@@ -200,7 +183,7 @@ impl SharedMemoryPublisher {
     fn send_alerts(&self, header: &FrameHeader, frame: &Frame) -> Result<(), String> {
         let Some(port) = &self.alerts else { return Ok(()) };
         for alert in &frame.alerts {
-            port.send_copy(message(header, alert)).map_err(|error| error.to_string())?;
+            port.send_copy(alert_message(header, alert)).map_err(|error| error.to_string())?;
         }
         Ok(())
     }
@@ -254,25 +237,6 @@ impl StatusPublisher for StatusSender {
         if let Err(error) = self.status.send_copy(*status) {
             log::warn!("the status could not be sent: {error}");
         }
-    }
-}
-
-/// The message of an alert that goes with a frame.
-pub fn message(header: &FrameHeader, alert: &Alert) -> CollisionAlert {
-    CollisionAlert {
-        run_id: header.run_id,
-        tick: header.tick,
-        stamp_ns: header.stamp_ns,
-        sim_time: header.sim_time,
-        event_time: alert.event_time,
-        time_to_event: alert.time_to_event,
-        clearance: alert.clearance,
-        x: alert.x,
-        y: alert.y,
-        level: alert.level as u32,
-        bench_a: alert.bench_a.unwrap_or(NO_BENCH),
-        bench_b: alert.bench_b.unwrap_or(NO_BENCH),
-        reserved: 0,
     }
 }
 

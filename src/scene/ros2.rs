@@ -1,0 +1,182 @@
+//! What a scene may say of its ROS 2 topics: `[publish.ros2]`.
+//!
+//! In: the table as written. Out: [`Ros2Settings`], checked. Called by the scene; read by the ROS 2 transport.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::{Accepted, SceneError, Source};
+
+/// A topic that a scene can ask for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Topic {
+    /// `/<name>/handles`, bench_dragon_msgs/HandlePoses.
+    Handles,
+    /// `/<name>/poses`, geometry_msgs/PoseArray.
+    Poses,
+    /// `/<name>/alerts`, bench_dragon_msgs/CollisionAlert.
+    Alerts,
+    /// `/<name>/stage`, bench_dragon_msgs/Stage.
+    Stage,
+    /// `/diagnostics`, diagnostic_msgs/DiagnosticArray.
+    Diagnostics,
+    /// `/<name>/markers`, visualization_msgs/MarkerArray.
+    Markers,
+    /// `/<name>/status`, bench_dragon_msgs/LoopStatus.
+    Status,
+}
+
+impl Topic {
+    /// What is published where the scene does not say.
+    pub const DEFAULT: [Self; 5] = [Self::Handles, Self::Poses, Self::Alerts, Self::Stage, Self::Diagnostics];
+
+    /// The name in the scene, and the last part of the topic's.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Handles => "handles",
+            Self::Poses => "poses",
+            Self::Alerts => "alerts",
+            Self::Stage => "stage",
+            Self::Diagnostics => "diagnostics",
+            Self::Markers => "markers",
+            Self::Status => "status",
+        }
+    }
+
+    /// The topic's full name, where the publisher is called `publisher`.
+    pub fn path(self, publisher: &str) -> String {
+        match self {
+            // Where every diagnostics tool looks.
+            Self::Diagnostics => "/diagnostics".to_owned(),
+            _ => format!("/{publisher}/{}", self.name()),
+        }
+    }
+
+    /// The quality of service where the scene does not say.
+    ///
+    /// Reliable throughout, since a default subscription is reliable and gets nothing from a best-effort publisher; a
+    /// best-effort subscription gets what a reliable publisher sends. What is sent seldom is kept for late subscribers.
+    pub fn default_qos(self) -> Qos {
+        match self {
+            Self::Alerts | Self::Stage => {
+                Qos { reliability: Reliability::Reliable, durability: Durability::TransientLocal, depth: 1 }
+            }
+            _ => Qos { reliability: Reliability::Reliable, durability: Durability::Volatile, depth: 10 },
+        }
+    }
+}
+
+/// Whether lost messages are sent again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reliability {
+    /// They are.
+    Reliable,
+    /// They are not.
+    BestEffort,
+}
+
+/// Whether late subscribers get what was sent before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Durability {
+    /// They do not.
+    Volatile,
+    /// They get the last messages, as many as the depth says.
+    TransientLocal,
+}
+
+/// The quality of service of a topic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Qos {
+    /// Whether lost messages are sent again.
+    pub reliability: Reliability,
+    /// Whether late subscribers get what was sent before.
+    pub durability: Durability,
+    /// The last messages that are kept.
+    pub depth: u32,
+}
+
+/// What a scene says of its ROS 2 topics.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ros2Settings {
+    /// Frames per second on ROS 2; where the scene does not say, the smaller of 60 and the loop's rate.
+    pub rate: Option<f64>,
+    /// The topics and how each is published.
+    pub topics: BTreeMap<Topic, Qos>,
+}
+
+impl Default for Ros2Settings {
+    fn default() -> Self {
+        Self { rate: None, topics: Topic::DEFAULT.into_iter().map(|topic| (topic, topic.default_qos())).collect() }
+    }
+}
+
+impl Ros2Settings {
+    /// Frames per second on ROS 2 where the loop makes `loop_rate`.
+    pub fn rate_of(&self, loop_rate: f64) -> f64 {
+        self.rate.unwrap_or(60.0).min(loop_rate)
+    }
+}
+
+/// The table as written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawRos2 {
+    rate: Option<Spanned<f64>>,
+    topics: Option<Spanned<Vec<Topic>>>,
+    #[serde(default)]
+    qos: BTreeMap<Topic, Spanned<RawQos>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawQos {
+    reliability: Option<Reliability>,
+    durability: Option<Durability>,
+    depth: Option<Spanned<i64>>,
+}
+
+impl RawRos2 {
+    pub(super) fn validated(&self, source: &Source) -> Result<Ros2Settings, SceneError> {
+        let rate =
+            self.rate.as_ref().map(|rate| source.check("publish.ros2.rate", rate, Accepted::RATE)).transpose()?;
+        let named = match &self.topics {
+            None => Topic::DEFAULT.to_vec(),
+            Some(topics) if topics.get_ref().is_empty() => {
+                let sentence = "publish.ros2.topics is empty, expected at least one topic, or no [publish.ros2]";
+                return Err(source.wrong(topics, sentence));
+            }
+            Some(topics) => topics.get_ref().clone(),
+        };
+        let mut topics: BTreeMap<Topic, Qos> = named.into_iter().map(|topic| (topic, topic.default_qos())).collect();
+        for (topic, raw) in &self.qos {
+            let Some(qos) = topics.get_mut(topic) else {
+                let sentence = format!(
+                    "publish.ros2.qos.{name} is given but \"{name}\" is not among publish.ros2.topics, expected both \
+                     or neither",
+                    name = topic.name()
+                );
+                return Err(source.wrong(raw, &sentence));
+            };
+            *qos = raw.get_ref().validated(*topic, source)?;
+        }
+        Ok(Ros2Settings { rate, topics })
+    }
+}
+
+impl RawQos {
+    fn validated(&self, topic: Topic, source: &Source) -> Result<Qos, SceneError> {
+        let default = topic.default_qos();
+        let field = format!("publish.ros2.qos.{}.depth", topic.name());
+        let depth = self.depth.as_ref().map(|depth| source.check_count(&field, depth, Accepted::DEPTH)).transpose()?;
+        Ok(Qos {
+            reliability: self.reliability.unwrap_or(default.reliability),
+            durability: self.durability.unwrap_or(default.durability),
+            depth: depth.map_or(default.depth, |depth| depth as u32),
+        })
+    }
+}

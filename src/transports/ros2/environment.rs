@@ -1,0 +1,148 @@
+//! The environment variables by which ROS 2 people choose a network, and legal ROS names.
+//!
+//! In: the process's environment. Out: a [`Network`], or a sentence: what cannot be honoured is refused, never ignored.
+//! Called when the ROS 2 transport opens.
+
+use super::Ros2Error;
+
+/// The greatest domain whose ports exist (ROS 2 documentation, "The ROS_DOMAIN_ID").
+const GREATEST_DOMAIN: u16 = 232;
+
+/// Which other ROS 2 processes are to be found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Network {
+    /// ROS_DOMAIN_ID, by default 0.
+    pub domain: u16,
+    /// How far.
+    pub range: Range,
+}
+
+/// How far other processes are looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Range {
+    /// All that multicast reaches.
+    Subnet,
+    /// This machine.
+    Localhost,
+}
+
+impl Network {
+    /// The network that the environment asks for; `variable` gives the value of a variable that is set.
+    ///
+    /// # Errors
+    /// [`Ros2Error::Environment`] for a value that ROS 2 does not know or that RustDDS cannot honour.
+    pub fn of(variable: impl Fn(&str) -> Option<String>) -> Result<Self, Ros2Error> {
+        let set = |name: &str| variable(name).filter(|value| !value.trim().is_empty());
+        let refused = |sentence: String| Err(Ros2Error::Environment(sentence));
+        let domain = match set("ROS_DOMAIN_ID") {
+            None => 0,
+            Some(text) => match text.trim().parse::<u16>() {
+                Ok(domain) if domain <= GREATEST_DOMAIN => domain,
+                _ => {
+                    return refused(format!(
+                        "ROS_DOMAIN_ID is \"{text}\", expected a whole number from 0 to {GREATEST_DOMAIN}"
+                    ));
+                }
+            },
+        };
+        if let Some(peers) = set("ROS_STATIC_PEERS") {
+            return refused(format!(
+                "ROS_STATIC_PEERS is \"{peers}\", which RustDDS cannot honour: unset it; other machines are found by \
+                 multicast"
+            ));
+        }
+        let range = match set("ROS_AUTOMATIC_DISCOVERY_RANGE").as_deref().map(str::trim) {
+            None | Some("SUBNET" | "SYSTEM_DEFAULT") => Range::Subnet,
+            Some("LOCALHOST") => Range::Localhost,
+            Some("OFF") => {
+                return refused(
+                    "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF, with which RustDDS would reach nobody: set it to LOCALHOST \
+                     or SUBNET, or run without ROS 2"
+                        .to_owned(),
+                );
+            }
+            Some(other) => {
+                return refused(format!(
+                    "ROS_AUTOMATIC_DISCOVERY_RANGE is \"{other}\", expected SUBNET, LOCALHOST, OFF or SYSTEM_DEFAULT"
+                ));
+            }
+        };
+        // Deprecated since Iron, and stronger than the range where it is set.
+        let range = match set("ROS_LOCALHOST_ONLY").as_deref().map(str::trim) {
+            Some("1") => Range::Localhost,
+            None | Some("0") => range,
+            Some(other) => return refused(format!("ROS_LOCALHOST_ONLY is \"{other}\", expected 0 or 1")),
+        };
+        Ok(Self { domain, range })
+    }
+
+    /// For people.
+    pub fn sentence(self) -> String {
+        let range = match self.range {
+            Range::Subnet => "the subnet",
+            Range::Localhost => "this machine only",
+        };
+        format!("domain {}, {range}", self.domain)
+    }
+}
+
+/// Checks that a name can be a ROS 2 namespace: words of letters, digits and single underscores, not beginning with a
+/// digit, joined by slashes (ROS 2 design, "Topic and Service name mapping").
+///
+/// # Errors
+/// [`Ros2Error::Name`].
+pub fn check_name(name: &str) -> Result<(), Ros2Error> {
+    let legal = |word: &str| {
+        word.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+            && word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+            && !word.contains("__")
+            && !word.ends_with('_')
+    };
+    if name.split('/').all(legal) { Ok(()) } else { Err(Ros2Error::Name(name.to_owned())) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn network(variables: &[(&str, &str)]) -> Result<Network, String> {
+        Network::of(|name| {
+            variables.iter().find(|(variable, _)| *variable == name).map(|(_, value)| (*value).to_owned())
+        })
+        .map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn the_environment_of_ros_people_is_honoured_or_refused() {
+        let found = |domain, range| Ok(Network { domain, range });
+        assert_eq!(network(&[]), found(0, Range::Subnet));
+        assert_eq!(network(&[("ROS_DOMAIN_ID", "")]), found(0, Range::Subnet));
+        assert_eq!(network(&[("ROS_DOMAIN_ID", "42")]), found(42, Range::Subnet));
+        assert_eq!(network(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")]), found(0, Range::Localhost));
+        assert_eq!(network(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "SYSTEM_DEFAULT")]), found(0, Range::Subnet));
+        assert_eq!(network(&[("ROS_LOCALHOST_ONLY", "1")]), found(0, Range::Localhost));
+        assert_eq!(network(&[("ROS_LOCALHOST_ONLY", "0")]), found(0, Range::Subnet));
+        for (variable, value, expected) in [
+            ("ROS_DOMAIN_ID", "233", "0 to 232"),
+            ("ROS_DOMAIN_ID", "-1", "0 to 232"),
+            ("ROS_DOMAIN_ID", "house", "0 to 232"),
+            ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF", "LOCALHOST"),
+            ("ROS_AUTOMATIC_DISCOVERY_RANGE", "near", "SUBNET"),
+            ("ROS_LOCALHOST_ONLY", "yes", "0 or 1"),
+            ("ROS_STATIC_PEERS", "192.168.1.2", "multicast"),
+        ] {
+            let sentence = network(&[(variable, value)]).unwrap_err();
+            assert!(sentence.contains(variable) && sentence.contains(expected), "{sentence}");
+        }
+    }
+
+    #[test]
+    fn names_that_ros_takes() {
+        for name in ["bench_dragon", "stage/left", "a1", "_x"] {
+            check_name(name).unwrap();
+        }
+        for name in ["", "1st", "a b", "a-b", "a__b", "a/", "/a", "a//b", "ä", "a_"] {
+            assert!(check_name(name).is_err(), "{name}");
+        }
+    }
+}

@@ -1,0 +1,117 @@
+"""Compares one ROS 2 topic, bit for bit, with the shared memory it goes beside.
+
+    ros2_content.py --name NAME --seconds S --topic handles|poses --reliability reliable|best_effort
+
+Reads the raw CDR (decoding it in Python would be slower than the publisher) and prints one JSON line: how many
+messages came, how many sequences are missing between the first and the last, how many were compared and differ.
+"""
+
+import argparse
+import json
+import struct
+import time
+
+import numpy as np
+from cyclonedds._clayer import ddspy_take
+from cyclonedds.core import InstanceState, SampleState, ViewState
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from ros2_peer import TOPICS, quality
+
+# CDR: 4 bytes that say little-endian, then sec, nanosec, and "stage" with its length.
+STAMP = struct.Struct("<4xiI")
+AFTER_HEADER = 4 + 24
+ANY = SampleState.Any | ViewState.Any | InstanceState.Any
+
+
+def of_handles(raw):
+    """Stamp and handles (x, y, heading, vx, vy) of a HandlePoses."""
+    # run_id to deadline_ns, three numbers, handles, state; then the length of the sequence.
+    count = struct.unpack_from("<I", raw, AFTER_HEADER + 6 * 8 + 3 * 8 + 8)[0]
+    first = AFTER_HEADER + 6 * 8 + 3 * 8 + 16
+    return np.frombuffer(raw, "<f8", 5 * count, first).reshape(count, 5)
+
+
+def of_poses(raw):
+    """Positions of a PoseArray."""
+    count = struct.unpack_from("<I", raw, AFTER_HEADER - 4)[0]
+    return np.frombuffer(raw, "<f8", 7 * count, AFTER_HEADER).reshape(count, 7)[:, :2]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--name", required=True)
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--topic", choices=("handles", "poses"), default="handles")
+    parser.add_argument("--reliability", default="reliable")
+    arguments = parser.parse_args()
+
+    participant = DomainParticipant(0)
+    topic = Topic(participant, f"rt/{arguments.name}/{arguments.topic}", TOPICS[arguments.topic])
+    reader = DataReader(participant, topic, qos=quality(arguments.reliability, "volatile"))
+    # Only now: what comes over shared memory before the match has nothing to be compared with.
+    shared = SharedMemory(arguments.name)
+    frames = {}
+    messages = {}
+    end = time.monotonic() + arguments.seconds
+    while time.monotonic() < end:
+        frames.update(shared.take())
+        for raw, _ in ddspy_take(reader._ref, ANY, 100):
+            sec, nanosec = STAMP.unpack_from(raw)
+            handles = of_handles(raw) if arguments.topic == "handles" else of_poses(raw)
+            messages[sec * 1_000_000_000 + nanosec] = handles
+        time.sleep(0.002)
+    frames.update(shared.take())
+    shared.close()
+
+    both = sorted(frames[stamp][0] for stamp in messages if stamp in frames)
+    different = 0
+    for stamp, handles in messages.items():
+        if stamp in frames:
+            columns = handles.shape[1]
+            different += not np.array_equal(handles, frames[stamp][1][:, :columns])
+    missing = both[-1] - both[0] + 1 - len(both) if both else None
+    print(json.dumps({"received": len(messages), "compared": len(both), "missing": missing, "different": different}))
+
+
+class SharedMemory:
+    """The frames of the shared memory by their stamp: sequence and handles."""
+
+    def __init__(self, name):
+        import sys
+
+        sys.path.insert(0, "examples/python")
+        import iceoryx2 as iox2
+        from bench_dragon_messages import FrameHeader, HandlePose, handles_of
+
+        iox2.set_log_level(iox2.LogLevel.Fatal)
+        self._handles_of = handles_of
+        self._node = (
+            iox2.NodeBuilder.new().signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
+        )
+        service = self._node.service_builder(iox2.ServiceName.new(f"{name}/poses"))
+        self._subscriber = (
+            service.publish_subscribe(iox2.Slice[HandlePose])
+            .user_header(FrameHeader)
+            .open()
+            .subscriber_builder()
+            .create()
+        )
+
+    def take(self):
+        frames = {}
+        while (sample := self._subscriber.receive()) is not None:
+            header = sample.user_header().contents
+            handles = self._handles_of(sample)
+            flat = handles.view("<f8").reshape(len(handles), 5).copy()
+            frames[header.stamp_ns] = (header.sequence, flat)
+            sample.delete()
+        return frames
+
+    def close(self):
+        del self._subscriber, self._node
+
+
+if __name__ == "__main__":
+    main()

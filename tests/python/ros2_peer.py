@@ -1,0 +1,195 @@
+"""A ROS 2 peer without ROS: Cyclone DDS with the types of msgs/*.msg, as `colcon build` would make them.
+
+    ros2_peer.py --name NAME --seconds S [--topic handles:reliable:volatile] ...
+
+Prints a JSON line for every message of the topics asked for and one line at the end. The program's own types are
+read from the .msg files, so that a drift between those and the wire shows.
+"""
+
+import argparse
+import json
+import math
+import pathlib
+import re
+import sys
+import time
+import types
+from dataclasses import dataclass
+
+from cyclonedds.core import Policy, Qos
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import IdlStruct, annotations, types as idl
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+MSG = pathlib.Path(__file__).resolve().parents[2] / "msgs" / "msg"
+
+PRIMITIVES = {
+    "float64": idl.float64,
+    "float32": idl.float32,
+    "uint64": idl.uint64,
+    "uint32": idl.uint32,
+    "int32": idl.int32,
+    "uint8": idl.uint8,
+    "bool": bool,
+    "string": str,
+}
+
+
+def message(package, name, fields):
+    """A final IDL struct of the type that ROS 2 calls package/msg/name."""
+
+    def body(namespace):
+        namespace["__annotations__"] = dict(fields)
+        namespace["__module__"] = __name__
+
+    base = types.new_class(name, (IdlStruct,), {"typename": f"{package}::msg::dds_::{name}_"}, body)
+    return dataclass(annotations.final(base))
+
+
+Time = message("builtin_interfaces", "Time", [("sec", idl.int32), ("nanosec", idl.uint32)])
+Duration = message("builtin_interfaces", "Duration", [("sec", idl.int32), ("nanosec", idl.uint32)])
+Header = message("std_msgs", "Header", [("stamp", Time), ("frame_id", str)])
+ColorRGBA = message("std_msgs", "ColorRGBA", [(c, idl.float32) for c in "rgba"])
+Point = message("geometry_msgs", "Point", [(c, idl.float64) for c in "xyz"])
+Vector3 = message("geometry_msgs", "Vector3", [(c, idl.float64) for c in "xyz"])
+Quaternion = message("geometry_msgs", "Quaternion", [(c, idl.float64) for c in "xyzw"])
+Pose = message("geometry_msgs", "Pose", [("position", Point), ("orientation", Quaternion)])
+PoseArray = message("geometry_msgs", "PoseArray", [("header", Header), ("poses", idl.sequence[Pose])])
+KeyValue = message("diagnostic_msgs", "KeyValue", [("key", str), ("value", str)])
+DiagnosticStatus = message(
+    "diagnostic_msgs",
+    "DiagnosticStatus",
+    [
+        ("level", idl.uint8),
+        ("name", str),
+        ("message", str),
+        ("hardware_id", str),
+        ("values", idl.sequence[KeyValue]),
+    ],
+)
+DiagnosticArray = message(
+    "diagnostic_msgs", "DiagnosticArray", [("header", Header), ("status", idl.sequence[DiagnosticStatus])]
+)
+CompressedImage = message(
+    "sensor_msgs", "CompressedImage", [("header", Header), ("format", str), ("data", idl.sequence[idl.uint8])]
+)
+UVCoordinate = message("visualization_msgs", "UVCoordinate", [("u", idl.float32), ("v", idl.float32)])
+MeshFile = message("visualization_msgs", "MeshFile", [("filename", str), ("data", idl.sequence[idl.uint8])])
+Marker = message(
+    "visualization_msgs",
+    "Marker",
+    [
+        ("header", Header),
+        ("ns", str),
+        ("id", idl.int32),
+        ("type", idl.int32),
+        ("action", idl.int32),
+        ("pose", Pose),
+        ("scale", Vector3),
+        ("color", ColorRGBA),
+        ("lifetime", Duration),
+        ("frame_locked", bool),
+        ("points", idl.sequence[Point]),
+        ("colors", idl.sequence[ColorRGBA]),
+        ("texture_resource", str),
+        ("texture", CompressedImage),
+        ("uv_coordinates", idl.sequence[UVCoordinate]),
+        ("text", str),
+        ("mesh_resource", str),
+        ("mesh_file", MeshFile),
+        ("mesh_use_embedded_materials", bool),
+    ],
+)
+MarkerArray = message("visualization_msgs", "MarkerArray", [("markers", idl.sequence[Marker])])
+
+
+def from_file(name, known):
+    """The type that a .msg file of this repository defines."""
+    fields = []
+    for line in (MSG / f"{name}.msg").read_text().splitlines():
+        line = line.split("#")[0].strip()
+        if not line or "=" in line:
+            continue
+        kind, field = line.split()
+        element = kind.removesuffix("[]")
+        of = PRIMITIVES.get(element) or known[element]
+        fields.append((field, idl.sequence[of] if kind.endswith("[]") else of))
+    return message("bench_dragon_msgs", name, fields)
+
+
+KNOWN = {"std_msgs/Header": Header}
+KNOWN["HandlePose"] = from_file("HandlePose", KNOWN)
+TOPICS = {
+    "handles": from_file("HandlePoses", KNOWN),
+    "alerts": from_file("CollisionAlert", KNOWN),
+    "status": from_file("LoopStatus", KNOWN),
+    "stage": from_file("Stage", KNOWN),
+    "poses": PoseArray,
+    "markers": MarkerArray,
+    "diagnostics": DiagnosticArray,
+}
+
+
+def plain(value):
+    """The message as JSON can hold it; what is no number is null."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, (list, tuple)):
+        return [plain(element) for element in value]
+    if hasattr(value, "__dataclass_fields__"):
+        return {name: plain(getattr(value, name)) for name in value.__dataclass_fields__}
+    return value
+
+
+def shortened(kind, sample):
+    """Of a frame only the first three handles and the last, so that the reader keeps up."""
+    if kind in ("handles", "poses"):
+        count = len(sample.poses)
+        sample.poses = sample.poses[:3] + sample.poses[-1:]
+        return plain(sample) | {"count": count}
+    return plain(sample)
+
+
+def quality(reliability, durability):
+    return Qos(
+        Policy.Reliability.Reliable(duration(seconds=1)) if reliability == "reliable" else Policy.Reliability.BestEffort,
+        Policy.Durability.TransientLocal if durability == "transient_local" else Policy.Durability.Volatile,
+        Policy.History.KeepLast(100),
+    )
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--name", default="bench_dragon")
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--domain", type=int, default=0)
+    parser.add_argument("--topic", action="append", default=[], help="topic:reliability:durability")
+    arguments = parser.parse_args()
+    participant = DomainParticipant(arguments.domain)
+    readers = []
+    for wanted in arguments.topic:
+        kind, reliability, durability = (wanted.split(":") + ["reliable", "volatile"])[:3]
+        name = "rt/diagnostics" if kind == "diagnostics" else f"rt/{arguments.name}/{kind}"
+        topic = Topic(participant, name, TOPICS[kind])
+        readers.append((wanted, kind, DataReader(participant, topic, qos=quality(reliability, durability))))
+    print(json.dumps({"type": "ready"}), flush=True)
+    counts = {wanted: 0 for wanted, _, _ in readers}
+    end = time.monotonic() + arguments.seconds
+    while time.monotonic() < end:
+        idle = True
+        for wanted, kind, reader in readers:
+            samples = reader.take(N=100)
+            for sample in samples:
+                idle = False
+                counts[wanted] += 1
+                print(json.dumps({"type": "message", "topic": wanted, "message": shortened(kind, sample)}))
+        if idle:
+            time.sleep(0.002)
+    publishers = {wanted: len(reader.get_matched_publications()) for wanted, _, reader in readers}
+    print(json.dumps({"type": "end", "counts": counts, "publishers": publishers}), flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

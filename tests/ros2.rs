@@ -1,0 +1,321 @@
+//! ROS 2 topics as subscribers in other processes get them: Cyclone DDS as the wire peer, with types made from `msgs/`.
+#![cfg(feature = "ros2")]
+
+mod processes;
+
+use std::process::Command;
+
+use processes::{Process, json_lines, program, python, scene_file, summary, text, unique, wait};
+use serde_json::Value;
+
+/// A Cyclone DDS process that prints what it gets of these topics.
+fn peer(name: &str, seconds: &str, topics: &[&str]) -> Command {
+    let mut command = python();
+    command.args(["tests/python/ros2_peer.py", "--name", &unique(name), "--seconds", seconds]);
+    topics.iter().for_each(|topic| {
+        command.args(["--topic", topic]);
+    });
+    command
+}
+
+fn content(name: &str, topic: &str, reliability: &str, seconds: &str) -> Command {
+    let mut command = python();
+    command.args(["tests/python/ros2_content.py", "--name", &unique(name), "--seconds", seconds]);
+    command.args(["--topic", topic, "--reliability", reliability]);
+    command
+}
+
+/// The messages of a topic.
+fn messages<'a>(lines: &'a [Value], topic: &str) -> Vec<&'a Value> {
+    lines.iter().filter(|line| line["topic"] == topic).map(|line| &line["message"]).collect()
+}
+
+/// How many messages each topic brought, and from how many publishers at the end.
+fn end(lines: &[Value]) -> &Value {
+    lines.last().filter(|line| line["type"] == "end").expect("the peer's last line")
+}
+
+#[test]
+fn both_kinds_of_subscriber_get_the_frames_of_the_shared_memory() {
+    let seconds = if std::env::var_os("BENCH_DRAGON_LONG").is_some() { 60 } else { 10 };
+    let run = (seconds + 4).to_string();
+    let publisher =
+        Process::start(program("content").args(["run", "--ros2", "--json", "--start", "300", "--duration", &run]));
+    wait(1.0);
+    let length = seconds.to_string();
+    let reliable = Process::start(&mut content("content", "handles", "reliable", &length));
+    let best_effort = Process::start(&mut content("content", "poses", "best_effort", &length));
+    for (subscriber, may_lose) in [(reliable, false), (best_effort, true)] {
+        let output = subscriber.output_within(seconds + 30);
+        let line = json_lines(&output).pop().unwrap_or_else(|| panic!("{}", text(&output.stderr)));
+        println!("{line}");
+        assert_eq!(line["different"], 0, "{line}");
+        assert!(line["compared"].as_u64().unwrap() > 50 * seconds, "{line}");
+        assert!(may_lose || line["missing"] == 0, "{line}");
+    }
+    let summary = summary(&publisher.output_within(30));
+    assert_eq!(summary["ros2"]["frames"], summary["frames"]);
+    assert_eq!(summary["ros2"]["discarded"], 0);
+}
+
+#[test]
+fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_what_msgs_says() {
+    let scene = scene_file("all_topics", &[]);
+    let all = "[publish.ros2]\nrate = 30.0\n\
+               topics = [\"handles\", \"poses\", \"alerts\", \"stage\", \"diagnostics\", \"markers\", \"status\"]\n";
+    std::fs::write(&scene, format!("{}\n{all}", std::fs::read_to_string(&scene).unwrap())).unwrap();
+    let mut run = program("late");
+    let publisher = Process::start(run.args([
+        "--scene",
+        scene.to_str().unwrap(),
+        "run",
+        "--json",
+        "--start",
+        "412",
+        "--duration",
+        "17",
+    ]));
+    // The contact is half a second after the start; ten seconds later somebody comes.
+    wait(10.5);
+    let topics = [
+        "alerts:reliable:transient_local",
+        "stage:reliable:transient_local",
+        "markers",
+        "diagnostics",
+        "status",
+        "handles",
+        "poses",
+    ];
+    let output = Process::start(&mut peer("late", "4", &topics)).output_within(40);
+    let lines = json_lines(&output);
+    assert!(!lines.is_empty(), "{}", text(&output.stderr));
+
+    let alerts = messages(&lines, topics[0]);
+    // RustDDS keeps a few alerts more than the one it is asked to keep; they come in order, and the last one holds.
+    let times: Vec<f64> = alerts.iter().map(|alert| alert["sim_time"].as_f64().unwrap()).collect();
+    assert!(times.len() <= 12 && times.is_sorted(), "{times:?}");
+    let alert = alerts.last().unwrap();
+    assert_eq!((&alert["level"], &alert["bench_a"], &alert["bench_b"]), (&2.into(), &0.into(), &8.into()));
+    assert!((alert["event_time"].as_f64().unwrap() - 412.473837682115).abs() < 1e-9);
+
+    let stages = messages(&lines, topics[1]);
+    assert_eq!(stages.len(), 1);
+    assert_eq!(stages[0]["pitch"], 0.55);
+    assert_eq!(stages[0]["benches"], 223);
+    assert_eq!(stages[0]["header"]["frame_id"], "stage");
+
+    let handles = messages(&lines, "handles");
+    let frame = handles.last().unwrap();
+    assert_eq!((&frame["handles"], &frame["count"], &frame["state"]), (&224.into(), &224.into(), &2.into()));
+    let [sec, nanosec] = ["sec", "nanosec"].map(|part| frame["header"]["stamp"][part].as_u64().unwrap());
+    assert_eq!(frame["stamp_ns"].as_u64(), Some(sec * 1_000_000_000 + nanosec));
+    let handle = |index: usize| ["x", "y"].map(|coordinate| frame["poses"][index][coordinate].as_f64().unwrap());
+    let (head, second) = (handle(0), handle(1));
+    assert!(((head[0] - second[0]).hypot(head[1] - second[1]) - 2.86).abs() < 1e-12);
+
+    let markers = messages(&lines, "markers");
+    let markers = markers.last().unwrap()["markers"].as_array().unwrap();
+    assert_eq!(markers.len(), 224, "a cube for every bench, a sphere for the contact");
+    // The head's cube lies between its handles, along the line that joins them.
+    let bench = &markers[0];
+    assert_eq!((&bench["type"], &bench["action"]), (&1.into(), &0.into()));
+    let centre = ["x", "y"].map(|coordinate| bench["pose"]["position"][coordinate].as_f64().unwrap());
+    assert!((centre[0] - 0.5 * (head[0] + second[0])).abs() < 1e-9);
+    assert!((centre[1] - 0.5 * (head[1] + second[1])).abs() < 1e-9);
+    let [z, w] = ["z", "w"].map(|part| bench["pose"]["orientation"][part].as_f64().unwrap());
+    let direction = (2.0 * w * w - 1.0, 2.0 * w * z);
+    assert!((direction.0 - (head[0] - second[0]) / 2.86).abs() < 1e-9, "{direction:?}");
+    assert!((direction.1 - (head[1] - second[1]) / 2.86).abs() < 1e-9, "{direction:?}");
+    let contact = &markers[223];
+    assert_eq!((&contact["ns"], &contact["type"], &contact["action"]), (&"contact".into(), &2.into(), &0.into()));
+    assert_eq!(contact["pose"]["position"]["x"], alert["x"]);
+
+    let diagnostics = messages(&lines, "diagnostics");
+    let dragon = &diagnostics.last().unwrap()["status"][1];
+    assert_eq!((&dragon["level"], &dragon["message"]), (&2.into(), &"contact".into()));
+    let status = messages(&lines, "status");
+    assert_eq!(status.last().unwrap()["scene"], "paper");
+    assert_eq!(status.last().unwrap()["rate"], 60.0);
+
+    let counts = &end(&lines)["counts"];
+    let frames = counts["handles"].as_u64().unwrap();
+    assert!((60..150).contains(&frames), "30 a second were asked for: {counts}");
+    let summary = summary(&publisher.output_within(30));
+    assert_eq!(summary["ros2"]["frames"].as_u64().unwrap().abs_diff(summary["frames"].as_u64().unwrap() / 2), 0);
+}
+
+#[test]
+fn a_clean_end_leaves_the_graph_at_once() {
+    let publisher = Process::start(program("gone").args(["run", "--ros2", "--json", "--duration", "3"]));
+    let watcher = Process::start(&mut peer("gone", "6", &["poses"]));
+    summary(&publisher.output_within(30));
+    let output = watcher.output_within(40);
+    let lines = json_lines(&output);
+    assert!(end(&lines)["counts"]["poses"].as_u64().unwrap() > 0, "{}", text(&output.stderr));
+    assert_eq!(end(&lines)["publishers"]["poses"], 0);
+}
+
+#[test]
+fn the_domain_is_the_environments() {
+    let mut run = program("domain");
+    let publisher = Process::start(run.env("ROS_DOMAIN_ID", "7").args(["run", "--ros2", "--json", "--duration", "6"]));
+    let same = Process::start(peer("domain", "4", &["poses"]).args(["--domain", "7"]));
+    let other = Process::start(&mut peer("domain", "4", &["poses"]));
+    let count = |process: Process| {
+        let output = process.output_within(40);
+        let lines = json_lines(&output);
+        end(&lines)["counts"]["poses"].as_u64().unwrap()
+    };
+    assert!(count(same) > 60);
+    assert_eq!(count(other), 0);
+    summary(&publisher.output_within(30));
+}
+
+#[test]
+fn what_ros_2_cannot_do_is_refused_in_a_sentence() {
+    for (variable, value, expected) in [
+        ("ROS_DOMAIN_ID", "300", "0 to 232"),
+        ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF", "LOCALHOST"),
+        ("ROS_LOCALHOST_ONLY", "maybe", "0 or 1"),
+        ("ROS_STATIC_PEERS", "10.0.0.1", "multicast"),
+    ] {
+        let output = Process::start(program("refused").env(variable, value).args(["run", "--ros2", "--duration", "1"]))
+            .output_within(20);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains(variable) && said.contains(expected), "{said}");
+        assert_eq!(said.trim().lines().count(), 1, "{said}");
+    }
+    let mut run = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    let output = Process::start(run.args(["run", "--ros2", "--name", "2nd dragon"])).output_within(20);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("2nd dragon"));
+}
+
+#[test]
+fn a_reliable_subscriber_that_stops_reading_holds_nobody_up() {
+    // 5,000 benches fill the memory that a topic may take within six seconds.
+    let scene = scene_file(
+        "stopped",
+        &[("benches = 223", "benches = 5000"), ("start_turn = 16", "start_turn = 60"), ("[alerts]", "#[alerts]")],
+    );
+    let text_of_scene = std::fs::read_to_string(&scene).unwrap();
+    let without_alerts: String =
+        text_of_scene.lines().filter(|line| !line.starts_with("approach_")).collect::<Vec<_>>().join("\n");
+    std::fs::write(&scene, format!("{without_alerts}\n[publish.ros2]\ntopics = [\"handles\"]\n")).unwrap();
+    let mut run = program("stopped");
+    let publisher = Process::start(run.args(["--scene", scene.to_str().unwrap(), "run", "--json", "--duration", "14"]));
+    wait(1.0);
+    let stopped = Process::start(&mut peer("stopped", "60", &["handles"]));
+    wait(3.0);
+    stopped.signal(nix::sys::signal::Signal::SIGSTOP);
+    let output = publisher.output_within(40);
+    stopped.signal(nix::sys::signal::Signal::SIGKILL);
+    let said = text(&output.stderr);
+    let summary = summary(&output);
+    let number = |value: &Value| value.as_u64().unwrap();
+    assert_eq!(number(&summary["frames"]) + number(&summary["skipped"]), 840, "{summary}");
+    assert!(number(&summary["ros2"]["discarded"]) > 0, "{summary}");
+    assert_eq!(said.matches("discarded").count(), 1, "said once: {said}");
+}
+
+#[test]
+fn without_being_asked_there_is_no_dds_thread_and_no_network_socket() {
+    let plain = Process::start(program("plain").args(["run", "--duration", "6"]));
+    let asked = Process::start(program("asked").args(["run", "--ros2", "--duration", "6"]));
+    wait(2.0);
+    let (threads, sockets) = of_process(plain.id());
+    assert_eq!((dds_threads(&threads), sockets), (0, 0), "{threads:?}");
+    // That the same look finds them where they are.
+    let (threads, sockets) = of_process(asked.id());
+    assert!(dds_threads(&threads) >= 2 && sockets >= 2, "{threads:?}, {sockets} sockets");
+}
+
+fn dds_threads(threads: &[String]) -> usize {
+    threads.iter().filter(|name| name.contains("DDS") || name.contains("ros2")).count()
+}
+
+/// The names of a process's threads and the number of its network sockets.
+fn of_process(process: u32) -> (Vec<String>, usize) {
+    let folder = |name: &str| std::fs::read_dir(format!("/proc/{process}/{name}")).unwrap().flatten();
+    let threads = folder("task").map(|task| std::fs::read_to_string(task.path().join("comm")).unwrap()).collect();
+    let tables: String = ["tcp", "tcp6", "udp", "udp6"]
+        .map(|table| std::fs::read_to_string(format!("/proc/{process}/net/{table}")).unwrap_or_default())
+        .concat();
+    let inodes: Vec<&str> = tables.lines().filter_map(|line| line.split_whitespace().nth(9)).collect();
+    let sockets = folder("fd")
+        .filter_map(|descriptor| std::fs::read_link(descriptor.path()).ok())
+        .filter(|link| {
+            let link = link.to_string_lossy().into_owned();
+            link.strip_prefix("socket:[")
+                .and_then(|inode| inode.strip_suffix(']'))
+                .is_some_and(|inode| inodes.contains(&inode))
+        })
+        .count();
+    (threads, sockets)
+}
+
+#[test]
+fn two_hosts_find_each_other_by_multicast() {
+    let Some(_hosts) = Hosts::new() else { return };
+    let on = |host: &str, command: &Command| {
+        let mut inside = Command::new("ip");
+        inside.args(["netns", "exec", &unique(host)]).arg(command.get_program()).args(command.get_args());
+        inside.current_dir(env!("CARGO_MANIFEST_DIR"));
+        inside
+    };
+    for (range, expected) in [("SUBNET", true), ("LOCALHOST", false)] {
+        let mut run = program("hosts");
+        run.args(["run", "--ros2", "--json", "--duration", "8"]);
+        let publisher = Process::start(on("left", &run).env("ROS_AUTOMATIC_DISCOVERY_RANGE", range));
+        let reader = Process::start(&mut on("right", &peer("hosts", "6", &["poses"])));
+        let output = reader.output_within(40);
+        let lines = json_lines(&output);
+        let count = end(&lines)["counts"]["poses"].as_u64().unwrap();
+        println!("{range}: {count} messages on the other host");
+        assert_eq!(count > 100, expected, "{range}: {count}; {}", text(&output.stderr));
+        summary(&publisher.output_within(30));
+    }
+}
+
+/// Two network namespaces joined by a cable, each with one address.
+struct Hosts;
+
+impl Hosts {
+    /// `None`, with the reason printed, where this process may not make namespaces.
+    fn new() -> Option<Self> {
+        let hosts = Self;
+        let [left, right] = ["left", "right"].map(unique);
+        let ends = [format!("bdl{}", std::process::id()), format!("bdr{}", std::process::id())];
+        let ip = |arguments: &str| {
+            let output = Command::new("ip").args(arguments.split_whitespace()).output().map_err(|e| e.to_string())?;
+            if output.status.success() { Ok(()) } else { Err(text(&output.stderr)) }
+        };
+        let made = ip(&format!("netns add {left}")).and_then(|()| {
+            ip(&format!("netns add {right}"))?;
+            ip(&format!("link add {} netns {left} type veth peer name {} netns {right}", ends[0], ends[1]))?;
+            for (host, end, address) in [(&left, &ends[0], "10.77.0.1/24"), (&right, &ends[1], "10.77.0.2/24")] {
+                ip(&format!("-n {host} address add {address} dev {end}"))?;
+                ip(&format!("-n {host} link set lo up"))?;
+                ip(&format!("-n {host} link set {end} up multicast on"))?;
+                ip(&format!("-n {host} route add default dev {end}"))?;
+            }
+            Ok(())
+        });
+        match made {
+            Ok(()) => Some(hosts),
+            Err(reason) => {
+                println!("skipped: two hosts need network namespaces (root and iproute2): {}", reason.trim());
+                None
+            }
+        }
+    }
+}
+
+impl Drop for Hosts {
+    fn drop(&mut self) {
+        for host in ["left", "right"] {
+            let _ = Command::new("ip").args(["netns", "delete", &unique(host)]).output();
+        }
+    }
+}
