@@ -77,7 +77,8 @@ struct Moment {
 pub fn measure(scene: &Scene, timeline: &Timeline, progress: &mut dyn FnMut(f64)) -> Result<Vec<Measurement>, String> {
     let end = timeline.end().time;
     let moments = truth(scene, end, &mut |share| progress(0.5 * share))?;
-    let candidates = candidates(scene, contact_errors(scene, timeline)?);
+    let contact = contact_errors(scene, timeline)?;
+    let candidates = scene.path.spiral().map_or(Vec::new(), |spiral| candidates(scene, *spiral, contact));
     let count = candidates.len() as f64;
     let mut measurements = Vec::new();
     for (index, candidate) in candidates.into_iter().enumerate() {
@@ -88,10 +89,16 @@ pub fn measure(scene: &Scene, timeline: &Timeline, progress: &mut dyn FnMut(f64)
     Ok(measurements)
 }
 
+/// The high-precision reference of a scene, which rides spirals only.
+fn reference(scene: &Scene) -> Result<Reference, String> {
+    let spiral = scene.path.spiral().ok_or("solvers are compared on spirals only: other paths have one solver")?;
+    Reference::new(scene.team, spiral.pitch(), spiral.start_turn(), scene.head_speed)
+}
+
 /// The reference at all moments. At the lock itself there is a solution only up to rounding, so the last moment is a
 /// thousandth of a second earlier.
 fn truth(scene: &Scene, end: f64, progress: &mut dyn FnMut(f64)) -> Result<Vec<Moment>, String> {
-    let mut reference = Reference::new(scene.team, scene.path.pitch(), scene.start_turn, scene.head_speed)?;
+    let mut reference = reference(scene)?;
     let last_second = 1f64.min(0.5 * end);
     let spread = (0..SPREAD_MOMENTS).map(|k| (end - last_second) * k as f64 / SPREAD_MOMENTS as f64);
     let last = (0..LAST_SECOND_MOMENTS)
@@ -122,7 +129,7 @@ fn contact_errors(scene: &Scene, timeline: &Timeline) -> Result<Option<ContactEr
     if time == 0.0 {
         return Ok(None);
     }
-    let mut reference = Reference::new(scene.team, scene.path.pitch(), scene.start_turn, scene.head_speed)?;
+    let mut reference = reference(scene)?;
     let mut gap = |time: f64| {
         let handles = reference.handles(time).map_err(|fold| format!("the reference at {time} s: {fold}"))?;
         let board = |bench: u32| {
@@ -140,8 +147,8 @@ fn contact_errors(scene: &Scene, timeline: &Timeline) -> Result<Option<ContactEr
     Ok(Some(ContactErrors { exact, paper }))
 }
 
-fn candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<Candidate> {
-    let Scene { path, team, head_speed, velocities, .. } = *scene;
+fn candidates(scene: &Scene, path: Spiral, contact: Option<ContactErrors>) -> Vec<Candidate> {
+    let Scene { team, head_speed, velocities, .. } = *scene;
     let exact = |name: String, solver: Box<dyn Solver>, memory_bytes| {
         // All of them follow one motion, whose contact is found once.
         Candidate { name, solver, contact_time_error: contact.map(|errors| errors.exact), memory_bytes }
@@ -157,7 +164,7 @@ fn candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<Candidate> {
     let newton = Newton::new(path, team, head_speed, velocities);
     candidates.push(exact("newton".to_owned(), Box::new(newton), size_of::<Newton<Spiral>>()));
     // The Euler steps of one show; where there are too many, the finest would take minutes.
-    let steps_to_end = |time_step: f64| scene.path.length() / head_speed / time_step;
+    let steps_to_end = |time_step: f64| path.length() / head_speed / time_step;
     let standard = PaperRules::default();
     let mut rules: Vec<(String, PaperRules)> = [1e-2, 1e-3, 1e-4, 1e-5]
         .into_iter()

@@ -84,7 +84,7 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
         handles: scene.team.handles(),
         queue: 64,
         alerts: true,
-        stage: stage(1, 0, &scene.team, scene.path.pitch(), scene.start_turn),
+        stage: stage(1, 0, &scene.team, &scene.path),
     };
     let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(SharedMemoryPublisher::open(&offer).unwrap())];
     let subscription = Subscription::new(&name).unwrap();

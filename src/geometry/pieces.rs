@@ -270,12 +270,11 @@ impl Curve {
         }
     }
 
-    /// The greatest curvature of the piece, 1/m. A spiral's is (2 + theta^2) / (a (1 + theta^2)^(3/2)), which falls
-    /// outward.
-    fn sharpest(&self) -> f64 {
+    /// The curvature at a place, 1/m. A spiral's is (2 + theta^2) / (a (1 + theta^2)^(3/2)), which falls outward.
+    fn curvature(&self, at: Coordinate) -> f64 {
         match self {
             Self::Inward(spiral) | Self::Outward(spiral) => {
-                let square = spiral.start().radians().powi(2);
+                let square = at.angle().radians().powi(2);
                 (2.0 + square) / (spiral.growth() * (1.0 + square).powf(1.5))
             }
             Self::Arc(arc) => arc.radius.recip(),
@@ -306,6 +305,59 @@ struct Piece {
     begin: f64,
     /// Metres of travel at which it ends.
     end: f64,
+}
+
+impl Piece {
+    /// The place at so many metres of travel of the whole path.
+    fn place_at(&self, travelled: f64) -> Coordinate {
+        match self.curve {
+            Curve::Inward(_) => self.curve.after(self.end - travelled),
+            _ => self.curve.after(travelled - self.begin),
+        }
+    }
+}
+
+/// What a drawing needs of a piece.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shape {
+    /// Which curve it is.
+    pub kind: ShapeKind,
+    /// Where it begins.
+    pub start: Point,
+    /// Direction of travel there, radians counter-clockwise from x.
+    pub heading: f64,
+    /// Metres along it.
+    pub length: f64,
+}
+
+/// The curve of a piece.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ShapeKind {
+    /// Straight on.
+    Line,
+    /// Part of a circle.
+    Arc {
+        /// 1/m, positive where it turns left.
+        curvature: f64,
+    },
+    /// Inward along r = pitch theta / 2 pi.
+    Inward {
+        /// Metres per turn.
+        pitch: f64,
+        /// Polar angle where it begins, radians.
+        first: f64,
+        /// Polar angle where it ends, radians.
+        last: f64,
+    },
+    /// Outward along the same spiral turned by half a turn.
+    Outward {
+        /// Metres per turn.
+        pitch: f64,
+        /// Polar angle on the unturned spiral where it begins, radians.
+        first: f64,
+        /// Polar angle on the unturned spiral where it ends, radians.
+        last: f64,
+    },
 }
 
 /// A path of pieces, each continuing the one before it in place and direction.
@@ -379,15 +431,6 @@ impl PiecePath {
         path.joined()
     }
 
-    /// The same path with travel starting `further` metres later.
-    pub fn starting_later(mut self, further: f64) -> Self {
-        for piece in &mut self.pieces {
-            piece.begin -= further;
-            piece.end -= further;
-        }
-        self
-    }
-
     fn push(&mut self, curve: Curve, length: f64) {
         let begin = self.pieces.last().map_or(0.0, |piece| piece.end);
         self.pieces.push(Piece { curve, begin, end: begin + length });
@@ -401,7 +444,8 @@ impl PiecePath {
             let (old, new) = (before.tangent(before.last()), after.tangent(after.first()));
             let gap = (end - start).norm();
             let corner = (old.x * new.y - old.y * new.x).atan2(old.dot(&new)).abs();
-            let size = end.coords.norm() + 1.0 / before.sharpest().max(after.sharpest()).max(1.0);
+            let sharpest = before.curvature(before.last()).max(after.curvature(after.first()));
+            let size = end.coords.norm() + 1.0 / sharpest.max(1.0);
             // Not a number is no join either.
             if !(gap <= 1e-12 * size && corner <= 1e-12) {
                 return Err(Disjoint { piece: index + 1, gap, corner });
@@ -427,7 +471,98 @@ impl PiecePath {
 
     /// The greatest curvature anywhere, 1/m: the tangent turns by no more than this per metre.
     pub fn sharpest_curvature(&self) -> f64 {
-        self.pieces.iter().map(|piece| piece.curve.sharpest()).fold(0.0, f64::max)
+        self.sharpest_between(f64::NEG_INFINITY, f64::INFINITY)
+    }
+
+    /// The greatest curvature from one distance of travel to another, 1/m.
+    pub fn sharpest_between(&self, from: f64, to: f64) -> f64 {
+        let met = self.pieces.iter().filter(|piece| piece.begin <= to && piece.end >= from);
+        met.map(|piece| {
+            let nearest = match piece.curve {
+                Curve::Inward(_) => to.min(piece.end),
+                _ => from.max(piece.begin),
+            };
+            piece.curve.curvature(piece.place_at(nearest))
+        })
+        .fold(0.0, f64::max)
+    }
+
+    /// Metres of travel at a place.
+    pub fn travelled(&self, place: PiecePlace) -> f64 {
+        let Piece { curve, begin, end } = &self.pieces[place.piece];
+        match curve {
+            Curve::Inward(_) => end - curve.distance(place.at, curve.last()),
+            _ => begin + curve.distance(curve.first(), place.at),
+        }
+    }
+
+    /// Metres of travel at the end of a place's piece where that is a line or an arc.
+    pub fn end_of_even_piece(&self, place: PiecePlace) -> Option<f64> {
+        let piece = &self.pieces[place.piece];
+        matches!(piece.curve, Curve::Arc(_) | Curve::Line { .. }).then_some(piece.end)
+    }
+
+    /// Metres of travel up to which a path that comes in from a spiral is still so far out on it that no link of this
+    /// length can stall or lock; minus infinity for other paths.
+    ///
+    /// On a spiral t . b of a front handle is positive beyond theta = link / a and theta = 1, and a fold is further in.
+    pub fn calm_until(&self, link: f64) -> f64 {
+        let Piece { curve: Curve::Inward(spiral), end, .. } = self.pieces[0] else { return f64::NEG_INFINITY };
+        let calm = (link / spiral.growth()).max(1.0);
+        let start = spiral.start();
+        if start.radians() >= calm {
+            return end;
+        }
+        end - spiral.distance_between(Angle::from_radians(calm), start)
+    }
+
+    /// Whether a link whose rear handle is here is so far out on the outward spiral that it can never stall or lock
+    /// again: there its two ends are those of a bench on the inward spiral, exchanged.
+    pub fn is_calm_from(&self, rear: PiecePlace, link: f64) -> bool {
+        match self.curve(rear) {
+            Curve::Outward(spiral) => rear.at.angle().radians() > (link / spiral.growth()).max(1.0),
+            _ => false,
+        }
+    }
+
+    /// The spiral on which the path comes in, from where the head starts, and the metres of travel at its end; `None`
+    /// for other paths.
+    pub fn approach(&self) -> Option<(Spiral, f64)> {
+        let Piece { curve: Curve::Inward(spiral), end, .. } = self.pieces[0] else { return None };
+        let start = spiral.place_at(-end).in_turns();
+        Some((Spiral::new(spiral.pitch(), start), end))
+    }
+
+    /// What a drawing needs of each piece, in order; of a spiral that comes in, the part from where the head starts.
+    pub fn shapes(&self) -> impl Iterator<Item = Shape> + '_ {
+        self.pieces.iter().map(|piece| {
+            let begin = piece.begin.max(0.0_f64.min(piece.end));
+            let (first, last) = (piece.place_at(begin), piece.place_at(piece.end));
+            let tangent = piece.curve.tangent(first);
+            let kind = match piece.curve {
+                Curve::Line { .. } => ShapeKind::Line,
+                Curve::Arc(arc) => {
+                    let left = arc.tangent.x * arc.inward.y - arc.tangent.y * arc.inward.x;
+                    ShapeKind::Arc { curvature: left.signum() / arc.radius }
+                }
+                Curve::Inward(spiral) => ShapeKind::Inward {
+                    pitch: spiral.pitch(),
+                    first: first.angle().radians(),
+                    last: last.angle().radians(),
+                },
+                Curve::Outward(spiral) => ShapeKind::Outward {
+                    pitch: spiral.pitch(),
+                    first: first.angle().radians(),
+                    last: last.angle().radians(),
+                },
+            };
+            Shape {
+                kind,
+                start: piece.curve.point(first),
+                heading: tangent.y.atan2(tangent.x),
+                length: piece.end - begin,
+            }
+        })
     }
 
     fn curve(&self, place: PiecePlace) -> &Curve {
@@ -527,12 +662,7 @@ impl Path for PiecePath {
     fn place_at(&self, travelled: f64) -> PiecePlace {
         let travelled = travelled.min(self.length());
         let piece = self.pieces.partition_point(|piece| piece.begin <= travelled).max(1) - 1;
-        let Piece { curve, begin, end } = &self.pieces[piece];
-        let at = match curve {
-            Curve::Inward(_) => curve.after(end - travelled),
-            _ => curve.after(travelled - begin),
-        };
-        PiecePlace { piece, at }
+        PiecePlace { piece, at: self.pieces[piece].place_at(travelled) }
     }
 
     fn point(&self, place: PiecePlace) -> Point {

@@ -107,6 +107,7 @@ pub(super) fn two_sum(x: f64, y: f64) -> (f64, f64) {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spiral {
     pitch: f64,
+    start_turn: f64,
     start: Angle,
     start_theta: f64,
     length: f64,
@@ -119,7 +120,7 @@ impl Spiral {
         debug_assert!(pitch > 0.0 && start_turn > 0.0);
         let start = Angle::from_turns(start_turn);
         let start_theta = TAU * start_turn;
-        let mut spiral = Self { pitch, start, start_theta, length: 0.0 };
+        let mut spiral = Self { pitch, start_turn, start, start_theta, length: 0.0 };
         spiral.length = spiral.arc_length(start_theta, start_theta);
         spiral
     }
@@ -132,6 +133,11 @@ impl Spiral {
     /// Metres of radius per radian: a = pitch / 2 pi.
     pub fn growth(&self) -> f64 {
         self.pitch / TAU
+    }
+
+    /// The number of turns at which travel starts.
+    pub fn start_turn(&self) -> f64 {
+        self.start_turn
     }
 
     /// Where travel starts.

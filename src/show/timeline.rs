@@ -3,9 +3,13 @@
 //! The scene and its path give the places; this room turns them into simulated seconds. The show, `events`, `solve`
 //! and `draw` use it.
 
+use crate::chain::Team;
 use crate::events::contact::first_contact;
-use crate::events::{Event, stall_and_end};
+use crate::events::sweep::Sweep;
+use crate::events::{self, Event};
+use crate::geometry::pieces::PiecePath;
 use crate::messages::State;
+use crate::scene::path::ScenePath;
 use crate::scene::{OnContact, Scene};
 
 /// An event and when it happens.
@@ -26,17 +30,20 @@ pub struct Timeline {
 impl Timeline {
     /// All events of a scene, contact included. `progress` is told which share of the search is done, from 0 to 1.
     pub fn of(scene: &Scene, progress: &mut dyn FnMut(f64)) -> Self {
-        let mut events = stall_and_end(&scene.path, &scene.team);
+        let mut events = stall_and_end(scene);
         // The motion always has an end: that is the last of these.
         let end = events[events.len() - 1].travelled;
         let stall = events.iter().find(|event| event.kind == State::Stall).map(|event| event.travelled);
-        events.extend(first_contact(&scene.path, &scene.team, stall, end, progress));
+        events.extend(match &scene.path {
+            ScenePath::Spiral(spiral) => first_contact(spiral, &scene.team, stall, end, progress),
+            ScenePath::Pieces(path) => contact_on_pieces(path, &scene.team, stall, end, progress),
+        });
         Self::timed(scene, events)
     }
 
     /// The events of a scene but for the contact, which costs a search.
     pub fn without_contact(scene: &Scene) -> Self {
-        Self::timed(scene, stall_and_end(&scene.path, &scene.team))
+        Self::timed(scene, stall_and_end(scene))
     }
 
     fn timed(scene: &Scene, events: Vec<Event>) -> Self {
@@ -86,4 +93,35 @@ impl Timeline {
     pub fn next_danger(&self, sim_time: f64) -> Option<&TimedEvent> {
         self.events.iter().find(|timed| timed.time > sim_time && timed.event.kind != State::PathEnd)
     }
+}
+
+fn stall_and_end(scene: &Scene) -> Vec<Event> {
+    match &scene.path {
+        ScenePath::Spiral(spiral) => events::stall_and_end(spiral, &scene.team),
+        ScenePath::Pieces(path) => events::course::stall_and_end(path, &scene.team),
+    }
+}
+
+/// The first contact on a path of pieces. As long as the head comes in on a spiral, all of the team is on it, and the
+/// spiral's own search is the faster one.
+fn contact_on_pieces(
+    path: &PiecePath,
+    team: &Team,
+    stall: Option<f64>,
+    end: f64,
+    progress: &mut dyn FnMut(f64),
+) -> Option<Event> {
+    let approach = path.approach().filter(|(_, until)| *until > 0.0);
+    let (from, found) = match approach {
+        Some((spiral, until)) => {
+            let until = until.min(end);
+            let stall = stall.filter(|stall| *stall < until);
+            (until, first_contact(&spiral, team, stall, until, &mut |share| progress(share * until / end)))
+        }
+        None => (0.0, None),
+    };
+    found.or_else(|| {
+        let sweep = Sweep::new(path, team, stall);
+        sweep.first_contact(from, end, &mut |share| progress((from + share * (end - from)) / end))
+    })
 }
