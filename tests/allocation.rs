@@ -15,7 +15,8 @@ use bench_dragon::scene::{AtEnd, Scene};
 use bench_dragon::show::timeline::Timeline;
 use bench_dragon::show::{Frame, Playback, Show};
 use bench_dragon::subscribers::connection::Subscription;
-use bench_dragon::transports::iceoryx2::{Offer, SharedMemoryPublisher, stage};
+use bench_dragon::transports::iceoryx2::{Offer, SharedMemoryPublisher};
+use bench_dragon::transports::stage;
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
