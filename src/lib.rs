@@ -9,6 +9,7 @@
 //! - [`events`]: when, exactly, something ends the show.
 //! - [`scene`]: the file a user writes, checked and turned into the types above.
 //! - [`show`]: from a scene and a tick to one frame, deterministic.
+//! - [`plan`]: the least pitch and the greatest speed, for a choreographer.
 //! - [`live`]: the fixed-rate loop, its clock, its statistics.
 //! - [`transports`]: iceoryx2 shared memory and ROS 2 topics, as publishers of the loop.
 //! - [`trade`]: accuracy against cost, measured for every solver on a scene and this machine.
@@ -16,12 +17,16 @@
 
 #![deny(missing_docs)]
 
+#[cfg(all(feature = "jazzy", feature = "humble"))]
+compile_error!("choose one ROS 2 distribution: `--no-default-features --features humble` for Humble");
+
 pub mod chain;
 pub mod clearance;
 pub mod events;
 pub mod geometry;
 pub mod live;
 pub mod messages;
+pub mod plan;
 pub mod scene;
 pub mod show;
 pub mod subscribers;

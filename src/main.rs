@@ -33,6 +33,8 @@ enum Command {
     Draw(commands::draw::DrawArguments),
     /// Measure accuracy against cost for every solver on this scene and machine
     Trade(commands::trade::TradeArguments),
+    /// Answer a choreographer: the least pitch, the greatest speed
+    Plan(commands::plan::PlanArguments),
     /// Validate a scene and say what it would model
     Check,
 }
@@ -47,6 +49,7 @@ fn main() -> ExitCode {
         Command::Events => commands::events::events(&common),
         Command::Draw(arguments) => commands::draw::draw(&common, arguments),
         Command::Trade(arguments) => commands::trade::trade(&common, arguments),
+        Command::Plan(arguments) => commands::plan::plan(&common, arguments),
         Command::Check => commands::check::check(&common),
     };
     match done {

@@ -1,5 +1,5 @@
 //! The loop allocates nothing of its own after its first frame: counted over its whole body, with the real shared
-//! memory, across a contact and a loop of the show.
+//! memory and the real ROS 2 publisher, across a contact and a loop of the show.
 //!
 //! iceoryx2 0.10.0 keeps the bookkeeping of each loaned sample in an `Rc`, made by `loan` and freed by `send`: one small
 //! allocation for every frame and every alert, which its interface leaves no way round. The test demands exactly those.
@@ -88,6 +88,24 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
         stage: stage(1, 0, &scene.team, &scene.path),
     };
     let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(SharedMemoryPublisher::open(&offer).unwrap())];
+    #[cfg(feature = "ros2")]
+    let ros2_thread = {
+        use bench_dragon::scene::ros2::Ros2Settings;
+        use bench_dragon::transports::ros2::environment::{Network, Range};
+        let settings = Ros2Settings { rate: Some(100.0), ..Ros2Settings::default() };
+        let offer = bench_dragon::transports::ros2::Ros2Offer {
+            name: name.clone(),
+            handles: scene.team.handles(),
+            loop_rate: 500.0,
+            settings,
+            alerts: true,
+            stage: offer.stage,
+        };
+        let network = Network { domain: 93, range: Range::Localhost };
+        let (publisher, _status, thread) = bench_dragon::transports::ros2::start(offer, network).unwrap();
+        publishers.push(Box::new(publisher));
+        thread
+    };
     let subscription = Subscription::new(&name).unwrap();
     let connection = subscription.connect().unwrap().unwrap();
     let (reports, _inbox) = queues();
@@ -96,6 +114,8 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     let counts = run_loop(&mut watched, &mut publishers, options, reports, &AtomicBool::new(false)).unwrap();
     let during = allocations() - watched.before.unwrap();
     assert_eq!(during, watched.loans, "the loop allocates more than iceoryx2's loans do, in {counts:?}");
+    #[cfg(feature = "ros2")]
+    assert!(ros2_thread.end().frames > 100);
     // Without these the test would prove nothing about alerts, contacts and loops.
     assert!(counts.frames > 500, "{counts:?}");
     assert!(watched.states[State::Approaching as usize] > 0 && watched.states[State::Contact as usize] > 0);

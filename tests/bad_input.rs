@@ -89,6 +89,13 @@ fn scenes_that_cannot_be_played() {
         ("rate = 60.0", "rate = 20001.0", &["line 27", "publish.rate", "2e4"]),
         ("velocities = true", "velocities = \"yes\"", &["line 28", "velocities", "boolean"]),
         ("velocities = true", "queue = 0", &["line 28", "publish.queue"]),
+        ("velocities = true", "[publish.ros2]\nrate = 0.0", &["line 29", "publish.ros2.rate"]),
+        ("velocities = true", "[publish.ros2]\nrates = 1.0", &["line 29", "rates", "topics"]),
+        ("velocities = true", "[publish.ros2]\ntopics = []", &["line 29", "publish.ros2.topics", "at least one"]),
+        ("velocities = true", "[publish.ros2]\ntopics = [\"pose\"]", &["line 29", "pose", "poses"]),
+        ("velocities = true", "[publish.ros2.qos.poses]\ndepth = 0", &["line 29", "publish.ros2.qos.poses.depth"]),
+        ("velocities = true", "[publish.ros2.qos.markers]\ndepth = 5", &["line 28", "markers", "topics"]),
+        ("velocities = true", "[publish.ros2.qos.poses]\nreliability = \"yes\"", &["line 29", "best_effort"]),
     ];
     for (from, to, named) in cases {
         let said = scene_refusal(from, to);

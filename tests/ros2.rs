@@ -257,42 +257,60 @@ fn of_process(process: u32) -> (Vec<String>, usize) {
     (threads, sockets)
 }
 
+/// What ROS 2 makes of `ROS_STATIC_PEERS=10.77.0.1` for Cyclone DDS.
+const STATIC_PEER: &str = "<CycloneDDS><Domain><Discovery><ParticipantIndex>auto</ParticipantIndex>\
+    <Peers><Peer Address=\"10.77.0.1\"/></Peers></Discovery></Domain></CycloneDDS>";
+
 #[test]
-fn two_hosts_find_each_other_by_multicast() {
-    let Some(_hosts) = Hosts::new() else { return };
+fn two_hosts_find_each_other_by_multicast_or_where_the_subscriber_names_the_publishers_host() {
+    let Some(hosts) = Hosts::new() else { return };
     let on = |host: &str, command: &Command| {
         let mut inside = Command::new("ip");
         inside.args(["netns", "exec", &unique(host)]).arg(command.get_program()).args(command.get_args());
         inside.current_dir(env!("CARGO_MANIFEST_DIR"));
         inside
     };
-    for (range, expected) in [("SUBNET", true), ("LOCALHOST", false)] {
+    for (range, multicast, peers, expected) in [
+        ("SUBNET", "on", "", true),
+        ("LOCALHOST", "on", "", false),
+        ("SUBNET", "off", "", false),
+        ("SUBNET", "off", STATIC_PEER, true),
+    ] {
+        hosts.set_multicast(multicast);
         let mut run = program("hosts");
-        run.args(["run", "--ros2", "--json", "--duration", "8"]);
+        run.args(["run", "--ros2", "--json", "--duration", "7"]);
         let publisher = Process::start(on("left", &run).env("ROS_AUTOMATIC_DISCOVERY_RANGE", range));
-        let reader = Process::start(&mut on("right", &peer("hosts", "6", &["poses"])));
+        let subscriber = peer("hosts", "5", &["poses"]);
+        let reader = Process::start(on("right", &subscriber).env("CYCLONEDDS_URI", peers));
         let output = reader.output_within(40);
         let lines = json_lines(&output);
         let count = end(&lines)["counts"]["poses"].as_u64().unwrap();
-        println!("{range}: {count} messages on the other host");
-        assert_eq!(count > 100, expected, "{range}: {count}; {}", text(&output.stderr));
+        let case = format!("{range}, multicast {multicast}, peers \"{peers}\": {count} messages on the other host");
+        println!("{case}");
+        assert_eq!(count > 100, expected, "{case}; {}", text(&output.stderr));
         summary(&publisher.output_within(30));
     }
 }
 
 /// Two network namespaces joined by a cable, each with one address.
-struct Hosts;
+struct Hosts {
+    ends: [String; 2],
+}
 
 impl Hosts {
+    /// Whether the cable carries multicast: "on" or "off".
+    fn set_multicast(&self, multicast: &str) {
+        for (host, end) in ["left", "right"].map(unique).iter().zip(&self.ends) {
+            ip(&format!("-n {host} link set {end} multicast {multicast}")).unwrap();
+        }
+    }
+
     /// `None`, with the reason printed, where this process may not make namespaces.
     fn new() -> Option<Self> {
-        let hosts = Self;
+        let ends = ["l", "r"].map(|side| format!("bd{side}{}", std::process::id()));
+        let hosts = Self { ends };
+        let ends = &hosts.ends;
         let [left, right] = ["left", "right"].map(unique);
-        let ends = [format!("bdl{}", std::process::id()), format!("bdr{}", std::process::id())];
-        let ip = |arguments: &str| {
-            let output = Command::new("ip").args(arguments.split_whitespace()).output().map_err(|e| e.to_string())?;
-            if output.status.success() { Ok(()) } else { Err(text(&output.stderr)) }
-        };
         let made = ip(&format!("netns add {left}")).and_then(|()| {
             ip(&format!("netns add {right}"))?;
             ip(&format!("link add {} netns {left} type veth peer name {} netns {right}", ends[0], ends[1]))?;
@@ -314,10 +332,27 @@ impl Hosts {
     }
 }
 
+/// Runs `ip`.
+fn ip(arguments: &str) -> Result<(), String> {
+    let output = Command::new("ip").args(arguments.split_whitespace()).output().map_err(|error| error.to_string())?;
+    if output.status.success() { Ok(()) } else { Err(text(&output.stderr)) }
+}
+
 impl Drop for Hosts {
     fn drop(&mut self) {
         for host in ["left", "right"] {
             let _ = Command::new("ip").args(["netns", "delete", &unique(host)]).output();
         }
     }
+}
+
+#[test]
+fn the_example_that_needs_no_ros_prints_the_frames() {
+    let publisher = Process::start(program("example").args(["run", "--ros2", "--json", "--duration", "7"]));
+    let mut example = python();
+    example.args(["examples/python/cyclone_listener.py", "--name", &unique("example"), "--seconds", "4.5"]);
+    let said = text(&Process::start(&mut example).output_within(40).stdout);
+    assert!(said.lines().count() >= 3, "{said}");
+    assert!(said.lines().last().is_some_and(|line| line.contains("224 handles, head (")), "{said}");
+    summary(&publisher.output_within(30));
 }

@@ -6,7 +6,7 @@ use bench_dragon::messages::State;
 use bench_dragon::scene::path::ScenePath;
 use bench_dragon::scene::{AtEnd, OnContact};
 
-use super::events::sentence;
+use super::events::{least_clearance, sentence};
 use super::{CommandError, Common, Output, number, search_timeline};
 
 /// Validates the scene and says what it would do.
@@ -53,11 +53,20 @@ pub fn check(common: &Common) -> Result<(), CommandError> {
             AtEnd::Loop => "begins again",
         }
     ))?;
-    output.line(&format!("  Publishing: {} frames per second.", number(scene.rate)))?;
+    output.line(&format!("  Publishing: {} frames per second to shared memory.", number(scene.rate)))?;
+    output.line(&match &scene.ros2 {
+        Some(settings) => format!(
+            "  ROS 2: {} at {} frames per second.",
+            settings.topics.keys().map(|topic| topic.name()).collect::<Vec<_>>().join(", "),
+            number(settings.rate_of(scene.rate))
+        ),
+        None => "  ROS 2: nothing and no network socket, unless `run --ros2` asks for it.".to_owned(),
+    })?;
     output.line("  Ahead, in simulated time:")?;
     for timed in timeline.events() {
         output.line(&format!("  {}", sentence(&scene, timed)))?;
     }
+    output.line(&format!("  {}", least_clearance(&scene, &timeline, common)))?;
     if timeline.find(State::Contact).is_some_and(|contact| contact.time == 0.0) {
         log::warn!("boards overlap at the start of scene \"{}\": widen the pitch or narrow the boards", scene.name);
     }

@@ -13,7 +13,7 @@
 use crate::chain::Team;
 use crate::geometry::path::Path;
 use crate::geometry::rectangle::Board;
-use crate::geometry::root::first_true;
+use crate::geometry::root::{first_true, least_between};
 use crate::geometry::separation::{
     circle_bound_board_board, closest_points_board_board, overlap_centre, signed_distance_board_board,
 };
@@ -125,31 +125,23 @@ impl<'a, P: Path> Sweep<'a, P> {
             let look = self.look_at_most(at, pair.1 + 1);
             look.map_or(f64::INFINITY, |look| clearance(&look, pair))
         };
-        // Golden section search (Kiefer, 1953).
-        let share = 0.5 * (5f64.sqrt() - 1.0);
-        let (mut low, mut high) = (from, to);
-        let (mut one, mut other) = (high - share * (high - low), low + share * (high - low));
-        let (mut at_one, mut at_other) = (clearance(one), clearance(other));
-        while other - one > 4.0 * f64::EPSILON * high.abs() {
-            if at_one <= at_other {
-                (high, other, at_other) = (other, one, at_one);
-                one = high - share * (high - low);
-                at_one = clearance(one);
-            } else {
-                (low, one, at_one) = (one, other, at_other);
-                other = low + share * (high - low);
-                at_other = clearance(other);
-            }
-        }
-        let ends = [from, one, other, to].map(|at| (clearance(at), at));
-        ends.into_iter().fold((f64::INFINITY, from), |best, next| if next.0 < best.0 { next } else { best })
+        least_between(clearance, from, to)
+    }
+
+    /// How many places of the head a search begins with.
+    pub fn looks(&self, from: f64, to: f64) -> f64 {
+        ((to - from) / self.step()).ceil().max(0.0)
+    }
+
+    fn step(&self) -> f64 {
+        0.25 * self.team.link(0).min(self.team.link(1))
     }
 
     /// The places of the head at which a search looks, after the first: none further than a quarter of a link from the
     /// next, and one at the stall.
     fn steps(&self, from: f64, to: f64) -> impl Iterator<Item = f64> {
-        let step = 0.25 * self.team.link(0).min(self.team.link(1));
-        let count = ((to - from) / step).ceil().max(0.0) as usize;
+        let step = self.step();
+        let count = self.looks(from, to) as usize;
         let stall = self.stall;
         let regular = (1..=count).map(move |k| (from + k as f64 * step).min(to));
         let mut before = from;

@@ -5,8 +5,9 @@
 
 use crate::chain::Team;
 use crate::events::contact::first_contact;
-use crate::events::sweep::Sweep;
+use crate::events::sweep::{LeastClearance, Sweep};
 use crate::events::{self, Event};
+use crate::geometry::path::Path;
 use crate::geometry::pieces::PiecePath;
 use crate::messages::State;
 use crate::scene::path::ScenePath;
@@ -17,6 +18,15 @@ use crate::scene::{OnContact, Scene};
 pub struct TimedEvent {
     /// What happens and where.
     pub event: Event,
+    /// Simulated seconds since the start of the scene.
+    pub time: f64,
+}
+
+/// The least clearance of a show and when it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimedClearance {
+    /// How near, which two, and where the head is then.
+    pub least: LeastClearance,
     /// Simulated seconds since the start of the scene.
     pub time: f64,
 }
@@ -76,12 +86,31 @@ impl Timeline {
         &self.events[self.events.len() - 1]
     }
 
+    /// The event at which a show freezes.
+    pub fn freeze(&self, on_contact: OnContact) -> &TimedEvent {
+        match (on_contact, self.find(State::Contact)) {
+            (OnContact::Stop, Some(contact)) => contact,
+            _ => self.end(),
+        }
+    }
+
     /// Simulated seconds at which a show freezes.
     pub fn freeze_time(&self, on_contact: OnContact) -> f64 {
-        match (on_contact, self.find(State::Contact)) {
-            (OnContact::Stop, Some(contact)) => contact.time,
-            _ => self.end().time,
-        }
+        self.freeze(on_contact).time
+    }
+
+    /// The least clearance of the whole show, up to where it freezes. `None` under three benches, and where it would
+    /// take too long: see [`MOST_LOOKS`]. `progress` is told which share of the search is done, from 0 to 1.
+    pub fn least_clearance(&self, scene: &Scene, progress: &mut dyn FnMut(f64)) -> Option<TimedClearance> {
+        let freeze = self.freeze(scene.on_contact).event;
+        // Until boards touch for the first time their clearance is above what it is then.
+        let from = self.find(State::Contact).map_or(0.0, |contact| contact.event.travelled);
+        let stall = self.find(State::Stall).map(|stall| stall.event.travelled);
+        let least = match &scene.path {
+            ScenePath::Spiral(spiral) => least_from(spiral, &scene.team, stall, from, freeze.travelled, progress),
+            ScenePath::Pieces(path) => least_from(path, &scene.team, stall, from, freeze.travelled, progress),
+        }?;
+        Some(TimedClearance { least, time: scene.time_of(least.travelled) })
     }
 
     /// The latest event at or before a time.
@@ -93,6 +122,25 @@ impl Timeline {
     pub fn next_danger(&self, sim_time: f64) -> Option<&TimedEvent> {
         self.events.iter().find(|timed| timed.time > sim_time && timed.event.kind != State::PathEnd)
     }
+}
+
+/// Boards looked at, times places of the head, beyond which the least clearance of a show is not searched for: about
+/// half a minute.
+pub const MOST_LOOKS: f64 = 2e8;
+
+fn least_from<P: Path>(
+    path: &P,
+    team: &Team,
+    stall: Option<f64>,
+    from: f64,
+    to: f64,
+    progress: &mut dyn FnMut(f64),
+) -> Option<LeastClearance> {
+    let sweep = Sweep::new(path, team, stall);
+    if sweep.looks(from, to) * team.benches as f64 > MOST_LOOKS {
+        return None;
+    }
+    sweep.least_clearance(from, to, progress)
 }
 
 fn stall_and_end(scene: &Scene) -> Vec<Event> {

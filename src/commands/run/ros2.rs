@@ -34,7 +34,7 @@ pub struct Ros2 {
 #[cfg(feature = "ros2")]
 pub fn open(scene: &Scene, name: &str, loop_rate: f64, stage: Stage) -> Result<Ros2, CommandError> {
     use bench_dragon::scene::ros2::Topic;
-    use bench_dragon::transports::ros2::{Ros2Error, Ros2Offer, environment::Network, start};
+    use bench_dragon::transports::ros2::{Ros2Error, Ros2Offer, environment, start};
 
     let settings = scene.ros2.clone().unwrap_or_default();
     let refused = |error: Ros2Error| match error {
@@ -44,7 +44,11 @@ pub fn open(scene: &Scene, name: &str, loop_rate: f64, stage: Stage) -> Result<R
     if let Some(rate) = settings.rate.filter(|rate| *rate > loop_rate) {
         log::warn!("publish.ros2.rate is {rate}, more than the loop's {loop_rate}: ROS 2 gets {loop_rate} a second");
     }
-    let network = Network::of(|variable| std::env::var(variable).ok()).map_err(refused)?;
+    let variable = |name: &str| std::env::var(name).ok();
+    let network = environment::Network::of(variable).map_err(refused)?;
+    if let Some(warning) = environment::other_distribution(variable) {
+        log::warn!("{warning}");
+    }
     let alerts = scene.alerts.is_some();
     let topics: Vec<String> = (settings.topics.keys())
         .filter(|topic| alerts || **topic != Topic::Alerts)

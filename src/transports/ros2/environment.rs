@@ -47,8 +47,8 @@ impl Network {
         };
         if let Some(peers) = set("ROS_STATIC_PEERS") {
             return refused(format!(
-                "ROS_STATIC_PEERS is \"{peers}\", which RustDDS cannot honour: unset it; other machines are found by \
-                 multicast"
+                "ROS_STATIC_PEERS is \"{peers}\", which RustDDS cannot honour: unset it here; others find this publisher \
+                 by multicast, or by naming this machine in their own ROS_STATIC_PEERS"
             ));
         }
         let range = match set("ROS_AUTOMATIC_DISCOVERY_RANGE").as_deref().map(str::trim) {
@@ -101,9 +101,28 @@ pub fn check_name(name: &str) -> Result<(), Ros2Error> {
     if name.split('/').all(legal) { Ok(()) } else { Err(Ros2Error::Name(name.to_owned())) }
 }
 
+/// A warning where `ROS_DISTRO` names another distribution than this program was built for. Humble and what came later
+/// write some of the graph's messages differently; the topics themselves do not differ.
+pub fn other_distribution(variable: impl Fn(&str) -> Option<String>) -> Option<String> {
+    let built = ros2_client::COMPILED_ROS_DISTRO;
+    let distribution = variable("ROS_DISTRO").filter(|name| !name.is_empty() && name != built.as_str())?;
+    Some(format!(
+        "ROS_DISTRO is {distribution} and this program was built for {built}: topics arrive, but `ros2 node list` may \
+         not show it (for Humble, build with `--no-default-features --features humble`)"
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn another_distribution_is_told() {
+        let built = ros2_client::COMPILED_ROS_DISTRO.as_str();
+        let told = |value: Option<&str>| other_distribution(|_| value.map(str::to_owned));
+        assert_eq!((told(None), told(Some("")), told(Some(built))), (None, None, None));
+        assert!(told(Some("foxy")).is_some_and(|warning| warning.contains("foxy") && warning.contains(built)));
+    }
 
     fn network(variables: &[(&str, &str)]) -> Result<Network, String> {
         Network::of(|name| {

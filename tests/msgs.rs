@@ -1,0 +1,166 @@
+//! `msgs/` and the Rust types that go on the wire cannot drift apart: fields, types, order and constants are compared.
+#![cfg(feature = "ros2")]
+
+use std::collections::BTreeMap;
+
+use bench_dragon::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, NO_BENCH, Stage, State};
+use bench_dragon::transports::ros2::messages::{HandlePoses, Header, Stamped, type_name};
+use serde::Serialize;
+use serde_reflection::{ContainerFormat, Format, Registry, Samples, Tracer, TracerConfig};
+
+/// A `.msg` file: (type, field) in order, and the constants. Every one of them must be followed by a comment.
+struct Interface {
+    fields: Vec<(String, String)>,
+    constants: BTreeMap<String, u32>,
+}
+
+fn interface(name: &str) -> Interface {
+    let path = format!("{}/msgs/msg/{name}.msg", env!("CARGO_MANIFEST_DIR"));
+    let mut interface = Interface { fields: Vec::new(), constants: BTreeMap::new() };
+    for line in std::fs::read_to_string(&path).unwrap().lines() {
+        let (declaration, comment) = line.split_once('#').map_or((line, None), |(code, text)| (code, Some(text)));
+        let mut words = declaration.split_whitespace();
+        let (Some(kind), Some(name)) = (words.next(), words.next()) else { continue };
+        if let Some((constant, value)) = name.split_once('=') {
+            assert_eq!(kind, "uint32");
+            interface.constants.insert(constant.to_owned(), value.parse().unwrap());
+        } else {
+            assert!(comment.is_some_and(|text| text.trim().len() > 2), "{path}: {name} has no comment");
+            interface.fields.push((kind.to_owned(), name.to_owned()));
+        }
+    }
+    interface
+}
+
+/// What serde writes for a message: (type, field) in the words of ROS 2, nested layouts taken apart.
+fn on_the_wire<T: Serialize>(message: &T) -> Vec<(String, String)> {
+    let mut tracer = Tracer::new(TracerConfig::default());
+    let (format, _) = tracer.trace_value(&mut Samples::new(), message).unwrap();
+    let registry = tracer.registry().unwrap();
+    let Format::TypeName(name) = format else { panic!("a message is a struct") };
+    fields(&registry, &name)
+}
+
+fn fields(registry: &Registry, name: &str) -> Vec<(String, String)> {
+    let ContainerFormat::Struct(members) = &registry[name] else { panic!("{name} is no struct") };
+    let mut all = Vec::new();
+    for member in members {
+        match &member.value {
+            Format::TypeName(inner) if inner != "Header" => all.extend(fields(registry, inner)),
+            format => all.push((ros(format), member.name.clone())),
+        }
+    }
+    all
+}
+
+fn ros(format: &Format) -> String {
+    match format {
+        Format::F64 => "float64".to_owned(),
+        Format::U64 => "uint64".to_owned(),
+        Format::U32 => "uint32".to_owned(),
+        Format::Str => "string".to_owned(),
+        Format::TypeName(name) if name == "Header" => "std_msgs/Header".to_owned(),
+        Format::TypeName(name) => name.clone(),
+        Format::Seq(element) => format!("{}[]", ros(element)),
+        other => panic!("{other:?} is in no .msg file"),
+    }
+}
+
+fn status() -> LoopStatus {
+    LoopStatus {
+        run_id: 0,
+        tick: 0,
+        sequence: 0,
+        stamp_ns: 0,
+        sim_time: 0.0,
+        rate: 0.0,
+        measured_rate: 0.0,
+        overruns: 0,
+        skipped: 0,
+        shows_played: 0,
+        lateness_p50_second: 0,
+        lateness_p99_second: 0,
+        lateness_max_second: 0,
+        lateness_p50_total: 0,
+        lateness_p99_total: 0,
+        lateness_p999_total: 0,
+        lateness_max_total: 0,
+        step_p50_second: 0,
+        step_p99_second: 0,
+        step_max_second: 0,
+        step_p50_total: 0,
+        step_p99_total: 0,
+        step_p999_total: 0,
+        step_max_total: 0,
+        resident_bytes: 0,
+        subscribers: 0,
+        file_descriptors: 0,
+        scene: [0; 64],
+    }
+}
+
+#[test]
+fn fields_types_and_order_are_those_of_the_interface_files() {
+    let frame =
+        HandlePoses { header: Header::of(0), frame: FrameHeader::default(), poses: vec![HandlePose::default()] };
+    for (name, wire) in [
+        ("HandlePose", on_the_wire(&HandlePose::default())),
+        ("HandlePoses", on_the_wire(&frame)),
+        ("CollisionAlert", on_the_wire(&Stamped::alert(CollisionAlert::default()))),
+        ("LoopStatus", on_the_wire(&Stamped::status(status()))),
+        ("Stage", on_the_wire(&Stamped::stage(Stage::default()))),
+    ] {
+        assert_eq!(interface(name).fields, wire, "{name}");
+    }
+}
+
+#[test]
+fn type_names_are_those_that_ros_2_gives_the_interface_files() {
+    let package = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/msgs/package.xml")).unwrap();
+    assert!(package.contains("<name>bench_dragon_msgs</name>"));
+    let list = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/msgs/CMakeLists.txt")).unwrap();
+    for (name, on_the_wire) in [
+        ("HandlePoses", type_name::HANDLE_POSES),
+        ("CollisionAlert", type_name::COLLISION_ALERT),
+        ("LoopStatus", type_name::LOOP_STATUS),
+        ("Stage", type_name::STAGE),
+    ] {
+        assert_eq!(on_the_wire, format!("bench_dragon_msgs::msg::dds_::{name}_"));
+    }
+    for file in std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/msgs/msg")).unwrap() {
+        let name = file.unwrap().file_name().into_string().unwrap();
+        assert!(list.contains(&format!("\"msg/{name}\"")), "{name} is not built");
+    }
+}
+
+#[test]
+fn constants_are_the_states_and_levels() {
+    let constants = |prefix: &str, states: &[State], name: fn(State) -> &'static str| -> BTreeMap<String, u32> {
+        states.iter().map(|state| (format!("{prefix}{}", name(*state).to_uppercase()), *state as u32)).collect()
+    };
+    let states = [State::Moving, State::Approaching, State::Contact, State::Stall, State::Lock, State::PathEnd];
+    assert_eq!(interface("HandlePoses").constants, constants("STATE_", &states, State::name));
+    let mut levels = constants("LEVEL_", &states[..5], State::level_name);
+    levels.insert("NO_BENCH".to_owned(), NO_BENCH);
+    assert_eq!(interface("CollisionAlert").constants, levels);
+    assert_eq!(State::from_wire(states.len() as u32), None, "a state that the interface files do not know");
+}
+
+#[test]
+fn viewers_are_set_up_for_topics_that_exist() {
+    use bench_dragon::scene::ros2::Topic;
+    let all = [Topic::Handles, Topic::Poses, Topic::Alerts, Topic::Stage, Topic::Markers, Topic::Status];
+    let topics = all.map(|topic| topic.path("bench_dragon"));
+    let foxglove = include_str!("../examples/foxglove/bench_dragon.json");
+    serde_json::from_str::<serde_json::Value>(foxglove).unwrap();
+    for viewer in [foxglove, include_str!("../examples/rviz/bench_dragon.rviz")] {
+        let named: Vec<String> = viewer
+            .match_indices("/bench_dragon/")
+            .map(|(at, _)| {
+                viewer[at..].chars().take_while(|c| c.is_ascii_alphanumeric() || "/_".contains(*c)).collect()
+            })
+            .collect();
+        assert!(named.contains(&topics[4]), "no markers in {named:?}");
+        assert!(named.iter().all(|topic| topics.contains(topic)), "{named:?}");
+    }
+}
