@@ -5,11 +5,10 @@
 
 use crate::chain::newton::Newton;
 use crate::chain::{Chain, Team, Velocities};
-use crate::events::contact::first_contact;
 use crate::events::stall_and_end;
 use crate::events::sweep::Sweep;
 use crate::geometry::path::Path;
-use crate::geometry::root::least_between;
+use crate::geometry::root::{first_true, least_between};
 use crate::geometry::spiral::{Angle, Spiral};
 use crate::messages::State;
 use crate::scene::path::ScenePath;
@@ -38,97 +37,122 @@ pub struct LeastPitch {
 /// so what touches further out touches again within these.
 const TURNS_BEFORE: f64 = 3.0;
 
-/// How near to the infimum the pitch is found, metres.
-const PITCH_RESOLUTION: f64 = 1e-11;
+/// How much the pitch grows at a time while the same two boards are in the way.
+const GROWTH: f64 = 1.005;
 
-/// Steps in which pitches are tried from below: a coarse search for one that will do, and a fine one of what lies just
-/// below it, since the pitches that will do need not be one interval.
-const COARSE: f64 = 1.01;
-const FINE: f64 = 1.0001;
+/// What is added to a pitch at which boards just touch, metres: more than rounding, less than anyone asks for.
+const FREE: f64 = 1e-13;
+
+/// How far about a touch, in links, the same two boards are followed as the pitch grows.
+const WINDOW: f64 = 0.3;
 
 /// The least pitch of an inward spiral at which the front handle of the head comes within `radius` metres of the centre
 /// and no two boards touch before. `progress` is told which share of the work is done, from 0 to 1.
+///
+/// The pitch grows from one that cannot do. Each time the trial fails, the two boards that overlap most deeply are
+/// followed near that place until they come free, and the next trial is made there: all pitches before it fail by those
+/// two. So none that will do is passed over, even where the pitches that will do are not one interval.
 ///
 /// # Errors
 /// A radius that every pitch reaches, or none.
 pub fn least_pitch(team: &Team, radius: f64, progress: &mut dyn FnMut(f64)) -> Result<LeastPitch, PlanError> {
     let Accepted { least, greatest, .. } = Accepted::LENGTH;
-    // Two turns that are narrower than half a board overlap, where there are two.
+    // Turns narrower than half a board overlap, where there are two.
     let lowest = least.max(0.5 * team.width);
-    let fails = |pitch: f64| Trial::new(team, pitch, radius).fails();
-    if !fails(lowest) {
+    let mut pitch = lowest;
+    let mut decided = None;
+    while let Some(obstacle) = Trial::new(team, pitch, radius).obstacle() {
+        if pitch > greatest {
+            return Err(PlanError(format!("the team reaches {radius} m with no pitch up to {greatest} m")));
+        }
+        let free = |pitch: f64| !Trial::new(team, pitch, radius).is_blocked_by(&obstacle);
+        while !free(pitch * GROWTH) && pitch <= greatest {
+            pitch *= GROWTH;
+        }
+        pitch = first_true(free, pitch, pitch * GROWTH) + FREE;
+        decided = Some(obstacle);
+        // The more turns fit into the radius, the further there is to go.
+        progress(1.0 - (-0.3 * pitch / lowest).exp());
+    }
+    let Some(obstacle) = decided else {
         return Err(PlanError(format!(
             "the team reaches {radius} m with every pitch from {lowest} m on: it is too short to meet itself"
         )));
-    }
-    let mut coarse = lowest;
-    while fails(coarse) {
-        coarse *= COARSE;
-        if coarse > greatest {
-            return Err(PlanError(format!("the team reaches {radius} m with no pitch up to {greatest} m")));
-        }
-        progress(0.3 * (1.0 - (radius - coarse).abs() / (radius + coarse)));
-    }
-    let (mut low, mut high) = (lowest.max(coarse / COARSE.powi(3)), coarse);
-    while low * FINE < coarse {
-        if !fails(low * FINE) {
-            high = low * FINE;
-            break;
-        }
-        low *= FINE;
-        progress(0.3 + 0.3 * (low / coarse - 1.0 / COARSE.powi(3)) / (1.0 - 1.0 / COARSE.powi(3)));
-    }
-    let halvings = ((high - low) / PITCH_RESOLUTION).log2();
-    while high - low > PITCH_RESOLUTION.max(4.0 * f64::EPSILON * high) {
-        let middle = 0.5 * (low + high);
-        if fails(middle) {
-            low = middle
-        } else {
-            high = middle
-        }
-        progress(1.0 - 0.4 * ((high - low) / PITCH_RESOLUTION).log2().max(0.0) / halvings);
-    }
-    let Some((bench_a, bench_b, travelled)) = Trial::new(team, low, radius).touch() else {
-        return Err(PlanError(format!("with any pitch below {high} m a bench folds before the head is at {radius} m")));
     };
-    let trial = Trial::new(team, high, radius);
-    let around = 0.1 * team.link(0).min(team.link(1));
-    let sweep = Sweep::new(&trial.spiral, team, None);
-    let (_, travelled) =
-        sweep.minimum_of((bench_a, bench_b), (travelled - around).max(0.0), (travelled + around).min(trial.limit));
+    let Obstacle::Touch { pair: (bench_a, bench_b), .. } = obstacle else {
+        return Err(PlanError(format!(
+            "no two boards touch before {radius} m, but with any pitch below {pitch} m a bench folds back on itself"
+        )));
+    };
+    let trial = Trial::new(team, pitch, radius);
+    let (_, travelled) = trial.nearest(&obstacle);
     let head_radius = trial.spiral.radius(trial.spiral.place_at(travelled));
-    Ok(LeastPitch { value: high, bench_a, bench_b, head_radius })
+    Ok(LeastPitch { value: pitch, bench_a, bench_b, head_radius })
 }
 
-/// A team that comes in on a spiral of one pitch to a radius.
-struct Trial<'a> {
-    team: &'a Team,
+/// What keeps a head from its radius.
+enum Obstacle {
+    /// A link locks before.
+    Lock,
+    /// Two boards overlap, most deeply this many metres of travel before the radius.
+    Touch { pair: (u32, u32), before: f64 },
+}
+
+/// The foremost part of a team that comes in on a spiral of one pitch to a radius.
+struct Trial {
+    team: Team,
     spiral: Spiral,
     /// Metres of travel at which the radius is reached.
     limit: f64,
 }
 
-impl<'a> Trial<'a> {
-    fn new(team: &'a Team, pitch: f64, radius: f64) -> Self {
+impl Trial {
+    fn new(team: &Team, pitch: f64, radius: f64) -> Self {
         let start = radius.max(team.link(0)).max(team.link(1)) / pitch + TURNS_BEFORE;
         let spiral = Spiral::new(pitch, start);
         let limit = spiral.distance_between(spiral.start(), Angle::from_turns(radius / pitch));
-        Self { team, spiral, limit }
+        // No board can touch one of the first two from more than two turns away without touching one before it.
+        let within = Spiral::new(pitch, start + 2.0);
+        let behind = within.distance_between(within.start(), spiral.start());
+        let benches = (behind / team.link(1)).ceil() as usize + 3;
+        Self { team: Team { benches: benches.min(team.benches), ..*team }, spiral, limit }
     }
 
-    /// Whether something keeps the head from the radius.
-    fn fails(&self) -> bool {
-        let events = stall_and_end(&self.spiral, self.team);
-        let locked = events.iter().any(|event| event.kind == State::Lock && event.travelled < self.limit);
-        locked || self.touch().is_some()
+    fn sweep(&self) -> Sweep<'_, Spiral> {
+        let stall = stall_and_end(&self.spiral, &self.team).into_iter().find(|event| event.kind == State::Stall);
+        Sweep::new(&self.spiral, &self.team, stall.map(|event| event.travelled))
     }
 
-    /// The first two benches that touch before the radius is reached, and the head's travel.
-    fn touch(&self) -> Option<(u32, u32, f64)> {
-        let stall = stall_and_end(&self.spiral, self.team).into_iter().find(|event| event.kind == State::Stall);
-        let stall = stall.map(|event| event.travelled).filter(|at| *at < self.limit);
-        let contact = first_contact(&self.spiral, self.team, stall, self.limit, &mut |_| ())?;
-        Some((contact.bench_a?, contact.bench_b?, contact.travelled))
+    fn locks(&self) -> bool {
+        let events = stall_and_end(&self.spiral, &self.team);
+        events.iter().any(|event| event.kind == State::Lock && event.travelled < self.limit)
+    }
+
+    /// What keeps the head from the radius, if anything does.
+    fn obstacle(&self) -> Option<Obstacle> {
+        if self.locks() {
+            return Some(Obstacle::Lock);
+        }
+        let touch = self.sweep().least_clearance(0.0, self.limit, &mut |_| ()).filter(|touch| touch.value <= 0.0)?;
+        Some(Obstacle::Touch { pair: (touch.bench_a, touch.bench_b), before: self.limit - touch.travelled })
+    }
+
+    /// Whether an obstacle of another pitch is one of this pitch too.
+    fn is_blocked_by(&self, obstacle: &Obstacle) -> bool {
+        match obstacle {
+            Obstacle::Lock => self.locks(),
+            Obstacle::Touch { .. } => self.nearest(obstacle).0 <= 0.0,
+        }
+    }
+
+    /// The least clearance of the pair of a touch, near where it touched, and the head's travel there.
+    fn nearest(&self, obstacle: &Obstacle) -> (f64, f64) {
+        let Obstacle::Touch { pair, before } = *obstacle else { return (f64::INFINITY, self.limit) };
+        let around = WINDOW * self.team.link(0).min(self.team.link(1));
+        let (sweep, at) = (self.sweep(), (self.limit - before).max(0.0));
+        let parts = [((at - around).max(0.0), at), (at, (at + around).min(self.limit))];
+        let nearest = parts.map(|(from, to)| sweep.minimum_of(pair, from, to));
+        if nearest[0].0 <= nearest[1].0 { nearest[0] } else { nearest[1] }
     }
 }
 

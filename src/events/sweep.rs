@@ -3,7 +3,9 @@
 //! **Why nothing is skipped.** Between two places of the head each handle goes one way along the path, so the path
 //! between the places at which a look finds it is as far as it can have moved; no point of a board moves further than
 //! [`Board::reach`] times what its handles do. A pair whose clearances at both ends of a step sum to more than what its
-//! two boards can move together, M, was never nearer than half of what is left over. A step that cannot be excluded so
+//! two boards can move together, M, was never nearer than half of what is left over. Where all four handles are on one
+//! spiral, they are watched from a frame that turns with one of them: turning changes no clearance, and leaves little
+//! motion ([`Path::motion_beside`]). A step that cannot be excluded so
 //! is halved, the earlier half first. Past the first stall, where handles may turn round once more, M is doubled.
 //!
 //! **Which pairs.** Every link behind the first has one length, so a pair (i, i+k), i >= 2, is wherever the pair
@@ -57,7 +59,7 @@ type Pair = (usize, usize);
 
 /// How finely the least clearance is bracketed before its place is refined, as a share of the shortest link: within
 /// that, the clearance of one pair has one minimum.
-const LEAF: f64 = 1e-3;
+const LEAF: f64 = 1e-2;
 
 impl<'a, P: Path> Sweep<'a, P> {
     /// The motion of `team` on `path`, whose first stall is at `stall`.
@@ -193,10 +195,25 @@ impl<'a, P: Path> Sweep<'a, P> {
 
     /// How far any point of a board can have moved between two looks.
     fn moved(&self, before: &Look<P>, after: &Look<P>, bench: usize) -> f64 {
-        let Team { hole_inset, width, .. } = *self.team;
         let handle = |k: usize| self.path.distance_between(before.places[k], after.places[k]).abs();
+        self.reach(before, bench) * handle(bench).max(handle(bench + 1))
+    }
+
+    fn reach(&self, before: &Look<P>, bench: usize) -> f64 {
+        let Team { hole_inset, width, .. } = *self.team;
         let slack = if before.travelled < self.stall { 1.0 } else { 2.0 };
-        slack * Board::reach(self.team.link(bench), hole_inset, width) * handle(bench).max(handle(bench + 1))
+        slack * Board::reach(self.team.link(bench), hole_inset, width)
+    }
+
+    /// How much nearer to each other two boards can have come between two looks: what both have moved, or what they
+    /// have moved as seen from a frame that turns with the first one's front handle.
+    fn approached(&self, before: &Look<P>, after: &Look<P>, (a, b): Pair) -> f64 {
+        let on_stage = self.moved(before, after, a) + self.moved(before, after, b);
+        let companion = (before.places[a], after.places[a]);
+        let handle = |k: usize| self.path.motion_beside(before.places[k], after.places[k], companion);
+        let board = |bench: usize| Some(self.reach(before, bench) * handle(bench)?.max(handle(bench + 1)?));
+        let turning = board(a).zip(board(b)).map_or(f64::INFINITY, |(a, b)| a + b);
+        on_stage.min(turning)
     }
 
     /// The pairs that may be nearer than `limit` somewhere between two looks.
@@ -215,7 +232,7 @@ impl<'a, P: Path> Sweep<'a, P> {
     /// Keeps the pairs that may be at or below `limit` somewhere between two looks.
     fn retain_uncertain(&self, before: &Look<P>, after: &Look<P>, limit: f64, pairs: &mut Vec<Pair>) {
         pairs.retain(|&(a, b)| {
-            let motion = self.moved(before, after, a) + self.moved(before, after, b);
+            let motion = self.approached(before, after, (a, b));
             let circles = |look: &Look<P>| circle_bound_board_board(&look.boards[a], &look.boards[b]);
             if circles(before) + circles(after) > 2.0 * limit + motion {
                 return false;
@@ -241,16 +258,25 @@ impl<'a, P: Path> Sweep<'a, P> {
         })
     }
 
+    /// Whether two looks are so near that a pair's clearance has one minimum between them.
+    fn is_leaf(&self, before: &Look<P>, after: &Look<P>) -> bool {
+        after.travelled - before.travelled <= LEAF * self.team.link(0).min(self.team.link(1))
+    }
+
+    fn nearest_between(&self, (a, b): Pair, before: &Look<P>, after: &Look<P>) -> LeastClearance {
+        let (bench_a, bench_b) = (a as u32, b as u32);
+        let (value, travelled) = self.minimum_of((bench_a, bench_b), before.travelled, after.travelled);
+        LeastClearance { value, travelled, bench_a, bench_b }
+    }
+
     /// Lowers `least` to what the pairs reach between two looks.
     fn least_within(&self, before: &Look<P>, after: &Look<P>, pairs: Vec<Pair>, least: &mut LeastClearance) {
         let Some(last) = pairs.iter().map(|&(_, b)| b + 1).max() else { return };
-        let shortest = self.team.link(0).min(self.team.link(1));
-        if after.travelled - before.travelled <= LEAF * shortest {
-            for (a, b) in pairs {
-                let pair = (a as u32, b as u32);
-                let (value, travelled) = self.minimum_of(pair, before.travelled, after.travelled);
-                if value < least.value {
-                    *least = LeastClearance { value, travelled, bench_a: pair.0, bench_b: pair.1 };
+        if self.is_leaf(before, after) {
+            for pair in pairs {
+                let nearest = self.nearest_between(pair, before, after);
+                if nearest.value < least.value {
+                    *least = nearest;
                 }
             }
             return;

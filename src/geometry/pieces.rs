@@ -702,6 +702,13 @@ impl Path for PiecePath {
         }
     }
 
+    fn motion_beside(&self, from: PiecePlace, to: PiecePlace, companion: (PiecePlace, PiecePlace)) -> Option<f64> {
+        let (Curve::Inward(spiral) | Curve::Outward(spiral)) = self.curve(from) else { return None };
+        let together = [to, companion.0, companion.1].iter().all(|place| place.piece == from.piece);
+        let [from, to, before, after] = [from, to, companion.0, companion.1].map(|place| place.at.angle());
+        if together { spiral.motion_beside(from, to, (before, after)) } else { None }
+    }
+
     fn bench(&self, front: PiecePlace, rear: PiecePlace, link: f64) -> BenchOnPath {
         match (self.curve(front), front.piece == rear.piece) {
             (Curve::Inward(spiral), true) => spiral.bench(front.at.angle(), rear.at.angle(), link),

@@ -327,6 +327,16 @@ impl Path for Spiral {
         Ok(front.plus(self.increment(self.radius(front), link)?))
     }
 
+    /// Outward and around: a |delta theta| + r |delta theta - delta theta of the companion|. Both only go one way: between
+    /// stalls the angle between two handles only grows inward and only shrinks outward, since
+    /// d theta_{i+1}/d theta_i = (t_i . b_i) w_i / ((t_{i+1} . b_i) w_{i+1}) < 1 (w = sqrt(a^2 + r^2); the difference of
+    /// the two products is 2 a (r + r') sin^2(d/2) / link > 0).
+    fn motion_beside(&self, from: Angle, to: Angle, companion: (Angle, Angle)) -> Option<f64> {
+        let own = from.minus(to);
+        let around = (own - companion.0.minus(companion.1)).abs();
+        Some(self.growth() * own.abs() + self.radius(from).max(self.radius(to)) * around)
+    }
+
     fn bench(&self, front: Angle, rear: Angle, link: f64) -> BenchOnPath {
         let a = self.growth();
         let d = rear.minus(front);
