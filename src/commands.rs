@@ -7,6 +7,7 @@ pub mod plan;
 pub mod run;
 pub mod solve;
 pub mod trade;
+pub mod view;
 pub mod watch;
 
 use std::fs::File;

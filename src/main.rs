@@ -25,6 +25,8 @@ enum Command {
     Run(commands::run::RunArguments),
     /// Watch a running publisher from another process
     Watch(commands::watch::WatchArguments),
+    /// Serve the live stage picture to a browser
+    View(commands::view::ViewArguments),
     /// Solve a scene offline and print every handle as a table
     Solve(commands::solve::SolveArguments),
     /// Find contact, stall, lock and path end
@@ -45,6 +47,7 @@ fn main() -> ExitCode {
     let done = match &command {
         Command::Run(arguments) => commands::run::run(&common, arguments),
         Command::Watch(arguments) => commands::watch::watch(&common, arguments),
+        Command::View(arguments) => commands::view::view(&common, arguments),
         Command::Solve(arguments) => commands::solve::solve(&common, arguments),
         Command::Events => commands::events::events(&common),
         Command::Draw(arguments) => commands::draw::draw(&common, arguments),

@@ -79,7 +79,9 @@ def main():
     frames, newest = 0, None
     while time.monotonic() < end:
         for message in reader.take(N=10):
-            frames, newest = frames + 1, message
+            # The news that a publisher has gone comes as a sample that holds nothing.
+            if isinstance(message, PoseArray):
+                frames, newest = frames + 1, message
         if time.monotonic() >= report:
             report += 1.0
             if newest is None:

@@ -1,6 +1,6 @@
 //! A subscriber's ends of a publisher's services, opened when they appear and kept while publishers come and go.
 //!
-//! The monitor reads through it.
+//! The monitor and the stage picture read through it.
 
 use std::time::Duration;
 
@@ -29,16 +29,34 @@ pub struct Connection {
 pub struct Subscription {
     node: Node<ipc::Service>,
     name: String,
+    wake: Wake,
+}
+
+/// How a subscriber learns that a frame has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wake {
+    /// The publisher wakes it, which costs the publisher some microseconds for every frame.
+    OnFrame,
+    /// It looks by itself as often as it likes, which costs the publisher nothing.
+    Never,
 }
 
 impl Subscription {
-    /// A subscription to the services of `name`, none of which need exist yet.
+    /// A subscription to the services of `name`, none of which need exist yet, that is woken by each frame.
     ///
     /// # Errors
     /// [`OpenError`] for a name that iceoryx2 cannot take.
     pub fn new(name: &str) -> Result<Self, OpenError> {
+        Self::with_wake(name, Wake::OnFrame)
+    }
+
+    /// As [`new`](Self::new), woken as `wake` says.
+    ///
+    /// # Errors
+    /// [`OpenError`] for a name that iceoryx2 cannot take.
+    pub fn with_wake(name: &str, wake: Wake) -> Result<Self, OpenError> {
         service_name(name, "poses")?;
-        Ok(Self { node: node()?, name: name.to_owned() })
+        Ok(Self { node: node()?, name: name.to_owned(), wake })
     }
 
     /// Connects to the publisher, or `None` while there is none.
@@ -99,6 +117,9 @@ impl Subscription {
     }
 
     fn listener(&self) -> Option<Listener<ipc::Service>> {
+        if self.wake == Wake::Never {
+            return None;
+        }
         let name = service_name(&self.name, "tick").ok()?;
         self.node.service_builder(&name).event().open().ok()?.listener_builder().create().ok()
     }
@@ -122,6 +143,15 @@ impl Connection {
             count += 1;
         }
         count
+    }
+
+    /// Hands the newest frame to `take` and drops those before it; `None` where none has come.
+    pub fn newest_frame<Taken>(&self, take: impl FnOnce(&FrameHeader, &[HandlePose]) -> Taken) -> Option<Taken> {
+        let mut newest = None;
+        while let Ok(Some(sample)) = self.poses.receive() {
+            newest = Some(sample);
+        }
+        newest.map(|sample| take(sample.user_header(), sample.payload()))
     }
 
     /// The next alert, if one has come.

@@ -2,9 +2,10 @@
 
 #![allow(dead_code, reason = "not every test file uses all of it")]
 
-use std::io::Read;
+use std::io::{BufRead, BufReader, Read};
 use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -32,14 +33,27 @@ impl Process {
         nix::sys::signal::kill(nix::unistd::Pid::from_raw(self.0.id() as i32), signal).unwrap();
     }
 
-    /// What the process printed, once it has ended by itself within `seconds`.
+    /// The first line that the process prints within `seconds`.
+    pub fn first_line_within(&mut self, seconds: u64) -> String {
+        let mut output = BufReader::new(self.0.stdout.take().unwrap());
+        let (sender, receiver) = mpsc::channel();
+        std::thread::spawn(move || {
+            let mut line = String::new();
+            let _ = output.read_line(&mut line);
+            let _ = sender.send(line);
+            // A closed pipe would end the process.
+            let _ = std::io::copy(&mut output, &mut std::io::sink());
+        });
+        receiver.recv_timeout(Duration::from_secs(seconds)).unwrap()
+    }
+
+    /// What the process printed, once it has ended by itself within `seconds`; nothing on standard output after
+    /// [`first_line_within`](Self::first_line_within).
     pub fn output_within(mut self, seconds: u64) -> Output {
         let deadline = Instant::now() + Duration::from_secs(seconds);
         // Read beside waiting: a full pipe would stop the process.
-        let [stdout, stderr] = [
-            std::thread::spawn(reading(self.0.stdout.take().unwrap())),
-            std::thread::spawn(reading(self.0.stderr.take().unwrap())),
-        ];
+        let [stdout, stderr] =
+            [std::thread::spawn(reading(self.0.stdout.take())), std::thread::spawn(reading(self.0.stderr.take()))];
         let status = loop {
             if let Some(status) = self.0.try_wait().unwrap() {
                 break status;
@@ -51,10 +65,12 @@ impl Process {
     }
 }
 
-fn reading(mut pipe: impl Read) -> impl FnOnce() -> Vec<u8> {
+fn reading(pipe: Option<impl Read>) -> impl FnOnce() -> Vec<u8> {
     move || {
         let mut bytes = Vec::new();
-        pipe.read_to_end(&mut bytes).unwrap();
+        if let Some(mut pipe) = pipe {
+            pipe.read_to_end(&mut bytes).unwrap();
+        }
         bytes
     }
 }

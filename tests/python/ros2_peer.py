@@ -186,8 +186,10 @@ def main():
     while time.monotonic() < end:
         idle = True
         for wanted, kind, reader in readers:
-            samples = reader.take(N=100)
-            for sample in samples:
+            for sample in reader.take(N=100):
+                # The news that a publisher has gone comes as a sample that holds nothing.
+                if not isinstance(sample, TOPICS[kind]):
+                    continue
                 idle = False
                 counts[wanted] += 1
                 print(json.dumps({"type": "message", "topic": wanted, "message": shortened(kind, sample)}))

@@ -1,0 +1,139 @@
+"""What the stage picture costs the publisher, how far it is behind, and how many pictures a second it reaches.
+
+    cargo build --release
+    .venv/bin/python benches/stage_picture.py cost      # lateness and step of a 1 kHz publisher: five browsers against none;
+                                                        # what follows is handed to `run`: cost --realtime 80
+    .venv/bin/python benches/stage_picture.py latency   # from sent_ns to received and to drawn, at 20 Hz, 60 Hz and 1 kHz
+    .venv/bin/python benches/stage_picture.py long      # pictures a second of a scene of 5,000 benches
+
+Needs Debian's Chromium and Playwright, which tests/run installs. Everything runs on this machine, in turn in one run:
+the ratios say more than the times.
+"""
+
+import contextlib
+import json
+import pathlib
+import signal
+import statistics
+import subprocess
+import sys
+import time
+
+from playwright.sync_api import sync_playwright
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+PROGRAM = ROOT / "target" / "release" / "bench-dragon"
+NAME = "stage_picture_bench"
+
+
+@contextlib.contextmanager
+def started(*arguments):
+    child = subprocess.Popen([PROGRAM, "--name", NAME, *arguments], stdout=subprocess.PIPE, text=True)
+    try:
+        yield child
+    finally:
+        child.kill()
+        child.wait()
+
+
+@contextlib.contextmanager
+def server():
+    with started("view", "--json", "--port", "0") as child:
+        yield json.loads(child.stdout.readline())["url"], child.pid
+
+
+@contextlib.contextmanager
+def pages(url, count, **viewport):
+    """Pages, each in a Chromium of its own."""
+    with contextlib.ExitStack() as stack:
+        playwright = stack.enter_context(sync_playwright())
+        opened = []
+        for _ in range(count):
+            chromium = stack.enter_context(playwright.chromium.launch(executable_path="/usr/bin/chromium"))
+            opened.append(chromium.new_page(viewport=viewport))
+            opened[-1].goto(url)
+        yield opened
+
+
+def picture(page):
+    return page.evaluate("({...picture, now: performance.now()})")
+
+
+def rates(page, seconds):
+    """Frames received and pictures drawn, a second; and the latencies of those, in ms."""
+    first = picture(page)
+    page.wait_for_timeout(1000 * seconds)
+    last = picture(page)
+    passed = (last["now"] - first["now"]) / 1000
+    received, drawn = ((last[key] - first[key]) / passed for key in ("received", "drawn"))
+    return received, drawn, last["ways"], last["latency"]
+
+
+def summary_of_a_run():
+    """The summary of a 20 s run at 1 kHz."""
+    with started("run", "--quiet", "--json", "--rate", "1000", "--start", "100", "--duration", "20", *sys.argv[2:]) as child:
+        return json.loads(child.communicate()[0].splitlines()[-1])
+
+
+def cost():
+    """In turn, so that what else the machine does falls on all alike."""
+    rounds = {"nobody": [], "server, no browser": [], "five browsers": []}
+    for turn in range(3):
+        rounds["nobody"].append(summary_of_a_run())
+        with server() as (url, _):
+            rounds["server, no browser"].append(summary_of_a_run())
+            with pages(url, 5, width=640, height=480):
+                rounds["five browsers"].append(summary_of_a_run())
+    print(f"{'median of 3 runs of 20 s, us':32}" + "".join(f"{head:>14}" for head in ["wake-up p50", "wake-up p99", "step p50", "step p99", "skipped"]))
+    figures = {}
+    for who, runs in rounds.items():
+        median = lambda part, key: statistics.median(run[part][key] for run in runs) / 1000
+        figures[who] = [median(part, key) for part in ("wakeup_ns", "step_ns") for key in ("p50", "p99")]
+        skipped = statistics.median(run["skipped"] for run in runs)
+        print(f"{who:32}" + "".join(f"{figure:14.1f}" for figure in figures[who]) + f"{skipped:14.0f}")
+    for who in ("server, no browser", "five browsers"):
+        print(f"{who + ' : nobody':32}" + "".join(f"{with_ / without:14.2f}" for with_, without in zip(figures[who], figures["nobody"])))
+
+
+def spread(figures):
+    ordered = sorted(figures)
+    if not ordered:
+        return "-"
+    return f"p50 {ordered[len(ordered) // 2]:.1f}, p99 {ordered[len(ordered) * 99 // 100]:.1f} ms"
+
+
+def latency():
+    for rate in ("20", "60", "1000"):
+        with server() as (url, _), started("run", "--quiet", "--json", "--start", "100", "--rate", rate), pages(url, 1, width=1280, height=720) as [page]:
+            page.wait_for_timeout(3000)
+            received, drawn, ways, drawn_after = rates(page, 10)
+            print(f"{rate:>5} Hz: {received:.0f} frames/s received after {spread(ways)}; {drawn:.0f} pictures/s, what they show was sent {spread(drawn_after)} before")
+
+
+def long():
+    scene = ROOT / "config" / "long.toml"
+    with server() as (url, _), started("run", "--quiet", "--json", "--scene", str(scene)), pages(url, 1, width=1600, height=900) as [page]:
+        page.wait_for_timeout(3000)
+        received, drawn, _, _ = rates(page, 10)
+        print(f"5,000 benches, 1600 x 900: {received:.1f} frames/s received, {drawn:.1f} pictures/s")
+        trace = page.context.new_cdp_session(page)
+        trace.send("Profiler.enable")
+        trace.send("Profiler.start")
+        page.wait_for_timeout(5000)
+        profile = trace.send("Profiler.stop")["profile"]
+        names = {node["id"]: node["callFrame"]["functionName"] or "(script)" for node in profile["nodes"]}
+        times = {}
+        for node, delta in zip(profile["samples"], profile["timeDeltas"]):
+            times[names[node]] = times.get(names[node], 0) + delta
+        whole = sum(times.values())
+        top = sorted(times.items(), key=lambda item: -item[1])[:8]
+        print("the page's thread: " + ", ".join(f"{name} {100 * part / whole:.0f} %" for name, part in top))
+        page.click("#follow")
+        page.wait_for_timeout(1000)
+        received, drawn, _, _ = rates(page, 5)
+        print(f"following the head: {drawn:.1f} pictures/s")
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    {"cost": cost, "latency": latency, "long": long}[sys.argv[1]]()

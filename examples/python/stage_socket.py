@@ -1,0 +1,74 @@
+"""Reads the stage picture's WebSocket, as a visualiser on any machine could: `pip install websockets==17.4`.
+
+    stage_socket.py [--url ws://127.0.0.1:8080/frames] [--rate HZ] [--seconds S]
+
+Prints the stage and the alerts as they come and the head's place once a second. Start `bench-dragon run` and
+`bench-dragon view` first.
+"""
+
+import argparse
+import json
+import struct
+import time
+
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+VERSION = 1
+HEADER = struct.Struct("<BBHI d d Q Q Q Q f I")
+HANDLE = struct.Struct("<4f")
+STATES = ["moving", "approaching", "contact", "stall", "lock", "path_end"]
+
+
+def frame(message):
+    """The header as a dictionary and one (x, y, heading, speed) for each handle."""
+    version, state, _, handles, sim_time, time_scale, sequence, run_id, sent_ns, tick, clearance, _ = HEADER.unpack_from(message)
+    if version != VERSION:
+        raise SystemExit(f"the server speaks version {version} of the layout, this program version {VERSION}")
+    header = {
+        "state": STATES[state],
+        "handles": handles,
+        "sim_time": sim_time,
+        "time_scale": time_scale,
+        "sequence": sequence,
+        "run_id": run_id,
+        "sent_ns": sent_ns,
+        "tick": tick,
+        "clearance": clearance,
+    }
+    return header, list(HANDLE.iter_unpack(memoryview(message)[HEADER.size :]))
+
+
+def follow(socket, deadline):
+    told = 0.0
+    for message in socket:
+        if isinstance(message, str):
+            print(json.loads(message), flush=True)
+        else:
+            header, handles = frame(message)
+            if time.monotonic() - told >= 1:
+                told = time.monotonic()
+                x, y, _, speed = handles[0]
+                print(f"t = {header['sim_time']:8.3f} s  {header['state']:11} head ({x:.3f}, {y:.3f}) m  {speed:.3f} m/s", flush=True)
+        if time.monotonic() > deadline:
+            return
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--url", default="ws://127.0.0.1:8080/frames")
+    parser.add_argument("--rate", type=float, default=60, help="at most so many frames a second")
+    parser.add_argument("--seconds", type=float, default=float("inf"))
+    options = parser.parse_args()
+    deadline = time.monotonic() + options.seconds
+    while time.monotonic() < deadline:
+        try:
+            with connect(f"{options.url}?rate={options.rate}", compression=None, max_queue=1) as socket:
+                follow(socket, deadline)
+        except (OSError, ConnectionClosed) as error:
+            print(f"no server: {error}; trying again", flush=True)
+            time.sleep(1)
+
+
+if __name__ == "__main__":
+    main()

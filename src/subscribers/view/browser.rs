@@ -1,0 +1,107 @@
+//! Sends the newest picture to one browser, at the pace at which that one takes it. Called by the server.
+//!
+//! A socket's buffers hold seconds of frames, so that it may be written to says nothing about what the other side has
+//! read. Each frame is therefore followed by a ping, which every WebSocket answers by itself once it has read that
+//! far, and no more than [`UNDER_WAY`] frames go unanswered: what a slow browser cannot take it never gets.
+
+use std::time::Duration;
+
+use axum::extract::ws::{Message, Utf8Bytes, WebSocket};
+use futures_util::{Sink, SinkExt, StreamExt};
+use tokio::sync::watch;
+use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout};
+
+use super::{Picture, wire};
+use crate::live::clock::monotonic_ns;
+
+/// Frames that may be on their way to a browser: enough for 60 a second over a network that takes 50 ms.
+const UNDER_WAY: u64 = 3;
+/// How often a browser is asked whether it is still there.
+const ASK: Duration = Duration::from_secs(10);
+/// Silence after which it is not.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// Serves a browser until it goes. `gap` is the least time between two frames.
+pub(super) async fn serve(socket: WebSocket, mut pictures: watch::Receiver<Picture>, gap: Duration) {
+    let (mut sink, mut stream) = socket.split();
+    let mut ask = interval(ASK);
+    ask.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let (mut sent, mut answered) = (0, 0);
+    let (mut due, mut heard) = (Instant::now(), Instant::now());
+    let mut known = Picture::default();
+    pictures.mark_changed();
+    loop {
+        let taken = sent - answered < UNDER_WAY;
+        let messages = tokio::select! {
+            message = stream.next() => {
+                let Some(Ok(message)) = message else { return };
+                heard = Instant::now();
+                match message {
+                    Message::Close(_) => return,
+                    Message::Pong(count) => {
+                        // Only the last of several pings need be answered.
+                        let count = count.as_ref().try_into().map_or(0, u64::from_le_bytes);
+                        answered = count.clamp(answered, sent);
+                        continue;
+                    }
+                    Message::Text(question) if question == "clock" => vec![text(wire::clock(monotonic_ns()))],
+                    _ => continue,
+                }
+            }
+            changed = wait_for(&mut pictures, due), if taken => {
+                if changed.is_err() {
+                    return;
+                }
+                let picture = pictures.borrow_and_update().clone();
+                let mut messages = news(&picture, &known);
+                if picture.frame != known.frame && !picture.frame.is_empty() {
+                    sent += 1;
+                    due = (due + gap).max(Instant::now() - gap);
+                    messages.extend([Message::Binary(picture.frame.clone()), ping(sent)]);
+                }
+                known = picture;
+                messages
+            }
+            _ = ask.tick() => {
+                if heard.elapsed() > PATIENCE {
+                    return;
+                }
+                vec![ping(sent)]
+            }
+        };
+        if !matches!(timeout(PATIENCE, send(&mut sink, messages)).await, Ok(Ok(()))) {
+            return;
+        }
+    }
+}
+
+/// Waits for a new picture that may be sent already. The sender has gone where this is an error.
+async fn wait_for(pictures: &mut watch::Receiver<Picture>, due: Instant) -> Result<(), watch::error::RecvError> {
+    sleep_until(due).await;
+    pictures.changed().await
+}
+
+/// The messages about what has changed besides the frame.
+fn news(picture: &Picture, known: &Picture) -> Vec<Message> {
+    let parts = |of: &Picture| [of.waiting.clone(), of.stage.clone(), of.alert.clone()];
+    let changed = parts(picture).into_iter().zip(parts(known)).filter(|(new, old)| new != old && !new.is_empty());
+    changed.map(|(new, _)| Message::Text(new)).collect()
+}
+
+fn text(json: String) -> Message {
+    Message::Text(Utf8Bytes::from(json))
+}
+
+fn ping(count: u64) -> Message {
+    Message::Ping(count.to_le_bytes().to_vec().into())
+}
+
+async fn send(
+    sink: &mut (impl Sink<Message, Error = axum::Error> + Unpin),
+    messages: Vec<Message>,
+) -> Result<(), axum::Error> {
+    for message in messages {
+        sink.feed(message).await?;
+    }
+    sink.flush().await
+}

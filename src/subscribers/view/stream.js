@@ -1,0 +1,181 @@
+// The stream: receives frames, stage and alerts, comes back by itself, and says where everything is at a moment
+// between two frames. Knows nothing of the page.
+
+const VERSION = 1;
+const HEADER_BYTES = 64;
+/** More frames a second than this make no motion smoother once it is interpolated. */
+const MOST_FRAMES = 125;
+/** Frames further apart than this (ms) are shown one after another: straight lines between them would be wrong. */
+const LONGEST_GAP = 1000;
+/** The clock is asked for this often (ms); a server that has not answered by the next time is gone. */
+const ASK = 5000;
+/** How much of the past (ms) says how irregularly frames come. */
+const MEMORY = 2000;
+
+/** A frame, as the server's layout has it. Null for a layout of another version. */
+function frameOf(data, at) {
+  const bytes = new DataView(data);
+  if (data.byteLength < HEADER_BYTES || bytes.getUint8(0) !== VERSION) return null;
+  const time = bytes.getFloat64(8, true), scale = bytes.getFloat64(16, true);
+  return {
+    at,
+    state: bytes.getUint8(1),
+    time,
+    scale,
+    sequence: Number(bytes.getBigUint64(24, true)),
+    run: String(bytes.getBigUint64(32, true)),
+    sent: Number(bytes.getBigUint64(40, true)) / 1e6,
+    clearance: bytes.getFloat32(56, true),
+    handles: new Float32Array(data, HEADER_BYTES),
+    // Milliseconds of wall time since the show's beginning, on the publisher's clock.
+    due: (1000 * time) / scale,
+  };
+}
+
+/** The last frames, and a clock that runs evenly a little behind them however unevenly they come. */
+class Playback {
+  constructor() {
+    this.clear();
+  }
+
+  clear() {
+    this.frames = [];
+    this.offsets = [];
+    this.earliest = this.lag = this.shown = NaN;
+    this.interval = 50;
+    this.drawnAt = 0;
+  }
+
+  get newest() {
+    return this.frames.at(-1) ?? null;
+  }
+
+  push(frame) {
+    const last = this.newest;
+    if (last && (last.run !== frame.run || frame.due < last.due || last.handles.length !== frame.handles.length)) this.clear();
+    if (last && last === this.newest && last.due === frame.due) {
+      // The show stands still.
+      this.frames[this.frames.length - 1] = frame;
+      return;
+    }
+    this.frames.push(frame);
+    if (this.frames.length > 64) this.frames.shift();
+    this.offsets.push({ at: frame.at, offset: frame.at - frame.due });
+    while (this.offsets[0].at < frame.at - MEMORY) this.offsets.shift();
+    const offsets = this.offsets.map((one) => one.offset).sort((a, b) => a - b);
+    this.earliest = offsets[0];
+    const spread = offsets[Math.floor(0.95 * (offsets.length - 1))] - offsets[0];
+    const count = Math.min(this.frames.length, 16);
+    if (count > 1) this.interval = (frame.due - this.frames.at(-count).due) / (count - 1);
+    this.lag = Math.min(this.interval, LONGEST_GAP) + Math.min(spread, 100);
+  }
+
+  /** The show's time now, in seconds, as far as the newest frame reaches or a little further. */
+  time(now) {
+    const { newest } = this;
+    return (Math.min(now - this.earliest, newest.due + this.interval) * newest.scale) / 1000;
+  }
+
+  /** The two frames to draw between, and how far from the first to the second. */
+  between(now) {
+    const { frames, newest } = this;
+    const passed = Math.min(now - this.drawnAt, 1000), target = now - this.earliest - this.lag;
+    this.drawnAt = now;
+    const error = target - this.shown - passed;
+    // A small error is worked off unseen.
+    this.shown = Math.abs(error) < 300 ? this.shown + passed + error * Math.min(1, passed / 300) : target;
+    let k = frames.length - 1;
+    while (k > 0 && frames[k - 1].due > this.shown) k--;
+    const b = frames[k], a = frames[Math.max(0, k - 1)], gap = b.due - a.due;
+    if (this.shown >= newest.due || gap <= 0 || gap > LONGEST_GAP) return { a: newest, b: newest, part: 1 };
+    return { a, b, part: Math.min(1, Math.max(0, (this.shown - a.due) / gap)) };
+  }
+}
+
+/** The server's stream, opened again whenever it breaks. */
+export class Stream {
+  constructor() {
+    this.playback = new Playback();
+    this.stages = null;
+    this.alerts = null;
+    this.trouble = "waiting for the server";
+    this.received = 0;
+    /** How long the last frames were on their way, ms. */
+    this.ways = [];
+    this.clock = null;
+    this.retry = 250;
+    this.open();
+  }
+
+  open() {
+    const scheme = location.protocol === "https:" ? "wss" : "ws";
+    const socket = new WebSocket(`${scheme}://${location.host}/frames?rate=${MOST_FRAMES}`);
+    socket.binaryType = "arraybuffer";
+    let asked = null, nearest = Infinity;
+    const again = () => {
+      clearInterval(asking);
+      socket.onopen = socket.onmessage = socket.onclose = null;
+      socket.close();
+      this.forget("waiting for the server");
+      setTimeout(() => this.open(), this.retry);
+      this.retry = Math.min(4000, 2 * this.retry);
+    };
+    const ask = () => {
+      // Without waiting for a goodbye: a machine that was switched off says none.
+      if (asked !== null || socket.readyState !== WebSocket.OPEN) return again();
+      asked = performance.now();
+      socket.send("clock");
+    };
+    const asking = setInterval(ask, ASK);
+    socket.onclose = again;
+    socket.onopen = () => {
+      this.retry = 250;
+      this.trouble = "waiting for a publisher";
+      ask();
+    };
+    socket.onmessage = ({ data }) => {
+      if (typeof data !== "string") return this.receive(data);
+      const message = JSON.parse(data);
+      if (message.type === "clock") {
+        // The shortest way there and back says most about how the two clocks lie to each other.
+        const now = performance.now(), way = now - asked;
+        asked = null;
+        if (way <= nearest) {
+          nearest = way;
+          this.clock = Number(message.monotonic_ns) / 1e6 - (now - way / 2);
+        }
+      } else this.tell(message);
+    };
+  }
+
+  forget(trouble) {
+    this.trouble = trouble;
+    this.playback.clear();
+    this.stages = this.alerts = null;
+  }
+
+  tell(message) {
+    if (message.type === "waiting") this.forget(message.reason ?? "waiting for a publisher");
+    if (message.type === "stage") this.stages = message;
+    if (message.type === "alert") this.alerts = message;
+  }
+
+  receive(data) {
+    const frame = frameOf(data, performance.now());
+    if (!frame) return this.forget("this page is for another version of the server: load it again");
+    this.trouble = null;
+    this.received++;
+    if (this.clock !== null && this.ways.push(frame.at + this.clock - frame.sent) > 600) this.ways.shift();
+    this.playback.push(frame);
+  }
+
+  /** The stage of the run whose frames come, if it is known. */
+  get stage() {
+    return this.stages?.run_id === this.playback.newest?.run ? this.stages : null;
+  }
+
+  /** The latest alert of that run, or null. */
+  get alert() {
+    return this.alerts?.run_id === this.playback.newest?.run ? this.alerts : null;
+  }
+}

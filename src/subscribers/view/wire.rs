@@ -1,0 +1,124 @@
+//! What a browser receives: frames as bytes, and JSON for what changes seldom. Called by the server only.
+//!
+//! Everything is little-endian. A frame is a header of 64 bytes and 16 bytes for each handle, head first:
+//!
+//! | byte | type | what |
+//! |---|---|---|
+//! | 0 | u8 | version of this layout: 1 |
+//! | 1 | u8 | state: 0 moving, 1 approaching, 2 contact, 3 stall, 4 lock, 5 path end |
+//! | 2 | u16 | 0 |
+//! | 4 | u32 | number of handles |
+//! | 8 | f64 | simulated time, s |
+//! | 16 | f64 | simulated seconds per second of wall time |
+//! | 24 | u64 | sequence: counts the frames published in this run; a browser skips some |
+//! | 32 | u64 | run: new for every start of a publisher |
+//! | 40 | u64 | CLOCK_MONOTONIC in ns when the publisher sent the frame |
+//! | 48 | u64 | tick |
+//! | 56 | f32 | least clearance, m; NaN where not computed |
+//! | 60 | u32 | 0 |
+//! | 64 + 16 k | 4 x f32 | handle k: x, y (m), heading (rad), speed without sign (m per simulated second; NaN where not computed) |
+
+use serde_json::{Value, json};
+
+use crate::messages::{CollisionAlert, FrameHeader, HandlePose, NO_BENCH, Stage, State};
+
+const VERSION: u8 = 1;
+const HEADER_BYTES: usize = 64;
+const HANDLE_BYTES: usize = 16;
+
+pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(HEADER_BYTES + HANDLE_BYTES * handles.len());
+    bytes.extend([VERSION, header.state as u8, 0, 0]);
+    bytes.extend((handles.len() as u32).to_le_bytes());
+    bytes.extend(header.sim_time.to_le_bytes());
+    bytes.extend(header.time_scale.to_le_bytes());
+    for number in [header.sequence, header.run_id, header.sent_ns, header.tick] {
+        bytes.extend(number.to_le_bytes());
+    }
+    bytes.extend((header.min_clearance as f32).to_le_bytes());
+    bytes.extend([0; 4]);
+    for pose in handles {
+        for number in [pose.x, pose.y, pose.heading, pose.vx.hypot(pose.vy)] {
+            bytes.extend((number as f32).to_le_bytes());
+        }
+    }
+    bytes
+}
+
+pub(super) fn stage(stage: &Stage) -> String {
+    let Stage { run_id, pitch, start_turn, hole_inset, head_length, body_length, width, benches, .. } = *stage;
+    json!({"type": "stage", "run_id": exact(run_id), "pitch": pitch, "start_turn": start_turn,
+        "hole_inset": hole_inset, "head_length": head_length, "body_length": body_length, "width": width,
+        "benches": benches})
+    .to_string()
+}
+
+pub(super) fn alert(alert: &CollisionAlert) -> String {
+    let bench = |bench: u32| (bench != NO_BENCH).then_some(bench);
+    json!({"type": "alert", "run_id": exact(alert.run_id),
+        "level": State::from_wire(alert.level).unwrap_or(State::Moving).level_name(),
+        "sim_time": alert.sim_time, "event_time": alert.event_time, "time_to_event": alert.time_to_event,
+        "clearance": alert.clearance, "x": alert.x, "y": alert.y,
+        "bench_a": bench(alert.bench_a), "bench_b": bench(alert.bench_b)})
+    .to_string()
+}
+
+/// No publisher is there; `reason` says why where it is one that cannot be used.
+pub(super) fn waiting(reason: Option<&str>) -> String {
+    json!({"type": "waiting", "reason": reason}).to_string()
+}
+
+/// The answer to a question for the time: CLOCK_MONOTONIC, which frames are stamped with.
+pub(super) fn clock(monotonic_ns: u64) -> String {
+    json!({"type": "clock", "monotonic_ns": exact(monotonic_ns)}).to_string()
+}
+
+/// JavaScript rounds numbers beyond 2^53, so these travel as text.
+fn exact(number: u64) -> Value {
+    Value::String(number.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_has_the_documented_layout() {
+        let header = FrameHeader {
+            run_id: u64::MAX,
+            sequence: 7,
+            tick: 9,
+            sent_ns: 1 << 60,
+            sim_time: 405.5,
+            time_scale: 2.0,
+            min_clearance: 0.25,
+            handles: 2,
+            state: 2,
+            ..FrameHeader::default()
+        };
+        let pose = HandlePose { x: 8.75, y: -1.5, heading: 0.5, vx: 3.0, vy: -4.0 };
+        let still = HandlePose { vx: f64::NAN, ..pose };
+        let bytes = frame(&header, &[pose, still]);
+        assert_eq!(bytes.len(), 96);
+        assert_eq!(bytes[..8], [1, 2, 0, 0, 2, 0, 0, 0]);
+        assert_eq!(bytes[8..16], 405.5_f64.to_le_bytes());
+        assert_eq!(bytes[16..24], 2.0_f64.to_le_bytes());
+        assert_eq!(bytes[24..32], 7_u64.to_le_bytes());
+        assert_eq!(bytes[32..40], [0xff; 8]);
+        assert_eq!(bytes[40..48], [0, 0, 0, 0, 0, 0, 0, 0x10]);
+        assert_eq!(bytes[48..56], 9_u64.to_le_bytes());
+        assert_eq!(bytes[56..64], [0, 0, 0x80, 0x3e, 0, 0, 0, 0]);
+        let numbers: Vec<_> = bytes[64..].chunks(4).map(|four| f32::from_le_bytes(four.try_into().unwrap())).collect();
+        assert_eq!(numbers[..7], [8.75, -1.5, 0.5, 5.0, 8.75, -1.5, 0.5]);
+        assert!(numbers[7].is_nan());
+    }
+
+    #[test]
+    fn an_alert_without_benches_or_event_has_nulls() {
+        let nothing =
+            CollisionAlert { bench_a: NO_BENCH, bench_b: NO_BENCH, event_time: f64::NAN, ..Default::default() };
+        let text: Value = serde_json::from_str(&alert(&nothing)).unwrap();
+        assert_eq!(text["level"], "clear");
+        assert!(["bench_a", "bench_b", "event_time"].iter().all(|key| text[key].is_null()), "{text}");
+    }
+}

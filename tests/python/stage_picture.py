@@ -1,0 +1,435 @@
+"""The stage picture in a real browser: Debian's Chromium, driven by Playwright.
+
+    stage_picture.py SCENARIO PROGRAM NAME
+
+Starts its own server and publishers under the service name NAME, looks at what the page shows and draws, and compares
+it with the exact positions in tests/truth. Ends with exit code 0, or with what it found instead.
+"""
+
+import base64
+import contextlib
+import csv
+import http.server
+import json
+import math
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy
+from playwright.sync_api import sync_playwright
+
+TRUTH = pathlib.Path(__file__).resolve().parents[1] / "truth" / "paper_scene_exact.csv"
+CONTACT = 412.473837682115
+WIDTH, HEAD_LENGTH, BODY_LENGTH = 0.30, 3.41, 2.20
+# Nothing here may wait for ever; an alarm still lets everything that was started be ended.
+WATCHDOG = 150
+STILL = ["--start", "300", "--time-scale", "1e-6"]
+
+_, SCENARIO, PROGRAM, NAME = sys.argv
+
+
+@contextlib.contextmanager
+def started(*arguments):
+    child = subprocess.Popen([PROGRAM, "--name", NAME, *arguments], stdout=subprocess.PIPE, text=True)
+    try:
+        yield child
+    finally:
+        child.kill()
+        child.wait()
+
+
+def publisher(*arguments):
+    return started("run", "--quiet", "--json", *arguments)
+
+
+@contextlib.contextmanager
+def server(port=0):
+    with started("view", "--json", "--port", str(port)) as child:
+        yield json.loads(child.stdout.readline())["url"]
+
+
+@contextlib.contextmanager
+def browser(**context):
+    """A page of a Chromium of its own, and a list of everything it complains about."""
+    with sync_playwright() as playwright, playwright.chromium.launch(executable_path="/usr/bin/chromium") as chromium:
+        yield opened(chromium, **context)
+
+
+def opened(chromium, **context):
+    page = chromium.new_context(**{"viewport": {"width": 1280, "height": 720}, "color_scheme": "light", **context}).new_page()
+    complaints = []
+    page.on("console", lambda message: message.type == "error" and complaints.append(message.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("requestfailed", lambda request: complaints.append(f"{request.url} failed"))
+    return page, complaints
+
+
+def until(page, script, what, seconds=30):
+    """The value of a script as soon as it is true."""
+    deadline = time.monotonic() + seconds
+    while not (value := page.evaluate(script)):
+        assert time.monotonic() < deadline, f"{what}: not within {seconds} s; the page says {words(page)!r}"
+        time.sleep(0.05)
+    return value
+
+
+def words(page):
+    return page.inner_text("body")
+
+
+def drawn(page):
+    until(page, "picture.head !== null && picture.drawn > 0", "a picture")
+
+
+def truth_at(second):
+    with open(TRUTH, encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if float(row["t_s"]) == second]
+    return numpy.array([[float(row["x_m"]), float(row["y_m"])] for row in rows])
+
+
+def canvas_pixels(page):
+    """The canvas's own pixels, and how places of the stage (metres) become pixels of it."""
+    width, height, data, origin, unit = page.evaluate(
+        """() => {
+            const canvas = document.getElementById("stage"), {width, height} = canvas;
+            const data = canvas.getContext("2d").getImageData(0, 0, width, height).data;
+            let text = "";
+            for (let k = 0; k < data.length; k += 8192) text += String.fromCharCode(...data.subarray(k, k + 8192));
+            return [width, height, btoa(text), picture.toPixel(0, 0), picture.toPixel(1, 1)];
+        }"""
+    )
+    pixels = numpy.frombuffer(base64.b64decode(data), numpy.uint8).reshape(height, width, 4)[:, :, :3]
+    origin, unit = numpy.array(origin), numpy.array(unit)
+    ratio = page.evaluate("devicePixelRatio")
+    return pixels, lambda places: numpy.floor((origin + places * (unit - origin)) * ratio).astype(int), unit[0] - origin[0]
+
+
+def is_board(colours):
+    """In the light theme, boards and their marks are the only thing that is not bright."""
+    return colours.min(axis=-1) < 160
+
+
+def outside_of_board(places, front, rear, length):
+    """The distance from each place to a board whose handles are at `front` and `rear`, 0 inside it."""
+    along = (front - rear) / numpy.linalg.norm(front - rear)
+    offset = places - (front + rear) / 2
+    u = numpy.maximum(numpy.abs(offset @ along) - length / 2, 0)
+    v = numpy.maximum(numpy.abs(offset @ [-along[1], along[0]]) - WIDTH / 2, 0)
+    return numpy.hypot(u, v)
+
+
+def outside_of_boards(places, handles):
+    """The distance from each place to the nearest board."""
+    lengths = [HEAD_LENGTH] + [BODY_LENGTH] * (len(handles) - 2)
+    boards = zip(handles, handles[1:], lengths)
+    return numpy.min([outside_of_board(places, *board) for board in boards], axis=0)
+
+
+def boards_are_where_the_truth_says():
+    handles = truth_at(300.0)
+    with server() as url, publisher(*STILL), browser() as (page, complaints):
+        requests = []
+        page.on("request", lambda request: requests.append(request.url))
+        page.goto(url)
+        drawn(page)
+        time.sleep(0.5)
+        pixels, to_pixel, scale = canvas_pixels(page)
+        box = page.locator("#stage").bounding_box()
+        assert box["width"] > 400 and box["height"] > 400, f"the canvas is {box}"
+        middles = to_pixel((handles[:-1] + handles[1:]) / 2)
+        missing = [bench for bench, (x, y) in enumerate(middles) if not is_board(pixels[y, x])]
+        assert not missing, f"no board is drawn where benches {missing} (from 0) are"
+        # The ground between the boards, away from their edges and from the words at both ends of the dragon.
+        random = numpy.random.default_rng(1)
+        places = random.uniform(-9, 9, (20000, 2))
+        away = outside_of_boards(places, handles) > 3 / scale
+        for end in [handles[0], handles[-1]]:
+            away &= numpy.linalg.norm(places - end, axis=1) > 100 / scale
+        at = to_pixel(places[away])
+        inside = (at >= 0).all(axis=1) & (at[:, 0] < pixels.shape[1] - 200) & (at[:, 1] < pixels.shape[0])
+        at = at[inside]
+        wrong = is_board(pixels[at[:, 1], at[:, 0]])
+        assert len(at) > 2000 and not wrong.any(), f"boards are drawn at {wrong.sum()} of {len(at)} places without one"
+        says_who_it_is(page, handles)
+        dark_and_light(page)
+        assert page.get_by_role("alert").count() == 1 and page.get_by_role("meter").count() == 1
+        assert all(request.startswith((url, "data:")) for request in requests), requests
+        assert not complaints, complaints
+
+
+def says_who_it_is(page, handles):
+    """A click on the head's board tells its number, place and speed; so does a number typed."""
+    x, y = page.evaluate("([x, y]) => picture.toPixel(x, y)", ((handles[0] + handles[1]) / 2).tolist())
+    box = page.locator("#stage").bounding_box()
+    page.mouse.click(box["x"] + x, box["y"] + y)
+    until(page, "document.getElementById('bench').textContent.startsWith('Bench 1 of 223, the head')", "the head, clicked")
+    told = [float(number) for number in re.findall(r"-?\d+\.\d+", page.inner_text("#bench"))]
+    assert numpy.allclose(told[:3], [*handles[0], 1.0], atol=6e-4), f"{told} is not {handles[0]} and 1 m/s"
+    page.fill("#pick", "223")
+    until(page, "document.getElementById('bench').textContent.startsWith('Bench 223 of 223, the tail')", "the tail, by number")
+    told = [float(number) for number in re.findall(r"-?\d+\.\d+", page.inner_text("#bench"))]
+    assert numpy.allclose(told[:2], handles[222], atol=6e-4), f"{told} is not {handles[222]}"
+
+
+def dark_and_light(page):
+    corner = lambda: canvas_pixels(page)[0][3, 3].mean()
+    assert corner() > 200, "the light page has no light ground"
+    page.emulate_media(color_scheme="dark")
+    time.sleep(0.5)
+    assert corner() < 50, "the dark page has no dark ground"
+    page.click("#theme")
+    time.sleep(0.5)
+    assert corner() > 200, "the button does not make it light"
+
+
+def hands_move_the_picture():
+    head = truth_at(300.0)[0].tolist()
+    at_head = lambda: numpy.array(page.evaluate("([x, y]) => picture.toPixel(x, y)", head))
+    scale = lambda: page.evaluate("picture.toPixel(1, 0)[0] - picture.toPixel(0, 0)[0]")
+    with server() as url, publisher(*STILL), browser(has_touch=True) as (page, complaints):
+        page.goto(url)
+        drawn(page)
+        box = page.locator("#stage").bounding_box()
+        first, size = at_head(), scale()
+        page.mouse.move(box["x"] + first[0], box["y"] + first[1])
+        page.mouse.wheel(0, -500)
+        until(page, f"picture.toPixel(1, 0)[0] - picture.toPixel(0, 0)[0] > 1.5 * {size}", "a larger picture")
+        assert numpy.allclose(at_head(), first, atol=1.0), "the wheel moves what is under the pointer"
+        page.mouse.down()
+        page.mouse.move(box["x"] + first[0] + 70, box["y"] + first[1] - 40, steps=5)
+        page.mouse.up()
+        assert numpy.allclose(at_head() - first, [70, -40], atol=1.0), "dragging does not move the picture along"
+        page.keyboard.press("0")
+        shown = f"{first}, {size} pixels a metre, became {at_head()}, {scale()}"
+        assert numpy.allclose(at_head(), first, atol=1.0) and math.isclose(scale(), size, rel_tol=1e-3), f"0: {shown}"
+        page.keyboard.press("ArrowRight")
+        assert at_head()[0] < first[0], "an arrow does not move the picture"
+        page.keyboard.press("+")
+        assert scale() > size, "+ does not enlarge"
+        page.click("#whole")
+        pinch(page, box)
+        assert math.isclose(scale(), 2 * size, rel_tol=0.02), "two fingers do not enlarge"
+        page.keyboard.press("f")
+        time.sleep(0.3)
+        assert numpy.allclose(at_head(), [box["width"] / 2, box["height"] / 2], atol=1.0), "the camera does not follow"
+        page.click("#whole")
+        page.set_viewport_size({"width": 390, "height": 844})
+        time.sleep(0.5)
+        fits(page)
+        head_pixel = at_head()
+        box = page.locator("#stage").bounding_box()
+        assert box["height"] > 280 and box["width"] == 390, f"on a phone the stage is {box}"
+        page.touchscreen.tap(box["x"] + head_pixel[0], box["y"] + head_pixel[1])
+        until(page, "document.getElementById('bench').textContent.startsWith('Bench 1 of')", "the head, tapped")
+        assert not complaints, complaints
+
+
+def pinch(page, box):
+    touch = page.context.new_cdp_session(page)
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    fingers = lambda apart: [{"x": x - apart, "y": y, "id": 1}, {"x": x + apart, "y": y, "id": 2}]
+    touch.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": fingers(60)})
+    for apart in range(65, 121, 5):
+        touch.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": fingers(apart)})
+    touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    time.sleep(0.3)
+
+
+def fits(page):
+    """Nothing is cut off at the side, and the words stay in their boxes."""
+    cut = page.evaluate(
+        """() => [...document.querySelectorAll("body, header, h1, #left, #alert, footer, nav")]
+            .filter((one) => one.scrollWidth > one.clientWidth + 1 && getComputedStyle(one).display !== "inline")
+            .map((one) => one.id || one.tagName)"""
+    )
+    assert not cut, f"{cut} are wider than their place at {page.viewport_size}"
+
+
+def show_ends_in_contact():
+    with server() as url, browser() as (page, complaints):
+        page.goto(url)
+        until(page, "document.body.dataset.level === 'waiting'", "waiting for a publisher")
+        listen(page)
+        with publisher("--start", "405", "--rate", "20"):
+            until(page, "document.body.dataset.level === 'approaching'", "the approach")
+            drawn(page)
+            counts_down(page)
+            receives_the_stream(page)
+            fits(page)
+            page.set_viewport_size({"width": 390, "height": 844})
+            time.sleep(0.3)
+            fits(page)
+            page.set_viewport_size({"width": 1280, "height": 720})
+            until(page, "document.body.dataset.level === 'contact'", "the contact")
+            time.sleep(0.5)
+            fits(page)
+            assert "contact" in page.inner_text("#state").lower(), page.inner_text("#state")
+            assert "benches 1 and 9 touch" in page.get_by_role("alert").inner_text(), words(page)
+            assert page.inner_text("#left") == "", "the countdown goes on after the contact"
+            heard = page.evaluate("heard")
+            assert any("Approaching" in one for one in heard) and any("benches 1 and 9 touch" in one for one in heard), heard
+            assert any(re.fullmatch(r"[345] seconds", one) for one in heard), heard
+            danger_is_marked(page)
+            assert not complaints, complaints
+
+
+def listen(page):
+    """Keeps what a screen reader would say."""
+    page.evaluate(
+        """() => {
+            window.heard = [];
+            const said = (changes) => changes.forEach(({target}) => heard.push(target.textContent));
+            for (const region of document.querySelectorAll("[role=alert], [aria-live=polite]"))
+                new MutationObserver(said).observe(region, {childList: true, characterData: true});
+        }"""
+    )
+
+
+def counts_down(page):
+    left, shown = page.evaluate("[document.getElementById('left').textContent, picture.time]")
+    number, unit = re.fullmatch(r"(\d+\.\d)(s)", left).groups()
+    assert unit == "s" and abs(float(number) - (CONTACT - shown)) < 1, f"{left} left at {shown} s"
+    height = page.evaluate("parseFloat(getComputedStyle(document.getElementById('left')).fontSize)")
+    assert height >= 0.1 * page.viewport_size["height"], f"a countdown of {height} px is not read from afar"
+
+
+def receives_the_stream(page):
+    counts = "[picture.received, picture.sequence, picture.drawn]"
+    first = page.evaluate(counts)
+    time.sleep(3)
+    received, published, drawn_times = (now - then for now, then in zip(page.evaluate(counts), first))
+    print(f"in 3 s {published} frames published, {received} received, {drawn_times} pictures drawn")
+    assert published > 0 and received >= published / 2, f"of {published} frames {received} came"
+
+
+def danger_is_marked(page):
+    """A red ring of 13 pixels is around the corner of the head's board that touches bench 8, and nowhere far from it."""
+    rows = subprocess.run([PROGRAM, "solve", "--at", "contact"], capture_output=True, text=True, check=True).stdout.splitlines()
+    handles = numpy.array([[float(row["x"]), float(row["y"])] for row in csv.DictReader(rows)])
+    along = (handles[0] - handles[1]) / numpy.linalg.norm(handles[0] - handles[1])
+    across, middle = numpy.array([-along[1], along[0]]), (handles[0] + handles[1]) / 2
+    corners = [middle + u * HEAD_LENGTH / 2 * along + v * WIDTH / 2 * across for u in (1, -1) for v in (1, -1)]
+    distances = [outside_of_board(corner[None], handles[8], handles[9], BODY_LENGTH)[0] for corner in corners]
+    assert min(distances) < 1e-6, f"the nearest corner of the head is {min(distances)} m from bench 8"
+    touching = corners[int(numpy.argmin(distances))]
+    pixels, to_pixel, scale = canvas_pixels(page)
+    red = (pixels[:, :, 0] > 150) & (pixels[:, :, 1] < 60) & (pixels[:, :, 2] < 80)
+    x, y = to_pixel(touching[None])[0]
+    for angle in range(20, 360, 40):
+        at_x, at_y = x + round(13 * math.cos(math.radians(angle))), y + round(13 * math.sin(math.radians(angle)))
+        assert red[at_y - 1 : at_y + 2, at_x - 1 : at_x + 2].any(), f"no ring around {touching}, at {angle} degrees"
+    ys, xs = numpy.nonzero(red)
+    furthest = numpy.hypot(xs - x, ys - y).max() / scale
+    # The head is 3.41 m long and its name stands at its end.
+    assert furthest < 6, f"red {furthest} m from the contact, where neither bench nor its name is"
+
+
+def publishers_come_and_go():
+    with browser() as (page, complaints):
+        with server() as url:
+            page.goto(url)
+            with publisher("--start", "100"):
+                drawn(page)
+                first = page.evaluate("picture.run")
+            until(page, "document.body.dataset.level === 'waiting' && picture.head === null", "its death")
+            assert "publisher" in page.inner_text("#state"), words(page)
+            with publisher("--start", "200"):
+                until(page, f"picture.run !== null && picture.run !== '{first}' && picture.time >= 200", "its return")
+            assert not complaints, complaints
+        until(page, "document.getElementById('state').textContent.includes('server')", "the server's death")
+        # From here on the browser itself reports each vain try to connect.
+        with server(int(url.rstrip("/").rsplit(":", 1)[1])), publisher("--start", "150"):
+            until(page, "picture.head !== null && picture.time >= 150", "the server's return")
+
+
+def five_at_once():
+    with contextlib.ExitStack() as stack:
+        url = stack.enter_context(server())
+        stack.enter_context(publisher("--start", "100"))
+        playwright = stack.enter_context(sync_playwright())
+        views = []
+        for _ in range(5):
+            chromium = stack.enter_context(playwright.chromium.launch(executable_path="/usr/bin/chromium"))
+            views.append(opened(chromium, viewport={"width": 480, "height": 360}))
+        for page, _ in views:
+            page.goto(url)
+        for page, _ in views:
+            drawn(page)
+        counts = "[picture.received, picture.drawn, picture.sequence, performance.now()]"
+        first = [page.evaluate(counts) for page, _ in views]
+        time.sleep(3)
+        for (page, complaints), then in zip(views, first):
+            received, drawn_times, published, ms = (now - before for now, before in zip(page.evaluate(counts), then))
+            print(f"{1000 * received / ms:.0f} of {1000 * published / ms:.0f} frames/s, {1000 * drawn_times / ms:.0f} pictures/s")
+            assert received > 0 and drawn_times > 0 and published > 0, (received, drawn_times, published)
+            assert not complaints, complaints
+
+
+# How many places the head was drawn at in four seconds, and how many frames came.
+PLACES = """() => new Promise((told) => {
+    const seen = new Set(), start = performance.now(), before = picture.received;
+    const look = () => {
+        seen.add(picture.head.join());
+        performance.now() < start + 4000 ? requestAnimationFrame(look) : told([seen.size, picture.received - before]);
+    };
+    look();
+})"""
+
+
+def motion_is_smooth_at_any_rate():
+    counts = "[picture.received, picture.drawn, picture.sequence]"
+    with server() as url, browser(viewport={"width": 640, "height": 480}) as (page, complaints):
+        page.goto(url)
+        with publisher("--start", "100", "--rate", "2"):
+            drawn(page)
+            places, received = page.evaluate(PLACES)
+            assert places > 2 * received > 0, f"{places} places from {received} frames: nothing between them"
+        until(page, "document.body.dataset.level === 'waiting'", "the publisher's end")
+        with publisher("--start", "100", "--rate", "1000"):
+            drawn(page)
+            first = page.evaluate(counts)
+            time.sleep(3)
+            received, pictures, published = (now - then for now, then in zip(page.evaluate(counts), first))
+            assert 0 < received < published / 4, f"{received} of {published} frames: a page needs fewer"
+            assert pictures > 0
+        assert not complaints, complaints
+
+
+def foreign_pages_are_refused():
+    """A page of another server on this very machine, which no other rule of the browser keeps away."""
+    elsewhere = http.server.ThreadingHTTPServer(("127.0.0.1", 0), http.server.BaseHTTPRequestHandler)
+    threading.Thread(target=elsewhere.serve_forever, daemon=True).start()
+    with server() as url, publisher(*STILL), browser() as (page, _):
+        opens = lambda: page.evaluate(
+            """(url) => new Promise((told) => {
+                const socket = new WebSocket(url);
+                [socket.onopen, socket.onerror] = [() => told(true), () => told(false)];
+            })""",
+            url.replace("http", "ws", 1) + "frames",
+        )
+        page.goto(url)
+        assert opens(), "its own page cannot watch"
+        page.goto(f"http://127.0.0.1:{elsewhere.server_port}/")
+        assert not opens(), "a page from elsewhere can watch"
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGALRM, lambda *_: sys.exit(f"{SCENARIO} took more than {WATCHDOG} s"))
+    signal.alarm(WATCHDOG)
+    {
+        scenario.__name__: scenario
+        for scenario in [
+            boards_are_where_the_truth_says,
+            hands_move_the_picture,
+            show_ends_in_contact,
+            publishers_come_and_go,
+            five_at_once,
+            motion_is_smooth_at_any_rate,
+            foreign_pages_are_refused,
+        ]
+    }[SCENARIO]()
