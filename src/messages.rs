@@ -267,6 +267,19 @@ pub struct StagePiece {
     pub reserved: u32,
 }
 
+impl StagePiece {
+    /// The name of its kind: `line`, `arc`, `inward_spiral`, `outward_spiral`, or `unknown` for a later layout's.
+    pub fn kind_name(&self) -> &'static str {
+        match self.kind {
+            PIECE_LINE => "line",
+            PIECE_ARC => "arc",
+            PIECE_INWARD_SPIRAL => "inward_spiral",
+            PIECE_OUTWARD_SPIRAL => "outward_spiral",
+            _ => "unknown",
+        }
+    }
+}
+
 /// What a subscriber needs to draw the stage. Payload of `<name>/stage`, sent at the start and kept for late joiners.
 ///
 /// The head's board has a length of its own; all that follow have one length. Layout 2 added the pieces of the path;
@@ -297,4 +310,11 @@ pub struct Stage {
     pub pieces: u32,
     /// The pieces of the path in the order of travel; those not in use are zero.
     pub path: [StagePiece; MOST_PIECES],
+}
+
+impl Stage {
+    /// The pieces of the path that are in use.
+    pub fn path_in_use(&self) -> &[StagePiece] {
+        &self.path[..(self.pieces as usize).min(MOST_PIECES)]
+    }
 }
