@@ -232,7 +232,7 @@ fn wrong_paths_are_refused_in_one_sentence() {
     let turn = "kind = \"turnaround\"\npitch = 1.7\nturn_radius = 4.5\narc_ratio = 2";
     let arc = "kind = \"pieces\"\n[[path.pieces]]\nkind = \"arc\"\nradius = 2";
     for (path, words) in [
-        (format!("{turn}"), "path.lead_in and path.start_turn are both missing"),
+        (turn.to_owned(), "path.lead_in and path.start_turn are both missing"),
         (format!("{turn}\nlead_in = 1\nstart_turn = 5"), "both given"),
         (format!("{turn}\nstart_turn = 2"), "inside the turn"),
         (format!("{turn}\nlead_in = 1\nheading_turns = 0.5"), "path.heading_turns is given"),
