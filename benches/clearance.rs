@@ -11,6 +11,9 @@ use bench_dragon::geometry::separation::{separation_board_board, signed_distance
 use bench_dragon::geometry::spiral::Spiral;
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
+use parry2d_f64::math::Pose;
+use parry2d_f64::query;
+use parry2d_f64::shape::Cuboid;
 
 const PITCH: f64 = 0.55;
 const FRAMES: usize = 60;
@@ -51,6 +54,31 @@ fn live(bencher: Bencher, (benches, percent): (usize, usize)) {
 #[divan::bench(args = CASES)]
 fn live_on_unknown_ground(bencher: Bencher, (benches, percent): (usize, usize)) {
     run(bencher, benches, percent, Ground::Unknown);
+}
+
+/// A peer: the distances of all pairs by parry2d.
+#[divan::bench(sample_count = 5, sample_size = 1)]
+fn all_pairs_by_parry2d(bencher: Bencher) {
+    let team = team(223);
+    let chain = chains(team, 50).swap_remove(0);
+    bencher.counter(ItemsCount::new(1usize)).bench_local(|| {
+        let boards: Vec<(Pose, Cuboid)> = (0..223)
+            .map(|bench| {
+                let board = board(&chain, &team, bench);
+                let angle = board.axis.y.atan2(board.axis.x);
+                let half_extents = [board.half_length, board.half_width];
+                (Pose::new([board.centre.x, board.centre.y].into(), angle), Cuboid::new(half_extents.into()))
+            })
+            .collect();
+        let mut least = f64::INFINITY;
+        for (i, (pose, shape)) in boards.iter().enumerate() {
+            for (other_pose, other) in boards.iter().skip(i + 2) {
+                let found = query::distance(pose, shape, other_pose, other).expect("parry knows two cuboids");
+                least = least.min(found.distance);
+            }
+        }
+        least
+    });
 }
 
 #[divan::bench(args = [(223, 50), (1_000, 50), (10_000, 50)], sample_count = 3, sample_size = 1)]

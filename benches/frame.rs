@@ -1,5 +1,6 @@
 //! What a frame costs: each solver at 60 Hz and 1 kHz, with and without velocities, for teams of 10 to 100,000; the
-//! floor below which no solver can go; and the safe solver beside it in the same run.
+//! floor below which no solver can go; the safe solver beside it in the same run; whole shows with and without alerts;
+//! the events; and a frame's way into shared memory.
 //!
 //! `cargo bench --bench frame`
 
@@ -11,6 +12,13 @@ use bench_dragon::chain::whole_chain::{Instructions, WholeChain};
 use bench_dragon::chain::{Chain, Solver, Team, Velocities};
 use bench_dragon::geometry::pieces::PiecePath;
 use bench_dragon::geometry::spiral::Spiral;
+use bench_dragon::live::Publisher;
+use bench_dragon::messages::FrameHeader;
+use bench_dragon::scene::Scene;
+use bench_dragon::show::timeline::Timeline;
+use bench_dragon::show::{Playback, Show};
+use bench_dragon::transports::iceoryx2::{Offer, SharedMemoryPublisher};
+use bench_dragon::transports::stage;
 use divan::Bencher;
 use divan::counter::ItemsCount;
 
@@ -122,6 +130,55 @@ fn whole_chain_portable(bencher: Bencher) {
 #[divan::bench(args = [10, 223, 1_000, 5_000, 20_000, 100_000], sample_count = 200, sample_size = 4)]
 fn whole_chain_by_benches(bencher: Bencher, benches: usize) {
     play(bencher, &mut WholeChain::new(spiral(), team(benches), 1.0, Velocities::Computed), benches + 1, 60.0);
+}
+
+#[divan::bench(args = [10, 223, 1_000, 5_000, 20_000, 100_000], sample_count = 20, sample_size = 1)]
+fn newton_by_benches(bencher: Bencher, benches: usize) {
+    play(bencher, &mut Newton::new(spiral(), team(benches), 1.0, Velocities::Computed), benches + 1, 60.0);
+}
+
+/// Whole frames of the paper scene's show as the live loop makes them, with and without what a scene can leave out.
+#[divan::bench(args = ["bare", "velocities", "alerts", "alerts and velocities"], sample_count = 500, sample_size = 20)]
+fn show(bencher: Bencher, with: &str) {
+    let mut scene = Scene::paper();
+    if !with.contains("alerts") {
+        scene.alerts = None;
+    }
+    scene.velocities = if with.contains("velocities") { Velocities::Computed } else { Velocities::Omitted };
+    let timeline = Timeline::of(&scene, &mut |_| ());
+    let playback = Playback { start: 200.0, ..Playback::of(&scene) };
+    let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
+    let mut tick = 0;
+    bencher.bench_local(|| {
+        tick = if tick < 12_000 { tick + 1 } else { 0 };
+        divan::black_box(show.frame(tick));
+    });
+}
+
+/// The events of the paper scene, contact, stall and lock: found once, before the show.
+#[divan::bench(sample_count = 20, sample_size = 1)]
+fn events() -> Timeline {
+    Timeline::of(&Scene::paper(), &mut |_| ())
+}
+
+/// A frame into iceoryx2's shared memory, solving left out.
+#[divan::bench(sample_count = 500, sample_size = 20)]
+fn publish_over_iceoryx2(bencher: Bencher) {
+    let scene = Scene::paper();
+    let playback = Playback { start: 200.0, ..Playback::of(&scene) };
+    let mut show = Show::new(&scene, Timeline::of(&scene, &mut |_| ()), playback).expect("200 s is before the contact");
+    let offer = Offer {
+        name: format!("bench_{}_frame", std::process::id()),
+        handles: scene.team.handles(),
+        queue: 64,
+        alerts: true,
+        subscribers: 8,
+        stage: stage(1, 0, &scene.team, &scene.path),
+    };
+    let mut publisher = SharedMemoryPublisher::open(&offer).expect("the name holds this process's number");
+    let frame = show.frame(0);
+    let header = FrameHeader { handles: 224, ..FrameHeader::default() };
+    bencher.bench_local(|| publisher.publish(&header, frame).expect("nobody else uses this service"));
 }
 
 #[divan::bench(sample_count = 20, sample_size = 1)]

@@ -11,6 +11,7 @@ use crate::chain::paper::{Paper, PaperRules};
 use crate::chain::reference::{Reference, ReferenceHandle};
 use crate::chain::whole_chain::{Instructions, WholeChain};
 use crate::chain::{Chain, Solver, Velocities};
+use crate::clearance::{ClearanceMonitor, Ground, least_clearance_all_pairs};
 use crate::geometry::Point;
 use crate::geometry::path::Path;
 use crate::geometry::rectangle::Board;
@@ -29,7 +30,7 @@ const LEAD_IN: usize = 4;
 /// The most frames that are timed, so that slow solvers and long shows end too.
 const TIMED_FRAMES: usize = 26_000;
 /// The longest time spent timing one solver, seconds.
-const TIMING_LIMIT: f64 = 4.0;
+const TIMING_LIMIT: f64 = 0.7;
 
 /// What one solver costs and how far it is off.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -52,13 +53,31 @@ pub struct Measurement {
     pub max_link_error: f64,
     /// Bytes that the solver holds.
     pub memory_bytes: usize,
+    /// What collisions cost on this scene; stands with the first solver only.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub collision: Vec<CollisionMeasurement>,
     /// Whether no other solver is both faster and more exact.
     pub on_front: bool,
+}
+
+/// What one way to look for collisions costs and by how much it misses the contact.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CollisionMeasurement {
+    /// The way.
+    pub method: String,
+    /// Nanoseconds per frame for the least clearance; `None` for a search.
+    pub frame_ns: Option<f64>,
+    /// Seconds that finding the contact takes from the start of the scene.
+    pub search_s: Option<f64>,
+    /// Seconds by which it finds the contact too late; `None` where there is none, and for a way that looks at frames.
+    pub contact_time_error: Option<f64>,
 }
 
 /// A solver to be measured.
 struct Candidate {
     name: String,
+    /// Frames played before one that is judged.
+    lead_in: usize,
     solver: Box<dyn Solver>,
     contact_time_error: Option<f64>,
     memory_bytes: usize,
@@ -86,6 +105,9 @@ pub fn measure(scene: &Scene, timeline: &Timeline, progress: &mut dyn FnMut(f64)
         progress(0.5 + 0.5 * (index + 1) as f64 / count);
     }
     mark_front(&mut measurements);
+    if let Some(first) = measurements.first_mut() {
+        first.collision = collision(scene, timeline, first.contact_time_error, first.frame_ns);
+    }
     Ok(measurements)
 }
 
@@ -98,17 +120,27 @@ fn reference(scene: &Scene) -> Result<Reference, String> {
 /// The reference at all moments. At the lock itself there is a solution only up to rounding, so the last moment is a
 /// thousandth of a second earlier.
 fn truth(scene: &Scene, end: f64, progress: &mut dyn FnMut(f64)) -> Result<Vec<Moment>, String> {
-    let mut reference = reference(scene)?;
     let last_second = 1f64.min(0.5 * end);
     let spread = (0..SPREAD_MOMENTS).map(|k| (end - last_second) * k as f64 / SPREAD_MOMENTS as f64);
     let last = (0..LAST_SECOND_MOMENTS)
         .map(|k| end - last_second + (last_second * 0.999) * k as f64 / (LAST_SECOND_MOMENTS - 1) as f64);
-    let total = (SPREAD_MOMENTS + LAST_SECOND_MOMENTS) as f64;
-    let mut moments = Vec::new();
-    for time in spread.chain(last) {
+    let times: Vec<f64> = spread.chain(last).collect();
+    let (first, second) = times.split_at(times.len() / 2);
+    std::thread::scope(|scope| {
+        let second = scope.spawn(|| moments(scene, second, &mut |_| ()));
+        let mut all = moments(scene, first, progress)?;
+        all.extend(second.join().map_err(|_| "the reference's second thread panicked".to_owned())??);
+        Ok(all)
+    })
+}
+
+fn moments(scene: &Scene, times: &[f64], progress: &mut dyn FnMut(f64)) -> Result<Vec<Moment>, String> {
+    let mut reference = reference(scene)?;
+    let mut moments = Vec::with_capacity(times.len());
+    for &time in times {
         let handles = reference.handles(time).map_err(|fold| format!("the reference at {time} s: {fold}"))?;
         moments.push(Moment { time, handles });
-        progress(moments.len() as f64 / total);
+        progress(moments.len() as f64 / times.len() as f64);
     }
     Ok(moments)
 }
@@ -151,7 +183,13 @@ fn candidates(scene: &Scene, path: Spiral, contact: Option<ContactErrors>) -> Ve
     let Scene { team, head_speed, velocities, .. } = *scene;
     let exact = |name: String, solver: Box<dyn Solver>, memory_bytes| {
         // All of them follow one motion, whose contact is found once.
-        Candidate { name, solver, contact_time_error: contact.map(|errors| errors.exact), memory_bytes }
+        Candidate {
+            name,
+            lead_in: LEAD_IN,
+            solver,
+            contact_time_error: contact.map(|errors| errors.exact),
+            memory_bytes,
+        }
     };
     let mut candidates = Vec::new();
     for instructions in Instructions::available() {
@@ -185,6 +223,7 @@ fn candidates(scene: &Scene, path: Spiral, contact: Option<ContactErrors>) -> Ve
         let memory_bytes = size_of::<Paper>() + 3 * 8 * team.handles();
         candidates.push(Candidate {
             name,
+            lead_in: 0,
             solver: Box::new(solver),
             contact_time_error: contact.map(|errors| errors.paper),
             memory_bytes,
@@ -194,7 +233,7 @@ fn candidates(scene: &Scene, path: Spiral, contact: Option<ContactErrors>) -> Ve
 }
 
 fn measured(scene: &Scene, mut candidate: Candidate, moments: &[Moment], end: f64) -> Measurement {
-    let errors = errors(scene, candidate.solver.as_mut(), moments);
+    let errors = errors(scene, &mut candidate, moments);
     let mut times = frame_times(scene, candidate.solver.as_mut(), end);
     times.sort_unstable();
     let quantile = |share: f64| times.get((share * times.len() as f64) as usize).map_or(f64::NAN, |ns| *ns as f64);
@@ -208,6 +247,7 @@ fn measured(scene: &Scene, mut candidate: Candidate, moments: &[Moment], end: f6
         contact_time_error: candidate.contact_time_error,
         max_link_error: errors.link,
         memory_bytes: candidate.memory_bytes,
+        collision: Vec::new(),
         on_front: false,
     }
 }
@@ -219,14 +259,14 @@ struct Errors {
     link: f64,
 }
 
-fn errors(scene: &Scene, solver: &mut dyn Solver, moments: &[Moment]) -> Errors {
+fn errors(scene: &Scene, candidate: &mut Candidate, moments: &[Moment]) -> Errors {
     let mut chain = Chain::new(scene.team.handles());
     let mut worst = Errors::default();
     for moment in moments {
-        for frame in (0..=LEAD_IN).rev() {
+        for frame in (0..=candidate.lead_in).rev() {
             let time = (moment.time - frame as f64 / scene.rate).max(0.0);
             // The paper's solver runs ahead of the truth and so locks a little earlier; that moment is left out.
-            if solver.solve(time, &mut chain).is_err() {
+            if candidate.solver.solve(time, &mut chain).is_err() {
                 return worst;
             }
         }
@@ -270,7 +310,7 @@ fn frame_times(scene: &Scene, solver: &mut dyn Solver, end: f64) -> Vec<u64> {
                 times.push(nanoseconds);
             }
         }
-        if began.elapsed().as_secs_f64() > 2.0 * TIMING_LIMIT {
+        if run > 0 && began.elapsed().as_secs_f64() > 2.0 * TIMING_LIMIT {
             break;
         }
     }
@@ -283,4 +323,98 @@ fn mark_front(measurements: &mut [Measurement]) {
         let beaten = |(c, e): &(f64, f64)| c <= cost && e <= error && (c < cost || e < error);
         measurement.on_front = !points.iter().any(beaten);
     }
+}
+
+/// Seconds between two samples of a contact search that samples.
+const SAMPLING_INTERVALS: [f64; 3] = [1.0, 0.1, 0.01];
+
+/// All pairs against the live way, and sampled searches against the exact one. `exact_error` is the error of the
+/// contact in `timeline`, `solve_ns` what the fastest solver takes for a frame.
+fn collision(scene: &Scene, timeline: &Timeline, exact_error: Option<f64>, solve_ns: f64) -> Vec<CollisionMeasurement> {
+    let end = timeline.end().time;
+    let frame_cost = |method: &str, ns: f64| CollisionMeasurement {
+        method: method.to_owned(),
+        frame_ns: Some(ns),
+        search_s: None,
+        contact_time_error: None,
+    };
+    let live = live_clearance_ns(scene, end);
+    let all_pairs = all_pairs_ns(scene, end);
+    let mut measurements = vec![frame_cost("live clearance", live), frame_cost("all pairs", all_pairs)];
+    let began = Instant::now();
+    let _ = Timeline::of(scene, &mut |_| ());
+    measurements.push(CollisionMeasurement {
+        method: "exact search".to_owned(),
+        frame_ns: None,
+        search_s: Some(began.elapsed().as_secs_f64()),
+        contact_time_error: exact_error,
+    });
+    let Some(contact) = timeline.find(State::Contact) else { return measurements };
+    for interval in SAMPLING_INTERVALS {
+        let found = first_overlapping_sample(scene, contact.time, end, interval);
+        measurements.push(CollisionMeasurement {
+            method: format!("all pairs every {interval} s"),
+            frame_ns: None,
+            search_s: Some(1e-9 * (all_pairs + solve_ns) * (found.unwrap_or(end) / interval)),
+            contact_time_error: found.map(|time| time - contact.time),
+        });
+    }
+    measurements
+}
+
+/// The first sample at or after `contact` at which boards overlap, simulated seconds.
+fn first_overlapping_sample(scene: &Scene, contact: f64, end: f64, interval: f64) -> Option<f64> {
+    let (mut solver, _) = scene.solver();
+    let mut chain = Chain::new(scene.team.handles());
+    let first = (contact / interval).ceil() as u64;
+    (first..first + 1000).map(|sample| sample as f64 * interval).take_while(|time| *time < end).find(|time| {
+        solver.solve(*time, &mut chain).is_ok()
+            && least_clearance_all_pairs(&chain, &scene.team).is_some_and(|least| least.value <= 0.0)
+    })
+}
+
+/// Nanoseconds of the live clearance, the median over runs of frames evenly over the show.
+fn live_clearance_ns(scene: &Scene, end: f64) -> f64 {
+    const RUNS: usize = 20;
+    const RUN: usize = 40;
+    let (mut solver, _) = scene.solver();
+    let mut chain = Chain::new(scene.team.handles());
+    let ground = scene.path.spiral().map_or(Ground::Unknown, |spiral| Ground::Spiral { pitch: spiral.pitch() });
+    let mut monitor = ClearanceMonitor::new(scene.team, ground);
+    let mut times = Vec::with_capacity(RUNS * RUN);
+    for run in 0..RUNS {
+        for frame in 0..RUN {
+            let time = 0.99 * end * run as f64 / RUNS as f64 + frame as f64 / scene.rate;
+            if time >= end || solver.solve(time, &mut chain).is_err() {
+                break;
+            }
+            let began = Instant::now();
+            let _ = std::hint::black_box(monitor.least_clearance(&chain));
+            // The first frame of a run follows a jump.
+            if frame > 0 {
+                times.push(began.elapsed().as_nanos() as u64);
+            }
+        }
+    }
+    median(times)
+}
+
+/// Nanoseconds of all pairs, the median over a few frames of the show.
+fn all_pairs_ns(scene: &Scene, end: f64) -> f64 {
+    let (mut solver, _) = scene.solver();
+    let mut chain = Chain::new(scene.team.handles());
+    let mut times = Vec::new();
+    for share in [0.1, 0.3, 0.5, 0.7, 0.9] {
+        if solver.solve(share * end, &mut chain).is_ok() {
+            let began = Instant::now();
+            let _ = std::hint::black_box(least_clearance_all_pairs(&chain, &scene.team));
+            times.push(began.elapsed().as_nanos() as u64);
+        }
+    }
+    median(times)
+}
+
+fn median(mut times: Vec<u64>) -> f64 {
+    times.sort_unstable();
+    times.get(times.len() / 2).map_or(f64::NAN, |nanoseconds| *nanoseconds as f64)
 }

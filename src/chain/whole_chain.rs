@@ -6,12 +6,13 @@
 
 mod arithmetic;
 mod kernel;
+mod lanes;
 
 pub use kernel::Instructions;
 
 use std::f64::consts::TAU;
 
-use kernel::{BLOCK, State, Step};
+use kernel::{State, Step};
 
 use super::newton::Newton;
 use super::{Chain, Solver, Team, Velocities};
@@ -21,7 +22,10 @@ use crate::geometry::spiral::Spiral;
 /// Corrections tried before the chain is found anew.
 const CORRECTIONS: usize = 3;
 
-/// The error that a correction may leave, as a distance: far below the rounding of the coordinates themselves.
+/// The error that a correction may leave, against the shortest link: a tenth of what links are promised to hold.
+const LEFT_OVER_OF_LINK: f64 = 1e-13;
+
+/// The same as a distance, metres: far below the rounding of the coordinates of a team of usual size.
 const LEFT_OVER: f64 = 1e-13;
 
 /// Newton's method on the whole chain, warm from frame to frame.
@@ -67,19 +71,8 @@ impl WholeChain {
     /// A solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve, with the
     /// fastest instructions this processor has.
     pub fn new(path: Spiral, team: Team, head_speed: f64, velocities: Velocities) -> Self {
-        let padded = (team.handles()).next_multiple_of(BLOCK);
         let link_term = |bench: usize| (team.link(bench.min(team.benches - 1)) / (2.0 * path.pitch())).powi(2);
-        let state = State {
-            link_term: (0..padded).map(link_term).collect(),
-            increment: vec![0.0; padded],
-            turns: vec![0.0; padded],
-            by_turns: vec![0.0; padded],
-            by_increment: vec![0.0; padded],
-            reciprocal: vec![0.0; padded],
-            rate: vec![0.0; padded + 1],
-            rate_before: vec![0.0; padded + 1],
-            rate_next: vec![0.0; padded + 1],
-        };
+        let state = State::new(team.handles(), link_term);
         Self {
             path,
             team,
@@ -108,7 +101,7 @@ impl WholeChain {
 
     /// Bytes this solver holds.
     pub fn memory_bytes(&self) -> usize {
-        size_of::<Self>() + 9 * size_of::<f64>() * self.state.increment.len()
+        size_of::<Self>() + self.state.memory_bytes()
     }
 
     /// How often the chain had to be found anew, handle by handle; once for the first frame.
@@ -123,7 +116,9 @@ impl WholeChain {
 
     /// Tries `corrections` corrections; true if the last one left no more than rounding.
     fn corrected(&mut self, step: &mut Step, corrections: usize, chain: &mut Chain) -> bool {
-        let left_over = LEFT_OVER.max(0.5 * f64::EPSILON * step.pitch * (step.head as f64 / 2f64.powi(64)));
+        let link = self.team.link(0).min(self.team.link(self.team.benches - 1));
+        let rounding = 0.5 * f64::EPSILON * step.pitch * step.head_turns();
+        let left_over = LEFT_OVER.min(LEFT_OVER_OF_LINK * link).max(rounding);
         for _ in 0..corrections {
             let bound = kernel::correct(self.instructions, &mut self.state, step, chain);
             if bound <= left_over {
@@ -140,9 +135,7 @@ impl WholeChain {
 
     /// Takes the rates just computed as the newest.
     fn remember(&mut self, travelled: f64) {
-        let State { rate, rate_before, rate_next, .. } = &mut self.state;
-        std::mem::swap(rate_before, rate);
-        std::mem::swap(rate, rate_next);
+        self.state.remember();
         self.history = match self.history {
             History::None => History::One { at: travelled },
             History::One { at } | History::Two { at, .. } if travelled == at => History::One { at },
@@ -153,18 +146,13 @@ impl WholeChain {
     /// Finds every increment from scratch, as the safe solver does.
     fn restart(&mut self, head: <Spiral as Path>::Place) -> Result<(), Fold> {
         self.restarts += 1;
-        // Multiplied by a step of zero they must give zero, which infinity would not.
-        self.state.rate.fill(0.0);
-        self.state.rate_before.fill(0.0);
         let mut front = head;
-        for bench in 0..self.state.increment.len() {
+        for bench in 0..self.state.benches() {
             let link = self.team.link(bench.min(self.team.benches - 1));
             let rear = self.path.follower(front, link)?;
-            self.state.turns[bench] = front.in_turns();
-            self.state.increment[bench] = rear.minus(front) / TAU;
+            self.state.set(bench, front.in_turns(), rear.minus(front) / TAU);
             front = rear;
         }
-        self.state.renew_slopes();
         Ok(())
     }
 }

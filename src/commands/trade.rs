@@ -62,6 +62,14 @@ fn print(output: &mut Output, measurements: &[Measurement]) -> Result<(), Comman
             m.memory_bytes
         ))?;
     }
+    for line in measurements.iter().flat_map(|measurement| &measurement.collision) {
+        let cost = match (line.frame_ns, line.search_s) {
+            (Some(nanoseconds), _) => format!("{:.2} us a frame", nanoseconds / 1e3),
+            (None, seconds) => format!("contact in {:.3} s", seconds.unwrap_or(f64::NAN)),
+        };
+        let error = line.contact_time_error.map_or(String::new(), |seconds| format!(", {seconds:.1e} s off"));
+        output.line(&format!("  collisions, {:25} {cost}{error}", line.method))?;
+    }
     output.line(&format!(
         "* no other is both faster and more exact. Errors: the largest over all handles at {SPREAD_MOMENTS} moments of \
          the show and {LAST_SECOND_MOMENTS} of its last second, against a reference of more than 30 digits."
