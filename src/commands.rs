@@ -4,6 +4,7 @@ pub mod check;
 pub mod draw;
 pub mod events;
 pub mod run;
+pub mod soak;
 pub mod solve;
 pub mod trade;
 pub mod view;
@@ -145,6 +146,21 @@ pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CommandError> {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
     }
     Ok(stop)
+}
+
+/// Ends this program with a sentence where a page of shared memory cannot be had, which Linux tells by SIGBUS: others
+/// have filled /dev/shm since it was last looked at.
+pub fn end_when_shared_memory_is_full() -> Result<(), CommandError> {
+    const SENTENCE: &[u8] = b"error: /dev/shm is full: remove what fills it, or make it larger\n";
+    let end = || {
+        // Nothing is left to do for a standard error that takes no more.
+        let _ = nix::unistd::write(io::stderr(), SENTENCE);
+        // SAFETY: async-signal-safe, and ends the process without unwinding.
+        unsafe { nix::libc::_exit(1) };
+    };
+    // SAFETY: the action calls write and _exit only, both async-signal-safe; `io::stderr` is a unit with a descriptor.
+    unsafe { signal_hook::low_level::register(signal_hook::consts::SIGBUS, end) }?;
+    Ok(())
 }
 
 /// Wall time as a person writes it: `60`, `90s`, `5m`, `8h`. Seconds.

@@ -35,6 +35,11 @@ enum Command {
     Draw(commands::draw::DrawArguments),
     /// Measure accuracy against cost for every solver on this scene and machine
     Trade(commands::trade::TradeArguments),
+    /// Soak-test: publish for hours to real subscriber processes and give a verdict
+    Soak(commands::soak::SoakArguments),
+    /// What soak starts
+    #[command(hide = true)]
+    SoakSubscriber(commands::soak::SoakSubscriberArguments),
     /// Validate a scene and say what it would model
     Check,
 }
@@ -42,7 +47,7 @@ enum Command {
 fn main() -> ExitCode {
     let CommandLine { common, command } = CommandLine::parse();
     set_up_logging(&common);
-    let done = match &command {
+    let done = commands::end_when_shared_memory_is_full().and_then(|()| match &command {
         Command::Run(arguments) => commands::run::run(&common, arguments),
         Command::Watch(arguments) => commands::watch::watch(&common, arguments),
         Command::View(arguments) => commands::view::view(&common, arguments),
@@ -50,8 +55,10 @@ fn main() -> ExitCode {
         Command::Events => commands::events::events(&common),
         Command::Draw(arguments) => commands::draw::draw(&common, arguments),
         Command::Trade(arguments) => commands::trade::trade(&common, arguments),
+        Command::Soak(arguments) => commands::soak::soak(&common, arguments),
+        Command::SoakSubscriber(arguments) => commands::soak::subscribe(&common, arguments),
         Command::Check => commands::check::check(&common),
-    };
+    });
     match done {
         Ok(()) | Err(CommandError::ClosedPipe) => ExitCode::SUCCESS,
         Err(CommandError::BadInput(sentence)) => {

@@ -21,6 +21,8 @@ use crate::geometry::spiral::Spiral;
 
 /// The paper's scene, as built into the program.
 const PAPER: &str = include_str!("../config/paper.toml");
+/// Subscribers that each iceoryx2 service admits at once where the scene does not say.
+const DEFAULT_SUBSCRIBERS: usize = 8;
 
 /// A closed range of accepted numbers and their unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,6 +56,8 @@ impl Accepted {
     pub const BENCHES: Self = Self { least: 1.0, greatest: 1e6, unit: "benches" };
     /// Frames a subscriber may fall behind.
     pub const QUEUE: Self = Self { least: 1.0, greatest: 1e6, unit: "frames" };
+    /// Subscribers at once.
+    pub const SUBSCRIBERS: Self = Self { least: 1.0, greatest: 256.0, unit: "subscribers" };
     /// Messages that a ROS 2 topic keeps.
     pub const DEPTH: Self = Self { least: 1.0, greatest: 1e3, unit: "messages" };
 
@@ -156,6 +160,8 @@ pub struct Scene {
     pub velocities: Velocities,
     /// Frames a subscriber may fall behind, where the scene says so.
     pub queue: Option<usize>,
+    /// Subscribers that each iceoryx2 service admits at once.
+    pub subscribers: usize,
     /// The ROS 2 topics; `None` where the scene asks for none.
     pub ros2: Option<Ros2Settings>,
 }
@@ -329,6 +335,7 @@ struct RawPublish {
     rate: Option<Spanned<f64>>,
     velocities: Option<bool>,
     queue: Option<Spanned<i64>>,
+    subscribers: Option<Spanned<i64>>,
     ros2: Option<RawRos2>,
 }
 
@@ -349,6 +356,9 @@ impl RawScene {
             self.publish.rate.as_ref().map_or(Ok(60.0), |rate| source.check("publish.rate", rate, Accepted::RATE))?;
         let queue =
             self.publish.queue.as_ref().map(|queue| source.check_count("publish.queue", queue, Accepted::QUEUE));
+        let subscribers = self.publish.subscribers.as_ref().map_or(Ok(DEFAULT_SUBSCRIBERS), |subscribers| {
+            source.check_count("publish.subscribers", subscribers, Accepted::SUBSCRIBERS)
+        })?;
         let velocities = self.publish.velocities.unwrap_or(true);
         Ok(Scene {
             name,
@@ -364,6 +374,7 @@ impl RawScene {
             rate,
             velocities: if velocities { Velocities::Computed } else { Velocities::Omitted },
             queue: queue.transpose()?,
+            subscribers,
             ros2: self.publish.ros2.as_ref().map(|ros2| ros2.validated(source)).transpose()?,
         })
     }

@@ -2,4 +2,5 @@
 
 pub mod connection;
 pub mod monitor;
+pub mod soak;
 pub mod view;

@@ -84,6 +84,7 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
         name: name.clone(),
         handles: scene.team.handles(),
         queue: 64,
+        subscribers: 8,
         alerts: true,
         stage: stage(1, 0, &scene.team, scene.path.pitch(), scene.start_turn),
     };

@@ -4,11 +4,9 @@
 
 mod processes;
 
-use std::path::Path;
-
 use serde_json::Value;
 
-use processes::{Process, example, json_lines, program, python, scene_file, summary, text, unique, wait};
+use processes::{Place, Process, example, json_lines, program, python, scene_file, summary, text, unique, wait};
 
 #[test]
 fn every_subscriber_gets_every_frame_at_60_hz() {
@@ -135,97 +133,20 @@ fn a_scene_without_alerts_has_no_alerts_service() {
 }
 
 #[test]
-fn a_second_publisher_of_one_name_is_refused() {
-    let _first = Process::start(program("twice").args(["run", "--json", "--duration", "20"]));
-    wait(1.0);
-    let second = Process::start(program("twice").args(["run", "--json", "--duration", "1"])).output_within(20);
-    assert_eq!(second.status.code(), Some(1));
-    let said = text(&second.stderr);
-    assert!(said.contains("another publisher") && said.contains("--name") && said.lines().count() == 1, "{said}");
-}
-
-#[test]
-fn a_watcher_notices_the_death_of_a_publisher_and_picks_up_the_next() {
-    let monitor = Process::start(program("death").args(["watch", "--duration", "9"]));
-    wait(0.5);
-    let first = Process::start(program("death").args(["run", "--json", "--duration", "30"]));
-    wait(3.0);
-    first.signal(nix::sys::signal::Signal::SIGKILL);
-    wait(2.0);
-    let second = Process::start(program("death").args(["run", "--json", "--duration", "2"]));
-    summary(&second.output_within(20));
-    let said = text(&monitor.output_within(20).stdout);
-    let count = |what: &str| said.lines().filter(|line| line.contains(what)).count();
-    assert_eq!(count("is running"), 2, "{said}");
-    assert_eq!(count("has ended"), 2, "{said}");
-    assert!(said.lines().all(|line| !line.contains("rate") || line.contains("missed 0")), "{said}");
-}
-
-#[test]
-fn killed_subscribers_leave_the_publisher_alone() {
-    let publisher = Process::start(program("killed").args(["run", "--json", "--duration", "8"]));
-    wait(0.7);
-    for _ in 0..20 {
-        let watcher = Process::start(program("killed").args(["watch", "--json"]));
-        wait(0.2);
-        watcher.signal(nix::sys::signal::Signal::SIGKILL);
-    }
-    let last = Process::start(program("killed").args(["watch", "--json", "--duration", "2"])).output_within(20);
-    let lines = json_lines(&last);
-    assert!(lines.iter().rfind(|line| line["type"] == "second").unwrap()["received"].as_u64() > Some(30), "{lines:?}");
-    let summary = summary(&publisher.output_within(30));
-    assert_eq!(summary["frames"].as_u64().unwrap() + summary["skipped"].as_u64().unwrap(), 480);
-}
-
-#[test]
-fn a_stopped_publisher_skips_whole_periods_and_catches_nothing_up() {
-    let publisher = Process::start(program("stopped").args(["run", "--json", "--rate", "100", "--duration", "6"]));
-    wait(1.5);
-    publisher.signal(nix::sys::signal::Signal::SIGSTOP);
-    wait(2.0);
-    publisher.signal(nix::sys::signal::Signal::SIGCONT);
-    let summary = summary(&publisher.output_within(30));
-    let [frames, skipped, overruns] = ["frames", "skipped", "overruns"].map(|key| summary[key].as_u64().unwrap());
-    assert_eq!(frames + skipped, 600, "{summary}");
-    // The machine itself may add a stall of a period or two.
-    assert!((195..260).contains(&skipped) && (1..20).contains(&overruns), "{summary}");
-    assert!(summary["wakeup_ns"]["max"].as_u64() > Some(1_900_000_000), "{summary}");
-}
-
-#[test]
 fn signals_end_a_run_cleanly_and_leave_nothing_behind() {
     use nix::sys::signal::Signal::{SIGINT, SIGTERM};
     for (signal, rate) in [(SIGINT, "60"), (SIGTERM, "0.1")] {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::create_dir(folder.path().join("config")).unwrap();
-        let prefix = unique(rate).replace('.', "_");
-        let settings = format!("[global]\nroot-path = \"{}/root/\"\nprefix = \"{prefix}\"\n", folder.path().display());
-        std::fs::write(folder.path().join("config/iceoryx2.toml"), settings).unwrap();
-        let publisher =
-            Process::start(program("signals").current_dir(folder.path()).args(["run", "--json", "--rate", rate]));
+        let place = Place::new("signals");
+        let publisher = Process::start(place.program().args(["run", "--json", "--rate", rate]));
         wait(1.5);
-        assert!(left_behind(folder.path(), &prefix) > 1, "the publisher runs in its own place");
+        assert!(place.left_behind().len() > 1, "the publisher runs in its own place");
         publisher.signal(signal);
         let summary = summary(&publisher.output_within(5));
         assert_eq!(summary["end"], "signal");
-        // One small file of iceoryx2's own stays.
-        assert!(left_behind(folder.path(), &prefix) <= 1);
+        place.assert_clean();
     }
 }
 
-/// Files of an isolated iceoryx2 that exist.
-fn left_behind(folder: &Path, prefix: &str) -> usize {
-    let shared = std::fs::read_dir("/dev/shm").unwrap().flatten();
-    let memory = shared.filter(|file| file.file_name().to_string_lossy().starts_with(prefix)).count();
-    memory + files_below(&folder.join("root"))
-}
-
-fn files_below(folder: &Path) -> usize {
-    let Ok(entries) = std::fs::read_dir(folder) else { return 0 };
-    entries.flatten().map(|entry| if entry.path().is_dir() { files_below(&entry.path()) } else { 1 }).sum()
-}
-
-/// The paper's scene with some text replaced, in a file.
 #[test]
 fn python_sees_the_same_layouts() {
     use bench_dragon::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};

@@ -59,6 +59,9 @@ pub struct RunArguments {
     /// Keep the loop on this CPU
     #[arg(long, value_name = "N", help_heading = "Punctuality")]
     cpu: Option<usize>,
+    /// End when the process that started this one ends
+    #[arg(long, hide = true)]
+    end_with_parent: bool,
 }
 
 /// The line of `run --json`.
@@ -83,6 +86,9 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
         if scene.alerts.is_some() { search_timeline(&scene, common) } else { Timeline::without_contact(&scene) };
     let show = Show::new(&scene, timeline, playback).map_err(|error| CommandError::BadInput(error.to_string()))?;
     let stop = stop_on_signals()?;
+    if arguments.end_with_parent {
+        super::soak::end_with_parent()?;
+    }
     let run_id = RandomState::new().hash_one(realtime_ns());
     let timeline = show.timeline().clone();
     let performance = Performance { common, arguments, scene: &scene, playback, run_id };
@@ -101,6 +107,7 @@ struct Performance<'a> {
 impl Performance<'_> {
     /// Runs the loop on one thread and the statistics on another.
     fn perform(&self, mut show: Show, timeline: &Timeline, stop: &Arc<AtomicBool>) -> Result<(), CommandError> {
+        iceoryx2::remains::keep_removing();
         let ros2 = self.open_ros2()?;
         let (reports, inbox) = statistics::queues();
         let done = AtomicBool::new(false);
@@ -181,13 +188,14 @@ impl Performance<'_> {
             name: self.common.name.clone(),
             handles,
             queue: self.queue(),
+            subscribers: scene.subscribers,
             alerts: scene.alerts.is_some(),
             stage: self.stage(),
         })?)
     }
 
     fn queue(&self) -> usize {
-        self.scene.queue.unwrap_or_else(|| iceoryx2::default_queue(self.scene.team.handles()))
+        self.scene.queue.unwrap_or_else(|| iceoryx2::default_queue(self.scene.team.handles(), self.scene.subscribers))
     }
 
     fn loop_options(&self) -> LoopOptions {
@@ -202,7 +210,8 @@ impl Performance<'_> {
         ros2: Option<Box<dyn StatusPublisher + Send>>,
         done: &AtomicBool,
     ) -> Result<Summary, CommandError> {
-        let mut sinks: Vec<Box<dyn StatusPublisher>> = vec![Box::new(StatusSender::open(&self.common.name)?)];
+        let mut sinks: Vec<Box<dyn StatusPublisher>> =
+            vec![Box::new(StatusSender::open(&self.common.name, self.scene.subscribers)?)];
         if let Some(status) = ros2 {
             sinks.push(status);
         }
@@ -232,8 +241,9 @@ impl Performance<'_> {
         eprintln!("{} frames per second{scale}, from {} s.", number(playback.rate), number(playback.start));
         let alerts = if scene.alerts.is_some() { ", /alerts" } else { "" };
         eprintln!(
-            "iceoryx2 services: {name}/poses{alerts}, /status, /stage, /tick (queues of {} frames).",
-            self.queue()
+            "iceoryx2 services: {name}/poses{alerts}, /status, /stage, /tick (queues of {} frames for {} subscribers).",
+            self.queue(),
+            scene.subscribers
         );
         if let Some(sentence) = ros2 {
             eprintln!("{sentence}");

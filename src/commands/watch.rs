@@ -89,7 +89,7 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
         }
         let mut news = Vec::new();
         let timeout = next.saturating_duration_since(now).min(Duration::from_millis(200));
-        monitor.step(timeout.max(Duration::from_millis(1)), |item| news.push(item))?;
+        monitor.step(timeout, |item| news.push(item))?;
         for item in news {
             screen.tell(&item)?;
         }

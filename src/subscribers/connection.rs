@@ -11,7 +11,7 @@ use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
-use crate::transports::iceoryx2::{OpenError, node, service_name};
+use crate::transports::iceoryx2::{OpenError, check_room_to_subscribe, node, remains, reserve_pages, service_name};
 
 type Receiver<Payload, Header> = Port<ipc::Service, Payload, Header>;
 
@@ -56,6 +56,8 @@ impl Subscription {
     /// [`OpenError`] for a name that iceoryx2 cannot take.
     pub fn with_wake(name: &str, wake: Wake) -> Result<Self, OpenError> {
         service_name(name, "poses")?;
+        check_room_to_subscribe()?;
+        remains::keep_removing();
         Ok(Self { node: node()?, name: name.to_owned(), wake })
     }
 
@@ -79,28 +81,39 @@ impl Subscription {
                 return Err(OpenError::Failed { service: name.to_string(), reason: format!("{error:?}") });
             }
         };
+        check_room_to_subscribe()?;
         use iceoryx2::port::subscriber::SubscriberCreateError;
         let poses = poses_service.subscriber_builder().create().map_err(|error| match error {
-            SubscriberCreateError::ExceedsMaxSupportedSubscribers => OpenError::TooManySubscribers(name.to_string()),
+            SubscriberCreateError::ExceedsMaxSupportedSubscribers => OpenError::TooManySubscribers {
+                service: name.to_string(),
+                most: poses_service.static_config().max_subscribers(),
+            },
             other => OpenError::Failed { service: name.to_string(), reason: format!("{other:?}") },
         })?;
-        Ok(Some(Connection {
+        let connection = Connection {
             poses,
             poses_service,
             alerts: self.receiver("alerts"),
             status: self.receiver("status"),
             stage: self.receiver("stage"),
             tick: self.listener(),
-        }))
+        };
+        reserve_pages()?;
+        Ok(Some(connection))
     }
 
     /// Opens what was not there when the connection was made: a publisher makes its services one after another, and
     /// one without alerts never makes that one.
-    pub fn complete(&self, connection: &mut Connection) {
+    ///
+    /// # Errors
+    /// [`OpenError::Full`] where a service is there now and the memory for it is not.
+    pub fn complete(&self, connection: &mut Connection) -> Result<(), OpenError> {
+        let missing = connection.missing();
         connection.alerts = connection.alerts.take().or_else(|| self.receiver("alerts"));
         connection.status = connection.status.take().or_else(|| self.receiver("status"));
         connection.stage = connection.stage.take().or_else(|| self.receiver("stage"));
         connection.tick = connection.tick.take().or_else(|| self.listener());
+        if connection.missing() < missing { reserve_pages() } else { Ok(()) }
     }
 
     /// Whether a publisher is there and alive. Cleans up after one that was killed.
@@ -126,8 +139,16 @@ impl Subscription {
 }
 
 impl Connection {
-    /// Waits until a frame is announced, or for `timeout`.
+    /// Services that are not open.
+    fn missing(&self) -> usize {
+        let open = [self.alerts.is_some(), self.status.is_some(), self.stage.is_some(), self.tick.is_some()];
+        open.into_iter().filter(|open| !open).count()
+    }
+
+    /// Waits until a frame is announced, or for `timeout` but at least 1 ms.
     pub fn wait(&self, timeout: Duration) {
+        // iceoryx2 takes less than a microsecond for "for ever".
+        let timeout = timeout.max(Duration::from_millis(1));
         let waited = self.tick.as_ref().map(|tick| tick.timed_wait(|_| (), timeout));
         if !matches!(waited, Some(Ok(_))) {
             // Without the event service there is nothing to wake on.

@@ -11,7 +11,7 @@ use crate::transports::iceoryx2::OpenError;
 use super::connection::{Connection, Subscription};
 
 /// How long a publisher may be silent before it is looked for: at least this, and three periods.
-const SILENCE: Duration = Duration::from_millis(700);
+const SILENCE: Duration = Duration::from_millis(500);
 /// How often services are looked for that were not there yet.
 const COMPLETION: Duration = Duration::from_millis(100);
 
@@ -145,7 +145,7 @@ impl Monitor {
         connection.wait(timeout);
         self.take_frames(&mut tell);
         self.take_messages(&mut tell);
-        self.complete();
+        self.complete()?;
         self.look_for_publisher(&mut tell);
         Ok(())
     }
@@ -182,13 +182,14 @@ impl Monitor {
         }
     }
 
-    fn complete(&mut self) {
+    fn complete(&mut self) -> Result<(), OpenError> {
         if let Some(connection) = &mut self.connection
             && self.last_completion.elapsed() >= COMPLETION
         {
-            self.subscription.complete(connection);
+            self.subscription.complete(connection)?;
             self.last_completion = Instant::now();
         }
+        Ok(())
     }
 
     /// After a silence: is the publisher gone, or does it only say nothing?

@@ -1,8 +1,8 @@
 //! The live stage picture: reads a publisher's frames and serves them to browsers, with the page that draws them.
 //!
-//! Called by the `view` command. [`reader`] reads the shared memory on a thread of its own, since ports cannot leave the
-//! thread that made them, and hands the newest picture over; [`browser`] sends it to one browser at that one's pace;
-//! [`wire`] says how it looks on the way.
+//! Called by the `view` command. `reader` reads the shared memory on a thread of its own, since ports cannot leave the
+//! thread that made them, and hands the newest picture over; `browser` sends it to one browser at that one's pace;
+//! `wire` says how it looks on the way.
 
 mod browser;
 mod reader;

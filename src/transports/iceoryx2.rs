@@ -4,6 +4,13 @@
 //! since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/alerts`, `/status`,
 //! `/stage` and the event service `<name>/tick`.
 
+pub mod remains;
+
+use std::collections::BTreeSet;
+use std::fs::OpenOptions;
+use std::io::ErrorKind;
+
+use ::iceoryx2::config::Config;
 use ::iceoryx2::port::notifier::Notifier;
 use ::iceoryx2::port::publisher::Publisher as Port;
 use ::iceoryx2::port::publisher::PublisherCreateError;
@@ -20,16 +27,17 @@ use crate::live::{PublishError, Publisher, StatusPublisher};
 use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 use crate::show::Frame;
 
-/// Subscribers that each service admits at once.
-pub const MAX_SUBSCRIBERS: usize = 8;
-/// Processes that may have a service open at once.
-const MAX_NODES: usize = 40;
+/// Nodes that may have a service open at once beyond one a subscriber: the publisher's, and those that died and have
+/// not been cleaned up after yet.
+const SPARE_NODES: usize = 32;
 /// Alerts and statuses that a subscriber may fall behind.
 const SMALL_QUEUE: usize = 16;
 /// The shared memory that the queues of frames may take by default.
 const QUEUE_BYTES: usize = 64_000_000;
 /// Where Linux keeps shared memory.
 const SHARED_MEMORY: &str = "/dev/shm";
+/// What a subscriber needs of it for its own bookkeeping, and more.
+const SUBSCRIBER_BYTES: u64 = 500_000;
 
 /// Why the shared memory cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -49,16 +57,34 @@ pub enum OpenError {
     AlreadyPublished(String),
     /// The queues would not fit.
     #[error(
-        "the queues of {queue} frames for {MAX_SUBSCRIBERS} subscribers need {needed} bytes of shared memory and \
-         {SHARED_MEMORY} has {free} left: lower publish.queue in the scene, or make {SHARED_MEMORY} larger"
+        "the queues of {queue} frames for {subscribers} subscribers need {needed} bytes of shared memory and \
+         {SHARED_MEMORY} has {free} left: lower publish.queue or publish.subscribers in the scene, or make \
+         {SHARED_MEMORY} larger"
     )]
     NoRoom {
         /// Frames in a queue.
         queue: usize,
+        /// Subscribers that may come.
+        subscribers: usize,
         /// Bytes needed.
         needed: u64,
         /// Bytes left.
         free: u64,
+    },
+    /// There is no room even for bookkeeping.
+    #[error("{SHARED_MEMORY} has {free} bytes left, which is too little: remove what fills it, or make it larger")]
+    Full {
+        /// Bytes left.
+        free: u64,
+    },
+    /// The services on this machine belong to another user.
+    #[error(
+        "{folder} belongs to another user, who keeps all others out: run as that user, or build every program that is to \
+         take part with the feature any_user"
+    )]
+    AnotherUsers {
+        /// The folder that cannot be entered.
+        folder: String,
     },
     /// A service of this name exists with other properties.
     #[error(
@@ -68,9 +94,15 @@ pub enum OpenError {
     Incompatible(String),
     /// The service admits no more subscribers.
     #[error(
-        "\"{0}\" has {MAX_SUBSCRIBERS} subscribers, which is as many as a publisher admits (MAX_SUBSCRIBERS): end one first"
+        "\"{service}\" has {most} subscribers, which is as many as its publisher admits (publish.subscribers in its \
+         scene): end one first, or raise that and start the publisher again"
     )]
-    TooManySubscribers(String),
+    TooManySubscribers {
+        /// The service.
+        service: String,
+        /// Subscribers admitted.
+        most: usize,
+    },
     /// Anything else.
     #[error("iceoryx2 could not open \"{service}\": {reason}")]
     Failed {
@@ -96,17 +128,23 @@ pub fn service_name(name: &str, service: &str) -> Result<ServiceName, OpenError>
 /// A node that leaves signals to this program.
 ///
 /// # Errors
-/// [`OpenError::Failed`] where iceoryx2 cannot make one.
+/// [`OpenError::AnotherUsers`] where another user's processes keep this one out, [`OpenError::Failed`] where iceoryx2
+/// cannot make one for another reason.
 pub fn node() -> Result<Node<ipc::Service>, OpenError> {
-    NodeBuilder::new()
-        .signal_handling_mode(SignalHandlingMode::Disabled)
-        .create::<ipc::Service>()
-        .map_err(|error| OpenError::Failed { service: "a node".to_owned(), reason: format!("{error:?}") })
+    remains::remove_unfinished_files();
+    let made = NodeBuilder::new().signal_handling_mode(SignalHandlingMode::Disabled).create::<ipc::Service>();
+    made.map_err(|error| {
+        let folder = Config::global_config().global.root_path().to_string();
+        match std::fs::read_dir(&folder) {
+            Err(refused) if refused.kind() == ErrorKind::PermissionDenied => OpenError::AnotherUsers { folder },
+            _ => OpenError::Failed { service: "a node".to_owned(), reason: format!("{error:?}") },
+        }
+    })
 }
 
 /// Frames a subscriber may fall behind, where the scene does not say: at most 64 MB for all subscribers together.
-pub fn default_queue(handles: usize) -> usize {
-    (QUEUE_BYTES / frame_bytes(handles) / MAX_SUBSCRIBERS).clamp(2, 64)
+pub fn default_queue(handles: usize, subscribers: usize) -> usize {
+    (QUEUE_BYTES / frame_bytes(handles) / subscribers).clamp(2, 64)
 }
 
 fn frame_bytes(handles: usize) -> usize {
@@ -122,6 +160,8 @@ pub struct Offer {
     pub handles: usize,
     /// Frames a subscriber may fall behind.
     pub queue: usize,
+    /// Subscribers that each service admits at once.
+    pub subscribers: usize,
     /// Whether there is an alerts service.
     pub alerts: bool,
     /// The stage, sent once and kept for late subscribers.
@@ -153,7 +193,7 @@ impl SharedMemoryPublisher {
         service_name(name, "poses")?;
         check_room(offer)?;
         let node = node()?;
-        let frame_service = frames(&node, name, offer.queue)?;
+        let frame_service = frames(&node, offer)?;
         let poses = frame_service
             .publisher_builder()
             .initial_max_slice_len(offer.handles)
@@ -161,15 +201,18 @@ impl SharedMemoryPublisher {
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|error| port_error(name, "poses", error))?;
-        let alerts = if offer.alerts { Some(sender(&node, name, "alerts")?) } else { None };
-        let stage = sender(&node, name, "stage")?;
+        let alerts = if offer.alerts { Some(sender(&node, name, "alerts", offer.subscribers)?) } else { None };
+        let stage = sender(&node, name, "stage", offer.subscribers)?;
         stage.send_copy(offer.stage).map_err(|error| failed(name, "stage", error))?;
         let tick_service = node
             .service_builder(&service_name(name, "tick")?)
             .event()
+            .max_listeners(offer.subscribers)
+            .max_nodes(offer.subscribers + SPARE_NODES)
             .open_or_create()
             .map_err(|error| failed(name, "tick", error))?;
         let tick = tick_service.notifier_builder().create().map_err(|error| failed(name, "tick", error))?;
+        reserve_pages()?;
         Ok(Self { poses, poses_service: frame_service, alerts, stage, tick, tick_service, _node: node })
     }
 
@@ -222,13 +265,15 @@ pub struct StatusSender {
 }
 
 impl StatusSender {
-    /// Opens `<name>/status`.
+    /// Opens `<name>/status`, which admits so many `subscribers` at once.
     ///
     /// # Errors
     /// As [`SharedMemoryPublisher::open`].
-    pub fn open(name: &str) -> Result<Self, OpenError> {
+    pub fn open(name: &str, subscribers: usize) -> Result<Self, OpenError> {
         let node = node()?;
-        Ok(Self { status: sender(&node, name, "status")?, _node: node })
+        let status = sender(&node, name, "status", subscribers)?;
+        reserve_pages()?;
+        Ok(Self { status, _node: node })
     }
 }
 
@@ -240,26 +285,59 @@ impl StatusPublisher for StatusSender {
     }
 }
 
-/// Refuses queues that the shared memory has no room for: the pages are reserved first and touched later, and touching
-/// one that is not there ends the process with SIGBUS.
+/// Refuses queues that the shared memory has no room for.
 fn check_room(offer: &Offer) -> Result<(), OpenError> {
+    let Offer { queue, subscribers, .. } = *offer;
     // Two frames that a subscriber may hold, two loans, the history, and a little for bookkeeping.
-    let frames = MAX_SUBSCRIBERS * (offer.queue + 2) + 4;
+    let frames = subscribers * (queue + 2) + 4;
     let needed = (frames * frame_bytes(offer.handles)) as u64 + 2_000_000;
-    // Where there is no such folder iceoryx2 itself will say what is wrong.
-    let Ok(space) = nix::sys::statvfs::statvfs(SHARED_MEMORY) else { return Ok(()) };
-    let free = space.blocks_available() * space.fragment_size();
-    if needed > free { Err(OpenError::NoRoom { queue: offer.queue, needed, free }) } else { Ok(()) }
+    match free_bytes() {
+        Some(free) if free < needed => Err(OpenError::NoRoom { queue, subscribers, needed, free }),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses to subscribe where the shared memory is as good as full.
+///
+/// # Errors
+/// [`OpenError::Full`].
+pub fn check_room_to_subscribe() -> Result<(), OpenError> {
+    match free_bytes() {
+        Some(free) if free < SUBSCRIBER_BYTES => Err(OpenError::Full { free }),
+        _ => Ok(()),
+    }
+}
+
+/// What is left of the shared memory; `None` where there is no such folder: iceoryx2 itself will say what is wrong.
+fn free_bytes() -> Option<u64> {
+    let space = nix::sys::statvfs::statvfs(SHARED_MEMORY).ok()?;
+    Some(space.blocks_available() * space.fragment_size())
+}
+
+/// Has the system set aside every page of the shared memory that this process has mapped. Without this a page is looked
+/// for when it is first written, and should others have filled the memory by then, the process is killed with SIGBUS.
+///
+/// # Errors
+/// [`OpenError::Full`] where the pages are not there.
+pub fn reserve_pages() -> Result<(), OpenError> {
+    let full = || OpenError::Full { free: free_bytes().unwrap_or(0) };
+    // Linux has this file for every process.
+    let maps = std::fs::read_to_string("/proc/self/maps").unwrap_or_default();
+    let mapped: BTreeSet<_> = maps.lines().filter_map(|line| Some(&line[line.find(SHARED_MEMORY)?..])).collect();
+    // A file that is removed meanwhile needs no pages.
+    for file in mapped.into_iter().filter_map(|file| OpenOptions::new().read(true).write(true).open(file).ok()) {
+        let length = file.metadata().map_or(0, |of| of.len());
+        if length > 0 {
+            nix::fcntl::posix_fallocate(&file, 0, length as i64).map_err(|_| full())?;
+        }
+    }
+    Ok(())
 }
 
 /// The service of frames. One left by a watcher can have shorter queues than this publisher would make: it is used as
 /// it is.
-fn frames(
-    node: &Node<ipc::Service>,
-    name: &str,
-    queue: usize,
-) -> Result<Service<[HandlePose], FrameHeader>, OpenError> {
-    let full_name = service_name(name, "poses")?;
+fn frames(node: &Node<ipc::Service>, offer: &Offer) -> Result<Service<[HandlePose], FrameHeader>, OpenError> {
+    let full_name = service_name(&offer.name, "poses")?;
     let builder = || {
         node.service_builder(&full_name)
             .publish_subscribe::<[HandlePose]>()
@@ -268,16 +346,17 @@ fn frames(
             .enable_safe_overflow(true)
     };
     let made = builder()
-        .max_subscribers(MAX_SUBSCRIBERS)
-        .max_nodes(MAX_NODES)
-        .subscriber_max_buffer_size(queue)
+        .max_subscribers(offer.subscribers)
+        .max_nodes(offer.subscribers + SPARE_NODES)
+        .subscriber_max_buffer_size(offer.queue)
         .open_or_create();
     match made {
         Err(PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
             PublishSubscribeOpenError::DoesNotSupportRequestedMinBufferSize,
         )) => {
             log::warn!(
-                "a subscriber keeps \"{full_name}\" open with shorter queues than {queue} frames: those are used"
+                "a subscriber keeps \"{full_name}\" open with shorter queues than {} frames: those are used",
+                offer.queue
             );
             builder().open().map_err(|error| service_error(&full_name, PublishSubscribeOpenOrCreateError::from(error)))
         }
@@ -290,13 +369,14 @@ fn sender<Message: ZeroCopySend + std::fmt::Debug + Copy>(
     node: &Node<ipc::Service>,
     name: &str,
     service: &str,
+    subscribers: usize,
 ) -> Result<Sender<Message, ()>, OpenError> {
     let full_name = service_name(name, service)?;
     node.service_builder(&full_name)
         .publish_subscribe::<Message>()
         .max_publishers(1)
-        .max_subscribers(MAX_SUBSCRIBERS)
-        .max_nodes(MAX_NODES)
+        .max_subscribers(subscribers)
+        .max_nodes(subscribers + SPARE_NODES)
         .subscriber_max_buffer_size(SMALL_QUEUE)
         .history_size(1)
         .enable_safe_overflow(true)

@@ -3,9 +3,9 @@
 #![allow(dead_code, reason = "not every test file uses all of it")]
 
 use std::io::{BufRead, BufReader, Read};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
-use std::sync::mpsc;
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -33,10 +33,21 @@ impl Process {
         nix::sys::signal::kill(nix::unistd::Pid::from_raw(self.0.id() as i32), signal).unwrap();
     }
 
+    /// Lines of standard output as they come; `output_within` is then not to be called.
+    pub fn lines(&mut self) -> Lines {
+        let (sender, lines) = channel();
+        let stdout = self.0.stdout.take().unwrap();
+        std::thread::spawn(move || {
+            let lines = BufReader::new(stdout).lines().map_while(Result::ok);
+            lines.take_while(|line| sender.send(line.clone()).is_ok()).for_each(drop);
+        });
+        Lines(lines)
+    }
+
     /// The first line that the process prints within `seconds`.
     pub fn first_line_within(&mut self, seconds: u64) -> String {
         let mut output = BufReader::new(self.0.stdout.take().unwrap());
-        let (sender, receiver) = mpsc::channel();
+        let (sender, receiver) = channel();
         std::thread::spawn(move || {
             let mut line = String::new();
             let _ = output.read_line(&mut line);
@@ -63,6 +74,95 @@ impl Process {
         };
         Output { status, stdout: stdout.join().unwrap(), stderr: stderr.join().unwrap() }
     }
+}
+
+/// What a process prints while it runs.
+pub struct Lines(Receiver<String>);
+
+impl Lines {
+    /// The next line that contains `what`, which has to come within `seconds`.
+    pub fn until(&self, what: &str, seconds: u64) -> String {
+        let deadline = Instant::now() + Duration::from_secs(seconds);
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            let line = self.0.recv_timeout(left).unwrap_or_else(|_| panic!("no \"{what}\" within {seconds} s"));
+            if line.contains(what) {
+                return line;
+            }
+        }
+    }
+
+    /// All lines until the process ends, which has to be within `seconds`.
+    pub fn rest(&self, seconds: u64) -> Vec<String> {
+        let deadline = Instant::now() + Duration::from_secs(seconds);
+        let mut lines = Vec::new();
+        loop {
+            use std::sync::mpsc::RecvTimeoutError;
+            match self.0.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+                Ok(line) => lines.push(line),
+                Err(RecvTimeoutError::Disconnected) => return lines,
+                Err(RecvTimeoutError::Timeout) => panic!("the process did not end within {seconds} s"),
+            }
+        }
+    }
+}
+
+/// An iceoryx2 of its own: processes of another place are not seen, and what is left behind can be counted.
+pub struct Place {
+    folder: tempfile::TempDir,
+    prefix: String,
+}
+
+impl Place {
+    pub fn new(name: &str) -> Self {
+        let (folder, prefix) = (tempfile::tempdir().unwrap(), format!("{}_", unique(name)));
+        std::fs::create_dir(folder.path().join("config")).unwrap();
+        let settings = format!("[global]\nroot-path = \"{}/root/\"\nprefix = \"{prefix}\"\n", folder.path().display());
+        std::fs::write(folder.path().join("config/iceoryx2.toml"), settings).unwrap();
+        Self { folder, prefix }
+    }
+
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// The program here, under its usual name.
+    pub fn program(&self) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+        command.current_dir(self.folder());
+        command
+    }
+
+    /// Files that exist here.
+    pub fn left_behind(&self) -> Vec<PathBuf> {
+        let mut files = self.shared_memory();
+        files.extend(files_below(&self.folder().join("root")));
+        files
+    }
+
+    fn shared_memory(&self) -> Vec<PathBuf> {
+        let files = std::fs::read_dir("/dev/shm").unwrap().flatten();
+        let ours = files.filter(|file| file.file_name().to_string_lossy().starts_with(&self.prefix));
+        ours.map(|file| file.path()).collect()
+    }
+
+    /// Fails if processes that have ended left more than the one small file that iceoryx2 always leaves.
+    pub fn assert_clean(&self) {
+        let files = self.left_behind();
+        assert!(files.len() <= 1, "{} files are left behind: {files:#?}", files.len());
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.shared_memory().iter().for_each(|file| drop(std::fs::remove_file(file)));
+    }
+}
+
+fn files_below(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let below = |file: PathBuf| if file.is_dir() { files_below(&file) } else { vec![file] };
+    entries.flatten().flat_map(|entry| below(entry.path())).collect()
 }
 
 fn reading(pipe: Option<impl Read>) -> impl FnOnce() -> Vec<u8> {
@@ -109,6 +209,11 @@ pub fn json_lines(output: &Output) -> Vec<Value> {
 pub fn summary(output: &Output) -> Value {
     assert!(output.status.success(), "{}", text(&output.stderr));
     json_lines(output).pop().unwrap()
+}
+
+/// Whether tests that take minutes are asked for.
+pub fn long() -> bool {
+    std::env::var_os("BENCH_DRAGON_LONG").is_some_and(|value| value == "1")
 }
 
 pub fn wait(seconds: f64) {

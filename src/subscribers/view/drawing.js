@@ -59,7 +59,7 @@ export class Camera {
   /** Makes the picture `by` times as large and leaves in place what is at a pixel. */
   zoomAt(by, x = this.width / 2, y = this.height / 2) {
     const [before, above] = this.toStage(x, y);
-    this.zoom = Math.min(2000, Math.max(0.2, this.zoom * by));
+    this.zoom = Math.min(Math.max(2000, 50 * this.reach), Math.max(0.2, this.zoom * by));
     if (this.follow) return;
     const [after, below] = this.toStage(x, y);
     this.x += before - after;

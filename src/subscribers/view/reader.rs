@@ -61,7 +61,10 @@ fn follow(subscription: &Subscription, mut connection: Connection, sender: &watc
         }
         if looked.elapsed() > LOOK {
             looked = Instant::now();
-            subscription.complete(&mut connection);
+            if subscription.complete(&mut connection).is_err() {
+                // Connecting anew tells why.
+                return;
+            }
             if heard.elapsed() > LOOK && !subscription.publisher_is_alive(&connection) {
                 return;
             }

@@ -215,7 +215,9 @@ function showFollow() {
 }
 function follow() {
   camera.follow = !camera.follow;
-  if (camera.follow && camera.zoom < 2.5) camera.zoom = 2.5;
+  // Near enough to tell the benches apart, however large the stage is.
+  const near = Math.max(2.5, camera.reach / (5 * (stream.stage?.head_length ?? camera.reach)));
+  if (camera.follow && camera.zoom < near) camera.zoom = near;
   showFollow();
 }
 function whole() {

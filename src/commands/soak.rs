@@ -1,0 +1,311 @@
+//! `soak`: a publisher and subscribers as processes for hours, and a verdict. `soak-subscriber` is what it starts.
+
+use std::ffi::OsString;
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use bench_dragon::live::clock::realtime_ns;
+use bench_dragon::scene::Accepted;
+use bench_dragon::subscribers::soak::fleet::{Fleet, FleetError, Plan, Role};
+use bench_dragon::subscribers::soak::history::History;
+use bench_dragon::subscribers::soak::observer::Observer;
+use bench_dragon::subscribers::soak::report::{Machine, Report, SubscriberReport};
+use bench_dragon::subscribers::soak::verdict::{Limits, Verdict};
+use bench_dragon::transports::iceoryx2;
+use indicatif::ProgressBar;
+
+use super::{CommandError, Common, Output, progress_bar, stop_on_signals, wall_seconds};
+
+/// How long a slow subscriber sleeps: longer than a queue of 64 frames lasts at 60 Hz.
+const SLOW_PAUSE: Duration = Duration::from_millis(1500);
+
+/// Arguments of `soak`.
+#[derive(Debug, clap::Args)]
+pub struct SoakArguments {
+    /// Wall time after which to end: 60, 90s, 5m, 8h
+    #[arg(long, value_name = "TIME", value_parser = wall_seconds, default_value = "8h", help_heading = "The test")]
+    duration: f64,
+    /// Frames per second; by default the scene's
+    #[arg(long, value_name = "HZ", help_heading = "The test", allow_negative_numbers = true)]
+    rate: Option<f64>,
+    /// Subscribers that keep up and must miss nothing
+    #[arg(long, value_name = "N", default_value_t = 3, help_heading = "The test")]
+    subscribers: usize,
+    /// Subscribers that sleep longer than their queue lasts; what they miss is reported and not judged
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "The test")]
+    slow: usize,
+    /// Subscribers that are killed with SIGKILL every 5 s and started again; what they miss is reported and not judged
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "The test")]
+    flaky: usize,
+    /// Publish ROS 2 topics too
+    #[arg(long, help_heading = "The test")]
+    ros2: bool,
+    /// Write the report to FILE.json and FILE.html
+    #[arg(long, value_name = "FILE", help_heading = "The test")]
+    report: Option<PathBuf>,
+    /// Run the publisher's loop with this real-time priority, 1 to 99 (SCHED_FIFO), and lock its memory
+    #[arg(long, value_name = "PRIORITY", value_parser = clap::value_parser!(u8).range(1..=99), help_heading = "Punctuality")]
+    realtime: Option<u8>,
+    /// Keep the publisher's loop on this CPU
+    #[arg(long, value_name = "N", help_heading = "Punctuality")]
+    cpu: Option<usize>,
+    /// Frames that subscribers which keep up may miss, all together
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Limits")]
+    max_missed: u64,
+    /// Share of the periods that may be skipped
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value = "0.01%", help_heading = "Limits")]
+    max_skipped: f64,
+    /// Wake-up lateness, 99.9th percentile: 200us, 1ms
+    #[arg(long, value_name = "TIME", value_parser = nanoseconds, default_value = "200us", help_heading = "Limits")]
+    max_lateness_p999: u64,
+    /// Growth of the publisher's resident memory after the first minute: 500kB, 1MB
+    #[arg(long, value_name = "SIZE", value_parser = bytes, default_value = "1MB", help_heading = "Limits")]
+    max_rss_growth: u64,
+}
+
+/// Arguments of `soak-subscriber`.
+#[derive(Debug, clap::Args)]
+pub struct SoakSubscriberArguments {
+    /// Sleep longer than the queue lasts between reads
+    #[arg(long)]
+    slow: bool,
+}
+
+/// Soaks until its duration is over or a signal comes, and judges.
+pub fn soak(common: &Common, arguments: &SoakArguments) -> Result<(), CommandError> {
+    arguments.check(common)?;
+    let files = arguments.report.as_deref().map(ReportFiles::create).transpose()?;
+    let stop = stop_on_signals()?;
+    let began_at = realtime_ns() / 1_000_000_000;
+    let mut fleet = Fleet::start(arguments.plan(common)?, &|| !stop.load(Ordering::Relaxed))?;
+    let bar = progress_bar(arguments.duration.ceil() as u64, common);
+    let mut history = History::new(fleet.columns());
+    let began = Instant::now();
+    let mut seconds = 0.0;
+    while seconds < arguments.duration && !stop.load(Ordering::Relaxed) && !fleet.publisher_has_ended() {
+        let next = began + Duration::from_secs_f64((seconds.floor() + 1.0).min(arguments.duration));
+        while Instant::now() < next && !stop.load(Ordering::Relaxed) && !fleet.publisher_has_ended() {
+            fleet.attend(next.saturating_duration_since(Instant::now()).min(Duration::from_millis(100)))?;
+        }
+        seconds = began.elapsed().as_secs_f64();
+        history.push(seconds, fleet.figures());
+        show_progress(&bar, &mut fleet, seconds);
+    }
+    fleet.finish()?;
+    bar.finish_and_clear();
+    fleet.said().iter().for_each(|line| eprintln!("publisher: {line}"));
+    let limits = arguments.limits();
+    let verdict = Verdict::of(&fleet, &limits);
+    let report = Report {
+        verdict: verdict.word(),
+        judgements: verdict,
+        command: std::env::args().collect(),
+        version: env!("CARGO_PKG_VERSION"),
+        machine: Machine::this(),
+        began_at,
+        seconds,
+        publisher: fleet.summary().cloned(),
+        subscribers: SubscriberReport::all(&fleet),
+        history,
+    };
+    drop(fleet);
+    conclude(&report, common, files)
+}
+
+fn show_progress(bar: &ProgressBar, fleet: &mut Fleet, seconds: f64) {
+    for line in fleet.said() {
+        bar.suspend(|| eprintln!("publisher: {line}"));
+    }
+    let (rate, overruns) = fleet.status().map_or((0.0, 0), |status| (status.measured_rate, status.overruns));
+    bar.set_message(format!("{rate:.1} Hz, {overruns} overruns, {} missed", fleet.missed()));
+    bar.set_position(seconds as u64);
+}
+
+fn conclude(report: &Report, common: &Common, files: Option<ReportFiles>) -> Result<(), CommandError> {
+    let mut output = Output::standard();
+    if common.json {
+        output.json(report)?;
+    } else {
+        report.lines().iter().try_for_each(|line| output.line(line))?;
+    }
+    output.finish()?;
+    if let Some(files) = files {
+        files.write(report)?;
+    }
+    if report.verdict == "PASS" {
+        return Ok(());
+    }
+    let broken: Vec<_> = report
+        .judgements
+        .judgements
+        .iter()
+        .filter(|judgement| !judgement.passed)
+        .map(|judgement| judgement.name)
+        .collect();
+    Err(CommandError::Failed(format!("the soak test failed: {}", broken.join("; "))))
+}
+
+impl SoakArguments {
+    fn check(&self, common: &Common) -> Result<(), CommandError> {
+        let admitted = common.load_scene()?.subscribers;
+        iceoryx2::service_name(&common.name, "poses")?;
+        if let Some(rate) = self.rate {
+            Accepted::RATE.check("--rate", rate).map_err(CommandError::BadInput)?;
+        }
+        let all = self.subscribers.saturating_add(self.slow).saturating_add(self.flaky);
+        if self.subscribers == 0 || all > admitted {
+            return Err(CommandError::BadInput(format!(
+                "--subscribers, --slow and --flaky are {}, {} and {}, expected at least 1 and together at most \
+                 {admitted} subscribers, which is as many as the publisher admits (publish.subscribers in the scene)",
+                self.subscribers, self.slow, self.flaky
+            )));
+        }
+        Ok(())
+    }
+
+    fn plan(&self, common: &Common) -> Result<Plan, CommandError> {
+        let mut shared: Vec<OsString> = vec!["--name".into(), (&common.name).into()];
+        if let Some(scene) = &common.scene {
+            shared.extend(["--scene".into(), scene.into()]);
+        }
+        let mut publisher: Vec<OsString> = vec!["--loop".into(), "--end-with-parent".into()];
+        publisher.extend(self.ros2.then(|| "--ros2".into()));
+        let optional = [
+            ("--rate", self.rate.map(|rate| rate.to_string())),
+            ("--realtime", self.realtime.map(|priority| priority.to_string())),
+            ("--cpu", self.cpu.map(|cpu| cpu.to_string())),
+        ];
+        for (option, value) in optional {
+            publisher.extend(value.into_iter().flat_map(|value| [option.into(), value.into()]));
+        }
+        let role = |role, count| std::iter::repeat_n(role, count);
+        let roles = role(Role::Steady, self.subscribers)
+            .chain(role(Role::Slow, self.slow))
+            .chain(role(Role::Flaky, self.flaky));
+        Ok(Plan { program: std::env::current_exe()?, common: shared, publisher, roles: roles.collect() })
+    }
+
+    fn limits(&self) -> Limits {
+        Limits {
+            missed: self.max_missed,
+            skipped_share: self.max_skipped,
+            lateness_p999_ns: self.max_lateness_p999,
+            resident_growth_bytes: self.max_rss_growth,
+        }
+    }
+}
+
+impl From<FleetError> for CommandError {
+    fn from(error: FleetError) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+/// Both files of a report, opened before the test: after eight hours is too late to learn that they cannot be.
+struct ReportFiles {
+    json: File,
+    html: File,
+}
+
+impl ReportFiles {
+    fn create(stem: &Path) -> Result<Self, CommandError> {
+        let create = |extension: &str| {
+            let mut name = stem.as_os_str().to_owned();
+            name.push(extension);
+            File::create(&name).map_err(|error| {
+                let file = Path::new(&name).display();
+                CommandError::BadInput(format!("--report: {file}: {error}, expected a file to write"))
+            })
+        };
+        Ok(Self { json: create(".json")?, html: create(".html")? })
+    }
+
+    fn write(mut self, report: &Report) -> Result<(), CommandError> {
+        serde_json::to_writer(&mut self.json, report).map_err(std::io::Error::from)?;
+        writeln!(self.json)?;
+        Ok(self.html.write_all(report.html().as_bytes())?)
+    }
+}
+
+/// Observes until a signal comes, an observation a second on standard output.
+pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result<(), CommandError> {
+    end_with_parent()?;
+    let mut observer = Observer::new(&common.name)?;
+    let stop = stop_on_signals()?;
+    let mut output = std::io::stdout().lock();
+    let mut say = |observer: &mut Observer| -> Result<(), CommandError> {
+        serde_json::to_writer(&mut output, &observer.observation()).map_err(std::io::Error::from)?;
+        writeln!(output)?;
+        Ok(output.flush()?)
+    };
+    let mut next = Instant::now() + Duration::from_secs(1);
+    while !stop.load(Ordering::Relaxed) {
+        if arguments.slow {
+            std::thread::sleep(SLOW_PAUSE);
+        }
+        let now = Instant::now();
+        observer.step(next.saturating_duration_since(now).min(Duration::from_millis(200)))?;
+        if now >= next {
+            say(&mut observer)?;
+            next = now + Duration::from_secs(1);
+        }
+    }
+    observer.step(Duration::from_millis(1))?;
+    say(&mut observer)
+}
+
+/// Has this process killed when the one that started it ends, so that nothing is left behind.
+pub fn end_with_parent() -> Result<(), CommandError> {
+    let asked = nix::sys::prctl::set_pdeathsig(nix::sys::signal::Signal::SIGTERM);
+    asked.map_err(|error| CommandError::Failed(format!("the end of the parent cannot be watched: {error}")))
+}
+
+/// A share as a person writes it: `0.01%`, `0.0001`.
+fn share(text: &str) -> Result<f64, String> {
+    let (digits, unit) = text.trim().strip_suffix('%').map_or((text.trim(), 1.0), |digits| (digits, 0.01));
+    let share = digits.trim().parse::<f64>().map_or(f64::NAN, |number| number * unit);
+    if (0.0..=1.0).contains(&share) { Ok(share) } else { Err("expected a share such as 0.01% or 0.0001".to_owned()) }
+}
+
+/// A short time as a person writes it: `500ns`, `200us`, `1.5ms`, `1s`. Nanoseconds.
+fn nanoseconds(text: &str) -> Result<u64, String> {
+    // The seconds come last: every other unit ends with their letter.
+    let units = [("ns", 1.0), ("us", 1e3), ("ms", 1e6), ("s", 1e9)];
+    quantity(text, &units).ok_or_else(|| "expected a time with its unit such as 200us or 1ms".to_owned())
+}
+
+/// A size as a person writes it: `800B`, `500kB`, `1MB`, `2GB`. Bytes.
+fn bytes(text: &str) -> Result<u64, String> {
+    let units = [("kB", 1e3), ("MB", 1e6), ("GB", 1e9), ("B", 1.0)];
+    quantity(text, &units).ok_or_else(|| "expected a size with its unit such as 500kB or 1MB".to_owned())
+}
+
+fn quantity(text: &str, units: &[(&str, f64)]) -> Option<u64> {
+    let (digits, unit) = units.iter().find_map(|(name, unit)| Some((text.trim().strip_suffix(name)?, unit)))?;
+    let value = digits.trim().parse::<f64>().ok()? * unit;
+    (0.0..=1e18).contains(&value).then_some(value as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_are_read_as_people_write_them() {
+        assert_eq!(
+            (nanoseconds("200us"), nanoseconds("1.5ms"), nanoseconds("2 s")),
+            (Ok(200_000), Ok(1_500_000), Ok(2_000_000_000))
+        );
+        assert_eq!((bytes("1MB"), bytes("500kB"), bytes("0B")), (Ok(1_000_000), Ok(500_000), Ok(0)));
+        assert_eq!((share("0.01%"), share("0.5")), (Ok(0.0001), Ok(0.5)));
+        for wrong in ["", "200", "us", "-1us", "nan%", "101%", "1XB"] {
+            assert!(nanoseconds(wrong).is_err() && bytes(wrong).is_err(), "{wrong}");
+        }
+        for wrong in ["", "-1", "nan%", "101%", "x"] {
+            assert!(share(wrong).is_err(), "{wrong}");
+        }
+    }
+}

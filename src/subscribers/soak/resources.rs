@@ -1,0 +1,52 @@
+//! What a process holds, as /proc tells it from outside. The soak test asks about its publisher.
+
+use std::collections::BTreeSet;
+use std::os::unix::fs::MetadataExt;
+
+/// Where Linux keeps shared memory.
+const SHARED_MEMORY: &str = "/dev/shm/";
+/// The unit of a file's blocks, bytes.
+const BLOCK: u64 = 512;
+
+/// What a process holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Resources {
+    /// Resident memory, shared memory that was touched included, bytes.
+    pub resident_bytes: u64,
+    /// Open file descriptors.
+    pub file_descriptors: u64,
+    /// Pages in use of the files in /dev/shm that the process has mapped, bytes.
+    pub shared_memory_bytes: u64,
+}
+
+impl Resources {
+    /// What the process `id` holds, or `None` if it is not there any more.
+    pub fn of(id: u32) -> Option<Self> {
+        let pages = std::fs::read_to_string(format!("/proc/{id}/statm")).ok()?;
+        let pages: u64 = pages.split_whitespace().nth(1)?.parse().ok()?;
+        let page = nix::unistd::sysconf(nix::unistd::SysconfVar::PAGE_SIZE).ok().flatten().unwrap_or(4096);
+        Some(Self {
+            resident_bytes: pages * page as u64,
+            file_descriptors: std::fs::read_dir(format!("/proc/{id}/fd")).ok()?.count() as u64,
+            shared_memory_bytes: shared_memory_bytes(id)?,
+        })
+    }
+}
+
+fn shared_memory_bytes(id: u32) -> Option<u64> {
+    let maps = std::fs::read_to_string(format!("/proc/{id}/maps")).ok()?;
+    let files: BTreeSet<_> = maps.lines().filter_map(|line| Some(&line[line.find(SHARED_MEMORY)?..])).collect();
+    Some(files.iter().filter_map(|file| std::fs::metadata(file).ok()).map(|file| file.blocks() * BLOCK).sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn this_process_holds_something_and_a_missing_one_nothing() {
+        let mine = Resources::of(std::process::id()).unwrap();
+        assert!(mine.resident_bytes > 100_000 && mine.file_descriptors >= 3, "{mine:?}");
+        assert_eq!(Resources::of(u32::MAX), None);
+    }
+}

@@ -1,0 +1,164 @@
+//! The verdict of a soak test: each limit, the value found, and whether it was kept.
+
+use serde::Serialize;
+
+use super::fleet::{Fleet, Member, Role};
+
+/// A deadline may be this far from first deadline + tick / rate: both are rounded to whole nanoseconds.
+const ROUNDING_NS: f64 = 2.0;
+
+/// What a user sets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Frames that a steady subscriber may miss.
+    pub missed: u64,
+    /// The share of periods that may be skipped, 0 to 1.
+    pub skipped_share: f64,
+    /// Wake-up lateness: 99.9th percentile, ns.
+    pub lateness_p999_ns: u64,
+    /// Growth of the publisher's resident memory after the first minute, bytes.
+    pub resident_growth_bytes: u64,
+}
+
+/// How a value is to be written for people.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Unit {
+    /// A number of something.
+    Count,
+    /// A share, 0 to 1; for people in percent.
+    Share,
+    /// Nanoseconds; for people in microseconds.
+    Nanoseconds,
+    /// Bytes; for people in megabytes.
+    Bytes,
+}
+
+impl Unit {
+    /// A value for people.
+    pub fn show(self, value: f64) -> String {
+        match self {
+            Self::Count => format!("{value}"),
+            Self::Share => format!("{:.4} %", 100.0 * value),
+            Self::Nanoseconds => format!("{:.3} us", value / 1e3),
+            Self::Bytes => format!("{:.3} MB", value / 1e6),
+        }
+    }
+}
+
+/// One limit and what was found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Judgement {
+    /// What was judged.
+    pub name: &'static str,
+    /// The most that it may be.
+    pub limit: f64,
+    /// What it was; NaN (null in JSON) if the test was too short, or ended too badly, to say.
+    pub value: f64,
+    /// How both are to be read.
+    pub unit: Unit,
+    /// Whether the limit was kept.
+    pub passed: bool,
+}
+
+impl Judgement {
+    fn new(name: &'static str, unit: Unit, limit: f64, value: f64) -> Self {
+        // What could not be found is no pass.
+        Self { name, limit, value, unit, passed: value <= limit }
+    }
+
+    /// A line for people.
+    pub fn line(&self) -> String {
+        let value = if self.value.is_nan() { "not known".to_owned() } else { self.unit.show(self.value) };
+        let mark = if self.passed { "pass" } else { "FAIL" };
+        format!("{mark}  {:<54} {value:>14}   at most {}", self.name, self.unit.show(self.limit))
+    }
+}
+
+/// All limits together.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(transparent)]
+pub struct Verdict {
+    /// Each of them.
+    pub judgements: Vec<Judgement>,
+}
+
+impl Verdict {
+    /// Judges a fleet that has finished.
+    pub fn of(fleet: &Fleet, limits: &Limits) -> Self {
+        let steady: Vec<_> = fleet.members().iter().filter(|member| member.role == Role::Steady).collect();
+        let of_all = |count: fn(&super::observer::Observation) -> u64| {
+            fleet.members().iter().map(|member| count(&member.seen())).sum::<u64>() as f64
+        };
+        let count = |name, limit, value| Judgement::new(name, Unit::Count, limit, value);
+        let summary = fleet.summary();
+        let of_summary = |value: fn(&super::fleet::RunSummary) -> f64| summary.map_or(f64::NAN, value);
+        let phase = fleet.members().iter().map(|member| member.seen().phase_error_ns).fold(0.0, f64::max);
+        let mut judgements = vec![
+            count("frames missed by steady subscribers", limits.missed as f64, missed(fleet, &steady)),
+            Judgement::new(
+                "periods skipped",
+                Unit::Share,
+                limits.skipped_share,
+                of_summary(|summary| summary.skipped as f64 / (summary.frames + summary.skipped) as f64),
+            ),
+            Judgement::new(
+                "wake-up lateness, 99.9th percentile",
+                Unit::Nanoseconds,
+                limits.lateness_p999_ns as f64,
+                of_summary(|summary| summary.wakeup_ns.p999 as f64),
+            ),
+        ];
+        // A test of less than a minute has nothing to say of memory.
+        judgements.extend(fleet.resident_growth().map(|growth| {
+            let limit = limits.resident_growth_bytes as f64;
+            Judgement::new("growth of resident memory after the first minute", Unit::Bytes, limit, growth as f64)
+        }));
+        judgements.extend([
+            count("frames out of order, or with times that cannot be", 0.0, of_all(|seen| seen.disordered)),
+            count("frames with a link of a wrong length", 0.0, of_all(|seen| seen.wrong_links)),
+            Judgement::new("drift of the tick against CLOCK_MONOTONIC", Unit::Nanoseconds, ROUNDING_NS, phase),
+            count("counts that publisher and subscribers disagree on", 0.0, disagreements(fleet, &steady)),
+            count("processes that ended by themselves or hung", 0.0, lost(fleet)),
+        ]);
+        Self { judgements }
+    }
+
+    /// Whether every limit was kept.
+    pub fn passed(&self) -> bool {
+        self.judgements.iter().all(|judgement| judgement.passed)
+    }
+
+    /// `PASS` or `FAIL`.
+    pub fn word(&self) -> &'static str {
+        if self.passed() { "PASS" } else { "FAIL" }
+    }
+}
+
+/// Frames that should have come and did not, those after the last one received included.
+fn missed(fleet: &Fleet, steady: &[&Member]) -> f64 {
+    let Some(summary) = fleet.summary() else { return f64::NAN };
+    let of = |member: &&Member| {
+        let seen = member.seen();
+        seen.missed + summary.frames.saturating_sub(seen.last_sequence + 1)
+    };
+    steady.iter().map(of).sum::<u64>() as f64
+}
+
+/// Steady subscribers for whom the publisher's frames and skipped periods do not add up to the last tick they
+/// received, that saw more than one run, or that left more than a second's frames uncompared with the stage.
+fn disagreements(fleet: &Fleet, steady: &[&Member]) -> f64 {
+    let Some(summary) = fleet.summary() else { return f64::NAN };
+    let disagrees = |member: &&&Member| {
+        let seen = member.seen();
+        let whole = seen.last_sequence + 1 < summary.frames || seen.last_tick + 1 == summary.frames + summary.skipped;
+        let second = seen.status.map_or(0.0, |status| status.rate);
+        !whole || seen.runs != 1 || (seen.received - seen.links_checked) as f64 > second
+    };
+    steady.iter().filter(disagrees).count() as f64
+}
+
+fn lost(fleet: &Fleet) -> f64 {
+    let subscribers = fleet.members().iter().filter(|member| member.ended_by_itself).count();
+    (subscribers + usize::from(fleet.summary().is_none())) as f64
+}

@@ -1,0 +1,371 @@
+//! What goes wrong on a real machine, done to real processes: kills, stops, clocks, full memory, races, other users.
+//!
+//! Each test ends with nothing lost that was promised and nothing left behind. `BENCH_DRAGON_LONG=1` repeats the kills
+//! a thousand and a hundred times. Every wait has a deadline, and nothing asserts a speed.
+
+mod processes;
+
+use std::collections::BTreeSet;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::os::unix::process::ExitStatusExt;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::Signal::{SIGBUS, SIGCONT, SIGINT, SIGKILL, SIGSTOP, SIGTERM};
+use serde_json::Value;
+
+use processes::{Lines, Place, Process, json_lines, long, scene_file, summary, text, wait};
+
+/// A subscriber that checks every frame: its process, and an observation a second.
+fn observer(place: &Place) -> (Process, Lines) {
+    let mut process = Process::start(place.program().arg("soak-subscriber"));
+    let lines = process.lines();
+    (process, lines)
+}
+
+/// What an observer has seen when it is told to end.
+fn observed((process, lines): &(Process, Lines)) -> Value {
+    process.signal(SIGTERM);
+    serde_json::from_str(lines.rest(20).last().unwrap()).unwrap()
+}
+
+fn number(value: &Value, key: &str) -> u64 {
+    value[key].as_u64().unwrap_or_else(|| panic!("no {key} in {value}"))
+}
+
+/// Fails unless a run's frames reached an observer up to the last one, in order and right.
+fn assert_nothing_lost(seen: &Value, summary: &Value) {
+    assert_nothing_wrong(seen);
+    assert_eq!(number(seen, "runs"), 1, "{seen}");
+    assert_eq!(number(seen, "last_sequence") + 1, number(summary, "frames"), "{seen} {summary}");
+    let periods = number(summary, "frames") + number(summary, "skipped");
+    assert_eq!(number(seen, "last_tick") + 1, periods, "{seen} {summary}");
+}
+
+/// Fails unless an observer missed nothing between the frames it received, and found nothing wrong with them.
+fn assert_nothing_wrong(seen: &Value) {
+    assert!(number(seen, "received") > 0, "{seen}");
+    for fault in ["missed", "disordered", "wrong_links"] {
+        assert_eq!(number(seen, fault), 0, "{fault}: {seen}");
+    }
+    assert!(seen["phase_error_ns"].as_f64().unwrap() <= 2.0, "{seen}");
+}
+
+/// One clear sentence and exit code 1.
+fn refusal(output: &Output) -> String {
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{:?} {said}", output.status.signal());
+    assert_eq!(said.lines().count(), 1, "{said}");
+    said
+}
+
+#[test]
+fn killed_subscribers_take_nothing_with_them() {
+    let place = Place::new("kills");
+    let publisher = Process::start(place.program().args(["run", "--json", "--rate", "200"]));
+    let steady = observer(&place);
+    steady.1.until("\"status\":{", 20);
+    let kills = if long() { 1000 } else { 20 };
+    for kill in 0..kills {
+        let victim = Process::start(place.program().args(["watch", "--json"]));
+        // From a moment before it has opened anything to one in full swing.
+        wait(0.015 * f64::from(kill % 20));
+        victim.signal(SIGKILL);
+    }
+    let late = Process::start(place.program().args(["watch", "--json", "--duration", "2"])).output_within(20);
+    assert!(number(json_lines(&late).last().unwrap(), "received") > 0);
+    publisher.signal(SIGINT);
+    let summary = summary(&publisher.output_within(20));
+    assert_nothing_lost(&observed(&steady), &summary);
+    // What was killed half way stays untouched for two seconds: it could be alive and slow.
+    wait(2.5);
+    Process::start(place.program().args(["watch", "--duration", "3"])).output_within(20);
+    place.assert_clean();
+}
+
+#[test]
+fn subscribers_survive_killed_publishers() {
+    let place = Place::new("widows");
+    let mut monitors = [1, 2].map(|_| Process::start(place.program().arg("watch")));
+    let news = monitors.each_mut().map(Process::lines);
+    let steady = observer(&place);
+    let start = || Process::start(place.program().args(["run", "--json", "--rate", "100"]));
+    let everybody_says = |what: &str| news.each_ref().map(|lines| lines.until(what, 20));
+    let rounds = if long() { 100 } else { 5 };
+    let mut longest = Duration::ZERO;
+    for _ in 0..rounds {
+        let publisher = start();
+        everybody_says("is running");
+        everybody_says("missed 0");
+        publisher.signal(SIGKILL);
+        let killed = Instant::now();
+        everybody_says("has ended");
+        longest = longest.max(killed.elapsed());
+    }
+    println!("{rounds} deaths of a publisher, each noticed within {longest:?}");
+    let last = start();
+    everybody_says("is running");
+    everybody_says("missed 0");
+    last.signal(SIGINT);
+    summary(&last.output_within(20));
+    everybody_says("has ended");
+    let seen = observed(&steady);
+    assert_nothing_wrong(&seen);
+    assert_eq!(number(&seen, "runs"), rounds + 1, "{seen}");
+    for (monitor, lines) in monitors.iter().zip(&news) {
+        monitor.signal(SIGTERM);
+        lines.rest(20);
+    }
+    place.assert_clean();
+}
+
+#[test]
+fn files_of_dead_runs_are_gone_after_the_next() {
+    let place = Place::new("dead");
+    let mut first = Process::start(place.program().args(["run", "--rate", "100"]));
+    observer(&place).1.until("\"status\":{", 20);
+    first.signal(SIGKILL);
+    first.lines().rest(20);
+    assert!(place.left_behind().len() > 5, "a killed publisher leaves files");
+    for start in 0..20 {
+        let killed = Process::start(place.program().args(["run", "--rate", "100"]));
+        // From before it has opened anything to the first frames.
+        wait(0.01 * f64::from(start));
+        killed.signal(SIGKILL);
+    }
+    // What was killed half way stays untouched for two seconds: it could be alive and slow.
+    wait(2.5);
+    summary(&Process::start(place.program().args(["run", "--json", "--duration", "3"])).output_within(20));
+    place.assert_clean();
+}
+
+#[test]
+fn a_stepped_wall_clock_moves_the_stamps_and_nothing_else() {
+    let place = Place::new("clock");
+    let library = std::env::current_exe().unwrap().ancestors().nth(2).unwrap().join("examples/libstepped_clock.so");
+    assert!(library.exists(), "cargo build --release --examples makes {}", library.display());
+    let stepped = |arguments: &[&str]| Process::start(place.program().env("LD_PRELOAD", &library).args(arguments));
+    let alert_every_second = ["--start", "405", "--time-scale", "0.1"];
+    let publisher =
+        stepped(&[&["run", "--json", "--rate", "100", "--duration", "6"][..], &alert_every_second].concat());
+    let monitor = stepped(&["watch", "--json", "--duration", "5"]);
+    let steady = observer(&place);
+    let summary = summary(&publisher.output_within(30));
+    // An hour that counted would be 360,000 periods one way, and a run that does not end the other.
+    assert_eq!(number(&summary, "frames") + number(&summary, "skipped"), 600, "{summary}");
+    assert!(number(&summary, "skipped") < 300, "{summary}");
+    assert_nothing_lost(&observed(&steady), &summary);
+    let lines = json_lines(&monitor.output_within(20));
+    let latencies = lines.iter().filter_map(|line| line["latency_ns"]["max"].as_u64());
+    assert!(latencies.max().is_some_and(|longest| longest < 3_000_000_000_000), "{lines:?}");
+    // The steps did reach the publisher: its stamps, which are the wall clock's, are an hour ahead and behind.
+    let now = std::time::SystemTime::UNIX_EPOCH.elapsed().unwrap().as_secs() as i64;
+    let stamps = lines.iter().filter_map(|line| line["stamp_ns"].as_u64());
+    let hours: BTreeSet<_> =
+        stamps.map(|stamp| ((stamp / 1_000_000_000) as i64 - now + 1800).div_euclid(3600)).collect();
+    assert!(hours.is_superset(&BTreeSet::from([-1, 1])), "{hours:?}: {lines:?}");
+    place.assert_clean();
+}
+
+#[test]
+fn a_stopped_publisher_skips_whole_periods_and_catches_nothing_up() {
+    let place = Place::new("stopped");
+    let publisher = Process::start(place.program().args(["run", "--json", "--rate", "100", "--duration", "8"]));
+    let steady = observer(&place);
+    steady.1.until("\"status\":{", 20);
+    publisher.signal(SIGSTOP);
+    wait(5.0);
+    publisher.signal(SIGCONT);
+    let summary = summary(&publisher.output_within(30));
+    assert_eq!(number(&summary, "frames") + number(&summary, "skipped"), 800, "{summary}");
+    // The machine itself may add a stall of a few periods.
+    assert!((498..560).contains(&number(&summary, "skipped")), "{summary}");
+    assert!((1..20).contains(&number(&summary, "overruns")), "{summary}");
+    assert!(number(&summary["wakeup_ns"], "max") > 4_900_000_000, "{summary}");
+    let seen = observed(&steady);
+    assert_nothing_lost(&seen, &summary);
+    // Coordinated omission: all of the wait is in the latency since the deadline, though no frame was under way.
+    let waited = number(&seen["total"]["since_deadline"], "max");
+    assert!(waited > 4_900_000_000, "{seen}");
+    assert!(number(&seen["total"]["since_deadline"], "p50") > number(&seen["total"]["since_sent"], "p50"), "{seen}");
+    place.assert_clean();
+}
+
+#[test]
+fn of_publishers_that_race_for_a_name_one_wins() {
+    let place = Place::new("race");
+    for round in 0..5 {
+        if round == 3 {
+            // From here on they also find what a dead one left.
+            let doomed = Process::start(place.program().args(["run", "--rate", "100"]));
+            observer(&place).1.until("\"status\":{", 20);
+            doomed.signal(SIGKILL);
+        }
+        let start = || Process::start(place.program().args(["run", "--json", "--duration", "2"]));
+        let outputs = [start(), start(), start()].map(|racer| racer.output_within(30));
+        let (winners, losers): (Vec<_>, Vec<_>) = outputs.iter().partition(|output| output.status.success());
+        assert_eq!(winners.len(), 1, "round {round}: {outputs:?}");
+        assert_eq!(number(&summary(winners[0]), "frames") + number(&summary(winners[0]), "skipped"), 120);
+        for loser in losers {
+            let said = refusal(loser);
+            assert!(said.contains("another publisher") && said.contains("--name"), "{said}");
+        }
+    }
+    place.assert_clean();
+}
+
+#[test]
+fn one_subscriber_too_many_is_told_the_limit_and_the_setting() {
+    let two = scene_file("two", &[("velocities = true", "subscribers = 2")]);
+    for (limit, scene) in [(8, None), (2, Some(two))] {
+        let place = Place::new("many");
+        let mut run = place.program();
+        run.args(["run", "--json"])
+            .args(scene.iter().flat_map(|scene| ["--scene".into(), scene.clone().into_os_string()]));
+        let publisher = Process::start(&mut run);
+        let mut admitted: Vec<_> = (0..limit).map(|_| observer(&place)).collect();
+        for subscriber in &admitted {
+            subscriber.1.until("\"status\":{", 20);
+        }
+        let watch = || Process::start(place.program().args(["watch", "--json", "--duration", "2"])).output_within(20);
+        let said = refusal(&watch());
+        assert!(said.contains(&format!("{limit} subscribers")) && said.contains("publish.subscribers"), "{said}");
+        assert_nothing_wrong(&observed(&admitted.pop().unwrap()));
+        let next = watch();
+        assert!(number(json_lines(&next).last().unwrap(), "received") > 0, "{}", text(&next.stderr));
+        publisher.signal(SIGINT);
+        let summary = summary(&publisher.output_within(20));
+        for subscriber in &admitted {
+            assert_nothing_lost(&observed(subscriber), &summary);
+        }
+        place.assert_clean();
+    }
+}
+
+/// A shell in which /dev/shm is a small memory of its own, with `$PROGRAM` for the program.
+fn with_shared_memory(size: &str, script: &str) -> Output {
+    let place = Place::new("small");
+    let root = std::fs::metadata("/proc/self").unwrap().uid() == 0;
+    let mut command = Command::new("unshare");
+    command.args(if root { vec!["--mount"] } else { vec!["--mount", "--map-root-user"] });
+    command.args(["sh", "-c", &format!("mount -t tmpfs -o size={size} tmpfs /dev/shm && {script}")]);
+    command.current_dir(place.folder()).env("PROGRAM", env!("CARGO_BIN_EXE_bench-dragon"));
+    Process::start(&mut command).output_within(60)
+}
+
+#[test]
+fn too_little_shared_memory_is_refused_with_figures() {
+    for size in ["100k", "1m", "6m"] {
+        let said = refusal(&with_shared_memory(size, "exec \"$PROGRAM\" run --json --duration 1"));
+        for part in ["/dev/shm", "6809280 bytes", "publish.queue", "publish.subscribers"] {
+            assert!(said.contains(part), "{said}");
+        }
+    }
+    let script = "dd if=/dev/zero of=/dev/shm/filler bs=4k 2>/dev/null; exec \"$PROGRAM\" watch --duration 1";
+    let said = refusal(&with_shared_memory("1m", script));
+    assert!(said.contains("/dev/shm") && said.contains("too little"), "{said}");
+}
+
+#[test]
+fn shared_memory_that_others_fill_does_not_stop_a_publisher() {
+    // The slow one keeps taking frames out of the pool, so that every page of it is written.
+    let output = with_shared_memory(
+        "7m",
+        "(\"$PROGRAM\" run --json --rate 200 --duration 10 & publisher=$!; sleep 1.5
+          \"$PROGRAM\" soak-subscriber --slow >slow & slow=$!
+          \"$PROGRAM\" soak-subscriber >steady & steady=$!; sleep 3
+          dd if=/dev/zero of=/dev/shm/filler bs=4k 2>/dev/null
+          \"$PROGRAM\" watch --duration 1 2>&1 | grep -q 'too little' || echo no refusal
+          wait $publisher || echo publisher failed
+          kill $slow $steady; wait $slow || echo slow failed; wait $steady || echo steady failed; tail -n 1 steady)",
+    );
+    let lines = json_lines(&output);
+    assert_eq!(lines.len(), 2, "{lines:?} {}", text(&output.stderr));
+    assert_eq!(number(&lines[0], "frames") + number(&lines[0], "skipped"), 2000);
+    assert_nothing_lost(&lines[1], &lines[0]);
+}
+
+#[test]
+fn a_page_that_cannot_be_had_is_a_sentence() {
+    let place = Place::new("page");
+    let monitor = Process::start(place.program().arg("watch").arg("--json"));
+    wait(0.5);
+    // What Linux sends where a page of a full /dev/shm is written.
+    monitor.signal(SIGBUS);
+    assert!(refusal(&monitor.output_within(20)).contains("/dev/shm is full"));
+}
+
+#[test]
+fn without_ros2_there_is_no_network_socket() {
+    let place = Place::new("sockets");
+    let publisher = Process::start(place.program().args(["run", "--json"]));
+    let steady = observer(&place);
+    steady.1.until("\"status\":{", 20);
+    let network: BTreeSet<String> = ["tcp", "tcp6", "udp", "udp6", "raw", "raw6", "udplite", "udplite6", "packet"]
+        .iter()
+        .filter_map(|protocol| std::fs::read_to_string(format!("/proc/net/{protocol}")).ok())
+        .flat_map(|table| table.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
+        .collect();
+    let mut sockets = 0;
+    for process in [&publisher, &steady.0] {
+        for descriptor in std::fs::read_dir(format!("/proc/{}/fd", process.id())).unwrap().flatten() {
+            let target = std::fs::read_link(descriptor.path()).unwrap_or_default();
+            let target = target.to_string_lossy();
+            if let Some(inode) = target.strip_prefix("socket:[").and_then(|rest| rest.strip_suffix(']')) {
+                sockets += 1;
+                assert!(!network.contains(inode), "{} has a network socket", process.id());
+            }
+        }
+    }
+    assert!(sockets > 0, "both wake each other through local sockets, which is what was looked through");
+}
+
+/// The user who has nothing.
+const NOBODY: u32 = 65534;
+
+/// The program as another user, from a copy that this user may read.
+fn as_nobody(place: &Place, arguments: &[&str]) -> Output {
+    let copy: PathBuf = place.folder().join("bench-dragon");
+    if !copy.exists() {
+        std::fs::copy(env!("CARGO_BIN_EXE_bench-dragon"), &copy).unwrap();
+        std::fs::set_permissions(place.folder(), std::fs::Permissions::from_mode(0o755)).unwrap();
+    }
+    let nobody = NOBODY.to_string();
+    let mut command = Command::new("setpriv");
+    command.args([&format!("--reuid={nobody}"), &format!("--regid={nobody}"), "--clear-groups"]);
+    command.arg(copy).args(arguments).current_dir(place.folder());
+    Process::start(&mut command).output_within(20)
+}
+
+/// Another user reads nothing, unless the program was built to let everybody in.
+#[test]
+fn another_user_is_kept_out_or_let_in_as_the_build_says() {
+    if std::fs::metadata("/proc/self").unwrap().uid() != 0 {
+        println!("not tried: only root can become another user");
+        return;
+    }
+    let place = Place::new("users");
+    let publisher = Process::start(place.program().args(["run", "--json", "--rate", "100"]));
+    observer(&place).1.until("\"status\":{", 20);
+    let shared = std::fs::read_dir("/dev/shm").unwrap().flatten();
+    let modes: BTreeSet<_> = shared
+        .filter(|file| {
+            file.file_name().to_string_lossy().contains("users")
+                && file.path().extension().is_some_and(|kind| kind == "data")
+        })
+        .map(|file| file.metadata().unwrap().mode() & 0o777)
+        .collect();
+    let output = as_nobody(&place, &["watch", "--json", "--duration", "2"]);
+    if cfg!(feature = "any_user") {
+        assert_eq!(modes, BTreeSet::from([0o666]));
+        let lines = json_lines(&output);
+        assert!(number(lines.last().unwrap(), "received") > 0, "{lines:?} {}", text(&output.stderr));
+    } else {
+        assert_eq!(modes, BTreeSet::from([0o600]));
+        let said = refusal(&output);
+        assert!(said.contains("another user"), "{said}");
+    }
+    publisher.signal(SIGINT);
+    summary(&publisher.output_within(20));
+}

@@ -1,0 +1,223 @@
+//! The soak test as users meet it: real publisher, real subscribers, a verdict with its exit code, a report.
+//!
+//! Asserts counts and order, never a speed: every limit on speed is set out of reach, or as low as can be.
+
+mod processes;
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use bench_dragon::messages::LoopStatus;
+use bench_dragon::subscribers::connection::Subscription;
+use nix::sys::signal::Signal::{SIGINT, SIGKILL};
+use nix::sys::signal::kill;
+use nix::unistd::Pid;
+use serde_json::Value;
+
+use processes::{Place, Process, json_lines, program, summary, text, unique, wait};
+
+/// Limits that any machine keeps.
+const ANY_SPEED: [&str; 6] = ["--max-skipped", "100%", "--max-lateness-p999", "3600s", "--max-rss-growth", "1MB"];
+
+fn number(value: &Value, key: &str) -> u64 {
+    value[key].as_u64().unwrap_or_else(|| panic!("no {key} in {value}"))
+}
+
+/// What was judged, by name: whether it passed, and its value.
+fn judgements(report: &Value) -> BTreeMap<&str, (bool, f64)> {
+    let all = report["judgements"].as_array().unwrap().iter();
+    let value = |one: &Value| one["value"].as_f64().unwrap_or(f64::NAN);
+    all.map(|one| (one["name"].as_str().unwrap(), (one["passed"] == true, value(one)))).collect()
+}
+
+#[test]
+fn twenty_seconds_pass_with_nothing_missed() {
+    let place = Place::new("soak");
+    let mut soak = place.program();
+    soak.args(["soak", "--json", "--duration", "20s", "--rate", "250", "--report", "report"]);
+    soak.args(["--subscribers", "3", "--slow", "1", "--flaky", "1"]).args(ANY_SPEED);
+    let output = Process::start(&mut soak).output_within(90);
+    assert!(output.status.success(), "{} {}", text(&output.stderr), text(&output.stdout));
+    let report = json_lines(&output).pop().unwrap();
+    assert_eq!(report["verdict"], "PASS");
+    let publisher = &report["publisher"];
+    let (frames, skipped) = (number(publisher, "frames"), number(publisher, "skipped"));
+    // The publisher starts before, and ends after, the twenty seconds.
+    assert!((5000..7500).contains(&(frames + skipped)), "{publisher}");
+    let subscribers = report["subscribers"].as_array().unwrap();
+    let roles: Vec<_> = subscribers.iter().map(|one| one["role"].as_str().unwrap()).collect();
+    assert_eq!(roles, ["steady", "steady", "steady", "slow", "flaky"]);
+    for subscriber in subscribers {
+        let seen = &subscriber["seen"];
+        for fault in ["disordered", "wrong_links"] {
+            assert_eq!(number(seen, fault), 0, "{subscriber}");
+        }
+        assert!(number(seen, "links_checked") > 100 && number(seen, "alerts") > 0, "{subscriber}");
+        match subscriber["role"].as_str().unwrap() {
+            "steady" => {
+                assert_eq!((number(seen, "missed"), number(seen, "runs")), (0, 1), "{subscriber}");
+                assert_eq!(number(seen, "last_sequence") + 1, frames, "{subscriber}");
+                assert_eq!(number(seen, "last_tick") + 1, frames + skipped, "{subscriber}");
+                assert!(number(seen, "received") > 4000, "{subscriber}");
+            }
+            // 1.5 s at 250 Hz are more than a queue of 64 holds.
+            "slow" => assert!(number(seen, "missed") > 1000, "{subscriber}"),
+            _ => assert!(number(subscriber, "lives") >= 3, "{subscriber}"),
+        }
+    }
+    let rows = report["history"]["rows"].as_array().unwrap();
+    assert!((18..=21).contains(&rows.len()), "{} rows", rows.len());
+    let columns = report["history"]["columns"].as_array().unwrap().len();
+    assert!(rows.iter().all(|row| row["values"].as_array().unwrap().len() == columns));
+    assert_is_whole_page(&std::fs::read_to_string(place.folder().join("report.html")).unwrap(), subscribers.len());
+    let filed: Value = serde_json::from_slice(&std::fs::read(place.folder().join("report.json")).unwrap()).unwrap();
+    assert_eq!(filed, report);
+    place.assert_clean();
+}
+
+/// One page with every plot drawn inside it, which fetches nothing.
+fn assert_is_whole_page(page: &str, subscribers: usize) {
+    assert!(page.starts_with("<!DOCTYPE html>") && page.trim_end().ends_with("</html>"));
+    // Lateness, step, missed, overruns, memory, shared memory, descriptors, shows; and a latency for each subscriber.
+    assert_eq!(page.matches("<h2>").count(), 8 + subscribers);
+    assert_eq!(page.matches("<svg").count(), 8 + subscribers);
+    let addresses = page.replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
+    for outside in ["http", "src=", "href=", "@import", "url(", "<script"] {
+        assert!(!addresses.contains(outside), "{outside}");
+    }
+}
+
+#[test]
+fn a_broken_limit_fails_even_when_interrupted() {
+    let place = Place::new("broken");
+    let mut soak = place.program();
+    soak.args(["soak", "--json", "--duration", "8h", "--rate", "100", "--subscribers", "1"]);
+    soak.args(["--max-skipped", "100%", "--max-lateness-p999", "1ns"]);
+    let soak = Process::start(&mut soak);
+    wait(4.0);
+    soak.signal(SIGINT);
+    let output = soak.output_within(60);
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("wake-up lateness"), "{}", text(&output.stderr));
+    let report = json_lines(&output).pop().unwrap();
+    assert_eq!(report["verdict"], "FAIL");
+    let judgements = judgements(&report);
+    let failed: Vec<_> = judgements.iter().filter(|(_, (passed, _))| !passed).collect();
+    assert_eq!(failed.len(), 1, "{judgements:?}");
+    assert!(failed[0].0.contains("lateness") && failed[0].1.1 > 1.0, "{failed:?}");
+    place.assert_clean();
+}
+
+/// Processes that a process has started, and what they were told.
+fn children(process: &Process) -> Vec<(Pid, String)> {
+    let id = process.id();
+    let children = std::fs::read_to_string(format!("/proc/{id}/task/{id}/children")).unwrap();
+    let told = |child: &str| std::fs::read_to_string(format!("/proc/{child}/cmdline")).unwrap_or_default();
+    children.split_whitespace().map(|child| (Pid::from_raw(child.parse().unwrap()), told(child))).collect()
+}
+
+fn exists(process: Pid) -> bool {
+    kill(process, None).is_ok()
+}
+
+#[test]
+fn a_publisher_that_dies_fails_the_test_at_once() {
+    let place = Place::new("bereft");
+    let mut soak = place.program();
+    soak.args(["soak", "--json", "--duration", "8h", "--rate", "100", "--subscribers", "2"]).args(ANY_SPEED);
+    let soak = Process::start(&mut soak);
+    wait(4.0);
+    let publisher = children(&soak).into_iter().find(|(_, told)| told.contains("\0run\0")).unwrap().0;
+    kill(publisher, SIGKILL).unwrap();
+    let output = soak.output_within(60);
+    assert_eq!(output.status.code(), Some(1));
+    let report = json_lines(&output).pop().unwrap();
+    assert_eq!((&report["verdict"], &report["publisher"]), (&Value::from("FAIL"), &Value::Null));
+    assert!(!judgements(&report)["processes that ended by themselves or hung"].0);
+}
+
+#[test]
+fn nobody_outlives_a_killed_soak_test() {
+    let place = Place::new("orphans");
+    let mut soak = place.program();
+    soak.args(["soak", "--duration", "8h", "--rate", "100", "--slow", "1"]);
+    let soak = Process::start(&mut soak);
+    wait(3.0);
+    let children = children(&soak);
+    assert_eq!(children.len(), 5, "{children:?}");
+    soak.signal(SIGKILL);
+    drop(soak);
+    let deadline = Instant::now() + Duration::from_secs(20);
+    while children.iter().any(|(child, _)| exists(*child)) {
+        assert!(Instant::now() < deadline, "{children:?} go on");
+        wait(0.05);
+    }
+    place.assert_clean();
+}
+
+#[test]
+fn what_cannot_be_is_refused_before_it_starts() {
+    let cases: [(&[&str], &str); 6] = [
+        (&["--subscribers", "0"], "--subscribers"),
+        (&["--subscribers", "7", "--flaky", "2"], "publish.subscribers"),
+        (&["--rate", "20001"], "--rate"),
+        (&["--max-skipped", "2"], "0.01%"),
+        (&["--max-lateness-p999", "200"], "200us"),
+        (&["--report", "/nonexistent/report"], "--report"),
+    ];
+    for (arguments, named) in cases {
+        let output = Process::start(program("refused").arg("soak").args(arguments)).output_within(20);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(said.contains(named), "{said}");
+    }
+}
+
+#[test]
+fn the_status_comes_once_a_second_and_adds_up() {
+    let publisher =
+        Process::start(program("status").args(["run", "--json", "--rate", "50", "--start", "300", "--duration", "6"]));
+    let subscription = Subscription::new(&unique("status")).unwrap();
+    let mut connection = None;
+    let mut statuses: Vec<LoopStatus> = Vec::new();
+    let mut frames = Vec::new();
+    let end = Instant::now() + Duration::from_secs(7);
+    while Instant::now() < end {
+        let Some(connection) = &mut connection else {
+            connection = subscription.connect().unwrap();
+            wait(0.01);
+            continue;
+        };
+        connection.wait(Duration::from_millis(50));
+        subscription.complete(connection).unwrap();
+        connection.frames(|header, _| frames.push((header.sequence, header.tick, header.run_id)));
+        statuses.extend(std::iter::from_fn(|| connection.status()));
+    }
+    let summary = summary(&publisher.output_within(20));
+    // Six full seconds have passed and the last status is the end's.
+    assert!((5..=8).contains(&statuses.len()), "{}", statuses.len());
+    for status in &statuses {
+        assert_eq!((status.scene_name(), status.rate), ("paper", 50.0));
+        assert_eq!(status.sequence + 1 + status.skipped, status.tick + 1, "{status:?}");
+        assert!(frames.contains(&(status.sequence, status.tick, status.run_id)), "{status:?}");
+        assert_eq!(status.sim_time, 300.0 + status.tick as f64 / 50.0);
+        assert!(status.measured_rate > 0.0 && status.overruns <= status.skipped);
+        let [late, step] = [
+            [
+                status.lateness_p50_total,
+                status.lateness_p99_total,
+                status.lateness_p999_total,
+                status.lateness_max_total,
+            ],
+            [status.step_p50_total, status.step_p99_total, status.step_p999_total, status.step_max_total],
+        ];
+        assert!(late.is_sorted() && step.is_sorted() && late[0] > 0 && step[0] > 0, "{status:?}");
+        assert!(status.lateness_p50_second <= status.lateness_max_second, "{status:?}");
+        assert!(status.lateness_max_second <= status.lateness_max_total, "{status:?}");
+        assert!(status.resident_bytes > 1_000_000 && status.file_descriptors > 3, "{status:?}");
+    }
+    assert!(statuses.windows(2).all(|pair| pair[0].tick < pair[1].tick && pair[0].stamp_ns < pair[1].stamp_ns));
+    assert!(statuses[1..].iter().all(|status| status.subscribers == 1), "{statuses:?}");
+    let last = statuses.last().unwrap();
+    assert_eq!((last.sequence + 1, last.skipped), (number(&summary, "frames"), number(&summary, "skipped")));
+}
