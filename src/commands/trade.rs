@@ -116,7 +116,7 @@ fn plot(svg: &mut String, scene: &str, measurements: &[Measurement]) -> Result<(
         let style = if measurement.on_front { colour.filled() } else { colour.stroke_width(1) };
         chart.draw_series([Circle::new(at, 4, style)])?;
         // Labels of points that lie on one another go below one another.
-        let near = |other: &&(f64, f64)| (other.0 / at.0).ln().abs() < 0.7 && (other.1 / at.1).ln().abs() < 0.7;
+        let near = |other: &&(f64, f64)| (other.0 / at.0).ln().abs() < 2.5 && (other.1 / at.1).ln().abs() < 0.7;
         let below = 13 * labelled.iter().filter(near).count() as i32;
         labelled.push(at);
         let label = Text::new(measurement.solver.clone(), (8, below - 6), ("sans-serif", 12));
