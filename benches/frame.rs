@@ -173,7 +173,6 @@ fn publish_over_iceoryx2(bencher: Bencher) {
         queue: 64,
         subscribers: 8,
         alerts: true,
-        subscribers: 8,
         stage: stage(1, 0, &scene.team, &scene.path),
     };
     let mut publisher = SharedMemoryPublisher::open(&offer).expect("the name holds this process's number");
