@@ -213,6 +213,42 @@ pub struct LoopStatus {
     pub scene: [u8; SCENE_NAME_BYTES],
 }
 
+impl Default for LoopStatus {
+    /// All zeros, and no name: arrays this long have no default of their own that could be derived from.
+    fn default() -> Self {
+        Self {
+            run_id: 0,
+            tick: 0,
+            sequence: 0,
+            stamp_ns: 0,
+            sim_time: 0.0,
+            rate: 0.0,
+            measured_rate: 0.0,
+            overruns: 0,
+            skipped: 0,
+            shows_played: 0,
+            lateness_p50_second: 0,
+            lateness_p99_second: 0,
+            lateness_max_second: 0,
+            lateness_p50_total: 0,
+            lateness_p99_total: 0,
+            lateness_p999_total: 0,
+            lateness_max_total: 0,
+            step_p50_second: 0,
+            step_p99_second: 0,
+            step_max_second: 0,
+            step_p50_total: 0,
+            step_p99_total: 0,
+            step_p999_total: 0,
+            step_max_total: 0,
+            resident_bytes: 0,
+            subscribers: 0,
+            file_descriptors: 0,
+            scene: [0; SCENE_NAME_BYTES],
+        }
+    }
+}
+
 impl LoopStatus {
     /// The scene's name.
     pub fn scene_name(&self) -> &str {

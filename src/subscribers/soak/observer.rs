@@ -391,36 +391,7 @@ mod tests {
 
     #[test]
     fn a_clock_that_drifts_is_seen() {
-        let status = |rate| LoopStatus {
-            rate,
-            run_id: 5,
-            tick: 0,
-            sequence: 0,
-            stamp_ns: 0,
-            sim_time: 0.0,
-            measured_rate: rate,
-            overruns: 0,
-            skipped: 0,
-            shows_played: 0,
-            lateness_p50_second: 0,
-            lateness_p99_second: 0,
-            lateness_max_second: 0,
-            lateness_p50_total: 0,
-            lateness_p99_total: 0,
-            lateness_p999_total: 0,
-            lateness_max_total: 0,
-            step_p50_second: 0,
-            step_p99_second: 0,
-            step_max_second: 0,
-            step_p50_total: 0,
-            step_p99_total: 0,
-            step_p999_total: 0,
-            step_max_total: 0,
-            resident_bytes: 0,
-            subscribers: 1,
-            file_descriptors: 0,
-            scene: [0; 64],
-        };
+        let status = |rate| LoopStatus { rate, run_id: 5, ..LoopStatus::default() };
         for (rate, error) in [(1000.0, 0.0), (1000.1, 99_990.0)] {
             let mut checks = checks();
             checks.status(&status(rate));
