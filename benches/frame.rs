@@ -171,8 +171,8 @@ fn publish_over_iceoryx2(bencher: Bencher) {
         name: format!("bench_{}_frame", std::process::id()),
         handles: scene.team.handles(),
         queue: 64,
-        alerts: true,
         subscribers: 8,
+        alerts: true,
         stage: stage(1, 0, &scene.team, &scene.path),
     };
     let mut publisher = SharedMemoryPublisher::open(&offer).expect("the name holds this process's number");

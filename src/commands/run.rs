@@ -276,21 +276,18 @@ impl Performance<'_> {
             if std::io::stderr().is_terminal() { Style::new().fg_color(Some(colour.into())) } else { Style::new() };
         let benches: Vec<_> =
             [alert.bench_a, alert.bench_b].into_iter().flatten().map(|bench| bench_name(self.scene, bench)).collect();
+        let benches = benches.join(" and ");
         let what = match (alert.level, alert.time_to_event.is_nan()) {
-            (State::Approaching, false) => {
-                format!("next event in {:.1} s", alert.time_to_event / self.playback.time_scale)
-            }
-            (State::Approaching, true) => "two boards are near each other".to_owned(),
-            (State::Moving, _) => "nothing near".to_owned(),
-            _ => format!("at {} s", number(alert.event_time)),
+            (State::Approaching, false) => format!(
+                "next event in {:.1} s; nearest are {benches}, {:.4} m apart",
+                alert.time_to_event / self.playback.time_scale,
+                alert.clearance
+            ),
+            (State::Approaching, true) => format!("{benches} are {:.4} m apart", alert.clearance),
+            (State::Moving, _) => format!("nothing within {:.4} m", alert.clearance),
+            _ => format!("at {:.6} s: {benches}", alert.event_time),
         };
-        eprintln!(
-            "{:>10.3} s  {style}{:<11}{style:#} {what}; nearest boards {:.4} m apart; {} (from 1)",
-            announcement.sim_time,
-            alert.level.level_name(),
-            alert.clearance,
-            benches.join(", ")
-        );
+        eprintln!("{:>10.3} s  {style}{:<11}{style:#} {what}", announcement.sim_time, alert.level.level_name());
     }
 
     fn print_summary(&self, counts: &Counts, summary: &Summary, ros2: Option<Ros2Summary>) -> Result<(), CommandError> {

@@ -185,7 +185,8 @@ impl Screen<'_> {
         let clearance = if header.min_clearance.is_nan() {
             "not computed".to_owned()
         } else {
-            format!("{:.4} m", header.min_clearance)
+            // Zero has no sign for people: a touch is solved to the last bits, on either side.
+            format!("{:.4} m", (header.min_clearance * 1e4).round() / 1e4 + 0.0)
         };
         let mut lines = vec![
             format!(

@@ -9,6 +9,7 @@ pub mod remains;
 use std::collections::BTreeSet;
 use std::fs::OpenOptions;
 use std::io::ErrorKind;
+use std::time::{Duration, Instant};
 
 use ::iceoryx2::config::Config;
 use ::iceoryx2::port::notifier::Notifier;
@@ -16,6 +17,7 @@ use ::iceoryx2::port::publisher::Publisher as Port;
 use ::iceoryx2::port::publisher::PublisherCreateError;
 use ::iceoryx2::port::update_connections::UpdateConnections;
 use ::iceoryx2::prelude::*;
+use ::iceoryx2::service::builder::event::{EventOpenError, EventOpenOrCreateError};
 use ::iceoryx2::service::builder::publish_subscribe::{
     PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
 };
@@ -36,6 +38,8 @@ const SMALL_QUEUE: usize = 16;
 const QUEUE_BYTES: usize = 64_000_000;
 /// Where Linux keeps shared memory.
 const SHARED_MEMORY: &str = "/dev/shm";
+/// How long a half made service may stop a publisher; [`remains`] needs less to remove it.
+const PATIENCE: Duration = Duration::from_secs(6);
 /// What a subscriber needs of it for its own bookkeeping, and more.
 const SUBSCRIBER_BYTES: u64 = 500_000;
 
@@ -71,6 +75,12 @@ pub enum OpenError {
         /// Bytes left.
         free: u64,
     },
+    /// A service stays half made.
+    #[error(
+        "the service \"{0}\" is half made and nobody finishes it: stop every program that uses it, or choose another \
+         name with --name"
+    )]
+    HalfMade(String),
     /// There is no room even for bookkeeping.
     #[error("{SHARED_MEMORY} has {free} bytes left, which is too little: remove what fills it, or make it larger")]
     Full {
@@ -189,6 +199,10 @@ impl SharedMemoryPublisher {
     /// # Errors
     /// [`OpenError`]: each names what is in the way and what to do.
     pub fn open(offer: &Offer) -> Result<Self, OpenError> {
+        patiently(|| Self::open_now(offer))
+    }
+
+    fn open_now(offer: &Offer) -> Result<Self, OpenError> {
         let name = offer.name.as_str();
         service_name(name, "poses")?;
         check_room(offer)?;
@@ -210,7 +224,10 @@ impl SharedMemoryPublisher {
             .max_listeners(offer.subscribers)
             .max_nodes(offer.subscribers + SPARE_NODES)
             .open_or_create()
-            .map_err(|error| failed(name, "tick", error))?;
+            .map_err(|error| match error {
+                EventOpenOrCreateError::EventOpenError(EventOpenError::HangsInCreation) => half_made(name, "tick"),
+                other => failed(name, "tick", other),
+            })?;
         let tick = tick_service.notifier_builder().create().map_err(|error| failed(name, "tick", error))?;
         reserve_pages()?;
         Ok(Self { poses, poses_service: frame_service, alerts, stage, tick, tick_service, _node: node })
@@ -270,10 +287,12 @@ impl StatusSender {
     /// # Errors
     /// As [`SharedMemoryPublisher::open`].
     pub fn open(name: &str, subscribers: usize) -> Result<Self, OpenError> {
-        let node = node()?;
-        let status = sender(&node, name, "status", subscribers)?;
-        reserve_pages()?;
-        Ok(Self { status, _node: node })
+        patiently(|| {
+            let node = node()?;
+            let status = sender(&node, name, "status", subscribers)?;
+            reserve_pages()?;
+            Ok(Self { status, _node: node })
+        })
     }
 }
 
@@ -390,6 +409,9 @@ fn sender<Message: ZeroCopySend + std::fmt::Debug + Copy>(
 
 fn service_error(service: &ServiceName, error: PublishSubscribeOpenOrCreateError) -> OpenError {
     use PublishSubscribeOpenError as Open;
+    if matches!(error, PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(Open::HangsInCreation)) {
+        return OpenError::HalfMade(service.to_string());
+    }
     let incompatible = match &error {
         PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(open) => !matches!(
             open,
@@ -411,6 +433,22 @@ fn port_error(name: &str, service: &str, error: PublisherCreateError) -> OpenErr
     match error {
         PublisherCreateError::ExceedsMaxSupportedPublishers => OpenError::AlreadyPublished(name.to_owned()),
         other => failed(name, service, other),
+    }
+}
+
+fn half_made(name: &str, service: &str) -> OpenError {
+    OpenError::HalfMade(format!("{name}/{service}"))
+}
+
+/// Tries again while a service is half made: its maker is about to finish it, or was killed, and then its file is removed
+/// after a while ([`remains`]).
+fn patiently<Opened>(open: impl Fn() -> Result<Opened, OpenError>) -> Result<Opened, OpenError> {
+    let began = Instant::now();
+    loop {
+        match open() {
+            Err(OpenError::HalfMade(_)) if began.elapsed() < PATIENCE => std::thread::sleep(Duration::from_millis(100)),
+            other => return other,
+        }
     }
 }
 

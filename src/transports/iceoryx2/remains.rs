@@ -36,7 +36,8 @@ enum Life {
     NotKnownDead,
 }
 
-/// Removes unfinished files of dead nodes, so that iceoryx2 can remove the rest. What cannot be removed stays.
+/// Removes unfinished files of dead nodes, so that iceoryx2 can remove the rest, and nodes that never came to be listed.
+/// What cannot be removed stays.
 pub fn remove_unfinished_files() {
     let config = Config::global_config();
     let mut nodes = BTreeMap::new();
@@ -48,14 +49,18 @@ pub fn remove_unfinished_files() {
     if listed.is_err() {
         return;
     }
-    for folder in entries(Path::new(&config.global.node_dir().to_string())) {
+    let all = entries(Path::new(&config.global.node_dir().to_string()));
+    for folder in all.iter().filter(|folder| folder.is_dir()) {
         let id = folder.file_name().unwrap_or_default().to_string_lossy();
         match nodes.get(id.as_ref()) {
-            Some(Life::Dead) => remove_all(with_mode(&folder, UNFINISHED)),
-            None if is_old_folder(&folder) => {
-                remove_all(with_mode(&folder, UNFINISHED));
-                // Fails where something is left in it.
-                let _ = fs::remove_dir(&folder);
+            Some(Life::Dead) => remove_all(with_mode(folder, UNFINISHED)),
+            // Killed before it was listed: nobody else knows of it.
+            None if is_old(folder) => {
+                let monitor = format!("{}{id}.", config.global.prefix);
+                let its_own =
+                    |file: &&PathBuf| file.file_name().is_some_and(|name| name.to_string_lossy().starts_with(&monitor));
+                remove_all(all.iter().filter(its_own).cloned().chain(entries(folder)).collect());
+                let _ = fs::remove_dir(folder);
             }
             _ => {}
         }
@@ -112,10 +117,10 @@ fn remove_all(files: Vec<PathBuf>) {
 }
 
 /// Whether nothing has changed in a folder for long.
-fn is_old_folder(folder: &Path) -> bool {
+fn is_old(folder: &Path) -> bool {
     let changed = folder.metadata().and_then(|of| of.modified());
     let is_old = |elapsed: Duration| elapsed > LONGEST_MAKING;
-    folder.is_dir() && changed.is_ok_and(|changed| changed.elapsed().is_ok_and(is_old))
+    changed.is_ok_and(|changed| changed.elapsed().is_ok_and(is_old))
 }
 
 #[cfg(test)]
