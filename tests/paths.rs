@@ -122,6 +122,31 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    /// Time reversal: with equal links, a chain in the turn, run backwards and turned by half a turn, is the chain in the
+    /// turn whose arcs are exchanged.
+    #[test]
+    fn the_way_out_is_the_way_in_backwards(ratio in 0.5..2.0f64, head in 40.0..110.0f64) {
+        let team = bench_dragon::chain::Team { benches: 20, head_length: 2.2, body_length: 2.2, width: 0.3, hole_inset: 0.275 };
+        let path = |ratio: f64| PiecePath::turnaround(1.7, 4.5, ratio, 60.0, 60.0).unwrap();
+        let (there, back) = (path(ratio), path(1.0 / ratio));
+        let mut front = there.place_at(head);
+        let mut places = vec![front];
+        for bench in 0..team.benches {
+            front = there.follower(front, team.link(bench)).unwrap();
+            places.push(front);
+        }
+        let mut mirrored = back.place_at(back.length() - there.travelled(front));
+        for place in places.iter().rev() {
+            let apart = there.point(*place).coords + back.point(mirrored).coords;
+            prop_assert!(apart.norm() < 1e-11, "{apart:?} at {place:?}");
+            mirrored = back.follower(mirrored, team.link(1)).unwrap();
+        }
+    }
+}
+
 /// Through the whole turn at 1 kHz: no handle goes further from frame to frame than its speed allows, velocities are
 /// the motion's, and the alert level does not flicker.
 #[test]

@@ -73,7 +73,7 @@ pub fn least_clearance(scene: &Scene, timeline: &Timeline, common: &Common) -> S
     let found = timeline.least_clearance(scene, &mut |share| bar.set_position((1000.0 * share) as u64));
     bar.finish_and_clear();
     let Some(TimedClearance { least, time }) = found else {
-        return "The least clearance of the show is not computed: there are too few benches, or too many.".to_owned();
+        return "The least clearance of the show is not computed: there are too few benches, or the search would be too long.".to_owned();
     };
     let (first, second) = (bench_name(scene, least.bench_a), bench_name(scene, least.bench_b));
     format!(
