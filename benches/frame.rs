@@ -156,6 +156,7 @@ fn publish_over_iceoryx2(bencher: Bencher) {
         name: format!("bench_{}_frame", std::process::id()),
         handles: scene.team.handles(),
         queue: 64,
+        subscribers: 8,
         alerts: true,
         stage: stage(1, 0, &scene.team, scene.path.pitch(), scene.start_turn),
     };
