@@ -10,6 +10,7 @@ use bench_dragon::chain::newton::Newton;
 use bench_dragon::chain::paper::{Paper, PaperRules};
 use bench_dragon::chain::whole_chain::{Instructions, WholeChain};
 use bench_dragon::chain::{Chain, Solver, Team, Velocities};
+use bench_dragon::geometry::pieces::PiecePath;
 use bench_dragon::geometry::spiral::Spiral;
 use bench_dragon::live::Publisher;
 use bench_dragon::messages::FrameHeader;
@@ -48,6 +49,20 @@ fn play(bencher: Bencher, solver: &mut dyn Solver, handles: usize, rate: f64) {
 #[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
 fn newton_cold(bencher: Bencher, rate: f64) {
     play(bencher, &mut Newton::new(spiral(), team(223), 1.0, Velocities::Computed), 224, rate);
+}
+
+/// A spiral scene as the show plays it, whatever the path's kind costs to tell apart.
+#[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
+fn scene_on_a_spiral(bencher: Bencher, rate: f64) {
+    let scene = bench_dragon::scene::Scene::paper();
+    play(bencher, scene.solver().0.as_mut(), 224, rate);
+}
+
+/// The turnaround, the head 20 m before its turn and on: the team on spiral, arcs and spiral.
+#[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
+fn newton_on_a_turnaround(bencher: Bencher, rate: f64) {
+    let path = PiecePath::turnaround(1.7, 4.5, 2.0, 220.0, 369.16).unwrap();
+    play(bencher, &mut Newton::new(path, team(223), 1.0, Velocities::Computed), 224, rate);
 }
 
 /// Newton's method from no guess but the link's length over the radius, on theta in one double, with the system's sine
@@ -158,7 +173,7 @@ fn publish_over_iceoryx2(bencher: Bencher) {
         queue: 64,
         subscribers: 8,
         alerts: true,
-        stage: stage(1, 0, &scene.team, scene.path.pitch(), scene.start_turn),
+        stage: stage(1, 0, &scene.team, &scene.path),
     };
     let mut publisher = SharedMemoryPublisher::open(&offer).expect("the name holds this process's number");
     let frame = show.frame(0);

@@ -3,6 +3,7 @@
 pub mod check;
 pub mod draw;
 pub mod events;
+pub mod plan;
 pub mod run;
 pub mod soak;
 pub mod solve;

@@ -2,9 +2,12 @@
 //! of the head's place on the path, never by sampling the motion.
 //!
 //! In: a path and a team. Out: at most one event of each kind, as a distance the head has travelled. The show and the
-//! `events` command call it once, before anything moves. [`contact`] holds the search for the first touch.
+//! `events` command call it once, before anything moves. [`contact`] holds the search for the first touch
+//! on a spiral, [`course`] stall and lock on a path of pieces, [`sweep`] contact and least clearance on any path.
 
 pub mod contact;
+pub mod course;
+pub mod sweep;
 
 use crate::chain::Team;
 use crate::geometry::Point;
@@ -28,7 +31,7 @@ pub struct Event {
     pub place: Option<Point>,
 }
 
-/// The first stall, and the lock or path end after which nothing follows. In order along the path.
+/// The first stall on a spiral, and the lock or path end after which nothing follows. In order along the path.
 ///
 /// A contact costs a search and is asked for separately: [`contact::first_contact`].
 pub fn stall_and_end(spiral: &Spiral, team: &Team) -> Vec<Event> {

@@ -4,6 +4,7 @@
 //! [`crate::events`] call it. Points and vectors are nalgebra's, in metres, frame `stage` (x right, y up).
 
 pub mod path;
+pub mod pieces;
 pub mod rectangle;
 pub mod root;
 pub mod separation;

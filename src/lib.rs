@@ -9,6 +9,7 @@
 //! - [`events`]: when, exactly, something ends the show.
 //! - [`scene`]: the file a user writes, checked and turned into the types above.
 //! - [`show`]: from a scene and a tick to one frame, deterministic.
+//! - [`plan`]: the least pitch and the greatest speed, for a choreographer.
 //! - [`live`]: the fixed-rate loop, its clock, its statistics.
 //! - [`transports`]: iceoryx2 shared memory and ROS 2 topics, as publishers of the loop.
 //! - [`trade`]: accuracy against cost, measured for every solver on a scene and this machine.
@@ -25,6 +26,7 @@ pub mod events;
 pub mod geometry;
 pub mod live;
 pub mod messages;
+pub mod plan;
 pub mod scene;
 pub mod show;
 pub mod subscribers;

@@ -35,6 +35,8 @@ enum Command {
     Draw(commands::draw::DrawArguments),
     /// Measure accuracy against cost for every solver on this scene and machine
     Trade(commands::trade::TradeArguments),
+    /// Answer a choreographer: the least pitch, the greatest speed
+    Plan(commands::plan::PlanArguments),
     /// Soak-test: publish for hours to real subscriber processes and give a verdict
     Soak(commands::soak::SoakArguments),
     /// What soak starts
@@ -55,6 +57,7 @@ fn main() -> ExitCode {
         Command::Events => commands::events::events(&common),
         Command::Draw(arguments) => commands::draw::draw(&common, arguments),
         Command::Trade(arguments) => commands::trade::trade(&common, arguments),
+        Command::Plan(arguments) => commands::plan::plan(&common, arguments),
         Command::Soak(arguments) => commands::soak::soak(&common, arguments),
         Command::SoakSubscriber(arguments) => commands::soak::subscribe(&common, arguments),
         Command::Check => commands::check::check(&common),

@@ -230,20 +230,71 @@ fn as_text<S: Serializer>(bytes: &[u8; SCENE_NAME_BYTES], serializer: S) -> Resu
     serializer.serialize_str(text(bytes))
 }
 
-/// Benches whose lengths differ from each other at most: the head, and all that follow.
-///
+/// The most pieces of a path that a [`Stage`] has room for.
+pub const MOST_PIECES: usize = 32;
+
+/// The `kind` of a [`StagePiece`]: straight on.
+pub const PIECE_LINE: u32 = 0;
+/// The `kind` of a [`StagePiece`]: part of a circle.
+pub const PIECE_ARC: u32 = 1;
+/// The `kind` of a [`StagePiece`]: inward along r = pitch theta / 2 pi.
+pub const PIECE_INWARD_SPIRAL: u32 = 2;
+/// The `kind` of a [`StagePiece`]: outward along that spiral, turned by half a turn about the centre.
+pub const PIECE_OUTWARD_SPIRAL: u32 = 3;
+
+/// One piece of the path in a [`Stage`].
+#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend, Serialize)]
+#[type_name("bench_dragon/StagePiece/2")]
+#[repr(C)]
+pub struct StagePiece {
+    /// Where it begins, metres right of the centre.
+    pub x: f64,
+    /// Where it begins, metres up from the centre.
+    pub y: f64,
+    /// Direction of travel there, radians counter-clockwise from x.
+    pub heading: f64,
+    /// Metres along it.
+    pub length: f64,
+    /// Of an arc, 1/m, positive where it turns left; of a line 0; of a spiral NaN.
+    pub curvature: f64,
+    /// Of a spiral, the polar angle at which it begins, radians (for an outward one: before it is turned); else NaN.
+    pub theta_first: f64,
+    /// Of a spiral, the polar angle at which it ends, radians; else NaN.
+    pub theta_last: f64,
+    /// [`PIECE_LINE`], [`PIECE_ARC`], [`PIECE_INWARD_SPIRAL`] or [`PIECE_OUTWARD_SPIRAL`].
+    pub kind: u32,
+    /// Always 0.
+    pub reserved: u32,
+}
+
+impl StagePiece {
+    /// The name of its kind: `line`, `arc`, `inward_spiral`, `outward_spiral`, or `unknown` for a later layout's.
+    pub fn kind_name(&self) -> &'static str {
+        match self.kind {
+            PIECE_LINE => "line",
+            PIECE_ARC => "arc",
+            PIECE_INWARD_SPIRAL => "inward_spiral",
+            PIECE_OUTWARD_SPIRAL => "outward_spiral",
+            _ => "unknown",
+        }
+    }
+}
+
 /// What a subscriber needs to draw the stage. Payload of `<name>/stage`, sent at the start and kept for late joiners.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
-#[type_name("bench_dragon/Stage/1")]
+///
+/// The head's board has a length of its own; all that follow have one length. Layout 2 added the pieces of the path;
+/// the team may stand further back than the first piece begins, on the same spiral or line.
+#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend, Serialize)]
+#[type_name("bench_dragon/Stage/2")]
 #[repr(C)]
 pub struct Stage {
     /// The run, as in [`FrameHeader::run_id`].
     pub run_id: u64,
     /// CLOCK_REALTIME in nanoseconds when this was written.
     pub stamp_ns: u64,
-    /// Metres per turn of the spiral.
+    /// Metres per turn of the spiral or spirals; NaN where the path has none.
     pub pitch: f64,
-    /// The turn on which the head starts (theta = 2 pi start_turn).
+    /// The turn on which the head starts (theta = 2 pi start_turn); NaN where it does not start on a spiral.
     pub start_turn: f64,
     /// Metres from the centre of a handle's hole to the nearest end of the board.
     pub hole_inset: f64,
@@ -255,6 +306,15 @@ pub struct Stage {
     pub width: f64,
     /// The number of benches; one less than the number of handles.
     pub benches: u32,
-    /// Always 0.
-    pub reserved: u32,
+    /// The number of pieces in use, at most [`MOST_PIECES`].
+    pub pieces: u32,
+    /// The pieces of the path in the order of travel; those not in use are zero.
+    pub path: [StagePiece; MOST_PIECES],
+}
+
+impl Stage {
+    /// The pieces of the path that are in use.
+    pub fn path_in_use(&self) -> &[StagePiece] {
+        &self.path[..(self.pieces as usize).min(MOST_PIECES)]
+    }
 }

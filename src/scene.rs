@@ -3,6 +3,7 @@
 //! In: TOML text, or what the command line overrides. Out: a [`Scene`], whose existence is the proof that every number
 //! is in range and that the start is legal. Errors name the file, the line, the field and what was expected.
 
+pub mod path;
 pub mod ros2;
 
 use std::path::Path as FilePath;
@@ -10,14 +11,13 @@ use std::path::Path as FilePath;
 use serde::Deserialize;
 use toml::Spanned;
 
+use self::path::{RawPath, ScenePath};
 use self::ros2::{RawRos2, Ros2Settings};
 use crate::chain::newton::Newton;
 use crate::chain::paper::{self, Paper, PaperRules};
 use crate::chain::whole_chain::WholeChain;
 use crate::chain::{Solver, Team, Velocities};
 use crate::geometry::path::Path;
-use crate::geometry::root::first_true;
-use crate::geometry::spiral::Spiral;
 
 /// The paper's scene, as built into the program.
 const PAPER: &str = include_str!("../config/paper.toml");
@@ -40,6 +40,18 @@ impl Accepted {
     pub const LENGTH: Self = Self { least: 1e-3, greatest: 1e4, unit: "metres" };
     /// The turn on which the head starts.
     pub const START_TURN: Self = Self { least: 1e-9, greatest: 1e7, unit: "turns" };
+    /// The first radius of a turnaround over the second.
+    pub const ARC_RATIO: Self = Self { least: 1e-3, greatest: 1e3, unit: "metres per metre" };
+    /// Metres of path before or after a turnaround.
+    pub const ROUTE: Self = Self { least: 0.0, greatest: 1e9, unit: "metres" };
+    /// A line or arc of a route.
+    pub const LEG: Self = Self { least: 1e-3, greatest: 1e9, unit: "metres" };
+    /// How far an arc of a route turns.
+    pub const ARC_TURNS: Self = Self { least: 1e-6, greatest: 1e3, unit: "turns" };
+    /// The direction in which a route begins.
+    pub const HEADING: Self = Self { least: -1.0, greatest: 1.0, unit: "turns" };
+    /// A coordinate on the stage.
+    pub const PLACE: Self = Self { least: -1e9, greatest: 1e9, unit: "metres" };
     /// Speed of the head.
     pub const SPEED: Self = Self { least: 1e-9, greatest: 1e6, unit: "metres per second" };
     /// Frames per second.
@@ -139,9 +151,7 @@ pub struct Scene {
     /// The benches.
     pub team: Team,
     /// The curve the handles ride.
-    pub path: Spiral,
-    /// The turn on which the head starts (theta = 2 pi start_turn).
-    pub start_turn: f64,
+    pub path: ScenePath,
     /// Metres per second of the head along the curve.
     pub head_speed: f64,
     /// How the solver is chosen.
@@ -207,10 +217,10 @@ impl Scene {
     /// Simulated seconds after which the head has travelled so many metres along the path, by the motion this scene's
     /// solver follows.
     pub fn time_of(&self, travelled: f64) -> f64 {
-        match self.method {
-            Method::Named(SolverName::Paper) => {
-                let theta = self.path.place_at(travelled).radians();
-                paper::time_of_theta(&self.path, self.head_speed, theta)
+        match (self.method, &self.path) {
+            (Method::Named(SolverName::Paper), ScenePath::Spiral(spiral)) => {
+                let theta = spiral.place_at(travelled).radians();
+                paper::time_of_theta(spiral, self.head_speed, theta)
             }
             _ => travelled / self.head_speed,
         }
@@ -218,26 +228,40 @@ impl Scene {
 
     /// The solver this scene asks for, and in words why it is that one.
     pub fn solver(&self) -> (Box<dyn Solver>, String) {
-        let newton = || Box::new(Newton::new(self.path, self.team, self.head_speed, self.velocities));
+        let Self { team, head_speed, velocities, .. } = *self;
+        let spiral = match &self.path {
+            ScenePath::Spiral(spiral) => *spiral,
+            ScenePath::Pieces(path) => {
+                let why = match self.method {
+                    Method::Named(_) => "named by the scene",
+                    Method::Accuracy(_) => "the one solver for paths of pieces, as exact as doubles allow",
+                };
+                let newton = Newton::new(path.clone(), team, head_speed, velocities);
+                return (Box::new(newton), format!("newton: {why}"));
+            }
+        };
         let whole_chain = || {
-            let solver = WholeChain::new(self.path, self.team, self.head_speed, self.velocities);
+            let solver = WholeChain::new(spiral, team, head_speed, velocities);
             let instructions = solver.instructions().name();
-            (solver, instructions)
+            (Box::new(solver), instructions)
         };
         match self.method {
             Method::Accuracy(accuracy) => {
                 let (solver, instructions) = whole_chain();
                 let why =
                     format!("whole_chain ({instructions}): the cheapest that meets an accuracy of {accuracy:e} m");
-                (Box::new(solver), why)
+                (solver, why)
             }
             Method::Named(SolverName::WholeChain) => {
                 let (solver, instructions) = whole_chain();
-                (Box::new(solver), format!("whole_chain ({instructions}): named by the scene"))
+                (solver, format!("whole_chain ({instructions}): named by the scene"))
             }
-            Method::Named(SolverName::Newton) => (newton(), "newton: named by the scene".to_owned()),
+            Method::Named(SolverName::Newton) => {
+                let newton = Newton::new(spiral, team, head_speed, velocities);
+                (Box::new(newton), "newton: named by the scene".to_owned())
+            }
             Method::Named(SolverName::Paper) => {
-                let paper = Paper::new(self.path, self.team, self.head_speed, self.velocities, self.paper_rules);
+                let paper = Paper::new(spiral, team, head_speed, velocities, self.paper_rules);
                 (Box::new(paper), "paper: named by the scene; its head is too fast by sqrt(1 + 1/theta^2)".to_owned())
             }
         }
@@ -268,7 +292,11 @@ impl Source<'_> {
     }
 
     fn wrong<T>(&self, value: &Spanned<T>, sentence: &str) -> SceneError {
-        SceneError(format!("{}, line {}: {sentence}", self.file, self.line(value.span().start)))
+        self.wrong_at(value.span().start, sentence)
+    }
+
+    fn wrong_at(&self, offset: usize, sentence: &str) -> SceneError {
+        SceneError(format!("{}, line {}: {sentence}", self.file, self.line(offset)))
     }
 
     fn check(&self, field: &str, value: &Spanned<f64>, accepted: Accepted) -> Result<f64, SceneError> {
@@ -305,14 +333,6 @@ struct RawTeam {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawPath {
-    kind: Spanned<String>,
-    pitch: Spanned<f64>,
-    start_turn: Spanned<f64>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
 struct RawMotion {
     head_speed: Spanned<f64>,
     accuracy: Option<Spanned<f64>>,
@@ -345,6 +365,12 @@ impl RawScene {
         let path = self.path.validated(source, &team)?;
         let head_speed = source.check("motion.head_speed", &self.motion.head_speed, Accepted::SPEED)?;
         let (method, paper_rules) = self.motion.method(source)?;
+        if let (Method::Named(SolverName::WholeChain | SolverName::Paper), ScenePath::Pieces(_), Some(given)) =
+            (method, &path, &self.motion.solver)
+        {
+            let sentence = "motion.solver rides spirals only, expected \"newton\" or no such field on this path";
+            return Err(source.wrong(given, sentence));
+        }
         let name = match &self.name {
             None => stem.to_owned(),
             Some(name) if name.get_ref().trim().is_empty() => {
@@ -364,7 +390,6 @@ impl RawScene {
             name,
             team,
             path,
-            start_turn: *self.path.start_turn.get_ref(),
             head_speed,
             method,
             paper_rules,
@@ -405,49 +430,6 @@ impl RawTeam {
         }
         Ok(team)
     }
-}
-
-impl RawPath {
-    fn validated(&self, source: &Source, team: &Team) -> Result<Spiral, SceneError> {
-        if self.kind.get_ref() != "spiral" {
-            let sentence = format!("path.kind is \"{}\", expected \"spiral\"", self.kind.get_ref());
-            return Err(source.wrong(&self.kind, &sentence));
-        }
-        let pitch = source.check("path.pitch", &self.pitch, Accepted::LENGTH)?;
-        let start_turn = source.check("path.start_turn", &self.start_turn, Accepted::START_TURN)?;
-        if let Some(least) = least_legal_start(pitch, start_turn, team) {
-            let sentence = format!(
-                "path.start_turn is {start_turn}, which is so near the centre that a bench is folded back on itself, \
-                 expected at least {least:.9}"
-            );
-            return Err(source.wrong(&self.start_turn, &sentence));
-        }
-        Ok(Spiral::new(pitch, start_turn))
-    }
-}
-
-/// Where a start is illegal, the least number of turns that is not, rounded up to nine decimals.
-///
-/// Only the first link of each length can be at or inside its fold: all others of that length are further out.
-fn least_legal_start(pitch: f64, start_turn: f64, team: &Team) -> Option<f64> {
-    let spiral = Spiral::new(pitch, start_turn);
-    let folds = [0, 1].map(|bench| spiral.fold(team.link(bench)));
-    let outside = |theta: f64, fold: Option<f64>| fold.is_none_or(|fold| theta > fold);
-    let legal = |theta: f64| {
-        outside(theta, folds[0])
-            && (team.benches < 2
-                || spiral
-                    .follower(spiral.place_of_theta(theta), team.link(0))
-                    .is_ok_and(|second| outside(second.radians(), folds[1])))
-    };
-    let start = spiral.start().radians();
-    if legal(start) {
-        return None;
-    }
-    // Beyond both folds every start is legal.
-    let safe = folds.iter().flatten().fold(start, |most, fold| most.max(*fold)) * 1.01;
-    let least = first_true(legal, start, safe);
-    Some((least / std::f64::consts::TAU * 1e9).ceil() / 1e9)
 }
 
 impl RawMotion {

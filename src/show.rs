@@ -10,6 +10,7 @@ use crate::chain::{Chain, Solver, Velocities};
 use crate::clearance::{ClearanceMonitor, Ground};
 use crate::geometry::path::Fold;
 use crate::messages::State;
+use crate::scene::path::ScenePath;
 use crate::scene::{AtEnd, Method, OnContact, Scene, SolverName};
 
 use alerts::{Alert, AlertLevel};
@@ -107,9 +108,9 @@ impl Show {
         let timeline = if scene.alerts.is_some() { timeline } else { timeline.end_only() };
         let freeze_time = timeline.freeze_time(playback.on_contact);
         // The paper's bisection can be told to be coarser than the spiral's bounds allow for.
-        let ground = match scene.method {
-            Method::Named(SolverName::Paper) => Ground::Unknown,
-            _ => Ground::Spiral { pitch: scene.path.pitch() },
+        let ground = match (scene.method, &scene.path) {
+            (Method::Named(SolverName::Paper), _) | (_, ScenePath::Pieces(_)) => Ground::Unknown,
+            (_, ScenePath::Spiral(spiral)) => Ground::Spiral { pitch: spiral.pitch() },
         };
         let clearance = scene.alerts.map(|_| ClearanceMonitor::new(scene.team, ground));
         let level = scene.alerts.map(|rules| AlertLevel::new(rules, playback.rate));

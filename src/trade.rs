@@ -96,7 +96,8 @@ struct Moment {
 pub fn measure(scene: &Scene, timeline: &Timeline, progress: &mut dyn FnMut(f64)) -> Result<Vec<Measurement>, String> {
     let end = timeline.end().time;
     let moments = truth(scene, end, &mut |share| progress(0.5 * share))?;
-    let candidates = candidates(scene, contact_errors(scene, timeline)?);
+    let contact = contact_errors(scene, timeline)?;
+    let candidates = scene.path.spiral().map_or(Vec::new(), |spiral| candidates(scene, *spiral, contact));
     let count = candidates.len() as f64;
     let mut measurements = Vec::new();
     for (index, candidate) in candidates.into_iter().enumerate() {
@@ -108,6 +109,12 @@ pub fn measure(scene: &Scene, timeline: &Timeline, progress: &mut dyn FnMut(f64)
         first.collision = collision(scene, timeline, first.contact_time_error, first.frame_ns);
     }
     Ok(measurements)
+}
+
+/// The high-precision reference of a scene, which rides spirals only.
+fn reference(scene: &Scene) -> Result<Reference, String> {
+    let spiral = scene.path.spiral().ok_or("solvers are compared on spirals only: other paths have one solver")?;
+    Reference::new(scene.team, spiral.pitch(), spiral.start_turn(), scene.head_speed)
 }
 
 /// The reference at all moments. At the lock itself there is a solution only up to rounding, so the last moment is a
@@ -128,7 +135,7 @@ fn truth(scene: &Scene, end: f64, progress: &mut dyn FnMut(f64)) -> Result<Vec<M
 }
 
 fn moments(scene: &Scene, times: &[f64], progress: &mut dyn FnMut(f64)) -> Result<Vec<Moment>, String> {
-    let mut reference = Reference::new(scene.team, scene.path.pitch(), scene.start_turn, scene.head_speed)?;
+    let mut reference = reference(scene)?;
     let mut moments = Vec::with_capacity(times.len());
     for &time in times {
         let handles = reference.handles(time).map_err(|fold| format!("the reference at {time} s: {fold}"))?;
@@ -154,7 +161,7 @@ fn contact_errors(scene: &Scene, timeline: &Timeline) -> Result<Option<ContactEr
     if time == 0.0 {
         return Ok(None);
     }
-    let mut reference = Reference::new(scene.team, scene.path.pitch(), scene.start_turn, scene.head_speed)?;
+    let mut reference = reference(scene)?;
     let mut gap = |time: f64| {
         let handles = reference.handles(time).map_err(|fold| format!("the reference at {time} s: {fold}"))?;
         let board = |bench: u32| {
@@ -172,8 +179,8 @@ fn contact_errors(scene: &Scene, timeline: &Timeline) -> Result<Option<ContactEr
     Ok(Some(ContactErrors { exact, paper }))
 }
 
-fn candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<Candidate> {
-    let Scene { path, team, head_speed, velocities, .. } = *scene;
+fn candidates(scene: &Scene, path: Spiral, contact: Option<ContactErrors>) -> Vec<Candidate> {
+    let Scene { team, head_speed, velocities, .. } = *scene;
     let exact = |name: String, solver: Box<dyn Solver>, memory_bytes| {
         // All of them follow one motion, whose contact is found once.
         Candidate {
@@ -195,7 +202,7 @@ fn candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<Candidate> {
     let newton = Newton::new(path, team, head_speed, velocities);
     candidates.push(exact("newton".to_owned(), Box::new(newton), size_of::<Newton<Spiral>>()));
     // The Euler steps of one show; where there are too many, the finest would take minutes.
-    let steps_to_end = |time_step: f64| scene.path.length() / head_speed / time_step;
+    let steps_to_end = |time_step: f64| path.length() / head_speed / time_step;
     let standard = PaperRules::default();
     let mut rules: Vec<(String, PaperRules)> = [1e-2, 1e-3, 1e-4, 1e-5]
         .into_iter()
@@ -372,7 +379,8 @@ fn live_clearance_ns(scene: &Scene, end: f64) -> f64 {
     const RUN: usize = 40;
     let (mut solver, _) = scene.solver();
     let mut chain = Chain::new(scene.team.handles());
-    let mut monitor = ClearanceMonitor::new(scene.team, Ground::Spiral { pitch: scene.path.pitch() });
+    let ground = scene.path.spiral().map_or(Ground::Unknown, |spiral| Ground::Spiral { pitch: spiral.pitch() });
+    let mut monitor = ClearanceMonitor::new(scene.team, ground);
     let mut times = Vec::with_capacity(RUNS * RUN);
     for run in 0..RUNS {
         for frame in 0..RUN {

@@ -5,11 +5,27 @@ pub mod iceoryx2;
 pub mod ros2;
 
 use crate::chain::Team;
-use crate::messages::{CollisionAlert, FrameHeader, NO_BENCH, Stage};
+use crate::geometry::pieces::{Shape, ShapeKind};
+use crate::geometry::spiral::Spiral;
+use crate::messages::{
+    CollisionAlert, FrameHeader, MOST_PIECES, NO_BENCH, PIECE_ARC, PIECE_INWARD_SPIRAL, PIECE_LINE,
+    PIECE_OUTWARD_SPIRAL, Stage, StagePiece,
+};
+use crate::scene::path::ScenePath;
 use crate::show::alerts::Alert;
 
-/// The stage of a team on a spiral.
-pub fn stage(run_id: u64, stamp_ns: u64, team: &Team, pitch: f64, start_turn: f64) -> Stage {
+/// The stage of a team on a scene's path.
+pub fn stage(run_id: u64, stamp_ns: u64, team: &Team, scene_path: &ScenePath) -> Stage {
+    let mut path = [StagePiece::default(); MOST_PIECES];
+    let (mut pieces, mut pitch, mut start_turn) = (0, f64::NAN, f64::NAN);
+    for (place, shape) in path.iter_mut().zip(scene_path.shapes()) {
+        *place = stage_piece(&shape);
+        if let ShapeKind::Inward { pitch: metres, first, .. } = shape.kind {
+            pitch = metres;
+            start_turn = scene_path.spiral().map_or(first / std::f64::consts::TAU, Spiral::start_turn);
+        }
+        pieces += 1;
+    }
     Stage {
         run_id,
         stamp_ns,
@@ -20,8 +36,20 @@ pub fn stage(run_id: u64, stamp_ns: u64, team: &Team, pitch: f64, start_turn: f6
         body_length: team.body_length,
         width: team.width,
         benches: team.benches as u32,
-        reserved: 0,
+        pieces,
+        path,
     }
+}
+
+fn stage_piece(shape: &Shape) -> StagePiece {
+    let (kind, curvature, theta_first, theta_last) = match shape.kind {
+        ShapeKind::Line => (PIECE_LINE, 0.0, f64::NAN, f64::NAN),
+        ShapeKind::Arc { curvature } => (PIECE_ARC, curvature, f64::NAN, f64::NAN),
+        ShapeKind::Inward { first, last, .. } => (PIECE_INWARD_SPIRAL, f64::NAN, first, last),
+        ShapeKind::Outward { first, last, .. } => (PIECE_OUTWARD_SPIRAL, f64::NAN, first, last),
+    };
+    let Shape { start, heading, length, .. } = *shape;
+    StagePiece { x: start.x, y: start.y, heading, length, curvature, theta_first, theta_last, kind, reserved: 0 }
 }
 
 /// The message of an alert that goes with a frame.

@@ -86,7 +86,7 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
         queue: 64,
         subscribers: 8,
         alerts: true,
-        stage: stage(1, 0, &scene.team, scene.path.pitch(), scene.start_turn),
+        stage: stage(1, 0, &scene.team, &scene.path),
     };
     let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(SharedMemoryPublisher::open(&offer).unwrap())];
     #[cfg(feature = "ros2")]

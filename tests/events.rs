@@ -44,8 +44,8 @@ fn the_papers_own_motion_touches_earlier() {
 /// The chain with the head `travelled` metres along, and the least clearance over all pairs that share no handle, by
 /// asking every one.
 fn least_clearance(scene: &Scene, travelled: f64, chain: &mut Chain) -> Option<f64> {
-    let newton = Newton::new(scene.path, scene.team, 1.0, Velocities::Omitted);
-    newton.solve_from(scene.path.place_at(travelled), chain).ok()?;
+    let newton = Newton::new(*scene.path.spiral().unwrap(), scene.team, 1.0, Velocities::Omitted);
+    newton.solve_from(scene.path.spiral().unwrap().place_at(travelled), chain).ok()?;
     let team = &scene.team;
     let boards: Vec<Board> = (0..team.benches)
         .map(|bench| {
@@ -113,11 +113,11 @@ proptest! {
         let end = timeline.end().event;
         let stall = timeline.find(State::Stall).map(|stall| stall.event.travelled);
         let mut chain = Chain::new(scene.team.handles());
-        let newton = Newton::new(scene.path, scene.team, 1.0, Velocities::Computed);
+        let newton = Newton::new(*scene.path.spiral().unwrap(), scene.team, 1.0, Velocities::Computed);
         let steps = 4000;
         for step in 1..steps {
             let travelled = end.travelled * f64::from(step) / f64::from(steps);
-            prop_assert!(newton.solve_from(scene.path.place_at(travelled), &mut chain).is_ok(), "a fold before the end");
+            prop_assert!(newton.solve_from(scene.path.spiral().unwrap().place_at(travelled), &mut chain).is_ok(), "a fold before the end");
             let backwards = chain.speed.iter().any(|speed| *speed < -1e-9);
             if stall.is_none_or(|stall| travelled < stall) {
                 prop_assert!(!backwards, "pushed backwards at {travelled}, stall at {stall:?}");
@@ -125,13 +125,13 @@ proptest! {
         }
         if let Some(stall) = stall.filter(|stall| *stall > 0.0) {
             // The handle behind the stalled link stands still there.
-            newton.solve_from(scene.path.place_at(stall), &mut chain).unwrap();
+            newton.solve_from(scene.path.spiral().unwrap().place_at(stall), &mut chain).unwrap();
             let slowest = chain.speed.iter().fold(f64::INFINITY, |least, speed| least.min(speed.abs()));
             prop_assert!(slowest < 1e-6, "slowest handle at the stall: {slowest:e}");
         }
         if end.kind == State::Lock {
             let bench = end.bench_a.unwrap() as usize;
-            newton.solve_from(scene.path.place_at(end.travelled * (1.0 - 1e-12)), &mut chain).unwrap();
+            newton.solve_from(scene.path.spiral().unwrap().place_at(end.travelled * (1.0 - 1e-12)), &mut chain).unwrap();
             // Unbounded at the lock itself: the bench's rear handle is far faster than its front one.
             prop_assert!(chain.speed[bench + 1].abs() > 100.0 * chain.speed[bench].abs());
         } else {

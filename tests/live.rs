@@ -159,21 +159,21 @@ fn python_sees_the_same_layouts() {
     let output = Process::start(python().args(["-c", code])).output_within(60);
     let said = text(&output.stdout);
     macro_rules! layout {
-        ($type:ident: $($field:ident)*) => {{
+        ($type:ident $version:literal: $($field:ident)*) => {{
             let offsets = [$(format!("{}={}", stringify!($field), offset_of!($type, $field))),*];
             let name = stringify!($type);
-            format!("{name} bench_dragon/{name}/1 {} {}", size_of::<$type>(), offsets.join(" "))
+            format!("{name} bench_dragon/{name}/{} {} {}", $version, size_of::<$type>(), offsets.join(" "))
         }};
     }
     let expected = [
-        layout!(HandlePose: x y heading vx vy),
-        layout!(FrameHeader: run_id sequence tick stamp_ns sent_ns deadline_ns sim_time time_scale min_clearance handles state),
-        layout!(CollisionAlert: run_id tick stamp_ns sim_time event_time time_to_event clearance x y level bench_a bench_b reserved),
-        layout!(LoopStatus: run_id tick sequence stamp_ns sim_time rate measured_rate overruns skipped shows_played
+        layout!(HandlePose 1: x y heading vx vy),
+        layout!(FrameHeader 1: run_id sequence tick stamp_ns sent_ns deadline_ns sim_time time_scale min_clearance handles state),
+        layout!(CollisionAlert 1: run_id tick stamp_ns sim_time event_time time_to_event clearance x y level bench_a bench_b reserved),
+        layout!(LoopStatus 1: run_id tick sequence stamp_ns sim_time rate measured_rate overruns skipped shows_played
             lateness_p50_second lateness_p99_second lateness_max_second lateness_p50_total lateness_p99_total
             lateness_p999_total lateness_max_total step_p50_second step_p99_second step_max_second step_p50_total
             step_p99_total step_p999_total step_max_total resident_bytes subscribers file_descriptors scene),
-        layout!(Stage: run_id stamp_ns pitch start_turn hole_inset head_length body_length width benches reserved),
+        layout!(Stage 2: run_id stamp_ns pitch start_turn hole_inset head_length body_length width benches pieces path),
         "40".to_owned(),
     ];
     assert_eq!(said.lines().collect::<Vec<_>>(), expected, "{}", text(&output.stderr));

@@ -104,6 +104,8 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_what_msgs_sa
     assert_eq!(stages.len(), 1);
     assert_eq!(stages[0]["pitch"], 0.55);
     assert_eq!(stages[0]["benches"], 223);
+    assert_eq!(stages[0]["pieces"], 1);
+    assert_eq!(stages[0]["path"][0]["kind"], 2);
     assert_eq!(stages[0]["header"]["frame_id"], "stage");
 
     let handles = messages(&lines, "handles");

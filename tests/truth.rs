@@ -5,6 +5,8 @@ use bench_dragon::chain::paper::{Paper, PaperRules};
 use bench_dragon::chain::reference::Reference;
 use bench_dragon::chain::whole_chain::{Instructions, WholeChain};
 use bench_dragon::chain::{Chain, Solver, Team, Velocities};
+use bench_dragon::geometry::path::Path;
+use bench_dragon::geometry::pieces::PiecePath;
 use bench_dragon::geometry::spiral::Spiral;
 
 /// One row of a 50-digit table.
@@ -194,5 +196,38 @@ fn the_reference_agrees_with_50_digits() {
             let bound = if row.time < 430.0 { 1e-14 } else { 1e-11 };
             assert!(((handle.speed - row.speed) / row.speed).abs() < bound, "{} {}", row.time, row.handle);
         }
+    }
+}
+
+/// The turnaround of pitch 1.7 m at 4.5 m, ratio 2, the team's length of path after it.
+fn turnaround(arc_ratio: f64) -> PiecePath {
+    PiecePath::turnaround(1.7, 4.5, arc_ratio, 100.0, 369.16).unwrap()
+}
+
+#[test]
+fn newton_agrees_with_the_turnaround_of_50_digits() {
+    // The table's clock stands at 0 with the head at the start of the turn, 100 s into the scene.
+    let text = include_str!("truth/turnaround_table.csv");
+    let mut newton = Newton::new(turnaround(2.0), paper_team(), 1.0, Velocities::Computed);
+    let (mut position, mut speed, mut rows) = (0f64, 0f64, 0);
+    for line in text.lines().skip(1) {
+        let fields: Vec<f64> = line.split(',').map(|field| field.parse().unwrap()).collect();
+        let (chain, i) = (solved(&mut newton, fields[0] + 100.0), fields[1] as usize);
+        position = position.max((chain.x[i] - fields[2]).hypot(chain.y[i] - fields[3]));
+        speed = speed.max((chain.speed[i] / fields[4] - 1.0).abs());
+        rows += 1;
+    }
+    println!("position {position:.1e} m, speed {speed:.1e}");
+    assert_eq!(rows, 48);
+    assert!(position < 1e-12 && speed < 1e-12, "position {position:e} m, speed {speed:e}");
+}
+
+#[test]
+fn the_turn_is_as_long_as_50_digits_say_whatever_the_ratio() {
+    for arc_ratio in [1.0, 2.0, 3.0] {
+        let path = turnaround(arc_ratio);
+        let begins: Vec<f64> = path.junctions().collect();
+        assert!((begins[2] - begins[0] - 13.621244906821123).abs() < 4e-14, "{begins:?}");
+        assert!((path.length() - begins[2] - 369.16).abs() < 1e-12);
     }
 }

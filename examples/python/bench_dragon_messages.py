@@ -14,9 +14,11 @@ LEVELS = ("clear", "approaching", "contact", "stall", "lock")
 
 
 class _Message(ctypes.Structure):
+    LAYOUT = 1
+
     @classmethod
     def type_name(cls) -> str:
-        return f"bench_dragon/{cls.__name__}/1"
+        return f"bench_dragon/{cls.__name__}/{cls.LAYOUT}"
 
 
 class HandlePose(_Message):
@@ -74,14 +76,29 @@ class LoopStatus(_Message):
     )
 
 
+PIECES = ("line", "arc", "inward_spiral", "outward_spiral")
+
+
+class StagePiece(ctypes.Structure):
+    """One piece of the path; `PIECES[kind]` says which curve it is."""
+
+    _fields_ = [
+        (name, ctypes.c_double)
+        for name in ("x", "y", "heading", "length", "curvature", "theta_first", "theta_last")
+    ] + [("kind", ctypes.c_uint32), ("reserved", ctypes.c_uint32)]
+
+
 class Stage(_Message):
+    """The team's measures and the path: `path[:pieces]`."""
+
+    LAYOUT = 2
     _fields_ = (
         [("run_id", ctypes.c_uint64), ("stamp_ns", ctypes.c_uint64)]
         + [
             (name, ctypes.c_double)
             for name in ("pitch", "start_turn", "hole_inset", "head_length", "body_length", "width")
         ]
-        + [("benches", ctypes.c_uint32), ("reserved", ctypes.c_uint32)]
+        + [("benches", ctypes.c_uint32), ("pieces", ctypes.c_uint32), ("path", StagePiece * 32)]
     )
 
 

@@ -1,10 +1,12 @@
 //! `check`: what a scene would model, what it leaves out, and which solver it would use and why.
 
 use bench_dragon::chain::Velocities;
+use bench_dragon::geometry::pieces::{Shape, ShapeKind};
 use bench_dragon::messages::State;
+use bench_dragon::scene::path::ScenePath;
 use bench_dragon::scene::{AtEnd, OnContact};
 
-use super::events::sentence;
+use super::events::{least_clearance, sentence};
 use super::{CommandError, Common, Output, number, search_timeline};
 
 /// Validates the scene and says what it would do.
@@ -23,12 +25,7 @@ pub fn check(common: &Common) -> Result<(), CommandError> {
         team.width,
         team.hole_inset
     ))?;
-    output.line(&format!(
-        "  Path: inward spiral, {} m per turn, the head starting on turn {} at {} m/s.",
-        scene.path.pitch(),
-        scene.start_turn,
-        scene.head_speed
-    ))?;
+    output.line(&format!("  Path: {}; the head moves at {} m/s.", path(&scene.path), scene.head_speed))?;
     output.line(&format!("  Solver: {}.", scene.solver().1))?;
     output.line(match scene.velocities {
         Velocities::Computed => "  Velocities: computed for every handle.",
@@ -69,8 +66,32 @@ pub fn check(common: &Common) -> Result<(), CommandError> {
     for timed in timeline.events() {
         output.line(&format!("  {}", sentence(&scene, timed)))?;
     }
+    output.line(&format!("  {}", least_clearance(&scene, &timeline, common)))?;
     if timeline.find(State::Contact).is_some_and(|contact| contact.time == 0.0) {
         log::warn!("boards overlap at the start of scene \"{}\": widen the pitch or narrow the boards", scene.name);
     }
     output.finish()
+}
+
+/// The path in words.
+fn path(path: &ScenePath) -> String {
+    if let ScenePath::Spiral(spiral) = path {
+        let (pitch, turn) = (spiral.pitch(), spiral.start_turn());
+        return format!("inward spiral, {pitch} m per turn, the head starting on turn {turn}");
+    }
+    let pieces: Vec<String> = path.shapes().iter().filter(|shape| shape.length > 0.0).map(piece).collect();
+    format!("{:.3} m: {}", path.length(), pieces.join(", "))
+}
+
+fn piece(shape: &Shape) -> String {
+    let length = shape.length;
+    match shape.kind {
+        ShapeKind::Line => format!("{length:.3} m straight on"),
+        ShapeKind::Arc { curvature } => {
+            let side = if curvature > 0.0 { "left" } else { "right" };
+            format!("{length:.3} m to the {side} at radius {:.6} m", 1.0 / curvature.abs())
+        }
+        ShapeKind::Inward { pitch, .. } => format!("{length:.3} m inward along a spiral of {pitch} m per turn"),
+        ShapeKind::Outward { pitch, .. } => format!("{length:.3} m outward along a spiral of {pitch} m per turn"),
+    }
 }

@@ -1,13 +1,15 @@
 //! `draw`: an SVG of the stage at a time: the path, every bench as its rectangle, the head, and where boards touch.
 
+use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 use bench_dragon::chain::Chain;
-use bench_dragon::geometry::path::Path;
+use bench_dragon::geometry::pieces::{Shape, ShapeKind};
 use bench_dragon::geometry::rectangle::Board;
 use bench_dragon::geometry::{Point, Vector};
 use bench_dragon::messages::State;
 use bench_dragon::scene::Scene;
+use bench_dragon::scene::path::ScenePath;
 use bench_dragon::show::solve_at_or_just_before;
 use bench_dragon::show::timeline::{TimedEvent, Timeline};
 use plotters::coord::types::RangedCoordf64;
@@ -68,7 +70,12 @@ fn picture(
     chain: &Chain,
     radius: Option<f64>,
 ) -> Result<String, Box<dyn std::error::Error>> {
-    let reach = chain.x.iter().zip(&chain.y).map(|(x, y)| x.hypot(*y)).fold(0.0, f64::max);
+    let team = chain.x.iter().zip(&chain.y).map(|(x, y)| x.hypot(*y));
+    let route = scene.path.shapes().into_iter().map(|shape| shape.start.coords.norm());
+    let reach = match &scene.path {
+        ScenePath::Spiral(_) => team.fold(0.0, f64::max),
+        ScenePath::Pieces(_) => team.chain(route).fold(0.0, f64::max),
+    };
     let radius = radius.unwrap_or(1.05 * reach + scene.team.head_length);
     let mut text = String::new();
     {
@@ -95,28 +102,46 @@ fn picture(
 }
 
 fn draw_path(stage: &mut Stage, scene: &Scene, radius: f64) -> Result<(), Box<dyn std::error::Error>> {
-    let theta = (1.42 * radius / scene.path.growth()).min(1e5);
-    let points = (0..=(theta * 12.0) as usize).map(|step| {
-        let point = scene.path.point(scene.path.place_of_theta(step as f64 / 12.0));
-        (point.x, point.y)
-    });
-    let visible = points.filter(|(x, y)| x.abs() <= radius && y.abs() <= radius);
-    // One line for each stretch inside the picture: what lies outside must not be bridged.
-    let mut stretches: Vec<Vec<(f64, f64)>> = Vec::new();
-    for point in visible {
-        match stretches.last_mut() {
-            Some(stretch) if near(stretch.last(), point, scene.path.growth() + radius / 10.0) => stretch.push(point),
-            _ => stretches.push(vec![point]),
+    let inside = |point: &(f64, f64)| point.0.abs() <= radius && point.1.abs() <= radius;
+    for shape in scene.path.shapes() {
+        let points: Vec<(f64, f64)> = outline(&shape, radius).into_iter().map(|point| (point.x, point.y)).collect();
+        // One line for each stretch inside the picture: what lies outside must not be bridged.
+        for stretch in points.split(|point| !inside(point)).filter(|stretch| stretch.len() > 1) {
+            stage.draw_series(LineSeries::new(stretch.to_vec(), CURVE.stroke_width(1)))?;
         }
-    }
-    for stretch in stretches {
-        stage.draw_series(LineSeries::new(stretch, CURVE.stroke_width(1)))?;
     }
     Ok(())
 }
 
-fn near(previous: Option<&(f64, f64)>, point: (f64, f64), distance: f64) -> bool {
-    previous.is_some_and(|(x, y)| (x - point.0).hypot(y - point.1) < distance)
+/// Points along a piece, near enough to each other for a picture of this radius. A spiral that comes in is drawn from
+/// as far out as the picture goes: the team stands there.
+fn outline(shape: &Shape, radius: f64) -> Vec<Point> {
+    let spiral = |pitch: f64, from: f64, to: f64, sign: f64| -> Vec<Point> {
+        let steps = ((to - from) * 12.0).ceil().clamp(1.0, 1e6);
+        let thetas = (0..=steps as usize).map(|step| from + (to - from) * step as f64 / steps);
+        let place = |theta: f64| Point::new(theta.cos(), theta.sin()) * (sign * pitch / TAU * theta);
+        thetas.map(place).collect()
+    };
+    match shape.kind {
+        ShapeKind::Inward { pitch, first, last } => {
+            spiral(pitch, last, first.max((1.42 * radius / pitch * TAU).min(1e5)), 1.0)
+        }
+        ShapeKind::Outward { pitch, first, last } => spiral(pitch, first, last.min(first.max(1e5)), -1.0),
+        ShapeKind::Line => {
+            let direction = Vector::new(shape.heading.cos(), shape.heading.sin());
+            // Short stretches, so that what leaves the picture is cut near its edge.
+            let steps = (shape.length / (0.002 * radius)).ceil().clamp(1.0, 1e6);
+            (0..=steps as usize).map(|step| shape.start + direction * (shape.length * step as f64 / steps)).collect()
+        }
+        ShapeKind::Arc { curvature } => {
+            let left = Vector::new(-shape.heading.sin(), shape.heading.cos());
+            let centre = shape.start + left / curvature;
+            let angle = curvature * shape.length;
+            let steps = (angle.abs() * 24.0).ceil().clamp(1.0, 1e6);
+            let turned = |step: usize| nalgebra::Rotation2::new(angle * step as f64 / steps) * (shape.start - centre);
+            (0..=steps as usize).map(|step| centre + turned(step)).collect()
+        }
+    }
 }
 
 fn draw_benches(

@@ -2,10 +2,10 @@
 
 use bench_dragon::messages::State;
 use bench_dragon::scene::Scene;
-use bench_dragon::show::timeline::TimedEvent;
+use bench_dragon::show::timeline::{TimedClearance, TimedEvent, Timeline};
 use serde::Serialize;
 
-use super::{CommandError, Common, Output, number, search_timeline};
+use super::{CommandError, Common, Output, number, progress_bar, search_timeline};
 
 /// One line of `events --json`.
 #[derive(Serialize)]
@@ -44,6 +44,7 @@ pub fn events(common: &Common) -> Result<(), CommandError> {
                 output.line(&format!("There is no {} before the motion ends.", kind.name()))?;
             }
         }
+        output.line(&least_clearance(&scene, &timeline, common))?;
     }
     output.finish()
 }
@@ -64,6 +65,22 @@ pub fn sentence(scene: &Scene, timed: &TimedEvent) -> String {
     };
     format!("{:>9}  t = {} s: {what} (counting from 1).", event.kind.name(), number(time))
         .replace("path (counting from 1)", "path")
+}
+
+/// The least clearance of the whole show, for people.
+pub fn least_clearance(scene: &Scene, timeline: &Timeline, common: &Common) -> String {
+    let bar = progress_bar(1000, common).with_message("searching for the least clearance");
+    let found = timeline.least_clearance(scene, &mut |share| bar.set_position((1000.0 * share) as u64));
+    bar.finish_and_clear();
+    let Some(TimedClearance { least, time }) = found else {
+        return "The least clearance of the show is not computed: there are too few benches, or too many.".to_owned();
+    };
+    let (first, second) = (bench_name(scene, least.bench_a), bench_name(scene, least.bench_b));
+    format!(
+        "The least clearance of the show is {} m, at t = {} s, between {first} and {second} (counting from 1).",
+        number(least.value),
+        number(time)
+    )
 }
 
 /// A bench as people call it, counted from 1.

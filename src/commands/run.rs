@@ -170,7 +170,7 @@ impl Performance<'_> {
 
     fn stage(&self) -> Stage {
         let scene = self.scene;
-        transports::stage(self.run_id, realtime_ns(), &scene.team, scene.path.pitch(), scene.start_turn)
+        transports::stage(self.run_id, realtime_ns(), &scene.team, &scene.path)
     }
 
     /// What has to be done on the loop's own thread before it starts.

@@ -18,6 +18,10 @@ pub struct TradeArguments {
 /// Measures every solver and prints a table or JSON lines.
 pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandError> {
     let scene = common.load_scene()?;
+    if scene.path.spiral().is_none() {
+        let sentence = "path.kind is not \"spiral\": `trade` compares solvers on spirals, other paths have one";
+        return Err(CommandError::BadInput(sentence.to_owned()));
+    }
     let timeline = search_timeline(&scene, common);
     let bar = progress_bar(1000, common).with_message("measuring");
     let measured = measure(&scene, &timeline, &mut |share| bar.set_position((1000.0 * share) as u64));
@@ -97,7 +101,7 @@ fn plot(svg: &mut String, scene: &str, measurements: &[Measurement]) -> Result<(
         .margin(14)
         .x_label_area_size(44)
         .y_label_area_size(70)
-        .build_cartesian_2d((0.5 * least..20.0 * most).log_scale(), (LEAST_ERROR..10.0).log_scale())?;
+        .build_cartesian_2d((0.5 * least..100.0 * most).log_scale(), (LEAST_ERROR..10.0).log_scale())?;
     chart
         .configure_mesh()
         .x_desc("microseconds per frame (median)")
@@ -109,12 +113,18 @@ fn plot(svg: &mut String, scene: &str, measurements: &[Measurement]) -> Result<(
     let mut front: Vec<(f64, f64)> = measurements.iter().filter(|m| m.on_front).map(|m| (cost(m), error(m))).collect();
     front.sort_by(|a, b| a.0.total_cmp(&b.0));
     chart.draw_series(LineSeries::new(front, &BLUE))?;
+    let mut labelled: Vec<(f64, f64)> = Vec::new();
     for measurement in measurements {
         let colour = if measurement.solver.starts_with("paper") { RED } else { BLUE };
         let at = (cost(measurement), error(measurement));
         let style = if measurement.on_front { colour.filled() } else { colour.stroke_width(1) };
         chart.draw_series([Circle::new(at, 4, style)])?;
-        chart.draw_series([Text::new(format!("  {}", measurement.solver), at, ("sans-serif", 12))])?;
+        // Labels of points that lie on one another go below one another.
+        let near = |other: &&(f64, f64)| (other.0 / at.0).ln().abs() < 2.5 && (other.1 / at.1).ln().abs() < 0.7;
+        let below = 13 * labelled.iter().filter(near).count() as i32;
+        labelled.push(at);
+        let label = Text::new(measurement.solver.clone(), (8, below - 6), ("sans-serif", 12));
+        chart.draw_series([EmptyElement::at(at) + label])?;
     }
     area.present()?;
     Ok(())

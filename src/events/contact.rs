@@ -361,7 +361,7 @@ fn touching(look: &Look, pairs: &[(usize, usize)]) -> Option<Event> {
 /// All pairs that share no handle and are not certain to stay apart while both together move by at most `motion`.
 ///
 /// Found with a grid whose cells are no narrower than the longest board and that motion.
-fn near_pairs(boards: &[Board], motion: f64) -> Vec<(usize, usize)> {
+pub(super) fn near_pairs(boards: &[Board], motion: f64) -> Vec<(usize, usize)> {
     let widest = boards.iter().map(|board| 2.0 * board.circle_radius()).fold(0.0, f64::max);
     let cell = widest + motion;
     let key = |board: &Board| ((board.centre.x / cell).floor() as i64, (board.centre.y / cell).floor() as i64);

@@ -34,6 +34,18 @@ pub trait Path {
     /// [`Fold`] where there is none before the distance begins to shrink again: the link is locked.
     fn follower(&self, front: Self::Place, link: f64) -> Result<Self::Place, Fold>;
 
+    /// How far a handle moves at most on its way from one place to another, going one way, seen from a frame that turns
+    /// about a fixed centre with another handle of the chain, which meanwhile goes from `companion.0` to `companion.1`.
+    /// `None` where the path there has no such centre.
+    fn motion_beside(
+        &self,
+        _from: Self::Place,
+        _to: Self::Place,
+        _companion: (Self::Place, Self::Place),
+    ) -> Option<f64> {
+        None
+    }
+
     /// How a link of `link` metres from `front` to its follower `rear` lies across the path.
     fn bench(&self, front: Self::Place, rear: Self::Place, link: f64) -> BenchOnPath;
 }

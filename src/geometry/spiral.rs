@@ -97,7 +97,7 @@ impl Angle {
 }
 
 /// The rounded sum and its rounding error (Knuth, The Art of Computer Programming, vol. 2, section 4.2.2).
-fn two_sum(x: f64, y: f64) -> (f64, f64) {
+pub(super) fn two_sum(x: f64, y: f64) -> (f64, f64) {
     let sum = x + y;
     let y_part = sum - x;
     (sum, (x - (sum - y_part)) + (y - y_part))
@@ -107,6 +107,7 @@ fn two_sum(x: f64, y: f64) -> (f64, f64) {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spiral {
     pitch: f64,
+    start_turn: f64,
     start: Angle,
     start_theta: f64,
     length: f64,
@@ -119,7 +120,7 @@ impl Spiral {
         debug_assert!(pitch > 0.0 && start_turn > 0.0);
         let start = Angle::from_turns(start_turn);
         let start_theta = TAU * start_turn;
-        let mut spiral = Self { pitch, start, start_theta, length: 0.0 };
+        let mut spiral = Self { pitch, start_turn, start, start_theta, length: 0.0 };
         spiral.length = spiral.arc_length(start_theta, start_theta);
         spiral
     }
@@ -132,6 +133,11 @@ impl Spiral {
     /// Metres of radius per radian: a = pitch / 2 pi.
     pub fn growth(&self) -> f64 {
         self.pitch / TAU
+    }
+
+    /// The number of turns at which travel starts.
+    pub fn start_turn(&self) -> f64 {
+        self.start_turn
     }
 
     /// Where travel starts.
@@ -319,6 +325,16 @@ impl Path for Spiral {
 
     fn follower(&self, front: Angle, link: f64) -> Result<Angle, Fold> {
         Ok(front.plus(self.increment(self.radius(front), link)?))
+    }
+
+    /// Outward and around: a |delta theta| + r |delta theta - delta theta of the companion|. Both only go one way: between
+    /// stalls the angle between two handles only grows inward and only shrinks outward, since
+    /// d theta_{i+1}/d theta_i = (t_i . b_i) w_i / ((t_{i+1} . b_i) w_{i+1}) < 1 (w = sqrt(a^2 + r^2); the difference of
+    /// the two products is 2 a (r + r') sin^2(d/2) / link > 0).
+    fn motion_beside(&self, from: Angle, to: Angle, companion: (Angle, Angle)) -> Option<f64> {
+        let own = from.minus(to);
+        let around = (own - companion.0.minus(companion.1)).abs();
+        Some(self.growth() * own.abs() + self.radius(from).max(self.radius(to)) * around)
     }
 
     fn bench(&self, front: Angle, rear: Angle, link: f64) -> BenchOnPath {

@@ -113,14 +113,20 @@ def from_file(name, known):
         if not line or "=" in line:
             continue
         kind, field = line.split()
-        element = kind.removesuffix("[]")
+        element, _, count = kind.partition("[")
         of = PRIMITIVES.get(element) or known[element]
-        fields.append((field, idl.sequence[of] if kind.endswith("[]") else of))
+        count = count.removesuffix("]")
+        if count:
+            of = idl.array[of, int(count)]
+        elif kind.endswith("[]"):
+            of = idl.sequence[of]
+        fields.append((field, of))
     return message("bench_dragon_msgs", name, fields)
 
 
 KNOWN = {"std_msgs/Header": Header}
 KNOWN["HandlePose"] = from_file("HandlePose", KNOWN)
+KNOWN["StagePiece"] = from_file("StagePiece", KNOWN)
 TOPICS = {
     "handles": from_file("HandlePoses", KNOWN),
     "alerts": from_file("CollisionAlert", KNOWN),

@@ -132,22 +132,45 @@ function outline(context, { x, y, c, s, l, w }) {
 }
 
 /**
- * The path of a stage as far out as `reach`, in metres: the spiral r = pitch * turn, as cubic curves that take its
- * tangents over.
+ * The path of a stage, in metres. A spiral on which the team comes in is drawn as far out as `reach`: the team stands
+ * there.
  */
-export function pathOf({ pitch, start_turn }, reach) {
-  const path = new Path2D(), turns = Math.max(start_turn, reach / pitch);
-  if (turns > MOST_TURNS) return path;
-  const a = pitch / (2 * Math.PI), steps = Math.ceil(12 * turns), step = (2 * Math.PI * turns) / steps;
-  let [x, y, dx, dy] = [0, 0, a, 0];
-  path.moveTo(0, 0);
+export function pathOf({ pitch, path: pieces }, reach) {
+  const path = new Path2D();
+  for (const { kind, x, y, heading, length, curvature, theta_first, theta_last } of pieces) {
+    const c = Math.cos(heading), s = Math.sin(heading);
+    if (kind === "line") {
+      path.moveTo(x, y);
+      path.lineTo(x + length * c, y + length * s);
+    } else if (kind === "arc") {
+      const cx = x - s / curvature, cy = y + c / curvature, from = Math.atan2(y - cy, x - cx);
+      path.moveTo(x, y);
+      path.arc(cx, cy, 1 / Math.abs(curvature), from, from + curvature * length, curvature < 0);
+    } else if (kind === "inward_spiral") {
+      addSpiral(path, pitch, theta_last, Math.max(theta_first, (2 * Math.PI * reach) / pitch));
+    } else {
+      addSpiral(path, -pitch, theta_first, theta_last);
+    }
+  }
+  return path;
+}
+
+/** The spiral r = pitch * turn from one polar angle to another, as cubic curves that take its tangents over. */
+function addSpiral(path, pitch, from, to) {
+  const turns = (to - from) / (2 * Math.PI);
+  if (turns > MOST_TURNS) return;
+  const a = pitch / (2 * Math.PI), steps = Math.ceil(12 * turns), step = (to - from) / steps;
+  const at = (angle) => {
+    const c = Math.cos(angle), s = Math.sin(angle), x = a * angle * c, y = a * angle * s;
+    return [x, y, a * c - y, a * s + x];
+  };
+  let [x, y, dx, dy] = at(from);
+  path.moveTo(x, y);
   for (let k = 1; k <= steps; k++) {
-    const angle = k * step, c = Math.cos(angle), s = Math.sin(angle), nx = a * angle * c, ny = a * angle * s;
-    const ex = a * c - ny, ey = a * s + nx, third = step / 3;
+    const [nx, ny, ex, ey] = at(from + k * step), third = step / 3;
     path.bezierCurveTo(x + dx * third, y + dy * third, nx - ex * third, ny - ey * third, nx, ny);
     [x, y, dx, dy] = [nx, ny, ex, ey];
   }
-  return path;
 }
 
 /** Lets a context draw in metres, moved by some of its pixels. */

@@ -20,7 +20,7 @@
 
 use serde_json::{Value, json};
 
-use crate::messages::{CollisionAlert, FrameHeader, HandlePose, NO_BENCH, Stage, State};
+use crate::messages::{CollisionAlert, FrameHeader, HandlePose, NO_BENCH, Stage, StagePiece, State};
 
 const VERSION: u8 = 1;
 const HEADER_BYTES: usize = 64;
@@ -49,8 +49,14 @@ pub(super) fn stage(stage: &Stage) -> String {
     let Stage { run_id, pitch, start_turn, hole_inset, head_length, body_length, width, benches, .. } = *stage;
     json!({"type": "stage", "run_id": exact(run_id), "pitch": pitch, "start_turn": start_turn,
         "hole_inset": hole_inset, "head_length": head_length, "body_length": body_length, "width": width,
-        "benches": benches})
+        "benches": benches, "path": stage.path_in_use().iter().map(piece).collect::<Vec<_>>()})
     .to_string()
+}
+
+fn piece(piece: &StagePiece) -> Value {
+    let StagePiece { x, y, heading, length, curvature, theta_first, theta_last, .. } = *piece;
+    json!({"kind": piece.kind_name(), "x": x, "y": y, "heading": heading, "length": length, "curvature": curvature,
+        "theta_first": theta_first, "theta_last": theta_last})
 }
 
 pub(super) fn alert(alert: &CollisionAlert) -> String {

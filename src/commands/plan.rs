@@ -1,0 +1,111 @@
+//! `plan`: answers for a choreographer, with where they are decided.
+
+use bench_dragon::plan::{GreatestSpeed, LeastPitch, PlanError, greatest_speed, least_pitch};
+use bench_dragon::scene::Accepted;
+use serde::Serialize;
+
+use super::events::bench_name;
+use super::{CommandError, Common, Output, number, progress_bar, search_timeline};
+
+/// Arguments of `plan`.
+#[derive(Debug, clap::Args)]
+pub struct PlanArguments {
+    #[command(subcommand)]
+    question: Question,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Question {
+    /// The least pitch at which the scene's team comes in to a radius on a spiral without touching itself
+    Pitch {
+        /// Metres from the centre that the front handle of the head is to reach
+        #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+        reach_radius: f64,
+    },
+    /// The greatest constant speed of the head at which no handle of the show is ever faster than a limit
+    Speed {
+        /// Metres per second that no handle may exceed
+        #[arg(long, value_name = "M/S", allow_negative_numbers = true)]
+        max_handle_speed: f64,
+    },
+}
+
+/// The line of `plan pitch --json`.
+#[derive(Serialize)]
+struct PitchLine {
+    plan: &'static str,
+    value: f64,
+    bench_a: u32,
+    bench_b: u32,
+    head_radius: f64,
+}
+
+/// The line of `plan speed --json`.
+#[derive(Serialize)]
+struct SpeedLine {
+    plan: &'static str,
+    value: f64,
+    time: f64,
+    handle: u32,
+    ratio: f64,
+}
+
+/// Answers the question.
+pub fn plan(common: &Common, arguments: &PlanArguments) -> Result<(), CommandError> {
+    match arguments.question {
+        Question::Pitch { reach_radius } => plan_pitch(common, reach_radius),
+        Question::Speed { max_handle_speed } => plan_speed(common, max_handle_speed),
+    }
+}
+
+fn plan_pitch(common: &Common, radius: f64) -> Result<(), CommandError> {
+    Accepted::LENGTH.check("--reach-radius", radius).map_err(CommandError::BadInput)?;
+    let scene = common.load_scene()?;
+    let bar = progress_bar(1000, common).with_message("searching for the pitch");
+    let found = least_pitch(&scene.team, radius, &mut |share| bar.set_position((1000.0 * share) as u64));
+    bar.finish_and_clear();
+    let LeastPitch { value, bench_a, bench_b, head_radius } = found?;
+    let mut output = Output::standard();
+    if common.json {
+        output.json(&PitchLine { plan: "pitch", value, bench_a, bench_b, head_radius })?;
+    } else {
+        output.line(&format!("The head reaches {radius} m with any pitch above {value:.10} m per turn."))?;
+        output.line(&format!(
+            "At that pitch {} and {} (counting from 1) just touch, the head being {head_radius:.6} m from the centre.",
+            bench_name(&scene, bench_a),
+            bench_name(&scene, bench_b)
+        ))?;
+    }
+    output.finish()
+}
+
+fn plan_speed(common: &Common, limit: f64) -> Result<(), CommandError> {
+    Accepted::SPEED.check("--max-handle-speed", limit).map_err(CommandError::BadInput)?;
+    let scene = common.load_scene()?;
+    let timeline = search_timeline(&scene, common);
+    let bar = progress_bar(1000, common).with_message("searching for the fastest handle");
+    let found = greatest_speed(&scene, &timeline, limit, &mut |share| bar.set_position((1000.0 * share) as u64));
+    bar.finish_and_clear();
+    let GreatestSpeed { value, time, handle, ratio } = found?;
+    let mut output = Output::standard();
+    if common.json {
+        output.json(&SpeedLine { plan: "speed", value, time, handle, ratio })?;
+    } else {
+        output.line(&format!(
+            "No handle is faster than {} m/s while the head moves at {value:.10} m/s.",
+            number(limit)
+        ))?;
+        output.line(&format!(
+            "The fastest is handle {} (counting from 1) at {ratio:.10} times the head's speed, at t = {time:.6} s of the \
+             scene as it is written.",
+            handle + 1
+        ))?;
+    }
+    output.finish()
+}
+
+impl From<PlanError> for CommandError {
+    fn from(error: PlanError) -> Self {
+        Self::BadInput(error.to_string())
+    }
+}
