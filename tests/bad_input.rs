@@ -89,7 +89,7 @@ fn scenes_that_cannot_be_played() {
         ("rate = 60.0", "rate = 20001.0", &["line 27", "publish.rate", "2e4"]),
         ("velocities = true", "velocities = \"yes\"", &["line 28", "velocities", "boolean"]),
         ("velocities = true", "queue = 0", &["line 28", "publish.queue"]),
-        ("velocities = true", "subscribers = 257", &["line 28", "publish.subscribers", "256"]),
+        ("velocities = true", "subscribers = 257", &["line 28", "publish.subscribers", "2.56e2"]),
         ("velocities = true", "[publish.ros2]\nrate = 0.0", &["line 29", "publish.ros2.rate"]),
         ("velocities = true", "[publish.ros2]\nrates = 1.0", &["line 29", "rates", "topics"]),
         ("velocities = true", "[publish.ros2]\ntopics = []", &["line 29", "publish.ros2.topics", "at least one"]),
