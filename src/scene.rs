@@ -83,9 +83,16 @@ impl Accepted {
             Ok(number)
         } else {
             let Self { least, greatest, unit } = self;
-            Err(format!("{field} is {number}, expected a number from {least:e} to {greatest:e} {unit}"))
+            let [least, greatest] = [least, greatest].map(short);
+            Err(format!("{field} is {number}, expected a number from {least} to {greatest} {unit}"))
         }
     }
+}
+
+/// A number as people write it: 256, 20000, 1e6.
+fn short(number: f64) -> String {
+    let plain = number.to_string();
+    if plain.len() <= 6 { plain } else { format!("{number:e}") }
 }
 
 /// Input that cannot be used, in one sentence that says where and what was expected.
