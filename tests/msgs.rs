@@ -3,7 +3,10 @@
 
 use std::collections::BTreeMap;
 
-use bench_dragon::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, NO_BENCH, Stage, State};
+use bench_dragon::messages::{
+    CollisionAlert, FrameHeader, HandlePose, LoopStatus, NO_BENCH, PIECE_ARC, PIECE_INWARD_SPIRAL, PIECE_LINE,
+    PIECE_OUTWARD_SPIRAL, Stage, StagePiece, State,
+};
 use bench_dragon::transports::ros2::messages::{HandlePoses, Header, Stamped, type_name};
 use serde::Serialize;
 use serde_reflection::{ContainerFormat, Format, Registry, Samples, Tracer, TracerConfig};
@@ -62,6 +65,7 @@ fn ros(format: &Format) -> String {
         Format::TypeName(name) if name == "Header" => "std_msgs/Header".to_owned(),
         Format::TypeName(name) => name.clone(),
         Format::Seq(element) => format!("{}[]", ros(element)),
+        Format::TupleArray { content, size } => format!("{}[{size}]", ros(content)),
         other => panic!("{other:?} is in no .msg file"),
     }
 }
@@ -76,6 +80,7 @@ fn fields_types_and_order_are_those_of_the_interface_files() {
         ("CollisionAlert", on_the_wire(&Stamped::alert(CollisionAlert::default()))),
         ("LoopStatus", on_the_wire(&Stamped::status(LoopStatus::default()))),
         ("Stage", on_the_wire(&Stamped::stage(Stage::default()))),
+        ("StagePiece", on_the_wire(&StagePiece::default())),
     ] {
         assert_eq!(interface(name).fields, wire, "{name}");
     }
@@ -110,6 +115,14 @@ fn constants_are_the_states_and_levels() {
     let mut levels = constants("LEVEL_", &states[..5], State::level_name);
     levels.insert("NO_BENCH".to_owned(), NO_BENCH);
     assert_eq!(interface("CollisionAlert").constants, levels);
+    let pieces = [
+        ("LINE", PIECE_LINE),
+        ("ARC", PIECE_ARC),
+        ("INWARD_SPIRAL", PIECE_INWARD_SPIRAL),
+        ("OUTWARD_SPIRAL", PIECE_OUTWARD_SPIRAL),
+    ];
+    let pieces = pieces.map(|(name, kind)| (name.to_owned(), kind));
+    assert_eq!(interface("StagePiece").constants, BTreeMap::from(pieces));
     assert_eq!(State::from_wire(states.len() as u32), None, "a state that the interface files do not know");
 }
 
