@@ -44,7 +44,9 @@ fn run(bencher: Bencher, benches: usize, percent: usize, ground: Ground) {
     });
 }
 
-const CASES: [(usize, usize); 6] = [(223, 0), (223, 50), (223, 90), (223, 99), (1_000, 50), (10_000, 50)];
+/// Benches, and hundredths of the way to the contact. At 38 nearly every pair on two turns is as near as the nearest.
+const CASES: [(usize, usize); 8] =
+    [(223, 0), (223, 38), (223, 50), (223, 90), (223, 99), (1_000, 50), (10_000, 38), (10_000, 50)];
 
 #[divan::bench(args = CASES)]
 fn live(bencher: Bencher, (benches, percent): (usize, usize)) {

@@ -155,6 +155,21 @@ fn show(bencher: Bencher, with: &str) {
     });
 }
 
+/// The same where the clearance costs most: the nearest boards are about as near as every pair on two turns, so that no
+/// bench can be left out.
+#[divan::bench(sample_count = 500, sample_size = 4)]
+fn show_where_every_turn_is_as_near(bencher: Bencher) {
+    let scene = Scene::paper();
+    let timeline = Timeline::of(&scene, &mut |_| ());
+    let playback = Playback { start: 156.0, rate: 1000.0, ..Playback::of(&scene) };
+    let mut show = Show::new(&scene, timeline, playback).expect("156 s is before the contact");
+    let mut tick = 0;
+    bencher.bench_local(|| {
+        tick += 1;
+        show.frame(tick).state
+    });
+}
+
 /// The events of the paper scene, contact, stall and lock: found once, before the show.
 #[divan::bench(sample_count = 20, sample_size = 1)]
 fn events() -> Timeline {
