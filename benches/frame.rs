@@ -127,12 +127,12 @@ fn whole_chain_portable(bencher: Bencher) {
     play(bencher, &mut solver, 224, 60.0);
 }
 
-#[divan::bench(args = [10, 223, 1_000, 5_000, 20_000, 100_000], sample_count = 200, sample_size = 4)]
+#[divan::bench(args = [10, 100, 223, 1_000, 5_000, 10_000, 20_000, 100_000], sample_count = 200, sample_size = 4)]
 fn whole_chain_by_benches(bencher: Bencher, benches: usize) {
     play(bencher, &mut WholeChain::new(spiral(), team(benches), 1.0, Velocities::Computed), benches + 1, 60.0);
 }
 
-#[divan::bench(args = [10, 223, 1_000, 5_000, 20_000, 100_000], sample_count = 20, sample_size = 1)]
+#[divan::bench(args = [10, 100, 223, 1_000, 5_000, 10_000, 20_000, 100_000], sample_count = 20, sample_size = 1)]
 fn newton_by_benches(bencher: Bencher, benches: usize) {
     play(bencher, &mut Newton::new(spiral(), team(benches), 1.0, Velocities::Computed), benches + 1, 60.0);
 }

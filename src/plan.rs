@@ -50,8 +50,8 @@ const WINDOW: f64 = 0.3;
 /// and no two boards touch before. `progress` is told which share of the work is done, from 0 to 1.
 ///
 /// The pitch grows from one that cannot do. Each time the trial fails, the two boards that overlap most deeply are
-/// followed near that place until they come free, and the next trial is made there: all pitches before it fail by those
-/// two. So none that will do is passed over, even where the pitches that will do are not one interval.
+/// followed near that place, in steps of half a percent, until they come free, and the next trial is made there. So pitches
+/// that will do are only passed over where the two come free and meet again within one step.
 ///
 /// # Errors
 /// A radius that every pitch reaches, or none.
@@ -179,7 +179,8 @@ const PEAK_MARGIN: f64 = 0.02;
 /// scene's start until its show freezes. `progress` is told which share of the work is done, from 0 to 1.
 ///
 /// A handle's speed over the head's depends on the head's place alone. It is looked at every hundredth of a link, and
-/// every peak that comes near the highest is followed to its top: between two looks a handle has one peak.
+/// every peak that comes near the highest is followed to its top. That a handle has one peak between two looks is taken for
+/// granted, not proven.
 ///
 /// # Errors
 /// A show that runs into a lock, near which speeds have no bound.
