@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Wake-up lateness: the live loop beside cyclictest, on the same core, at the same interval and priority.
 
-In turn, for some rounds, so that the machine's moods fall on both. cyclictest is Debian's package rt-tests; real-time
-priority needs root or a limit in /etc/security/limits.conf. --priority 0 compares without. The live loop counts the
-periods that a late wake-up delayed as well (coordinated omission); cyclictest counts the wake-up only, which is to its
-advantage. Needs:
+In turn, for some rounds, so that the machine's moods fall on both; and either once with CPUs that may sleep and once with
+CPUs that are kept awake (cyclictest --latency, bench-dragon run --cpu-latency: cyclictest keeps them awake unless told
+not to). cyclictest is Debian's package rt-tests; real-time priority and waking CPUs need root. --priority 0 compares
+without a priority. The live loop counts the periods that a late wake-up delayed as well (coordinated omission);
+cyclictest counts the wake-up only, which is to its advantage. Needs:
 
     apt-get install rt-tests && cargo build --release
     python3 benches/lateness.py [--seconds 20] [--rounds 3] [--cpu 1] [--priority 80] [--interval-us 1000]
@@ -19,15 +20,17 @@ import subprocess
 
 TARGET = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "target", "release")
 NAME = f"lateness_{os.getpid()}"
+# Microseconds that a CPU may take to wake up: one that any sleep meets, and one that no sleep meets.
+CPU_LATENCIES = (("may sleep", 1_000_000), ("awake", 0))
 PERCENTILES = (("p50", 0.5), ("p99", 0.99), ("p999", 0.999))
 # Lateness beyond this many microseconds is only counted by cyclictest.
 LONGEST_US = 100_000
 
 
-def cyclictest(arguments):
+def cyclictest(arguments, cpu_latency):
     command = ["cyclictest", "--mlockall", "--quiet", "--threads=1", f"--affinity={arguments.cpu}"]
     command += [f"--interval={arguments.interval_us}", f"--loops={int(arguments.seconds * 1e6 / arguments.interval_us)}"]
-    command += [f"--histogram={LONGEST_US}"]
+    command += [f"--histogram={LONGEST_US}", f"--latency={cpu_latency}"]
     command += [f"--priority={arguments.priority}"] if arguments.priority else ["--policy=other"]
     said = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
     histogram = [tuple(map(int, line.split())) for line in said.splitlines() if re.match(r"\d{6} \d+", line)]
@@ -44,9 +47,10 @@ def cyclictest(arguments):
     return found
 
 
-def live(arguments):
+def live(arguments, cpu_latency):
     command = [os.path.join(TARGET, "bench-dragon"), "--name", NAME, "run", "--json", "--duration", str(arguments.seconds)]
     command += ["--rate", str(1e6 / arguments.interval_us), "--cpu", str(arguments.cpu)]
+    command += ["--cpu-latency", str(cpu_latency)]
     command += ["--realtime", str(arguments.priority)] if arguments.priority else []
     said = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
     return {name: value / 1000 for name, value in json.loads(said)["wakeup_ns"].items()}
@@ -61,19 +65,21 @@ def main():
     parser.add_argument("--interval-us", type=int, default=1000)
     arguments = parser.parse_args()
     names = [name for name, _ in PERCENTILES] + ["max"]
-    print(f"{'round':>5} {'':<11}" + "".join(f"{name + ', us':>12}" for name in names))
-    rounds = {"cyclictest": [], "live": []}
+    print(f"{'round':>5} {'CPUs':<10} {'':<11}" + "".join(f"{name + ', us':>12}" for name in names))
+    rounds = {}
     for number in range(1, arguments.rounds + 1):
-        for label, measure in (("cyclictest", cyclictest), ("live", live)):
-            found = measure(arguments)
-            rounds[label].append(found)
-            print(f"{number:>5} {label:<11}" + "".join(f"{found[name]:12.1f}" for name in names), flush=True)
-    median = {
-        label: {name: statistics.median(one[name] for one in found) for name in names}
-        for label, found in rounds.items()
-    }
-    ratios = "".join(f"{median['live'][name] / max(median['cyclictest'][name], 1):12.2f}" for name in names)
-    print(f"live / cyclictest{ratios}   (medians of the rounds)")
+        for sleep, cpu_latency in CPU_LATENCIES:
+            for label, measure in (("cyclictest", cyclictest), ("live", live)):
+                found = measure(arguments, cpu_latency)
+                rounds.setdefault((sleep, label), []).append(found)
+                print(f"{number:>5} {sleep:<10} {label:<11}" + "".join(f"{found[name]:12.1f}" for name in names), flush=True)
+    for sleep, _ in CPU_LATENCIES:
+        median = {
+            label: {name: statistics.median(one[name] for one in rounds[sleep, label]) for name in names}
+            for label in ("cyclictest", "live")
+        }
+        ratios = "".join(f"{median['live'][name] / max(median['cyclictest'][name], 1):12.2f}" for name in names)
+        print(f"      {sleep:<10} live / cyc. {ratios[1:]}   (medians of the rounds)")
 
 
 if __name__ == "__main__":

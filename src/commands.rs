@@ -4,6 +4,7 @@ pub mod check;
 pub mod draw;
 pub mod events;
 pub mod plan;
+mod punctuality;
 pub mod run;
 pub mod soak;
 pub mod solve;

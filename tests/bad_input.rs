@@ -143,6 +143,7 @@ fn arguments_that_cannot_be_used() {
         (vec!["run", "--duration=-5"], "--duration"),
         (vec!["run", "--realtime", "100"], "--realtime"),
         (vec!["run", "--cpu", "4096", "--duration", "1"], "--cpu"),
+        (vec!["run", "--cpu-latency", "-1"], "-1"),
         (vec!["run", "--name", ""], "--name"),
         (vec!["run", "--name", &long_name], "--name"),
         (vec!["watch", "--name", &long_name], "--name"),

@@ -12,7 +12,7 @@ use std::sync::mpsc;
 use anstyle::{AnsiColor, Style};
 use bench_dragon::live::clock::realtime_ns;
 use bench_dragon::live::statistics::{self, Announcement, Inbox, Percentiles, Run, Summary};
-use bench_dragon::live::{Counts, End, LoopOptions, Publisher, StatusPublisher, realtime, run_loop};
+use bench_dragon::live::{Counts, End, LoopOptions, Publisher, StatusPublisher, run_loop};
 use bench_dragon::messages::{Stage, State};
 use bench_dragon::scene::{Accepted, AtEnd, Scene};
 use bench_dragon::show::timeline::Timeline;
@@ -24,6 +24,7 @@ use serde::Serialize;
 use self::ros2::{Ros2, Ros2Summary};
 
 use super::events::{bench_name, sentence};
+use super::punctuality::Punctuality;
 use super::{CommandError, Common, Output, number, search_timeline, stop_on_signals};
 
 /// Arguments of `run`.
@@ -50,15 +51,11 @@ pub struct RunArguments {
     /// Begin again whenever the show has ended
     #[arg(long = "loop", help_heading = "The show")]
     looping: bool,
-    /// Run the loop with this real-time priority, 1 to 99 (SCHED_FIFO), and lock its memory
-    #[arg(long, value_name = "PRIORITY", value_parser = clap::value_parser!(u8).range(1..=99), help_heading = "Punctuality")]
-    realtime: Option<u8>,
     /// Publish ROS 2 topics too, as the scene's [publish.ros2] says or the usual ones
     #[arg(long)]
     ros2: bool,
-    /// Keep the loop on this CPU
-    #[arg(long, value_name = "N", help_heading = "Punctuality")]
-    cpu: Option<usize>,
+    #[command(flatten)]
+    punctuality: Punctuality,
     /// End when the process that started this one ends
     #[arg(long, hide = true)]
     end_with_parent: bool,
@@ -120,9 +117,10 @@ impl Performance<'_> {
         };
         let ended = std::thread::scope(|threads| {
             let looping = threads.spawn(|| {
-                let ready = self.prepare();
-                let publisher = match ready {
-                    Ok(publisher) => publisher,
+                let punctual = self.arguments.punctuality.prepare_thread();
+                let ready = punctual.and_then(|awake| Ok((self.open_shared_memory()?, awake)));
+                let (publisher, _awake) = match ready {
+                    Ok(ready) => ready,
                     Err(error) => {
                         let _ = opened.send(Err(error));
                         return None;
@@ -173,15 +171,7 @@ impl Performance<'_> {
         transports::stage(self.run_id, realtime_ns(), &scene.team, &scene.path)
     }
 
-    /// What has to be done on the loop's own thread before it starts.
-    fn prepare(&self) -> Result<SharedMemoryPublisher, CommandError> {
-        if let Some(cpu) = self.arguments.cpu {
-            realtime::pin_to_cpu(cpu).map_err(CommandError::BadInput)?;
-        }
-        realtime::set_timer_slack();
-        if let Some(priority) = self.arguments.realtime {
-            realtime::become_realtime(priority);
-        }
+    fn open_shared_memory(&self) -> Result<SharedMemoryPublisher, CommandError> {
         let scene = self.scene;
         let handles = scene.team.handles();
         Ok(SharedMemoryPublisher::open(&Offer {

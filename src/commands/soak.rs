@@ -17,6 +17,7 @@ use bench_dragon::subscribers::soak::verdict::{Limits, Verdict};
 use bench_dragon::transports::iceoryx2;
 use indicatif::ProgressBar;
 
+use super::punctuality::Punctuality;
 use super::{CommandError, Common, Output, progress_bar, stop_on_signals, wall_seconds};
 
 /// How long a slow subscriber sleeps: longer than a queue of 64 frames lasts at 60 Hz.
@@ -46,12 +47,8 @@ pub struct SoakArguments {
     /// Write the report to FILE.json and FILE.html
     #[arg(long, value_name = "FILE", help_heading = "The test")]
     report: Option<PathBuf>,
-    /// Run the publisher's loop with this real-time priority, 1 to 99 (SCHED_FIFO), and lock its memory
-    #[arg(long, value_name = "PRIORITY", value_parser = clap::value_parser!(u8).range(1..=99), help_heading = "Punctuality")]
-    realtime: Option<u8>,
-    /// Keep the publisher's loop on this CPU
-    #[arg(long, value_name = "N", help_heading = "Punctuality")]
-    cpu: Option<usize>,
+    #[command(flatten)]
+    punctuality: Punctuality,
     /// Frames that subscribers which keep up may miss, all together
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Limits")]
     max_missed: u64,
@@ -173,14 +170,8 @@ impl SoakArguments {
         }
         let mut publisher: Vec<OsString> = vec!["--loop".into(), "--end-with-parent".into()];
         publisher.extend(self.ros2.then(|| "--ros2".into()));
-        let optional = [
-            ("--rate", self.rate.map(|rate| rate.to_string())),
-            ("--realtime", self.realtime.map(|priority| priority.to_string())),
-            ("--cpu", self.cpu.map(|cpu| cpu.to_string())),
-        ];
-        for (option, value) in optional {
-            publisher.extend(value.into_iter().flat_map(|value| [option.into(), value.into()]));
-        }
+        publisher.extend(self.rate.into_iter().flat_map(|rate| ["--rate".into(), rate.to_string().into()]));
+        publisher.extend(self.punctuality.arguments());
         let role = |role, count| std::iter::repeat_n(role, count);
         let roles = role(Role::Steady, self.subscribers)
             .chain(role(Role::Slow, self.slow))

@@ -1,5 +1,8 @@
 //! What the operating system can do for a punctual thread: timer slack, real-time priority, locked memory, a CPU of
-//! its own. Called once, on the loop's thread, before the loop.
+//! its own, CPUs that stay awake. Called once, on the loop's thread, before the loop.
+
+use std::fs::{File, OpenOptions};
+use std::io::Write;
 
 use nix::sys::mman::{MlockAllFlags, mlockall};
 use thread_priority::unix::{
@@ -38,6 +41,28 @@ pub fn become_realtime(priority: u8) {
              \"ulimit -l unlimited\", or add \"@realtime - memlock unlimited\" to /etc/security/limits.conf"
         );
     }
+}
+
+/// Where Linux takes wishes for the CPUs' wake-up latency (Documentation/power/pm_qos_interface.rst).
+const CPU_LATENCY_DEVICE: &str = "/dev/cpu_dma_latency";
+
+/// Lets no CPU of this machine sleep so deeply that it takes more than `microseconds` to wake up, for as long as the
+/// returned file is open. With 0 idle CPUs do not sleep at all. cyclictest does the same unasked.
+///
+/// Without the right to it a warning says how to get it.
+pub fn limit_cpu_latency(microseconds: u32) -> Option<File> {
+    // The device reads a signed 32-bit number; no CPU takes longer than what that holds.
+    let wish = i32::try_from(microseconds).unwrap_or(i32::MAX);
+    let opened = OpenOptions::new().write(true).open(CPU_LATENCY_DEVICE);
+    opened
+        .and_then(|mut device| device.write_all(&wish.to_ne_bytes()).map(|()| device))
+        .inspect_err(|error| {
+            log::warn!(
+                "the CPUs' wake-up latency could not be limited ({CPU_LATENCY_DEVICE}: {error}): idle CPUs go on \
+                 sleeping. To allow it, run as root or grant write access to that file"
+            );
+        })
+        .ok()
 }
 
 /// Keeps this thread on one CPU.
