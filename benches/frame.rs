@@ -8,8 +8,9 @@ use std::f64::consts::TAU;
 
 use bench_dragon::chain::newton::Newton;
 use bench_dragon::chain::paper::{Paper, PaperRules};
-use bench_dragon::chain::whole_chain::{Instructions, WholeChain};
-use bench_dragon::chain::{Chain, Solver, Team, Velocities};
+use bench_dragon::chain::follower_table::FollowerTable;
+use bench_dragon::chain::whole_chain::WholeChain;
+use bench_dragon::chain::{Chain, Instructions, Solver, Team, Velocities};
 use bench_dragon::geometry::pieces::PiecePath;
 use bench_dragon::geometry::spiral::Spiral;
 use bench_dragon::live::Publisher;
@@ -108,6 +109,37 @@ fn newton_cold_without_care(bencher: Bencher) {
         }
         divan::black_box(&chain);
     });
+}
+
+fn follower_table(benches: usize, velocities: Velocities) -> FollowerTable {
+    FollowerTable::new(spiral(), team(benches), 1.0, velocities).expect("the paper's spiral has a table")
+}
+
+#[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
+fn table(bencher: Bencher, rate: f64) {
+    play(bencher, &mut follower_table(223, Velocities::Computed), 224, rate);
+}
+
+#[divan::bench(sample_count = 500, sample_size = 20)]
+fn table_without_velocities(bencher: Bencher) {
+    play(bencher, &mut follower_table(223, Velocities::Omitted), 224, 60.0);
+}
+
+#[divan::bench(sample_count = 500, sample_size = 20)]
+fn table_portable(bencher: Bencher) {
+    let solver = follower_table(223, Velocities::Computed).with_instructions(Instructions::Portable);
+    play(bencher, &mut solver.expect("every processor has it"), 224, 60.0);
+}
+
+/// Making the table, once before the show.
+#[divan::bench(args = [223, 5_000, 100_000], sample_count = 5, sample_size = 1)]
+fn make_table(benches: usize) -> FollowerTable {
+    follower_table(benches, Velocities::Computed)
+}
+
+#[divan::bench(args = [10, 100, 223, 1_000, 5_000, 10_000, 20_000, 100_000], sample_count = 200, sample_size = 4)]
+fn table_by_benches(bencher: Bencher, benches: usize) {
+    play(bencher, &mut follower_table(benches, Velocities::Computed), benches + 1, 60.0);
 }
 
 #[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]

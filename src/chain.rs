@@ -3,10 +3,15 @@
 //! Solvers differ in cost and accuracy and stand behind [`Solver`]; the show and the offline commands call them.
 //! [`Team`] is the model's description of the benches, without any of the scene file's syntax.
 
+mod arithmetic;
+pub mod follower_table;
+mod lanes;
 pub mod newton;
 pub mod paper;
 pub mod reference;
 pub mod whole_chain;
+
+pub use lanes::Instructions;
 
 use crate::geometry::path::Fold;
 use crate::messages::HandlePose;

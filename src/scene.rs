@@ -15,6 +15,7 @@ use self::path::{RawPath, ScenePath};
 use self::ros2::{RawRos2, Ros2Settings};
 use crate::chain::newton::Newton;
 use crate::chain::paper::{self, Paper, PaperRules};
+use crate::chain::follower_table::FollowerTable;
 use crate::chain::whole_chain::WholeChain;
 use crate::chain::{Solver, Team, Velocities};
 use crate::geometry::path::Path;
@@ -117,6 +118,8 @@ pub enum SolverName {
     Newton,
     /// Exact motion, all handles at once from the frame before.
     WholeChain,
+    /// Exact motion, every handle read off a table of where such chains stand.
+    FollowerTable,
     /// The paper's rules.
     Paper,
 }
@@ -247,21 +250,36 @@ impl Scene {
                 return (Box::new(newton), format!("newton: {why}"));
             }
         };
-        let whole_chain = || {
+        let whole_chain = || -> (Box<dyn Solver>, String) {
             let solver = WholeChain::new(spiral, team, head_speed, velocities);
-            let instructions = solver.instructions().name();
-            (Box::new(solver), instructions)
+            let name = format!("whole_chain ({})", solver.instructions().name());
+            (Box::new(solver), name)
+        };
+        let table = || -> Option<(Box<dyn Solver>, String)> {
+            let solver = FollowerTable::new(spiral, team, head_speed, velocities)?;
+            let valid = if solver.valid_until() * head_speed < spiral.length() {
+                format!(" up to {:.1} s, then whole_chain", solver.valid_until())
+            } else {
+                String::new()
+            };
+            let name = format!("follower_table ({}){valid}", solver.instructions().name());
+            Some((Box::new(solver), name))
         };
         match self.method {
             Method::Accuracy(accuracy) => {
-                let (solver, instructions) = whole_chain();
-                let why =
-                    format!("whole_chain ({instructions}): the cheapest that meets an accuracy of {accuracy:e} m");
-                (solver, why)
+                let (solver, name) = table().unwrap_or_else(whole_chain);
+                (solver, format!("{name}: the cheapest that meets an accuracy of {accuracy:e} m"))
             }
+            Method::Named(SolverName::FollowerTable) => match table() {
+                Some((solver, name)) => (solver, format!("{name}: named by the scene")),
+                None => {
+                    let (solver, name) = whole_chain();
+                    (solver, format!("{name}: the scene names follower_table, which has no table for this team and path"))
+                }
+            },
             Method::Named(SolverName::WholeChain) => {
-                let (solver, instructions) = whole_chain();
-                (solver, format!("whole_chain ({instructions}): named by the scene"))
+                let (solver, name) = whole_chain();
+                (solver, format!("{name}: named by the scene"))
             }
             Method::Named(SolverName::Newton) => {
                 let newton = Newton::new(spiral, team, head_speed, velocities);
@@ -372,7 +390,7 @@ impl RawScene {
         let path = self.path.validated(source, &team)?;
         let head_speed = source.check("motion.head_speed", &self.motion.head_speed, Accepted::SPEED)?;
         let (method, paper_rules) = self.motion.method(source)?;
-        if let (Method::Named(SolverName::WholeChain | SolverName::Paper), ScenePath::Pieces(_), Some(given)) =
+        if let (Method::Named(SolverName::WholeChain | SolverName::FollowerTable | SolverName::Paper), ScenePath::Pieces(_), Some(given)) =
             (method, &path, &self.motion.solver)
         {
             let sentence = "motion.solver rides spirals only, expected \"newton\" or no such field on this path";

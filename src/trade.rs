@@ -9,8 +9,9 @@ use serde::Serialize;
 use crate::chain::newton::Newton;
 use crate::chain::paper::{Paper, PaperRules};
 use crate::chain::reference::{Reference, ReferenceHandle};
-use crate::chain::whole_chain::{Instructions, WholeChain};
-use crate::chain::{Chain, Solver, Velocities};
+use crate::chain::follower_table::FollowerTable;
+use crate::chain::whole_chain::WholeChain;
+use crate::chain::{Chain, Instructions, Solver, Velocities};
 use crate::clearance::{ClearanceMonitor, Ground, least_clearance_all_pairs};
 use crate::geometry::Point;
 use crate::geometry::path::Path;
@@ -192,6 +193,13 @@ fn candidates(scene: &Scene, path: Spiral, contact: Option<ContactErrors>) -> Ve
         }
     };
     let mut candidates = Vec::new();
+    for instructions in Instructions::available() {
+        let table = FollowerTable::new(path, team, head_speed, velocities);
+        if let Some(solver) = table.and_then(|solver| solver.with_instructions(instructions)) {
+            let memory = solver.memory_bytes();
+            candidates.push(exact(format!("follower_table ({})", instructions.name()), Box::new(solver), memory));
+        }
+    }
     for instructions in Instructions::available() {
         let solver = WholeChain::new(path, team, head_speed, velocities);
         let memory = solver.memory_bytes();

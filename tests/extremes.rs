@@ -4,12 +4,14 @@
 //! travelled)), and links hold to 1e-12 link + 4 ulp(r). The judge is the 38-digit reference, which shares no formula
 //! with the solvers. `BENCH_DRAGON_LONG=1` runs 100,000 random scenes instead of 300.
 
+use std::cell::Cell;
 use std::f64::consts::{PI, TAU};
 
 use bench_dragon::chain::newton::Newton;
 use bench_dragon::chain::reference::Reference;
-use bench_dragon::chain::whole_chain::{Instructions, WholeChain};
-use bench_dragon::chain::{Chain, Solver, Team, Velocities};
+use bench_dragon::chain::follower_table::FollowerTable;
+use bench_dragon::chain::whole_chain::WholeChain;
+use bench_dragon::chain::{Chain, Instructions, Solver, Team, Velocities};
 use bench_dragon::geometry::path::Path;
 use bench_dragon::geometry::spiral::Spiral;
 use bench_dragon::messages::State;
@@ -57,6 +59,10 @@ impl Model {
 
     fn whole_chain(&self) -> WholeChain {
         WholeChain::new(self.spiral(), self.team, self.speed, Velocities::Computed)
+    }
+
+    fn table(&self) -> Option<FollowerTable> {
+        FollowerTable::new(self.spiral(), self.team, self.speed, Velocities::Computed)
     }
 
     fn newton(&self) -> Newton<Spiral> {
@@ -108,14 +114,18 @@ impl Model {
             self.assert_true(&chain, time, "newton");
         }
         for instructions in Instructions::available() {
-            let mut solver = self.whole_chain().with_instructions(instructions).unwrap();
-            for &time in times {
-                for frame in (0..=3).rev() {
-                    let time = (time - f64::from(frame) / rate).max(0.0);
-                    solver.solve(time, &mut chain).unwrap_or_else(|fold| panic!("at {time} s: {fold}: {self:?}"));
+            let whole_chain: Box<dyn Solver> = Box::new(self.whole_chain().with_instructions(instructions).unwrap());
+            let table = self.table().and_then(|table| table.with_instructions(instructions));
+            for mut solver in [Some(whole_chain), table.map(|table| Box::new(table) as _)].into_iter().flatten() {
+                let who = format!("{} ({})", solver.name(), instructions.name());
+                for &time in times {
+                    for frame in (0..=3).rev() {
+                        let time = (time - f64::from(frame) / rate).max(0.0);
+                        solver.solve(time, &mut chain).unwrap_or_else(|fold| panic!("at {time} s: {fold}: {self:?}"));
+                    }
+                    self.assert_sound(&chain, time, &who);
+                    self.assert_true(&chain, time, &who);
                 }
-                self.assert_sound(&chain, time, instructions.name());
-                self.assert_true(&chain, time, instructions.name());
             }
         }
     }
@@ -184,11 +194,17 @@ fn a_hundred_thousand_benches_hold_their_links() {
     assert_eq!(solver.restarts(), 1, "four of the five frames were found from the one before");
     let time = 300.0 + 4.0 / 60.0;
     model.newton().solve(time, &mut safe).unwrap();
-    model.assert_sound(&fast, time, "whole_chain");
-    for i in 0..fast.handles() {
-        let error = (fast.x[i] - safe.x[i]).hypot(fast.y[i] - safe.y[i]);
-        // The last digit of a link, a hundred thousand times in one direction.
-        assert!(error <= 1e5 * f64::EPSILON * 1.65, "handle {i}: {error:e} m");
+    let mut read_off = Chain::new(100_001);
+    let mut table = model.table().unwrap();
+    table.solve(time, &mut read_off).unwrap();
+    assert_eq!(table.fallbacks(), 0);
+    for (chain, who) in [(&fast, "whole_chain"), (&read_off, "follower_table")] {
+        model.assert_sound(chain, time, who);
+        for i in 0..chain.handles() {
+            let error = (chain.x[i] - safe.x[i]).hypot(chain.y[i] - safe.y[i]);
+            // The last digit of a link, a hundred thousand times in one direction.
+            assert!(error <= 1e5 * f64::EPSILON * 1.65, "{who}, handle {i}: {error:e} m");
+        }
     }
 }
 
@@ -367,6 +383,7 @@ fn random_scenes_keep_the_promise() {
     let long = std::env::var("BENCH_DRAGON_LONG").is_ok_and(|value| value == "1");
     let config = Config { cases: if long { 100_000 } else { 300 }, failure_persistence: None, ..Config::default() };
     let case = (models(), 0.0..0.995f64, 1e-7..1e-4f64);
+    let (cases, tables) = (config.cases, Cell::new(0));
     TestRunner::new(config)
         .run(&case, |(model, share, step_share)| {
             let end = model.travel() / model.speed;
@@ -381,6 +398,13 @@ fn random_scenes_keep_the_promise() {
             let now = time + step;
             model.assert_sound(middle, now, "whole_chain");
             model.assert_true(middle, now, "whole_chain");
+            if let Some(mut table) = model.table() {
+                let mut read_off = Chain::new(handles);
+                table.solve(now, &mut read_off).unwrap();
+                model.assert_sound(&read_off, now, "follower_table");
+                model.assert_true(&read_off, now, "follower_table");
+                tables.set(tables.get() + 1 - table.fallbacks());
+            }
             for i in 0..handles {
                 let rounding = 8.0 * f64::EPSILON * (radius(middle, i) + model.speed * now) + ACCURACY * 1e-3;
                 let fastest =
@@ -398,4 +422,48 @@ fn random_scenes_keep_the_promise() {
             Ok(())
         })
         .unwrap();
+    println!("{} of {cases} frames were read off a table", tables.get());
+    assert!(tables.get() > u64::from(cases / 4));
+}
+
+#[test]
+fn a_frame_of_the_table_does_not_depend_on_the_ones_before() {
+    let model = Model::paper();
+    let (mut chain, mut again) = (Chain::new(224), Chain::new(224));
+    let mut solver = model.table().unwrap();
+    for time in [412.0, 0.0, 100.0, 100.001, 333.3] {
+        solver.solve(time, &mut chain).unwrap();
+        model.table().unwrap().solve(time, &mut again).unwrap();
+        assert_eq!(chain, again, "{time} s");
+    }
+    assert_eq!(solver.fallbacks(), 0);
+    // Past the table it is the whole-chain solver's work, and back in it nothing is left of that.
+    let beyond = solver.valid_until() + 1e-9;
+    for time in [beyond, 432.9] {
+        solver.solve(time, &mut chain).unwrap();
+        model.assert_sound(&chain, time, "past the table");
+        model.assert_true(&chain, time, "past the table");
+    }
+    assert_eq!(solver.fallbacks(), 2);
+    assert!(solver.solve(433.0, &mut chain).is_err(), "past the lock");
+    solver.solve(333.3, &mut chain).unwrap();
+    assert_eq!(chain, again);
+}
+
+#[test]
+fn no_handle_jumps_where_the_table_goes_from_knot_to_knot() {
+    let model = Model::paper();
+    let mut solver = model.table().unwrap();
+    let (mut chain, mut before) = (Chain::new(224), Chain::new(224));
+    // Half way between two knots of the head's way (0.25 m apart), and from the table to the whole-chain solver.
+    for edge in [0.125, 100.125, 300.375, 412.125, solver.valid_until()] {
+        solver.solve(edge - 1e-9, &mut before).unwrap();
+        solver.solve(edge + 1e-9, &mut chain).unwrap();
+        for i in 0..224 {
+            let moved = (chain.x[i] - before.x[i]).hypot(chain.y[i] - before.y[i]);
+            assert!(moved <= 2e-9 * chain.speed[i].abs() * 1.001 + 5e-13, "handle {i} at {edge} s: {moved:e} m");
+            let faster = (chain.speed[i] - before.speed[i]).abs();
+            assert!(faster <= 1e-8, "handle {i} at {edge} s: {faster:e} m/s");
+        }
+    }
 }

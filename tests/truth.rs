@@ -1,10 +1,13 @@
 //! The solvers against figures computed with 50 digits, and against the paper's printed tables.
 
+use std::f64::consts::{PI, TAU};
+
 use bench_dragon::chain::newton::Newton;
 use bench_dragon::chain::paper::{Paper, PaperRules};
 use bench_dragon::chain::reference::Reference;
-use bench_dragon::chain::whole_chain::{Instructions, WholeChain};
-use bench_dragon::chain::{Chain, Solver, Team, Velocities};
+use bench_dragon::chain::follower_table::FollowerTable;
+use bench_dragon::chain::whole_chain::WholeChain;
+use bench_dragon::chain::{Chain, Instructions, Solver, Team, Velocities};
 use bench_dragon::geometry::path::Path;
 use bench_dragon::geometry::pieces::PiecePath;
 use bench_dragon::geometry::spiral::Spiral;
@@ -147,6 +150,49 @@ fn paper_tends_to_the_limit_of_its_own_model() {
     let rows = table(include_str!("truth/paper_scene_as_printed_model.csv"));
     for (time, position, _) in errors(&mut paper_solver(), &rows) {
         assert!(position < 1.5e-5, "t = {time} s: {position:e} m");
+    }
+}
+
+#[test]
+fn the_table_agrees_with_50_digits_on_every_code_path() {
+    let rows = table(include_str!("truth/paper_scene_exact.csv"));
+    for instructions in Instructions::available() {
+        let solver = FollowerTable::new(Spiral::new(0.55, 16.0), paper_team(), 1.0, Velocities::Computed).unwrap();
+        let mut solver = solver.with_instructions(instructions).unwrap();
+        println!("{}: the table is valid until {} s", instructions.name(), solver.valid_until());
+        // It holds beyond the contact, where the show freezes.
+        assert!(solver.valid_until() > 412.5);
+        for (time, position, speed) in errors(&mut solver, &rows) {
+            println!("t = {time} s: position {position:.1e} m, speed {speed:.1e}, fallbacks {}", solver.fallbacks());
+            let bound = if time < 412.5 { 1e-12 } else { 1e-9 };
+            assert!(position < bound && speed < bound, "t = {time} s: {position:e} m, {speed:e}");
+        }
+        let beyond = rows.iter().filter(|row| row.handle == 0 && row.time > solver.valid_until()).count();
+        assert_eq!(solver.fallbacks(), beyond as u64);
+    }
+}
+
+/// Headings and velocities follow from the positions of the 50-digit table.
+#[test]
+fn headings_and_velocities_of_the_table_are_those_of_the_positions() {
+    let rows = table(include_str!("truth/paper_scene_exact.csv"));
+    let mut solver = FollowerTable::new(Spiral::new(0.55, 16.0), paper_team(), 1.0, Velocities::Computed).unwrap();
+    let mut chain = Chain::new(224);
+    let growth = 0.55 / TAU;
+    for frame in rows.chunk_by(|a, b| a.time == b.time).filter(|frame| frame[0].time < 412.5) {
+        solver.solve(frame[0].time, &mut chain).unwrap();
+        for (i, row) in frame.iter().enumerate() {
+            let [inner, outer] = if i < 223 { [row, &frame[i + 1]] } else { [&frame[i - 1], row] };
+            let heading = (inner.y - outer.y).atan2(inner.x - outer.x);
+            let off = (chain.heading[i] - heading + PI).rem_euclid(TAU) - PI;
+            assert!(off.abs() < 1e-13, "t = {} s, heading {i}: {off:e}", row.time);
+            // Inward along r = a theta: the velocity is -(a e_r + r e_phi) v / hypot(r, a).
+            let r = row.x.hypot(row.y);
+            let scale = -row.speed / r.hypot(growth);
+            let (vx, vy) = (scale * (growth * row.x / r - row.y), scale * (growth * row.y / r + row.x));
+            let off = (chain.vx[i] - vx).hypot(chain.vy[i] - vy);
+            assert!(off < 1e-12, "t = {} s, velocity {i}: {off:e}", row.time);
+        }
     }
 }
 

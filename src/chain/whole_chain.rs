@@ -4,18 +4,14 @@
 //! first frame, after a jump in time, near a lock) and then corrects again or asks the path for each follower anew;
 //! [`WholeChain::restarts`] counts the latter. The show calls it through [`Solver`].
 
-mod arithmetic;
 mod kernel;
-mod lanes;
-
-pub use kernel::Instructions;
 
 use std::f64::consts::TAU;
 
 use kernel::{State, Step};
 
 use super::newton::Newton;
-use super::{Chain, Solver, Team, Velocities};
+use super::{Chain, Instructions, Solver, Team, Velocities};
 use crate::geometry::path::{Fold, Path};
 use crate::geometry::spiral::Spiral;
 

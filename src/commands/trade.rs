@@ -113,19 +113,45 @@ fn plot(svg: &mut String, scene: &str, measurements: &[Measurement]) -> Result<(
     let mut front: Vec<(f64, f64)> = measurements.iter().filter(|m| m.on_front).map(|m| (cost(m), error(m))).collect();
     front.sort_by(|a, b| a.0.total_cmp(&b.0));
     chart.draw_series(LineSeries::new(front, &BLUE))?;
-    let mut labelled: Vec<(f64, f64)> = Vec::new();
-    for measurement in measurements {
+    let mut labelled: Vec<&Measurement> = measurements.iter().collect();
+    labelled.sort_by(|a, b| error(b).total_cmp(&error(a)));
+    let mut labels: Vec<Label> = Vec::new();
+    for measurement in labelled {
         let colour = if measurement.solver.starts_with("paper") { RED } else { BLUE };
         let at = (cost(measurement), error(measurement));
         let style = if measurement.on_front { colour.filled() } else { colour.stroke_width(1) };
         chart.draw_series([Circle::new(at, 4, style)])?;
-        // Labels of points that lie on one another go below one another.
-        let near = |other: &&(f64, f64)| (other.0 / at.0).ln().abs() < 2.5 && (other.1 / at.1).ln().abs() < 0.7;
-        let below = 13 * labelled.iter().filter(near).count() as i32;
-        labelled.push(at);
-        let label = Text::new(measurement.solver.clone(), (8, below - 6), ("sans-serif", 12));
-        chart.draw_series([EmptyElement::at(at) + label])?;
+        let (left, middle) = chart.backend_coord(&at);
+        let label = Label::below(&labels, left + 8, middle - 6, &measurement.solver);
+        let text = Text::new(measurement.solver.clone(), (8, label.top - middle), ("sans-serif", 12));
+        chart.draw_series([EmptyElement::at(at) + text])?;
+        labels.push(label);
     }
     area.present()?;
     Ok(())
+}
+
+/// Where a label stands on the plot, pixels.
+struct Label {
+    left: i32,
+    right: i32,
+    top: i32,
+}
+
+impl Label {
+    const HEIGHT: i32 = 13;
+    /// What a letter takes, rounded up.
+    const LETTER: i32 = 7;
+
+    /// A label at a place, or as far below it as it must be to lie on none of `others`.
+    fn below(others: &[Self], left: i32, top: i32, text: &str) -> Self {
+        let mut label = Self { left, right: left + Self::LETTER * text.len() as i32, top };
+        let overlaps = |label: &Self, other: &Self| {
+            label.left < other.right && other.left < label.right && (label.top - other.top).abs() < Self::HEIGHT
+        };
+        while let Some(other) = others.iter().find(|other| overlaps(&label, other)) {
+            label.top = other.top + Self::HEIGHT;
+        }
+        label
+    }
 }

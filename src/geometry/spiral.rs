@@ -189,6 +189,26 @@ impl Spiral {
         (place, self.start.minus(place))
     }
 
+    /// The place `metres` further along the path than `from`, or back where negative; `None` past the centre.
+    ///
+    /// Exact to the last digits of `metres`, however far along `from` is.
+    pub(crate) fn ahead(&self, from: Angle, metres: f64) -> Option<Angle> {
+        let theta = from.radians();
+        let mut span = metres / (self.growth() * 1f64.hypot(theta));
+        for _ in 0..8 {
+            let inner = theta - span;
+            if inner <= 0.0 {
+                return None;
+            }
+            let step = (metres - self.arc_length(theta, span)) / (self.growth() * 1f64.hypot(inner));
+            span += step;
+            if step.abs() < 1e-9 * span.abs() {
+                break;
+            }
+        }
+        (span < theta).then(|| from.plus(-span))
+    }
+
     /// Where the square of the chord to the point `increment` radians behind a handle at radius `r` stands against
     /// the square of the link, and its derivative by the increment d:
     /// G = (a d)^2 + 4 r (r + a d) sin^2(d/2) - link^2 (law of cosines).

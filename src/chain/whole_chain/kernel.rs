@@ -17,13 +17,13 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::arithmetic::{
+use crate::chain::arithmetic::{
     Quarters, SHORT_ARC_TANGENT, fixed_point, quarters, short_arc_tangent_in_turns, sine_cosine, sine_cosine_of_half,
     to_quarter, turned_by_quarters, within_half_turn,
 };
 #[cfg(target_arch = "x86_64")]
-use super::lanes::avx2::Avx2;
-use super::lanes::{Bits, LANES, Lanes, Portable, Row};
+use crate::chain::lanes::avx2::Avx2;
+use crate::chain::lanes::{Bits, Instructions, LANES, Lanes, Portable, Row};
 use crate::chain::{Chain, Velocities};
 
 /// The most handles of a strand: as many as stay in the first-level cache from pass to pass.
@@ -183,51 +183,6 @@ impl Step {
     pub(super) fn head_turns(&self) -> f64 {
         // Two halves, since a conversion of all 128 bits is a slow library call.
         (self.head >> 64) as u64 as f64 + (self.head as u64) as f64 / 2f64.powi(64)
-    }
-}
-
-/// The instructions that a code path may use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Instructions {
-    /// 256-bit vectors with fused multiply-add, and twice the registers.
-    Avx512,
-    /// 256-bit vectors with fused multiply-add.
-    Avx2,
-    /// What every processor of the architecture has.
-    Portable,
-}
-
-impl Instructions {
-    /// All code paths that this processor can run, the fastest first.
-    pub fn available() -> Vec<Self> {
-        #[cfg(target_arch = "x86_64")]
-        {
-            let mut available = Vec::new();
-            if is_x86_feature_detected!("avx512f")
-                && is_x86_feature_detected!("avx512dq")
-                && is_x86_feature_detected!("avx512vl")
-                && is_x86_feature_detected!("avx2")
-                && is_x86_feature_detected!("fma")
-            {
-                available.push(Self::Avx512);
-            }
-            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-                available.push(Self::Avx2);
-            }
-            available.push(Self::Portable);
-            available
-        }
-        #[cfg(not(target_arch = "x86_64"))]
-        vec![Self::Portable]
-    }
-
-    /// The name for people.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Avx512 => "AVX-512",
-            Self::Avx2 => "AVX2 and FMA",
-            Self::Portable => "portable",
-        }
     }
 }
 

@@ -1,5 +1,5 @@
-//! The few functions of which the kernel consists, on four numbers at once: no branch, no call, no table. Called by the
-//! kernel only.
+//! The few functions of which the fast solvers consist, on four numbers at once: no branch, no call, no table. Called by
+//! the solvers only.
 
 use std::f64::consts::{PI, TAU};
 

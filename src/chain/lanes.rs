@@ -1,9 +1,54 @@
-//! Four numbers at once: the vectors in which the kernel is written, and what each code path makes of them.
+//! Four numbers at once: the vectors in which the fast solvers are written, and what each code path makes of them.
 //!
 //! Left to itself the compiler turned some of the kernel's loops into vectors and others, after a harmless change, no
-//! longer; written out, the same frame takes half the time (`cargo bench --bench frame`). Called by the kernel only.
+//! longer; written out, the same frame takes half the time (`cargo bench --bench frame`). Called by the solvers only.
 
 use std::ops::{Add, Div, Mul, Sub};
+
+/// The instructions that a code path may use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Instructions {
+    /// 256-bit vectors with fused multiply-add, and twice the registers.
+    Avx512,
+    /// 256-bit vectors with fused multiply-add.
+    Avx2,
+    /// What every processor of the architecture has.
+    Portable,
+}
+
+impl Instructions {
+    /// All code paths that this processor can run, the fastest first.
+    pub fn available() -> Vec<Self> {
+        #[cfg(target_arch = "x86_64")]
+        {
+            let mut available = Vec::new();
+            if is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512dq")
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("fma")
+            {
+                available.push(Self::Avx512);
+            }
+            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+                available.push(Self::Avx2);
+            }
+            available.push(Self::Portable);
+            available
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        vec![Self::Portable]
+    }
+
+    /// The name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Avx512 => "AVX-512",
+            Self::Avx2 => "AVX2 and FMA",
+            Self::Portable => "portable",
+        }
+    }
+}
 
 /// How many numbers stand side by side.
 pub(super) const LANES: usize = 4;
@@ -224,7 +269,7 @@ impl Bits for PortableBits {
 
 #[cfg(target_arch = "x86_64")]
 pub(super) mod avx2 {
-    //! 256-bit registers with fused multiply-add. The kernel makes these types only within a function compiled for
+    //! 256-bit registers with fused multiply-add. The solvers make these types only within a function compiled for
     //! AVX2 and FMA, which is called only where the processor was found to have both: that is the safety of every
     //! block in here.
     #![allow(clippy::undocumented_unsafe_blocks, reason = "one reason for all, in the module's first lines")]

@@ -1,0 +1,206 @@
+//! Where the head and the handle behind it are, by the metres the head has travelled.
+//!
+//! The head's link is longer than the others, so its map is not the table's; both places are tabulated over the head's
+//! way instead. Called by the follower table only.
+
+use std::f64::consts::TAU;
+
+use super::columns::{Columns, fraction, place, ratio_of_rates, tilt, turns};
+use super::stencil::{DIFFERENCES, REACH, Stencil};
+use crate::chain::Team;
+use crate::geometry::path::Path;
+use crate::geometry::spiral::{Angle, Spiral};
+
+/// The most knots: a second of making.
+const MOST_KNOTS: usize = 1 << 18;
+
+/// The error of a place that is let pass, against the length of a link: a fifth of what links are promised to hold.
+const ERROR_OF_LINK: f64 = 2e-13;
+
+/// The same against the distance from the centre: the rounding of the coordinates.
+const ERROR_OF_RADIUS: f64 = 0.5 * f64::EPSILON;
+
+/// The error of a speed that is let pass, relative.
+const ERROR_OF_SPEED: f64 = 2e-12;
+
+/// The table over the head's way. Every knot's numbers and, but for the last, the differences to the next.
+#[derive(Debug, Clone)]
+pub(super) struct Heads {
+    /// Metres between two knots, a power of two.
+    spacing: f64,
+    knots: Vec<Knot>,
+    /// Turns of the head to the next knot.
+    turns: Vec<f64>,
+    /// Knots of the columns from the second handle to where it is at the next knot.
+    columns: Vec<f64>,
+    /// What the tilt of the first bench grows to the next knot, turns.
+    tilt: Vec<f64>,
+    /// Metres up to which the table is exact.
+    valid: f64,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Knot {
+    /// Turns of the head, and their fraction.
+    turns: f64,
+    fraction: f64,
+    /// The angle of the first bench less that of the head, turns.
+    tilt: f64,
+    /// The knot of the columns nearest to the second handle and how far beyond it that is.
+    column_knot: usize,
+    between: f64,
+}
+
+/// What the table says of a moment.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lead {
+    /// Turns of the head.
+    pub turns: f64,
+    /// Their fraction, give or take a turn.
+    pub fraction: f64,
+    /// The angle of the first bench less that of the head, turns.
+    pub tilt: f64,
+    /// The knot of the columns nearest to the second handle.
+    pub knot: usize,
+    /// How far beyond it the handle is, -1/2 to 1/2 knots.
+    pub between: f64,
+    /// Knots per metre of the head's travel; negative, since the way goes inward.
+    pub knots_per_metre: f64,
+}
+
+/// A knot while the table is made.
+struct Making {
+    head: Angle,
+    second: i128,
+    tilt: f64,
+}
+
+impl Heads {
+    /// The table from the start inward as far as it is exact; `None` where it is not at the start, or too large.
+    pub(super) fn new(path: &Spiral, team: &Team, columns: &Columns, stencil: &Stencil) -> Option<Self> {
+        let spacing = (0.25 * team.link(1)).log2().floor().exp2();
+        if path.length() / spacing > MOST_KNOTS as f64 {
+            return None;
+        }
+        let mut outward = vec![path.start()];
+        for _ in 0..REACH {
+            outward.push(path.ahead(*outward.last()?, -spacing)?);
+        }
+        let mut places: Vec<Angle> = outward.into_iter().rev().collect();
+        let mut made: Vec<Making> = Vec::new();
+        let mut knots = Vec::new();
+        for at in 0.. {
+            let Some(head) = places.get(at).copied().or_else(|| path.ahead(*places.last()?, spacing)) else { break };
+            if at == places.len() {
+                places.push(head);
+            }
+            let Some(knot) = Making::of(path, team, head) else { break };
+            let Some((column_knot, between)) = columns.locate(knot.second, stencil) else { break };
+            let fixed = place(head);
+            knots.push(Knot { turns: turns(fixed), fraction: fraction(fixed), tilt: knot.tilt, column_knot, between });
+            made.push(knot);
+        }
+        let of_pairs = |difference: &dyn Fn(usize) -> f64| (1..made.len()).map(|next| difference(next)).collect();
+        let heads = Self {
+            spacing,
+            turns: of_pairs(&|next| turns(place(made[next].head) - place(made[next - 1].head))),
+            columns: of_pairs(&|next| {
+                let (before, after) = (&knots[next - 1], &knots[next]);
+                (after.column_knot as f64 - before.column_knot as f64) + (after.between - before.between)
+            }),
+            tilt: of_pairs(&|next| made[next].tilt - made[next - 1].tilt),
+            knots,
+            valid: 0.0,
+        };
+        heads.checked(path, team, columns, stencil, &made)
+    }
+
+    /// The table, valid as far as it is right half way between any two knots, where interpolation is worst.
+    fn checked(
+        mut self,
+        path: &Spiral,
+        team: &Team,
+        columns: &Columns,
+        stencil: &Stencil,
+        made: &[Making],
+    ) -> Option<Self> {
+        let mut knot = REACH;
+        // The next knot needs its stencil too: half way may round up to it.
+        while knot + REACH + 1 < made.len() {
+            let half = 0.5 * self.spacing;
+            let Some(right) = path.ahead(made[knot].head, half).and_then(|head| Making::of(path, team, head)) else { break };
+            let lead = self.around(knot, 0.5, stencil);
+            if !is_right(&lead, &right, path, team, columns, stencil) {
+                break;
+            }
+            self.valid = (knot - REACH) as f64 * self.spacing + half;
+            knot += 1;
+        }
+        (self.valid > 0.0).then_some(self)
+    }
+
+    /// Metres of travel up to which [`Heads::at`] may be asked.
+    pub(super) fn valid(&self) -> f64 {
+        self.valid
+    }
+
+    /// Bytes it holds.
+    pub(super) fn memory_bytes(&self) -> usize {
+        size_of_val(self.knots.as_slice()) + 3 * size_of_val(self.turns.as_slice())
+    }
+
+    /// The moment at which the head has travelled so many metres, from 0 to [`Heads::valid`].
+    #[inline(always)]
+    pub(super) fn at(&self, travelled: f64, stencil: &Stencil) -> Lead {
+        let knots = travelled / self.spacing;
+        let nearest = knots.round();
+        self.around(nearest as usize + REACH, knots - nearest, stencil)
+    }
+
+    #[inline(always)]
+    fn around(&self, nearest: usize, beyond: f64, stencil: &Stencil) -> Lead {
+        let weights = stencil.at(beyond);
+        let differences = nearest - REACH..nearest - REACH + DIFFERENCES;
+        let knot = &self.knots[nearest];
+        let (ahead, _) = weights.of(&self.turns[differences.clone()]);
+        let (columns, columns_slope) = weights.of(&self.columns[differences.clone()]);
+        let (tilt, _) = weights.of(&self.tilt[differences]);
+        let beyond_knot = knot.between + columns;
+        let whole = beyond_knot.round();
+        Lead {
+            turns: knot.turns + ahead,
+            fraction: knot.fraction + ahead,
+            tilt: knot.tilt + tilt,
+            knot: knot.column_knot.wrapping_add_signed(whole as isize),
+            between: beyond_knot - whole,
+            knots_per_metre: columns_slope / self.spacing,
+        }
+    }
+}
+
+impl Making {
+    fn of(path: &Spiral, team: &Team, head: Angle) -> Option<Self> {
+        let second = path.follower(head, team.link(0)).ok()?;
+        let (first, second) = (place(head), place(second));
+        Some(Self { head, second, tilt: tilt(turns(first), turns(second - first)) })
+    }
+}
+
+/// Whether the places, speeds and angles of the first three handles that the tables give are those of `right`.
+fn is_right(lead: &Lead, right: &Making, path: &Spiral, team: &Team, columns: &Columns, stencil: &Stencil) -> bool {
+    let (head, tau) = (place(right.head), turns(right.second));
+    let radius = path.pitch() * tau;
+    let metres = TAU * radius.hypot(path.growth());
+    let allowed = (ERROR_OF_LINK * team.link(1)).max(ERROR_OF_RADIUS * radius);
+    let Some(third) = path.increment(radius, team.link(1)).ok() else { return false };
+    let head_slope = 1.0 / (path.pitch() * 1f64.hypot(right.head.radians()));
+    let slope = ratio_of_rates(turns(head), turns(right.second - head)) * head_slope;
+    let second = columns.around(lead.knot, lead.between, stencil);
+    let rate = second.turns_per_knot * -lead.knots_per_metre;
+    let error_of_turns = |error: f64| error.abs() * metres <= allowed;
+    error_of_turns(fraction(head) - lead.fraction - (fraction(head) - lead.fraction).round())
+        && error_of_turns(columns.turns_from(lead.knot, right.second) - second.turns)
+        && error_of_turns(right.tilt - lead.tilt)
+        && error_of_turns(tilt(tau, third / TAU) - second.tilt)
+        && (rate - slope).abs() <= ERROR_OF_SPEED * slope.abs()
+}
