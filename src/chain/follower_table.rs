@@ -16,6 +16,9 @@ use heads::Heads;
 use kernel::Moment;
 use stencil::Stencil;
 
+#[cfg(target_arch = "x86_64")]
+use super::lanes::avx2::Avx2;
+use super::lanes::{Lanes, Portable};
 use super::whole_chain::WholeChain;
 use super::{Chain, Instructions, Solver, Team, Velocities};
 use crate::geometry::path::Fold;
@@ -85,6 +88,31 @@ impl FollowerTable {
 
     /// The chain when the head has travelled so many metres, within the table.
     fn read_off(&self, travelled: f64, chain: &mut Chain) {
+        match self.instructions {
+            // SAFETY: a solver is only made with instructions that this processor was found to have.
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx512 => unsafe { self.read_off_with_avx512(travelled, chain) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2 => unsafe { self.read_off_with_avx2(travelled, chain) },
+            _ => self.read_off_with::<Portable>(travelled, chain),
+        }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
+    fn read_off_with_avx512(&self, travelled: f64, chain: &mut Chain) {
+        self.read_off_with::<Avx2>(travelled, chain);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    fn read_off_with_avx2(&self, travelled: f64, chain: &mut Chain) {
+        self.read_off_with::<Avx2>(travelled, chain);
+    }
+
+    #[inline(always)]
+    fn read_off_with<L: Lanes>(&self, travelled: f64, chain: &mut Chain) {
         let lead = self.heads.at(travelled, &self.stencil);
         let moment = Moment {
             knot: lead.knot,
@@ -93,7 +121,7 @@ impl FollowerTable {
             knots_per_second: lead.knots_per_metre * self.head_speed,
             velocities: self.velocities,
         };
-        kernel::write(self.instructions, &self.columns, &self.stencil, &moment, chain);
+        kernel::write::<L>(&self.columns, &self.stencil, &moment, chain);
         let last = chain.handles() - 1;
         chain.heading[last] = chain.heading[last - 1];
         let (sine, cosine) = (TAU * lead.fraction).sin_cos();
@@ -101,12 +129,12 @@ impl FollowerTable {
         chain.x[0] = r * cosine;
         chain.y[0] = r * sine;
         let bearing = lead.fraction + lead.tilt;
-        let within = bearing - bearing.round();
+        let within = bearing - bearing.round_ties_even();
         chain.heading[0] = TAU * if within <= -0.5 { 0.5 } else { within };
         if self.velocities == Velocities::Computed {
             // The path's tangent, e_phi theta + e_r against the growing angle.
             let theta = TAU * lead.turns;
-            let along = self.head_speed / 1f64.hypot(theta);
+            let along = self.head_speed / (theta * theta + 1.0).sqrt();
             chain.speed[0] = self.head_speed;
             chain.vx[0] = along * (theta * sine - cosine);
             chain.vy[0] = -along * (theta * cosine + sine);

@@ -14,6 +14,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::stencil::{DIFFERENCES, REACH, Stencil};
 use crate::chain::Team;
+use crate::chain::arithmetic::SMALL_ANGLE;
 use crate::geometry::path::Path;
 use crate::geometry::root::increasing_root;
 use crate::geometry::spiral::{Angle, Spiral};
@@ -34,8 +35,8 @@ const FITTED_PLACES: usize = 32;
 /// The most links that a table spans: 25 MB.
 const MOST_COLUMNS: usize = 1 << 17;
 
-/// Increments above this end the table: so near the centre no polynomial follows the chain.
-const LARGEST_INCREMENT: f64 = 0.45;
+/// Increments above this end the table: half way between two knots, a handle is then [`SMALL_ANGLE`] from either.
+const LARGEST_INCREMENT: f64 = SMALL_ANGLE * 2.0 * PHASES as f64 / TAU;
 
 /// The knots of one phase, one per link, from the innermost outward.
 #[derive(Debug, Clone, Default)]

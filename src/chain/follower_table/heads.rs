@@ -153,7 +153,7 @@ impl Heads {
     #[inline(always)]
     pub(super) fn at(&self, travelled: f64, stencil: &Stencil) -> Lead {
         let knots = travelled / self.spacing;
-        let nearest = knots.round();
+        let nearest = knots.round_ties_even();
         self.around(nearest as usize + REACH, knots - nearest, stencil)
     }
 
@@ -166,7 +166,7 @@ impl Heads {
         let (columns, columns_slope) = weights.of(&self.columns[differences.clone()]);
         let (tilt, _) = weights.of(&self.tilt[differences]);
         let beyond_knot = knot.between + columns;
-        let whole = beyond_knot.round();
+        let whole = beyond_knot.round_ties_even();
         Lead {
             turns: knot.turns + ahead,
             fraction: knot.fraction + ahead,

@@ -6,10 +6,8 @@ use std::f64::consts::TAU;
 
 use super::columns::{Columns, PHASES, Phase};
 use super::stencil::{DIFFERENCES, REACH, Stencil};
-use crate::chain::arithmetic::{sine_cosine, within_half_turn};
-#[cfg(target_arch = "x86_64")]
-use crate::chain::lanes::avx2::Avx2;
-use crate::chain::lanes::{Instructions, LANES, Lanes, Portable, Row};
+use crate::chain::arithmetic::{small_sine_cosine, within_half_turn};
+use crate::chain::lanes::{LANES, Lanes, Row};
 use crate::chain::{Chain, Velocities};
 
 /// What a frame needs to know besides the table.
@@ -27,77 +25,84 @@ pub(super) struct Moment {
     pub velocities: Velocities,
 }
 
+/// Handles that are worked out together: two vectors, so that every weight is loaded for both.
+const BLOCK: usize = 2 * LANES;
+
+/// The lists of a frame, from the column of its second handle on.
+struct Frame<'a> {
+    /// Differences j = 0, 4, 8 of a stencil are of the first part, 1, 5, 9 of the next, and so on.
+    to_next: [&'a [f64]; PHASES],
+    tilt_to_next: [&'a [f64]; PHASES],
+    turns: &'a [f64],
+    cosine: &'a [f64],
+    sine: &'a [f64],
+    bearing: &'a [f64],
+    value: [Row; DIFFERENCES],
+    slope: [Row; DIFFERENCES],
+    /// Metres per turn.
+    pitch: f64,
+    /// Metres of radius per second for each turn per knot.
+    outward: f64,
+}
+
 /// Writes all handles but the head. The heading of the last is not its own.
-///
-/// `instructions` must be among [`Instructions::available`].
-pub(super) fn write(
-    instructions: Instructions,
+#[inline(always)]
+pub(super) fn write<L: Lanes>(columns: &Columns, stencil: &Stencil, moment: &Moment, chain: &mut Chain) {
+    match moment.velocities {
+        Velocities::Computed => write_all::<L, true>(columns, stencil, moment, chain),
+        Velocities::Omitted => write_all::<L, false>(columns, stencil, moment, chain),
+    }
+}
+
+#[inline(always)]
+fn write_all<L: Lanes, const VELOCITIES: bool>(
     columns: &Columns,
     stencil: &Stencil,
     moment: &Moment,
     chain: &mut Chain,
 ) {
-    match instructions {
-        // SAFETY: a solver is only made with instructions that this processor was found to have.
-        #[cfg(target_arch = "x86_64")]
-        Instructions::Avx512 => unsafe { write_with_avx512(columns, stencil, moment, chain) },
-        // SAFETY: as above.
-        #[cfg(target_arch = "x86_64")]
-        Instructions::Avx2 => unsafe { write_with_avx2(columns, stencil, moment, chain) },
-        _ => write_with::<Portable>(columns, stencil, moment, chain),
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
-fn write_with_avx512(columns: &Columns, stencil: &Stencil, moment: &Moment, chain: &mut Chain) {
-    write_with::<Avx2>(columns, stencil, moment, chain);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn write_with_avx2(columns: &Columns, stencil: &Stencil, moment: &Moment, chain: &mut Chain) {
-    write_with::<Avx2>(columns, stencil, moment, chain);
-}
-
-/// A phase from the column on that a frame begins with.
-#[derive(Clone, Copy)]
-struct Part<'a> {
-    to_next: &'a [f64],
-    tilt_to_next: &'a [f64],
-}
-
-#[inline(always)]
-fn write_with<L: Lanes>(columns: &Columns, stencil: &Stencil, moment: &Moment, chain: &mut Chain) {
-    let phases = columns.phases();
     let handles = chain.handles() - 1;
-    // Differences j = 0, 4, 8 of a stencil are of one phase, 1, 5, 9 of the next, and so on.
-    let first = moment.knot - REACH;
-    let parts: [Part; PHASES] = std::array::from_fn(|part| {
-        let knot = first + part;
-        let (phase, column) = (&phases[knot % PHASES], knot / PHASES);
-        Part { to_next: &phase.to_next[column..], tilt_to_next: &phase.tilt_to_next[column..] }
-    });
-    let nearest = &phases[moment.knot % PHASES];
-    let column = moment.knot / PHASES;
+    let padded = handles.next_multiple_of(BLOCK);
+    let phases = columns.phases();
+    let part = |list: fn(&Phase) -> &[f64], part: usize| {
+        let knot = moment.knot - REACH + part;
+        &list(&phases[knot % PHASES])[knot / PHASES..][..padded + DIFFERENCES / PHASES]
+    };
+    let nearest = |list: fn(&Phase) -> &[f64]| {
+        &list(&phases[moment.knot % PHASES])[moment.knot / PHASES..][..padded]
+    };
     let weights = stencil.at(moment.between);
     let splat = |weights: [f64; DIFFERENCES]| weights.map(|weight| Row([weight; LANES]));
-    let frame = Frame { parts, value: splat(weights.value), slope: splat(weights.slope), moment };
+    let frame = Frame {
+        to_next: std::array::from_fn(|k| part(|phase| &phase.to_next, k)),
+        tilt_to_next: std::array::from_fn(|k| part(|phase| &phase.tilt_to_next, k)),
+        turns: nearest(|phase| &phase.turns),
+        cosine: nearest(|phase| &phase.cosine),
+        sine: nearest(|phase| &phase.sine),
+        bearing: nearest(|phase| &phase.bearing),
+        value: splat(weights.value),
+        slope: splat(weights.slope),
+        pitch: moment.pitch,
+        outward: moment.pitch * moment.knots_per_second,
+    };
     let Chain { x, y, heading, speed, vx, vy } = chain;
-    let mut outputs = [x, y, heading, speed, vx, vy].map(|output| output[1..].as_chunks_mut::<LANES>());
-    let wanted = if moment.velocities == Velocities::Computed { 6 } else { 3 };
-    for four in 0..handles / LANES {
-        let numbers = frame.four::<L>(nearest, column, four * LANES);
-        for ((whole, _), numbers) in outputs.iter_mut().zip(numbers).take(wanted) {
-            whole[four] = numbers.row().0;
+    let mut outputs = [x, y, heading, speed, vx, vy].map(|output| &mut output[1..][..handles]);
+    let wanted = if VELOCITIES { 6 } else { 3 };
+    let mut at = 0;
+    while at + BLOCK <= padded {
+        let block = frame.block::<L, VELOCITIES>(at);
+        for (output, numbers) in outputs.iter_mut().zip(block).take(wanted) {
+            let [first, second] = numbers.map(|numbers| numbers.row().0);
+            if at + BLOCK <= handles {
+                output[at..at + LANES].copy_from_slice(&first);
+                output[at + LANES..at + BLOCK].copy_from_slice(&second);
+            } else {
+                for (place, number) in output[at..].iter_mut().zip(first.into_iter().chain(second)) {
+                    *place = number;
+                }
+            }
         }
-    }
-    let left = handles % LANES;
-    if left > 0 {
-        let numbers = frame.four::<L>(nearest, column, handles - left);
-        for ((_, rest), numbers) in outputs.iter_mut().zip(numbers).take(wanted) {
-            rest.copy_from_slice(&numbers.row().0[..left]);
-        }
+        at += BLOCK;
     }
 }
 
@@ -109,42 +114,45 @@ fn load<L: Lanes>(numbers: &[f64], at: usize) -> L {
     L::load(&row)
 }
 
-struct Frame<'a> {
-    parts: [Part<'a>; PHASES],
-    value: [Row; DIFFERENCES],
-    slope: [Row; DIFFERENCES],
-    moment: &'a Moment,
-}
-
 impl Frame<'_> {
-    /// x, y, heading, speed, vx and vy of the four handles from the one `at` behind the second; without velocities the
-    /// last three are unspecified.
+    /// x, y, heading, speed, vx and vy of the handles from the one `at` behind the second; without velocities the last
+    /// three are unspecified.
     #[inline(always)]
-    fn four<L: Lanes>(&self, nearest: &Phase, column: usize, at: usize) -> [L; 6] {
-        // Two sums each, since a vector waits longer for a sum than it takes to begin another.
-        let mut ahead = [L::all(0.0); 2];
-        let mut tilt = [L::all(0.0); 2];
-        let mut slope = [L::all(0.0); 2];
+    fn block<L: Lanes, const VELOCITIES: bool>(&self, at: usize) -> [[L; 2]; 6] {
+        let places = [at, at + LANES];
+        let [mut ahead, mut tilt, mut slope] = [[L::all(0.0); 2]; 3];
         for j in 0..DIFFERENCES {
-            let part = &self.parts[j % PHASES];
-            let to_next: L = load(part.to_next, at + j / PHASES);
-            let tilt_to_next: L = load(part.tilt_to_next, at + j / PHASES);
-            let weight = L::load(&self.value[j]);
-            ahead[j % 2] = weight.multiply_add(to_next, ahead[j % 2]);
-            tilt[j % 2] = weight.multiply_add(tilt_to_next, tilt[j % 2]);
-            slope[j % 2] = L::load(&self.slope[j]).multiply_add(to_next, slope[j % 2]);
+            let (to_next, tilt_to_next) = (self.to_next[j % PHASES], self.tilt_to_next[j % PHASES]);
+            let (value_weight, slope_weight) = (L::load(&self.value[j]), L::load(&self.slope[j]));
+            for (half, place) in places.into_iter().enumerate() {
+                let difference: L = load(to_next, place + j / PHASES);
+                ahead[half] = value_weight.multiply_add(difference, ahead[half]);
+                if VELOCITIES {
+                    slope[half] = slope_weight.multiply_add(difference, slope[half]);
+                }
+                tilt[half] = value_weight.multiply_add(load(tilt_to_next, place + j / PHASES), tilt[half]);
+            }
         }
-        let [ahead, tilt, slope] = [ahead, tilt, slope].map(|[even, odd]| even + odd);
-        let at = column + at;
-        let tau = load::<L>(&nearest.turns, at) + ahead;
-        let (sine_ahead, cosine_ahead) = sine_cosine(L::all(TAU) * ahead);
-        let (sine_there, cosine_there): (L, L) = (load(&nearest.sine, at), load(&nearest.cosine, at));
+        let four = |half: usize| self.four::<L, VELOCITIES>(places[half], ahead[half], tilt[half], slope[half]);
+        let (first, second) = (four(0), four(1));
+        std::array::from_fn(|number| [first[number], second[number]])
+    }
+
+    #[inline(always)]
+    fn four<L: Lanes, const VELOCITIES: bool>(&self, at: usize, ahead: L, tilt: L, slope: L) -> [L; 6] {
+        let tau = load::<L>(self.turns, at) + ahead;
+        let (sine_ahead, cosine_ahead) = small_sine_cosine(L::all(TAU) * ahead);
+        let (sine_there, cosine_there): (L, L) = (load(self.sine, at), load(self.cosine, at));
         let cosine = sine_there.negated_multiply_add(sine_ahead, cosine_there * cosine_ahead);
         let sine = cosine_there.multiply_add(sine_ahead, sine_there * cosine_ahead);
-        let r = L::all(self.moment.pitch) * tau;
-        let heading = L::all(TAU) * within_half_turn(load::<L>(&nearest.bearing, at) + (ahead + tilt));
+        let r = L::all(self.pitch) * tau;
+        let heading = L::all(TAU) * within_half_turn(load::<L>(self.bearing, at) + (ahead + tilt));
+        if !VELOCITIES {
+            let none = L::all(f64::NAN);
+            return [r * cosine, r * sine, heading, none, none, none];
+        }
         // d/dt of r (cos theta, sin theta).
-        let outward = L::all(self.moment.pitch * self.moment.knots_per_second) * slope;
+        let outward = L::all(self.outward) * slope;
         let theta = L::all(TAU) * tau;
         let vx = outward * theta.negated_multiply_add(sine, cosine);
         let vy = outward * theta.multiply_add(cosine, sine);
