@@ -13,9 +13,9 @@ use toml::Spanned;
 
 use self::path::{RawPath, ScenePath};
 use self::ros2::{RawRos2, Ros2Settings};
+use crate::chain::follower_table::FollowerTable;
 use crate::chain::newton::Newton;
 use crate::chain::paper::{self, Paper, PaperRules};
-use crate::chain::follower_table::FollowerTable;
 use crate::chain::whole_chain::WholeChain;
 use crate::chain::{Solver, Team, Velocities};
 use crate::geometry::path::Path;
@@ -274,7 +274,10 @@ impl Scene {
                 Some((solver, name)) => (solver, format!("{name}: named by the scene")),
                 None => {
                     let (solver, name) = whole_chain();
-                    (solver, format!("{name}: the scene names follower_table, which has no table for this team and path"))
+                    (
+                        solver,
+                        format!("{name}: the scene names follower_table, which has no table for this team and path"),
+                    )
                 }
             },
             Method::Named(SolverName::WholeChain) => {
@@ -390,8 +393,11 @@ impl RawScene {
         let path = self.path.validated(source, &team)?;
         let head_speed = source.check("motion.head_speed", &self.motion.head_speed, Accepted::SPEED)?;
         let (method, paper_rules) = self.motion.method(source)?;
-        if let (Method::Named(SolverName::WholeChain | SolverName::FollowerTable | SolverName::Paper), ScenePath::Pieces(_), Some(given)) =
-            (method, &path, &self.motion.solver)
+        if let (
+            Method::Named(SolverName::WholeChain | SolverName::FollowerTable | SolverName::Paper),
+            ScenePath::Pieces(_),
+            Some(given),
+        ) = (method, &path, &self.motion.solver)
         {
             let sentence = "motion.solver rides spirals only, expected \"newton\" or no such field on this path";
             return Err(source.wrong(given, sentence));

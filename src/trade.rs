@@ -6,10 +6,10 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use crate::chain::follower_table::FollowerTable;
 use crate::chain::newton::Newton;
 use crate::chain::paper::{Paper, PaperRules};
 use crate::chain::reference::{Reference, ReferenceHandle};
-use crate::chain::follower_table::FollowerTable;
 use crate::chain::whole_chain::WholeChain;
 use crate::chain::{Chain, Instructions, Solver, Velocities};
 use crate::clearance::{ClearanceMonitor, Ground, least_clearance_all_pairs};

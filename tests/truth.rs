@@ -2,10 +2,10 @@
 
 use std::f64::consts::{PI, TAU};
 
+use bench_dragon::chain::follower_table::FollowerTable;
 use bench_dragon::chain::newton::Newton;
 use bench_dragon::chain::paper::{Paper, PaperRules};
 use bench_dragon::chain::reference::Reference;
-use bench_dragon::chain::follower_table::FollowerTable;
 use bench_dragon::chain::whole_chain::WholeChain;
 use bench_dragon::chain::{Chain, Instructions, Solver, Team, Velocities};
 use bench_dragon::geometry::path::Path;

@@ -100,7 +100,7 @@ impl Heads {
             knots.push(Knot { turns: turns(fixed), fraction: fraction(fixed), tilt: knot.tilt, column_knot, between });
             made.push(knot);
         }
-        let of_pairs = |difference: &dyn Fn(usize) -> f64| (1..made.len()).map(|next| difference(next)).collect();
+        let of_pairs = |difference: &dyn Fn(usize) -> f64| (1..made.len()).map(difference).collect();
         let heads = Self {
             spacing,
             turns: of_pairs(&|next| turns(place(made[next].head) - place(made[next - 1].head))),
@@ -128,7 +128,9 @@ impl Heads {
         // The next knot needs its stencil too: half way may round up to it.
         while knot + REACH + 1 < made.len() {
             let half = 0.5 * self.spacing;
-            let Some(right) = path.ahead(made[knot].head, half).and_then(|head| Making::of(path, team, head)) else { break };
+            let Some(right) = path.ahead(made[knot].head, half).and_then(|head| Making::of(path, team, head)) else {
+                break;
+            };
             let lead = self.around(knot, 0.5, stencil);
             if !is_right(&lead, &right, path, team, columns, stencil) {
                 break;

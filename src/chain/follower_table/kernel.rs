@@ -66,11 +66,9 @@ fn write_all<L: Lanes, const VELOCITIES: bool>(
     let phases = columns.phases();
     let part = |list: fn(&Phase) -> &[f64], part: usize| {
         let knot = moment.knot - REACH + part;
-        &list(&phases[knot % PHASES])[knot / PHASES..][..padded + DIFFERENCES / PHASES]
+        &list(&phases[knot % PHASES])[knot / PHASES..][..padded + (DIFFERENCES - 1) / PHASES]
     };
-    let nearest = |list: fn(&Phase) -> &[f64]| {
-        &list(&phases[moment.knot % PHASES])[moment.knot / PHASES..][..padded]
-    };
+    let nearest = |list: fn(&Phase) -> &[f64]| &list(&phases[moment.knot % PHASES])[moment.knot / PHASES..][..padded];
     let weights = stencil.at(moment.between);
     let splat = |weights: [f64; DIFFERENCES]| weights.map(|weight| Row([weight; LANES]));
     let frame = Frame {
@@ -86,31 +84,45 @@ fn write_all<L: Lanes, const VELOCITIES: bool>(
         outward: moment.pitch * moment.knots_per_second,
     };
     let Chain { x, y, heading, speed, vx, vy } = chain;
-    let mut outputs = [x, y, heading, speed, vx, vy].map(|output| &mut output[1..][..handles]);
+    let mut outputs = [x, y, heading, speed, vx, vy].map(|output| output[1..].as_chunks_mut::<BLOCK>());
     let wanted = if VELOCITIES { 6 } else { 3 };
-    let mut at = 0;
-    while at + BLOCK <= padded {
-        let block = frame.block::<L, VELOCITIES>(at);
-        for (output, numbers) in outputs.iter_mut().zip(block).take(wanted) {
-            let [first, second] = numbers.map(|numbers| numbers.row().0);
-            if at + BLOCK <= handles {
-                output[at..at + LANES].copy_from_slice(&first);
-                output[at + LANES..at + BLOCK].copy_from_slice(&second);
-            } else {
-                for (place, number) in output[at..].iter_mut().zip(first.into_iter().chain(second)) {
-                    *place = number;
-                }
-            }
+    let whole = handles / BLOCK;
+    // Cut here, so that no block has to ask whether it is there.
+    let [x, y, heading, speed, vx, vy] = &mut outputs;
+    let mut lists = [
+        &mut x.0[..whole],
+        &mut y.0[..whole],
+        &mut heading.0[..whole],
+        &mut speed.0[..whole],
+        &mut vx.0[..whole],
+        &mut vy.0[..whole],
+    ];
+    for block in 0..whole {
+        let numbers = frame.block::<L, VELOCITIES>(block * BLOCK);
+        for (list, [first, second]) in lists.iter_mut().zip(numbers).take(wanted) {
+            list[block][..LANES].copy_from_slice(&first.row().0);
+            list[block][LANES..].copy_from_slice(&second.row().0);
         }
-        at += BLOCK;
+    }
+    if whole * BLOCK < handles {
+        let numbers = frame.block::<L, VELOCITIES>(whole * BLOCK);
+        for ((_, rest), [first, second]) in outputs.iter_mut().zip(numbers).take(wanted) {
+            let numbers = first.row().0.into_iter().chain(second.row().0);
+            rest.iter_mut().zip(numbers).for_each(|(place, number)| *place = number);
+        }
     }
 }
 
-/// Four neighbours in a list.
+/// Four neighbours in a list of a [`Frame`], `at` < its `padded`, a multiple of the lanes, plus at most
+/// (DIFFERENCES - 1) / PHASES.
 #[inline(always)]
 fn load<L: Lanes>(numbers: &[f64], at: usize) -> L {
+    debug_assert!(at + LANES <= numbers.len());
     let mut row = Row::ZERO;
-    row.0.copy_from_slice(&numbers[at..at + LANES]);
+    // SAFETY: `write_all` cuts every list to `padded` numbers, those with a stencil to (DIFFERENCES - 1) / PHASES more,
+    // and asks only for blocks that end at or before `padded`. Checking each of the loads takes a fifth of the frame's
+    // time (`cargo bench --bench frame -- table`), since the lists are too many for the compiler to see through.
+    row.0.copy_from_slice(unsafe { numbers.get_unchecked(at..at + LANES) });
     L::load(&row)
 }
 
