@@ -115,17 +115,22 @@ fn plot(svg: &mut String, scene: &str, measurements: &[Measurement]) -> Result<(
     chart.draw_series(LineSeries::new(front, &BLUE))?;
     let mut labelled: Vec<&Measurement> = measurements.iter().collect();
     labelled.sort_by(|a, b| error(b).total_cmp(&error(a)));
-    let mut labels: Vec<Label> = Vec::new();
+    // No label lies on a point either.
+    let mut taken: Vec<Label> = Vec::new();
+    for measurement in measurements {
+        let (middle, level) = chart.backend_coord(&(cost(measurement), error(measurement)));
+        taken.push(Label { left: middle - 6, right: middle + 6, top: level - 6 });
+    }
     for measurement in labelled {
         let colour = if measurement.solver.starts_with("paper") { RED } else { BLUE };
         let at = (cost(measurement), error(measurement));
         let style = if measurement.on_front { colour.filled() } else { colour.stroke_width(1) };
         chart.draw_series([Circle::new(at, 4, style)])?;
         let (left, middle) = chart.backend_coord(&at);
-        let label = Label::below(&labels, left + 8, middle - 6, &measurement.solver);
+        let label = Label::below(&taken, left + 8, middle - 6, &measurement.solver);
         let text = Text::new(measurement.solver.clone(), (8, label.top - middle), ("sans-serif", 12));
         chart.draw_series([EmptyElement::at(at) + text])?;
-        labels.push(label);
+        taken.push(label);
     }
     area.present()?;
     Ok(())
