@@ -207,6 +207,12 @@ struct Look {
     cosine: f64,
 }
 
+/// The last place of the head, from `from` to `to`, at which the team stands: `to` itself or, where that is a lock and its
+/// own last digits are past it, the last one before. Without this the search's whole last step would be lost.
+fn last_place(stands: impl Fn(f64) -> bool, from: f64, to: f64) -> f64 {
+    if stands(to) || !stands(from) { to } else { first_true(|travelled| !stands(travelled), from, to).next_down() }
+}
+
 /// t . b at a front handle at `theta`; past the fold, where there is no follower, -1: the bench has been stalled.
 fn stall_margin(spiral: &Spiral, theta: f64, link: f64) -> f64 {
     let front = spiral.place_of_theta(theta);

@@ -80,6 +80,23 @@ fn cases(usual: u32) -> ProptestConfig {
     ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(if long { 50 * usual } else { usual }) }
 }
 
+/// The boards meet in the last quarter of a second before the lock, whose own last digits no team can stand on.
+#[test]
+fn a_contact_just_before_the_lock_is_found() {
+    let text = "[team]\nbenches = 3\nhead_length = 2.1117711923317812\nbody_length = 3.555706400138558\nwidth = 0.02\n\
+                hole_inset = 0.17921771164504968\n[path]\nkind = \"spiral\"\npitch = 0.7961849666936323\n\
+                start_turn = 5.774603178083499\n[motion]\nhead_speed = 1.0\n[alerts]\n";
+    let scene = Scene::parse(text, "random", "random").unwrap();
+    let timeline = Timeline::of(&scene, &mut |_| ());
+    let contact = timeline.find(State::Contact).expect("sampling sees them overlap at 77.6728 m").event;
+    assert!(contact.travelled > 77.585 && contact.travelled < 77.6728, "{contact:?}");
+    let mut chain = Chain::new(scene.team.handles());
+    let clearance = least_clearance(&scene, contact.travelled, &mut chain).unwrap();
+    assert!(clearance.abs() < 1e-12, "{clearance:e}");
+    let least = timeline.least_clearance(&scene, &mut |_| ()).unwrap();
+    assert!(least.least.value < 1e-12, "{least:?}");
+}
+
 proptest! {
     #![proptest_config(cases(200))]
 

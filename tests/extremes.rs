@@ -167,6 +167,9 @@ fn corners_of_the_ranges() {
         let rate = 26_000.0 * model.speed / model.travel();
         model.assert_promise(&model.times(), rate);
     }
+    // Links so long that a table which is right to their last digits is not right to a nanometre.
+    let long = Model::new(9, 9406.914221731744, 9000.0, 6292.008334889938, 3.019746065123493, 29878.041797247908);
+    long.assert_promise(&[2.851732066821893], 1e4);
 }
 
 #[test]

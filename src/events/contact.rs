@@ -28,7 +28,7 @@ use crate::geometry::separation::{circle_bound_board_board, clearance_board_boar
 use crate::geometry::spiral::{Angle, Spiral};
 use crate::messages::State;
 
-use super::Event;
+use super::{Event, last_place};
 
 /// The first contact at or before `limit` metres of travel, `stall` being where a link first stalls.
 ///
@@ -236,6 +236,7 @@ impl Search<'_> {
     fn between(&self, from: f64, to: f64, pairs: Pairs, progress: &mut dyn FnMut(f64)) -> Option<Event> {
         let mut step = 0.1 * self.team.link(0).min(self.team.link(1));
         let room = self.room();
+        let to = last_place(|travelled| self.look(travelled, pairs).is_some(), from, to);
         let mut before = (from < to).then(|| self.look(from, pairs)).flatten()?;
         while before.travelled < to {
             progress(before.travelled / to);
@@ -243,10 +244,7 @@ impl Search<'_> {
             if before.travelled < self.stall {
                 next = next.min(self.stall);
             }
-            let Some(after) = self.look(next, pairs) else {
-                // The very last digits before a lock can be lost.
-                return None;
-            };
+            let after = self.look(next, pairs)?;
             if step > 1e-9 * room && self.widest_motion(&before, &after, pairs) > room {
                 step *= 0.5;
                 continue;

@@ -21,8 +21,8 @@ use crate::geometry::separation::{
 };
 use crate::messages::State;
 
-use super::Event;
 use super::contact::near_pairs;
+use super::{Event, last_place};
 
 /// The least clearance of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,6 +83,7 @@ impl<'a, P: Path> Sweep<'a, P> {
             let place = overlap_centre(&before.boards[a], &before.boards[b]);
             return Some(contact(&before, (a, b), place));
         }
+        let to = self.last_place(from, to);
         for next in self.steps(from, to) {
             progress((next - from) / (to - from));
             let after = self.look(next)?;
@@ -101,6 +102,7 @@ impl<'a, P: Path> Sweep<'a, P> {
         if self.team.benches < 3 {
             return None;
         }
+        let to = self.last_place(from, to);
         let mut least = LeastClearance { value: f64::INFINITY, travelled: from, bench_a: 0, bench_b: 0 };
         // First a fair guess, then the proof that nothing is below it, or what is.
         for at in std::iter::once(from).chain(self.steps(from, to)) {
@@ -174,6 +176,10 @@ impl<'a, P: Path> Sweep<'a, P> {
 
     fn look(&self, travelled: f64) -> Option<Look<P>> {
         self.look_at_most(travelled, self.team.benches)
+    }
+
+    fn last_place(&self, from: f64, to: f64) -> f64 {
+        last_place(|travelled| self.look(travelled).is_some(), from, to)
     }
 
     /// The foremost `benches` boards.

@@ -17,8 +17,11 @@ const MOST_KNOTS: usize = 1 << 18;
 /// The error of a place that is let pass, against the length of a link: a fifth of what links are promised to hold.
 const ERROR_OF_LINK: f64 = 2e-13;
 
-/// The same against the distance from the centre: the rounding of the coordinates.
-const ERROR_OF_RADIUS: f64 = 0.5 * f64::EPSILON;
+/// The most that is let pass, metres, where links are long.
+const MOST_ERROR: f64 = 3e-13;
+
+/// But the rounding of numbers as great as the distance from the centre is always let pass.
+const ERROR_OF_RADIUS: f64 = 2.0 * f64::EPSILON;
 
 /// The error of a speed that is let pass, relative.
 const ERROR_OF_SPEED: f64 = 2e-12;
@@ -193,7 +196,7 @@ fn is_right(lead: &Lead, right: &Making, path: &Spiral, team: &Team, columns: &C
     let (head, tau) = (place(right.head), turns(right.second));
     let radius = path.pitch() * tau;
     let metres = TAU * radius.hypot(path.growth());
-    let allowed = (ERROR_OF_LINK * team.link(1)).max(ERROR_OF_RADIUS * radius);
+    let allowed = (ERROR_OF_LINK * team.link(1)).min(MOST_ERROR).max(ERROR_OF_RADIUS * radius);
     let Some(third) = path.increment(radius, team.link(1)).ok() else { return false };
     let head_slope = 1.0 / (path.pitch() * 1f64.hypot(right.head.radians()));
     let slope = ratio_of_rates(turns(head), turns(right.second - head)) * head_slope;
