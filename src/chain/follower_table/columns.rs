@@ -32,7 +32,7 @@ const FITTED_LINKS: usize = 4;
 const FITTED_DEGREE: usize = 8;
 const FITTED_PLACES: usize = 32;
 
-/// The most links that a table spans: 25 MB.
+/// The most links that a table spans: 34 MB.
 const MOST_COLUMNS: usize = 1 << 17;
 
 /// Increments above this end the table: half way between two knots, a handle is then [`SMALL_ANGLE`] from either.
