@@ -280,15 +280,20 @@ fn errors(scene: &Scene, candidate: &mut Candidate, moments: &[Moment]) -> Error
         }
         for (i, truth) in moment.handles.iter().enumerate() {
             let error = truth.x.error_of(chain.x[i]).hypot(truth.y.error_of(chain.y[i]));
-            worst.position = worst.position.max(error);
-            worst.speed = worst.speed.max(((chain.speed[i] - truth.speed) / truth.speed).abs());
+            worst.position = worse(worst.position, error);
+            worst.speed = worse(worst.speed, ((chain.speed[i] - truth.speed) / truth.speed).abs());
         }
         for bench in 0..scene.team.benches {
             let (dx, dy) = (chain.x[bench + 1] - chain.x[bench], chain.y[bench + 1] - chain.y[bench]);
-            worst.link = worst.link.max((dx.hypot(dy) - scene.team.link(bench)).abs());
+            worst.link = worse(worst.link, (dx.hypot(dy) - scene.team.link(bench)).abs());
         }
     }
     worst
+}
+
+/// The greater of two errors; what is not a number is worst.
+fn worse(one: f64, other: f64) -> f64 {
+    if one >= other || one.is_nan() { one } else { other }
 }
 
 /// Nanoseconds of each frame. Where the show has too many frames, or the solver is too slow for all, runs of frames

@@ -454,6 +454,37 @@ fn a_frame_of_the_table_does_not_depend_on_the_ones_before() {
 }
 
 #[test]
+fn a_table_holds_up_to_its_very_end() {
+    let models = [
+        Model::paper(),
+        // Past the stall of a long head's link the short team behind it is pushed far out again.
+        Model::new(9, 1.0, 0.007, 1.7, 0.12, 1.0),
+        Model::new(9, 1.0, 0.02, 1.7, 0.3, 1.0),
+        // The head's link is promised to its own length, which is a two hundredth of the others'.
+        Model::new(8, 0.01, 2.0, 0.55, 8.0, 1.0),
+    ];
+    for model in models {
+        let mut table = model.table().unwrap_or_else(|| panic!("a table: {model:?}"));
+        let (end, handles) = (table.valid_until(), model.team.handles());
+        let mut chain = Chain::new(handles);
+        for k in 0..400 {
+            let time = end * (1.0 - 1e-3 * f64::from(k));
+            table.solve(time, &mut chain).unwrap();
+            model.assert_sound(&chain, time, "follower_table");
+            if k % 40 == 0 {
+                model.assert_true(&chain, time, "follower_table");
+            }
+        }
+        assert_eq!(table.fallbacks(), 0);
+        let behind = |share: f64| end + share * (model.travel() / model.speed - end);
+        for time in [0.1, 0.5, 0.9].map(behind) {
+            table.solve(time, &mut chain).unwrap();
+            model.assert_sound(&chain, time, "past the table");
+        }
+    }
+}
+
+#[test]
 fn no_handle_jumps_where_the_table_goes_from_knot_to_knot() {
     let model = Model::paper();
     let mut solver = model.table().unwrap();

@@ -46,6 +46,8 @@ fn errors(solver: &mut dyn Solver, rows: &[Row]) -> Vec<(f64, f64, f64)> {
             let (mut position, mut speed) = (0f64, 0f64);
             for row in rows {
                 let i = row.handle;
+                let numbers = [chain.x[i], chain.y[i], chain.heading[i], chain.speed[i], chain.vx[i], chain.vy[i]];
+                assert!(numbers.into_iter().all(f64::is_finite), "t = {} s, handle {i}: {numbers:?}", row.time);
                 position = position.max((chain.x[i] - row.x).hypot(chain.y[i] - row.y));
                 speed = speed.max(((chain.speed[i] - row.speed) / row.speed).abs());
             }

@@ -1,6 +1,6 @@
 //! The cheapest solver: a table of where a chain of equal links stands, made once, and read off every frame.
 //!
-//! In: the time. Out: the chain, as exact as the safe solver's. A frame does not depend on the ones before. The table is
+//! In: the time. Out: the chain, as exact as the safe solver's. A frame of the table does not depend on the ones before. The table is
 //! as good as it was found to be when it was made; past that, in the last metres before a lock, the whole-chain solver
 //! does the work, and [`FollowerTable::fallbacks`] counts how often. The show calls it through [`Solver`].
 
@@ -26,7 +26,8 @@ use crate::geometry::spiral::Spiral;
 
 /// A table of the follower map, interpolated.
 ///
-/// The same times give the same bits on the same [`Instructions`], whichever frames were asked for before.
+/// Within the table the same times give the same bits on the same [`Instructions`], whichever frames were asked for
+/// before.
 #[derive(Debug, Clone)]
 pub struct FollowerTable {
     pitch: f64,
@@ -47,7 +48,7 @@ impl FollowerTable {
     /// `None` where there is no such table: for a single bench, for a team or a way so long that the table would not fit,
     /// and where interpolation in it was found not to be exact even at the start.
     pub fn new(path: Spiral, team: Team, head_speed: f64, velocities: Velocities) -> Option<Self> {
-        if team.benches < 2 {
+        if team.benches < 2 || !heads::fits(&path, &team) {
             return None;
         }
         let stencil = Stencil::new();

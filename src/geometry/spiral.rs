@@ -203,10 +203,10 @@ impl Spiral {
             let step = (metres - self.arc_length(theta, span)) / (self.growth() * 1f64.hypot(inner));
             span += step;
             if step.abs() < 1e-9 * span.abs() {
-                break;
+                return (span < theta).then(|| from.plus(-span));
             }
         }
-        (span < theta).then(|| from.plus(-span))
+        None
     }
 
     /// Where the square of the chord to the point `increment` radians behind a handle at radius `r` stands against

@@ -12,6 +12,7 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{DMatrix, DVector};
 
+use super::kernel::BLOCK;
 use super::stencil::{DIFFERENCES, REACH, Stencil};
 use crate::chain::Team;
 use crate::chain::arithmetic::SMALL_ANGLE;
@@ -47,11 +48,11 @@ pub(super) struct Phase {
     pub cosine: Vec<f64>,
     /// See `cosine`.
     pub sine: Vec<f64>,
-    /// Its fraction of a turn plus `tilt`.
+    /// Its fraction of a turn plus the tilt, which is the angle of a bench less that of its front handle, in turns.
     pub bearing: Vec<f64>,
     /// Turns to the next knot, which is one of the next phase.
     pub to_next: Vec<f64>,
-    /// What `tilt` grows to the next knot, where the tilt is the angle of a bench less that of its front handle.
+    /// What the tilt grows to the next knot.
     pub tilt_to_next: Vec<f64>,
 }
 
@@ -103,7 +104,7 @@ impl Columns {
         &self.phases
     }
 
-    /// How many knots the table has whose followers it has too.
+    /// How many knots the table has lists for.
     pub(super) fn len(&self) -> usize {
         self.phases[0].turns.len() * PHASES
     }
@@ -134,10 +135,13 @@ impl Columns {
         turns(place - self.knots[knot])
     }
 
-    /// The knot nearest to a place and how many knots beyond it the place lies, -1/2 to 1/2; `None` beyond the table.
-    pub(super) fn locate(&self, place: i128, stencil: &Stencil) -> Option<(usize, f64)> {
+    /// The knot nearest to a place and how many knots beyond it the place lies, -1/2 to 1/2; `None` where the table does
+    /// not go as far, or not as far beyond as a team of `benches` with its second handle there.
+    pub(super) fn locate(&self, place: i128, benches: usize, stencil: &Stencil) -> Option<(usize, f64)> {
         let above = self.knots.partition_point(|knot| *knot <= place);
-        if above < REACH + 2 || above + REACH + 1 >= self.len() {
+        // Room for the stencil, and for a place between two others that rounds to the knot beyond both.
+        let last_column = above / PHASES + benches.next_multiple_of(BLOCK) + 3;
+        if above < REACH + 2 || last_column >= self.len() / PHASES {
             return None;
         }
         let share = self.turns_from(above - 1, place) / turns(self.knots[above] - self.knots[above - 1]);
@@ -148,7 +152,7 @@ impl Columns {
             let found = self.around(knot, between, stencil);
             between -= (found.turns - beyond) / found.turns_per_knot;
         }
-        between.is_finite().then_some((knot, between))
+        (between.abs() <= 0.75).then_some((knot, between))
     }
 }
 
@@ -279,7 +283,7 @@ pub(super) fn fraction(fixed: i128) -> f64 {
 }
 
 /// A number of turns in fixed point.
-pub(super) fn fixed(turns: f64) -> i128 {
+fn fixed(turns: f64) -> i128 {
     (turns * 2f64.powi(64)) as i128
 }
 

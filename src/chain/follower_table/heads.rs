@@ -1,6 +1,6 @@
 //! Where the head and the handle behind it are, by the metres the head has travelled.
 //!
-//! The head's link is longer than the others, so its map is not the table's; both places are tabulated over the head's
+//! The head's link differs from the others, so its map is not the table's; both places are tabulated over the head's
 //! way instead. Called by the follower table only.
 
 use std::f64::consts::TAU;
@@ -23,7 +23,7 @@ const MOST_ERROR: f64 = 3e-13;
 /// But the rounding of numbers as great as the distance from the centre is always let pass.
 const ERROR_OF_RADIUS: f64 = 2.0 * f64::EPSILON;
 
-/// The error of a speed that is let pass, relative.
+/// The error of a speed that is let pass, relative to it or to the head's, whichever is greater.
 const ERROR_OF_SPEED: f64 = 2e-12;
 
 /// The table over the head's way. Every knot's numbers and, but for the last, the differences to the next.
@@ -78,13 +78,20 @@ struct Making {
     tilt: f64,
 }
 
+/// Metres between two knots.
+fn spacing(team: &Team) -> f64 {
+    (0.25 * team.link(1)).log2().floor().exp2()
+}
+
+/// Whether the head's way is short enough for a table.
+pub(super) fn fits(path: &Spiral, team: &Team) -> bool {
+    path.length() / spacing(team) <= MOST_KNOTS as f64
+}
+
 impl Heads {
-    /// The table from the start inward as far as it is exact; `None` where it is not at the start, or too large.
+    /// The table from the start inward as far as it is exact; `None` where it is not at the start.
     pub(super) fn new(path: &Spiral, team: &Team, columns: &Columns, stencil: &Stencil) -> Option<Self> {
-        let spacing = (0.25 * team.link(1)).log2().floor().exp2();
-        if path.length() / spacing > MOST_KNOTS as f64 {
-            return None;
-        }
+        let spacing = spacing(team);
         let mut outward = vec![path.start()];
         for _ in 0..REACH {
             outward.push(path.ahead(*outward.last()?, -spacing)?);
@@ -98,7 +105,7 @@ impl Heads {
                 places.push(head);
             }
             let Some(knot) = Making::of(path, team, head) else { break };
-            let Some((column_knot, between)) = columns.locate(knot.second, stencil) else { break };
+            let Some((column_knot, between)) = columns.locate(knot.second, team.benches, stencil) else { break };
             let fixed = place(head);
             knots.push(Knot { turns: turns(fixed), fraction: fraction(fixed), tilt: knot.tilt, column_knot, between });
             made.push(knot);
@@ -118,7 +125,8 @@ impl Heads {
         heads.checked(path, team, columns, stencil, &made)
     }
 
-    /// The table, valid as far as it is right half way between any two knots, where interpolation is worst.
+    /// The table, valid up to two knots before the first between which it is not right, a quarter of the way and half way:
+    /// half way the head's own interpolation is worst, while the columns' depends on where their knots lie meanwhile.
     fn checked(
         mut self,
         path: &Spiral,
@@ -130,17 +138,18 @@ impl Heads {
         let mut knot = REACH;
         // The next knot needs its stencil too: half way may round up to it.
         while knot + REACH + 1 < made.len() {
-            let half = 0.5 * self.spacing;
-            let Some(right) = path.ahead(made[knot].head, half).and_then(|head| Making::of(path, team, head)) else {
-                break;
+            let right_at = |share: f64| {
+                let head = path.ahead(made[knot].head, share * self.spacing);
+                let right = head.and_then(|head| Making::of(path, team, head));
+                let lead = self.around(knot, share, stencil);
+                right.is_some_and(|right| is_right(&lead, &right, path, team, columns, stencil))
             };
-            let lead = self.around(knot, 0.5, stencil);
-            if !is_right(&lead, &right, path, team, columns, stencil) {
+            if !(right_at(0.25) && right_at(0.5)) {
                 break;
             }
-            self.valid = (knot - REACH) as f64 * self.spacing + half;
             knot += 1;
         }
+        self.valid = (knot as f64 - REACH as f64 - 2.0) * self.spacing;
         (self.valid > 0.0).then_some(self)
     }
 
@@ -191,12 +200,12 @@ impl Making {
     }
 }
 
-/// Whether the places, speeds and angles of the first three handles that the tables give are those of `right`.
+/// Whether the places of the first two handles, the angles of their benches and the second one's speed are right.
 fn is_right(lead: &Lead, right: &Making, path: &Spiral, team: &Team, columns: &Columns, stencil: &Stencil) -> bool {
     let (head, tau) = (place(right.head), turns(right.second));
     let radius = path.pitch() * tau;
     let metres = TAU * radius.hypot(path.growth());
-    let allowed = (ERROR_OF_LINK * team.link(1)).min(MOST_ERROR).max(ERROR_OF_RADIUS * radius);
+    let allowed = (ERROR_OF_LINK * team.link(0).min(team.link(1))).min(MOST_ERROR).max(ERROR_OF_RADIUS * radius);
     let Some(third) = path.increment(radius, team.link(1)).ok() else { return false };
     let head_slope = 1.0 / (path.pitch() * 1f64.hypot(right.head.radians()));
     let slope = ratio_of_rates(turns(head), turns(right.second - head)) * head_slope;
@@ -207,5 +216,5 @@ fn is_right(lead: &Lead, right: &Making, path: &Spiral, team: &Team, columns: &C
         && error_of_turns(columns.turns_from(lead.knot, right.second) - second.turns)
         && error_of_turns(right.tilt - lead.tilt)
         && error_of_turns(tilt(tau, third / TAU) - second.tilt)
-        && (rate - slope).abs() <= ERROR_OF_SPEED * slope.abs()
+        && (rate - slope).abs() <= ERROR_OF_SPEED * slope.abs().max(head_slope)
 }

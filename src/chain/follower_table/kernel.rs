@@ -26,11 +26,11 @@ pub(super) struct Moment {
 }
 
 /// Handles that are worked out together: two vectors, so that every weight is loaded for both.
-const BLOCK: usize = 2 * LANES;
+pub(super) const BLOCK: usize = 2 * LANES;
 
 /// The lists of a frame, from the column of its second handle on.
 struct Frame<'a> {
-    /// Differences j = 0, 4, 8 of a stencil are of the first part, 1, 5, 9 of the next, and so on.
+    /// Differences j = 0 and 4 of a stencil are of the first part, 1 and 5 of the next, and so on.
     to_next: [&'a [f64]; PHASES],
     tilt_to_next: [&'a [f64]; PHASES],
     turns: &'a [f64],
