@@ -1,8 +1,9 @@
 //! The cheapest solver: a table of where a chain of equal links stands, made once, and read off every frame.
 //!
-//! In: the time. Out: the chain, as exact as the safe solver's. A frame of the table does not depend on the ones before. The table is
-//! as good as it was found to be when it was made; past that, in the last metres before a lock, the whole-chain solver
-//! does the work, and [`FollowerTable::fallbacks`] counts how often. The show calls it through [`Solver`].
+//! In: the time. Out: the chain, as exact as the safe solver's. A frame of the table does not depend on the ones before.
+//! The table is as good as it was found to be when it was made; past that, in the last metres before a lock, the
+//! whole-chain solver does the work, and [`FollowerTable::fallbacks`] counts how often. The show calls it through
+//! [`Solver`].
 
 mod columns;
 mod heads;
@@ -33,7 +34,6 @@ pub struct FollowerTable {
     pitch: f64,
     head_speed: f64,
     velocities: Velocities,
-    instructions: Instructions,
     stencil: Stencil,
     columns: Columns,
     heads: Heads,
@@ -55,20 +55,19 @@ impl FollowerTable {
         let columns = Columns::new(&path, &team)?;
         let heads = Heads::new(&path, &team, &columns, &stencil)?;
         let whole_chain = WholeChain::new(path, team, head_speed, velocities);
-        let instructions = whole_chain.instructions();
         let pitch = path.pitch();
-        Some(Self { pitch, head_speed, velocities, instructions, stencil, columns, heads, whole_chain, fallbacks: 0 })
+        Some(Self { pitch, head_speed, velocities, stencil, columns, heads, whole_chain, fallbacks: 0 })
     }
 
     /// The same solver with other instructions, or `None` where this processor lacks them.
     pub fn with_instructions(self, instructions: Instructions) -> Option<Self> {
         let whole_chain = self.whole_chain.with_instructions(instructions)?;
-        Some(Self { instructions, whole_chain, ..self })
+        Some(Self { whole_chain, ..self })
     }
 
     /// The instructions it uses.
     pub fn instructions(&self) -> Instructions {
-        self.instructions
+        self.whole_chain.instructions()
     }
 
     /// Bytes this solver holds.
@@ -89,7 +88,7 @@ impl FollowerTable {
 
     /// The chain when the head has travelled so many metres, within the table.
     fn read_off(&self, travelled: f64, chain: &mut Chain) {
-        match self.instructions {
+        match self.instructions() {
             // SAFETY: a solver is only made with instructions that this processor was found to have.
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx512 => unsafe { self.read_off_with_avx512(travelled, chain) },

@@ -3,7 +3,7 @@
 //! All links but the head's are equal, so that one map F takes every handle's place to its follower's. The table holds a
 //! smooth function T with T(alpha + 1) = F(T(alpha)): a chain whose second handle stands at T(alpha) has its others at
 //! T(alpha + 1), T(alpha + 2) and so on, each found without the ones before. (T is the inverse of an Abel function of
-//! F; Kuczma, Choczewski and Ger, Iterative Functional Equations, 1990, section 8.) Any start of T over one link gives
+//! F; Kuczma, Choczewski and Ger, Iterative Functional Equations, 1990.) Any start of T over one link gives
 //! such a function; the smooth one is fitted far outside, where the spiral is nearly straight, and followed inward.
 //!
 //! Called by the follower table only. Angles are in turns, places in fixed-point turns of 2^-64.
@@ -18,7 +18,7 @@ use crate::chain::Team;
 use crate::chain::arithmetic::SMALL_ANGLE;
 use crate::geometry::path::Path;
 use crate::geometry::root::increasing_root;
-use crate::geometry::spiral::{Angle, Spiral};
+use crate::geometry::spiral::Spiral;
 
 /// Knots per link.
 pub(super) const PHASES: usize = 4;
@@ -236,12 +236,11 @@ fn leader(tau: f64, guess: f64, term: f64) -> Option<f64> {
 }
 
 fn tabulated(knots: &[i128]) -> [Phase; PHASES] {
-    let followed = knots.len().saturating_sub(PHASES);
     let tilts: Vec<f64> =
         knots.windows(PHASES + 1).map(|link| tilt(turns(link[0]), turns(link[PHASES] - link[0]))).collect();
     let mut phases: [Phase; PHASES] = Default::default();
-    // The last has no next tilt.
-    for knot in 0..followed.saturating_sub(PHASES) {
+    // The last ones have no next tilt; left out as a whole link, so that all lists are of one length.
+    for knot in 0..tilts.len().saturating_sub(PHASES) {
         let phase = &mut phases[knot % PHASES];
         let fraction = fraction(knots[knot]);
         let (sine, cosine) = (TAU * fraction).sin_cos();
@@ -263,15 +262,6 @@ pub(super) fn tilt(tau: f64, u: f64) -> f64 {
     0.5 * u - 0.25 - (u * cosine).atan2((tau + tau + u) * sine) / TAU
 }
 
-/// How much slower the rear handle of a link turns than the front one: 1 - g_tau / g_u, with g as in [`leader`] written
-/// for the front handle.
-pub(super) fn ratio_of_rates(tau: f64, u: f64) -> f64 {
-    let (sine, cosine) = (PI * u).sin_cos();
-    let (outer, square) = (tau + u, sine * sine);
-    let by_increment = 0.5 * u + tau * square + TAU * tau * outer * sine * cosine;
-    1.0 - (tau + outer) * square / by_increment
-}
-
 /// Fixed-point turns as a number.
 pub(super) fn turns(fixed: i128) -> f64 {
     fixed as f64 / 2f64.powi(64)
@@ -285,9 +275,4 @@ pub(super) fn fraction(fixed: i128) -> f64 {
 /// A number of turns in fixed point.
 fn fixed(turns: f64) -> i128 {
     (turns * 2f64.powi(64)) as i128
-}
-
-/// The place of an angle in fixed point.
-pub(super) fn place(angle: Angle) -> i128 {
-    angle.in_fixed_point_turns()
 }

@@ -5,7 +5,7 @@
 
 use std::f64::consts::TAU;
 
-use super::columns::{Columns, fraction, place, ratio_of_rates, tilt, turns};
+use super::columns::{Columns, fraction, tilt, turns};
 use super::stencil::{DIFFERENCES, REACH, Stencil};
 use crate::chain::Team;
 use crate::geometry::path::Path;
@@ -74,7 +74,7 @@ pub(super) struct Lead {
 /// A knot while the table is made.
 struct Making {
     head: Angle,
-    second: i128,
+    second: Angle,
     tilt: f64,
 }
 
@@ -92,28 +92,21 @@ impl Heads {
     /// The table from the start inward as far as it is exact; `None` where it is not at the start.
     pub(super) fn new(path: &Spiral, team: &Team, columns: &Columns, stencil: &Stencil) -> Option<Self> {
         let spacing = spacing(team);
-        let mut outward = vec![path.start()];
-        for _ in 0..REACH {
-            outward.push(path.ahead(*outward.last()?, -spacing)?);
-        }
-        let mut places: Vec<Angle> = outward.into_iter().rev().collect();
+        let outermost = (0..REACH).try_fold(path.start(), |place, _| path.ahead(place, -spacing))?;
         let mut made: Vec<Making> = Vec::new();
         let mut knots = Vec::new();
-        for at in 0.. {
-            let Some(head) = places.get(at).copied().or_else(|| path.ahead(*places.last()?, spacing)) else { break };
-            if at == places.len() {
-                places.push(head);
-            }
+        for head in std::iter::successors(Some(outermost), |place| path.ahead(*place, spacing)) {
             let Some(knot) = Making::of(path, team, head) else { break };
-            let Some((column_knot, between)) = columns.locate(knot.second, team.benches, stencil) else { break };
-            let fixed = place(head);
+            let second = knot.second.in_fixed_point_turns();
+            let Some((column_knot, between)) = columns.locate(second, team.benches, stencil) else { break };
+            let fixed = head.in_fixed_point_turns();
             knots.push(Knot { turns: turns(fixed), fraction: fraction(fixed), tilt: knot.tilt, column_knot, between });
             made.push(knot);
         }
         let of_pairs = |difference: &dyn Fn(usize) -> f64| (1..made.len()).map(difference).collect();
         let heads = Self {
             spacing,
-            turns: of_pairs(&|next| turns(place(made[next].head) - place(made[next - 1].head))),
+            turns: of_pairs(&|next| turns_between(made[next - 1].head, made[next].head)),
             columns: of_pairs(&|next| {
                 let (before, after) = (&knots[next - 1], &knots[next]);
                 (after.column_knot as f64 - before.column_knot as f64) + (after.between - before.between)
@@ -195,26 +188,30 @@ impl Heads {
 impl Making {
     fn of(path: &Spiral, team: &Team, head: Angle) -> Option<Self> {
         let second = path.follower(head, team.link(0)).ok()?;
-        let (first, second) = (place(head), place(second));
-        Some(Self { head, second, tilt: tilt(turns(first), turns(second - first)) })
+        Some(Self { head, second, tilt: tilt(head.in_turns(), turns_between(head, second)) })
     }
+}
+
+/// Turns from one place to another, negative if that is further in.
+fn turns_between(from: Angle, to: Angle) -> f64 {
+    turns(to.in_fixed_point_turns() - from.in_fixed_point_turns())
 }
 
 /// Whether the places of the first two handles, the angles of their benches and the second one's speed are right.
 fn is_right(lead: &Lead, right: &Making, path: &Spiral, team: &Team, columns: &Columns, stencil: &Stencil) -> bool {
-    let (head, tau) = (place(right.head), turns(right.second));
-    let radius = path.pitch() * tau;
+    let (head, second) = (right.head.in_fixed_point_turns(), right.second.in_fixed_point_turns());
+    let radius = path.radius(right.second);
     let metres = TAU * radius.hypot(path.growth());
     let allowed = (ERROR_OF_LINK * team.link(0).min(team.link(1))).min(MOST_ERROR).max(ERROR_OF_RADIUS * radius);
     let Some(third) = path.increment(radius, team.link(1)).ok() else { return false };
-    let head_slope = 1.0 / (path.pitch() * 1f64.hypot(right.head.radians()));
-    let slope = ratio_of_rates(turns(head), turns(right.second - head)) * head_slope;
-    let second = columns.around(lead.knot, lead.between, stencil);
-    let rate = second.turns_per_knot * -lead.knots_per_metre;
+    let bench = path.bench(right.head, right.second, team.link(0));
+    let speed = bench.front_cosine / bench.rear_cosine;
+    let found = columns.around(lead.knot, lead.between, stencil);
+    let found_speed = found.turns_per_knot * -lead.knots_per_metre * metres;
     let error_of_turns = |error: f64| error.abs() * metres <= allowed;
     error_of_turns(fraction(head) - lead.fraction - (fraction(head) - lead.fraction).round())
-        && error_of_turns(columns.turns_from(lead.knot, right.second) - second.turns)
+        && error_of_turns(columns.turns_from(lead.knot, second) - found.turns)
         && error_of_turns(right.tilt - lead.tilt)
-        && error_of_turns(tilt(tau, third / TAU) - second.tilt)
-        && (rate - slope).abs() <= ERROR_OF_SPEED * slope.abs().max(head_slope)
+        && error_of_turns(tilt(right.second.in_turns(), third / TAU) - found.tilt)
+        && (found_speed - speed).abs() <= ERROR_OF_SPEED * speed.abs().max(1.0)
 }
