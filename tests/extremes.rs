@@ -426,7 +426,8 @@ fn random_scenes_keep_the_promise() {
         })
         .unwrap();
     println!("{} of {cases} frames were read off a table", tables.get());
-    assert!(tables.get() > u64::from(cases / 4));
+    // Some three in ten are; a tenth is seven deviations of the draw away from that.
+    assert!(tables.get() > u64::from(cases / 10));
 }
 
 #[test]
