@@ -430,6 +430,19 @@ fn random_scenes_keep_the_promise() {
     assert!(tables.get() > u64::from(cases / 10));
 }
 
+/// Where a link is to hold to the last digits of x and y themselves, the angle's own digits must not cost any.
+#[test]
+fn short_links_far_from_the_centre() {
+    let model = Model::new(20, 0.0156, 0.006126810246871752, 0.08501015264165514, 1627.284520913776, 1.0);
+    let mut chain = Chain::new(model.team.handles());
+    let mut solver = model.whole_chain();
+    for k in 0..2000 {
+        let time = 145_193.0 + 0.37 * f64::from(k);
+        solver.solve(time, &mut chain).unwrap();
+        model.assert_sound(&chain, time, "whole_chain");
+    }
+}
+
 #[test]
 fn a_frame_of_the_table_does_not_depend_on_the_ones_before() {
     let model = Model::paper();

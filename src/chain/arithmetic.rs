@@ -100,6 +100,8 @@ pub(super) struct Quarters<L: Lanes> {
     pub quarters: L,
     /// What is left, from -1/8 to 1/8 turns, to the nearest 2^-54.
     pub part: L,
+    /// What is left beyond `part`, to the last bit.
+    pub rest: L,
 }
 
 /// A fraction of a turn in units of 2^-64 as quarter turns and what is left.
@@ -112,13 +114,17 @@ pub(super) fn quarters<L: Lanes>(fraction: L::Bits) -> Quarters<L> {
     let base = L::Bits::all(TWO_TO_52);
     let raised = fraction.plus(L::Bits::all((1 << 61) + HALF_OF_2_TO_MINUS_54));
     let quadrant = raised.down::<62>();
-    let rest = L::from_bits(raised.up::<2>().down::<12>().or(base));
-    // The rest counts 2^-54 turns, from -1/8 turn.
-    let zero = L::all(4_503_599_627_370_496.0 + 2_251_799_813_685_248.0);
+    let left = raised.up::<2>();
+    // The upper bits count 2^-54 turns, from -1/8 turn; the lower twelve 2^-66 turns, from -2^-55 turns.
+    let upper = L::from_bits(left.down::<12>().or(base));
+    let upper_zero = L::all(4_503_599_627_370_496.0 + 2_251_799_813_685_248.0);
+    let lower = L::from_bits(left.and(L::Bits::all(0xfff)).or(base));
+    let lower_zero = L::all(4_503_599_627_370_496.0 + 2048.0);
     Quarters {
         quadrant,
         quarters: L::from_bits(quadrant.or(base)) - L::all(4_503_599_627_370_496.0),
-        part: (rest - zero) * L::all(1.0 / 18_014_398_509_481_984.0),
+        part: (upper - upper_zero) * L::all(1.0 / 18_014_398_509_481_984.0),
+        rest: (lower - lower_zero) * L::all(1.0 / 73_786_976_294_838_206_464.0),
     }
 }
 
@@ -166,6 +172,7 @@ pub(super) fn short_arc_tangent_in_turns<L: Lanes>(x: L) -> L {
 mod tests {
     use super::super::lanes::{Portable, PortableBits, Row};
     use super::*;
+    use crate::geometry::spiral::Angle;
 
     fn one(lanes: Portable) -> f64 {
         lanes.row().0[0]
@@ -180,12 +187,14 @@ mod tests {
         for k in 0..100_000u64 {
             let fraction = k.wrapping_mul(0x9e37_79b9_7f4a_7c15);
             let found = quarters::<Portable>(PortableBits::all(fraction));
-            let (sine, cosine) = turned_by_quarters(found.quadrant, sine_cosine(four(TAU) * found.part));
+            let angle = four(TAU).multiply_add(found.part, four(TAU) * found.rest);
+            let (sine, cosine) = turned_by_quarters(found.quadrant, sine_cosine(angle));
             let (quarters, part) = (one(found.quarters), one(found.part));
             let turns = fraction as f64 / 2f64.powi(64);
-            // Near whole quarters the system's function, given one double, is the less exact one.
-            let (true_sine, true_cosine) = (TAU * turns).sin_cos();
-            assert!((one(sine) - true_sine).abs() < 1.2e-15 && (one(cosine) - true_cosine).abs() < 1.2e-15, "{turns}");
+            // A single double has lost the fraction's last bits.
+            let (upper, lower) = ((fraction >> 32) as f64 / 2f64.powi(32), fraction as u32 as f64 / 2f64.powi(64));
+            let (true_sine, true_cosine) = Angle::from_turns(upper).plus(TAU * lower).sin_cos();
+            assert!((one(sine) - true_sine).abs() < 3e-16 && (one(cosine) - true_cosine).abs() < 3e-16, "{turns}");
             let error = (0.25 * quarters + part - turns).rem_euclid(1.0);
             assert!(error.min(1.0 - error) < 2e-16 && part.abs() <= 0.125, "{turns}");
             let (sine, cosine) = sine_cosine_of_half(four(turns.min(0.999)));

@@ -124,11 +124,11 @@ impl FollowerTable {
         kernel::write::<L>(&self.columns, &self.stencil, &moment, chain);
         let last = chain.handles() - 1;
         chain.heading[last] = chain.heading[last - 1];
-        let (sine, cosine) = (TAU * lead.fraction).sin_cos();
+        let (sine, cosine) = columns::sine_cosine(lead.fraction);
         let r = self.pitch * lead.turns;
         chain.x[0] = r * cosine;
         chain.y[0] = r * sine;
-        let bearing = lead.fraction + lead.tilt;
+        let bearing = columns::fraction_of_turn(lead.fraction) + lead.tilt;
         let within = bearing - bearing.round_ties_even();
         chain.heading[0] = TAU * if within <= -0.5 { 0.5 } else { within };
         if self.velocities == Velocities::Computed {

@@ -126,7 +126,7 @@ impl Columns {
         let (turns, turns_per_knot) = weights.of(&of_stencil(|phase| &phase.to_next));
         let (tilt, _) = weights.of(&of_stencil(|phase| &phase.tilt_to_next));
         let phase = &self.phases[knot % PHASES];
-        let tilt_of_knot = phase.bearing[knot / PHASES] - fraction(self.knots[knot]);
+        let tilt_of_knot = phase.bearing[knot / PHASES] - fraction_of_turn(fraction(self.knots[knot]));
         Single { turns, turns_per_knot, tilt: tilt_of_knot + tilt }
     }
 
@@ -242,12 +242,11 @@ fn tabulated(knots: &[i128]) -> [Phase; PHASES] {
     // The last ones have no next tilt; left out as a whole link, so that all lists are of one length.
     for knot in 0..tilts.len().saturating_sub(PHASES) {
         let phase = &mut phases[knot % PHASES];
-        let fraction = fraction(knots[knot]);
-        let (sine, cosine) = (TAU * fraction).sin_cos();
+        let (sine, cosine) = sine_cosine(fraction(knots[knot]));
         phase.turns.push(turns(knots[knot]));
         phase.cosine.push(cosine);
         phase.sine.push(sine);
-        phase.bearing.push(fraction + tilts[knot]);
+        phase.bearing.push(fraction_of_turn(fraction(knots[knot])) + tilts[knot]);
         phase.to_next.push(turns(knots[knot + 1] - knots[knot]));
         phase.tilt_to_next.push(tilts[knot + 1] - tilts[knot]);
     }
@@ -267,9 +266,26 @@ pub(super) fn turns(fixed: i128) -> f64 {
     fixed as f64 / 2f64.powi(64)
 }
 
-/// The fraction of a turn, -1/2 to 1/2.
-pub(super) fn fraction(fixed: i128) -> f64 {
-    (fixed as i64) as f64 / 2f64.powi(64)
+/// The fraction of a turn of fixed-point turns, -2^63 to 2^63 of 2^-64 turns.
+pub(super) fn fraction(fixed: i128) -> i64 {
+    fixed as i64
+}
+
+/// A fixed-point fraction as a number, -1/2 to 1/2 turns.
+pub(super) fn fraction_of_turn(fixed: i64) -> f64 {
+    fixed as f64 / 2f64.powi(64)
+}
+
+/// Sine and cosine of a fixed-point fraction: of what is left of it beside whole quarters, which a double holds better.
+pub(super) fn sine_cosine(fraction: i64) -> (f64, f64) {
+    let quarters = fraction.wrapping_add(1 << 61) >> 62;
+    let (sine, cosine) = (TAU * fraction_of_turn(fraction.wrapping_sub(quarters << 62))).sin_cos();
+    match quarters & 3 {
+        0 => (sine, cosine),
+        1 => (cosine, -sine),
+        2 => (-sine, -cosine),
+        _ => (-cosine, sine),
+    }
 }
 
 /// A number of turns in fixed point.

@@ -5,7 +5,7 @@
 
 use std::f64::consts::TAU;
 
-use super::columns::{Columns, fraction, tilt, turns};
+use super::columns::{Columns, fraction, fraction_of_turn, tilt, turns};
 use super::stencil::{DIFFERENCES, REACH, Stencil};
 use crate::chain::Team;
 use crate::geometry::path::Path;
@@ -44,9 +44,9 @@ pub(super) struct Heads {
 
 #[derive(Debug, Clone, Copy)]
 struct Knot {
-    /// Turns of the head, and their fraction.
+    /// Turns of the head, and their fraction in fixed point, whose last digits a number would round away.
     turns: f64,
-    fraction: f64,
+    fraction: i64,
     /// The angle of the first bench less that of the head, turns.
     tilt: f64,
     /// The knot of the columns nearest to the second handle and how far beyond it that is.
@@ -59,8 +59,8 @@ struct Knot {
 pub(super) struct Lead {
     /// Turns of the head.
     pub turns: f64,
-    /// Their fraction, give or take a turn.
-    pub fraction: f64,
+    /// Their fraction, in units of 2^-64 turns.
+    pub fraction: i64,
     /// The angle of the first bench less that of the head, turns.
     pub tilt: f64,
     /// The knot of the columns nearest to the second handle.
@@ -176,7 +176,7 @@ impl Heads {
         let whole = beyond_knot.round_ties_even();
         Lead {
             turns: knot.turns + ahead,
-            fraction: knot.fraction + ahead,
+            fraction: knot.fraction.wrapping_add((ahead * 2f64.powi(64)) as i64),
             tilt: knot.tilt + tilt,
             knot: knot.column_knot.wrapping_add_signed(whole as isize),
             between: beyond_knot - whole,
@@ -209,7 +209,7 @@ fn is_right(lead: &Lead, right: &Making, path: &Spiral, team: &Team, columns: &C
     let found = columns.around(lead.knot, lead.between, stencil);
     let found_speed = found.turns_per_knot * -lead.knots_per_metre * metres;
     let error_of_turns = |error: f64| error.abs() * metres <= allowed;
-    error_of_turns(fraction(head) - lead.fraction - (fraction(head) - lead.fraction).round())
+    error_of_turns(fraction_of_turn(fraction(head).wrapping_sub(lead.fraction)))
         && error_of_turns(columns.turns_from(lead.knot, second) - found.turns)
         && error_of_turns(right.tilt - lead.tilt)
         && error_of_turns(tilt(right.second.in_turns(), third / TAU) - found.tilt)

@@ -432,8 +432,9 @@ fn evaluate<L: Lanes>(
     let rate = L::load(&passing.product) * beginnings.rate;
     four.rate[next] = rate.row();
     four.spread[next] = (rate * L::load(&four.ratio)).row();
-    let Quarters { quadrant, quarters, part } = quarters::<L>(fraction);
-    let (sine, cosine) = turned_by_quarters(quadrant, sine_cosine(L::all(TAU) * part));
+    let Quarters { quadrant, quarters, part, rest } = quarters::<L>(fraction);
+    let angle = L::all(TAU).multiply_add(part, L::all(TAU) * rest);
+    let (sine, cosine) = turned_by_quarters(quadrant, sine_cosine(angle));
     // The corrected turns are right to a few digits of their last; the sum, to the last.
     let tau = to_quarter(L::load(&passing.turns) - part) + part;
     four.turns = tau.row();
