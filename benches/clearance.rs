@@ -50,7 +50,7 @@ const CASES: [(usize, usize); 8] =
 
 #[divan::bench(args = CASES)]
 fn live(bencher: Bencher, (benches, percent): (usize, usize)) {
-    run(bencher, benches, percent, Ground::Spiral { pitch: PITCH });
+    run(bencher, benches, percent, Ground::Spiral(Spiral::new(PITCH, 16.0)));
 }
 
 #[divan::bench(args = CASES)]

@@ -110,7 +110,7 @@ impl Show {
         // The paper's bisection can be told to be coarser than the spiral's bounds allow for.
         let ground = match (scene.method, &scene.path) {
             (Method::Named(SolverName::Paper), _) | (_, ScenePath::Pieces(_)) => Ground::Unknown,
-            (_, ScenePath::Spiral(spiral)) => Ground::Spiral { pitch: spiral.pitch() },
+            (_, ScenePath::Spiral(spiral)) => Ground::Spiral(*spiral),
         };
         let clearance = scene.alerts.map(|_| ClearanceMonitor::new(scene.team, ground));
         let level = scene.alerts.map(|rules| AlertLevel::new(rules, playback.rate));

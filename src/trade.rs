@@ -392,7 +392,7 @@ fn live_clearance_ns(scene: &Scene, end: f64) -> f64 {
     const RUN: usize = 40;
     let (mut solver, _) = scene.solver();
     let mut chain = Chain::new(scene.team.handles());
-    let ground = scene.path.spiral().map_or(Ground::Unknown, |spiral| Ground::Spiral { pitch: spiral.pitch() });
+    let ground = scene.path.spiral().map_or(Ground::Unknown, |spiral| Ground::Spiral(*spiral));
     let mut monitor = ClearanceMonitor::new(scene.team, ground);
     let mut times = Vec::with_capacity(RUNS * RUN);
     for run in 0..RUNS {
