@@ -22,20 +22,25 @@ fn team(benches: usize) -> Team {
     Team { benches, head_length: 3.41, body_length: 2.2, width: 0.3, hole_inset: 0.275 }
 }
 
-fn chains(team: Team, percent: usize) -> Vec<Chain> {
-    let solver = Newton::new(Spiral::new(PITCH, 16.0), team, 1.0, Velocities::Omitted);
+fn chains(spiral: Spiral, team: Team, percent: usize) -> Vec<Chain> {
+    let solver = Newton::new(spiral, team, 1.0, Velocities::Omitted);
     let start = 4.12 * percent as f64;
     let frame = |k: usize| {
         let mut chain = Chain::new(team.handles());
-        let head = Spiral::new(PITCH, 16.0).place_at(start + k as f64 / 60.0);
+        let head = spiral.place_at(start + k as f64 / 60.0);
         solver.solve_from(head, &mut chain).expect("the paper's head travels this far before any link locks");
         chain
     };
     (0..FRAMES).map(frame).collect()
 }
 
-fn run(bencher: Bencher, benches: usize, percent: usize, ground: Ground) {
-    let chains = chains(team(benches), percent);
+/// The paper's spiral.
+fn spiral() -> Spiral {
+    Spiral::new(PITCH, 16.0)
+}
+
+fn run(bencher: Bencher, (benches, percent): (usize, usize), spiral: Spiral, ground: Ground) {
+    let chains = chains(spiral, team(benches), percent);
     let mut monitor = ClearanceMonitor::new(team(benches), ground);
     bencher.counter(ItemsCount::new(FRAMES)).bench_local(|| {
         for chain in &chains {
@@ -50,19 +55,32 @@ const CASES: [(usize, usize); 8] =
 
 #[divan::bench(args = CASES)]
 fn live(bencher: Bencher, (benches, percent): (usize, usize)) {
-    run(bencher, benches, percent, Ground::Spiral(Spiral::new(PITCH, 16.0)));
+    run(bencher, (benches, percent), spiral(), Ground::Spiral(spiral()));
 }
 
 #[divan::bench(args = CASES)]
 fn live_on_unknown_ground(bencher: Bencher, (benches, percent): (usize, usize)) {
-    run(bencher, benches, percent, Ground::Unknown);
+    run(bencher, (benches, percent), spiral(), Ground::Unknown);
+}
+
+/// A team too short to meet itself on the next turn: every bench is as near as any to the next but one.
+#[divan::bench]
+fn live_on_less_than_a_turn(bencher: Bencher) {
+    let spiral = Spiral::new(PITCH, 121.7);
+    run(bencher, (223, 0), spiral, Ground::Spiral(spiral));
+}
+
+/// What the table of bounds costs once, before the show.
+#[divan::bench(args = [223, 1_000, 5_000, 10_000], sample_count = 5, sample_size = 1)]
+fn make_monitor(benches: usize) -> ClearanceMonitor {
+    ClearanceMonitor::new(team(benches), Ground::Spiral(spiral()))
 }
 
 /// A peer: the distances of all pairs by parry2d.
 #[divan::bench(sample_count = 5, sample_size = 1)]
 fn all_pairs_by_parry2d(bencher: Bencher) {
     let team = team(223);
-    let chain = chains(team, 50).swap_remove(0);
+    let chain = chains(spiral(), team, 50).swap_remove(0);
     bencher.counter(ItemsCount::new(1usize)).bench_local(|| {
         let boards: Vec<(Pose, Cuboid)> = (0..223)
             .map(|bench| {
@@ -85,7 +103,7 @@ fn all_pairs_by_parry2d(bencher: Bencher) {
 
 #[divan::bench(args = [(223, 50), (1_000, 50), (10_000, 50)], sample_count = 3, sample_size = 1)]
 fn all_pairs(bencher: Bencher, (benches, percent): (usize, usize)) {
-    let chain = chains(team(benches), percent).swap_remove(0);
+    let chain = chains(spiral(), team(benches), percent).swap_remove(0);
     bencher
         .counter(ItemsCount::new(1usize))
         .bench_local(|| least_clearance_all_pairs(black_box(&chain), &team(benches)));
@@ -93,14 +111,14 @@ fn all_pairs(bencher: Bencher, (benches, percent): (usize, usize)) {
 
 #[divan::bench]
 fn separation_of_one_pair(bencher: Bencher) {
-    let chain = chains(team(223), 99).swap_remove(0);
+    let chain = chains(spiral(), team(223), 99).swap_remove(0);
     let (a, b) = (board(&chain, &team(223), 0), board(&chain, &team(223), 8));
     bencher.bench_local(|| separation_board_board(black_box(&a), black_box(&b)));
 }
 
 #[divan::bench]
 fn signed_distance_of_one_pair(bencher: Bencher) {
-    let chain = chains(team(223), 99).swap_remove(0);
+    let chain = chains(spiral(), team(223), 99).swap_remove(0);
     let (a, b) = (board(&chain, &team(223), 0), board(&chain, &team(223), 8));
     bencher.bench_local(|| signed_distance_board_board(black_box(&a), black_box(&b)));
 }

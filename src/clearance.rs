@@ -106,7 +106,7 @@ pub struct ClearanceCounters {
 ///
 /// On a spiral a table made by the constructor says for every bench below what its clearance cannot be where it stands,
 /// and only those are asked that can be within the limit: most often none but the last nearest pair. Where a team or its
-/// way is too long for the table, the head is asked against all whose circles are within the limit, and the rest follows
+/// way is too long for the table, or no boards are as near as turns and benches usually are, the head is asked against all whose circles are within the limit, and the rest follows
 /// in order, each bench against those beside it on the next turns, up to the first bench beyond which the shape of the
 /// spiral itself excludes a nearer pair. Elsewhere, and within a link of the centre, the leading benches are asked as
 /// the head is, and the others by a tree of boxes about consecutive benches.
@@ -134,7 +134,8 @@ pub struct ClearanceMonitor {
 const LEADING_BENCHES: usize = 24;
 
 impl ClearanceMonitor {
-    /// A monitor for the chains of `team`. On a spiral this takes some 10 ms for a way of 500 links, half a second at most.
+    /// A monitor for the chains of `team`. On a spiral it takes some 10 ms for a way of 500 links, about half a second at
+    /// most.
     pub fn new(team: Team, ground: Ground) -> Self {
         let cells = match &ground {
             Ground::Spiral(spiral) => Cells::new(spiral, &team),
@@ -179,11 +180,14 @@ impl ClearanceMonitor {
         }
         let squared = chain.x[1] * chain.x[1] + chain.y[1] * chain.y[1];
         self.located = self.cells.as_ref().and_then(|cells| cells.locate(squared, self.team.benches - 1, self.located));
-        if let (Some(cells), Some(located)) = (&self.cells, self.located) {
-            self.ask_by_cells(chain, cells, located, &mut nearest);
-        } else {
-            self.ask_one_against_all(chain, 0, &mut nearest);
-            self.ask_followers(chain, &mut nearest);
+        match (&self.cells, self.located) {
+            (Some(cells), Some(located)) if nearest.value < cells.farthest() => {
+                self.ask_by_cells(chain, cells, located, &mut nearest);
+            }
+            _ => {
+                self.ask_one_against_all(chain, 0, &mut nearest);
+                self.ask_followers(chain, &mut nearest);
+            }
         }
         self.counters.pairs += nearest.asked;
         self.last_pair = (nearest.pair.1 < self.team.benches).then_some(nearest.pair);
@@ -193,15 +197,16 @@ impl ClearanceMonitor {
 
     /// Asks the pairs that the table does not exclude.
     fn ask_by_cells(&self, chain: &Chain, cells: &Cells, located: Located, nearest: &mut Nearest) {
-        self.ask_near(chain, 0, 1, cells.of_head(located), nearest);
+        let head_squared = chain.x[0] * chain.x[0] + chain.y[0] * chain.y[0];
+        self.ask_near(chain, 0, 1, cells.of_head(head_squared, located), nearest);
         // The last bench and the last but one have none behind that counts.
         let bounds = cells.bounds(located, self.team.benches - 3);
-        for (chunk, bounds) in bounds.chunks(BOUNDS).enumerate() {
+        for (chunk, bounds) in bounds.chunks(BOUNDS_AT_ONCE).enumerate() {
             let limit = (nearest.value as f32).next_up();
             if bounds.iter().fold(false, |near, bound| near | (*bound <= limit)) {
                 for (k, bound) in bounds.iter().enumerate() {
                     if f64::from(*bound) <= nearest.value {
-                        let behind = chunk * BOUNDS + k;
+                        let behind = chunk * BOUNDS_AT_ONCE + k;
                         self.ask_near(chain, 1 + behind, 1 + behind, cells.of_body(located, behind), nearest);
                     }
                 }
@@ -363,7 +368,7 @@ impl ClearanceMonitor {
 }
 
 /// Bounds that are compared together.
-const BOUNDS: usize = 32;
+const BOUNDS_AT_ONCE: usize = 32;
 
 /// Benches whose distances are worked out together, so that the processor does several at once.
 const CHUNK: usize = 8;
@@ -386,6 +391,7 @@ mod tests {
     use crate::chain::newton::Newton;
     use crate::geometry::path::Path;
     use proptest::prelude::*;
+    use std::f64::consts::TAU;
 
     fn team(benches: usize, width: f64) -> Team {
         Team { benches, head_length: 3.41, body_length: 2.2, width, hole_inset: 0.275 }
@@ -434,6 +440,17 @@ mod tests {
             let (compared, counters) = agree(team, pitch, turns, &runs(Spiral::new(pitch, turns).length(), 20));
             assert!(compared >= 60, "{team:?}: {compared}");
             assert_eq!(counters.frames as usize, compared);
+        }
+    }
+
+    /// The handle behind the head is pushed out again to where it was, while the head is elsewhere.
+    #[test]
+    fn the_same_as_all_pairs_past_a_stall() {
+        let four = Team { benches: 4, head_length: 9.5, body_length: 6.5, width: 2.7, hole_inset: 1.1 };
+        let fourteen = Team { benches: 14, head_length: 8.9, body_length: 7.7, width: 1.4, hole_inset: 0.8 };
+        for team in [four, fourteen] {
+            let (compared, _) = agree(team, 8.0, 2.5, &[158.2, 158.22, 158.24, 158.26]);
+            assert_eq!(compared, 4);
         }
     }
 
@@ -505,6 +522,19 @@ mod tests {
             let travels: Vec<f64> =
                 places.iter().flat_map(|place| [place * length, place * length + 1.0 / 60.0]).collect();
             agree(team, pitch, turns, &travels);
+        }
+
+        #[test]
+        fn the_same_as_all_pairs_next_to_the_centre(
+            benches in 3..20usize, turns in 2.0..4.0f64, width in 0.01..0.5f64, inset in 0.0..0.6f64,
+            head in 4.0..6.5f64, body in 2.0..6.0f64, places in prop::collection::vec(0.0..3.0f64, 6),
+        ) {
+            // All in units of pitch / 2 pi.
+            let (head_length, body_length) = (head + 2.0 * inset, body + 2.0 * inset);
+            let team = Team { benches, head_length, body_length, width: width * TAU, hole_inset: inset };
+            let length = Spiral::new(TAU, turns).length();
+            let travels: Vec<f64> = places.iter().flat_map(|place| [length - place - 1e-3, length - place]).collect();
+            agree(team, TAU, turns, &travels);
         }
 
         /// The bound that excludes benches is below the truth among the benches it speaks of.

@@ -4,7 +4,8 @@
 //! All links but the head's are equal: where one handle behind the head stands, all further ones follow. So how near a
 //! bench is to those behind it depends on nothing but its own place. The table divides the path into cells,
 //! [`PHASES`] to a link, such that when a handle is in one, the next handle is in the cell a link further out. For each
-//! it has a lower bound of the clearance, proven at [`Pair`]. Called by the clearance only.
+//! it has a lower bound of the clearance, proven at [`Pair`]; where nothing is proven, a bound that excludes nobody.
+//! Called by the clearance only.
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 use std::ops::Range;
@@ -22,8 +23,15 @@ use crate::geometry::spiral::{Angle, Spiral};
 /// Cells to a link.
 const PHASES: usize = 16;
 
-/// The most links a table spans: about half a second of making.
-const MOST_LINKS: f64 = 16_384.0;
+/// The most benches of a table: 11 MB.
+const MOST_BENCHES: f64 = 16_384.0;
+
+/// The most work to make a table, in pairs looked at: about half a second. Where boards are long against their links or
+/// the turns against the boards, every board has hundreds about it.
+const MOST_WORK: usize = 1 << 29;
+
+/// The work of bounding a pair, in pairs looked at.
+const WORK_OF_BOUND: usize = 128;
 
 /// Beyond so many benches the ones that can be the nearest are on different turns.
 const MOST_NEAREST: usize = 8;
@@ -55,7 +63,12 @@ impl Near {
 /// The table.
 #[derive(Debug, Clone)]
 pub(super) struct Cells {
-    links: usize,
+    /// How many benches have cells, from the inside out.
+    benches: usize,
+    /// The most that a bound says, metres.
+    farthest: f64,
+    /// The squared distance from the origin beyond which a head is told by its rear handle.
+    head_from_squared: f64,
     /// Squared distances from the origin at which the cells begin, from the inside out.
     begins: Vec<f64>,
     /// For body benches.
@@ -84,51 +97,66 @@ impl Cells {
         }
         // A link's arc is longer than its chord; the head's, by less than pi / 2 times.
         let way = (spiral.distance_between(spiral.start(), innermost) + 2.0 * team.link(0)) / link;
-        if way + team.benches as f64 > MOST_LINKS {
+        if way + team.benches as f64 > MOST_BENCHES {
             return None;
         }
-        let head_links = way as usize + 1;
-        let links = head_links + team.benches + 2;
+        let heads = way as usize + 1;
+        let benches = heads + team.benches;
         let span = spiral.follower(innermost, link).ok()?.minus(innermost);
         let stand = |phase: usize| {
-            Stand::new(spiral, team, (links, head_links), innermost.plus(span * phase as f64 / PHASES as f64))
+            Stand::new(spiral, team, benches, heads, innermost.plus(span * phase as f64 / PHASES as f64))
         };
         let mut table = Self {
-            links,
-            begins: vec![0.0; links * PHASES],
-            body: vec![Near::UNKNOWN; links * PHASES],
-            head: vec![Near::UNKNOWN; head_links * PHASES],
-            bounds: vec![f32::NEG_INFINITY; links * PHASES],
+            benches,
+            farthest: (spiral.pitch() - team.width).min(link),
+            head_from_squared: HeadBoard::least_radius(spiral, team).powi(2),
+            begins: vec![0.0; (benches + 1) * PHASES],
+            body: vec![Near::UNKNOWN; benches * PHASES],
+            head: vec![Near::UNKNOWN; heads * PHASES],
+            bounds: vec![f32::NEG_INFINITY; benches * PHASES],
         };
         let innermost_stand = stand(0)?;
         let mut before = innermost_stand.clone();
-        for phase in 0..PHASES - 1 {
-            let after = stand(phase + 1)?;
-            table.fill(phase, &Stretch { spiral, team, before: &before, after: &after, shift: 0 });
-            before = after;
+        let mut work = 0;
+        for phase in 0..PHASES {
+            let after = if phase + 1 < PHASES { Some(stand(phase + 1)?) } else { None };
+            // After the last phase a handle is where the next one was at the first.
+            let (after_it, shift) = after.as_ref().map_or((&innermost_stand, 1), |after| (after, 0));
+            let farthest = table.farthest;
+            let step = PhaseStep { spiral, team, farthest, before: &before, after: after_it, shift };
+            table.fill(phase, &step, &mut work)?;
+            before = after.unwrap_or(before);
         }
-        // After the last phase a handle is where the next one was at the first.
-        table.fill(PHASES - 1, &Stretch { spiral, team, before: &before, after: &innermost_stand, shift: 1 });
         Some(table)
     }
 
-    fn fill(&mut self, phase: usize, stretch: &Stretch) {
+    /// Fills the cells of one phase; `None` where that is too much work.
+    fn fill(&mut self, phase: usize, step: &PhaseStep, work: &mut usize) -> Option<()> {
         let (mut body_end, mut head_end) = (0, 0);
-        for link in 0..self.links {
+        for (begin, radius) in self.begins.iter_mut().skip(phase).step_by(PHASES).zip(&step.before.radii) {
+            *begin = radius * radius;
+        }
+        for link in 0..self.benches {
             let cell = link * PHASES + phase;
-            self.begins[cell] = stretch.before.radii[link].powi(2);
-            if link + 3 < self.links {
-                self.body[cell] = stretch.near(&stretch.body(link, link), link, link + 2, &mut body_end);
-                self.bounds[phase * self.links + link] = self.body[cell].bound;
+            self.body[cell] = step.near(&step.body(link, link), link, link + 2, &mut body_end, work);
+            self.bounds[phase * self.benches + link] = self.body[cell].bound;
+            if let (Some(near), Some(head)) = (self.head.get_mut(cell), step.head(link)) {
+                *near = step.near(&head, link, link + 1, &mut head_end, work);
             }
-            if let (Some(near), Some(head)) = (self.head.get_mut(cell), stretch.head(link)) {
-                *near = stretch.near(&head, link, link + 1, &mut head_end);
+            if *work > MOST_WORK {
+                return None;
             }
         }
+        Some(())
     }
 
-    /// Where the handle at this squared distance from the origin is, if that and `behind` more are in the table; `guess` is
-    /// where it was.
+    /// The most that a bound says, metres: where no boards are nearer, the table excludes nobody.
+    pub(super) fn farthest(&self) -> f64 {
+        self.farthest
+    }
+
+    /// Where the handle at this squared distance from the origin is, if the benches from it on, `behind` of them, are in the
+    /// table; `guess` is where it was.
     pub(super) fn locate(&self, squared: f64, behind: usize, guess: Option<Located>) -> Option<Located> {
         let is_in =
             |cell: usize| self.begins[cell] <= squared && self.begins.get(cell + 1).is_some_and(|end| squared < *end);
@@ -141,12 +169,13 @@ impl Cells {
             self.begins.partition_point(|begin| *begin <= squared).checked_sub(1)?
         };
         let (link, phase) = (cell / PHASES, cell % PHASES);
-        (link + behind + 3 < self.links).then_some(Located { link, phase })
+        (link + behind <= self.benches).then_some(Located { link, phase })
     }
 
-    /// What is known of the head, its rear handle being `located`.
-    pub(super) fn of_head(&self, located: Located) -> &Near {
-        self.head.get(located.link * PHASES + located.phase).unwrap_or(&Near::UNKNOWN)
+    /// What is known of the head at this squared distance from the origin, its rear handle being `located`.
+    pub(super) fn of_head(&self, squared: f64, located: Located) -> &Near {
+        let near = self.head.get(located.link * PHASES + located.phase);
+        near.filter(|_| squared > self.head_from_squared).unwrap_or(&Near::UNKNOWN)
     }
 
     /// What is known of the bench so many links behind the handle `located`.
@@ -156,12 +185,12 @@ impl Cells {
 
     /// The bounds of that many benches, the first one's front handle being `located`.
     pub(super) fn bounds(&self, located: Located, benches: usize) -> &[f32] {
-        let first = located.phase * self.links + located.link;
+        let first = located.phase * self.benches + located.link;
         &self.bounds[first..first + benches]
     }
 }
 
-/// A chain of equal links from a place outward, and a head's board before each handle.
+/// A chain of equal links from a place outward, and a head's board before each of the first handles.
 #[derive(Clone)]
 struct Stand {
     radii: Vec<f64>,
@@ -178,21 +207,33 @@ struct HeadBoard {
 }
 
 impl Stand {
-    fn new(spiral: &Spiral, team: &Team, (links, head_links): (usize, usize), innermost: Angle) -> Option<Self> {
-        let equal = Team { benches: links, head_length: team.body_length, ..*team };
+    /// One bench more than `benches`: after the last phase a bench is where the next one was.
+    fn new(spiral: &Spiral, team: &Team, benches: usize, heads: usize, innermost: Angle) -> Option<Self> {
+        let equal = Team { benches: benches + 1, head_length: team.body_length, ..*team };
         let mut chain = Chain::new(equal.handles());
         Newton::new(*spiral, equal, 1.0, Velocities::Omitted).solve_from(innermost, &mut chain).ok()?;
         let handles = || chain.x.iter().zip(&chain.y).map(|(x, y)| Point::new(*x, *y));
         Some(Self {
             radii: handles().map(|handle| handle.coords.norm()).collect(),
-            boards: (0..links).map(|bench| super::board(&chain, &equal, bench)).collect(),
-            heads: handles().take(head_links + 1).map(|rear| HeadBoard::before(spiral, team, rear)).collect(),
+            boards: (0..=benches).map(|bench| super::board(&chain, &equal, bench)).collect(),
+            heads: handles().take(heads + 1).map(|rear| HeadBoard::before(spiral, team, rear)).collect(),
         })
     }
 }
 
 impl HeadBoard {
-    /// The head whose rear handle is at `rear`; `None` where its link would span more than a quarter turn.
+    /// The distance from the origin beyond which a head is told by its rear handle.
+    ///
+    /// The rear handle at R, an increment d outward of the front one at r = R - a d: the square of the link is
+    /// (a d)^2 + 4 R r sin^2(d/2), and grows with d by 2 a^2 d + 4 R sin(d/2) (r cos(d/2) - a sin(d/2)). Where r > a and
+    /// d <= pi / 2 that is positive, for all smaller d too; and d <= 2 asin(link / 2 r) <= pi / 2 where r >= link / sqrt 2.
+    /// So there is one such head. Further in there can be two: past its stall the head goes on while the handle behind it
+    /// is pushed out again, to where it was.
+    fn least_radius(spiral: &Spiral, team: &Team) -> f64 {
+        (team.link(0) * FRAC_1_SQRT_2).max(spiral.growth())
+    }
+
+    /// The head whose rear handle is at `rear`; `None` where it is not told by that.
     fn before(spiral: &Spiral, team: &Team, rear: Point) -> Option<Self> {
         let (link, outer) = (team.link(0), rear.coords.norm());
         // The law of cosines the other way round: a handle inward is one at a negative increment.
@@ -203,7 +244,7 @@ impl HeadBoard {
         };
         let increment = increasing_root(inward, 0.0, FRAC_PI_2, link / outer);
         let radius = outer - spiral.growth() * increment;
-        if radius <= (link * FRAC_1_SQRT_2).max(spiral.growth()) || inward(increment).0.abs() > 1e-12 * link * link {
+        if radius <= Self::least_radius(spiral, team) || inward(increment).0.abs() > 1e-12 * link * link {
             return None;
         }
         let (sine, cosine) = increment.sin_cos();
@@ -215,9 +256,11 @@ impl HeadBoard {
 
 /// The cells of one phase: from where the handles stand in `before` to where they stand in `after`, a handle of number n
 /// in the one being n + `shift` in the other.
-struct Stretch<'a> {
+struct PhaseStep<'a> {
     spiral: &'a Spiral,
     team: &'a Team,
+    /// See [`Cells::farthest`].
+    farthest: f64,
     before: &'a Stand,
     after: &'a Stand,
     shift: usize,
@@ -229,9 +272,12 @@ struct Stretch<'a> {
 /// follower has, with a = pitch / 2 pi, r' = r + a d and d <= pi / 2,
 /// d' = -4 a (r + r') sin^2(d/2) / (2 a^2 d + 4 a r sin^2(d/2) + 2 r r' sin d), from the derivative of the law of cosines.
 /// So 0 >= d' >= -(2 a / r) tan(d/2). Summing the logarithmic derivatives of its factors, |d''| <= 6 (a / r) |d'|, at most
-/// twist = 12 (a / r)^2 tan(d/2). A follower turns by theta' (1 + d') where its front handle turns by theta': so of all
-/// handles from the one in the cell on, 0 < theta' <= 1, and |theta''| <= n twist for the n-th. The head's front handle
-/// has theta' = 1 / (1 + d') and |theta''| <= twist theta'^3, with its own link's d.
+/// twist = 12 (a / r)^2 tan(d/2). And 1 + d' has the sign of 2 a^2 d + 4 r' sin(d/2) (r cos(d/2) - a sin(d/2)). That is
+/// positive where r is a link or more: then d <= 2 asin(1/2) and d <= link / a <= r / a, so tan(d/2) < r / a.
+///
+/// A follower turns by theta' (1 + d') where its front handle turns by theta': so of all handles from the one in the cell
+/// on, 0 < theta' <= 1, and |theta''| <= n twist for the n-th. The head's front handle has theta' = 1 / (1 + d') and
+/// |theta''| <= twist theta'^3, with its own link's d.
 ///
 /// A handle at (r, theta) has the velocity (a, r) theta' along and across its ray, at most (r + a) theta', and an
 /// acceleration of at most (r + 2 a) (theta'^2 + |theta''|). Points of the board are fixed linear functions of its two
@@ -248,7 +294,7 @@ struct Mover {
     rate: f64,
 }
 
-impl Stretch<'_> {
+impl PhaseStep<'_> {
     /// The growth of phi while the handle `link` is in its cell.
     fn growth_of_angle(&self, link: usize) -> f64 {
         (self.after.radii[link + self.shift] - self.before.radii[link]) / self.spiral.growth()
@@ -287,41 +333,50 @@ impl Stretch<'_> {
         Some(self.mover(cell, (before.board, after.board), 0, acceleration, slowed.recip()))
     }
 
-    /// How near `mover` can be to the benches from `from` on; none before `end` is too far inward, as for those inward of it.
-    fn near(&self, mover: &Mover, cell: usize, from: usize, end: &mut usize) -> Near {
-        // The nearest bench is hardly further than the next turn or the next bench but one.
-        let farthest = (self.spiral.pitch() - self.team.width).min(self.team.link(1));
-        let (link, circle) = (self.team.link(1), circle_radius(self.team, 1));
+    /// How near `mover` can be to the benches from `from` on. `candidates_end` is a bench beyond which all are too far out,
+    /// for this and every cell further in; it is moved on. What was looked at is added to `work`.
+    fn near(&self, mover: &Mover, cell: usize, from: usize, candidates_end: &mut usize, work: &mut usize) -> Near {
+        let (link, circle, corner) =
+            (self.team.link(1), circle_radius(self.team, 1), self.team.hole_inset.hypot(0.5 * self.team.width));
         // A board's points are within its corner of the segment between the handles, and that is at most so far inward of
         // the front handle as the foot of the origin on it.
-        let corner = self.team.hole_inset.hypot(0.5 * self.team.width);
-        let reached = self.after.radii[cell + 1 + self.shift] + 2.0 * corner + farthest;
+        let reached = self.after.radii[cell + 1 + self.shift] + 2.0 * corner + self.farthest;
         let last = self.before.boards.len() - 1;
-        while *end < last && self.before.radii[*end].powi(2) - 0.25 * link * link <= reached * reached {
-            *end += 1;
+        while *candidates_end < last
+            && self.before.radii[*candidates_end].powi(2) - 0.25 * link * link <= reached * reached
+        {
+            *candidates_end += 1;
         }
-        let outermost = reached + 2.0 * link + self.spiral.growth();
-        let handle_travel = outermost * mover.rate * self.growth_of_angle(cell);
-        let apart = mover.circle + circle + farthest + 2.0 * handle_travel;
+        // Half a link further out is the outermost candidate's front handle, a link further its rear one, and the cell ends
+        // some sixteenth of a link further still.
+        let outermost = reached + 2.0 * link;
+        let handle_travel = (outermost + self.spiral.growth()) * mover.rate * self.growth_of_angle(cell);
+        let apart = mover.circle + circle + self.farthest + 2.0 * handle_travel;
         let reach = mover.reach + Board::reach(link, self.team.hole_inset, self.team.width);
+        // The handles are on the spiral up to the solver's accuracy and the last digits of their coordinates.
+        let rounding = (1e-9 + 64.0 * f64::EPSILON * outermost) * reach;
         let centre = mover.before.centre;
         let (mut pairs, mut most) = (Vec::new(), f64::INFINITY);
-        for bench in from..*end {
+        for bench in from..*candidates_end {
             let board = &self.before.boards[bench];
             if (board.centre - centre).norm_squared() <= apart * apart
-                && separation_board_board(&mover.before, board) <= farthest + reach * handle_travel
+                && separation_board_board(&mover.before, board) <= self.farthest + reach * handle_travel
             {
-                let (bound, at_an_end) = Pair { front: mover, rear: &self.body(cell, bench) }.bound(outermost);
-                most = most.min(at_an_end);
+                let pair = Pair { front: mover, rear: &self.body(cell, bench) };
+                let (bound, at_ends) = pair.bound();
+                most = most.min(at_ends);
                 pairs.push((bench, bound));
             }
         }
+        *work += candidates_end.saturating_sub(from) + WORK_OF_BOUND * pairs.len();
         let can_be_nearest = || pairs.iter().filter(|(_, bound)| *bound <= most).map(|(bench, _)| *bench);
         let first = can_be_nearest().next().unwrap_or(cell);
         let end =
             can_be_nearest().take_while(|bench| *bench < first + MOST_NEAREST).last().map_or(first, |last| last + 1);
+        // The benches left out are farther than `farthest`.
         let least = |pairs: &mut dyn Iterator<Item = &(usize, f64)>| {
-            (pairs.fold(farthest, |least, (_, bound)| least.min(*bound)) as f32).next_down()
+            let least = pairs.fold(self.farthest, |least, (_, bound)| least.min(*bound));
+            ((least - rounding) as f32).next_down()
         };
         Near {
             bound: least(&mut pairs.iter()),
@@ -349,9 +404,9 @@ struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    /// The clearance is not below the first number; the second is what it is at one end. `size` is a distance from the
-    /// origin beyond both.
-    fn bound(&self, size: f64) -> (f64, f64) {
+    /// The clearance is not below the first number. The second is the greater of those at the ends, from which nothing
+    /// follows but whom to expect as the nearest.
+    fn bound(&self) -> (f64, f64) {
         let Self { front, rear } = self;
         let ends = [(&front.before, &rear.before), (&front.after, &rear.after)];
         let [begin, end] = ends.map(|(front, rear)| signed_distance_board_board(front, rear));
@@ -362,20 +417,14 @@ impl Pair<'_> {
                 (offset.dot(&rear.axis), offset.dot(&rear.across()))
             })
         });
-        let moved = before
-            .iter()
-            .zip(&after)
-            .map(|(p, q)| (p.0 - q.0).powi(2) + (p.1 - q.1).powi(2))
-            .fold(0.0, f64::max)
-            .sqrt();
+        let moved_squared =
+            before.iter().zip(&after).map(|(p, q)| (p.0 - q.0).powi(2) + (p.1 - q.1).powi(2)).fold(0.0, f64::max);
         let turn = (rear.after.axis - rear.before.axis).norm();
         let bend = front.bend + rear.bend;
-        let travel = (moved + turn * least.max(0.0) + 0.5 * bend) / (1.0 - turn);
+        let travel = (moved_squared.sqrt() + turn * least.max(0.0) + 0.5 * bend) / (1.0 - turn);
         let nearest = least - 0.5 * travel;
-        // The handles are on the spiral up to the solver's accuracy and the last digits of their coordinates.
-        let rounding = (1e-9 + 64.0 * f64::EPSILON * size) * (front.reach + rear.reach);
         if turn < 0.5 && nearest > 0.0 {
-            (least - 0.125 * (bend + travel * travel / nearest) - rounding, most)
+            (least - 0.125 * (bend + travel * travel / nearest), most)
         } else {
             (f64::NEG_INFINITY, most)
         }
@@ -398,7 +447,11 @@ mod tests {
         let boards: Vec<Board> = (0..team.benches).map(|bench| board(&chain, team, bench)).collect();
         let (mut least_bound, mut least) = (f64::INFINITY, f64::INFINITY);
         for a in 0..team.benches - 2 {
-            let (near, front) = if a == 0 { (cells.of_head(located), 1) } else { (cells.of_body(located, a - 1), a) };
+            let (near, front) = if a == 0 {
+                (cells.of_head(chain.x[0].powi(2) + chain.y[0].powi(2), located), 1)
+            } else {
+                (cells.of_body(located, a - 1), a)
+            };
             assert!(a == 0 || cells.bounds(located, a)[a - 1] == near.bound);
             least_bound = least_bound.min(f64::from(near.bound));
             for b in a + 2..team.benches {
@@ -432,6 +485,8 @@ mod tests {
         assert!(table(16.0, Team { benches: 2, ..team }).is_none(), "no pair counts");
         assert!(table(16.0, Team { width: 0.55, ..team }).is_none(), "boards on two turns always overlap");
         assert!(table(1e6, team).is_none() && table(16.0, Team { benches: 20_000, ..team }).is_none(), "too long");
+        let crowded = Team { benches: 15_000, body_length: 1.0, hole_inset: 0.475, ..team };
+        assert!(Cells::new(&Spiral::new(0.31, 16.0), &crowded).is_none(), "hundreds of boards about every one");
         let (cells, short) = (table(16.0, team).unwrap(), table(16.0, Team { benches: 20, ..team }).unwrap());
         assert!(cells.locate(1.0, 222, None).is_none() && cells.locate(f64::NAN, 222, None).is_none());
         assert!(cells.locate(64.0, 222, None).is_some());
