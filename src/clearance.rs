@@ -106,10 +106,11 @@ pub struct ClearanceCounters {
 ///
 /// On a spiral a table made by the constructor says for every bench below what its clearance cannot be where it stands,
 /// and only those are asked that can be within the limit: most often none but the last nearest pair. Where a team or its
-/// way is too long for the table, or no boards are as near as turns and benches usually are, the head is asked against all whose circles are within the limit, and the rest follows
-/// in order, each bench against those beside it on the next turns, up to the first bench beyond which the shape of the
-/// spiral itself excludes a nearer pair. Elsewhere, and within a link of the centre, the leading benches are asked as
-/// the head is, and the others by a tree of boxes about consecutive benches.
+/// way is too long for the table, or no boards are as near as turns and benches usually are, the head is asked against
+/// all whose circles are within the limit, and the rest follows in order, each bench against those beside it on the next
+/// turns, up to the first bench beyond which the shape of the spiral itself excludes a nearer pair. Elsewhere, and within
+/// a link of the centre, the leading benches are asked as the head is, and the others by a tree of boxes about
+/// consecutive benches.
 #[derive(Debug, Clone)]
 pub struct ClearanceMonitor {
     team: Team,
