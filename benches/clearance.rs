@@ -1,14 +1,16 @@
 //! What the least clearance of a frame costs: all pairs against the live way, and one pair.
 //!
-//! Every case averages over a run of consecutive 60 Hz frames at one place of the show, given in hundredths of the
-//! head's way to the contact (of the way that leaves it 4 m from the centre, for longer teams).
+//! Every case averages over a run of consecutive frames at one place of the show. On the paper's spiral it is given in
+//! hundredths of the head's way to the contact (of the way that leaves it 4 m from the centre, for longer teams).
 
-use bench_dragon::chain::newton::Newton;
-use bench_dragon::chain::{Chain, Team, Velocities};
-use bench_dragon::clearance::{ClearanceMonitor, Ground, board, least_clearance_all_pairs};
-use bench_dragon::geometry::path::Path;
-use bench_dragon::geometry::separation::{separation_board_board, signed_distance_board_board};
-use bench_dragon::geometry::spiral::Spiral;
+use bench_dragon::model::Point;
+use bench_dragon::model::curve::Side;
+use bench_dragon::model::path::Path;
+use bench_dragon::model::separation::{separation_board_board, signed_distance_board_board};
+use bench_dragon::model::team::Team;
+use bench_dragon::motion::clearance::{ClearanceMonitor, board, least_clearance_all_pairs};
+use bench_dragon::solve::newton::Newton;
+use bench_dragon::solve::{Chain, Velocities};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use parry2d_f64::math::Pose;
@@ -22,29 +24,43 @@ fn team(benches: usize) -> Team {
     Team { benches, head_length: 3.41, body_length: 2.2, width: 0.3, hole_inset: 0.275 }
 }
 
-fn chains(spiral: Spiral, team: Team, percent: usize) -> Vec<Chain> {
-    let solver = Newton::new(spiral, team, 1.0, Velocities::Omitted);
-    let start = 4.12 * percent as f64;
+/// The chains of consecutive frames, with the metres the head has travelled.
+fn chains(path: &Path, team: Team, start: f64, rate: f64) -> Vec<(Chain, f64)> {
+    let solver = Newton::new(path.clone(), team, 1.0, Velocities::Omitted);
     let frame = |k: usize| {
         let mut chain = Chain::new(team.handles());
-        let head = spiral.place_at(start + k as f64 / 60.0);
-        solver.solve_from(head, &mut chain).expect("the paper's head travels this far before any link locks");
-        chain
+        let travelled = start + k as f64 / rate;
+        solver.solve_at(travelled, &mut chain).expect("the head travels this far before any link locks");
+        (chain, travelled)
     };
     (0..FRAMES).map(frame).collect()
 }
 
 /// The paper's spiral.
-fn spiral() -> Spiral {
-    Spiral::new(PITCH, 16.0)
+fn spiral() -> Path {
+    Path::spiral(PITCH, 16.0)
 }
 
-fn run(bencher: Bencher, (benches, percent): (usize, usize), spiral: Spiral, ground: Ground) {
-    let chains = chains(spiral, team(benches), percent);
-    let mut monitor = ClearanceMonitor::new(team(benches), ground);
+fn at(percent: usize) -> f64 {
+    4.12 * percent as f64
+}
+
+/// The path of `config/turnaround.toml`.
+fn turnaround() -> Path {
+    Path::turnaround(1.7, 4.5, 2.0, 100.0, 369.16).expect("its segments join")
+}
+
+/// The path of `config/procession.toml`.
+fn procession() -> Path {
+    let corner = Path::route(Point::new(-30.0, -10.0), 0.0).line(40.0).arc(Side::Left, 6.0, 0.25).line(12.0);
+    let bends = corner.arc(Side::Right, 5.0, 0.5).line(10.0).arc(Side::Left, 5.0, 0.5).line(120.0);
+    bends.build().expect("its segments join")
+}
+
+fn run(bencher: Bencher, mut monitor: ClearanceMonitor, chains: &[(Chain, f64)]) {
     bencher.counter(ItemsCount::new(FRAMES)).bench_local(|| {
-        for chain in &chains {
-            black_box(monitor.least_clearance(black_box(chain)));
+        for (chain, travelled) in chains {
+            black_box(monitor.least_clearance(black_box(chain), *travelled));
         }
     });
 }
@@ -55,32 +71,61 @@ const CASES: [(usize, usize); 8] =
 
 #[divan::bench(args = CASES)]
 fn live(bencher: Bencher, (benches, percent): (usize, usize)) {
-    run(bencher, (benches, percent), spiral(), Ground::Spiral(spiral()));
+    let chains = chains(&spiral(), team(benches), at(percent), 60.0);
+    run(bencher, ClearanceMonitor::new(&spiral(), team(benches)), &chains);
+}
+
+/// Metres of travel: in along the spiral, in the turn, and between the lanes that still come in.
+#[divan::bench(args = [50.0, 110.0, 200.0, 300.0, 400.0])]
+fn live_on_the_turnaround(bencher: Bencher, travelled: f64) {
+    let chains = chains(&turnaround(), team(223), travelled, 60.0);
+    run(bencher, ClearanceMonitor::new(&turnaround(), team(223)), &chains);
+}
+
+/// Metres of travel. On the straight lines at the beginning all neighbours are equally near, so that all are tested.
+#[divan::bench(args = [10.0, 60.0, 90.0, 120.0, 200.0])]
+fn live_on_the_procession(bencher: Bencher, travelled: f64) {
+    let chains = chains(&procession(), team(60), travelled, 60.0);
+    run(bencher, ClearanceMonitor::new(&procession(), team(60)), &chains);
 }
 
 #[divan::bench(args = CASES)]
-fn live_on_unknown_ground(bencher: Bencher, (benches, percent): (usize, usize)) {
-    run(bencher, (benches, percent), spiral(), Ground::Unknown);
+fn live_without_table(bencher: Bencher, (benches, percent): (usize, usize)) {
+    let chains = chains(&spiral(), team(benches), at(percent), 60.0);
+    run(bencher, ClearanceMonitor::without_table(team(benches)), &chains);
+}
+
+/// The same with 223 benches, by frames a second: what a frame has to find out anew goes with the way between two.
+#[divan::bench(args = [60.0, 1_000.0, 20_000.0])]
+fn live_without_table_by_rate(bencher: Bencher, rate: f64) {
+    let chains = chains(&spiral(), team(223), at(50), rate);
+    run(bencher, ClearanceMonitor::without_table(team(223)), &chains);
 }
 
 /// A team too short to meet itself on the next turn: every bench is as near as any to the next but one.
 #[divan::bench]
 fn live_on_less_than_a_turn(bencher: Bencher) {
-    let spiral = Spiral::new(PITCH, 121.7);
-    run(bencher, (223, 0), spiral, Ground::Spiral(spiral));
+    let spiral = Path::spiral(PITCH, 60.0);
+    let chains = chains(&spiral, team(100), 0.0, 60.0);
+    run(bencher, ClearanceMonitor::new(&spiral, team(100)), &chains);
 }
 
-/// What the table of bounds costs once, before the show.
+/// What the table of bounds costs once, before the show, with the follower table from which it is made.
 #[divan::bench(args = [223, 1_000, 5_000, 10_000], sample_count = 5, sample_size = 1)]
 fn make_monitor(benches: usize) -> ClearanceMonitor {
-    ClearanceMonitor::new(team(benches), Ground::Spiral(spiral()))
+    ClearanceMonitor::new(&spiral(), team(benches))
+}
+
+#[divan::bench(sample_count = 5, sample_size = 1)]
+fn make_monitor_of_the_turnaround() -> ClearanceMonitor {
+    ClearanceMonitor::new(&turnaround(), team(223))
 }
 
 /// A peer: the distances of all pairs by parry2d.
 #[divan::bench(sample_count = 5, sample_size = 1)]
 fn all_pairs_by_parry2d(bencher: Bencher) {
     let team = team(223);
-    let chain = chains(spiral(), team, 50).swap_remove(0);
+    let (chain, _) = chains(&spiral(), team, at(50), 60.0).swap_remove(0);
     bencher.counter(ItemsCount::new(1usize)).bench_local(|| {
         let boards: Vec<(Pose, Cuboid)> = (0..223)
             .map(|bench| {
@@ -103,7 +148,7 @@ fn all_pairs_by_parry2d(bencher: Bencher) {
 
 #[divan::bench(args = [(223, 50), (1_000, 50), (10_000, 50)], sample_count = 3, sample_size = 1)]
 fn all_pairs(bencher: Bencher, (benches, percent): (usize, usize)) {
-    let chain = chains(spiral(), team(benches), percent).swap_remove(0);
+    let (chain, _) = chains(&spiral(), team(benches), at(percent), 60.0).swap_remove(0);
     bencher
         .counter(ItemsCount::new(1usize))
         .bench_local(|| least_clearance_all_pairs(black_box(&chain), &team(benches)));
@@ -111,14 +156,14 @@ fn all_pairs(bencher: Bencher, (benches, percent): (usize, usize)) {
 
 #[divan::bench]
 fn separation_of_one_pair(bencher: Bencher) {
-    let chain = chains(spiral(), team(223), 99).swap_remove(0);
+    let (chain, _) = chains(&spiral(), team(223), at(99), 60.0).swap_remove(0);
     let (a, b) = (board(&chain, &team(223), 0), board(&chain, &team(223), 8));
     bencher.bench_local(|| separation_board_board(black_box(&a), black_box(&b)));
 }
 
 #[divan::bench]
 fn signed_distance_of_one_pair(bencher: Bencher) {
-    let chain = chains(spiral(), team(223), 99).swap_remove(0);
+    let (chain, _) = chains(&spiral(), team(223), at(99), 60.0).swap_remove(0);
     let (a, b) = (board(&chain, &team(223), 0), board(&chain, &team(223), 8));
     bencher.bench_local(|| signed_distance_board_board(black_box(&a), black_box(&b)));
 }

@@ -6,18 +6,17 @@
 
 use std::f64::consts::TAU;
 
-use bench_dragon::chain::follower_table::FollowerTable;
-use bench_dragon::chain::newton::Newton;
-use bench_dragon::chain::paper::{Paper, PaperRules};
-use bench_dragon::chain::whole_chain::WholeChain;
-use bench_dragon::chain::{Chain, Instructions, Solver, Team, Velocities};
-use bench_dragon::geometry::pieces::PiecePath;
-use bench_dragon::geometry::spiral::Spiral;
 use bench_dragon::live::Publisher;
 use bench_dragon::messages::FrameHeader;
+use bench_dragon::model::path::Path;
+use bench_dragon::model::team::Team;
+use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::Scene;
-use bench_dragon::show::timeline::Timeline;
 use bench_dragon::show::{Playback, Show};
+use bench_dragon::solve::newton::Newton;
+use bench_dragon::solve::paper::{Paper, PaperRules};
+use bench_dragon::solve::table::{FollowerTable, Instructions};
+use bench_dragon::solve::{Chain, Solver, Velocities};
 use bench_dragon::transports::iceoryx2::{Offer, SharedMemoryPublisher};
 use bench_dragon::transports::stage;
 use divan::Bencher;
@@ -31,8 +30,8 @@ fn team(benches: usize) -> Team {
     Team { benches, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 }
 }
 
-fn spiral() -> Spiral {
-    Spiral::new(0.55, 16.0)
+fn spiral() -> Path {
+    Path::spiral(0.55, 16.0)
 }
 
 /// Plays the paper scene from 200 s on, over and over, a frame per call.
@@ -56,13 +55,13 @@ fn newton_cold(bencher: Bencher, rate: f64) {
 #[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
 fn scene_on_a_spiral(bencher: Bencher, rate: f64) {
     let scene = bench_dragon::scene::Scene::paper();
-    play(bencher, scene.solver().0.as_mut(), 224, rate);
+    play(bencher, scene.motion.solver(scene.velocities).solver.as_mut(), 224, rate);
 }
 
 /// The turnaround, the head 20 m before its turn and on: the team on spiral, arcs and spiral.
 #[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
 fn newton_on_a_turnaround(bencher: Bencher, rate: f64) {
-    let path = PiecePath::turnaround(1.7, 4.5, 2.0, 220.0, 369.16).unwrap();
+    let path = Path::turnaround(1.7, 4.5, 2.0, 220.0, 369.16).unwrap();
     play(bencher, &mut Newton::new(path, team(223), 1.0, Velocities::Computed), 224, rate);
 }
 
@@ -112,7 +111,7 @@ fn newton_cold_without_care(bencher: Bencher) {
 }
 
 fn follower_table(benches: usize, velocities: Velocities) -> FollowerTable {
-    FollowerTable::new(spiral(), team(benches), 1.0, velocities).expect("the paper's spiral has a table")
+    FollowerTable::new(&spiral(), team(benches), 1.0, velocities).expect("the paper's spiral has a table")
 }
 
 #[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
@@ -142,28 +141,6 @@ fn table_by_benches(bencher: Bencher, benches: usize) {
     play(bencher, &mut follower_table(benches, Velocities::Computed), benches + 1, 60.0);
 }
 
-#[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
-fn whole_chain(bencher: Bencher, rate: f64) {
-    play(bencher, &mut WholeChain::new(spiral(), team(223), 1.0, Velocities::Computed), 224, rate);
-}
-
-#[divan::bench(sample_count = 500, sample_size = 20)]
-fn whole_chain_without_velocities(bencher: Bencher) {
-    play(bencher, &mut WholeChain::new(spiral(), team(223), 1.0, Velocities::Omitted), 224, 60.0);
-}
-
-#[divan::bench(sample_count = 500, sample_size = 20)]
-fn whole_chain_portable(bencher: Bencher) {
-    let solver = WholeChain::new(spiral(), team(223), 1.0, Velocities::Computed);
-    let mut solver = solver.with_instructions(Instructions::Portable).expect("every processor has it");
-    play(bencher, &mut solver, 224, 60.0);
-}
-
-#[divan::bench(args = [10, 100, 223, 1_000, 5_000, 10_000, 20_000, 100_000], sample_count = 200, sample_size = 4)]
-fn whole_chain_by_benches(bencher: Bencher, benches: usize) {
-    play(bencher, &mut WholeChain::new(spiral(), team(benches), 1.0, Velocities::Computed), benches + 1, 60.0);
-}
-
 #[divan::bench(args = [10, 100, 223, 1_000, 5_000, 10_000, 20_000, 100_000], sample_count = 20, sample_size = 1)]
 fn newton_by_benches(bencher: Bencher, benches: usize) {
     play(bencher, &mut Newton::new(spiral(), team(benches), 1.0, Velocities::Computed), benches + 1, 60.0);
@@ -177,7 +154,7 @@ fn show(bencher: Bencher, with: &str) {
         scene.alerts = None;
     }
     scene.velocities = if with.contains("velocities") { Velocities::Computed } else { Velocities::Omitted };
-    let timeline = Timeline::of(&scene, &mut |_| ());
+    let timeline = scene.motion.timeline(&mut |_| ());
     let playback = Playback { start: 200.0, ..Playback::of(&scene) };
     let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
     let mut tick = 0;
@@ -192,7 +169,7 @@ fn show(bencher: Bencher, with: &str) {
 #[divan::bench(sample_count = 500, sample_size = 4)]
 fn show_where_every_turn_is_as_near(bencher: Bencher) {
     let scene = Scene::paper();
-    let timeline = Timeline::of(&scene, &mut |_| ());
+    let timeline = scene.motion.timeline(&mut |_| ());
     let playback = Playback { start: 156.0, rate: 1000.0, ..Playback::of(&scene) };
     let mut show = Show::new(&scene, timeline, playback).expect("156 s is before the contact");
     let mut tick = 0;
@@ -205,7 +182,7 @@ fn show_where_every_turn_is_as_near(bencher: Bencher) {
 /// The events of the paper scene, contact, stall and lock: found once, before the show.
 #[divan::bench(sample_count = 20, sample_size = 1)]
 fn events() -> Timeline {
-    Timeline::of(&Scene::paper(), &mut |_| ())
+    Scene::paper().motion.timeline(&mut |_| ())
 }
 
 /// A frame into iceoryx2's shared memory, solving left out.
@@ -213,14 +190,15 @@ fn events() -> Timeline {
 fn publish_over_iceoryx2(bencher: Bencher) {
     let scene = Scene::paper();
     let playback = Playback { start: 200.0, ..Playback::of(&scene) };
-    let mut show = Show::new(&scene, Timeline::of(&scene, &mut |_| ()), playback).expect("200 s is before the contact");
+    let mut show =
+        Show::new(&scene, scene.motion.timeline(&mut |_| ()), playback).expect("200 s is before the contact");
     let offer = Offer {
         name: format!("bench_{}_frame", std::process::id()),
-        handles: scene.team.handles(),
+        handles: scene.team().handles(),
         queue: 64,
         subscribers: 8,
         alerts: true,
-        stage: stage(1, 0, &scene.team, &scene.path),
+        stage: stage(1, 0, &scene.motion),
     };
     let mut publisher = SharedMemoryPublisher::open(&offer).expect("the name holds this process's number");
     let frame = show.frame(0);
@@ -230,7 +208,9 @@ fn publish_over_iceoryx2(bencher: Bencher) {
 
 #[divan::bench(sample_count = 20, sample_size = 1)]
 fn paper(bencher: Bencher) {
-    let mut solver = Paper::new(spiral(), team(223), 1.0, Velocities::Computed, PaperRules::default());
+    let path = spiral();
+    let (spiral, start) = path.as_spiral().expect("the paper's path is a spiral");
+    let mut solver = Paper::new(*spiral, start.high, team(223), 1.0, Velocities::Computed, PaperRules::default());
     play(bencher, &mut solver, 224, 60.0);
 }
 

@@ -5,28 +5,27 @@
 
 use std::time::Instant;
 
-use bench_dragon::chain::Chain;
-use bench_dragon::clearance::least_clearance_all_pairs;
-use bench_dragon::messages::State;
+use bench_dragon::motion::clearance::least_clearance_all_pairs;
+use bench_dragon::motion::event::EventKind;
 use bench_dragon::scene::Scene;
-use bench_dragon::show::timeline::Timeline;
+use bench_dragon::solve::Chain;
 
 fn main() {
     let scene = Scene::paper();
     let began = Instant::now();
-    let timeline = Timeline::of(&scene, &mut |_| ());
+    let timeline = scene.motion.timeline(&mut |_| ());
     let exact = began.elapsed();
-    let contact = timeline.find(State::Contact).map_or(f64::NAN, |contact| contact.time);
+    let contact = timeline.find(EventKind::Contact).map_or(f64::NAN, |contact| contact.time);
 
-    let (mut solver, _) = scene.solver();
-    let mut chain = Chain::new(scene.team.handles());
+    let mut solver = scene.motion.solver(scene.velocities).solver;
+    let mut chain = Chain::new(scene.team().handles());
     let began = Instant::now();
     let mut samples = 0u32;
     let overlap = (41_000..).map(|hundredths| f64::from(hundredths) / 100.0).find(|time| {
         samples += 1;
         // The motion goes on well past the contact.
         solver.solve(*time, &mut chain).is_ok()
-            && least_clearance_all_pairs(&chain, &scene.team).is_some_and(|least| least.value <= 0.0)
+            && least_clearance_all_pairs(&chain, scene.team()).is_some_and(|least| least.value <= 0.0)
     });
     let a_sample = began.elapsed() / samples;
     let overlap = overlap.unwrap_or(f64::NAN);

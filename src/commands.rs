@@ -18,8 +18,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::{Scene, SceneError};
-use bench_dragon::show::timeline::Timeline;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -136,9 +136,20 @@ pub fn progress_bar(length: u64, common: &Common) -> ProgressBar {
 /// All events of a scene, with a progress bar for the long searches.
 pub fn search_timeline(scene: &Scene, common: &Common) -> Timeline {
     let bar = progress_bar(1000, common).with_message("searching for contact");
-    let timeline = Timeline::of(scene, &mut |share| bar.set_position((1000.0 * share) as u64));
+    let timeline = scene.motion.timeline(&mut |share| bar.set_position((1000.0 * share) as u64));
     bar.finish_and_clear();
+    warn_of_gap(&timeline);
     timeline
+}
+
+/// Says how far the searches came, where one of them gave up.
+pub fn warn_of_gap(timeline: &Timeline) {
+    if let Some(until) = timeline.searched_until() {
+        log::warn!(
+            "the search for events gave up: searched up to t = {} s, later events may be missing",
+            number(until)
+        );
+    }
 }
 
 /// A flag that SIGINT and SIGTERM set.

@@ -3,10 +3,10 @@
 //! Data flows one way, and each module uses only those above it in this list:
 //!
 //! - [`messages`]: the memory layouts that go over the wire.
-//! - [`geometry`]: the path, the board, the separation of two boards. Pure functions.
-//! - [`chain`]: from the head's travel to the state of every handle; several solvers behind one interface.
-//! - [`clearance`]: which two boards of a chain are nearest.
-//! - [`events`]: when, exactly, something ends the show.
+//! - [`model`]: curves and the path made of them, the board, the separation of two boards. Pure functions.
+//! - [`linkage`]: links on a path: the follower and how a link lies.
+//! - [`solve`]: from the head's travel to the state of every handle; several solvers behind one interface.
+//! - [`motion`]: a team on a path: its solver, its events, its clearance.
 //! - [`scene`]: the file a user writes, checked and turned into the types above.
 //! - [`show`]: from a scene and a tick to one frame, deterministic.
 //! - [`plan`]: the least pitch and the greatest speed, for a choreographer.
@@ -20,15 +20,15 @@
 #[cfg(all(feature = "jazzy", feature = "humble"))]
 compile_error!("choose one ROS 2 distribution: `--no-default-features --features humble` for Humble");
 
-pub mod chain;
-pub mod clearance;
-pub mod events;
-pub mod geometry;
+pub mod linkage;
 pub mod live;
 pub mod messages;
+pub mod model;
+pub mod motion;
 pub mod plan;
 pub mod scene;
 pub mod show;
+pub mod solve;
 pub mod subscribers;
 pub mod trade;
 pub mod transports;

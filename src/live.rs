@@ -75,7 +75,10 @@ pub struct LoopOptions {
 impl LoopOptions {
     /// The periods of `seconds` of wall time at `rate`: ticks 0 .. ceil(seconds * rate) - 1.
     pub fn periods_of(seconds: f64, rate: f64) -> u64 {
-        (seconds * rate).ceil() as u64
+        let periods = seconds * rate;
+        // A product that rounding has pushed past a whole number is that number.
+        let whole = periods.round();
+        if (periods - whole).abs() <= 4.0 * f64::EPSILON * whole { whole as u64 } else { periods.ceil() as u64 }
     }
 }
 
@@ -215,6 +218,8 @@ fn report(
         tick: frame.tick,
         sim_time: frame.sim_time,
         shows_played: frame.shows_played,
+        unforeseen_contacts: frame.unforeseen_contacts,
+        unsolved_frames: frame.unsolved_frames,
         counts: *counts,
         lateness_ns,
         step_ns: monotonic_ns().saturating_sub(woke_ns),

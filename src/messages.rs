@@ -148,10 +148,10 @@ pub const SCENE_NAME_BYTES: usize = 64;
 
 /// How the loop is doing, once a second. Payload of `<name>/status`.
 ///
-/// `_second` figures are of the last second alone, `_total` figures since the start of the run; all durations are in
+/// Layout 2 added the unforeseen contacts and the unsolved frames. `_second` figures are of the last second alone, `_total` figures since the start of the run; all durations are in
 /// nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ZeroCopySend)]
-#[type_name("bench_dragon/LoopStatus/1")]
+#[type_name("bench_dragon/LoopStatus/2")]
 #[repr(C)]
 pub struct LoopStatus {
     /// The run, as in [`FrameHeader::run_id`].
@@ -174,6 +174,10 @@ pub struct LoopStatus {
     pub skipped: u64,
     /// Times the show has been played to its end and begun again.
     pub shows_played: u64,
+    /// Contacts that no search had found before the show, since the start: 0 unless a search is wrong or gave up.
+    pub unforeseen_contacts: u64,
+    /// Frames for whose time there was no solution, so that the one before was shown again, since the start.
+    pub unsolved_frames: u64,
     /// Wake-up lateness of the last second: median, ns.
     pub lateness_p50_second: u64,
     /// Wake-up lateness of the last second: 99th percentile, ns.
@@ -227,6 +231,8 @@ impl Default for LoopStatus {
             overruns: 0,
             skipped: 0,
             shows_played: 0,
+            unforeseen_contacts: 0,
+            unsolved_frames: 0,
             lateness_p50_second: 0,
             lateness_p99_second: 0,
             lateness_max_second: 0,

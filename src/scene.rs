@@ -11,14 +11,12 @@ use std::path::Path as FilePath;
 use serde::Deserialize;
 use toml::Spanned;
 
-use self::path::{RawPath, ScenePath};
+use self::path::RawPath;
 use self::ros2::{RawRos2, Ros2Settings};
-use crate::chain::follower_table::FollowerTable;
-use crate::chain::newton::Newton;
-use crate::chain::paper::{self, Paper, PaperRules};
-use crate::chain::whole_chain::WholeChain;
-use crate::chain::{Solver, Team, Velocities};
-use crate::geometry::path::Path;
+use crate::model::team::Team;
+use crate::motion::{Method, Motion, MotionError};
+use crate::solve::Velocities;
+use crate::solve::paper::PaperRules;
 
 /// The paper's scene, as built into the program.
 const PAPER: &str = include_str!("../config/paper.toml");
@@ -101,24 +99,13 @@ fn short(number: f64) -> String {
 #[error("{0}")]
 pub struct SceneError(String);
 
-/// How the solver is chosen.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Method {
-    /// The cheapest solver that meets this position error, metres.
-    Accuracy(f64),
-    /// This solver, whatever its accuracy.
-    Named(SolverName),
-}
-
 /// The solvers that a scene can name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum SolverName {
+enum SolverName {
     /// Exact motion, each follower bracketed.
     Newton,
-    /// Exact motion, all handles at once from the frame before.
-    WholeChain,
-    /// Exact motion, every handle read off a table of where such chains stand.
+    /// Exact motion, every handle interpolated in a table of where such chains stand.
     FollowerTable,
     /// The paper's rules.
     Paper,
@@ -158,16 +145,8 @@ pub struct AlertRules {
 pub struct Scene {
     /// The scene's name; by default the stem of its file.
     pub name: String,
-    /// The benches.
-    pub team: Team,
-    /// The curve the handles ride.
-    pub path: ScenePath,
-    /// Metres per second of the head along the curve.
-    pub head_speed: f64,
-    /// How the solver is chosen.
-    pub method: Method,
-    /// The paper's numbers, used by its solver only.
-    pub paper_rules: PaperRules,
+    /// The team on its path, and how exactly it is followed.
+    pub motion: Motion,
     /// What happens at a contact.
     pub on_contact: OnContact,
     /// What happens at the end.
@@ -218,81 +197,20 @@ impl Scene {
     /// One sentence that names the file, the line, the field and what was expected.
     pub fn parse(text: &str, file: &str, stem: &str) -> Result<Self, SceneError> {
         let source = Source { text, file };
-        let deserializer = toml::Deserializer::parse(text).map_err(|error| source.refused(&error, ""))?;
+        let deserializer = toml::Deserializer::parse(text).map_err(|error| source.toml_error(&error, ""))?;
         let raw: RawScene = serde_path_to_error::deserialize(deserializer)
-            .map_err(|error| source.refused(error.inner(), &error.path().to_string()))?;
+            .map_err(|error| source.toml_error(error.inner(), &error.path().to_string()))?;
         raw.validated(&source, stem)
     }
 
-    /// Simulated seconds after which the head has travelled so many metres along the path, by the motion this scene's
-    /// solver follows.
-    pub fn time_of(&self, travelled: f64) -> f64 {
-        match (self.method, &self.path) {
-            (Method::Named(SolverName::Paper), ScenePath::Spiral(spiral)) => {
-                let theta = spiral.place_at(travelled).radians();
-                paper::time_of_theta(spiral, self.head_speed, theta)
-            }
-            _ => travelled / self.head_speed,
-        }
+    /// The benches.
+    pub fn team(&self) -> &Team {
+        self.motion.team()
     }
 
-    /// The solver this scene asks for, and in words why it is that one.
-    pub fn solver(&self) -> (Box<dyn Solver>, String) {
-        let Self { team, head_speed, velocities, .. } = *self;
-        let spiral = match &self.path {
-            ScenePath::Spiral(spiral) => *spiral,
-            ScenePath::Pieces(path) => {
-                let why = match self.method {
-                    Method::Named(_) => "named by the scene",
-                    Method::Accuracy(_) => "the one solver for paths of pieces, as exact as doubles allow",
-                };
-                let newton = Newton::new(path.clone(), team, head_speed, velocities);
-                return (Box::new(newton), format!("newton: {why}"));
-            }
-        };
-        let whole_chain = || -> (Box<dyn Solver>, String) {
-            let solver = WholeChain::new(spiral, team, head_speed, velocities);
-            let name = format!("whole_chain ({})", solver.instructions().name());
-            (Box::new(solver), name)
-        };
-        let table = || -> Option<(Box<dyn Solver>, String)> {
-            let solver = FollowerTable::new(spiral, team, head_speed, velocities)?;
-            let valid = if solver.valid_until() * head_speed < spiral.length() {
-                format!(" up to {:.1} s, then whole_chain", solver.valid_until())
-            } else {
-                String::new()
-            };
-            let name = format!("follower_table ({}){valid}", solver.instructions().name());
-            Some((Box::new(solver), name))
-        };
-        match self.method {
-            Method::Accuracy(accuracy) => {
-                let (solver, name) = table().unwrap_or_else(whole_chain);
-                (solver, format!("{name}: the cheapest that meets an accuracy of {accuracy:e} m"))
-            }
-            Method::Named(SolverName::FollowerTable) => match table() {
-                Some((solver, name)) => (solver, format!("{name}: named by the scene")),
-                None => {
-                    let (solver, name) = whole_chain();
-                    (
-                        solver,
-                        format!("{name}: the scene names follower_table, which has no table for this team and path"),
-                    )
-                }
-            },
-            Method::Named(SolverName::WholeChain) => {
-                let (solver, name) = whole_chain();
-                (solver, format!("{name}: named by the scene"))
-            }
-            Method::Named(SolverName::Newton) => {
-                let newton = Newton::new(spiral, team, head_speed, velocities);
-                (Box::new(newton), "newton: named by the scene".to_owned())
-            }
-            Method::Named(SolverName::Paper) => {
-                let paper = Paper::new(spiral, team, head_speed, velocities, self.paper_rules);
-                (Box::new(paper), "paper: named by the scene; its head is too fast by sqrt(1 + 1/theta^2)".to_owned())
-            }
-        }
+    /// Whether a show of this scene stops at a contact: it computes none without alerts.
+    pub fn stops_at_contact(&self) -> bool {
+        self.alerts.is_some() && self.on_contact == OnContact::Stop
     }
 }
 
@@ -308,7 +226,7 @@ impl Source<'_> {
     }
 
     /// What the TOML reader refused, in one sentence.
-    fn refused(&self, error: &toml::de::Error, field: &str) -> SceneError {
+    fn toml_error(&self, error: &toml::de::Error, field: &str) -> SceneError {
         let place = error.span().map_or(String::new(), |span| format!(", line {}", self.line(span.start)));
         // What carries its place in the text is wrapped in a field that no user wrote.
         let field = field.replace(".$__serde_spanned_private_value", "");
@@ -319,20 +237,21 @@ impl Source<'_> {
         SceneError(format!("{}{place}: {field}{message}", self.file))
     }
 
-    fn wrong<T>(&self, value: &Spanned<T>, sentence: &str) -> SceneError {
-        self.wrong_at(value.span().start, sentence)
+    fn field_error<T>(&self, value: &Spanned<T>, sentence: &str) -> SceneError {
+        self.field_error_at(value.span().start, sentence)
     }
 
-    fn wrong_at(&self, offset: usize, sentence: &str) -> SceneError {
+    fn field_error_at(&self, offset: usize, sentence: &str) -> SceneError {
         SceneError(format!("{}, line {}: {sentence}", self.file, self.line(offset)))
     }
 
     fn check(&self, field: &str, value: &Spanned<f64>, accepted: Accepted) -> Result<f64, SceneError> {
-        accepted.check(field, *value.get_ref()).map_err(|sentence| self.wrong(value, &sentence))
+        accepted.check(field, *value.get_ref()).map_err(|sentence| self.field_error(value, &sentence))
     }
 
     fn check_count(&self, field: &str, value: &Spanned<i64>, accepted: Accepted) -> Result<usize, SceneError> {
-        let number = accepted.check(field, *value.get_ref() as f64).map_err(|sentence| self.wrong(value, &sentence))?;
+        let number =
+            accepted.check(field, *value.get_ref() as f64).map_err(|sentence| self.field_error(value, &sentence))?;
         Ok(number as usize)
     }
 }
@@ -390,22 +309,22 @@ struct RawPublish {
 impl RawScene {
     fn validated(self, source: &Source, stem: &str) -> Result<Scene, SceneError> {
         let team = self.team.validated(source)?;
-        let path = self.path.validated(source, &team)?;
+        let description = self.path.validated(source, &team)?;
         let head_speed = source.check("motion.head_speed", &self.motion.head_speed, Accepted::SPEED)?;
-        let (method, paper_rules) = self.motion.method(source)?;
-        if let (
-            Method::Named(SolverName::WholeChain | SolverName::FollowerTable | SolverName::Paper),
-            ScenePath::Pieces(_),
-            Some(given),
-        ) = (method, &path, &self.motion.solver)
-        {
-            let sentence = "motion.solver rides spirals only, expected \"newton\" or no such field on this path";
-            return Err(source.wrong(given, sentence));
-        }
+        let method = self.motion.method(source)?;
+        let motion = Motion::new(description, team, head_speed, method).map_err(|error| {
+            match (&error, &self.motion.solver) {
+                (MotionError::PaperElsewhere, Some(given)) => source.field_error(
+                    given,
+                    "motion.solver is \"paper\", which follows spirals only, expected another solver or no such field",
+                ),
+                _ => self.path.error(source, &error.to_string()),
+            }
+        })?;
         let name = match &self.name {
             None => stem.to_owned(),
             Some(name) if name.get_ref().trim().is_empty() => {
-                return Err(source.wrong(name, "name is empty, expected a name or no such field"));
+                return Err(source.field_error(name, "name is empty, expected a name or no such field"));
             }
             Some(name) => name.get_ref().clone(),
         };
@@ -419,11 +338,7 @@ impl RawScene {
         let velocities = self.publish.velocities.unwrap_or(true);
         Ok(Scene {
             name,
-            team,
-            path,
-            head_speed,
-            method,
-            paper_rules,
+            motion,
             on_contact: self.motion.on_contact.unwrap_or(OnContact::Stop),
             at_end: self.motion.at_end.unwrap_or(AtEnd::Hold),
             alerts: self.alerts.as_ref().map(|alerts| alerts.validated(source)).transpose()?,
@@ -456,7 +371,7 @@ impl RawTeam {
                     team.hole_inset,
                     Accepted::LENGTH.least
                 );
-                return Err(source.wrong(board, &sentence));
+                return Err(source.field_error(board, &sentence));
             }
         }
         Ok(team)
@@ -464,32 +379,38 @@ impl RawTeam {
 }
 
 impl RawMotion {
-    fn method(&self, source: &Source) -> Result<(Method, PaperRules), SceneError> {
-        let method = match (&self.accuracy, &self.solver) {
+    fn method(&self, source: &Source) -> Result<Method, SceneError> {
+        let solver = self.solver.as_ref().map(|solver| *solver.get_ref());
+        if let (Some(paper), true) = (&self.paper, solver != Some(SolverName::Paper)) {
+            let sentence = "motion.paper is given but motion.solver is not \"paper\", expected both or neither";
+            return Err(source.field_error(paper, sentence));
+        }
+        match (&self.accuracy, solver) {
             (Some(accuracy), Some(_)) => {
                 let sentence = "motion.accuracy and motion.solver are both given, expected one of them";
-                return Err(source.wrong(accuracy, sentence));
+                Err(source.field_error(accuracy, sentence))
             }
             (Some(accuracy), None) => {
-                Method::Accuracy(source.check("motion.accuracy", accuracy, Accepted::ACCURACY)?)
+                Ok(Method::Accuracy(source.check("motion.accuracy", accuracy, Accepted::ACCURACY)?))
             }
-            (None, Some(solver)) => Method::Named(*solver.get_ref()),
-            (None, None) => Method::Accuracy(1e-9),
-        };
-        let Some(paper) = &self.paper else { return Ok((method, PaperRules::default())) };
-        if method != Method::Named(SolverName::Paper) {
-            let sentence = "motion.paper is given but motion.solver is not \"paper\", expected both or neither";
-            return Err(source.wrong(paper, sentence));
+            (None, None) => Ok(Method::Accuracy(1e-9)),
+            (None, Some(SolverName::Newton)) => Ok(Method::Newton),
+            (None, Some(SolverName::FollowerTable)) => Ok(Method::FollowerTable),
+            (None, Some(SolverName::Paper)) => Ok(Method::Paper(self.paper_rules(source)?)),
         }
+    }
+
+    fn paper_rules(&self, source: &Source) -> Result<PaperRules, SceneError> {
+        let Some(paper) = &self.paper else { return Ok(PaperRules::default()) };
         let rules = *paper.get_ref();
         for (field, number) in [
             ("motion.paper.time_step", rules.time_step),
             ("motion.paper.difference_interval", rules.difference_interval),
             ("motion.paper.bisection_tolerance", rules.bisection_tolerance),
         ] {
-            Accepted::PAPER_RULE.check(field, number).map_err(|sentence| source.wrong(paper, &sentence))?;
+            Accepted::PAPER_RULE.check(field, number).map_err(|sentence| source.field_error(paper, &sentence))?;
         }
-        Ok((method, rules))
+        Ok(rules)
     }
 }
 

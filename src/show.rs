@@ -4,17 +4,17 @@
 //! commands call it.
 
 pub mod alerts;
-pub mod timeline;
 
-use crate::chain::{Chain, Solver, Velocities};
-use crate::clearance::{ClearanceMonitor, Ground};
-use crate::geometry::path::Fold;
+use crate::linkage::NoFollower;
 use crate::messages::State;
-use crate::scene::path::ScenePath;
-use crate::scene::{AtEnd, Method, OnContact, Scene, SolverName};
+use crate::motion::clearance::{ClearanceMonitor, PairClearance};
+use crate::motion::event::{Event, EventKind};
+use crate::motion::timeline::{TimedEvent, Timeline};
+use crate::motion::{Choice, Method};
+use crate::scene::{AtEnd, OnContact, Scene};
+use crate::solve::{Chain, Solver, Velocities};
 
 use alerts::{Alert, AlertLevel};
-use timeline::Timeline;
 
 /// One moment of the show.
 #[derive(Debug, Clone)]
@@ -33,7 +33,14 @@ pub struct Frame {
     pub alerts: Vec<Alert>,
     /// Times the show has been played to its end and begun again.
     pub shows_played: u64,
+    /// Contacts so far that no search had found: boards that overlapped before any contact was due.
+    pub unforeseen_contacts: u64,
+    /// Frames so far for whose time there was no solution, so that the one before was shown again.
+    pub unsolved_frames: u64,
 }
+
+/// Ticks beyond which a show counts as endless: at 20 kHz, fourteen million years.
+const LONGEST_SHOW: f64 = 9e18;
 
 /// How a scene is played: what the command line may override.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,7 +70,11 @@ impl Playback {
 
     /// The ticks of one showing: up to and including the first whose time is at or past `freeze`.
     fn ticks_per_show(&self, freeze: f64) -> u64 {
-        let estimate = ((freeze - self.start) * self.rate / self.time_scale).max(0.0) as u64;
+        let estimate = (freeze - self.start) * self.rate / self.time_scale;
+        if estimate >= LONGEST_SHOW {
+            return u64::MAX;
+        }
+        let estimate = estimate.max(0.0) as u64;
         // The estimate is off by rounding; the clock itself decides.
         let mut tick = estimate.saturating_sub(2 + estimate / (1 << 50));
         while self.sim_time(tick) < freeze {
@@ -82,15 +93,23 @@ pub struct StartError(String);
 pub struct Show {
     playback: Playback,
     solver: Box<dyn Solver>,
+    solver_reason: String,
     velocities: Velocities,
+    /// What the head travels in a simulated second; not a number where the method does not follow the path exactly.
+    metres_per_second: f64,
     timeline: Timeline,
     freeze_time: f64,
     ticks_per_show: u64,
     clearance: Option<ClearanceMonitor>,
     level: Option<AlertLevel>,
+    /// Metres of overlap that no search has let pass; `None` where the solver does not follow the searched motion.
+    overlap_tolerance: Option<f64>,
     solved_time: Option<f64>,
     frame: Frame,
 }
+
+/// Metres of overlap before the contact, as a share of the longest link, that rounding explains.
+const ROUNDING_OVERLAP: f64 = 1e-9;
 
 impl Show {
     /// A show of `scene`, whose events `timeline` holds.
@@ -105,36 +124,45 @@ impl Show {
                 "--start is {start} s, expected at least 0 and less than {time} s, at which the motion ends ({name})"
             )));
         }
-        let timeline = if scene.alerts.is_some() { timeline } else { timeline.end_only() };
-        let freeze_time = timeline.freeze_time(playback.on_contact);
-        // The paper's bisection can be told to be coarser than the spiral's bounds allow for.
-        let ground = match (scene.method, &scene.path) {
-            (Method::Named(SolverName::Paper), _) | (_, ScenePath::Pieces(_)) => Ground::Unknown,
-            (_, ScenePath::Spiral(spiral)) => Ground::Spiral(*spiral),
-        };
-        let clearance = scene.alerts.map(|_| ClearanceMonitor::new(scene.team, ground));
+        let mut timeline = if scene.alerts.is_some() { timeline } else { timeline.end_only() };
+        timeline.reserve_contact();
+        let stops = scene.alerts.is_some() && playback.on_contact == OnContact::Stop;
+        let freeze_time = timeline.freeze(stops).time;
+        let clearance = scene.alerts.map(|_| scene.motion.clearance_monitor());
         let level = scene.alerts.map(|rules| AlertLevel::new(rules, playback.rate));
+        let Choice { solver, reason } = scene.motion.solver(scene.velocities);
+        let exact = !matches!(scene.motion.method(), Method::Paper(_));
         let frame = Frame {
             tick: 0,
             sim_time: playback.start,
             state: State::Moving,
-            chain: Chain::new(scene.team.handles()),
+            chain: Chain::new(scene.team().handles()),
             min_clearance: f64::NAN,
             alerts: Vec::with_capacity(alerts::MOST_PER_FRAME),
             shows_played: 0,
+            unforeseen_contacts: 0,
+            unsolved_frames: 0,
         };
         Ok(Self {
             ticks_per_show: playback.ticks_per_show(freeze_time),
             playback,
-            solver: scene.solver().0,
+            solver,
+            solver_reason: reason,
             velocities: scene.velocities,
+            metres_per_second: scene.motion.travelled_at(1.0),
             timeline,
             freeze_time,
             clearance,
             level,
+            overlap_tolerance: exact.then_some(ROUNDING_OVERLAP * scene.team().longest_link()),
             solved_time: None,
             frame,
         })
+    }
+
+    /// The solver of this show and why it was chosen, for people.
+    pub fn solver_reason(&self) -> &str {
+        &self.solver_reason
     }
 
     /// The events of this show, in order.
@@ -147,14 +175,14 @@ impl Show {
         self.freeze_time
     }
 
-    /// Pairs of boards asked for their separation so far: none where the scene has no alerts.
-    pub fn pairs_asked(&self) -> u64 {
+    /// Pairs of boards tested for their separation so far: none where the scene has no alerts.
+    pub fn pairs_tested(&self) -> u64 {
         self.clearance.as_ref().map_or(0, |monitor| monitor.counters().pairs)
     }
 
     /// The frame of a tick: time, chain, clearance, state, alerts.
     ///
-    /// Ticks are asked in increasing order; some may be left out. The same sequence of ticks gives the same bits.
+    /// Ticks are given in increasing order; some may be left out. The same sequence of ticks gives the same bits.
     pub fn frame(&mut self, tick: u64) -> &Frame {
         let shows_played = match self.playback.at_end {
             AtEnd::Hold => 0,
@@ -167,8 +195,9 @@ impl Show {
         self.frame.shows_played = shows_played;
         self.frame.sim_time = sim_time;
         self.solve(sim_time);
-        self.measure_clearance();
-        self.judge(tick_of_show, restarted);
+        let closest = self.measure_clearance();
+        self.record_unforeseen_contact(closest);
+        self.update_state(tick_of_show, restarted, closest);
         &self.frame
     }
 
@@ -178,29 +207,50 @@ impl Show {
             return;
         }
         self.solved_time = Some(sim_time);
-        solve_at_or_just_before(self.solver.as_mut(), sim_time, &mut self.frame.chain);
+        if solve_at_or_just_before(self.solver.as_mut(), sim_time, &mut self.frame.chain).is_err() {
+            self.frame.unsolved_frames += 1;
+        }
         if sim_time >= self.freeze_time && self.velocities == Velocities::Computed {
             let Chain { speed, vx, vy, .. } = &mut self.frame.chain;
             [speed, vx, vy].into_iter().for_each(|numbers| numbers.fill(0.0));
         }
     }
 
-    fn measure_clearance(&mut self) {
-        let Some(monitor) = &mut self.clearance else { return };
-        let least = monitor.least_clearance(&self.frame.chain);
+    fn measure_clearance(&mut self) -> Option<PairClearance> {
+        let travelled = self.metres_per_second * self.frame.sim_time;
+        let least = self.clearance.as_mut()?.least_clearance(&self.frame.chain, travelled);
         self.frame.min_clearance = least.map_or(f64::NAN, |least| least.value);
+        least
     }
 
-    fn judge(&mut self, tick_of_show: u64, restarted: bool) {
+    /// Boards that overlap while no contact has happened are a contact now, whatever the searches said.
+    fn record_unforeseen_contact(&mut self, closest: Option<PairClearance>) {
+        let (Some(tolerance), Some(closest)) = (self.overlap_tolerance, closest) else { return };
+        let time = self.frame.sim_time;
+        let happened = self.timeline.find(EventKind::Contact).is_some_and(|contact| contact.time <= time);
+        if closest.value >= -tolerance || happened {
+            return;
+        }
+        self.frame.unforeseen_contacts += 1;
+        let event = Event {
+            kind: EventKind::Contact,
+            travelled: f64::NAN,
+            bench_a: Some(closest.bench_a as u32),
+            bench_b: Some(closest.bench_b as u32),
+            place: Some(nalgebra::center(&closest.point_a, &closest.point_b)),
+        };
+        self.timeline.record_contact(TimedEvent { event, time });
+    }
+
+    fn update_state(&mut self, tick_of_show: u64, restarted: bool, closest: Option<PairClearance>) {
         let frame = &mut self.frame;
         frame.alerts.clear();
         let passed = self.timeline.latest_passed(frame.sim_time);
-        frame.state = passed.map_or(State::Moving, |passed| passed.event.kind);
+        frame.state = passed.map_or(State::Moving, |passed| state_of(passed.event.kind));
         let Some(level) = &mut self.level else { return };
         if restarted {
             level.restart();
         }
-        let closest = self.clearance.as_ref().and_then(ClearanceMonitor::latest);
         level.update(tick_of_show, frame.sim_time, &self.timeline, closest, &mut frame.alerts);
         if passed.is_none() {
             frame.state = level.current();
@@ -208,19 +258,33 @@ impl Show {
     }
 }
 
+/// The state in which an event leaves the show.
+pub fn state_of(kind: EventKind) -> State {
+    match kind {
+        EventKind::Contact => State::Contact,
+        EventKind::Stall => State::Stall,
+        EventKind::Lock => State::Lock,
+        EventKind::PathEnd => State::PathEnd,
+    }
+}
+
 /// Solves at `time`, or at the latest moment before it at which there is a solution.
 ///
 /// The time of a lock, multiplied by the speed again, can lie past the lock by the last digit; the paper's solver is
 /// one of its own time steps ahead. Nothing else steps back, and nothing does so by more than 1e-4 of the time.
-pub fn solve_at_or_just_before(solver: &mut dyn Solver, time: f64, chain: &mut Chain) {
+///
+/// # Errors
+/// [`NoFollower`] where there is none as near; `chain` is then unspecified.
+pub fn solve_at_or_just_before(solver: &mut dyn Solver, time: f64, chain: &mut Chain) -> Result<(), NoFollower> {
     let mut back = f64::EPSILON * time;
     let mut at = time;
-    while let Err(Fold) = solver.solve(at, chain) {
+    while let Err(none) = solver.solve(at, chain) {
         at = time - back;
         back *= 2.0;
-        if back > 1e-4 * time {
-            log::error!("there is no solution at {time} s: the last one is shown instead");
-            return;
+        // Not a number, and a time of 0, end it too.
+        if !(back > 0.0 && back <= 1e-4 * time) {
+            return Err(none);
         }
     }
+    Ok(())
 }

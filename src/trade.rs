@@ -6,28 +6,26 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use crate::chain::follower_table::FollowerTable;
-use crate::chain::newton::Newton;
-use crate::chain::paper::{Paper, PaperRules};
-use crate::chain::reference::{Reference, ReferenceHandle};
-use crate::chain::whole_chain::WholeChain;
-use crate::chain::{Chain, Instructions, Solver, Velocities};
-use crate::clearance::{ClearanceMonitor, Ground, least_clearance_all_pairs};
-use crate::geometry::Point;
-use crate::geometry::path::Path;
-use crate::geometry::rectangle::Board;
-use crate::geometry::separation::separation_board_board;
-use crate::geometry::spiral::Spiral;
-use crate::messages::State;
-use crate::scene::{Method, Scene, SolverName};
-use crate::show::timeline::Timeline;
+use crate::model::Point;
+use crate::model::board::Board;
+use crate::model::separation::separation_board_board;
+use crate::motion::Method;
+use crate::motion::clearance::least_clearance_all_pairs;
+use crate::motion::event::EventKind;
+use crate::motion::timeline::Timeline;
+use crate::scene::Scene;
+use crate::solve::newton::Newton;
+use crate::solve::paper::{Paper, PaperRules};
+use crate::solve::reference::{Reference, ReferenceHandle};
+use crate::solve::table::{FollowerTable, Instructions};
+use crate::solve::{Chain, Solver, Velocities};
 
 /// Moments at which the error is taken, spread evenly over the show.
 pub const SPREAD_MOMENTS: usize = 200;
 /// Further moments, spread evenly over its last second.
 pub const LAST_SECOND_MOMENTS: usize = 10;
 /// Frames of warming up before each moment: it is a running show that is judged.
-const LEAD_IN: usize = 4;
+const WARM_UP_FRAMES: usize = 4;
 /// The most frames that are timed, so that slow solvers and long shows end too.
 const TIMED_FRAMES: usize = 26_000;
 /// The longest time spent timing one solver, seconds.
@@ -78,7 +76,7 @@ pub struct CollisionMeasurement {
 struct Candidate {
     name: String,
     /// Frames played before one that is judged.
-    lead_in: usize,
+    warm_up_frames: usize,
     solver: Box<dyn Solver>,
     contact_time_error: Option<f64>,
     memory_bytes: usize,
@@ -98,24 +96,24 @@ pub fn measure(scene: &Scene, timeline: &Timeline, progress: &mut dyn FnMut(f64)
     let end = timeline.end().time;
     let moments = truth(scene, end, &mut |share| progress(0.5 * share))?;
     let contact = contact_errors(scene, timeline)?;
-    let candidates = scene.path.spiral().map_or(Vec::new(), |spiral| candidates(scene, *spiral, contact));
+    let candidates = candidates(scene, contact);
     let count = candidates.len() as f64;
     let mut measurements = Vec::new();
     for (index, candidate) in candidates.into_iter().enumerate() {
         measurements.push(measured(scene, candidate, &moments, end));
         progress(0.5 + 0.5 * (index + 1) as f64 / count);
     }
-    mark_front(&mut measurements);
+    mark_pareto_front(&mut measurements);
     if let Some(first) = measurements.first_mut() {
         first.collision = collision(scene, timeline, first.contact_time_error, first.frame_ns);
     }
     Ok(measurements)
 }
 
-/// The high-precision reference of a scene, which rides spirals only.
+/// The high-precision reference of a scene.
 fn reference(scene: &Scene) -> Result<Reference, String> {
-    let spiral = scene.path.spiral().ok_or("solvers are compared on spirals only: other paths have one solver")?;
-    Reference::new(scene.team, spiral.pitch(), spiral.start_turn(), scene.head_speed)
+    let motion = &scene.motion;
+    Reference::new(*motion.team(), motion.description(), motion.head_speed())
 }
 
 /// The reference at all moments. At the lock itself there is a solution only up to rounding, so the last moment is a
@@ -139,7 +137,7 @@ fn moments(scene: &Scene, times: &[f64], progress: &mut dyn FnMut(f64)) -> Resul
     let mut reference = reference(scene)?;
     let mut moments = Vec::with_capacity(times.len());
     for &time in times {
-        let handles = reference.handles(time).map_err(|fold| format!("the reference at {time} s: {fold}"))?;
+        let handles = reference.handles(time).map_err(|none| format!("the reference at {time} s: {none}"))?;
         moments.push(Moment { time, handles });
         progress(moments.len() as f64 / times.len() as f64);
     }
@@ -156,37 +154,38 @@ struct ContactErrors {
 /// The gap of the two boards in the reference, at the time found for the contact, over the speed at which it closes.
 /// `None` without a contact or with one at the very start.
 fn contact_errors(scene: &Scene, timeline: &Timeline) -> Result<Option<ContactErrors>, String> {
-    let Some(contact) = timeline.find(State::Contact) else { return Ok(None) };
+    let Some(contact) = timeline.find(EventKind::Contact) else { return Ok(None) };
     let (Some(a), Some(b)) = (contact.event.bench_a, contact.event.bench_b) else { return Ok(None) };
-    let time = contact.event.travelled / scene.head_speed;
+    let time = contact.event.travelled / scene.motion.head_speed();
     if time == 0.0 {
         return Ok(None);
     }
     let mut reference = reference(scene)?;
     let mut gap = |time: f64| {
-        let handles = reference.handles(time).map_err(|fold| format!("the reference at {time} s: {fold}"))?;
+        let handles = reference.handles(time).map_err(|none| format!("the reference at {time} s: {none}"))?;
         let board = |bench: u32| {
             let point = |handle: usize| Point::new(handles[handle].x.high, handles[handle].y.high);
             let (front, rear) = (point(bench as usize), point(bench as usize + 1));
-            Board::from_handles(front, rear, scene.team.hole_inset, scene.team.width)
+            Board::from_handles(front, rear, scene.team().hole_inset, scene.team().width)
         };
         Ok::<f64, String>(separation_board_board(&board(a), &board(b)))
     };
     let interval = 1e-7 * time;
     let closing = (gap(time - interval)? - gap(time)?) / interval;
     let exact = (gap(time)? / closing).abs();
-    let of_paper = Scene { method: Method::Named(SolverName::Paper), ..scene.clone() };
-    let paper = (of_paper.time_of(contact.event.travelled) - time).abs();
+    let of_paper = scene.motion.with_method(Method::Paper(PaperRules::default()));
+    let paper = of_paper.map_or(f64::NAN, |motion| (motion.time_at(contact.event.travelled) - time).abs());
     Ok(Some(ContactErrors { exact, paper }))
 }
 
-fn candidates(scene: &Scene, path: Spiral, contact: Option<ContactErrors>) -> Vec<Candidate> {
-    let Scene { team, head_speed, velocities, .. } = *scene;
+fn candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<Candidate> {
+    let (path, team, head_speed) = (scene.motion.path(), *scene.team(), scene.motion.head_speed());
+    let velocities = scene.velocities;
     let exact = |name: String, solver: Box<dyn Solver>, memory_bytes| {
         // All of them follow one motion, whose contact is found once.
         Candidate {
             name,
-            lead_in: LEAD_IN,
+            warm_up_frames: WARM_UP_FRAMES,
             solver,
             contact_time_error: contact.map(|errors| errors.exact),
             memory_bytes,
@@ -200,15 +199,16 @@ fn candidates(scene: &Scene, path: Spiral, contact: Option<ContactErrors>) -> Ve
             candidates.push(exact(format!("follower_table ({})", instructions.name()), Box::new(solver), memory));
         }
     }
-    for instructions in Instructions::available() {
-        let solver = WholeChain::new(path, team, head_speed, velocities);
-        let memory = solver.memory_bytes();
-        if let Some(solver) = solver.with_instructions(instructions) {
-            candidates.push(exact(format!("whole_chain ({})", instructions.name()), Box::new(solver), memory));
-        }
-    }
-    let newton = Newton::new(path, team, head_speed, velocities);
-    candidates.push(exact("newton".to_owned(), Box::new(newton), size_of::<Newton<Spiral>>()));
+    let newton = Newton::new(path.clone(), team, head_speed, velocities);
+    candidates.push(exact("newton".to_owned(), Box::new(newton), size_of::<Newton>()));
+    candidates.extend(paper_candidates(scene, contact));
+    candidates
+}
+
+/// The paper's solver with its own numbers and others, on a spiral.
+fn paper_candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<Candidate> {
+    let (path, team, head_speed) = (scene.motion.path(), *scene.team(), scene.motion.head_speed());
+    let Some((spiral, start)) = path.as_spiral() else { return Vec::new() };
     // The Euler steps of one show; where there are too many, the finest would take minutes.
     let steps_to_end = |time_step: f64| path.length() / head_speed / time_step;
     let standard = PaperRules::default();
@@ -226,18 +226,18 @@ fn candidates(scene: &Scene, path: Spiral, contact: Option<ContactErrors>) -> Ve
         let name = format!("paper (time step 1e-3 s, differences over {difference_interval} s)");
         rules.push((name, PaperRules { difference_interval, ..coarse }));
     }
-    for (name, rules) in rules {
-        let solver = Paper::new(path, team, head_speed, velocities, rules);
+    let candidate = |(name, rules)| {
+        let solver = Paper::new(*spiral, start.high, team, head_speed, scene.velocities, rules);
         let memory_bytes = size_of::<Paper>() + 3 * 8 * team.handles();
-        candidates.push(Candidate {
+        Candidate {
             name,
-            lead_in: 0,
+            warm_up_frames: 0,
             solver: Box::new(solver),
             contact_time_error: contact.map(|errors| errors.paper),
             memory_bytes,
-        });
-    }
-    candidates
+        }
+    };
+    rules.into_iter().map(candidate).collect()
 }
 
 fn measured(scene: &Scene, mut candidate: Candidate, moments: &[Moment], end: f64) -> Measurement {
@@ -268,10 +268,10 @@ struct Errors {
 }
 
 fn errors(scene: &Scene, candidate: &mut Candidate, moments: &[Moment]) -> Errors {
-    let mut chain = Chain::new(scene.team.handles());
+    let mut chain = Chain::new(scene.team().handles());
     let mut worst = Errors::default();
     for moment in moments {
-        for frame in (0..=candidate.lead_in).rev() {
+        for frame in (0..=candidate.warm_up_frames).rev() {
             let time = (moment.time - frame as f64 / scene.rate).max(0.0);
             // The paper's solver runs ahead of the truth and so locks a little earlier; that moment is left out.
             if candidate.solver.solve(time, &mut chain).is_err() {
@@ -283,9 +283,9 @@ fn errors(scene: &Scene, candidate: &mut Candidate, moments: &[Moment]) -> Error
             worst.position = worse(worst.position, error);
             worst.speed = worse(worst.speed, ((chain.speed[i] - truth.speed) / truth.speed).abs());
         }
-        for bench in 0..scene.team.benches {
+        for bench in 0..scene.team().benches {
             let (dx, dy) = (chain.x[bench + 1] - chain.x[bench], chain.y[bench + 1] - chain.y[bench]);
-            worst.link = worse(worst.link, (dx.hypot(dy) - scene.team.link(bench)).abs());
+            worst.link = worse(worst.link, (dx.hypot(dy) - scene.team().link(bench)).abs());
         }
     }
     worst
@@ -300,7 +300,7 @@ fn worse(one: f64, other: f64) -> f64 {
 /// evenly over the show are timed.
 fn frame_times(scene: &Scene, solver: &mut dyn Solver, end: f64) -> Vec<u64> {
     const RUN: usize = 50;
-    let mut chain = Chain::new(scene.team.handles());
+    let mut chain = Chain::new(scene.team().handles());
     let frames = (end * scene.rate) as usize;
     let began = Instant::now();
     let _ = solver.solve(0.0, &mut chain);
@@ -330,7 +330,7 @@ fn frame_times(scene: &Scene, solver: &mut dyn Solver, end: f64) -> Vec<u64> {
     times
 }
 
-fn mark_front(measurements: &mut [Measurement]) {
+fn mark_pareto_front(measurements: &mut [Measurement]) {
     let points: Vec<(f64, f64)> = measurements.iter().map(|m| (m.frame_ns, m.max_position_error)).collect();
     for (measurement, (cost, error)) in measurements.iter_mut().zip(&points) {
         let beaten = |(c, e): &(f64, f64)| c <= cost && e <= error && (c < cost || e < error);
@@ -344,6 +344,9 @@ const SAMPLING_INTERVALS: [f64; 3] = [1.0, 0.1, 0.01];
 /// All pairs against the live way, and sampled searches against the exact one. `exact_error` is the error of the
 /// contact in `timeline`, `solve_ns` what the fastest solver takes for a frame.
 fn collision(scene: &Scene, timeline: &Timeline, exact_error: Option<f64>, solve_ns: f64) -> Vec<CollisionMeasurement> {
+    if scene.team().benches < 3 {
+        return Vec::new();
+    }
     let end = timeline.end().time;
     let frame_cost = |method: &str, ns: f64| CollisionMeasurement {
         method: method.to_owned(),
@@ -355,14 +358,14 @@ fn collision(scene: &Scene, timeline: &Timeline, exact_error: Option<f64>, solve
     let all_pairs = all_pairs_ns(scene, end);
     let mut measurements = vec![frame_cost("live clearance", live), frame_cost("all pairs", all_pairs)];
     let began = Instant::now();
-    let _ = Timeline::of(scene, &mut |_| ());
+    let _ = scene.motion.timeline(&mut |_| ());
     measurements.push(CollisionMeasurement {
         method: "exact search".to_owned(),
         frame_ns: None,
         search_s: Some(began.elapsed().as_secs_f64()),
         contact_time_error: exact_error,
     });
-    let Some(contact) = timeline.find(State::Contact) else { return measurements };
+    let Some(contact) = timeline.find(EventKind::Contact) else { return measurements };
     for interval in SAMPLING_INTERVALS {
         let found = first_overlapping_sample(scene, contact.time, end, interval);
         measurements.push(CollisionMeasurement {
@@ -377,12 +380,12 @@ fn collision(scene: &Scene, timeline: &Timeline, exact_error: Option<f64>, solve
 
 /// The first sample at or after `contact` at which boards overlap, simulated seconds.
 fn first_overlapping_sample(scene: &Scene, contact: f64, end: f64, interval: f64) -> Option<f64> {
-    let (mut solver, _) = scene.solver();
-    let mut chain = Chain::new(scene.team.handles());
+    let mut solver = scene.motion.solver(scene.velocities).solver;
+    let mut chain = Chain::new(scene.team().handles());
     let first = (contact / interval).ceil() as u64;
     (first..first + 1000).map(|sample| sample as f64 * interval).take_while(|time| *time < end).find(|time| {
         solver.solve(*time, &mut chain).is_ok()
-            && least_clearance_all_pairs(&chain, &scene.team).is_some_and(|least| least.value <= 0.0)
+            && least_clearance_all_pairs(&chain, scene.team()).is_some_and(|least| least.value <= 0.0)
     })
 }
 
@@ -390,10 +393,9 @@ fn first_overlapping_sample(scene: &Scene, contact: f64, end: f64, interval: f64
 fn live_clearance_ns(scene: &Scene, end: f64) -> f64 {
     const RUNS: usize = 20;
     const RUN: usize = 40;
-    let (mut solver, _) = scene.solver();
-    let mut chain = Chain::new(scene.team.handles());
-    let ground = scene.path.spiral().map_or(Ground::Unknown, |spiral| Ground::Spiral(*spiral));
-    let mut monitor = ClearanceMonitor::new(scene.team, ground);
+    let mut solver = scene.motion.solver(scene.velocities).solver;
+    let mut chain = Chain::new(scene.team().handles());
+    let mut monitor = scene.motion.clearance_monitor();
     let mut times = Vec::with_capacity(RUNS * RUN);
     for run in 0..RUNS {
         for frame in 0..RUN {
@@ -402,7 +404,7 @@ fn live_clearance_ns(scene: &Scene, end: f64) -> f64 {
                 break;
             }
             let began = Instant::now();
-            let _ = std::hint::black_box(monitor.least_clearance(&chain));
+            let _ = std::hint::black_box(monitor.least_clearance(&chain, scene.motion.travelled_at(time)));
             // The first frame of a run follows a jump.
             if frame > 0 {
                 times.push(began.elapsed().as_nanos() as u64);
@@ -414,13 +416,13 @@ fn live_clearance_ns(scene: &Scene, end: f64) -> f64 {
 
 /// Nanoseconds of all pairs, the median over a few frames of the show.
 fn all_pairs_ns(scene: &Scene, end: f64) -> f64 {
-    let (mut solver, _) = scene.solver();
-    let mut chain = Chain::new(scene.team.handles());
+    let mut solver = scene.motion.solver(scene.velocities).solver;
+    let mut chain = Chain::new(scene.team().handles());
     let mut times = Vec::new();
     for share in [0.1, 0.3, 0.5, 0.7, 0.9] {
         if solver.solve(share * end, &mut chain).is_ok() {
             let began = Instant::now();
-            let _ = std::hint::black_box(least_clearance_all_pairs(&chain, &scene.team));
+            let _ = std::hint::black_box(least_clearance_all_pairs(&chain, scene.team()));
             times.push(began.elapsed().as_nanos() as u64);
         }
     }

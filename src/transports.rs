@@ -4,25 +4,36 @@ pub mod iceoryx2;
 #[cfg(feature = "ros2")]
 pub mod ros2;
 
-use crate::chain::Team;
-use crate::geometry::pieces::{Shape, ShapeKind};
-use crate::geometry::spiral::Spiral;
 use crate::messages::{
-    CollisionAlert, FrameHeader, MOST_PIECES, NO_BENCH, PIECE_ARC, PIECE_INWARD_SPIRAL, PIECE_LINE,
+    CollisionAlert, FrameHeader, HandlePose, MOST_PIECES, NO_BENCH, PIECE_ARC, PIECE_INWARD_SPIRAL, PIECE_LINE,
     PIECE_OUTWARD_SPIRAL, Stage, StagePiece,
 };
-use crate::scene::path::ScenePath;
+use crate::model::path::{OutlineKind, SegmentOutline};
+use crate::model::spiral::Direction;
+use crate::motion::Motion;
 use crate::show::alerts::Alert;
+use crate::solve::Chain;
 
-/// The stage of a team on a scene's path.
-pub fn stage(run_id: u64, stamp_ns: u64, team: &Team, scene_path: &ScenePath) -> Stage {
+/// One handle of a chain as it goes over the wire. Panics if there is no such handle.
+pub fn handle_pose(chain: &Chain, handle: usize) -> HandlePose {
+    HandlePose {
+        x: chain.x[handle],
+        y: chain.y[handle],
+        heading: chain.heading[handle],
+        vx: chain.vx[handle],
+        vy: chain.vy[handle],
+    }
+}
+
+/// The stage of a motion.
+pub fn stage(run_id: u64, stamp_ns: u64, motion: &Motion) -> Stage {
+    let team = motion.team();
     let mut path = [StagePiece::default(); MOST_PIECES];
     let (mut pieces, mut pitch, mut start_turn) = (0, f64::NAN, f64::NAN);
-    for (place, shape) in path.iter_mut().zip(scene_path.shapes()) {
-        *place = stage_piece(&shape);
-        if let ShapeKind::Inward { pitch: metres, first, .. } = shape.kind {
-            pitch = metres;
-            start_turn = scene_path.spiral().map_or(first / std::f64::consts::TAU, Spiral::start_turn);
+    for (place, outline) in path.iter_mut().zip(motion.outline()) {
+        *place = stage_piece(&outline);
+        if let OutlineKind::Spiral { direction: Direction::Inward, pitch: metres, first, .. } = outline.kind {
+            (pitch, start_turn) = (metres, first / std::f64::consts::TAU);
         }
         pieces += 1;
     }
@@ -41,14 +52,18 @@ pub fn stage(run_id: u64, stamp_ns: u64, team: &Team, scene_path: &ScenePath) ->
     }
 }
 
-fn stage_piece(shape: &Shape) -> StagePiece {
-    let (kind, curvature, theta_first, theta_last) = match shape.kind {
-        ShapeKind::Line => (PIECE_LINE, 0.0, f64::NAN, f64::NAN),
-        ShapeKind::Arc { curvature } => (PIECE_ARC, curvature, f64::NAN, f64::NAN),
-        ShapeKind::Inward { first, last, .. } => (PIECE_INWARD_SPIRAL, f64::NAN, first, last),
-        ShapeKind::Outward { first, last, .. } => (PIECE_OUTWARD_SPIRAL, f64::NAN, first, last),
+fn stage_piece(outline: &SegmentOutline) -> StagePiece {
+    let (kind, curvature, theta_first, theta_last) = match outline.kind {
+        OutlineKind::Line => (PIECE_LINE, 0.0, f64::NAN, f64::NAN),
+        OutlineKind::Arc { curvature } => (PIECE_ARC, curvature, f64::NAN, f64::NAN),
+        OutlineKind::Spiral { direction: Direction::Inward, first, last, .. } => {
+            (PIECE_INWARD_SPIRAL, f64::NAN, first, last)
+        }
+        OutlineKind::Spiral { direction: Direction::Outward, first, last, .. } => {
+            (PIECE_OUTWARD_SPIRAL, f64::NAN, first, last)
+        }
     };
-    let Shape { start, heading, length, .. } = *shape;
+    let SegmentOutline { start, heading, length, .. } = *outline;
     StagePiece { x: start.x, y: start.y, heading, length, curvature, theta_first, theta_last, kind, reserved: 0 }
 }
 

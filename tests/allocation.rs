@@ -12,7 +12,6 @@ use bench_dragon::live::statistics::queues;
 use bench_dragon::live::{Frames, LoopOptions, Publisher, run_loop};
 use bench_dragon::messages::State;
 use bench_dragon::scene::{AtEnd, Scene};
-use bench_dragon::show::timeline::Timeline;
 use bench_dragon::show::{Frame, Playback, Show};
 use bench_dragon::subscribers::connection::Subscription;
 use bench_dragon::transports::iceoryx2::{Offer, SharedMemoryPublisher};
@@ -77,16 +76,16 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     let scene = Scene::paper();
     let playback =
         Playback { start: 400.0, rate: 500.0, time_scale: 20.0, at_end: AtEnd::Loop, ..Playback::of(&scene) };
-    let timeline = Timeline::of(&scene, &mut |_| ());
+    let timeline = scene.motion.timeline(&mut |_| ());
     let show = Show::new(&scene, timeline, playback).unwrap();
     let name = format!("test_{}_allocation", std::process::id());
     let offer = Offer {
         name: name.clone(),
-        handles: scene.team.handles(),
+        handles: scene.team().handles(),
         queue: 64,
         subscribers: 8,
         alerts: true,
-        stage: stage(1, 0, &scene.team, &scene.path),
+        stage: stage(1, 0, &scene.motion),
     };
     let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(SharedMemoryPublisher::open(&offer).unwrap())];
     #[cfg(feature = "ros2")]
@@ -96,7 +95,7 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
         let settings = Ros2Settings { rate: Some(100.0), ..Ros2Settings::default() };
         let offer = bench_dragon::transports::ros2::Ros2Offer {
             name: name.clone(),
-            handles: scene.team.handles(),
+            handles: scene.team().handles(),
             loop_rate: 500.0,
             settings,
             alerts: true,

@@ -169,7 +169,8 @@ fn python_sees_the_same_layouts() {
         layout!(HandlePose 1: x y heading vx vy),
         layout!(FrameHeader 1: run_id sequence tick stamp_ns sent_ns deadline_ns sim_time time_scale min_clearance handles state),
         layout!(CollisionAlert 1: run_id tick stamp_ns sim_time event_time time_to_event clearance x y level bench_a bench_b reserved),
-        layout!(LoopStatus 1: run_id tick sequence stamp_ns sim_time rate measured_rate overruns skipped shows_played
+        layout!(LoopStatus 2: run_id tick sequence stamp_ns sim_time rate measured_rate overruns skipped shows_played
+            unforeseen_contacts unsolved_frames
             lateness_p50_second lateness_p99_second lateness_max_second lateness_p50_total lateness_p99_total
             lateness_p999_total lateness_max_total step_p50_second step_p99_second step_max_second step_p50_total
             step_p99_total step_p999_total step_max_total resident_bytes subscribers file_descriptors scene),

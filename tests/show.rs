@@ -4,13 +4,13 @@
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use bench_dragon::messages::State;
+use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::{AtEnd, OnContact, Scene};
-use bench_dragon::show::timeline::Timeline;
 use bench_dragon::show::{Frame, Playback, Show};
 use proptest::prelude::*;
 
 fn paper_timeline() -> Timeline {
-    Timeline::of(&Scene::paper(), &mut |_| ())
+    Scene::paper().motion.timeline(&mut |_| ())
 }
 
 fn show(playback: Playback) -> Show {
@@ -90,7 +90,7 @@ fn a_start_after_the_contact_is_in_contact_at_once() {
 fn without_alerts_and_velocities_neither_is_computed() {
     let text = include_str!("../config/paper.toml").replace("[alerts]", "").replace("approach_", "# approach_");
     let scene = Scene::parse(&text.replace("velocities = true", "velocities = false"), "test", "test").unwrap();
-    let timeline = Timeline::without_contact(&scene);
+    let timeline = scene.motion.timeline_without_contact();
     let mut show = Show::new(&scene, timeline, Playback { start: 412.0, ..Playback::of(&scene) }).unwrap();
     for tick in 0..100 {
         let frame = show.frame(tick);
@@ -99,7 +99,43 @@ fn without_alerts_and_velocities_neither_is_computed() {
         let chain = &frame.chain;
         assert!(chain.vx.iter().chain(&chain.vy).chain(&chain.speed).all(|velocity| velocity.is_nan()));
     }
-    assert_eq!(show.pairs_asked(), 0, "a pair was asked for its clearance");
+    assert_eq!(show.pairs_tested(), 0, "a pair was tested for its clearance");
+}
+
+#[test]
+fn a_tick_past_the_lock_freezes_the_show_at_it() {
+    // The largest time scale, and the lowest rate at a large one: the second frame is far past the lock.
+    let lock = paper_timeline().end().time;
+    for (rate, time_scale) in [(60.0, 1e6), (0.1, 1e6), (0.1, 50.0)] {
+        let mut show = show(Playback { rate, time_scale, on_contact: OnContact::Continue, ..playback() });
+        assert_eq!(show.frame(0).sim_time, 0.0);
+        for tick in [1, 2, 10_000_000_000] {
+            let frame = show.frame(tick);
+            assert_eq!((frame.sim_time, frame.state), (lock, State::Lock));
+            assert!(frame.chain.vx.iter().chain(&frame.chain.speed).all(|speed| *speed == 0.0));
+            assert!(frame.chain.x.iter().chain(&frame.chain.heading).all(|number| number.is_finite()));
+        }
+    }
+}
+
+/// A show that no search has looked into, as when one gave up: the frames themselves tell of the contact.
+#[test]
+fn boards_that_overlap_unforeseen_are_a_contact_at_once() {
+    let scene = Scene::paper();
+    let unsearched = scene.motion.timeline_without_contact();
+    let playback = Playback { start: 412.0, rate: 1000.0, ..playback() };
+    let mut show = Show::new(&scene, unsearched, playback).unwrap();
+    let mut alerts = Vec::new();
+    for tick in 0..600 {
+        let frame = show.frame(tick);
+        alerts.extend(frame.alerts.iter().copied().filter(|alert| alert.level == State::Contact));
+        let overlapping = frame.sim_time > 412.473837682115;
+        assert_eq!((frame.state == State::Contact, frame.unforeseen_contacts), (overlapping, u64::from(overlapping)));
+        assert_eq!(frame.unsolved_frames, 0);
+    }
+    let [alert] = alerts[..] else { panic!("{alerts:?}") };
+    assert_eq!((alert.bench_a, alert.bench_b), (Some(0), Some(8)));
+    assert!((alert.event_time - 412.474).abs() < 1e-9, "{alert:?}");
 }
 
 /// The levels announced over a whole show, repeats left out, and the times of the events as announced.

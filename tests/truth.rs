@@ -1,16 +1,11 @@
-//! The solvers against figures computed with 50 digits, and against the paper's printed tables.
+//! The reference against figures computed with 50 digits, and the paper's solver against its printed tables.
 
-use std::f64::consts::{PI, TAU};
-
-use bench_dragon::chain::follower_table::FollowerTable;
-use bench_dragon::chain::newton::Newton;
-use bench_dragon::chain::paper::{Paper, PaperRules};
-use bench_dragon::chain::reference::Reference;
-use bench_dragon::chain::whole_chain::WholeChain;
-use bench_dragon::chain::{Chain, Instructions, Solver, Team, Velocities};
-use bench_dragon::geometry::path::Path;
-use bench_dragon::geometry::pieces::PiecePath;
-use bench_dragon::geometry::spiral::Spiral;
+use bench_dragon::model::description::PathDescription;
+use bench_dragon::model::path::Path;
+use bench_dragon::model::team::Team;
+use bench_dragon::solve::paper::{Paper, PaperRules};
+use bench_dragon::solve::reference::Reference;
+use bench_dragon::solve::{Chain, Solver, Velocities};
 
 /// One row of a 50-digit table.
 struct Row {
@@ -56,21 +51,10 @@ fn errors(solver: &mut dyn Solver, rows: &[Row]) -> Vec<(f64, f64, f64)> {
         .collect()
 }
 
-#[test]
-fn newton_agrees_with_50_digits() {
-    let rows = table(include_str!("truth/paper_scene_exact.csv"));
-    let mut newton = Newton::new(Spiral::new(0.55, 16.0), paper_team(), 1.0, Velocities::Computed);
-    let errors = errors(&mut newton, &rows);
-    assert_eq!(errors.len(), 11);
-    for (time, position, speed) in errors {
-        println!("t = {time} s: position {position:.1e} m, speed {speed:.1e}");
-        let bound = if time < 412.5 { 1e-12 } else { 1e-9 };
-        assert!(position < bound && speed < bound, "t = {time} s: position {position:e} m, speed {speed:e}");
-    }
-}
-
 fn paper_solver() -> Paper {
-    Paper::new(Spiral::new(0.55, 16.0), paper_team(), 1.0, Velocities::Computed, PaperRules::default())
+    let path = Path::spiral(0.55, 16.0);
+    let (spiral, start) = path.as_spiral().unwrap();
+    Paper::new(*spiral, start.high, paper_team(), 1.0, Velocities::Computed, PaperRules::default())
 }
 
 fn solved(solver: &mut dyn Solver, time: f64) -> Chain {
@@ -156,83 +140,10 @@ fn paper_tends_to_the_limit_of_its_own_model() {
 }
 
 #[test]
-fn the_table_agrees_with_50_digits_on_every_code_path() {
-    let rows = table(include_str!("truth/paper_scene_exact.csv"));
-    for instructions in Instructions::available() {
-        let solver = FollowerTable::new(Spiral::new(0.55, 16.0), paper_team(), 1.0, Velocities::Computed).unwrap();
-        let mut solver = solver.with_instructions(instructions).unwrap();
-        println!("{}: the table is valid until {} s", instructions.name(), solver.valid_until());
-        // It holds beyond the contact, where the show freezes.
-        assert!(solver.valid_until() > 412.5);
-        for (time, position, speed) in errors(&mut solver, &rows) {
-            println!("t = {time} s: position {position:.1e} m, speed {speed:.1e}, fallbacks {}", solver.fallbacks());
-            let bound = if time < 412.5 { 1e-12 } else { 1e-9 };
-            assert!(position < bound && speed < bound, "t = {time} s: {position:e} m, {speed:e}");
-        }
-        let beyond = rows.iter().filter(|row| row.handle == 0 && row.time > solver.valid_until()).count();
-        assert_eq!(solver.fallbacks(), beyond as u64);
-    }
-}
-
-/// Headings and velocities follow from the positions of the 50-digit table.
-#[test]
-fn headings_and_velocities_of_the_table_are_those_of_the_positions() {
-    let rows = table(include_str!("truth/paper_scene_exact.csv"));
-    let mut solver = FollowerTable::new(Spiral::new(0.55, 16.0), paper_team(), 1.0, Velocities::Computed).unwrap();
-    let mut chain = Chain::new(224);
-    let growth = 0.55 / TAU;
-    for frame in rows.chunk_by(|a, b| a.time == b.time).filter(|frame| frame[0].time < 412.5) {
-        solver.solve(frame[0].time, &mut chain).unwrap();
-        for (i, row) in frame.iter().enumerate() {
-            let [inner, outer] = if i < 223 { [row, &frame[i + 1]] } else { [&frame[i - 1], row] };
-            let heading = (inner.y - outer.y).atan2(inner.x - outer.x);
-            let off = (chain.heading[i] - heading + PI).rem_euclid(TAU) - PI;
-            assert!(off.abs() < 1e-13, "t = {} s, heading {i}: {off:e}", row.time);
-            // Inward along r = a theta: the velocity is -(a e_r + r e_phi) v / hypot(r, a).
-            let r = row.x.hypot(row.y);
-            let scale = -row.speed / r.hypot(growth);
-            let (vx, vy) = (scale * (growth * row.x / r - row.y), scale * (growth * row.y / r + row.x));
-            let off = (chain.vx[i] - vx).hypot(chain.vy[i] - vy);
-            assert!(off < 1e-12, "t = {} s, velocity {i}: {off:e}", row.time);
-        }
-    }
-}
-
-#[test]
-fn whole_chain_agrees_with_50_digits_on_every_code_path() {
-    let rows = table(include_str!("truth/paper_scene_exact.csv"));
-    let mut times: Vec<f64> = rows.iter().map(|row| row.time).collect();
-    times.dedup();
-    for instructions in Instructions::available() {
-        let solver = WholeChain::new(Spiral::new(0.55, 16.0), paper_team(), 1.0, Velocities::Computed);
-        let mut solver = solver.with_instructions(instructions).unwrap();
-        let mut chain = Chain::new(224);
-        for &time in &times {
-            // A few frames before each, so that it is a warm frame that is judged.
-            for k in (0..=20).rev() {
-                solver.solve((time - f64::from(k) / 60.0).max(0.0), &mut chain).unwrap();
-            }
-            let (mut position, mut speed) = (0f64, 0f64);
-            for row in rows.iter().filter(|row| row.time == time) {
-                let i = row.handle;
-                position = position.max((chain.x[i] - row.x).hypot(chain.y[i] - row.y));
-                speed = speed.max(((chain.speed[i] - row.speed) / row.speed).abs());
-            }
-            println!(
-                "{}: t = {time} s: position {position:.1e} m, speed {speed:.1e}, restarts {}",
-                instructions.name(),
-                solver.restarts()
-            );
-            let bound = if time < 412.5 { 1e-12 } else { 1e-9 };
-            assert!(position < bound && speed < bound, "t = {time} s: {position:e} m, {speed:e}");
-        }
-    }
-}
-
-#[test]
 fn the_reference_agrees_with_50_digits() {
     let rows = table(include_str!("truth/paper_scene_exact.csv"));
-    let mut reference = Reference::new(paper_team(), 0.55, 16.0, 1.0).unwrap();
+    let description = PathDescription::Spiral { pitch: 0.55, start_turn: 16.0 };
+    let mut reference = Reference::new(paper_team(), &description, 1.0).unwrap();
     for rows in rows.chunk_by(|a, b| a.time == b.time) {
         let handles = reference.handles(rows[0].time).unwrap();
         for row in rows {
@@ -244,38 +155,5 @@ fn the_reference_agrees_with_50_digits() {
             let bound = if row.time < 430.0 { 1e-14 } else { 1e-11 };
             assert!(((handle.speed - row.speed) / row.speed).abs() < bound, "{} {}", row.time, row.handle);
         }
-    }
-}
-
-/// The turnaround of pitch 1.7 m at 4.5 m, ratio 2, the team's length of path after it.
-fn turnaround(arc_ratio: f64) -> PiecePath {
-    PiecePath::turnaround(1.7, 4.5, arc_ratio, 100.0, 369.16).unwrap()
-}
-
-#[test]
-fn newton_agrees_with_the_turnaround_of_50_digits() {
-    // The table's clock stands at 0 with the head at the start of the turn, 100 s into the scene.
-    let text = include_str!("truth/turnaround_table.csv");
-    let mut newton = Newton::new(turnaround(2.0), paper_team(), 1.0, Velocities::Computed);
-    let (mut position, mut speed, mut rows) = (0f64, 0f64, 0);
-    for line in text.lines().skip(1) {
-        let fields: Vec<f64> = line.split(',').map(|field| field.parse().unwrap()).collect();
-        let (chain, i) = (solved(&mut newton, fields[0] + 100.0), fields[1] as usize);
-        position = position.max((chain.x[i] - fields[2]).hypot(chain.y[i] - fields[3]));
-        speed = speed.max((chain.speed[i] / fields[4] - 1.0).abs());
-        rows += 1;
-    }
-    println!("position {position:.1e} m, speed {speed:.1e}");
-    assert_eq!(rows, 48);
-    assert!(position < 1e-12 && speed < 1e-12, "position {position:e} m, speed {speed:e}");
-}
-
-#[test]
-fn the_turn_is_as_long_as_50_digits_say_whatever_the_ratio() {
-    for arc_ratio in [1.0, 2.0, 3.0] {
-        let path = turnaround(arc_ratio);
-        let begins: Vec<f64> = path.junctions().collect();
-        assert!((begins[2] - begins[0] - 13.621244906821123).abs() < 4e-14, "{begins:?}");
-        assert!((path.length() - begins[2] - 369.16).abs() < 1e-12);
     }
 }

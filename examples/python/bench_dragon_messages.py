@@ -46,6 +46,7 @@ class CollisionAlert(_Message):
 
 
 class LoopStatus(_Message):
+    LAYOUT = 2
     _fields_ = (
         [(name, ctypes.c_uint64) for name in ("run_id", "tick", "sequence", "stamp_ns")]
         + [(name, ctypes.c_double) for name in ("sim_time", "rate", "measured_rate")]
@@ -55,6 +56,8 @@ class LoopStatus(_Message):
                 "overruns",
                 "skipped",
                 "shows_played",
+                "unforeseen_contacts",
+                "unsolved_frames",
                 "lateness_p50_second",
                 "lateness_p99_second",
                 "lateness_max_second",

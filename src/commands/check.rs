@@ -1,10 +1,11 @@
 //! `check`: what a scene would model, what it leaves out, and which solver it would use and why.
 
-use bench_dragon::chain::Velocities;
-use bench_dragon::geometry::pieces::{Shape, ShapeKind};
-use bench_dragon::messages::State;
-use bench_dragon::scene::path::ScenePath;
+use bench_dragon::model::path::{OutlineKind, SegmentOutline};
+use bench_dragon::model::spiral::Direction;
+use bench_dragon::motion::Motion;
+use bench_dragon::motion::event::EventKind;
 use bench_dragon::scene::{AtEnd, OnContact};
+use bench_dragon::solve::Velocities;
 
 use super::events::{least_clearance, sentence};
 use super::{CommandError, Common, Output, number, search_timeline};
@@ -14,7 +15,7 @@ pub fn check(common: &Common) -> Result<(), CommandError> {
     let scene = common.load_scene()?;
     let timeline = search_timeline(&scene, common);
     let mut output = Output::standard();
-    let team = &scene.team;
+    let team = scene.team();
     output.line(&format!("Scene \"{}\" is valid.", scene.name))?;
     output.line(&format!(
         "  Team: {} benches, {} handles; head board {} m, the others {} m, {} m wide, holes {} m from the ends.",
@@ -25,8 +26,8 @@ pub fn check(common: &Common) -> Result<(), CommandError> {
         team.width,
         team.hole_inset
     ))?;
-    output.line(&format!("  Path: {}; the head moves at {} m/s.", path(&scene.path), scene.head_speed))?;
-    output.line(&format!("  Solver: {}.", scene.solver().1))?;
+    output.line(&format!("  Path: {}; the head moves at {} m/s.", path(&scene.motion), scene.motion.head_speed()))?;
+    output.line(&format!("  Solver: {}.", scene.motion.solver(scene.velocities).reason))?;
     output.line(match scene.velocities {
         Velocities::Computed => "  Velocities: computed for every handle.",
         Velocities::Omitted => "  Velocities: not computed; vx and vy are NaN.",
@@ -67,31 +68,37 @@ pub fn check(common: &Common) -> Result<(), CommandError> {
         output.line(&format!("  {}", sentence(&scene, timed)))?;
     }
     output.line(&format!("  {}", least_clearance(&scene, &timeline, common)))?;
-    if timeline.find(State::Contact).is_some_and(|contact| contact.time == 0.0) {
+    if timeline.find(EventKind::Contact).is_some_and(|contact| contact.time == 0.0) {
         log::warn!("boards overlap at the start of scene \"{}\": widen the pitch or narrow the boards", scene.name);
     }
     output.finish()
 }
 
 /// The path in words.
-fn path(path: &ScenePath) -> String {
-    if let ScenePath::Spiral(spiral) = path {
-        let (pitch, turn) = (spiral.pitch(), spiral.start_turn());
+fn path(motion: &Motion) -> String {
+    let outline = motion.outline();
+    if let [SegmentOutline { kind: OutlineKind::Spiral { pitch, first, .. }, .. }] = outline.as_slice() {
+        let turn = first / std::f64::consts::TAU;
         return format!("inward spiral, {pitch} m per turn, the head starting on turn {turn}");
     }
-    let pieces: Vec<String> = path.shapes().iter().filter(|shape| shape.length > 0.0).map(piece).collect();
-    format!("{:.3} m: {}", path.length(), pieces.join(", "))
+    let segments: Vec<String> = outline.iter().map(segment).collect();
+    format!("{:.3} m: {}", motion.path().length(), segments.join(", "))
 }
 
-fn piece(shape: &Shape) -> String {
-    let length = shape.length;
-    match shape.kind {
-        ShapeKind::Line => format!("{length:.3} m straight on"),
-        ShapeKind::Arc { curvature } => {
+fn segment(outline: &SegmentOutline) -> String {
+    let length = outline.length;
+    match outline.kind {
+        OutlineKind::Line => format!("{length:.3} m straight on"),
+        OutlineKind::Arc { curvature } => {
             let side = if curvature > 0.0 { "left" } else { "right" };
             format!("{length:.3} m to the {side} at radius {:.6} m", 1.0 / curvature.abs())
         }
-        ShapeKind::Inward { pitch, .. } => format!("{length:.3} m inward along a spiral of {pitch} m per turn"),
-        ShapeKind::Outward { pitch, .. } => format!("{length:.3} m outward along a spiral of {pitch} m per turn"),
+        OutlineKind::Spiral { direction, pitch, .. } => {
+            let way = match direction {
+                Direction::Inward => "inward",
+                Direction::Outward => "outward",
+            };
+            format!("{length:.3} m {way} along a spiral of {pitch} m per turn")
+        }
     }
 }

@@ -3,15 +3,15 @@
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
-use bench_dragon::chain::Chain;
-use bench_dragon::geometry::pieces::{Shape, ShapeKind};
-use bench_dragon::geometry::rectangle::Board;
-use bench_dragon::geometry::{Point, Vector};
-use bench_dragon::messages::State;
+use bench_dragon::model::board::Board;
+use bench_dragon::model::path::{OutlineKind, SegmentOutline};
+use bench_dragon::model::spiral::Direction;
+use bench_dragon::model::{Point, Vector};
+use bench_dragon::motion::event::EventKind;
+use bench_dragon::motion::timeline::{TimedEvent, Timeline};
 use bench_dragon::scene::Scene;
-use bench_dragon::scene::path::ScenePath;
 use bench_dragon::show::solve_at_or_just_before;
-use bench_dragon::show::timeline::{TimedEvent, Timeline};
+use bench_dragon::solve::Chain;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
@@ -50,8 +50,10 @@ pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandErr
     }
     let timeline = search_timeline(&scene, common);
     let time = time_at(&arguments.at, &timeline)?;
-    let mut chain = Chain::new(scene.team.handles());
-    solve_at_or_just_before(scene.solver().0.as_mut(), time, &mut chain);
+    let mut chain = Chain::new(scene.team().handles());
+    let mut solver = scene.motion.solver(scene.velocities).solver;
+    solve_at_or_just_before(solver.as_mut(), time, &mut chain)
+        .map_err(|none| CommandError::Failed(format!("at {time} s: {none}")))?;
     let picture = picture(&scene, &timeline, time, &chain, arguments.radius)
         .map_err(|error| CommandError::Failed(format!("the picture could not be drawn: {error}")))?;
     let mut output = match &arguments.output {
@@ -71,12 +73,10 @@ fn picture(
     radius: Option<f64>,
 ) -> Result<String, Box<dyn std::error::Error>> {
     let team = chain.x.iter().zip(&chain.y).map(|(x, y)| x.hypot(*y));
-    let route = scene.path.shapes().into_iter().map(|shape| shape.start.coords.norm());
-    let reach = match &scene.path {
-        ScenePath::Spiral(_) => team.fold(0.0, f64::max),
-        ScenePath::Pieces(_) => team.chain(route).fold(0.0, f64::max),
-    };
-    let radius = radius.unwrap_or(1.05 * reach + scene.team.head_length);
+    // The head's way from its start on, of which an inward spiral only comes nearer.
+    let route = scene.motion.outline().into_iter().map(|segment| segment.start.coords.norm());
+    let reach = team.chain(route.skip(1)).fold(0.0, f64::max);
+    let radius = radius.unwrap_or(1.05 * reach + scene.team().head_length);
     let mut text = String::new();
     {
         let area = SVGBackend::with_string(&mut text, (900, 918)).into_drawing_area();
@@ -103,8 +103,8 @@ fn picture(
 
 fn draw_path(stage: &mut Stage, scene: &Scene, radius: f64) -> Result<(), Box<dyn std::error::Error>> {
     let inside = |point: &(f64, f64)| point.0.abs() <= radius && point.1.abs() <= radius;
-    for shape in scene.path.shapes() {
-        let points: Vec<(f64, f64)> = outline(&shape, radius).into_iter().map(|point| (point.x, point.y)).collect();
+    for segment in scene.motion.outline() {
+        let points: Vec<(f64, f64)> = outline(&segment, radius).into_iter().map(|point| (point.x, point.y)).collect();
         // One line for each stretch inside the picture: what lies outside must not be bridged.
         for stretch in points.split(|point| !inside(point)).filter(|stretch| stretch.len() > 1) {
             stage.draw_series(LineSeries::new(stretch.to_vec(), CURVE.stroke_width(1)))?;
@@ -115,30 +115,34 @@ fn draw_path(stage: &mut Stage, scene: &Scene, radius: f64) -> Result<(), Box<dy
 
 /// Points along a piece, near enough to each other for a picture of this radius. A spiral that comes in is drawn from
 /// as far out as the picture goes: the team stands there.
-fn outline(shape: &Shape, radius: f64) -> Vec<Point> {
+fn outline(segment: &SegmentOutline, radius: f64) -> Vec<Point> {
     let spiral = |pitch: f64, from: f64, to: f64, sign: f64| -> Vec<Point> {
         let steps = ((to - from) * 12.0).ceil().clamp(1.0, 1e6);
         let thetas = (0..=steps as usize).map(|step| from + (to - from) * step as f64 / steps);
         let place = |theta: f64| Point::new(theta.cos(), theta.sin()) * (sign * pitch / TAU * theta);
         thetas.map(place).collect()
     };
-    match shape.kind {
-        ShapeKind::Inward { pitch, first, last } => {
+    match segment.kind {
+        OutlineKind::Spiral { direction: Direction::Inward, pitch, first, last } => {
             spiral(pitch, last, first.max((1.42 * radius / pitch * TAU).min(1e5)), 1.0)
         }
-        ShapeKind::Outward { pitch, first, last } => spiral(pitch, first, last.min(first.max(1e5)), -1.0),
-        ShapeKind::Line => {
-            let direction = Vector::new(shape.heading.cos(), shape.heading.sin());
-            // Short stretches, so that what leaves the picture is cut near its edge.
-            let steps = (shape.length / (0.002 * radius)).ceil().clamp(1.0, 1e6);
-            (0..=steps as usize).map(|step| shape.start + direction * (shape.length * step as f64 / steps)).collect()
+        OutlineKind::Spiral { direction: Direction::Outward, pitch, first, last } => {
+            spiral(pitch, first, last.min(first.max(1e5)), -1.0)
         }
-        ShapeKind::Arc { curvature } => {
-            let left = Vector::new(-shape.heading.sin(), shape.heading.cos());
-            let centre = shape.start + left / curvature;
-            let angle = curvature * shape.length;
+        OutlineKind::Line => {
+            let direction = Vector::new(segment.heading.cos(), segment.heading.sin());
+            // Short stretches, so that what leaves the picture is cut near its edge.
+            let steps = (segment.length / (0.002 * radius)).ceil().clamp(1.0, 1e6);
+            (0..=steps as usize)
+                .map(|step| segment.start + direction * (segment.length * step as f64 / steps))
+                .collect()
+        }
+        OutlineKind::Arc { curvature } => {
+            let left = Vector::new(-segment.heading.sin(), segment.heading.cos());
+            let centre = segment.start + left / curvature;
+            let angle = curvature * segment.length;
             let steps = (angle.abs() * 24.0).ceil().clamp(1.0, 1e6);
-            let turned = |step: usize| nalgebra::Rotation2::new(angle * step as f64 / steps) * (shape.start - centre);
+            let turned = |step: usize| nalgebra::Rotation2::new(angle * step as f64 / steps) * (segment.start - centre);
             (0..=steps as usize).map(|step| centre + turned(step)).collect()
         }
     }
@@ -152,9 +156,9 @@ fn draw_benches(
     chain: &Chain,
     radius: f64,
 ) -> Result<(), Box<dyn std::error::Error>> {
-    let contact = timeline.find(State::Contact).filter(|contact| contact.time <= time);
+    let contact = timeline.find(EventKind::Contact).filter(|contact| contact.time <= time);
     let touching = |bench: usize| contact.is_some_and(|contact| is_of(contact, bench));
-    let last = scene.team.benches - 1;
+    let last = scene.team().benches - 1;
     let (touch, others): (Vec<_>, Vec<_>) = (0..=last).partition(|bench| touching(*bench));
     let (head, followers): (Vec<_>, Vec<_>) = others.into_iter().partition(|bench| *bench == 0);
     let (tail, body): (Vec<_>, Vec<_>) = followers.into_iter().partition(|bench| *bench == last);
@@ -196,6 +200,6 @@ fn is_of(contact: &TimedEvent, bench: usize) -> bool {
 fn board(scene: &Scene, chain: &Chain, bench: usize) -> Board {
     let (sine, cosine) = chain.heading[bench].sin_cos();
     let front = Point::new(chain.x[bench], chain.y[bench]);
-    let team = &scene.team;
+    let team = scene.team();
     Board::from_front(front, Vector::new(cosine, sine), team.link(bench), team.hole_inset, team.width)
 }

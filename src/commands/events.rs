@@ -1,8 +1,8 @@
 //! `events`: everything that ends the show, in order.
 
-use bench_dragon::messages::State;
+use bench_dragon::motion::event::EventKind;
+use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
 use bench_dragon::scene::Scene;
-use bench_dragon::show::timeline::{TimedClearance, TimedEvent, Timeline};
 use serde::Serialize;
 
 use super::{CommandError, Common, Output, number, progress_bar, search_timeline};
@@ -10,7 +10,7 @@ use super::{CommandError, Common, Output, number, progress_bar, search_timeline}
 /// One line of `events --json`.
 #[derive(Serialize)]
 struct EventLine {
-    event: State,
+    event: &'static str,
     time: f64,
     bench_a: Option<u32>,
     bench_b: Option<u32>,
@@ -27,7 +27,7 @@ pub fn events(common: &Common) -> Result<(), CommandError> {
         if common.json {
             let TimedEvent { event, time } = *timed;
             output.json(&EventLine {
-                event: event.kind,
+                event: event.kind.name(),
                 time,
                 bench_a: event.bench_a,
                 bench_b: event.bench_b,
@@ -39,7 +39,7 @@ pub fn events(common: &Common) -> Result<(), CommandError> {
         }
     }
     if !common.json {
-        for kind in [State::Contact, State::Stall] {
+        for kind in [EventKind::Contact, EventKind::Stall] {
             if timeline.find(kind).is_none() {
                 output.line(&format!("There is no {} before the motion ends.", kind.name()))?;
             }
@@ -56,12 +56,11 @@ pub fn sentence(scene: &Scene, timed: &TimedEvent) -> String {
     let place = event.place.map_or(String::new(), |place| format!(" at ({:.6}, {:.6}) m", place.x, place.y));
     let (first, second) = (bench(event.bench_a), bench(event.bench_b));
     let what = match event.kind {
-        State::Contact if time == 0.0 => format!("{first} and {second} overlap from the start, most deeply{place}"),
-        State::Contact => format!("{first} and {second} touch{place}"),
-        State::Stall => format!("{first} stalls: from the handle{place} on, the team is pushed backwards"),
-        State::Lock => format!("{first} locks, its rear handle{place}: the motion cannot go on"),
-        State::PathEnd => "the head reaches the end of the path".to_owned(),
-        State::Moving | State::Approaching => "nothing".to_owned(),
+        EventKind::Contact if time == 0.0 => format!("{first} and {second} overlap from the start, most deeply{place}"),
+        EventKind::Contact => format!("{first} and {second} touch{place}"),
+        EventKind::Stall => format!("{first} stalls: from the handle{place} on, the team is pushed backwards"),
+        EventKind::Lock => format!("{first} locks, its rear handle{place}: the motion cannot go on"),
+        EventKind::PathEnd => "the head reaches the end of the path".to_owned(),
     };
     format!("{:>9}  t = {} s: {what} (counting from 1).", event.kind.name(), number(time))
         .replace("path (counting from 1)", "path")
@@ -70,17 +69,18 @@ pub fn sentence(scene: &Scene, timed: &TimedEvent) -> String {
 /// The least clearance of the whole show, for people.
 pub fn least_clearance(scene: &Scene, timeline: &Timeline, common: &Common) -> String {
     let bar = progress_bar(1000, common).with_message("searching for the least clearance");
-    let found = timeline.least_clearance(scene, &mut |share| bar.set_position((1000.0 * share) as u64));
+    let freeze = timeline.freeze(scene.stops_at_contact());
+    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+    let found = scene.motion.least_clearance(timeline, freeze, &mut progress);
     bar.finish_and_clear();
-    let Some(TimedClearance { least, time }) = found else {
-        return "The least clearance of the show is not computed: there are too few benches, or the search would be too long.".to_owned();
+    let Some(TimedClearance { least, time, searched_until }) = found else {
+        return "The least clearance of the show is not computed: there are no two benches that could meet, or the search gave up.".to_owned();
     };
     let (first, second) = (bench_name(scene, least.bench_a), bench_name(scene, least.bench_b));
-    format!(
-        "The least clearance of the show is {} m, at t = {} s, between {first} and {second} (counting from 1).",
-        number(least.value),
-        number(time)
-    )
+    let (value, time) = (number(least.value), number(time));
+    let of = searched_until
+        .map_or("of the show".to_owned(), |until| format!("up to t = {} s, where the search gave up,", number(until)));
+    format!("The least clearance {of} is {value} m, at t = {time} s, between {first} and {second} (counting from 1).")
 }
 
 /// A bench as people call it, counted from 1.
@@ -88,7 +88,7 @@ pub fn bench_name(scene: &Scene, bench: u32) -> String {
     let count = bench as usize + 1;
     match count {
         1 => "bench 1 (the head)".to_owned(),
-        _ if count == scene.team.benches => format!("bench {count} (the tail)"),
+        _ if count == scene.team().benches => format!("bench {count} (the tail)"),
         _ => format!("bench {count}"),
     }
 }

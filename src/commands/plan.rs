@@ -62,7 +62,7 @@ fn plan_pitch(common: &Common, radius: f64) -> Result<(), CommandError> {
     Accepted::LENGTH.check("--reach-radius", radius).map_err(CommandError::BadInput)?;
     let scene = common.load_scene()?;
     let bar = progress_bar(1000, common).with_message("searching for the pitch");
-    let found = least_pitch(&scene.team, radius, &mut |share| bar.set_position((1000.0 * share) as u64));
+    let found = least_pitch(scene.team(), radius, &mut |share| bar.set_position((1000.0 * share) as u64));
     bar.finish_and_clear();
     let LeastPitch { value, bench_a, bench_b, head_radius } = found?;
     let mut output = Output::standard();

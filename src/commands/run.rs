@@ -14,8 +14,9 @@ use bench_dragon::live::clock::realtime_ns;
 use bench_dragon::live::statistics::{self, Announcement, Inbox, Percentiles, Run, Summary};
 use bench_dragon::live::{Counts, End, LoopOptions, Publisher, StatusPublisher, run_loop};
 use bench_dragon::messages::{Stage, State};
+use bench_dragon::motion::event::EventKind;
+use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::{Accepted, AtEnd, Scene};
-use bench_dragon::show::timeline::Timeline;
 use bench_dragon::show::{Playback, Show};
 use bench_dragon::transports;
 use bench_dragon::transports::iceoryx2::{self, Offer, OpenError, SharedMemoryPublisher, StatusSender};
@@ -25,7 +26,7 @@ use self::ros2::{Ros2, Ros2Summary};
 
 use super::events::{bench_name, sentence};
 use super::punctuality::Punctuality;
-use super::{CommandError, Common, Output, number, search_timeline, stop_on_signals};
+use super::{CommandError, Common, Output, number, search_timeline, stop_on_signals, warn_of_gap};
 
 /// Arguments of `run`.
 #[derive(Debug, clap::Args)]
@@ -79,31 +80,39 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
     let scene = common.load_scene()?;
     let playback = arguments.playback(&scene)?;
     iceoryx2::service_name(&common.name, "poses")?;
-    let timeline =
-        if scene.alerts.is_some() { search_timeline(&scene, common) } else { Timeline::without_contact(&scene) };
+    let timeline = if scene.alerts.is_some() {
+        search_timeline(&scene, common)
+    } else {
+        let timeline = scene.motion.timeline_without_contact();
+        warn_of_gap(&timeline);
+        timeline
+    };
     let show = Show::new(&scene, timeline, playback).map_err(|error| CommandError::BadInput(error.to_string()))?;
     let stop = stop_on_signals()?;
     if arguments.end_with_parent {
         super::soak::end_with_parent()?;
     }
     let run_id = RandomState::new().hash_one(realtime_ns());
-    let timeline = show.timeline().clone();
-    let performance = Performance { common, arguments, scene: &scene, playback, run_id };
-    performance.perform(show, &timeline, &stop)
+    let (timeline, solver) = (show.timeline().clone(), show.solver_reason().to_owned());
+    let session = RunSession { common, arguments, scene: &scene, playback, run_id, timeline, solver };
+    session.run(show, &stop)
 }
 
 /// All that the threads of a run have in common.
-struct Performance<'a> {
+struct RunSession<'a> {
     common: &'a Common,
     arguments: &'a RunArguments,
     scene: &'a Scene,
     playback: Playback,
     run_id: u64,
+    timeline: Timeline,
+    /// The solver and why it was chosen.
+    solver: String,
 }
 
-impl Performance<'_> {
+impl RunSession<'_> {
     /// Runs the loop on one thread and the statistics on another.
-    fn perform(&self, mut show: Show, timeline: &Timeline, stop: &Arc<AtomicBool>) -> Result<(), CommandError> {
+    fn run(&self, mut show: Show, stop: &Arc<AtomicBool>) -> Result<(), CommandError> {
         iceoryx2::remains::keep_removing();
         let ros2 = self.open_ros2()?;
         let (reports, inbox) = statistics::queues();
@@ -136,7 +145,7 @@ impl Performance<'_> {
             // The thread sends exactly once; should it have died, joining it tells.
             let ready = opening.recv().unwrap_or(Ok(()));
             let summary = ready.and_then(|()| {
-                self.print_start(timeline, ros2_sentence.as_deref())?;
+                self.print_start(ros2_sentence.as_deref())?;
                 let collecting = threads.spawn(|| {
                     // Without statistics the loop would run unseen.
                     self.collect(inbox, ros2_status, &done).inspect_err(|_| stop.store(true, Ordering::Relaxed))
@@ -168,12 +177,12 @@ impl Performance<'_> {
 
     fn stage(&self) -> Stage {
         let scene = self.scene;
-        transports::stage(self.run_id, realtime_ns(), &scene.team, &scene.path)
+        transports::stage(self.run_id, realtime_ns(), &scene.motion)
     }
 
     fn open_shared_memory(&self) -> Result<SharedMemoryPublisher, CommandError> {
         let scene = self.scene;
-        let handles = scene.team.handles();
+        let handles = scene.team().handles();
         Ok(SharedMemoryPublisher::open(&Offer {
             name: self.common.name.clone(),
             handles,
@@ -185,7 +194,7 @@ impl Performance<'_> {
     }
 
     fn queue(&self) -> usize {
-        self.scene.queue.unwrap_or_else(|| iceoryx2::default_queue(self.scene.team.handles(), self.scene.subscribers))
+        self.scene.queue.unwrap_or_else(|| iceoryx2::default_queue(self.scene.team().handles(), self.scene.subscribers))
     }
 
     fn loop_options(&self) -> LoopOptions {
@@ -216,13 +225,13 @@ impl Performance<'_> {
     }
 
     /// What a person wants to know at the start, on standard error: standard output is for the summary.
-    fn print_start(&self, timeline: &Timeline, ros2: Option<&str>) -> Result<(), CommandError> {
+    fn print_start(&self, ros2: Option<&str>) -> Result<(), CommandError> {
         if self.common.quiet || self.common.json {
             return Ok(());
         }
         let (scene, name, playback) = (self.scene, &self.common.name, self.playback);
-        eprintln!("Scene \"{}\": {} benches, {} handles.", scene.name, scene.team.benches, scene.team.handles());
-        eprintln!("Solver {}.", scene.solver().1);
+        eprintln!("Scene \"{}\": {} benches, {} handles.", scene.name, scene.team().benches, scene.team().handles());
+        eprintln!("Solver {}.", self.solver);
         let scale = if playback.time_scale == 1.0 {
             String::new()
         } else {
@@ -242,10 +251,10 @@ impl Performance<'_> {
             Some(_) => eprintln!("Ahead, in simulated time:"),
             None => eprintln!("No alerts: contact and stall are not computed. Ahead, in simulated time:"),
         }
-        for timed in timeline.events() {
+        for timed in self.timeline.events() {
             eprintln!("{}", sentence(scene, timed));
         }
-        if timeline.find(State::Contact).is_some_and(|contact| contact.time == 0.0) {
+        if self.timeline.find(EventKind::Contact).is_some_and(|contact| contact.time == 0.0) {
             log::warn!("boards overlap at the start of this scene");
         }
         Ok(())

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use bench_dragon::chain::Chain;
-use bench_dragon::messages::State;
+use bench_dragon::motion::event::EventKind;
+use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::Scene;
 use bench_dragon::show::solve_at_or_just_before;
-use bench_dragon::show::timeline::Timeline;
+use bench_dragon::solve::Chain;
 use serde::Serialize;
 
 use super::{CommandError, Common, Output, number, progress_bar, search_timeline};
@@ -43,11 +43,12 @@ struct TimeLine {
 /// Solves the scene at the times asked for and prints the table.
 pub fn solve(common: &Common, arguments: &SolveArguments) -> Result<(), CommandError> {
     let scene = common.load_scene()?;
-    let wants_contact = arguments.at.iter().any(|time| time.trim() == State::Contact.name());
-    let timeline = if wants_contact { search_timeline(&scene, common) } else { Timeline::without_contact(&scene) };
-    let times = arguments.times(&timeline)?;
-    let (mut solver, _) = scene.solver();
-    let mut chain = Chain::new(scene.team.handles());
+    let wants_contact = arguments.at.iter().any(|time| time.trim() == EventKind::Contact.name());
+    let timeline =
+        if wants_contact { search_timeline(&scene, common) } else { scene.motion.timeline_without_contact() };
+    let (count, times) = arguments.times(&timeline)?;
+    let mut solver = scene.motion.solver(scene.velocities).solver;
+    let mut chain = Chain::new(scene.team().handles());
     let mut output = match &arguments.output {
         Some(file) => Output::file(file)?,
         None => Output::standard(),
@@ -55,9 +56,11 @@ pub fn solve(common: &Common, arguments: &SolveArguments) -> Result<(), CommandE
     if !common.json {
         output.line("t,handle,x,y,heading,vx,vy,speed")?;
     }
-    let bar = progress_bar(times.len() as u64, common);
+    let bar = progress_bar(count, common);
     for time in times {
-        solve_at_or_just_before(solver.as_mut(), time, &mut chain);
+        if solve_at_or_just_before(solver.as_mut(), time, &mut chain).is_err() {
+            return Err(CommandError::Failed(format!("there is no solution at {} s", number(time))));
+        }
         if common.json {
             output.json(&TimeLine { t: time, handles: (0..chain.handles()).map(|i| numbers(&chain, i)).collect() })?;
         } else {
@@ -79,15 +82,18 @@ fn numbers(chain: &Chain, handle: usize) -> [f64; 6] {
 }
 
 impl SolveArguments {
-    /// The times asked for, all of them within the motion.
-    fn times(&self, timeline: &Timeline) -> Result<Vec<f64>, CommandError> {
+    /// How many times are asked for, and one after the other, all of them within the motion.
+    fn times(&self, timeline: &Timeline) -> Result<Times, CommandError> {
         match (self.every, self.until) {
             (Some(every), Some(until)) => self.regular_times(every, until, timeline),
-            _ => self.at.iter().map(|text| time_at(text, timeline)).collect(),
+            _ => {
+                let times: Vec<f64> = self.at.iter().map(|text| time_at(text, timeline)).collect::<Result<_, _>>()?;
+                Ok((times.len() as u64, Box::new(times.into_iter())))
+            }
         }
     }
 
-    fn regular_times(&self, every: f64, until: f64, timeline: &Timeline) -> Result<Vec<f64>, CommandError> {
+    fn regular_times(&self, every: f64, until: f64, timeline: &Timeline) -> Result<Times, CommandError> {
         let from = self.from;
         if !(every.is_finite() && every > 0.0) {
             return Err(CommandError::BadInput(format!("--every is {every}, expected a number of seconds above 0")));
@@ -107,19 +113,31 @@ impl SolveArguments {
                 "--every {every} gives {steps:e} rows, expected fewer than 1e9"
             )));
         }
-        let times = (0..=steps as u64).map(|step| from + step as f64 * every);
         let end = timeline.end();
-        let within: Vec<f64> = times.take_while(|time| *time <= end.time).collect();
-        if (within.len() as f64) <= steps {
+        let steps = steps as u64;
+        let time = move |step: u64| from + step as f64 * every;
+        let within = if time(steps) <= end.time {
+            steps + 1
+        } else {
             eprintln!(
                 "The motion ends at {} s ({}): the table ends at its last row before that.",
                 number(end.time),
                 end.event.kind.name()
             );
-        }
-        Ok(within)
+            // The first row past the end: found by halving, since the rows may be a billion.
+            let (mut within, mut past) = (0, steps);
+            while within < past {
+                let middle = within.midpoint(past);
+                if time(middle) <= end.time { within = middle + 1 } else { past = middle }
+            }
+            within
+        };
+        Ok((within, Box::new((0..within).map(time))))
     }
 }
+
+/// How many times, and one after the other.
+type Times = (u64, Box<dyn Iterator<Item = f64>>);
 
 /// A time as `--at` takes it: seconds, or the name of an event.
 ///
@@ -127,8 +145,9 @@ impl SolveArguments {
 /// Bad input: not a number, an event that does not happen, or a time after the motion's end.
 pub fn time_at(text: &str, timeline: &Timeline) -> Result<f64, CommandError> {
     let text = text.trim();
-    let named =
-        [State::Contact, State::Stall, State::Lock, State::PathEnd].into_iter().find(|kind| kind.name() == text);
+    let named = [EventKind::Contact, EventKind::Stall, EventKind::Lock, EventKind::PathEnd]
+        .into_iter()
+        .find(|kind| kind.name() == text);
     if let Some(kind) = named {
         return timeline.find(kind).map(|timed| timed.time).ok_or_else(|| {
             CommandError::BadInput(format!("--at {text}: this scene has no {text}; `events` lists what it has"))
@@ -140,6 +159,12 @@ pub fn time_at(text: &str, timeline: &Timeline) -> Result<f64, CommandError> {
     let end = timeline.end();
     if !(time.is_finite() && time >= 0.0) {
         return Err(CommandError::BadInput(format!("--at {text}: expected a number of seconds, at least 0")));
+    }
+    // Minus zero is zero.
+    let time = time + 0.0;
+    // The end's own time, printed with fewer digits and read again, is the end.
+    if time > end.time && time <= end.time * (1.0 + 4.0 * f64::EPSILON) {
+        return Ok(end.time);
     }
     if time > end.time {
         return Err(CommandError::BadInput(format!(

@@ -18,10 +18,6 @@ pub struct TradeArguments {
 /// Measures every solver and prints a table or JSON lines.
 pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandError> {
     let scene = common.load_scene()?;
-    if scene.path.spiral().is_none() {
-        let sentence = "path.kind is not \"spiral\": `trade` compares solvers on spirals, other paths have one";
-        return Err(CommandError::BadInput(sentence.to_owned()));
-    }
     let timeline = search_timeline(&scene, common);
     let bar = progress_bar(1000, common).with_message("measuring");
     let measured = measure(&scene, &timeline, &mut |share| bar.set_position((1000.0 * share) as u64));

@@ -29,6 +29,10 @@ pub struct Sample {
     pub sim_time: f64,
     /// Shows played so far.
     pub shows_played: u64,
+    /// Unforeseen contacts so far.
+    pub unforeseen_contacts: u64,
+    /// Unsolved frames so far.
+    pub unsolved_frames: u64,
     /// What was counted so far, this frame included.
     pub counts: Counts,
     /// How late the thread woke after the intended deadline.
@@ -189,6 +193,8 @@ fn status(run: &Run, sample: &Sample, measured_rate: f64, second: &Stretch, tota
         overruns: sample.counts.overruns,
         skipped: sample.counts.skipped,
         shows_played: sample.shows_played,
+        unforeseen_contacts: sample.unforeseen_contacts,
+        unsolved_frames: sample.unsolved_frames,
         lateness_p50_second: late.p50,
         lateness_p99_second: late.p99,
         lateness_max_second: late.max,

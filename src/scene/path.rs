@@ -1,72 +1,26 @@
 //! The `[path]` table: a spiral, a turnaround, or a route of lines and arcs.
 //!
-//! In: what serde has read. Out: a [`ScenePath`], or one sentence about the field that is wrong. Only [`super`] calls
-//! the reading part.
+//! In: what serde has read. Out: a [`PathDescription`], or one sentence about the field that is wrong. Only [`super`]
+//! calls it.
+
+use std::f64::consts::TAU;
 
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::{Accepted, SceneError, Source};
-use crate::chain::Team;
-use crate::geometry::path::Path;
-use crate::geometry::pieces::{Leg, PiecePath, Shape, ShapeKind, Side};
-use crate::geometry::root::first_true;
-use crate::geometry::spiral::Spiral;
-use crate::geometry::{Point, Vector};
+use crate::linkage::follower;
+use crate::model::Point;
+use crate::model::curve::{Curve, Side};
+use crate::model::description::{PathDescription, RouteStep};
+use crate::model::double_double::DoubleDouble;
+use crate::model::path::Path;
+use crate::model::root::bisect_predicate;
+use crate::model::spiral::{Direction, Spiral};
+use crate::model::team::Team;
 
-/// The curve that a scene's handles ride.
-#[derive(Debug, Clone, PartialEq)]
-pub enum ScenePath {
-    /// Inward along a spiral to its centre.
-    Spiral(Spiral),
-    /// A turnaround, or a route of lines and arcs.
-    Pieces(PiecePath),
-}
-
-impl ScenePath {
-    /// The spiral, where the path is nothing else.
-    pub fn spiral(&self) -> Option<&Spiral> {
-        match self {
-            Self::Spiral(spiral) => Some(spiral),
-            Self::Pieces(_) => None,
-        }
-    }
-
-    /// Metres that the head can travel.
-    pub fn length(&self) -> f64 {
-        match self {
-            Self::Spiral(spiral) => spiral.length(),
-            Self::Pieces(path) => path.length(),
-        }
-    }
-
-    /// What a drawing needs of each piece, in order.
-    pub fn shapes(&self) -> Vec<Shape> {
-        match self {
-            Self::Spiral(spiral) => {
-                let tangent = spiral.tangent(spiral.start());
-                vec![Shape {
-                    kind: ShapeKind::Inward { pitch: spiral.pitch(), first: spiral.start().radians(), last: 0.0 },
-                    start: spiral.point(spiral.start()),
-                    heading: tangent.y.atan2(tangent.x),
-                    length: spiral.length(),
-                }]
-            }
-            Self::Pieces(path) => path.shapes().collect(),
-        }
-    }
-
-    /// The point at which the head is after so many metres of travel.
-    pub fn head_point(&self, travelled: f64) -> Point {
-        match self {
-            Self::Spiral(spiral) => spiral.point(spiral.place_at(travelled)),
-            Self::Pieces(path) => path.point(path.place_at(travelled)),
-        }
-    }
-}
-
-/// The most legs of a route: what a stage message has room for, less the line on which the team stands.
-pub const MOST_LEGS: usize = crate::messages::MOST_PIECES - 1;
+/// The most segments of a route: what a stage message has room for, less the line on which the team stands.
+const MOST_STEPS: usize = crate::messages::MOST_PIECES - 1;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -80,13 +34,13 @@ pub(super) struct RawPath {
     lead_out: Option<Spanned<f64>>,
     start: Option<Spanned<[f64; 2]>>,
     heading_turns: Option<Spanned<f64>>,
-    pieces: Option<Spanned<Vec<Spanned<RawLeg>>>>,
+    pieces: Option<Spanned<Vec<Spanned<RawStep>>>>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawLeg {
-    kind: RawLegKind,
+struct RawStep {
+    kind: RawStepKind,
     length: Option<Spanned<f64>>,
     radius: Option<Spanned<f64>>,
     turns: Option<Spanned<f64>>,
@@ -95,7 +49,7 @@ struct RawLeg {
 
 #[derive(Clone, Copy, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
-enum RawLegKind {
+enum RawStepKind {
     Line,
     Arc,
 }
@@ -108,16 +62,22 @@ enum RawSide {
 }
 
 impl RawPath {
-    pub(super) fn validated(&self, source: &Source, team: &Team) -> Result<ScenePath, SceneError> {
+    /// The path that is meant.
+    pub(super) fn validated(&self, source: &Source, team: &Team) -> Result<PathDescription, SceneError> {
         match self.kind.get_ref().as_str() {
-            "spiral" => self.spiral(source, team).map(ScenePath::Spiral),
-            "turnaround" => self.turnaround(source, team).map(ScenePath::Pieces),
-            "pieces" => self.route(source, team).map(ScenePath::Pieces),
+            "spiral" => self.spiral(source, team),
+            "turnaround" => self.turnaround(source, team),
+            "pieces" => self.route(source),
             other => {
                 let sentence = format!("path.kind is \"{other}\", expected \"spiral\", \"turnaround\" or \"pieces\"");
-                Err(source.wrong(&self.kind, &sentence))
+                Err(source.field_error(&self.kind, &sentence))
             }
         }
+    }
+
+    /// An error of the path as a whole.
+    pub(super) fn error(&self, source: &Source, sentence: &str) -> SceneError {
+        source.field_error(&self.kind, sentence)
     }
 
     /// Refuses fields that the kind does not have.
@@ -125,7 +85,7 @@ impl RawPath {
         let refused = |field: &str, at: usize| {
             let (kind, fields) = (self.kind.get_ref(), fields.join(", "));
             let sentence = format!("path.{field} is given but path.kind is \"{kind}\", expected only {fields}");
-            source.wrong_at(at, &sentence)
+            source.field_error_at(at, &sentence)
         };
         let numbers = [
             ("pitch", &self.pitch),
@@ -157,7 +117,7 @@ impl RawPath {
     ) -> Result<&'a Spanned<T>, SceneError> {
         value.as_ref().ok_or_else(|| {
             let sentence = format!("path.{field} is missing, a path of kind \"{}\" needs it", self.kind.get_ref());
-            source.wrong(&self.kind, &sentence)
+            source.field_error(&self.kind, &sentence)
         })
     }
 
@@ -171,7 +131,7 @@ impl RawPath {
         source.check(&format!("path.{field}"), self.needed(source, field, value)?, accepted)
     }
 
-    fn spiral(&self, source: &Source, team: &Team) -> Result<Spiral, SceneError> {
+    fn spiral(&self, source: &Source, team: &Team) -> Result<PathDescription, SceneError> {
         self.only(source, &["pitch", "start_turn"])?;
         let pitch = self.number(source, "pitch", &self.pitch, Accepted::LENGTH)?;
         let given = self.needed(source, "start_turn", &self.start_turn)?;
@@ -181,70 +141,71 @@ impl RawPath {
                 "path.start_turn is {start_turn}, which is so near the centre that a bench is folded back on itself, \
                  expected at least {least:.9}"
             );
-            return Err(source.wrong(given, &sentence));
+            return Err(source.field_error(given, &sentence));
         }
-        Ok(Spiral::new(pitch, start_turn))
+        Ok(PathDescription::Spiral { pitch, start_turn })
     }
 
-    fn turnaround(&self, source: &Source, team: &Team) -> Result<PiecePath, SceneError> {
+    fn turnaround(&self, source: &Source, team: &Team) -> Result<PathDescription, SceneError> {
         self.only(source, &["pitch", "turn_radius", "arc_ratio", "start_turn", "lead_in", "lead_out"])?;
         let pitch_given = self.needed(source, "pitch", &self.pitch)?;
         let pitch = source.check("path.pitch", pitch_given, Accepted::LENGTH)?;
         let turn_radius = self.number(source, "turn_radius", &self.turn_radius, Accepted::LENGTH)?;
         let arc_ratio = self.number(source, "arc_ratio", &self.arc_ratio, Accepted::ARC_RATIO)?;
-        let turn = Spiral::new(pitch, turn_radius / pitch);
-        let lead_in = self.lead_in(source, &turn)?;
-        if let Some(least) = least_legal_start(pitch, turn.place_at(-lead_in).in_turns(), team) {
-            let needed = turn.distance_between(Spiral::new(pitch, least).start(), turn.start());
+        let spiral = Spiral::new(pitch, Direction::Inward);
+        let turn = DoubleDouble::from_turns(turn_radius / pitch);
+        let lead_in = self.lead_in(source, &spiral, turn_radius / pitch)?;
+        let start_turn = spiral.advance(turn, -lead_in).high / TAU;
+        if let Some(least) = least_legal_start(pitch, start_turn, team) {
+            let needed = spiral.arc_length(DoubleDouble::from_turns(least), turn);
             let sentence = format!(
                 "the head starts so near the centre that a bench is folded back on itself, expected path.start_turn \
                  of at least {least:.9}, or path.lead_in of at least {needed:.9}"
             );
-            return Err(
-                source.wrong(self.start_turn.as_ref().or(self.lead_in.as_ref()).unwrap_or(pitch_given), &sentence)
-            );
+            return Err(source
+                .field_error(self.start_turn.as_ref().or(self.lead_in.as_ref()).unwrap_or(pitch_given), &sentence));
         }
         let lead_out = match &self.lead_out {
             Some(given) => source.check("path.lead_out", given, Accepted::ROUTE)?,
-            None => team_length(team),
+            None => team.length(),
         };
-        PiecePath::turnaround(pitch, turn_radius, arc_ratio, lead_in, lead_out)
-            .map_err(|error| source.wrong(&self.kind, &format!("the path has a gap: {error}")))
+        Ok(PathDescription::Turnaround { pitch, turn_radius, arc_ratio, lead_in, lead_out })
     }
 
     /// Metres of path before the turn.
-    fn lead_in(&self, source: &Source, turn: &Spiral) -> Result<f64, SceneError> {
+    fn lead_in(&self, source: &Source, spiral: &Spiral, turn: f64) -> Result<f64, SceneError> {
         match (&self.lead_in, &self.start_turn) {
             (Some(lead_in), Some(_)) => {
                 let sentence = "path.lead_in and path.start_turn are both given, expected one of them";
-                Err(source.wrong(lead_in, sentence))
+                Err(source.field_error(lead_in, sentence))
             }
             (Some(lead_in), None) => source.check("path.lead_in", lead_in, Accepted::ROUTE),
             (None, Some(given)) => {
                 let start_turn = source.check("path.start_turn", given, Accepted::START_TURN)?;
-                if start_turn < turn.start_turn() {
+                if start_turn < turn {
                     let sentence = format!(
-                        "path.start_turn is {start_turn}, which is inside the turn, expected at least {} \
-                         (path.turn_radius / path.pitch)",
-                        turn.start_turn()
+                        "path.start_turn is {start_turn}, which is inside the turn, expected at least {turn} \
+                         (path.turn_radius / path.pitch)"
                     );
-                    return Err(source.wrong(given, &sentence));
+                    return Err(source.field_error(given, &sentence));
                 }
-                Ok(turn.distance_between(Spiral::new(turn.pitch(), start_turn).start(), turn.start()))
+                Ok(spiral.arc_length(DoubleDouble::from_turns(start_turn), DoubleDouble::from_turns(turn)))
             }
             (None, None) => {
                 let sentence = "path.lead_in and path.start_turn are both missing, expected one of them";
-                Err(source.wrong(&self.kind, sentence))
+                Err(source.field_error(&self.kind, sentence))
             }
         }
     }
 
-    fn route(&self, source: &Source, team: &Team) -> Result<PiecePath, SceneError> {
+    fn route(&self, source: &Source) -> Result<PathDescription, SceneError> {
         self.only(source, &["start", "heading_turns", "pieces"])?;
         let start = match &self.start {
             Some(given) => {
                 for number in given.get_ref() {
-                    Accepted::PLACE.check("path.start", *number).map_err(|sentence| source.wrong(given, &sentence))?;
+                    Accepted::PLACE
+                        .check("path.start", *number)
+                        .map_err(|sentence| source.field_error(given, &sentence))?;
                 }
                 Point::from(*given.get_ref())
             }
@@ -255,34 +216,27 @@ impl RawPath {
             None => 0.0,
         };
         let given = self.needed(source, "pieces", &self.pieces)?;
-        if given.get_ref().is_empty() || given.get_ref().len() > MOST_LEGS {
-            let sentence = format!("path.pieces has {} pieces, expected from 1 to {MOST_LEGS}", given.get_ref().len());
-            return Err(source.wrong(given, &sentence));
+        if given.get_ref().is_empty() || given.get_ref().len() > MOST_STEPS {
+            let sentence = format!("path.pieces has {} pieces, expected from 1 to {MOST_STEPS}", given.get_ref().len());
+            return Err(source.field_error(given, &sentence));
         }
-        // The team stands in the wings: on a straight line behind the first piece.
-        let wings = team_length(team) * (1.0 + 1e-9);
-        let (sine, cosine) = (std::f64::consts::TAU * heading_turns).sin_cos();
-        let first = start - wings * Vector::new(cosine, sine);
-        let mut legs = vec![Leg::Line { length: wings }];
-        for leg in given.get_ref() {
-            legs.push(leg.get_ref().validated(source, leg)?);
-        }
-        PiecePath::route(first, heading_turns, &legs, wings)
-            .map_err(|error| source.wrong(given, &format!("the path has a gap: {error}")))
+        let segments = given.get_ref().iter().map(|step| step.get_ref().validated(source, step));
+        let steps = segments.collect::<Result<_, _>>()?;
+        Ok(PathDescription::Route { start, heading_turns, steps })
     }
 }
 
-impl RawLeg {
-    fn validated(&self, source: &Source, at: &Spanned<Self>) -> Result<Leg, SceneError> {
+impl RawStep {
+    fn validated(&self, source: &Source, at: &Spanned<Self>) -> Result<RouteStep, SceneError> {
         let check = |field: &str, value: &Spanned<f64>, accepted: Accepted| {
             source.check(&format!("path.pieces.{field}"), value, accepted)
         };
         match (self.kind, &self.length, &self.turns, &self.radius, self.side) {
-            (RawLegKind::Line, Some(length), None, None, None) => {
-                Ok(Leg::Line { length: check("length", length, Accepted::LEG)? })
+            (RawStepKind::Line, Some(length), None, None, None) => {
+                Ok(RouteStep::Line { length: check("length", length, Accepted::LEG)? })
             }
-            (RawLegKind::Line, ..) => Err(source.wrong(at, "a line has a length and nothing else")),
-            (RawLegKind::Arc, length, turns, Some(radius), Some(side)) if length.is_some() != turns.is_some() => {
+            (RawStepKind::Line, ..) => Err(source.field_error(at, "a line has a length and nothing else")),
+            (RawStepKind::Arc, length, turns, Some(radius), Some(side)) if length.is_some() != turns.is_some() => {
                 let radius = check("radius", radius, Accepted::LENGTH)?;
                 let turns = match (turns, length) {
                     (Some(turns), _) => check("turns", turns, Accepted::ARC_TURNS)?,
@@ -290,18 +244,18 @@ impl RawLeg {
                         let turns = check("length", length, Accepted::LEG)? / (std::f64::consts::TAU * radius);
                         Accepted::ARC_TURNS
                             .check("path.pieces.length in turns", turns)
-                            .map_err(|sentence| source.wrong(length, &sentence))?
+                            .map_err(|sentence| source.field_error(length, &sentence))?
                     }
                     // The guard has seen one of the two.
-                    (None, None) => return Err(source.wrong(at, "an arc needs turns or a length")),
+                    (None, None) => return Err(source.field_error(at, "an arc needs turns or a length")),
                 };
                 let side = match side {
                     RawSide::Left => Side::Left,
                     RawSide::Right => Side::Right,
                 };
-                Ok(Leg::Arc { side, turns, radius })
+                Ok(RouteStep::Arc { side, turns, radius })
             }
-            (RawLegKind::Arc, ..) => Err(source.wrong(
+            (RawStepKind::Arc, ..) => Err(source.field_error(
                 at,
                 "an arc has a radius, a side (\"left\" or \"right\") and either turns (0.25 is a quarter circle) or a \
                  length",
@@ -310,31 +264,24 @@ impl RawLeg {
     }
 }
 
-/// Metres from the first handle to the last, the team being stretched.
-pub fn team_length(team: &Team) -> f64 {
-    team.link(0) + team.link(1) * (team.benches - 1) as f64
-}
-
 /// Where a start is illegal, the least number of turns that is not, rounded up to nine decimals.
 ///
 /// Only the first link of each length can be at or inside its fold: all others of that length are further out.
 fn least_legal_start(pitch: f64, start_turn: f64, team: &Team) -> Option<f64> {
-    let spiral = Spiral::new(pitch, start_turn);
+    let spiral = Spiral::new(pitch, Direction::Inward);
     let folds = [0, 1].map(|bench| spiral.fold(team.link(bench)));
     let outside = |theta: f64, fold: Option<f64>| fold.is_none_or(|fold| theta > fold);
-    let legal = |theta: f64| {
-        outside(theta, folds[0])
+    let legal = |turns: f64| {
+        let path = Path::spiral(pitch, turns);
+        let head = path.param_at(0.0);
+        outside(head.at.high, folds[0])
             && (team.benches < 2
-                || spiral
-                    .follower(spiral.place_of_theta(theta), team.link(0))
-                    .is_ok_and(|second| outside(second.radians(), folds[1])))
+                || follower(&path, head, team.link(0)).is_ok_and(|second| outside(second.at.high, folds[1])))
     };
-    let start = spiral.start().radians();
-    if legal(start) {
+    if legal(start_turn) {
         return None;
     }
     // Beyond both folds every start is legal.
-    let safe = folds.iter().flatten().fold(start, |most, fold| most.max(*fold)) * 1.01;
-    let least = first_true(legal, start, safe);
-    Some((least / std::f64::consts::TAU * 1e9).ceil() / 1e9)
+    let safe = folds.iter().flatten().fold(start_turn, |most, fold| most.max(*fold / TAU)) * 1.01;
+    Some((bisect_predicate(legal, start_turn, safe) * 1e9).ceil() / 1e9)
 }

@@ -148,7 +148,7 @@ impl RawRos2 {
             None => Topic::DEFAULT.to_vec(),
             Some(topics) if topics.get_ref().is_empty() => {
                 let sentence = "publish.ros2.topics is empty, expected at least one topic, or no [publish.ros2]";
-                return Err(source.wrong(topics, sentence));
+                return Err(source.field_error(topics, sentence));
             }
             Some(topics) => topics.get_ref().clone(),
         };
@@ -160,7 +160,7 @@ impl RawRos2 {
                      or neither",
                     name = topic.name()
                 );
-                return Err(source.wrong(raw, &sentence));
+                return Err(source.field_error(raw, &sentence));
             };
             *qos = raw.get_ref().validated(*topic, source)?;
         }

@@ -2,23 +2,25 @@
 //!
 //! Called by the show, once a frame.
 
-use crate::clearance::PairClearance;
 use crate::messages::State;
+use crate::motion::clearance::PairClearance;
+use crate::motion::event::EventKind;
+use crate::motion::timeline::{TimedEvent, Timeline};
 use crate::scene::AlertRules;
 
-use super::timeline::{TimedEvent, Timeline};
+use super::state_of;
 
 /// More alerts than this cannot go with one frame: each event once, and one for approaching or clear.
 pub const MOST_PER_FRAME: usize = 8;
 
 /// How far clearance must have opened again, as a multiple of the clearance that raised the level: without a gap
 /// between the two, a clearance that swings about the threshold would make the level flicker.
-const RELEASE: f64 = 1.5;
+const HYSTERESIS_RATIO: f64 = 1.5;
 
 /// How long it must have stayed that open, as a share of the approach time. The gap alone does not do: as the paper's
 /// head passes from one bench to the next its clearance swings from 0.050 m up to 0.082 m and back within 4 s, and
 /// stays above 0.075 m for 0.6 s of them.
-const CALM: f64 = 0.1;
+const RELEASE_HOLD: f64 = 0.1;
 
 /// A change of the alert level or a step of the countdown: what of a
 /// [`CollisionAlert`](crate::messages::CollisionAlert) does not depend on clocks and runs.
@@ -75,6 +77,8 @@ impl AlertLevel {
     pub fn restart(&mut self) {
         self.previous = None;
         self.open_since = None;
+        self.since = 0;
+        self.counted = 0;
     }
 
     /// Decides the level of a frame and adds the alerts that go with it.
@@ -90,7 +94,7 @@ impl AlertLevel {
         alerts: &mut Vec<Alert>,
     ) {
         let clearance = closest.map_or(f64::NAN, |closest| closest.value);
-        let dangers = timeline.events().iter().filter(|timed| timed.event.kind != State::PathEnd);
+        let dangers = timeline.events().iter().filter(|timed| timed.event.kind != EventKind::PathEnd);
         let passed = dangers.filter(|timed| timed.time <= sim_time);
         let announced = match self.previous {
             Some(previous) => passed.clone().filter(|timed| timed.time > previous).count(),
@@ -98,13 +102,14 @@ impl AlertLevel {
         };
         let happened = passed.clone().count();
         for timed in passed.skip(happened - announced) {
-            if self.fresh || self.level != timed.event.kind {
-                self.announce(timed.event.kind, tick_of_show);
+            let level = state_of(timed.event.kind);
+            if self.fresh || self.level != level {
+                self.announce(level, tick_of_show);
                 alerts.push(of_event(timed, sim_time, clearance));
             }
         }
         if happened == 0 {
-            let next = timeline.next_danger(sim_time);
+            let next = timeline.next_alertable(sim_time);
             let level = self.level_ahead(sim_time, clearance, next);
             let changed = self.fresh || level != self.level;
             if changed {
@@ -130,9 +135,9 @@ impl AlertLevel {
         let standing = self.level == State::Approaching && self.previous.is_some();
         let threshold = self.rules.approach_clearance;
         // NaN, where there are no two boards to compare, is never near.
-        let closed = clearance <= RELEASE * threshold;
+        let closed = clearance <= HYSTERESIS_RATIO * threshold;
         self.open_since = if closed { None } else { self.open_since.or(Some(sim_time)) };
-        let calm = self.open_since.is_some_and(|since| sim_time - since >= CALM * self.rules.approach_time);
+        let calm = self.open_since.is_some_and(|since| sim_time - since >= RELEASE_HOLD * self.rules.approach_time);
         let near = if standing { !calm } else { clearance < threshold };
         if soon || near { State::Approaching } else { State::Moving }
     }
@@ -149,7 +154,7 @@ impl AlertLevel {
 fn of_event(timed: &TimedEvent, sim_time: f64, clearance: f64) -> Alert {
     let TimedEvent { event, time } = *timed;
     Alert {
-        level: event.kind,
+        level: state_of(event.kind),
         event_time: time,
         time_to_event: time - sim_time,
         clearance,

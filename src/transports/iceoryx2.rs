@@ -23,7 +23,7 @@ use ::iceoryx2::service::builder::publish_subscribe::{
 };
 use ::iceoryx2::service::port_factory::{event, publish_subscribe};
 
-use super::alert_message;
+use super::{alert_message, handle_pose};
 use crate::live::clock::monotonic_ns;
 use crate::live::{PublishError, Publisher, StatusPublisher};
 use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
@@ -235,7 +235,7 @@ impl SharedMemoryPublisher {
 
     fn send_frame(&self, header: &FrameHeader, frame: &Frame) -> Result<(), String> {
         let sample = self.poses.loan_slice_uninit(frame.chain.handles()).map_err(|error| error.to_string())?;
-        let mut sample = sample.write_from_fn(|handle| frame.chain.pose(handle));
+        let mut sample = sample.write_from_fn(|handle| handle_pose(&frame.chain, handle));
         *sample.user_header_mut() = FrameHeader { sent_ns: monotonic_ns(), ..*header };
         sample.send().map(|_| ()).map_err(|error| error.to_string())
     }

@@ -15,7 +15,7 @@ use std::thread::JoinHandle;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::alert_message;
+use super::{alert_message, handle_pose};
 use crate::live::{PublishError, Publisher, StatusPublisher};
 use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 use crate::scene::ros2::Ros2Settings;
@@ -199,7 +199,7 @@ impl Publisher for Ros2Publisher {
         };
         snapshot.header = FrameHeader { sent_ns: crate::live::clock::monotonic_ns(), ..*header };
         for (handle, pose) in snapshot.handles.iter_mut().enumerate() {
-            *pose = frame.chain.pose(handle);
+            *pose = handle_pose(&frame.chain, handle);
         }
         let _ = self.filled.push(snapshot);
         Ok(())

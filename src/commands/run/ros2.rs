@@ -60,7 +60,7 @@ pub fn open(scene: &Scene, name: &str, loop_rate: f64, stage: Stage) -> Result<R
         settings.rate_of(loop_rate),
         topics.join(", ")
     );
-    let handles = scene.team.handles();
+    let handles = scene.team().handles();
     let offer = Ros2Offer { name: name.to_owned(), handles, loop_rate, settings, alerts, stage };
     let (publisher, status, thread) = start(offer, network).map_err(refused)?;
     let end = move || {

@@ -5,9 +5,9 @@
 
 use serde::Serialize;
 
-use crate::geometry::Point;
-use crate::geometry::rectangle::Board;
 use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, NO_BENCH, Stage, State};
+use crate::model::Point;
+use crate::model::board::Board;
 
 /// The frame of all coordinates: metres, x to the right, y up, origin at the centre.
 pub const FRAME_ID: &str = "stage";

@@ -1,0 +1,81 @@
+//! A path by the numbers of which it is made, as a scene states them: from them [`Path`] is built in doubles, and the
+//! reference builds its own with more digits.
+
+use super::Point;
+use super::curve::Side;
+use super::path::{Disjoint, Path};
+
+/// What a path is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PathDescription {
+    /// Inward to the centre: see [`Path::spiral`].
+    Spiral {
+        /// Metres per turn.
+        pitch: f64,
+        /// The turn on which the head starts.
+        start_turn: f64,
+    },
+    /// Inward, through an S of two arcs, and outward: see [`Path::turnaround`].
+    Turnaround {
+        /// Metres per turn.
+        pitch: f64,
+        /// Metres from the centre at which the turn begins.
+        turn_radius: f64,
+        /// The radius of the first arc over that of the second.
+        arc_ratio: f64,
+        /// Metres of travel before the turn.
+        lead_in: f64,
+        /// Metres of travel after it.
+        lead_out: f64,
+    },
+    /// Lines and arcs: see [`Path::route`].
+    Route {
+        /// Where the head starts.
+        start: Point,
+        /// The direction there, turns counter-clockwise from x.
+        heading_turns: f64,
+        /// What follows, in order.
+        steps: Vec<RouteStep>,
+    },
+}
+
+/// One segment of a route.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RouteStep {
+    /// Straight on.
+    Line {
+        /// Metres.
+        length: f64,
+    },
+    /// Along a circle.
+    Arc {
+        /// The side on which the circle's centre is.
+        side: Side,
+        /// Metres.
+        radius: f64,
+        /// How far the direction turns, in turns (90 degrees are a quarter).
+        turns: f64,
+    },
+}
+
+impl PathDescription {
+    /// The path in doubles.
+    ///
+    /// # Errors
+    /// [`Disjoint`] where numbers so extreme are given that rounding leaves a gap.
+    pub fn path(&self) -> Result<Path, Disjoint> {
+        match self {
+            Self::Spiral { pitch, start_turn } => Ok(Path::spiral(*pitch, *start_turn)),
+            Self::Turnaround { pitch, turn_radius, arc_ratio, lead_in, lead_out } => {
+                Path::turnaround(*pitch, *turn_radius, *arc_ratio, *lead_in, *lead_out)
+            }
+            Self::Route { start, heading_turns, steps } => {
+                let route = steps.iter().fold(Path::route(*start, *heading_turns), |route, step| match *step {
+                    RouteStep::Line { length } => route.line(length),
+                    RouteStep::Arc { side, radius, turns } => route.arc(side, radius, turns),
+                });
+                route.build()
+            }
+        }
+    }
+}

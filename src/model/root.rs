@@ -1,0 +1,116 @@
+//! Root finding in one unknown, written once: a bracketed Newton iteration, and bisection for what has no derivative.
+//!
+//! Called by the paths and by the events.
+
+/// The root of an increasing function within `low..=high`, by Newton's method kept inside a shrinking bracket
+/// (rtsafe; Press et al., Numerical Recipes, 3rd ed., section 9.4).
+///
+/// `function` gives the value and the derivative. The result is as exact as the function's own rounding allows.
+pub fn increasing_root(function: impl Fn(f64) -> (f64, f64), low: f64, high: f64, guess: f64) -> f64 {
+    let (mut low, mut high) = (low, high);
+    let mut x = guess.clamp(low, high);
+    let mut last_step = f64::INFINITY;
+    for _ in 0..200 {
+        let (value, slope) = function(x);
+        if value == 0.0 {
+            return x;
+        }
+        if value < 0.0 {
+            low = x;
+        } else {
+            high = x;
+        }
+        let newton = x - value / slope;
+        let next = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
+        let step = (next - x).abs();
+        // The second test ends the jitter of the last digits where the function is nearly flat.
+        if step <= f64::EPSILON * x.abs() || (step < 1e-10 * x.abs() && step > 0.5 * last_step) {
+            return next;
+        }
+        last_step = step;
+        x = next;
+    }
+    x
+}
+
+/// The place within `low..=high` where `holds` turns from false to true, to the last bit: the least number known to
+/// hold. `holds(low)` is taken to be false and `holds(high)` to be true.
+pub fn bisect_predicate(mut holds: impl FnMut(f64) -> bool, low: f64, high: f64) -> f64 {
+    let (mut low, mut high) = (low, high);
+    // 1,100 halvings exhaust the doubles between any two finite numbers.
+    for _ in 0..1100 {
+        let middle = low + 0.5 * (high - low);
+        if middle <= low || middle >= high {
+            break;
+        }
+        if holds(middle) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    high
+}
+
+/// The least value of a function that has one minimum within `low..=high`, and where it is (golden section search;
+/// Kiefer, Sequential minimax search for a maximum, 1953).
+///
+/// The value is as exact as the function; the place of a smooth minimum only to half the digits.
+pub fn golden_section_min(mut function: impl FnMut(f64) -> f64, low: f64, high: f64) -> (f64, f64) {
+    let share = 0.5 * (5f64.sqrt() - 1.0);
+    let ends = [(function(low), low), (function(high), high)];
+    let (mut low, mut high) = (low, high);
+    let (mut left, mut right) = (high - share * (high - low), low + share * (high - low));
+    let (mut at_left, mut at_right) = (function(left), function(right));
+    // Each step keeps 0.618 of the bracket, so that 200 exhaust the doubles between any two places of a show.
+    for _ in 0..200 {
+        if right - left <= 2.0 * f64::EPSILON * high.abs() {
+            break;
+        }
+        if at_left <= at_right {
+            (high, right, at_right) = (right, left, at_left);
+            left = high - share * (high - low);
+            at_left = function(left);
+        } else {
+            (low, left, at_left) = (left, right, at_right);
+            right = low + share * (high - low);
+            at_right = function(right);
+        }
+    }
+    let found = [(at_left, left), (at_right, right)];
+    let least = |best: (f64, f64), next: (f64, f64)| if next.0 < best.0 { next } else { best };
+    found.into_iter().chain(ends).fold((f64::INFINITY, low), least)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn increasing_root_survives_a_guess_from_which_newton_diverges() {
+        // Newton alone, started at 3, leaves arctan for infinity.
+        let root = increasing_root(|x| ((x - 0.5).atan(), 1.0 / (1.0 + (x - 0.5).powi(2))), -10.0, 10.0, 3.0);
+        assert!((root - 0.5).abs() < 1e-15);
+    }
+
+    #[test]
+    fn increasing_root_ends_on_a_flat_root() {
+        let root = increasing_root(|x| ((x - 1.0).powi(3), 3.0 * (x - 1.0).powi(2)), 0.0, 5.0, 4.0);
+        assert!((root - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn bisect_predicate_finds_the_last_bit() {
+        let found = bisect_predicate(|x| x * x >= 2.0, 0.0, 2.0);
+        assert!(found * found >= 2.0 && found.next_down() * found.next_down() < 2.0);
+    }
+
+    #[test]
+    fn golden_section_min_finds_smooth_minima_kinks_and_ends() {
+        let (value, at) = golden_section_min(|x| (x - 0.3).powi(2) + 1.0, 0.0, 2.0);
+        assert!(value == 1.0 && (at - 0.3).abs() < 1e-7);
+        let (value, at) = golden_section_min(|x| (x - 0.3).abs(), 0.0, 2.0);
+        assert!(value < 1e-14 && (at - 0.3).abs() < 1e-14);
+        assert_eq!(golden_section_min(|x| x, 0.5, 2.0), (0.5, 0.5));
+    }
+}

@@ -1,0 +1,434 @@
+//! How far apart two boards are. Every value is **positive apart, negative overlapping, zero touching**, in metres.
+//!
+//! - [`separation_board_board`]: the largest gap along an edge normal (the separating axis theorem). Overlapping: minus
+//!   the least translation that parts the boards. Apart: at most the distance, and equal to it unless two corners are
+//!   nearest.
+//! - [`signed_distance_board_board`] (with its points: [`clearance_board_board`]): the Euclidean distance apart, the separation overlapping.
+//!
+//! Positions are subtracted before anything else, so that the error is a few units in the last place of the boards'
+//! size and of their distance, plus what the centres themselves have lost. Swapping the boards gives the same bits.
+
+use super::board::Board;
+use super::{Point, Vector};
+
+/// One board as the other's frame sees it: its centre along and across, and the cosine and sine of its turn.
+#[derive(Clone, Copy)]
+struct Relative {
+    along: f64,
+    across: f64,
+    cosine: f64,
+    sine: f64,
+}
+
+impl Relative {
+    fn new(of: &Board, seen_from: &Board) -> Self {
+        let offset = of.centre - seen_from.centre;
+        let (own, other) = (seen_from.axis, of.axis);
+        Self {
+            along: own.x * offset.x + own.y * offset.y,
+            across: own.x * offset.y - own.y * offset.x,
+            cosine: own.x * other.x + own.y * other.y,
+            sine: own.x * other.y - own.y * other.x,
+        }
+    }
+
+    /// The gaps along the frame's two axes between the frame's board and the other.
+    fn gaps(&self, own: &Board, other: &Board) -> (f64, f64) {
+        let (cosine, sine) = (self.cosine.abs(), self.sine.abs());
+        let along = other.half_length * cosine + other.half_width * sine;
+        let across = other.half_length * sine + other.half_width * cosine;
+        (self.along.abs() - (own.half_length + along), self.across.abs() - (own.half_width + across))
+    }
+
+    /// The other board's corners in the frame.
+    fn corners(&self, other: &Board) -> [(f64, f64); 4] {
+        let (lx, ly) = (other.half_length * self.cosine, other.half_length * self.sine);
+        let (wx, wy) = (-other.half_width * self.sine, other.half_width * self.cosine);
+        let (x, y) = (self.along, self.across);
+        [
+            (x + (lx + wx), y + (ly + wy)),
+            (x - (lx - wx), y - (ly - wy)),
+            (x - (lx + wx), y - (ly + wy)),
+            (x + (lx - wx), y + (ly - wy)),
+        ]
+    }
+
+    /// The least squared distance from a corner of the other board to the frame's board.
+    fn nearest_corner_squared(&self, own: &Board, other: &Board) -> f64 {
+        let squared = |(x, y): (f64, f64)| {
+            let dx = (x.abs() - own.half_length).max(0.0);
+            let dy = (y.abs() - own.half_width).max(0.0);
+            dx * dx + dy * dy
+        };
+        let [a, b, c, d] = self.corners(other).map(squared);
+        a.min(b).min(c.min(d))
+    }
+}
+
+/// A lower bound of [`signed_distance_board_board`] from the circles about the boards, for callers that can skip a pair.
+pub fn circle_bound_board_board(a: &Board, b: &Board) -> f64 {
+    (b.centre - a.centre).norm() - (a.circle_radius() + b.circle_radius())
+}
+
+/// The signed separation by the separating axis theorem, metres: never more than the clearance.
+///
+/// The normals of the Minkowski difference's edges are those of the boards, so the largest of the four gaps is minus
+/// the least translation when all are negative (Ericson, Real-Time Collision Detection, section 4.4).
+#[inline]
+pub fn separation_board_board(a: &Board, b: &Board) -> f64 {
+    let (along_a, across_a) = Relative::new(b, a).gaps(a, b);
+    let (along_b, across_b) = Relative::new(a, b).gaps(b, a);
+    along_a.max(across_a).max(along_b.max(across_b))
+}
+
+/// The clearance, metres: the Euclidean distance apart, minus the least translation that parts the boards overlapping.
+///
+/// The nearest points of two convex polygons that are apart include a corner of one of them.
+#[inline]
+pub fn signed_distance_board_board(a: &Board, b: &Board) -> f64 {
+    distance_from_separation(a, b, separation_board_board(a, b))
+}
+
+/// The clearance when it is at most `limit`, else `None`: most pairs are dismissed by the separation alone.
+#[inline]
+pub fn signed_distance_within(a: &Board, b: &Board, limit: f64) -> Option<f64> {
+    let separation = separation_board_board(a, b);
+    if separation > limit {
+        return None;
+    }
+    let clearance = distance_from_separation(a, b, separation);
+    (clearance <= limit).then_some(clearance)
+}
+
+#[inline]
+fn distance_from_separation(a: &Board, b: &Board, separation: f64) -> f64 {
+    if separation <= 0.0 {
+        return separation;
+    }
+    let from_a = Relative::new(b, a).nearest_corner_squared(a, b);
+    let from_b = Relative::new(a, b).nearest_corner_squared(b, a);
+    // Rounding must not make the distance less than its lower bound, nor a gap a touch.
+    from_a.min(from_b).sqrt().max(separation)
+}
+
+/// The clearance of two boards and where it is taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clearance {
+    /// Metres: the [`signed_distance_board_board`].
+    pub value: f64,
+    /// The closest point of the first board.
+    pub point_a: Point,
+    /// The closest point of the second board.
+    pub point_b: Point,
+}
+
+/// The clearance of two boards with the points at which it is taken.
+pub fn clearance_board_board(a: &Board, b: &Board) -> Clearance {
+    let (point_a, point_b) = closest_points_board_board(a, b);
+    Clearance { value: signed_distance_board_board(a, b), point_a, point_b }
+}
+
+/// The two closest points, the first on `a`, the second on `b`.
+///
+/// Overlapping: the deepest pair, a corner inside and the point of the other board's edge through which the least
+/// translation takes it out.
+pub fn closest_points_board_board(a: &Board, b: &Board) -> (Point, Point) {
+    let to_b = Relative::new(b, a);
+    let to_a = Relative::new(a, b);
+    if separation_board_board(a, b) > 0.0 {
+        let (squared_a, of_a, corner_of_b) = nearest_to_corner(&to_b, a, b);
+        let (squared_b, of_b, corner_of_a) = nearest_to_corner(&to_a, b, a);
+        return if squared_a <= squared_b { (of_a, corner_of_b) } else { (corner_of_a, of_b) };
+    }
+    let (along_a, across_a) = to_b.gaps(a, b);
+    let (along_b, across_b) = to_a.gaps(b, a);
+    if along_a.max(across_a) >= along_b.max(across_b) {
+        deepest(&to_b, a, b)
+    } else {
+        let (on_b, on_a) = deepest(&to_a, b, a);
+        (on_a, on_b)
+    }
+}
+
+fn in_stage(board: &Board, along: f64, across: f64) -> Point {
+    board.centre + along * board.axis + across * board.across()
+}
+
+/// The squared distance, the point of `own`, and the corner of `other` that is nearest to it.
+fn nearest_to_corner(relative: &Relative, own: &Board, other: &Board) -> (f64, Point, Point) {
+    let mut best = (f64::INFINITY, own.centre, other.centre);
+    for ((x, y), corner) in relative.corners(other).into_iter().zip(other.corners()) {
+        let (dx, dy) = ((x.abs() - own.half_length).max(0.0), (y.abs() - own.half_width).max(0.0));
+        let squared = dx * dx + dy * dy;
+        if squared < best.0 {
+            let on_own =
+                in_stage(own, x.clamp(-own.half_length, own.half_length), y.clamp(-own.half_width, own.half_width));
+            best = (squared, on_own, corner);
+        }
+    }
+    best
+}
+
+/// The point of `own`'s edge and the deepest point of `other` under it, for the smaller overlap along `own`'s axes.
+fn deepest(relative: &Relative, own: &Board, other: &Board) -> (Point, Point) {
+    let (along, across) = relative.gaps(own, other);
+    let corners = relative.corners(other);
+    // Where an edge of `other` is parallel to the edge of `own`, the clamped corner slides along it.
+    if along >= across {
+        let side = 1f64.copysign(relative.along);
+        let (_, y) = corners.into_iter().min_by(|p, q| (side * p.0).total_cmp(&(side * q.0))).unwrap_or_default();
+        let (x, y) = (side * own.half_length, y.clamp(-own.half_width, own.half_width));
+        (in_stage(own, x, y), in_stage(own, x + side * along, y))
+    } else {
+        let side = 1f64.copysign(relative.across);
+        let (x, _) = corners.into_iter().min_by(|p, q| (side * p.1).total_cmp(&(side * q.1))).unwrap_or_default();
+        let (x, y) = (x.clamp(-own.half_length, own.half_length), side * own.half_width);
+        (in_stage(own, x, y), in_stage(own, x, y + side * across))
+    }
+}
+
+/// The centre of area of what two boards have in common; where that is nothing, the middle of their closest points.
+///
+/// One board clipped by the other's four edges (Sutherland and Hodgman, 1974), then the centroid of the polygon; where
+/// the boards only touch, the middle of the touching points.
+pub fn overlap_centre(a: &Board, b: &Board) -> Point {
+    let middle = || {
+        let (on_a, on_b) = closest_points_board_board(a, b);
+        nalgebra::center(&on_a, &on_b)
+    };
+    if separation_board_board(a, b) > 0.0 {
+        return middle();
+    }
+    // Each of the four half-planes can add one corner.
+    let mut polygon = [Vector::zeros(); 8];
+    let relative = Relative::new(b, a);
+    for (corner, (x, y)) in polygon.iter_mut().zip(relative.corners(b)) {
+        *corner = Vector::new(x, y);
+    }
+    let mut count = 4;
+    let planes = [
+        (Vector::x(), a.half_length),
+        (-Vector::x(), a.half_length),
+        (Vector::y(), a.half_width),
+        (-Vector::y(), a.half_width),
+    ];
+    for (normal, offset) in planes {
+        count = clip(&mut polygon, count, normal, offset);
+    }
+    if count == 0 {
+        // Touching to the last digit, and clipped away by its rounding.
+        return middle();
+    }
+    let centre = centroid(&polygon[..count]);
+    in_stage(a, centre.x, centre.y)
+}
+
+/// Keeps what of the polygon's first `count` corners lies where `normal` . p <= `offset`; returns the new count.
+fn clip(polygon: &mut [Vector; 8], count: usize, normal: Vector, offset: f64) -> usize {
+    let before = *polygon;
+    let mut kept = 0;
+    let mut push = |corner| {
+        // A convex polygon gains at most one corner per half-plane; rounding may say otherwise once it is a sliver.
+        if kept < polygon.len() {
+            polygon[kept] = corner;
+            kept += 1;
+        }
+    };
+    for k in 0..count {
+        let (from, to) = (before[k], before[(k + 1) % count]);
+        let (out, next_out) = (normal.dot(&from) - offset, normal.dot(&to) - offset);
+        if out <= 0.0 {
+            push(from);
+        }
+        if (out < 0.0 && next_out > 0.0) || (out > 0.0 && next_out < 0.0) {
+            push(from + (to - from) * (out / (out - next_out)));
+        }
+    }
+    kept
+}
+
+fn centroid(polygon: &[Vector]) -> Vector {
+    let origin = polygon[0];
+    let (mut doubled_area, mut moment) = (0.0, Vector::zeros());
+    for pair in polygon[1..].windows(2) {
+        let (p, q) = (pair[0] - origin, pair[1] - origin);
+        let area = p.x * q.y - p.y * q.x;
+        doubled_area += area;
+        moment += area * (p + q);
+    }
+    let centre = origin + moment / (3.0 * doubled_area);
+    if centre.x.is_finite() && centre.y.is_finite() && doubled_area > 0.0 {
+        centre
+    } else {
+        polygon.iter().sum::<Vector>() / polygon.len() as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use parry2d_f64::math::Pose;
+    use parry2d_f64::query;
+    use parry2d_f64::shape::Cuboid;
+    use proptest::prelude::*;
+    use proptest::test_runner::{RngAlgorithm, TestRng};
+
+    fn board(x: f64, y: f64, heading: f64, half_length: f64, half_width: f64) -> Board {
+        Board { centre: Point::new(x, y), axis: Vector::new(heading.cos(), heading.sin()), half_length, half_width }
+    }
+
+    /// The distance by parry, 0 where the boards overlap. It is asked near the origin and in units of `size`: its
+    /// thresholds are absolute.
+    fn judge(a: &Board, b: &Board, size: f64) -> f64 {
+        let shape = |board: &Board| Cuboid::new([board.half_length / size, board.half_width / size].into());
+        let pose = |board: &Board, at: Vector| Pose::new([at.x, at.y].into(), board.axis.y.atan2(board.axis.x));
+        let (pose_a, pose_b) = (pose(a, Vector::zeros()), pose(b, (b.centre - a.centre) / size));
+        query::distance(&pose_a, &shape(a), &pose_b, &shape(b)).unwrap().distance * size
+    }
+
+    /// The translation along our deepest pair parts the boards, and in no direction tried does less (by parry, whose
+    /// own depths are off where a corner is nearer to another edge than to the one it came through).
+    fn check_depth(a: &Board, b: &Board, ours: f64, size: f64) {
+        let (on_a, on_b) = closest_points_board_board(a, b);
+        let out = (on_a - on_b).normalize();
+        let moved = |by: Vector| Board { centre: b.centre + by, ..*b };
+        let gap = 1e-6 * size;
+        let parted = judge(a, &moved(out * (gap - ours)), size);
+        assert!((parted - gap).abs() < 1e-9 * size, "{a:?} {b:?} {ours} {parted}");
+        for k in 0..16 {
+            let (sine, cosine) = (TAU * f64::from(k) / 16.0).sin_cos();
+            let less = moved(Vector::new(cosine, sine) * (-ours - gap));
+            assert!(-ours < gap || judge(a, &less, size) < 1e-9 * size, "{a:?} {b:?} {ours} {k}");
+        }
+    }
+
+    /// Asks both about one pair; `size` is the scale of everything in it. Returns whether the boards overlap.
+    fn compare(a: &Board, b: &Board, size: f64) -> bool {
+        let tolerance = 1e-12 * size;
+        // What the stage's own coordinates have lost, far from the origin.
+        let lost = tolerance + 8.0 * f64::EPSILON * (a.centre.coords.norm() + b.centre.coords.norm());
+        let ours = signed_distance_board_board(a, b);
+        let separation = separation_board_board(a, b);
+        let distance = judge(a, b, size);
+        let message = format!("{a:?} {b:?} ours {ours}, separation {separation}, parry {distance}");
+        assert!((ours.max(0.0) - distance).abs() <= tolerance, "{message}");
+        assert!(separation <= ours && (separation > 0.0) == (ours > 0.0), "{message}");
+        assert!(circle_bound_board_board(a, b) <= ours + tolerance, "{message}");
+        if ours < -1e-9 * size && lost < 1e-11 * size {
+            check_depth(a, b, ours, size);
+        }
+        assert_eq!(ours, signed_distance_board_board(b, a), "{message}");
+        let (on_a, on_b) = closest_points_board_board(a, b);
+        assert!(((on_a - on_b).norm() - ours.abs()).abs() <= lost, "{message} {on_a} {on_b}");
+        for (point, board) in [(on_a, a), (on_b, b)] {
+            let offset = point - board.centre;
+            assert!(offset.dot(&board.axis).abs() <= board.half_length + lost, "{message} {point}");
+            assert!(offset.dot(&board.across()).abs() <= board.half_width + lost, "{message} {point}");
+        }
+        if ours <= 0.0 {
+            let centre = overlap_centre(a, b);
+            for board in [a, b] {
+                let offset = centre - board.centre;
+                assert!(offset.dot(&board.axis).abs() <= board.half_length + lost, "{message} {centre}");
+                assert!(offset.dot(&board.across()).abs() <= board.half_width + lost, "{message} {centre}");
+            }
+        }
+        ours < 0.0
+    }
+
+    #[test]
+    fn parry_agrees_on_random_pairs() {
+        // A million take seconds optimised.
+        let pairs = if cfg!(debug_assertions) { 50_000 } else { 1_000_000 };
+        let mut random = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
+        let mut unit = || random.next_u64() as f64 / u64::MAX as f64;
+        let (mut overlapping, mut apart) = (0, 0);
+        for k in 0..pairs {
+            let size = [1.0, 1e-3, 1e4, 1e-9, 1e9][k % 5];
+            let from_origin = if k % 3 == 0 { 1e6 * size } else { 0.0 };
+            let ratio = if k % 7 == 0 { 30.0 } else { 3.0 };
+            let first = board(from_origin * unit(), from_origin * unit(), 6.3 * unit(), size * unit(), size * unit());
+            let second = board(
+                first.centre.x + ratio * size * (unit() - 0.5),
+                first.centre.y + ratio * size * (unit() - 0.5),
+                6.3 * unit(),
+                size * unit(),
+                size * unit(),
+            );
+            let hit = compare(&first, &second, ratio * size);
+            overlapping += usize::from(hit);
+            apart += usize::from(!hit);
+            // The same pair, moved along the line of its nearest points until it nearly touches, from both sides.
+            if k % 4 == 0 && from_origin == 0.0 {
+                let (on_a, on_b) = closest_points_board_board(&first, &second);
+                let towards = (on_a - on_b) * (1.0 + 1e-13 * (unit() - 0.5)) + Vector::new(1.0, 1.0) * 1e-15 * size;
+                compare(&first, &Board { centre: second.centre + towards, ..second }, ratio * size);
+            }
+            // One within the other.
+            if k % 11 == 0 {
+                compare(&first, &Board { half_length: 0.01 * size, centre: first.centre, ..second }, ratio * size);
+            }
+        }
+        assert!(overlapping > pairs / 10 && apart > pairs / 10, "{overlapping} {apart}");
+    }
+
+    #[test]
+    fn known_pairs() {
+        let square = board(0.0, 0.0, 0.0, 1.0, 1.0);
+        // Corner to corner, 3-4-5.
+        let corner = board(5.0, 6.0, 0.0, 1.0, 1.0);
+        assert_eq!(signed_distance_board_board(&square, &corner), 5.0);
+        assert_eq!(separation_board_board(&square, &corner), 4.0);
+        assert_eq!(closest_points_board_board(&square, &corner), (Point::new(1.0, 1.0), Point::new(4.0, 5.0)));
+        // Touching, and a hundredth deep.
+        assert_eq!(signed_distance_board_board(&square, &board(2.0, 0.0, 0.0, 1.0, 1.0)), 0.0);
+        let deep = board(1.75, 1.0, 0.0, 1.0, 1.0);
+        assert_eq!(signed_distance_board_board(&square, &deep), -0.25);
+        assert_eq!(overlap_centre(&square, &deep), Point::new(0.875, 0.5));
+        assert_eq!(overlap_centre(&square, &corner), Point::new(2.5, 3.0));
+    }
+
+    fn any_board() -> impl Strategy<Value = Board> {
+        (-2.0..2.0f64, -2.0..2.0f64, 0.0..6.3f64, 0.01..2.0f64, 0.01..1.0f64)
+            .prop_map(|(x, y, heading, length, width)| board(x, y, heading, length, width))
+    }
+
+    proptest! {
+        #[test]
+        fn symmetric_and_blind_to_where_the_stage_is(
+            a in any_board(), b in any_board(), turn in 0.0..6.3f64, x in -50.0..50.0f64, y in -50.0..50.0f64,
+        ) {
+            let rotation = nalgebra::Rotation2::new(turn);
+            let moved = |board: Board| Board {
+                centre: rotation * board.centre + Vector::new(x, y), axis: rotation * board.axis, ..board
+            };
+            for query in [separation_board_board, signed_distance_board_board] {
+                prop_assert_eq!(query(&a, &b), query(&b, &a));
+                prop_assert!((query(&a, &b) - query(&moved(a), &moved(b))).abs() < 1e-13);
+            }
+        }
+
+        #[test]
+        fn the_overlap_centre_is_the_mean_of_what_both_hold(a in any_board(), b in any_board()) {
+            let inside = |board: &Board, p: Point| {
+                let offset = p - board.centre;
+                offset.dot(&board.axis).abs() <= board.half_length && offset.dot(&board.across()).abs() <= board.half_width
+            };
+            let (mut count, mut sum) = (0.0, Vector::zeros());
+            for i in 0..200 {
+                for j in 0..200 {
+                    let p = a.centre
+                        + a.axis * a.half_length * ((i as f64 + 0.5) / 100.0 - 1.0)
+                        + a.across() * a.half_width * ((j as f64 + 0.5) / 100.0 - 1.0);
+                    if inside(&b, p) { count += 1.0; sum += p.coords; }
+                }
+            }
+            if count > 200.0 {
+                let centre = overlap_centre(&a, &b);
+                prop_assert!((centre.coords - sum / count).norm() < 0.05 * a.circle_radius());
+            }
+        }
+    }
+}

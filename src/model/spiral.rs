@@ -1,0 +1,227 @@
+//! The Archimedean spiral r = a theta, a = pitch / 2 pi, travelled inward (clockwise, theta decreasing) or outward.
+//!
+//! The path and the linkage call it. All formulas are derived in the polar frame of a handle, so that none subtracts two
+//! positions that are nearly the same.
+
+use std::f64::consts::{PI, TAU};
+
+use super::curve::{Coordinate, Curve};
+use super::double_double::DoubleDouble;
+use super::root::{bisect_predicate, increasing_root};
+use super::{Point, Vector};
+
+/// Which way a spiral is travelled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// Towards the centre.
+    Inward,
+    /// Away from the centre, on the inward spiral turned by half a turn: the two are each other's continuation through
+    /// an S of two arcs.
+    Outward,
+}
+
+/// The spiral. Its coordinate is the polar angle theta of the unturned spiral, radians.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spiral {
+    pitch: f64,
+    radius_per_radian: DoubleDouble,
+    direction: Direction,
+}
+
+/// No point behind is as far away as the link is long: going on would make the handle jump.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("no point behind on the path is one link away")]
+pub struct NoFollower;
+
+impl Spiral {
+    /// A spiral of `pitch` metres per turn, which must be positive and finite; the scene, which knows the user's file and
+    /// line, refuses others.
+    pub fn new(pitch: f64, direction: Direction) -> Self {
+        debug_assert!(pitch > 0.0);
+        // a = pitch / 2 pi to 32 digits: 2 pi is itself a sum of two doubles.
+        let DoubleDouble { high, low } = DoubleDouble::quotient(pitch, TAU);
+        let tau_low = DoubleDouble::from_turns(1.0).low;
+        Self { pitch, radius_per_radian: DoubleDouble { high, low: low - high * tau_low / TAU }, direction }
+    }
+
+    /// Metres per turn.
+    pub fn pitch(&self) -> f64 {
+        self.pitch
+    }
+
+    /// Metres of radius per radian: a = pitch / 2 pi.
+    pub fn radius_per_radian(&self) -> f64 {
+        self.radius_per_radian.high
+    }
+
+    /// Which way it is travelled.
+    pub fn direction(&self) -> Direction {
+        self.direction
+    }
+
+    /// Distance of a place from the centre, metres.
+    pub fn radius(&self, at: Coordinate) -> f64 {
+        let DoubleDouble { high, low } = self.radius_per_radian;
+        at.high.mul_add(high, at.high * low + at.low * high)
+    }
+
+    /// Arc length between `theta` and `theta - span`, metres.
+    ///
+    /// From s = a/2 (theta w + asinh theta), w = sqrt(1 + theta^2), with both differences written as products of the
+    /// span, so that short spans far out keep all digits:
+    /// theta w - theta' w' = span (w + theta' (theta + theta') / (w + w')) and
+    /// asinh theta - asinh theta' = asinh(span (theta + theta') / (theta w' + theta' w)).
+    fn inward_length(&self, theta: f64, span: f64) -> f64 {
+        if span == 0.0 {
+            return 0.0;
+        }
+        let inner = theta - span;
+        let (w, w_inner) = (1f64.hypot(theta), 1f64.hypot(inner));
+        let algebraic = span * (w + inner * (theta + inner) / (w + w_inner));
+        let logarithmic = (span * (theta + inner) / (theta * w_inner + inner * w)).asinh();
+        0.5 * self.radius_per_radian.high * (algebraic + logarithmic)
+    }
+
+    /// The place `metres` inward of another, outward where negative; the centre where it is not as far.
+    fn inward(&self, from: Coordinate, metres: f64) -> Coordinate {
+        let (theta, a) = (from.high, self.radius_per_radian.high);
+        if metres == 0.0 {
+            return from;
+        }
+        if metres >= self.inward_length(theta, theta) {
+            return Coordinate::ZERO;
+        }
+        // Without the logarithm the arc length is (theta^2 - theta'^2) a / 2.
+        let twice = 2.0 * metres / a;
+        let guess = twice / (theta + (theta * theta - twice).max(0.0).sqrt());
+        let span = increasing_root(
+            |span| (self.inward_length(theta, span) - metres, a * 1f64.hypot(theta - span)),
+            if metres < 0.0 { 2.0 * guess } else { 0.0 },
+            theta,
+            guess,
+        );
+        from.plus(-span)
+    }
+
+    /// The residual of the chord from a handle at radius `r` to the point `d` radians outward, and its derivative by d:
+    /// G = (a d)^2 + 4 r (r + a d) sin^2(d/2) - link^2 (law of cosines).
+    pub(crate) fn chord_residual(&self, r: f64, link: f64) -> impl Fn(f64) -> (f64, f64) + use<> {
+        let a = self.radius_per_radian.high;
+        move |d| {
+            let (sine, cosine) = (0.5 * d).sin_cos();
+            let rise = a * d;
+            let outer = r + rise;
+            let value = rise.mul_add(rise, (2.0 * r * sine) * (2.0 * outer * sine)) - link * link;
+            let slope = 2.0 * a * rise + 4.0 * r * a * sine * sine + 4.0 * r * outer * sine * cosine;
+            (value, slope)
+        }
+    }
+
+    /// The angle from a handle at radius `r` outward to the first point at the link's distance, radians.
+    pub(crate) fn follower_angle(&self, r: f64, link: f64) -> Result<f64, NoFollower> {
+        let a = self.radius_per_radian.high;
+        let residual = self.chord_residual(r, link);
+        // Up to half a turn every term of the slope is positive: the root there is single.
+        let high = if residual(PI).0 >= 0.0 {
+            PI
+        } else {
+            match first_chord_maximum(r / a) {
+                // The chord grows for ever and is at least the radial rise.
+                None => (link / a).max(PI),
+                Some(maximum) => {
+                    let value = residual(maximum).0;
+                    if value < -8.0 * f64::EPSILON * link * link {
+                        return Err(NoFollower);
+                    }
+                    if value <= 0.0 {
+                        return Ok(maximum);
+                    }
+                    maximum
+                }
+            }
+        };
+        let first = link / r.hypot(a);
+        let second = link / (r + 0.5 * a * first.min(PI)).hypot(a);
+        Ok(increasing_root(residual, 0.0, high, second))
+    }
+
+    /// The outermost fold for links of `link` metres: the polar angle at which a front handle's link locks, or `None`
+    /// where the link is so short against the pitch that it never does.
+    ///
+    /// The first maximum of the chord grows with theta (d(chord^2)/d theta = 4 a^2 (2 theta + d) sin^2(d/2) > 0), so
+    /// at most one theta has it equal to the link.
+    pub fn fold(&self, link: f64) -> Option<f64> {
+        let ratio = link / self.radius_per_radian.high;
+        let chord = |theta: f64, d: f64| d.hypot(2.0 * (theta * (theta + d)).sqrt() * (0.5 * d).sin());
+        let reaches = |theta: f64| first_chord_maximum(theta).is_some_and(|d| chord(theta, d) >= ratio);
+        // Below theta = 1/4 the chord never shrinks; at theta = 1 it does.
+        let least = bisect_predicate(|theta| first_chord_maximum(theta).is_some(), 0.25, 1.0);
+        if reaches(least) {
+            return None;
+        }
+        // At radius link / 2 the chord of half a turn is longer than the link.
+        Some(bisect_predicate(reaches, least, (0.5 * ratio).max(1.0)))
+    }
+}
+
+/// The angle d at which the chord from theta to theta + d first stops growing, in (pi, 2 pi), or `None` where it
+/// grows for ever. Depends on theta alone.
+///
+/// Half the slope of the squared chord over a^2 is H(d) = d + 2 theta sin^2(d/2) + theta (theta + d) sin d, positive up
+/// to pi. Where H' >= 0 at pi it stays so. Where not, H has one minimum before 2 pi, and a zero exactly when that
+/// minimum is not above zero. Should the first turn have none, no later turn has one: at sin d = -1,
+/// H = (1 - theta)(d + theta), and the part of the dip below that shrinks with d.
+fn first_chord_maximum(theta: f64) -> Option<f64> {
+    let half_slope = |d: f64| {
+        let sine = (0.5 * d).sin();
+        d + 2.0 * theta * sine * sine + theta * (theta + d) * d.sin()
+    };
+    let curvature = |d: f64| 1.0 + 2.0 * theta * d.sin() + theta * (theta + d) * d.cos();
+    if curvature(PI) >= 0.0 {
+        return None;
+    }
+    let lowest = bisect_predicate(|d| curvature(d) >= 0.0, PI, TAU);
+    if half_slope(lowest) > 0.0 {
+        return None;
+    }
+    Some(bisect_predicate(|d| half_slope(d) <= 0.0, PI, lowest))
+}
+
+impl Curve for Spiral {
+    fn point(&self, at: Coordinate) -> Point {
+        let r = match self.direction {
+            Direction::Inward => self.radius(at),
+            Direction::Outward => -self.radius(at),
+        };
+        let (sine, cosine) = at.sin_cos();
+        Point::new(r * cosine, r * sine)
+    }
+
+    fn tangent(&self, at: Coordinate) -> Vector {
+        let (r, a) = (self.radius(at), self.radius_per_radian.high);
+        let (sine, cosine) = at.sin_cos();
+        // dp/dtheta = a e_r + r e_phi, and theta decreases. Turned by half a turn and travelled the other way, the outward
+        // spiral has the same tangent.
+        Vector::new(r * sine - a * cosine, -a * sine - r * cosine) / r.hypot(a)
+    }
+
+    /// (2 + theta^2) / (a (1 + theta^2)^(3/2)), which falls outward.
+    fn curvature(&self, at: Coordinate) -> f64 {
+        let square = at.high * at.high;
+        (2.0 + square) / (self.radius_per_radian.high * (1.0 + square).powf(1.5))
+    }
+
+    fn arc_length(&self, from: Coordinate, to: Coordinate) -> f64 {
+        match self.direction {
+            Direction::Inward => self.inward_length(from.high, from.minus(to)),
+            Direction::Outward => self.inward_length(to.high, to.minus(from)),
+        }
+    }
+
+    fn advance(&self, from: Coordinate, metres: f64) -> Coordinate {
+        match self.direction {
+            Direction::Inward => self.inward(from, metres),
+            Direction::Outward => self.inward(from, -metres),
+        }
+    }
+}

@@ -1,0 +1,271 @@
+//! The motion: a team on a path at a speed, followed by a method. The one place that knows what a show computes: which
+//! solver and why, which events, the live clearance, the time of a travelled distance, the outline to draw.
+//!
+//! In: what a scene states. The show, the plans and the commands call it; nobody else asks what kind of path it is.
+
+pub mod clearance;
+pub mod contact;
+pub mod event;
+pub mod singularities;
+pub mod timeline;
+
+use crate::model::description::PathDescription;
+use crate::model::path::{Disjoint, Path, SegmentOutline};
+use crate::model::team::Team;
+use crate::solve::newton::Newton;
+use crate::solve::paper::{self, Paper, PaperRules};
+use crate::solve::table::FollowerTable;
+use crate::solve::{Solver, Velocities};
+
+use clearance::ClearanceMonitor;
+use contact::{ConservativeAdvancement, LeastClearance};
+use event::{Budget, Event, EventKind};
+use singularities::Singularities;
+use timeline::{TimedClearance, TimedEvent, Timeline};
+
+/// How the solver is chosen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Method {
+    /// The cheapest solver that meets this position error, metres.
+    Accuracy(f64),
+    /// Exact motion, each follower bracketed.
+    Newton,
+    /// Exact motion, every handle interpolated in a table of where such chains stand.
+    FollowerTable,
+    /// The paper's rules, on a spiral.
+    Paper(PaperRules),
+}
+
+/// A solver and why it was chosen.
+pub struct Choice {
+    /// The solver.
+    pub solver: Box<dyn Solver>,
+    /// Its name, its settings and the reason, for people.
+    pub reason: String,
+}
+
+/// A motion that cannot be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MotionError {
+    /// The path has a gap or a corner.
+    #[error("the path has a gap: {0}")]
+    Disjoint(#[from] Disjoint),
+    /// The paper's rules are for its spiral.
+    #[error("the paper's solver follows an inward spiral to its centre and no other path")]
+    PaperElsewhere,
+}
+
+/// A team on a path.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motion {
+    description: PathDescription,
+    path: Path,
+    team: Team,
+    head_speed: f64,
+    method: Method,
+}
+
+/// Units of work after which the search for stall and lock gives up: some ten seconds.
+const SINGULARITIES_BUDGET: u64 = 50_000_000;
+
+/// Units of work after which the search for a contact, or for the least clearance, gives up: about half a minute.
+const CONTACT_BUDGET: u64 = 100_000_000;
+
+impl Motion {
+    /// The motion of `team`, its head moving at `head_speed` metres per second along the path.
+    ///
+    /// # Errors
+    /// [`MotionError`]
+    pub fn new(description: PathDescription, team: Team, head_speed: f64, method: Method) -> Result<Self, MotionError> {
+        let path = description.path()?;
+        if matches!(method, Method::Paper(_)) && path.as_spiral().is_none() {
+            return Err(MotionError::PaperElsewhere);
+        }
+        Ok(Self { description, path, team, head_speed, method })
+    }
+
+    /// The numbers of which the path is made.
+    pub fn description(&self) -> &PathDescription {
+        &self.description
+    }
+
+    /// The path.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The benches.
+    pub fn team(&self) -> &Team {
+        &self.team
+    }
+
+    /// Metres per second of the head along the curve.
+    pub fn head_speed(&self) -> f64 {
+        self.head_speed
+    }
+
+    /// How the solver is chosen.
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// The same motion by another method.
+    ///
+    /// # Errors
+    /// [`MotionError::PaperElsewhere`]
+    pub fn with_method(&self, method: Method) -> Result<Self, MotionError> {
+        Self::new(self.description.clone(), self.team, self.head_speed, method)
+    }
+
+    /// Simulated seconds after which the head has travelled so many metres along the path, as the method has it.
+    pub fn time_at(&self, travelled: f64) -> f64 {
+        match (self.method, self.path.as_spiral()) {
+            (Method::Paper(_), Some((spiral, start))) => {
+                let theta = self.path.param_at(travelled).at.high;
+                paper::time_of_theta(spiral, start.high, self.head_speed, theta)
+            }
+            _ => travelled / self.head_speed,
+        }
+    }
+
+    /// What a drawing needs of the path, segment by segment.
+    pub fn outline(&self) -> Vec<SegmentOutline> {
+        self.path.outline()
+    }
+
+    /// The solver, made anew.
+    pub fn solver(&self, velocities: Velocities) -> Choice {
+        let newton = || Newton::new(self.path.clone(), self.team, self.head_speed, velocities);
+        let table = |why: &str| {
+            let table = FollowerTable::new(&self.path, self.team, self.head_speed, velocities);
+            table.map(|table| self.chosen_table(table, why))
+        };
+        let no_table = "there is no table for this team and path";
+        match (self.method, self.path.as_spiral()) {
+            (Method::Accuracy(accuracy), _) => {
+                let why = "as exact as doubles allow, and the cheapest that is";
+                table(why).unwrap_or_else(|| {
+                    let reason = format!("newton: {no_table}, and {accuracy:e} m is met by exact motion alone");
+                    Choice { solver: Box::new(newton()), reason }
+                })
+            }
+            (Method::FollowerTable, _) => table("named by the scene").unwrap_or_else(|| {
+                let reason = format!("newton: the scene names follower_table, but {no_table}");
+                Choice { solver: Box::new(newton()), reason }
+            }),
+            (Method::Paper(rules), Some((spiral, start))) => {
+                let paper = Paper::new(*spiral, start.high, self.team, self.head_speed, velocities, rules);
+                let reason = "paper: named by the scene; its head is too fast by sqrt(1 + 1/theta^2)".to_owned();
+                Choice { solver: Box::new(paper), reason }
+            }
+            (Method::Newton | Method::Paper(_), _) => {
+                Choice { solver: Box::new(newton()), reason: "newton: named by the scene".to_owned() }
+            }
+        }
+    }
+
+    fn chosen_table(&self, table: FollowerTable, why: &str) -> Choice {
+        let valid = if table.valid_until() * self.head_speed < self.path.length() {
+            format!(" up to {:.1} s, then newton", table.valid_until())
+        } else {
+            String::new()
+        };
+        let reason = format!("follower_table ({}){valid}: {why}", table.instructions().name());
+        Choice { solver: Box::new(table), reason }
+    }
+
+    /// The live clearance of this motion's frames.
+    pub fn clearance_monitor(&self) -> ClearanceMonitor {
+        match self.method {
+            Method::Paper(_) => ClearanceMonitor::without_table(self.team),
+            _ => ClearanceMonitor::new(&self.path, self.team),
+        }
+    }
+
+    /// Metres that the head has travelled at a time; not a number where the method does not follow the path exactly.
+    pub fn travelled_at(&self, time: f64) -> f64 {
+        match self.method {
+            Method::Paper(_) => f64::NAN,
+            _ => self.head_speed * time,
+        }
+    }
+
+    /// All events, contact included. `progress` is called now and then with the share of the search that is done, from
+    /// 0 to 1.
+    pub fn timeline(&self, progress: &mut dyn FnMut(f64)) -> Timeline {
+        let found = self.singularities(&mut |share| progress(0.1 * share));
+        let end = self.end(&found);
+        let mut searched_until = found.searched_until;
+        let mut events: Vec<Event> = found.stall.into_iter().chain([end]).collect();
+        let mut progress = |share: f64| progress(0.1 + 0.9 * share);
+        let mut budget = Budget::new(CONTACT_BUDGET, &mut progress);
+        let until = end.travelled.min(searched_until);
+        match self.advancement(&found).first_contact(0.0, until, &mut budget) {
+            Ok(contact) => {
+                searched_until = searched_until.min(contact.searched_until);
+                events.extend(contact.value);
+            }
+            Err(stuck) => {
+                log::warn!("the search for a contact stopped at a place without a solution: {stuck}");
+                searched_until = 0.0;
+            }
+        }
+        self.timed(events, searched_until)
+    }
+
+    /// The events but for the contact, which costs a search.
+    pub fn timeline_without_contact(&self) -> Timeline {
+        let found = self.singularities(&mut |_| ());
+        let end = self.end(&found);
+        self.timed(found.stall.into_iter().chain([end]).collect(), found.searched_until)
+    }
+
+    /// The least clearance from the start until the show freezes at `freeze`. `None` under three benches. `progress` is
+    /// called as by [`Motion::timeline`].
+    pub fn least_clearance(
+        &self,
+        timeline: &Timeline,
+        freeze: &TimedEvent,
+        progress: &mut dyn FnMut(f64),
+    ) -> Option<TimedClearance> {
+        if self.team.benches < 3 {
+            return None;
+        }
+        let found = self.singularities(&mut |_| ());
+        // Until boards touch for the first time their clearance is above what it is then.
+        let from = timeline.find(EventKind::Contact).map_or(0.0, |contact| contact.event.travelled);
+        let to = freeze.event.travelled;
+        let mut budget = Budget::new(CONTACT_BUDGET, progress);
+        let least = self.advancement(&found).least_clearance(from, to.max(from), &mut budget).ok()?;
+        let LeastClearance { travelled, .. } = least.value?;
+        Some(TimedClearance {
+            least: least.value?,
+            time: self.time_at(travelled),
+            searched_until: (least.searched_until < to).then(|| self.time_at(least.searched_until)),
+        })
+    }
+
+    /// Stall, lock and the turns of the handles.
+    pub fn singularities(&self, progress: &mut dyn FnMut(f64)) -> Singularities {
+        Singularities::search(&self.path, &self.team, &mut Budget::new(SINGULARITIES_BUDGET, progress))
+    }
+
+    /// The search for contacts and clearances, given what [`Motion::singularities`] found.
+    pub fn advancement<'a>(&'a self, found: &'a Singularities) -> ConservativeAdvancement<'a> {
+        ConservativeAdvancement::new(&self.path, &self.team, &found.head_turns, &found.body_turns)
+    }
+
+    /// The lock or path end; where the search gave up before either, the path's end, as far as anyone knows.
+    fn end(&self, found: &Singularities) -> Event {
+        let path_end = EventKind::PathEnd;
+        let travelled = self.path.length();
+        found.end.unwrap_or(Event { kind: path_end, travelled, bench_a: None, bench_b: None, place: None })
+    }
+
+    /// The events with their times, and the time up to which they are all there are.
+    fn timed(&self, events: Vec<Event>, searched_until: f64) -> Timeline {
+        let end = events.iter().fold(0.0, |end: f64, event| end.max(event.travelled));
+        let timed = events.into_iter().map(|event| TimedEvent { event, time: self.time_at(event.travelled) }).collect();
+        Timeline::new(timed, (searched_until < end).then(|| self.time_at(searched_until)))
+    }
+}

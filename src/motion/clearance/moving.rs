@@ -1,0 +1,144 @@
+//! Boards that move through a cell of the table, and how near two of them can come meanwhile. Called by the making of the
+//! table only.
+//!
+//! **The bound.** Time t runs from -1 to 1 over the cell. Every handle is a quadratic polynomial of t, off by at most an
+//! `error` known in metres; so are the middle of a board and, its link being rigid, its unit axis u. Take any direction w
+//! that is fixed to board a: w = p u + q n with p^2 + q^2 = 1 and n the unit normal of a. Between a and b there is the gap
+//!
+//! (c_b - c_a) . w - h_a(w) - L_b |u_b . w| - W_b |n_b . w|,
+//!
+//! with the middles c, half the length L_b and width W_b of b, and h_a(w) = L_a |p| + W_a |q|, which is constant. The
+//! signed distance is the greatest such gap over all w (by the separating axis theorem where the boards overlap), so each
+//! is a lower bound. The gap is the least of four functions, one for each corner of b; each is a sum of products of two
+//! known quadratics. Of every product the powers up to t^2 are kept, the others are bounded by their coefficients; if A
+//! and B are off by e and f, and B is a unit vector, A . B is off by at most e + |A| f. What remains is the least value
+//! of a quadratic between -1 and 1. Sliding along a costs such a bound nothing, whatever the speed.
+
+use super::corner_reach;
+use crate::model::board::Board;
+use crate::model::separation::closest_points_board_board;
+use crate::model::team::Team;
+use crate::model::{Point, Vector};
+
+/// A vector as a quadratic polynomial of t from -1 to 1, by power.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Quadratic {
+    pub terms: [Vector; 3],
+    /// How far the true vector is off, at most.
+    pub error: f64,
+}
+
+impl Quadratic {
+    /// Through three vectors at -1, 0 and 1.
+    pub(super) fn through(before: Vector, middle: Vector, after: Vector) -> Self {
+        Self { terms: [middle, 0.5 * (after - before), 0.5 * (after + before) - middle], error: 0.0 }
+    }
+
+    pub(super) fn at(&self, t: f64) -> Vector {
+        self.terms[0] + t * (self.terms[1] + t * self.terms[2])
+    }
+
+    /// How far the vector goes from where it is at 0, at most.
+    pub(super) fn travel(&self) -> f64 {
+        self.terms[1].norm() + self.terms[2].norm() + self.error
+    }
+
+    fn combine(&self, other: &Self, each: impl Fn(Vector, Vector) -> Vector, error: f64) -> Self {
+        Self { terms: std::array::from_fn(|power| each(self.terms[power], other.terms[power])), error }
+    }
+
+    /// The product with a unit vector: its polynomial, and how far that is off.
+    fn dot(&self, unit: &Self) -> ([f64; 3], f64) {
+        let (a, b) = (&self.terms, &unit.terms);
+        let dropped = (a[1].dot(&b[2]) + a[2].dot(&b[1])).abs() + a[2].dot(&b[2]).abs();
+        let size = a[0].norm() + a[1].norm() + a[2].norm();
+        let kept =
+            [a[0].dot(&b[0]), a[0].dot(&b[1]) + a[1].dot(&b[0]), a[0].dot(&b[2]) + a[1].dot(&b[1]) + a[2].dot(&b[0])];
+        (kept, dropped + self.error + size * unit.error)
+    }
+}
+
+fn normal(vector: Vector) -> Vector {
+    Vector::new(-vector.y, vector.x)
+}
+
+/// The least value of a quadratic between -1 and 1.
+fn least([constant, slope, square]: [f64; 3]) -> f64 {
+    let slope = slope.abs();
+    if slope < 2.0 * square { constant - 0.25 * slope * slope / square } else { constant - slope + square }
+}
+
+/// A board on its way through a cell.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MovingBoard {
+    centre: Quadratic,
+    axis: Quadratic,
+    half_length: f64,
+    half_width: f64,
+    /// How far any of its points goes from where it is at 0, at most, metres.
+    pub travel: f64,
+}
+
+impl MovingBoard {
+    /// The board of a kind of bench (0 = head) between two handles.
+    pub(super) fn new(front: &Quadratic, rear: &Quadratic, team: &Team, bench: usize) -> Self {
+        let link = team.link(bench);
+        let error = front.error + rear.error;
+        Self {
+            centre: front.combine(rear, |front, rear| 0.5 * (front + rear), 0.5 * error),
+            axis: front.combine(rear, |front, rear| (front - rear) / link, error / link),
+            half_length: 0.5 * link + team.hole_inset,
+            half_width: 0.5 * team.width,
+            travel: corner_reach(team, bench) * front.travel().max(rear.travel()),
+        }
+    }
+
+    /// The board in the middle of the cell, where no handle is off.
+    pub(super) fn middle(&self) -> Board {
+        let Self { half_length, half_width, .. } = *self;
+        Board { centre: Point::from(self.centre.terms[0]), axis: self.axis.terms[0], half_length, half_width }
+    }
+
+    /// The least gap to `other` along the direction that is `along` and `across` in this board's frame.
+    fn least_gap(&self, other: &Self, along: f64, across: f64) -> f64 {
+        let direction = Quadratic { terms: self.axis.terms.map(|u| along * u + across * normal(u)), ..self.axis };
+        let offset = other.centre.combine(&self.centre, |b, a| b - a, other.centre.error + self.centre.error);
+        let other_normal = Quadratic { terms: other.axis.terms.map(normal), ..other.axis };
+        let (offset, offset_off) = offset.dot(&direction);
+        let (length, length_off) = other.axis.dot(&direction);
+        let (width, width_off) = other_normal.dot(&direction);
+        let corner = |length_sign: f64, width_sign: f64| {
+            let (l, w) = (length_sign * other.half_length, width_sign * other.half_width);
+            least(std::array::from_fn(|power| offset[power] + l * length[power] + w * width[power]))
+        };
+        let nearest = corner(1.0, 1.0).min(corner(1.0, -1.0)).min(corner(-1.0, 1.0).min(corner(-1.0, -1.0)));
+        let own = self.half_length * along.abs() + self.half_width * across.abs();
+        nearest - own - offset_off - other.half_length * length_off - other.half_width * width_off
+    }
+
+    /// A lower bound of the signed distance to `other` throughout the cell: the least gap along the direction in which the
+    /// two are nearest in the middle of it, given where they are then.
+    pub(super) fn least_distance(&self, at: &Board, other: &Self, other_at: &Board) -> f64 {
+        let direction = direction(at, other_at);
+        let [own, others] = [at, other_at].map(|board| (direction.dot(&board.axis), direction.dot(&board.across())));
+        // An edge's normal is best fixed to that edge's board.
+        if own.0.abs().min(own.1.abs()) <= others.0.abs().min(others.1.abs()) {
+            self.least_gap(other, own.0, own.1)
+        } else {
+            other.least_gap(self, -others.0, -others.1)
+        }
+    }
+}
+
+/// The direction from `a` to `b` along which the gap between them is greatest.
+fn direction(a: &Board, b: &Board) -> Vector {
+    let (on_a, on_b) = closest_points_board_board(a, b);
+    let between = on_b - on_a;
+    let length = between.norm();
+    if length == 0.0 {
+        return a.across();
+    }
+    // Overlapping boards' deepest points lie the other way.
+    let sign = if between.dot(&(b.centre - a.centre)) < 0.0 { -1.0 } else { 1.0 };
+    between * (sign / length)
+}

@@ -1,0 +1,110 @@
+//! Which pairs of boards a step of the search must test, and how far back the chain must be solved for them.
+
+use crate::model::path::Param;
+
+use super::configuration::{Configuration, Halt, Pair};
+use super::displacement::{Displacements, Weights, progress};
+use super::search::Search;
+
+impl Search<'_, '_, '_> {
+    /// Whether pairs without boards 0 and 1 matter: handle 2 is behind where handle 1 began, or may be within
+    /// `excursion` metres of these configurations.
+    pub(super) fn all_pairs(&self, ends: &[&Configuration], excursion: f64) -> bool {
+        let visited = |at: Param| !self.is_behind(at, self.second_handle, -excursion);
+        let quiet = |at: Param| self.quiet.is_some_and(|quiet| self.is_behind(at, quiet, excursion));
+        !ends.iter().all(|end| visited(end.places[2])) && !ends.iter().all(|end| quiet(end.places[2]))
+    }
+
+    /// Whether a place is behind another by more than `margin` metres.
+    fn is_behind(&self, place: Param, other: Param, margin: f64) -> bool {
+        if margin == 0.0 {
+            progress(self.chain.path, place, other) > 0.0
+        } else {
+            self.chain.path.arc_length(place, other) > margin
+        }
+    }
+
+    /// The pairs that may be at or below the limit in a step, or without `after` in one configuration. Solves both as
+    /// far back as any board can come near one that matters.
+    pub(super) fn candidates(
+        &mut self,
+        before: &mut Configuration,
+        mut after: Option<&mut Configuration>,
+    ) -> Result<Vec<Pair>, Halt> {
+        let mut step = Displacements::default();
+        self.extend(before, after.as_deref_mut(), &mut step, 2)?;
+        let limit = self.limit(before);
+        let all = self.all_pairs(&[before, after.as_deref().unwrap_or(before)], step.excursion());
+        let mut benches = 2;
+        while all && benches < self.chain.team.benches {
+            let ends = [&*before, after.as_deref().unwrap_or(before)];
+            if self.quiet.is_some_and(|quiet| self.all_behind(&ends, benches, quiet, step.excursion())) {
+                break;
+            }
+            benches += 1;
+            self.extend(before, after.as_deref_mut(), &mut step, benches)?;
+        }
+        let ends = (&*before, after.as_deref().unwrap_or(before));
+        let rearmost = step.reach(self.chain, ends, benches).rearmost(self.chain.path, self.chain.team, limit.max(0.0));
+        while benches < self.chain.team.benches {
+            let ends = [&*before, after.as_deref().unwrap_or(before)];
+            if rearmost.is_none_or(|rearmost| self.all_behind(&ends, benches, rearmost, step.excursion())) {
+                break;
+            }
+            benches += 1;
+            self.extend(before, after.as_deref_mut(), &mut step, benches)?;
+        }
+        let ends = (&*before, after.as_deref().unwrap_or(before));
+        let mut pairs = if all {
+            before.near_pairs(benches, limit + step.most_relative_motion(self.chain, benches))
+        } else {
+            (0..2).flat_map(|a| (a + 2..benches).map(move |b| (a, b))).collect()
+        };
+        self.retain_uncertain(&step, ends, limit, &mut pairs)?;
+        Ok(pairs)
+    }
+
+    fn all_behind(&self, ends: &[&Configuration], handle: usize, place: Param, margin: f64) -> bool {
+        ends.iter().all(|end| self.is_behind(end.places[handle], place, margin))
+    }
+
+    /// Solves both ends of a step to so many benches, and their handles' displacements.
+    fn extend(
+        &mut self,
+        before: &mut Configuration,
+        mut after: Option<&mut Configuration>,
+        step: &mut Displacements,
+        benches: usize,
+    ) -> Result<(), Halt> {
+        self.solve(before, benches)?;
+        if let Some(after) = after.as_deref_mut() {
+            self.solve(after, benches)?;
+        }
+        let ends = (&*before, after.as_deref().unwrap_or(before));
+        step.extend_to(benches + 1, self.chain, ends, self.budget)
+    }
+
+    /// Keeps the pairs that may be at or below `limit` somewhere in a step.
+    pub(super) fn retain_uncertain(
+        &mut self,
+        step: &Displacements,
+        ends: (&Configuration, &Configuration),
+        limit: f64,
+        pairs: &mut Vec<Pair>,
+    ) -> Result<(), Halt> {
+        if !self.budget.spend(pairs.len() as u64) {
+            return Err(Halt::Spent);
+        }
+        let (before, after) = ends;
+        let weights = Weights::for_limit(limit);
+        pairs.retain(|&pair| {
+            let most = 2.0 * limit + step.relative_motion_bound(self.chain, ends, pair, weights);
+            if before.circle_bound(pair) + after.circle_bound(pair) > most {
+                return false;
+            }
+            let (first, last) = (before.clearance(pair), after.clearance(pair));
+            first.min(last) <= limit || first + last <= most
+        });
+        Ok(())
+    }
+}

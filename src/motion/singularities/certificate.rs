@@ -1,0 +1,347 @@
+//! What a step of a link's front handle can be proven to hold, from the configurations at its two ends.
+//!
+//! In: a link and two of its configurations. Out: that the follower map is continuous over the step, or that it jumps,
+//! and how often the rear handle can turn round. Only [`super`] calls it.
+//!
+//! **Notation.** Front handle at travel s in [s0, s1], h = s1 - s0; a place u behind it; P the path, T its tangent;
+//! D(s, u) = |P(s) - P(u)|; L the link; k the greatest curvature of the path in the stretch concerned.
+//!
+//! **Continuous.** For fixed u, d2(D^2)/ds^2 = 2 (1 + (P(s) - P(u)) . P''(s)) lies within 2 (1 -+ k D), so over the step
+//!   D^2 <= max(ends) + max(0, k D - 1) h^2 / 4   and   D^2 >= min(ends) - (1 + k D) h^2 / 4.
+//! 1. With the first bound, every place from the front handle back to a place `near` is nearer than L throughout the
+//!    step: D <= s - u as far as that is less than L, from there in steps back that D^2 cannot use up
+//!    ([`Link::nearer_throughout`]). So no nearer point comes to be at the link's distance.
+//! 2. With the second one, a place `far` is further away than L throughout.
+//! 3. Between the two the distance grows backward: q(s, u) = T(u) . (P(s) - P(u)) > 0, from its values at the corners,
+//!    |q_u| <= 1 + k D and |q_ss| <= k.
+//!
+//! Hence there is one root between `far` and `near`, it is the follower, and by 3 it moves continuously; its cosine is
+//! at least min q / L.
+//!
+//! **Jump.** Where a place strictly between the two followers is nearer than L throughout, by the first bound, no
+//! follower passes it: the follower map has a discontinuity in the step.
+//!
+//! **Turns.** With the rear cosine at least c, and m = max |f| over the step, the rear handle is at most m / c times as
+//! fast as the front one and the link turns by at most (1 + m / c) / L per metre, so |f'| <= k + (1 + m / c) / L, and
+//! m itself is at most max(ends) + |f'| h / 2. Then f has no zero where |f0| + |f1| > max |f'| h. Further, with signed
+//! curvature K and normal n, f' = K n . b + (1 - f^2 - v t . t') / L, |v| <= m / c, t and t' the parts of the two tangents
+//! across the link: where this keeps its sign, f has at most one zero.
+//!
+//! All these bounds tighten in proportion to the step, and what they have to beat (f, c, and how much a nearer point
+//! lacks) falls in proportion to the distance from a singular configuration, even where all of them vanish at once: the
+//! steps shrink in geometric progression towards it.
+
+use std::f64::consts::{PI, TAU};
+
+use crate::linkage::{NoFollower, follower, link_pose};
+use crate::model::curve::{Curve, Segment};
+use crate::model::path::{Param, Path};
+use crate::model::spiral::Direction;
+use crate::model::{Point, Vector};
+
+/// A link of one length, anywhere on the path.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Link<'a> {
+    pub path: &'a Path,
+    /// Metres between its handles.
+    pub length: f64,
+}
+
+/// A link with its front handle at one place.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Configuration {
+    /// Metres of travel of the front handle.
+    pub front: f64,
+    /// Metres of travel of the rear handle.
+    pub rear: f64,
+    /// t . b at the front handle: 0 is a stall.
+    pub front_cosine: f64,
+    /// t . b at the rear handle: 0 is a lock.
+    pub rear_cosine: f64,
+    /// The place of the front handle.
+    pub front_param: Param,
+    /// The place of the rear handle.
+    pub rear_param: Param,
+    front_point: Point,
+    /// b, from the rear handle to the front one.
+    direction: Vector,
+}
+
+impl Configuration {
+    /// Whether the rear handle stands still or goes backward as the front one goes forward.
+    pub fn is_stalled(&self) -> bool {
+        self.front_cosine <= 0.0
+    }
+}
+
+/// The curvature of the one segment on which the front handle is during a step.
+struct FrontCurvature {
+    /// 1/m, not negative.
+    least: f64,
+    most: f64,
+    /// 1 where the segment turns left, -1 where it turns right.
+    side: f64,
+}
+
+/// From the front handle at both ends of a step to one place behind.
+struct Distances {
+    param: Param,
+    /// 1/m, not negative.
+    curvature: f64,
+    /// The least square of the distance, m^2.
+    square: f64,
+    /// The least q = T . (P(s) - P(u)), metres: by how much half the square grows per metre backward.
+    growth: f64,
+    /// The greatest |q_u|.
+    bend: f64,
+}
+
+impl Link<'_> {
+    /// The link with its front handle after so many metres of travel.
+    ///
+    /// # Errors
+    /// [`NoFollower`] at or inside the fold of an inward spiral.
+    pub fn configuration(&self, front: f64) -> Result<Configuration, NoFollower> {
+        self.configuration_at(front, self.path.param_at(front))
+    }
+
+    /// The same for a front handle whose place is known.
+    pub fn configuration_at(&self, front: f64, front_param: Param) -> Result<Configuration, NoFollower> {
+        let rear_param = follower(self.path, front_param, self.length)?;
+        let pose = link_pose(self.path, front_param, rear_param, self.length);
+        Ok(Configuration {
+            front,
+            rear: front - self.path.arc_length(rear_param, front_param),
+            front_cosine: pose.front_cosine,
+            rear_cosine: pose.rear_cosine,
+            front_param,
+            rear_param,
+            front_point: self.path.point(front_param),
+            direction: pose.direction,
+        })
+    }
+
+    /// What rounding can make of a place of the front handle, metres.
+    pub fn resolution(&self, at: &Configuration) -> f64 {
+        8.0 * f64::EPSILON * (at.front.abs() + self.length + at.front_point.coords.norm())
+    }
+
+    /// What rounding can make of the square of a distance of about a link, m^2.
+    fn rounding(&self, at: &Configuration) -> f64 {
+        16.0 * f64::EPSILON * self.length * (self.length + at.front_point.coords.norm())
+    }
+
+    /// Metres of travel of the front handle up to which its segment goes on.
+    pub fn segment_end(&self, at: &Configuration) -> f64 {
+        self.path.end_of(at.front_param.segment)
+    }
+
+    /// Metres of travel of the front handle up to which nothing can happen, because both handles are on one segment.
+    ///
+    /// On a line or an arc nothing changes. On the outward spiral, from a front handle at theta to a rear one at theta - d,
+    /// chord^2 = (a d)^2 + 4 a^2 theta (theta - d) sin^2(d/2) grows with d while tan(d/2) <= theta - d, and with theta
+    /// for fixed d. So where that inequality holds at the follower it holds at all smaller d; d falls as theta grows, and
+    /// it holds for ever. The rear cosine is positive there, and the front one (see `link_pose`) is larger.
+    pub fn steady_until(&self, at: &Configuration) -> Option<f64> {
+        let (front, rear) = (at.front_param, at.rear_param);
+        if front.segment != rear.segment {
+            return None;
+        }
+        let steady = match self.path.segment(front) {
+            Segment::Line(_) | Segment::Arc(_) => true,
+            Segment::Spiral(spiral) => {
+                let d = front.at.minus(rear.at);
+                spiral.direction() == Direction::Outward && d < PI && (0.5 * d).tan() < rear.at.high
+            }
+        };
+        Some(self.segment_end(at)).filter(|end| steady && *end > at.front)
+    }
+
+    /// Whether a step, during which the front handle is on one segment, is proven to be continuous and to hold no turn of
+    /// the rear handle, or one where the front cosines at its ends differ in sign.
+    pub fn is_certain(&self, before: &Configuration, after: &Configuration) -> bool {
+        let curvature = self.front_curvature(before, after);
+        self.least_rear_cosine(before, after, curvature.most)
+            .is_some_and(|rear_cosine| self.turns_are_certain(before, after, &curvature, rear_cosine))
+    }
+
+    fn front_curvature(&self, before: &Configuration, after: &Configuration) -> FrontCurvature {
+        let Param { segment, at } = before.front_param;
+        let last = if after.front_param.segment == segment { after.front_param.at } else { self.path.last(segment) };
+        let segment = self.path.segment(before.front_param);
+        let (first, last) = (segment.curvature(at), segment.curvature(last));
+        let side = side(segment);
+        FrontCurvature { least: first.min(last), most: first.max(last), side }
+    }
+
+    /// The least rear cosine over a step that is proven to be continuous; `curvature` is that at the front handle.
+    fn least_rear_cosine(&self, before: &Configuration, after: &Configuration, curvature: f64) -> Option<f64> {
+        let (link, step) = (self.length, after.front - before.front);
+        let (rear_far, rear_near) = (before.rear.min(after.rear), before.rear.max(after.rear));
+        let growth = before.rear_cosine.min(after.rear_cosine) * link;
+        let bend = |reach: f64| 1.0 + link * self.path.max_curvature_between(rear_far - reach, rear_near + reach);
+        // Where the cosine is so small, rounding decides where the follower is.
+        if growth <= 0.0 || growth * growth <= 2.0 * bend(0.0) * self.rounding(before) {
+            return None;
+        }
+        // How far beyond the two followers: as little as the step asks for, as long as rounding allows.
+        let least_slack = 0.25 * growth / bend(0.25 * link);
+        let slack = (0.25 * growth / bend(0.0)).min((rear_near - rear_far + step).max(least_slack));
+        let reach = link + step + (rear_near - rear_far) + 2.0 * slack;
+        let least_change = 0.25 * (1.0 + curvature * reach) * step * step;
+        let (far, near) = (rear_far - slack - least_change / growth, rear_near + slack);
+        let reach = reach + least_change / growth;
+        let (at_far, at_near) = (self.distances(before, after, far), self.distances(before, after, near));
+        if at_far.square - least_change <= link * link {
+            return None;
+        }
+        let bend = self.largest_bend([&at_far, &at_near], near - far, step, reach);
+        let growth = 0.5 * (at_far.growth + at_near.growth - bend * (near - far)) - 0.125 * curvature * step * step;
+        (growth > 0.0 && self.nearer_throughout(before, after, curvature, near)).then_some(growth / link)
+    }
+
+    fn distances(&self, before: &Configuration, after: &Configuration, travelled: f64) -> Distances {
+        let param = self.path.param_at(travelled);
+        let (point, tangent) = (self.path.point(param), self.path.tangent(param));
+        let offsets = [before.front_point - point, after.front_point - point];
+        let curvature = self.path.segment(param).curvature(param.at);
+        let turning = side(self.path.segment(param)) * curvature;
+        Distances {
+            param,
+            curvature,
+            square: offsets[0].norm_squared().min(offsets[1].norm_squared()),
+            growth: offsets[0].dot(&tangent).min(offsets[1].dot(&tangent)),
+            bend: offsets.map(|offset| (turning * tangent.perp(&offset) - 1.0).abs()).into_iter().fold(0.0, f64::max),
+        }
+    }
+
+    /// The most that q changes per metre of the rear handle between two places, `apart` metres from each other, `reach`
+    /// being the longest distance: |q_u| = |K n . (P(s) - P(u)) - 1|, on one segment from its values at the corners and
+    /// its own rates of change, |K (K q + n . T(s))| at most.
+    fn largest_bend(&self, ends: [&Distances; 2], apart: f64, step: f64, reach: f64) -> f64 {
+        let [far, near] = ends;
+        let curvature = far.curvature.max(near.curvature);
+        if far.param.segment == near.param.segment {
+            let drift = curvature * (curvature * reach * apart + step) + (far.curvature - near.curvature).abs() * reach;
+            return (far.bend.max(near.bend) + drift).min(1.0 + reach * curvature);
+        }
+        let place = |end: &Distances| self.path.travelled(end.param);
+        1.0 + reach * self.path.max_curvature_between(place(far), place(near))
+    }
+
+    /// Whether every place from the front handle back to `to` is nearer than the link throughout a step.
+    ///
+    /// The square of the distance grows over the next x metres back by at most 2 slope x + bound x^2.
+    fn nearer_throughout(&self, before: &Configuration, after: &Configuration, curvature: f64, to: f64) -> bool {
+        let step = after.front - before.front;
+        let reach = self.length + step;
+        let limit = self.length * self.length - largest_excess(curvature, reach, step);
+        let mut place = after.front - self.length;
+        let mut segment = self.path.param_at(place).segment;
+        while place > to {
+            let begin = if segment == 0 { f64::NEG_INFINITY } else { self.path.end_of(segment - 1) };
+            let stop = match self.path.segment(Param { segment, at: self.path.first(segment) }) {
+                // One turn has been everywhere on the circle.
+                Segment::Arc(arc) => to.max(begin).max(place - TAU * arc.radius),
+                _ => to.max(begin),
+            };
+            while place > stop {
+                let at_end = segment < after.front_param.segment && place >= self.path.end_of(segment);
+                let param =
+                    if at_end { Param { segment, at: self.path.last(segment) } } else { self.path.param_at(place) };
+                let (point, tangent) = (self.path.point(param), self.path.tangent(param));
+                let bound = 1.0 + reach * self.max_curvature_back(segment, param);
+                let free = [before, after].map(|end| {
+                    let offset = end.front_point - point;
+                    let (lacking, slope) = (limit - offset.norm_squared(), offset.dot(&tangent));
+                    if lacking <= 0.0 {
+                        return 0.0;
+                    }
+                    let root = (slope * slope + bound * lacking).sqrt();
+                    if slope >= 0.0 { lacking / (slope + root) } else { (root - slope) / bound }
+                });
+                let next = place - free[0].min(free[1]);
+                if place - next <= f64::EPSILON * self.length {
+                    return false;
+                }
+                place = next;
+            }
+            place = place.min(to.max(begin));
+            segment = segment.saturating_sub(1);
+        }
+        true
+    }
+
+    /// The greatest curvature of a segment from a place back to the segment's beginning.
+    fn max_curvature_back(&self, segment: usize, from: Param) -> f64 {
+        let first = Param { segment, at: self.path.first(segment) };
+        match self.path.segment(first) {
+            Segment::Spiral(spiral) if spiral.direction() == Direction::Inward => spiral.curvature(from.at),
+            other => other.curvature(first.at),
+        }
+    }
+
+    /// Whether the number of turns in a step is certain: 0 where the front cosines have one sign, else 1.
+    fn turns_are_certain(
+        &self,
+        before: &Configuration,
+        after: &Configuration,
+        curvature: &FrontCurvature,
+        rear_cosine: f64,
+    ) -> bool {
+        let (link, step) = (self.length, after.front - before.front);
+        let (first, last) = (before.front_cosine, after.front_cosine);
+        let share = 0.5 * step / (rear_cosine * link);
+        if share > 0.5 {
+            return false;
+        }
+        let most = first.abs().max(last.abs()) + 0.5 * step * (curvature.most + link.recip());
+        let most = most / (1.0 - share);
+        let rear_speed = most / rear_cosine;
+        let change = curvature.most + (1.0 + rear_speed) / link;
+        if before.is_stalled() == after.is_stalled() && first.abs() + last.abs() > change * step {
+            return true;
+        }
+        let tangent = self.path.tangent(before.front_param);
+        let across = curvature.side * tangent.perp(&before.direction).signum();
+        let level = (1.0 - most * most).max(0.0);
+        let bending = [curvature.least * level.sqrt(), curvature.most].map(|curvature| across * curvature);
+        let least = bending[0].min(bending[1]) + (level - rear_speed) / link;
+        let largest = bending[0].max(bending[1]) + (1.0 + rear_speed) / link;
+        most < 1.0 && (least > 0.0 || largest < 0.0)
+    }
+
+    /// A place that the rear handle is proven to jump over in a step.
+    pub fn jump(&self, before: &Configuration, after: &Configuration) -> Option<f64> {
+        let step = after.front - before.front;
+        let curvature = self.path.max_curvature_between(before.front, after.front);
+        let excess = largest_excess(curvature, self.length + step, step);
+        let limit = self.length * self.length - excess - self.rounding(before);
+        let share = (after.rear - before.rear) / f64::from(JUMP_SAMPLES);
+        (1..JUMP_SAMPLES).map(|sample| before.rear + share * f64::from(sample)).find(|place| {
+            let point = self.path.point(self.path.param_at(*place));
+            [before, after].iter().all(|end| (end.front_point - point).norm_squared() < limit)
+        })
+    }
+}
+
+/// 1 where a segment turns left, -1 where it turns right.
+fn side(segment: &Segment) -> f64 {
+    match segment {
+        Segment::Line(_) => 0.0,
+        Segment::Arc(arc) => arc.signed_curvature().signum(),
+        // The inward spiral is travelled clockwise; outward it is travelled the other way.
+        Segment::Spiral(spiral) if spiral.direction() == Direction::Inward => -1.0,
+        Segment::Spiral(_) => 1.0,
+    }
+}
+
+/// Places between two followers at which a proof of a jump is tried. Nearly all of them serve: up to the further follower
+/// everything is nearer than the link, in one of the two configurations at least.
+const JUMP_SAMPLES: i32 = 32;
+
+/// By how much the square of a distance of at most `reach` can exceed its values at both ends of a step of the front
+/// handle.
+fn largest_excess(curvature: f64, reach: f64, step: f64) -> f64 {
+    0.25 * (curvature * reach - 1.0).max(0.0) * step * step
+}

@@ -1,0 +1,378 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::model::curve::Side;
+use crate::model::path::Route;
+
+fn team(benches: usize, head_length: f64, body_length: f64) -> Team {
+    Team { benches, head_length, body_length, width: 0.30, hole_inset: 0.275 }
+}
+
+fn search(path: &Path, team: &Team) -> Singularities {
+    Singularities::search(path, team, &mut Budget::new(10_000_000, &mut |_| ()))
+}
+
+/// The whole trace of one link.
+fn trace(path: &Path, length: f64) -> LinkTrace<'_> {
+    let mut trace = LinkTrace::new(Link { path, length }, Some(0.0)).unwrap();
+    let mut none = |_| ();
+    let mut budget = Budget::new(3_000_000, &mut none);
+    while trace.end().is_none() {
+        assert!(trace.advance(&mut budget), "the budget was spent at {}", trace.at().front);
+    }
+    trace
+}
+
+fn point(path: &Path, travelled: f64) -> Point {
+    path.point(path.param_at(travelled))
+}
+
+/// The follower by sphere tracing: the distance grows by at most 1 per metre back.
+fn traced_follower(path: &Path, front: f64, link: f64) -> f64 {
+    let from = point(path, front);
+    let mut rear = front - link;
+    for _ in 0..1_000_000 {
+        let lacking = link - (point(path, rear) - from).norm();
+        if lacking <= 1e-13 * link {
+            break;
+        }
+        rear -= lacking;
+    }
+    rear
+}
+
+fn is_stalled(path: &Path, front: f64, link: f64) -> (bool, f64) {
+    let rear = point(path, traced_follower(path, front, link));
+    let cosine = (point(path, front) - rear).dot(&path.tangent(path.param_at(front))) / link;
+    (cosine <= 0.0, cosine)
+}
+
+/// Where between two places of the front handle the follower jumps, by halving the interval in which it goes further.
+fn jump_between(path: &Path, link: f64, mut low: f64, mut high: f64) -> Option<f64> {
+    let rear = |front| traced_follower(path, front, link);
+    let (mut rear_low, mut rear_high) = (rear(low), rear(high));
+    if (rear_high - rear_low).abs() < 8.0 * (high - low) {
+        return None;
+    }
+    while high - low > 1e-9 * link {
+        let middle = 0.5 * (low + high);
+        let between = rear(middle);
+        if (between - rear_low).abs() > (rear_high - between).abs() {
+            (high, rear_high) = (middle, between);
+        } else {
+            (low, rear_low) = (middle, between);
+        }
+    }
+    ((rear_high - rear_low).abs() > 1e-3 * link).then_some(high)
+}
+
+/// Compares a trace with dense sampling.
+fn check(path: &Path, link: f64) {
+    let trace = trace(path, link);
+    let end = trace.at().front;
+    if trace.end() == Some(TraceEnd::Lock) {
+        let digit = 1e-9 * link;
+        let jump = traced_follower(path, end + digit, link) - traced_follower(path, end - digit, link);
+        assert!(jump.abs() > 1e-7 * link, "no jump at {end}: {jump:e}, link {link} {path:?}");
+    } else {
+        assert_eq!(end, path.length());
+    }
+    let samples = 1000;
+    let at = |sample: usize| end * (sample as f64 + 0.5) / samples as f64;
+    for sample in 0..samples {
+        let front = at(sample);
+        let (stalled, cosine) = is_stalled(path, front, link);
+        let turns = trace.turns().iter().filter(|turn| **turn <= front).count();
+        assert!(
+            stalled == (turns % 2 == 1) || cosine.abs() < 1e-6,
+            "{cosine} at {front}: {:?} to {end}, link {link} {path:?}",
+            trace.turns()
+        );
+        if sample > 0 {
+            let jump = jump_between(path, link, at(sample - 1), front);
+            assert!(jump.is_none(), "a jump at {jump:?} before {end}, link {link} {path:?}");
+        }
+    }
+}
+
+fn route() -> Route {
+    Path::route(Point::origin(), 0.0)
+}
+
+/// Asserts the first stall and the end, as metres of travel and link, to so many metres.
+fn assert_events(path: &Path, team: &Team, stall: Option<(f64, u32)>, end: (f64, Option<u32>), tolerance: f64) {
+    let found = search(path, team);
+    let at = |event: &Event| (event.travelled, event.bench_a);
+    let expected = stall.map(|(travelled, link)| (travelled, Some(link)));
+    for (found, expected) in [(found.stall.as_ref().map(at), expected), (found.end.as_ref().map(at), Some(end))] {
+        let agrees = match (found, expected) {
+            (Some(found), Some(expected)) => (found.0 - expected.0).abs() <= tolerance && found.1 == expected.1,
+            (found, expected) => found == expected,
+        };
+        assert!(agrees, "{found:?} instead of {expected:?}");
+    }
+    assert_eq!(Some(found.searched_until), found.end.map(|end| end.travelled));
+    let places = [found.stall, found.end].into_iter().flatten().filter(|event| event.bench_a.is_some());
+    assert!(places.into_iter().all(|event| event.place.is_some_and(|place| place.coords.norm().is_finite())));
+}
+
+#[test]
+fn spirals_stall_and_lock_where_50_digits_say() {
+    let paper = team(223, 3.41, 2.20);
+    let events = [
+        (Path::spiral(0.55, 16.0), 432.758134083656, 432.917924228383),
+        (Path::spiral(1.7, 6.0), 190.39942112376414, 190.8187293052253),
+        (Path::spiral(0.45, 16.0), 349.75443037967284, 349.8872674183089),
+    ];
+    for (path, stall, lock) in events {
+        assert_events(&path, &paper, Some((stall, 0)), (lock, Some(0)), 1e-10);
+    }
+}
+
+#[test]
+fn short_links_neither_stall_nor_lock_and_middling_ones_only_stall() {
+    let path = Path::spiral(1.0, 8.0);
+    assert_events(&path, &team(223, 0.75, 0.75), None, (path.length(), None), 0.0);
+    let found = search(&path, &team(223, 1.05, 1.05));
+    assert_eq!((found.stall.unwrap().bench_a, found.end.unwrap().kind), (Some(0), EventKind::PathEnd));
+}
+
+#[test]
+fn wide_bends_hold_nothing() {
+    let turnaround = Path::turnaround(1.7, 4.5, 2.0, 100.0, 369.16).unwrap();
+    let procession = route().line(40.0).arc(Side::Left, 6.0, 0.25).line(12.0).arc(Side::Right, 5.0, 0.5).line(10.0);
+    let procession = procession.arc(Side::Left, 5.0, 0.5).line(120.0).build().unwrap();
+    let long = route().line(1.0).arc(Side::Left, 5.0, 1000.0).line(1e9).arc(Side::Right, 1e8, 1.0).build().unwrap();
+    for path in [turnaround, procession, long] {
+        assert_events(&path, &team(223, 3.41, 2.20), None, (path.length(), None), 0.0);
+    }
+}
+
+#[test]
+fn tight_bends_stall_at_once() {
+    let path = route().line(5.0).arc(Side::Left, 0.03, 0.5).line(20.0).build().unwrap();
+    assert!((search(&path, &team(20, 3.41, 2.20)).stall.unwrap().travelled - 5.047441916962).abs() < 1e-11);
+    let team = Team { benches: 14, head_length: 2.63, body_length: 1.9, width: 0.4, hole_inset: 0.45 };
+    let path = route().line(20.73).arc(Side::Right, 0.021277099139995617, 0.2415370362213321);
+    let path = path.arc(Side::Left, 0.02770720113482116, 0.11516399630650424);
+    let path = path.arc(Side::Right, 0.010232884755659723, 0.3446585013052239).line(0.06698729339347953);
+    let path = path.arc(Side::Left, 1.4814300271320127, 0.3).build().unwrap();
+    let found = search(&path, &team);
+    assert!((found.stall.unwrap().travelled - 20.79056).abs() < 1e-5);
+    assert!((found.head_turns[1] - 22.19615).abs() < 1e-5);
+    let path = route().line(15.73).arc(Side::Right, 0.010077025143215441, 0.25955572291751955);
+    let path = path.arc(Side::Left, 0.507347784935104, 0.4493062280894443).line(0.038008853957396976).build().unwrap();
+    assert!((search(&path, &team).stall.unwrap().travelled - 15.74589).abs() < 1e-5);
+}
+
+#[test]
+fn a_small_jump_is_a_lock() {
+    let path = route().line(10.0).arc(Side::Left, 1.4299999, 0.5).line(40.0).build().unwrap();
+    let (stall, lock) = (14.491720873727827, 14.4932334878);
+    assert_events(&path, &team(20, 3.41, 2.20), Some((stall, 0)), (lock, Some(0)), 1e-9);
+    for radius in [0.4140430, 0.4141, 0.4142] {
+        let path = route().line(2.0).arc(Side::Left, radius, 0.375).arc(Side::Right, radius, 0.375).line(3.0);
+        let path = path.build().unwrap();
+        assert_eq!(trace(&path, 1.0).end(), Some(TraceEnd::Lock), "{radius}");
+    }
+}
+
+#[test]
+fn u_turns_as_wide_as_the_link_cost_no_more_than_others() {
+    for link in [1e-3, 0.01, 0.1, 0.5, 1.0, 1.65, 2.0, 2.86, 3.3, 10.0] {
+        for power in [-3, -5, -7, -9, -11, -12, -13, -14, -15, -99] {
+            for excess in [-10f64.powi(power), 10f64.powi(power)] {
+                let path = u_turn(link, 0.5 * link * (1.0 + excess));
+                let mut none = |_| ();
+                let mut budget = Budget::new(2_000, &mut none);
+                let team = Team { benches: 9, head_length: link, body_length: link, width: 1e-4, hole_inset: 0.0 };
+                let found = Singularities::search(&path, &team, &mut budget);
+                let end = found.end.expect("the budget was spent");
+                // Nearer than some 1e-14 the jump, and then the stall, is below what doubles can tell.
+                if power > -14 {
+                    let expected = if excess < 0.0 { EventKind::Lock } else { EventKind::PathEnd };
+                    assert_eq!(end.kind, expected, "{link} {excess}");
+                }
+                assert_eq!(found.stall.is_some(), excess < -5e-15, "{link} {excess} {found:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn extremes_are_searched_to_the_last_place() {
+    let extreme =
+        |benches, head_length, body_length| Team { benches, head_length, body_length, width: 1e-3, hole_inset: 1e-3 };
+    for (path, team) in [
+        (Path::spiral(1e-3, 1e7), extreme(1_000_000, 0.003, 0.003)),
+        (Path::spiral(1e-3, 1e7), extreme(3, 1e4, 0.003)),
+        (Path::spiral(1e4, 1e3), extreme(100_000, 0.003, 1e4)),
+    ] {
+        let found = search(&path, &team);
+        assert!(found.stall.unwrap().travelled < found.end.unwrap().travelled);
+        assert!(found.stall.unwrap().place.is_some() && found.end.unwrap().place.is_some(), "{found:?}");
+    }
+}
+
+#[test]
+fn a_spent_budget_says_how_far_it_came() {
+    let path = route().line(1.0).arc(Side::Left, 0.2, 10.0).line(5.0).build().unwrap();
+    let team = team(4, 3.41, 2.20);
+    let whole = search(&path, &team);
+    let mut last = 0.0;
+    for limit in [20, 100, 400, 800] {
+        let found = Singularities::search(&path, &team, &mut Budget::new(limit, &mut |_| ()));
+        assert!(found.end.is_none() && found.searched_until > last, "{limit}: {found:?}");
+        assert_eq!(found.head_turns, whole.head_turns[..found.head_turns.len()]);
+        last = found.searched_until;
+    }
+    assert!(last < whole.searched_until);
+}
+
+fn u_turn(link: f64, radius: f64) -> Path {
+    Path::route(Point::origin(), 0.0).line(4.0 * link).arc(Side::Left, radius, 0.5).line(10.0 * link).build().unwrap()
+}
+
+/// A narrow lobe to the left of the way, then most of a circle.
+fn lobe(height: f64, apart: f64, radius: f64) -> Path {
+    let small = 0.025002979881674117;
+    let path = route().line(2.0).arc(Side::Left, small, 0.25).line(height).arc(Side::Right, small, 0.5).line(height);
+    path.arc(Side::Left, small, 0.25).line(apart).arc(Side::Right, radius, 0.95).line(2.0).build().unwrap()
+}
+
+#[test]
+fn a_point_out_of_reach_for_a_moment_is_a_lock() {
+    let path = lobe(0.48967371252936887, 0.2340087363064477, 0.20334920134437337);
+    assert_eq!(trace(&path, 1.0).end(), Some(TraceEnd::Lock));
+    check(&path, 1.0);
+}
+
+fn routes() -> impl Strategy<Value = Path> {
+    let radius = prop_oneof![0.003f64..0.1, 0.1f64..1.0, 0.4f64..0.6, 1.0f64..5.0];
+    let leg = (radius, 0.02f64..1.1, 0..3, 0.01f64..3.0);
+    prop::collection::vec(leg, 1..12).prop_map(|legs| {
+        let mut route = Path::route(Point::new(1.0, 2.0), 0.1).line(2.0);
+        for (radius, turns, kind, length) in legs {
+            route = match kind {
+                0 => route.line(length),
+                1 => route.arc(Side::Left, radius, turns),
+                _ => route.arc(Side::Right, radius, turns),
+            };
+        }
+        route.line(3.0).build().unwrap()
+    })
+}
+
+/// The front handles' travels and front cosines of all links.
+fn chain(path: &Path, team: &Team, head: f64) -> Vec<(f64, f64)> {
+    let mut front = head;
+    (0..team.benches)
+        .map(|link| {
+            let length = team.link(link);
+            let rear = traced_follower(path, front, length);
+            let chord = point(path, front) - point(path, rear);
+            let cosine = chord.dot(&path.tangent(path.param_at(front))) / length;
+            let at = front;
+            front = rear;
+            (at, cosine)
+        })
+        .collect()
+}
+
+/// Compares the events with dense sampling of all links.
+fn check_chain(path: &Path, team: &Team) {
+    let found = search(path, team);
+    let end = found.end.unwrap();
+    let stall = found.stall.map_or(end.travelled, |stall| stall.travelled);
+    let samples = 400;
+    let mut last: Option<Vec<(f64, f64)>> = None;
+    for sample in 0..=samples {
+        let head = end.travelled * f64::from(sample) / f64::from(samples);
+        if head > end.travelled - 1e-9 {
+            break;
+        }
+        let links = chain(path, team, head);
+        if head < stall {
+            assert!(
+                links.iter().all(|(_, cosine)| *cosine > -1e-6),
+                "{head} before {stall} {links:?} {found:?} {path:?} {team:?}"
+            );
+        }
+        let turns = |turns: &[f64], at: f64| turns.iter().filter(|turn| **turn <= at).count();
+        for (index, (front, cosine)) in links.iter().enumerate() {
+            let turns = turns(if index == 0 { &found.head_turns } else { &found.body_turns }, *front);
+            if index > 0 || stall > 0.0 {
+                assert!(
+                    cosine.abs() < 1e-6 || (*cosine < 0.0) == (turns % 2 == 1),
+                    "{head} {index} {front} {cosine} {found:?} {path:?} {team:?}"
+                );
+            }
+        }
+        if let Some(before) = &last {
+            for (index, (at, old)) in links.iter().zip(before).enumerate().skip(1) {
+                let go = (at.0 - old.0).abs();
+                let step = (links[index - 1].0 - before[index - 1].0).abs();
+                if go > 8.0 * step && go > 0.01 {
+                    let (a, b) = (before[index - 1].0, links[index - 1].0);
+                    let jump = jump_between(path, team.link(index - 1), a.min(b), a.max(b));
+                    assert!(jump.is_none(), "{head} {index} {found:?} {path:?} {team:?}");
+                }
+            }
+        }
+        last = Some(links);
+    }
+    if let Some(link) = found.stall.and_then(|stall| stall.bench_a)
+        && stall > 0.0
+        && stall + 1e-6 < end.travelled
+    {
+        let after = chain(path, team, stall + 1e-7)[link as usize].1;
+        let before = chain(path, team, (stall - 1e-7).max(0.0))[link as usize].1;
+        assert!(after < 0.0 && before > 0.0, "{before} {after} {found:?} {path:?} {team:?}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
+    #[test]
+    fn chains_on_routes(path in routes(), head in 0.3f64..2.0, body in 0.3f64..2.0) {
+        check_chain(&path, &team(5, head + 0.55, body + 0.55));
+    }
+
+    #[test]
+    fn chains_on_spirals(pitch in 0.2f64..3.0, start in 0.01f64..2.0, head in 0.3f64..2.0, body in 0.3f64..2.0) {
+        let path = Path::spiral(pitch, start);
+        let team = team(6, head + 0.55, body + 0.55);
+        let first = search(&path, &team);
+        if first.end.unwrap().travelled > 0.0 {
+            check_chain(&path, &team);
+        }
+    }
+
+    #[test]
+    fn chains_on_turnarounds(pitch in 0.2f64..3.0, radius in 0.1f64..4.0, ratio in 0.3f64..3.0, lead in 0.0f64..5.0, head in 0.3f64..2.0, body in 0.3f64..2.0) {
+        let path = Path::turnaround(pitch, radius, ratio, lead, 10.0).unwrap();
+        let team = team(6, head + 0.55, body + 0.55);
+        if search(&path, &team).end.unwrap().travelled > 0.0 {
+            check_chain(&path, &team);
+        }
+    }
+
+    #[test]
+    fn routes_agree_with_sampling(path in routes(), link in 0.3f64..2.0) {
+        check(&path, link);
+    }
+
+    #[test]
+    fn turnarounds_agree_with_sampling(pitch in 0.1f64..3.0, radius in 0.3f64..4.0, ratio in 0.3f64..3.0, link in 0.3f64..2.0) {
+        let path = Path::turnaround(pitch, radius, ratio, 5.0, 10.0).unwrap();
+        if LinkTrace::new(Link { path: &path, length: link }, Some(0.0)).unwrap().at().front >= 0.0 {
+            check(&path, link);
+        }
+    }
+
+    #[test]
+    fn lobes_agree_with_sampling(height in 0.05f64..0.9, apart in 0.01f64..0.9, radius in 0.1f64..0.49) {
+        check(&lobe(height, apart, radius), 1.0);
+    }
+}

@@ -1,0 +1,79 @@
+//! The safe solver: exact motion along the arc, each follower found by a bracketed Newton iteration.
+//!
+//! It is right wherever there is an answer, and every faster solver falls back to it.
+
+use super::{Chain, Solver, Velocities};
+use crate::linkage::{NoFollower, follower, link_pose};
+use crate::model::Vector;
+use crate::model::path::{Param, Path};
+use crate::model::team::Team;
+
+/// One handle after another along the path, each from scratch.
+#[derive(Debug, Clone)]
+pub struct Newton {
+    path: Path,
+    team: Team,
+    head_speed: f64,
+    velocities: Velocities,
+}
+
+impl Newton {
+    /// A solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve.
+    pub fn new(path: Path, team: Team, head_speed: f64, velocities: Velocities) -> Self {
+        Self { path, team, head_speed, velocities }
+    }
+
+    /// Fills `chain` with the state when the head has travelled so many metres, whatever the time.
+    ///
+    /// Speeds come from rigidity: both ends of a link have the same velocity along it,
+    /// v_{i+1} (t_{i+1} . b_i) = v_i (t_i . b_i).
+    ///
+    /// # Errors
+    /// [`NoFollower`] where a link is locked; `chain` is then unspecified.
+    pub fn solve_at(&self, travelled: f64, chain: &mut Chain) -> Result<(), NoFollower> {
+        let mut front = self.path.param_at(travelled);
+        let mut speed = self.head_speed;
+        let last = self.team.benches;
+        for bench in 0..last {
+            let link = self.team.link(bench);
+            let rear = follower(&self.path, front, link)?;
+            let pose = link_pose(&self.path, front, rear, link);
+            self.write(chain, bench, front, pose.direction, speed);
+            speed *= pose.front_cosine / pose.rear_cosine;
+            if bench + 1 == last {
+                self.write(chain, last, rear, pose.direction, speed);
+            }
+            front = rear;
+        }
+        Ok(())
+    }
+
+    fn write(&self, chain: &mut Chain, handle: usize, param: Param, direction: Vector, speed: f64) {
+        let point = self.path.point(param);
+        chain.x[handle] = point.x;
+        chain.y[handle] = point.y;
+        chain.heading[handle] = heading(direction);
+        if self.velocities == Velocities::Computed {
+            let velocity = self.path.tangent(param) * speed;
+            chain.speed[handle] = speed;
+            chain.vx[handle] = velocity.x;
+            chain.vy[handle] = velocity.y;
+        }
+    }
+}
+
+/// The angle of a direction in (-pi, pi]: minus pi, which atan2 gives for a negative zero, is turned to pi.
+pub(super) fn heading(direction: Vector) -> f64 {
+    let angle = direction.y.atan2(direction.x);
+    if angle == -std::f64::consts::PI { std::f64::consts::PI } else { angle }
+}
+
+impl Solver for Newton {
+    fn name(&self) -> &'static str {
+        "newton"
+    }
+
+    fn solve(&mut self, time: f64, chain: &mut Chain) -> Result<(), NoFollower> {
+        self.solve_at(self.head_speed * time, chain)
+    }
+}

@@ -1,0 +1,171 @@
+//! The paper's solver, with its rules and its errors, so that its tables can be reproduced and its cost measured.
+//!
+//! Three rules set it apart from exact motion:
+//! - The head's polar angle advances by Euler steps of v dt / r, which forgets the radial part: the head really moves
+//!   at v sqrt(1 + 1/theta^2). A printed time t is the state after t/dt + 1 steps.
+//! - Each follower is found by bisection on the polar angle (section 3.1, step 3).
+//! - Speeds are the displacement over an interval of 0.2 s, divided by it (equation 4). Differences taken backwards fit
+//!   the printed Table 2, and explain its column of zeros at t = 0.
+
+use std::f64::consts::PI;
+
+use super::{Chain, Solver, Velocities};
+use crate::linkage::NoFollower;
+use crate::model::spiral::Spiral;
+use crate::model::team::Team;
+
+/// The numbers the paper chose, which a scene may change.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PaperRules {
+    /// Seconds of one Euler step of the head.
+    pub time_step: f64,
+    /// Seconds over which a speed is a difference of positions.
+    pub difference_interval: f64,
+    /// Radians at which the bisection for a follower stops.
+    pub bisection_tolerance: f64,
+}
+
+impl Default for PaperRules {
+    fn default() -> Self {
+        Self { time_step: 1e-5, difference_interval: 0.2, bisection_tolerance: 1e-12 }
+    }
+}
+
+/// The paper's method for one scene.
+#[derive(Debug, Clone)]
+pub struct Paper {
+    spiral: Spiral,
+    team: Team,
+    rules: PaperRules,
+    velocities: Velocities,
+    head: EulerHead,
+    earlier_head: EulerHead,
+    earlier: Chain,
+}
+
+impl Paper {
+    /// A solver for `team` on the inward `spiral`, starting at the polar angle `start`, the head moving at a nominal
+    /// `head_speed` metres per second.
+    pub fn new(
+        spiral: Spiral,
+        start: f64,
+        team: Team,
+        head_speed: f64,
+        velocities: Velocities,
+        rules: PaperRules,
+    ) -> Self {
+        let head = EulerHead::new(&spiral, start, head_speed, rules.time_step);
+        let earlier = Chain::new(team.handles());
+        Self { spiral, team, rules, velocities, earlier_head: head.clone(), head, earlier }
+    }
+}
+
+/// The head's polar angle by Euler steps; remembers the last one asked for, so that a running show pays only for the
+/// steps since. The angle after n steps does not depend on what was asked before.
+#[derive(Debug, Clone)]
+struct EulerHead {
+    start: f64,
+    time_step: f64,
+    /// v dt / a: radians times radians per step.
+    advance: f64,
+    steps: u64,
+    theta: f64,
+}
+
+impl EulerHead {
+    fn new(spiral: &Spiral, start: f64, head_speed: f64, time_step: f64) -> Self {
+        Self { start, time_step, advance: head_speed * time_step / spiral.radius_per_radian(), steps: 0, theta: start }
+    }
+
+    /// The angle at a printed time, radians; 0 once the centre is reached.
+    fn theta_at(&mut self, time: f64) -> f64 {
+        let steps = (time / self.time_step).round() as u64 + 1;
+        if steps < self.steps {
+            self.steps = 0;
+            self.theta = self.start;
+        }
+        for _ in self.steps..steps {
+            self.theta -= self.advance / self.theta;
+            if self.theta.is_nan() || self.theta <= 0.0 {
+                self.theta = 0.0;
+                break;
+            }
+        }
+        self.steps = steps;
+        self.theta
+    }
+}
+
+/// Seconds after which the paper's head comes from the polar angle `start` to `theta`, as dt goes to 0: from
+/// d theta/dt = -v / (a theta), t = a (theta_0^2 - theta^2) / 2 v.
+pub fn time_of_theta(spiral: &Spiral, start: f64, head_speed: f64, theta: f64) -> f64 {
+    0.5 * spiral.radius_per_radian() * (start - theta) * (start + theta) / head_speed
+}
+
+/// The angle to the follower of a handle at `theta` by bisection to `tolerance`, radians.
+fn bisected_follower_angle(spiral: &Spiral, theta: f64, link: f64, tolerance: f64) -> Result<f64, NoFollower> {
+    let residual = spiral.chord_residual(spiral.radius_per_radian() * theta, link);
+    let (mut low, mut high) = (0.0, PI);
+    if residual(high).0 < 0.0 {
+        // Beyond half a turn the paper's search has no bracket: leave it to the safe one.
+        return spiral.follower_angle(spiral.radius_per_radian() * theta, link);
+    }
+    while high - low > tolerance {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            break;
+        }
+        if residual(middle).0 < 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    Ok(0.5 * (low + high))
+}
+
+/// Writes positions and headings of the chain whose head is at `theta`.
+fn place_chain(spiral: &Spiral, team: &Team, tolerance: f64, theta: f64, chain: &mut Chain) -> Result<(), NoFollower> {
+    let a = spiral.radius_per_radian();
+    let mut angle = theta;
+    for handle in 0..team.handles() {
+        chain.x[handle] = a * angle * angle.cos();
+        chain.y[handle] = a * angle * angle.sin();
+        if handle < team.benches {
+            angle += bisected_follower_angle(spiral, angle, team.link(handle), tolerance)?;
+        }
+    }
+    for handle in 0..team.benches {
+        let (dx, dy) = (chain.x[handle] - chain.x[handle + 1], chain.y[handle] - chain.y[handle + 1]);
+        chain.heading[handle] = dy.atan2(dx);
+    }
+    chain.heading[team.benches] = chain.heading[team.benches - 1];
+    Ok(())
+}
+
+impl Solver for Paper {
+    fn name(&self) -> &'static str {
+        "paper"
+    }
+
+    fn solve(&mut self, time: f64, chain: &mut Chain) -> Result<(), NoFollower> {
+        let Self { spiral, team, rules, velocities, head, earlier_head, earlier } = self;
+        place_chain(spiral, team, rules.bisection_tolerance, head.theta_at(time), chain)?;
+        if *velocities == Velocities::Omitted {
+            return Ok(());
+        }
+        let before = earlier_head.theta_at((time - rules.difference_interval).max(0.0));
+        place_chain(spiral, team, rules.bisection_tolerance, before, earlier)?;
+        for handle in 0..team.handles() {
+            let vx = (chain.x[handle] - earlier.x[handle]) / rules.difference_interval;
+            let vy = (chain.y[handle] - earlier.y[handle]) / rules.difference_interval;
+            chain.vx[handle] = vx;
+            chain.vy[handle] = vy;
+            // The paper knows no direction; travel is clockwise, so the sign is that of r x v, turned round.
+            let turning = chain.y[handle] * vx - chain.x[handle] * vy;
+            chain.speed[handle] = if turning < 0.0 { -vx.hypot(vy) } else { vx.hypot(vy) };
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,155 @@
+//! The chain to more than 30 digits, by a method of its own: what the solvers are measured against.
+//!
+//! In: a path by the numbers of the scene, a team and a time. Out: every handle as sums of two doubles. Points are
+//! Cartesian, the condition on a follower is the plain distance of two points, nothing is rearranged to save digits:
+//! there are enough of them. It shares nothing with the path, the linkage and the solvers in doubles but their names.
+//! It takes some milliseconds per frame. `trade` and tests call it.
+
+mod path;
+mod real;
+mod walk;
+
+#[cfg(test)]
+mod tests;
+
+use self::path::{Place, RealPath};
+use self::real::Real;
+use self::walk::Walk;
+use crate::linkage::NoFollower;
+use crate::model::description::PathDescription;
+use crate::model::double_double::DoubleDouble;
+use crate::model::team::Team;
+
+/// One handle of the reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReferenceHandle {
+    /// Metres to the right of the centre.
+    pub x: DoubleDouble,
+    /// Metres up from the centre.
+    pub y: DoubleDouble,
+    /// Signed speed along the path, metres per second.
+    pub speed: f64,
+}
+
+/// The exact motion of one team on one path.
+pub struct Reference {
+    team: Team,
+    path: RealPath,
+    head_speed: f64,
+}
+
+/// A handle in its place on the path.
+struct Seat {
+    segment: usize,
+    place: Place,
+    /// What the coordinate gains per second.
+    rate: Real,
+}
+
+impl Reference {
+    /// The reference for `team` on the path of `description`, the head moving at `head_speed` metres per second along
+    /// the curve.
+    ///
+    /// # Errors
+    /// A sentence where there is no memory for the constants pi and ln 2.
+    pub fn new(team: Team, description: &PathDescription, head_speed: f64) -> Result<Self, String> {
+        Ok(Self { team, path: RealPath::new(description)?, head_speed })
+    }
+
+    /// All handles at `time` simulated seconds, the head first.
+    ///
+    /// # Errors
+    /// [`NoFollower`] where a link has no follower; where its front handle is on an inward spiral, on the first rise of
+    /// the chord.
+    pub fn handles(&mut self, time: f64) -> Result<Vec<ReferenceHandle>, NoFollower> {
+        Ok(self.seats(time)?.iter().map(|seat| self.handle(seat)).collect())
+    }
+
+    fn handle(&self, Seat { segment, place, rate }: &Seat) -> ReferenceHandle {
+        let curve = &self.path.segment(*segment).curve;
+        let speed = curve.forward() * (rate * curve.rate(&place.at)).rounded();
+        ReferenceHandle { x: place.point.x.split(), y: place.point.y.split(), speed }
+    }
+
+    fn seats(&mut self, time: f64) -> Result<Vec<Seat>, NoFollower> {
+        let head_speed = Real::from(self.head_speed);
+        let (segment, place) = self.path.place_at(&(&head_speed * Real::from(time)));
+        let curve = &self.path.segment(segment).curve;
+        let rate = Real::from(curve.forward()) * head_speed / curve.rate(&place.at);
+        let mut seats = vec![Seat { segment, place, rate }];
+        for bench in 0..self.team.benches {
+            let front = &seats[bench];
+            let (segment, place) = self.follower(front.segment, &front.place, self.team.link(bench))?;
+            let front = &seats[bench];
+            // Both ends of a link have the same velocity along it.
+            let link = &front.place.point - &place.point;
+            let rate = &front.rate * front.place.slope.dot(&link) / place.slope.dot(&link);
+            seats.push(Seat { segment, place, rate });
+        }
+        Ok(seats)
+    }
+
+    /// The first place behind at the link's distance: a guess by walking back in doubles, then Newton's method.
+    ///
+    /// The guess is the first one up to the rounding of doubles. That of Newton's method is taken to be the same where
+    /// it is within a millionth of the link and the distance grows backward there.
+    fn follower(&mut self, segment: usize, front: &Place, link: f64) -> Result<(usize, Place), NoFollower> {
+        let (mut segment, guess) = self.guess(segment, front, link)?;
+        let mut place = self.settled(segment, front, guess.clone(), link)?;
+        // Near a junction the place may be on a neighbour of the segment on which the guess is.
+        for _ in 0..self.path.segments() {
+            let Some((neighbour, junction)) = self.neighbour(segment, &place) else { break };
+            segment = neighbour;
+            place = self.settled(segment, front, junction, link)?;
+        }
+        let (moved, toward) = (&place.point - &guess.point, &front.point - &place.point);
+        let grows = self.path.segment(segment).curve.forward() * place.slope.dot(&toward).rounded();
+        if grows > 0.0 && moved.rounded().norm() <= 1e-6 * link { Ok((segment, place)) } else { Err(NoFollower) }
+    }
+
+    fn guess(&mut self, segment: usize, front: &Place, link: f64) -> Result<(usize, Place), NoFollower> {
+        for index in (0..=segment).rev() {
+            let on = self.path.segment(index);
+            let from = if index == segment { front } else { &on.last };
+            if let Some(back) = Walk::new(on, index == 0, from, front).first_at(link)? {
+                let by = Real::from(-on.curve.forward() * back);
+                let from = from.clone();
+                return Ok((index, self.path.moved(index, &from, &by)));
+            }
+        }
+        Err(NoFollower)
+    }
+
+    /// Newton's method on the square of the distance from `front`, from a place on a segment, which is taken to go on
+    /// beyond its ends.
+    fn settled(&mut self, segment: usize, front: &Place, from: Place, link: f64) -> Result<Place, NoFollower> {
+        let square = Real::from(link).square();
+        let mut place = from;
+        for _ in 0..60 {
+            let offset = &place.point - &front.point;
+            let excess = offset.dot(&offset) - &square;
+            let step = -(excess / (Real::from(2.0) * place.slope.dot(&offset)));
+            place = self.path.moved(segment, &place, &step);
+            let metres = step.rounded().abs() * place.slope.rounded().norm();
+            // The next step would be the square of this one.
+            if metres <= 1e-20 * link {
+                return Ok(place);
+            }
+        }
+        Err(NoFollower)
+    }
+
+    /// Where a place is beyond an end of its segment: the neighbour there and the place on it where the two join.
+    fn neighbour(&self, segment: usize, place: &Place) -> Option<(usize, Place)> {
+        let on = self.path.segment(segment);
+        let ahead = on.curve.forward() * (&place.at - &on.last.at).rounded();
+        let behind = on.curve.forward() * (&on.first.at - &place.at).rounded();
+        if ahead > 0.0 && segment + 1 < self.path.segments() {
+            Some((segment + 1, self.path.segment(segment + 1).first.clone()))
+        } else if behind > 0.0 && segment > 0 {
+            Some((segment - 1, self.path.segment(segment - 1).last.clone()))
+        } else {
+            None
+        }
+    }
+}

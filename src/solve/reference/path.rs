@@ -1,0 +1,294 @@
+//! The path of a description with 38 digits: curves in plain Cartesian coordinates, one after the other.
+//!
+//! In: a [`PathDescription`]. Out: a path that gives places by metres of travel and by a curve's own coordinate. Only
+//! the reference calls it.
+
+use super::real::{Functions, Real, RealVector};
+use crate::model::curve::Side;
+use crate::model::description::{PathDescription, RouteStep};
+use crate::model::spiral::Direction;
+
+/// A curve. Its coordinate is metres on a line, radians turned on an arc, the polar angle on a spiral.
+#[derive(Debug, Clone)]
+pub(super) enum Curve {
+    Line {
+        origin: RealVector,
+        direction: RealVector,
+    },
+    /// Its angle from x is `heading` where the coordinate is 0; `sense` is 1 where it turns left, -1 where right.
+    Arc {
+        centre: RealVector,
+        radius: Real,
+        heading: Real,
+        sense: Real,
+    },
+    /// r = `radius_per_radian` theta; outward, turned by half a turn.
+    Spiral {
+        radius_per_radian: Real,
+        direction: Direction,
+    },
+}
+
+/// A place on a curve.
+#[derive(Debug, Clone)]
+pub(super) struct Place {
+    /// The curve's coordinate.
+    pub at: Real,
+    pub point: RealVector,
+    /// The derivative of the point by the coordinate.
+    pub slope: RealVector,
+    /// The unit vector at the angle that belongs to the coordinate: along an arc, from the centre on a spiral.
+    unit: RealVector,
+}
+
+impl Curve {
+    pub fn place(&self, at: Real, functions: &mut Functions) -> Place {
+        let unit = match self {
+            Self::Line { direction, .. } => direction.clone(),
+            Self::Arc { heading, sense, .. } => functions.unit_vector(&(heading + sense * &at)),
+            Self::Spiral { .. } => functions.unit_vector(&at),
+        };
+        self.place_with(at, unit)
+    }
+
+    /// The place `by` further along the coordinate. Where that is little, no sine and no cosine is computed.
+    pub fn moved(&self, place: &Place, by: &Real, functions: &mut Functions) -> Place {
+        let at = &place.at + by;
+        if by.rounded().abs() >= 1e-8 {
+            return self.place(at, functions);
+        }
+        let unit = match self {
+            Self::Line { direction, .. } => direction.clone(),
+            Self::Arc { sense, .. } => place.unit.turned_slightly(&(sense * by)),
+            Self::Spiral { .. } => place.unit.turned_slightly(by),
+        };
+        self.place_with(at, unit)
+    }
+
+    fn place_with(&self, at: Real, unit: RealVector) -> Place {
+        let (point, slope) = match self {
+            Self::Line { origin, direction } => (origin + &direction.scaled(&at), direction.clone()),
+            Self::Arc { centre, radius, sense, .. } => {
+                (centre - &unit.left().scaled(&(sense * radius)), unit.scaled(radius))
+            }
+            Self::Spiral { radius_per_radian, direction } => {
+                let radius_per_radian = if *direction == Direction::Inward {
+                    radius_per_radian.clone()
+                } else {
+                    -radius_per_radian.clone()
+                };
+                let point = unit.scaled(&(&radius_per_radian * &at));
+                let slope = &unit.scaled(&radius_per_radian) + &point.left();
+                (point, slope)
+            }
+        };
+        Place { at, point, slope, unit }
+    }
+
+    /// 1 where the coordinate grows in the direction of travel, -1 where it shrinks.
+    pub fn forward(&self) -> f64 {
+        if matches!(self, Self::Spiral { direction: Direction::Inward, .. }) { -1.0 } else { 1.0 }
+    }
+
+    /// Metres per unit of the coordinate.
+    pub fn rate(&self, at: &Real) -> Real {
+        match self {
+            Self::Line { .. } => Real::from(1.0),
+            Self::Arc { radius, .. } => radius.clone(),
+            Self::Spiral { radius_per_radian, .. } => radius_per_radian * (Real::from(1.0) + at.square()).sqrt(),
+        }
+    }
+
+    /// The coordinate `metres` of travel after another, before it where negative.
+    fn advanced(&self, from: &Real, metres: &Real, functions: &mut Functions) -> Real {
+        match self {
+            Self::Line { .. } => from + metres,
+            Self::Arc { radius, .. } => from + metres / radius,
+            Self::Spiral { radius_per_radian, .. } => {
+                let length = spiral_length(radius_per_radian, from, functions) + Real::from(self.forward()) * metres;
+                spiral_angle(radius_per_radian, &length, functions)
+            }
+        }
+    }
+}
+
+/// Metres of the spiral from its centre: s = a/2 (theta sqrt(1 + theta^2) + ln(theta + sqrt(1 + theta^2))).
+fn spiral_length(radius_per_radian: &Real, theta: &Real, functions: &mut Functions) -> Real {
+    let w = (Real::from(1.0) + theta.square()).sqrt();
+    let logarithm = functions.ln(&(theta + &w));
+    radius_per_radian / Real::from(2.0) * (theta * w + logarithm)
+}
+
+/// The polar angle so many metres of the spiral from its centre.
+///
+/// s is convex and neither below a theta nor below a theta^2 / 2: Newton's method begins outside and cannot overshoot.
+fn spiral_angle(radius_per_radian: &Real, length: &Real, functions: &mut Functions) -> Real {
+    let ratio = length / radius_per_radian;
+    if ratio.rounded() <= 0.0 {
+        return Real::from(0.0);
+    }
+    let root = (Real::from(2.0) * &ratio).sqrt();
+    let mut theta = if root < ratio { root } else { ratio };
+    for _ in 0..100 {
+        let excess = spiral_length(radius_per_radian, &theta, functions) - length;
+        let slope = radius_per_radian * (Real::from(1.0) + theta.square()).sqrt();
+        let step = excess / slope;
+        theta = theta - &step;
+        // The next step would be the square of this one.
+        if step.rounded().abs() <= 1e-20 * theta.rounded() {
+            break;
+        }
+    }
+    theta
+}
+
+/// A curve in its place on the path.
+#[derive(Debug, Clone)]
+pub(super) struct Segment {
+    pub curve: Curve,
+    /// Where it begins; on the first segment, which has no beginning, the place from which it is measured.
+    pub first: Place,
+    /// Metres of travel at `first`.
+    pub begin: Real,
+    /// Where it ends.
+    pub last: Place,
+    /// Metres of travel there.
+    pub end: Real,
+}
+
+/// A path that grows at its end.
+pub(super) struct RealPath {
+    segments: Vec<Segment>,
+    /// Direction of travel at its end, radians from x.
+    heading: Real,
+    pub functions: Functions,
+}
+
+impl RealPath {
+    /// # Errors
+    /// A sentence where there is no memory for the constants.
+    pub fn new(description: &PathDescription) -> Result<Self, String> {
+        let mut path = Self { segments: Vec::new(), heading: Real::from(0.0), functions: Functions::new()? };
+        match *description {
+            PathDescription::Spiral { pitch, start_turn } => path.spiral(pitch, start_turn),
+            PathDescription::Turnaround { pitch, turn_radius, arc_ratio, lead_in, lead_out } => {
+                path.turnaround(pitch, turn_radius, arc_ratio);
+                path.between(lead_in, lead_out);
+            }
+            PathDescription::Route { start, heading_turns, ref steps } => {
+                path.heading = path.functions.turn() * Real::from(heading_turns);
+                let direction = path.functions.unit_vector(&path.heading);
+                let origin = RealVector { x: Real::from(start.x), y: Real::from(start.y) };
+                let zero = Real::from(0.0);
+                path.push(Curve::Line { origin, direction }, zero.clone(), &zero);
+                for step in steps {
+                    path.step(step);
+                }
+            }
+        }
+        Ok(path)
+    }
+
+    fn spiral(&mut self, pitch: f64, start_turn: f64) {
+        let turn = self.functions.turn();
+        let radius_per_radian = Real::from(pitch) / &turn;
+        let start = turn * Real::from(start_turn);
+        let length = spiral_length(&radius_per_radian, &start, &mut self.functions);
+        self.push(Curve::Spiral { radius_per_radian, direction: Direction::Inward }, start, &length);
+    }
+
+    /// The inward spiral that ends at A, of no length, both arcs, and the outward one that begins at B, of no length.
+    fn turnaround(&mut self, pitch: f64, turn_radius: f64, arc_ratio: f64) {
+        let turn = self.functions.turn();
+        let (radius_per_radian, radius) = (Real::from(pitch) / &turn, Real::from(turn_radius));
+        let (theta, zero) = (&radius / &radius_per_radian, Real::from(0.0));
+        self.push(
+            Curve::Spiral { radius_per_radian: radius_per_radian.clone(), direction: Direction::Inward },
+            theta.clone(),
+            &zero,
+        );
+        // The tangent there is -(a e_r + R e_phi) / sqrt(a^2 + R^2).
+        let to_radius = self.functions.atan(&theta);
+        self.heading = &theta + &to_radius + turn / Real::from(2.0);
+        let both = (radius_per_radian.square() + radius.square()).sqrt();
+        let ratio = Real::from(arc_ratio);
+        let second = both / (Real::from(1.0) + &ratio);
+        let angle = Real::from(2.0) * to_radius;
+        self.arc(Side::Right, &ratio * &second, &angle);
+        self.arc(Side::Left, second, &angle);
+        self.push(Curve::Spiral { radius_per_radian, direction: Direction::Outward }, theta, &zero);
+    }
+
+    /// Lets travel begin `lead_in` metres before the end of the first segment and end `lead_out` metres after the
+    /// beginning of the last.
+    fn between(&mut self, lead_in: f64, lead_out: f64) {
+        let lead_in = Real::from(lead_in);
+        for segment in &mut self.segments {
+            segment.begin = &segment.begin + &lead_in;
+            segment.end = &segment.end + &lead_in;
+        }
+        let Some(Segment { curve, first, begin, last, end }) = self.segments.last_mut() else { return };
+        let lead_out = Real::from(lead_out);
+        *last = curve.place(curve.advanced(&first.at, &lead_out, &mut self.functions), &mut self.functions);
+        *end = &*begin + lead_out;
+    }
+
+    fn step(&mut self, step: &RouteStep) {
+        match *step {
+            RouteStep::Line { length } => {
+                let direction = self.functions.unit_vector(&self.heading);
+                let line = Curve::Line { origin: self.end_point(), direction };
+                self.push(line, Real::from(0.0), &Real::from(length));
+            }
+            RouteStep::Arc { side, radius, turns } => {
+                let angle = self.functions.turn() * Real::from(turns);
+                self.arc(side, Real::from(radius), &angle);
+            }
+        }
+    }
+
+    fn arc(&mut self, side: Side, radius: Real, angle: &Real) {
+        let sense = Real::from(if side == Side::Left { 1.0 } else { -1.0 });
+        let heading = self.heading.clone();
+        let to_centre = self.functions.unit_vector(&heading).left().scaled(&(&sense * &radius));
+        let centre = &self.end_point() + &to_centre;
+        self.heading = &heading + &sense * angle;
+        let length = &radius * angle;
+        self.push(Curve::Arc { centre, radius, heading, sense }, Real::from(0.0), &length);
+    }
+
+    fn end_point(&self) -> RealVector {
+        self.segments[self.segments.len() - 1].last.point.clone()
+    }
+
+    fn push(&mut self, curve: Curve, first: Real, length: &Real) {
+        let begin = self.segments.last().map_or(Real::from(0.0), |segment| segment.end.clone());
+        let last = curve.advanced(&first, length, &mut self.functions);
+        let first = curve.place(first, &mut self.functions);
+        let last = curve.place(last, &mut self.functions);
+        let end = &begin + length;
+        self.segments.push(Segment { curve, first, begin, last, end });
+    }
+
+    pub fn segment(&self, index: usize) -> &Segment {
+        &self.segments[index]
+    }
+
+    pub fn segments(&self) -> usize {
+        self.segments.len()
+    }
+
+    /// The segment and the place so many metres of travel past the start; clamped to the path's end.
+    pub fn place_at(&mut self, travelled: &Real) -> (usize, Place) {
+        let index = self.segments.partition_point(|segment| segment.begin <= *travelled).max(1) - 1;
+        let Segment { curve, first, begin, end, .. } = &self.segments[index];
+        let metres = if travelled > end { end - begin } else { travelled - begin };
+        let at = curve.advanced(&first.at, &metres, &mut self.functions);
+        (index, curve.place(at, &mut self.functions))
+    }
+
+    /// The place `by` further along the coordinate of a segment.
+    pub fn moved(&mut self, segment: usize, place: &Place, by: &Real) -> Place {
+        self.segments[segment].curve.moved(place, by, &mut self.functions)
+    }
+}

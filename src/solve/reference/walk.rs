@@ -1,0 +1,128 @@
+//! The first place behind a handle at the link's distance, in doubles: the guess from which the reference begins.
+//!
+//! The straight-line distance from the handle grows by at most a metre per metre of path. So from a place that lacks so
+//! much of the link's length one may go back by as much and cannot pass the place sought (sphere tracing: Hart, The
+//! Visual Computer 12, 1996, for rays). The points are displacements from places that the reference knows exactly, so
+//! that they keep their digits far from the origin. Only the reference calls it.
+
+use super::path::{Curve, Place, Segment};
+use crate::linkage::NoFollower;
+use crate::model::Vector;
+use crate::model::spiral::Direction;
+
+/// The finest step, in links: a way out of the link's reach and back in that is shorter than it may be overlooked.
+const FINEST: f64 = 1e-9;
+
+/// The longest step on a spiral, radians: short against the half turns over which a chord's radius_per_radian changes its sign.
+const LONGEST: f64 = 0.05;
+
+/// By how much a distance must shrink, in links, to be taken for more than rounding.
+const NOISE: f64 = 1e-14;
+
+/// Steps after which the search on one segment gives up.
+const MOST_STEPS: usize = 10_000_000;
+
+/// The way back along a curve from one of its places, seen from the front handle of a link.
+pub(super) struct Walk<'a> {
+    curve: &'a Curve,
+    /// The coordinate of the place, and how much of it is left behind.
+    at: f64,
+    behind: f64,
+    /// From the front handle to the place.
+    offset: Vector,
+    slope: Vector,
+    /// Of the arc, with the sign of its curvature; of the spiral, per radian.
+    radius: f64,
+    /// Whether the handle is on this curve and the distance can shrink only after a fold.
+    folds: bool,
+}
+
+impl<'a> Walk<'a> {
+    /// Back from `place` on `segment`, which is the path's first or not, for the handle at `front`.
+    pub fn new(segment: &'a Segment, is_first: bool, place: &Place, front: &Place) -> Self {
+        let radius = match &segment.curve {
+            Curve::Line { .. } => f64::INFINITY,
+            Curve::Arc { radius, sense, .. } => (sense * radius).rounded(),
+            Curve::Spiral { radius_per_radian, .. } => radius_per_radian.rounded(),
+        };
+        Self {
+            curve: &segment.curve,
+            at: place.at.rounded(),
+            behind: if is_first { f64::INFINITY } else { (&place.at - &segment.first.at).rounded() },
+            offset: (&place.point - &front.point).rounded(),
+            slope: place.slope.rounded(),
+            radius,
+            folds: std::ptr::eq(place, front) && is_inward(&segment.curve),
+        }
+    }
+
+    /// How far back, in units of the coordinate, the first place is that is `link` metres from the front handle; `None`
+    /// where the segment has none.
+    ///
+    /// # Errors
+    /// [`NoFollower`] where a handle on the inward spiral is found to come nearer again first.
+    pub fn first_at(&self, link: f64) -> Result<Option<f64>, NoFollower> {
+        let (mut back, mut distance) = (0.0, self.offset.norm());
+        let mut farthest = distance;
+        if distance >= link {
+            return Ok(Some(0.0));
+        }
+        for _ in 0..MOST_STEPS {
+            let next = self.behind.min(back + self.safe_step(back, (link - distance).max(FINEST * link)));
+            let reached = self.position(next).norm();
+            if reached >= link {
+                // The step was one of the finest: the path is as good as straight.
+                return Ok(Some(back + (next - back) * (link - distance) / (reached - distance)));
+            }
+            if next == self.behind {
+                return Ok(None);
+            }
+            farthest = reached.max(farthest);
+            if self.folds && reached < farthest - NOISE * link {
+                return Err(NoFollower);
+            }
+            (back, distance) = (next, reached);
+        }
+        Err(NoFollower)
+    }
+
+    /// How far back along the coordinate one may go from `back` with no more than `metres` of path.
+    fn safe_step(&self, back: f64, metres: f64) -> f64 {
+        match self.curve {
+            Curve::Line { .. } => metres,
+            Curve::Arc { .. } => metres / self.radius.abs(),
+            Curve::Spiral { direction, .. } => {
+                let step = |theta: f64| (metres / (self.radius * 1f64.hypot(theta))).min(LONGEST);
+                match direction {
+                    // Further out a radian is longer: first by the rate here, then by the rate at the end of that.
+                    Direction::Inward => step(self.at + back + step(self.at + back)),
+                    Direction::Outward => step(self.at - back),
+                }
+            }
+        }
+    }
+
+    /// From the front handle to the point `back` behind the place.
+    fn position(&self, back: f64) -> Vector {
+        let left = |vector: Vector| Vector::new(-vector.y, vector.x);
+        let half_sine = (0.5 * back).sin();
+        let versine = 2.0 * half_sine * half_sine;
+        let displacement = match self.curve {
+            Curve::Line { .. } => -back * self.slope,
+            Curve::Arc { .. } => versine * self.radius.signum() * left(self.slope) - back.sin() * self.slope,
+            Curve::Spiral { direction, .. } => {
+                let d = if *direction == Direction::Inward { back } else { -back };
+                let (a, r) = (self.radius, self.radius * self.at);
+                let other = r + a * d;
+                // p' = (a + r J) e for p = r e, J the quarter turn to the left.
+                let e = (a * self.slope - r * left(self.slope)) / (a * a + r * r);
+                (a * d - other * versine) * e + other * d.sin() * left(e)
+            }
+        };
+        self.offset + displacement
+    }
+}
+
+fn is_inward(curve: &Curve) -> bool {
+    matches!(curve, Curve::Spiral { direction: Direction::Inward, .. })
+}

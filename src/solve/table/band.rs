@@ -1,0 +1,343 @@
+//! How T is made: band after band from the team's rear to the front of the path.
+//!
+//! A *strand* is the run of all places of one phase through a band, each found from the one behind it. Five strands
+//! make a piece: their slopes carry its polynomials, their places prove them; where they do not, the piece is cut in
+//! two. The next band starts from the frontmost row of this one. Called by [`super::FollowerTable::new`] only.
+
+use std::f64::consts::{PI, TAU};
+use std::rc::Rc;
+
+use super::beginning::Beginning;
+use super::layout::{bands, between_kinks, foremost, kinks};
+use super::polynomial::{economise, from_slopes, horner};
+use super::rows::{Band, LANES, Lanes, Order, Piece, Rows};
+use super::track::{Node, Track};
+use crate::linkage;
+use crate::model::Vector;
+use crate::model::path::Param;
+use crate::model::team::Team;
+
+/// Halvings of what lies between two kinks, at most.
+const MOST_HALVINGS: usize = 9;
+
+/// Bytes of a table, at most.
+const MOST_BYTES: usize = 150 << 20;
+
+/// What part of its allowance a halved piece may still use up if halving is to go on: less gain is rounding, not shape.
+const LEAST_GAIN: f64 = 0.75;
+
+/// A piece that uses up this many times its allowance is cut without looking at the rest of its rows.
+const HOPELESS: f64 = 100.0;
+
+/// Beta of the five strands of a piece.
+const NODES: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
+
+/// Max |e|, where the slope's error is e = b (b^2 - 1/4) (b^2 - 1) times its first neglected coefficient.
+const LARGEST_NODAL: f64 = 0.12;
+
+/// The nodes of one phase through a band, from its last row forward, as far as the chain can stand there.
+type Strand = Rc<Vec<Node>>;
+
+/// The last row behind a band, from which its strands start.
+struct Row<'a> {
+    track: &'a Track<'a>,
+    pieces: Vec<RowPiece>,
+}
+
+/// The places of a piece in one row: metres of travel from its centre as a polynomial of beta.
+struct RowPiece {
+    piece: Piece,
+    centre: Param,
+    metres: [f64; 6],
+}
+
+impl<'a> Row<'a> {
+    /// Each piece comes out with the rounding of its own centre. Were that kept, the next band's pieces would meet
+    /// jumps and be cut in vain: here every piece continues the one before, and what adds up is spread over all
+    /// phases.
+    fn new(track: &'a Track<'a>, nodes: &[(Piece, [Node; 5])]) -> Self {
+        let mut pieces: Vec<RowPiece> = Vec::with_capacity(nodes.len());
+        for &(piece, nodes) in nodes {
+            let half = 0.5 * (piece.end - piece.begin);
+            let mut metres = from_slopes(nodes.map(|node| -half * node.spacing));
+            let centre = nodes[2].at;
+            if let Some(before) = pieces.last().filter(|before| before.piece.end == piece.begin) {
+                let reached = horner(&before.metres, 1.0).0 - track.path.arc_length(before.centre, centre);
+                metres[0] = reached - horner(&metres, -1.0).0;
+            }
+            pieces.push(RowPiece { piece, centre, metres });
+        }
+        let drift = pieces.last().map_or(0.0, |last| last.metres[0]);
+        for RowPiece { piece, metres, .. } in &mut pieces {
+            metres[0] -= drift * 0.5 * (piece.begin + piece.end);
+            metres[1] -= drift * 0.5 * (piece.end - piece.begin);
+        }
+        Self { track, pieces }
+    }
+
+    fn node(&self, phase: f64) -> Option<Node> {
+        let at = self.pieces.partition_point(|known| known.piece.end < phase);
+        let RowPiece { piece, centre, metres } = self.pieces.get(at).filter(|known| known.piece.begin <= phase)?;
+        let (offset, rate) = horner(metres, piece.beta(phase));
+        let at = self.track.advanced(*centre, offset);
+        let (tangent, spacing) = (self.track.path.tangent(at), -rate * piece.beta_per_alpha());
+        // No link of the band is led from here, so that the heading does not matter.
+        Some(Node { at, tangent, spacing, heading: 0.0, heading_rate: 0.0 })
+    }
+}
+
+/// A band being made.
+struct BandBuilder<'a> {
+    track: &'a Track<'a>,
+    order: Order,
+    link: f64,
+    behind: Row<'a>,
+    band: Band,
+    /// The row behind the band; nothing ahead of `needed` has to be exact.
+    end_row: usize,
+    needed: usize,
+    /// Whether the second handle can come here.
+    with_centres: bool,
+    front_row: Vec<(Piece, [Node; 5])>,
+    valid_from: f64,
+    budget: usize,
+}
+
+/// Five strands, evenly spaced over a piece.
+type Quintet = [Strand; 5];
+
+/// The largest errors of a piece over its rows, as parts of what is allowed.
+struct Errors {
+    worst: f64,
+    /// Alpha behind which the piece is exact.
+    valid_from: f64,
+    /// Whether cutting the piece can help: some strand reaches each row that is wrong.
+    curable: bool,
+}
+
+impl BandBuilder<'_> {
+    fn strand(&self, phase: f64) -> Strand {
+        let mut nodes = Vec::with_capacity(self.band.rows);
+        let mut gap = self.link;
+        let mut rear = self.behind.node(phase);
+        while let Some(node) = rear
+            && nodes.len() < self.band.rows
+        {
+            rear = self.track.ahead(&node, &mut gap, self.link);
+            nodes.extend(rear);
+        }
+        Rc::new(nodes)
+    }
+
+    fn quintet(&self, piece: Piece) -> Quintet {
+        std::array::from_fn(|k| self.strand(piece.begin + 0.25 * k as f64 * (piece.end - piece.begin)))
+    }
+
+    /// Cuts a piece until its parts are exact, and adds these to the band. `None` where the table grows too large.
+    fn refine(&mut self, piece: Piece, strands: Quintet, halvings: usize, parent: f64) -> Option<()> {
+        let errors = self.errors(piece, &strands, halvings);
+        if errors.worst <= 1.0 || !errors.curable || halvings == 0 || errors.worst > LEAST_GAIN * parent {
+            if errors.worst > 1.0 {
+                self.valid_from = self.valid_from.max(errors.valid_from);
+            }
+            return self.keep(piece, &strands);
+        }
+        let middle = 0.5 * (piece.begin + piece.end);
+        let [a, b, c, d, e] = strands;
+        for (begin, end, [front, centre, rear]) in
+            [(piece.begin, middle, [a, b, c.clone()]), (middle, piece.end, [c, d, e])]
+        {
+            let part = Piece { begin, end };
+            let quarter = 0.25 * (end - begin);
+            let (first, second) = (self.strand(begin + quarter), self.strand(end - quarter));
+            self.refine(part, [front, first, centre, second, rear], halvings - 1, errors.worst)?;
+        }
+        Some(())
+    }
+
+    fn keep(&mut self, piece: Piece, strands: &Quintet) -> Option<()> {
+        self.tabulate(piece, strands);
+        if self.with_centres {
+            let middle = &strands[2];
+            let missing = std::iter::repeat_n(None, self.band.rows - middle.len());
+            self.band.centres.extend(missing.chain(middle.iter().rev().map(|node| Some(node.at))));
+        }
+        self.front_row.extend(quintet_at(strands, self.band.rows - 1).map(|nodes| (piece, nodes.map(|node| *node))));
+        self.band.pieces.push(piece);
+        (size_of_val(self.band.coefficients.as_slice()) <= self.budget).then_some(())
+    }
+
+    /// Adds the polynomials of a piece.
+    fn tabulate(&mut self, piece: Piece, strands: &Quintet) {
+        let Order { coefficients, heading_coefficients, .. } = self.order;
+        let half = 0.5 * (piece.end - piece.begin);
+        let (rows, per_row) = (self.band.rows, self.order.per_row());
+        let begin = self.band.coefficients.len();
+        self.band.coefficients.resize(begin + rows / LANES * per_row, Lanes([0.0; LANES]));
+        for (index, nodes) in (0..rows).map_while(|index| Some((index, quintet_at(strands, index)?))) {
+            let row = rows - 1 - index;
+            let block = &mut self.band.coefficients[begin + row / LANES * per_row..][..per_row];
+            let mut polynomials = polynomials(half, nodes);
+            let middle = nodes[2];
+            let point = self.track.path.point(middle.at);
+            for (polynomial, centre) in polynomials.iter_mut().zip([point.x, point.y, middle.heading]) {
+                polynomial[0] += centre;
+            }
+            for (quantity, mut polynomial) in polynomials.into_iter().enumerate() {
+                let keep = if quantity < 2 { coefficients } else { heading_coefficients };
+                economise(&mut polynomial, keep);
+                for (power, coefficient) in polynomial[..keep].iter().enumerate() {
+                    block[quantity * coefficients + power].0[row % LANES] = *coefficient;
+                }
+            }
+        }
+    }
+
+    /// How far the polynomials of a piece are off; infinitely where the piece is sure to be cut.
+    fn errors(&self, piece: Piece, strands: &Quintet, halvings: usize) -> Errors {
+        let half = 0.5 * (piece.end - piece.begin);
+        let mut errors = Errors { worst: 0.0, valid_from: 0.0, curable: false };
+        for index in 0..self.end_row - self.needed.max(self.band.first_row).min(self.end_row) {
+            let row = self.end_row - 1 - index;
+            let error = match quintet_at(strands, index) {
+                Some(nodes) => self.error(half, nodes, index, &strands[1]),
+                None => f64::INFINITY,
+            };
+            errors.curable |= strands.iter().any(|strand| strand.len() > index);
+            if error > 1.0 {
+                errors.valid_from = errors.valid_from.max(row as f64 + piece.end);
+            }
+            errors.worst = errors.worst.max(error);
+            if error == f64::INFINITY || error > HOPELESS && halvings > 0 {
+                errors.worst = f64::INFINITY;
+                break;
+            }
+        }
+        errors
+    }
+
+    /// The error of one row of a piece `2 half` long, as a part of what is allowed: the largest of those of place,
+    /// heading and speed.
+    fn error(&self, half: f64, nodes: [&Node; 5], index: usize, strand: &Strand) -> f64 {
+        let mut polynomials = polynomials(half, nodes);
+        // The size of the slope's next power, had it fallen off as the last one did.
+        let power = |power: usize| power as f64 * polynomials[0][power].hypot(polynomials[1][power]);
+        let neglected = LARGEST_NODAL * power(5) * (power(5) / power(4)).min(1.0);
+        let dropped: [f64; 3] = std::array::from_fn(|quantity| {
+            let keep = if quantity < 2 { self.order.coefficients } else { self.order.heading_coefficients };
+            economise(&mut polynomials[quantity], keep)
+        });
+        let [x, y, heading] = polynomials;
+        let middle = nodes[2];
+        // Each step rounds; the strands of a band differ by what adds up.
+        let walk = (index as f64 + 8.0).sqrt() * f64::EPSILON * self.link;
+        let allowed = self.order.tolerance.min(1e-13 * self.link) + 4.0 * walk;
+        let allowed_heading = 10.0 * allowed / self.link + 2.0 * f64::EPSILON;
+        let (mut miss, mut turn): (f64, f64) = (0.0, 0.0);
+        for (node, beta) in nodes.into_iter().zip(NODES) {
+            let found = Vector::new(horner(&x, beta).0, horner(&y, beta).0);
+            miss = miss.max((self.track.displacement(middle.at, node.at) - found).norm());
+            turn = turn.max((within_half_turn(node.heading - middle.heading) - horner(&heading, beta).0).abs());
+        }
+        let dropped_place = dropped[0].hypot(dropped[1]);
+        let truncated = neglected + 25.0 * dropped_place;
+        let worst = ((miss + dropped_place) / allowed)
+            .max((turn + dropped[2]) / allowed_heading)
+            .max(truncated / (half * middle.spacing) / self.order.speed_tolerance);
+        if worst <= 1.0 && !self.is_first_follower(strand, index) { f64::INFINITY } else { worst }
+    }
+
+    /// Whether the node before this one of a strand is where the linkage says the follower is.
+    fn is_first_follower(&self, strand: &Strand, index: usize) -> bool {
+        let Some(before) = index.checked_sub(1) else { return true };
+        let (front, rear) = (strand[index].at, strand[before].at);
+        let Ok(found) = linkage::follower(self.track.path, front, self.link) else { return false };
+        let size = self.track.path.point(front).coords.norm();
+        self.track.displacement(found, rear).norm() <= 1e-6 * self.link + 1e-13 * size
+    }
+}
+
+/// The nodes of a row's five strands, the row counted forward from the band's last; `None` where a strand ends before.
+fn quintet_at(strands: &Quintet, index: usize) -> Option<[&Node; 5]> {
+    let [a, b, c, d, e] = strands.each_ref().map(|strand| strand.get(index));
+    Some([a?, b?, c?, d?, e?])
+}
+
+/// The polynomials in beta of x and y relative to the middle node, metres, and of the heading relative to its heading.
+fn polynomials(half: f64, nodes: [&Node; 5]) -> [[f64; 6]; 3] {
+    [
+        from_slopes(nodes.map(|node| -half * node.spacing * node.tangent.x)),
+        from_slopes(nodes.map(|node| -half * node.spacing * node.tangent.y)),
+        from_slopes(nodes.map(|node| half * node.heading_rate)),
+    ]
+}
+
+/// A difference of two angles brought into half a turn.
+pub(super) fn within_half_turn(angle: f64) -> f64 {
+    if angle > PI {
+        angle - TAU
+    } else if angle < -PI {
+        angle + TAU
+    } else {
+        angle
+    }
+}
+
+/// The table for `team` on `path`; `None` where there is none, or a too large one.
+pub(super) fn rows(track: &Track, team: &Team, order: Order) -> Option<Rows> {
+    let beginning = Beginning::new(track, team)?;
+    let link = team.link(1);
+    let foremost = foremost(track, team)?;
+    let second = track.follower(track.path.param_at(0.0), team.link(0))?;
+    // One strand tells how many rows there are, with some to spare.
+    let mut node = beginning.node(track, 0.0);
+    let (mut gap, mut steps, mut behind_second) = (link, 0, 0);
+    while track.path.arc_length(foremost, node.at) < 0.0 {
+        steps += 1;
+        if track.path.arc_length(second, node.at) < 0.0 {
+            behind_second = steps;
+        }
+        let Some(next) = track.ahead(&node, &mut gap, link) else { break };
+        node = next;
+        if steps * order.per_row() * size_of::<f64>() > MOST_BYTES {
+            return None;
+        }
+    }
+    let end = (steps + 2).next_multiple_of(LANES);
+    let kinks = kinks(track, &beginning, link, end);
+    let phases = kinks.iter().map(|kink| kink.fract()).collect();
+    let mut table = Rows { order, bands: Vec::new(), kinks: phases, valid_from: 0.0 };
+    // So far behind, one piece says it all, and says it more smoothly than the beginning could for each phase by
+    // itself.
+    let whole = Piece { begin: 0.0, end: 1.0 };
+    let nodes = [0.0, 0.25, 0.5, 0.75, 1.0].map(|alpha| beginning.node(track, alpha));
+    let mut behind = Row::new(track, &[(whole, nodes)]);
+    for (first_row, end_row) in bands(end) {
+        let mut builder = BandBuilder {
+            track,
+            order,
+            link,
+            behind,
+            band: Band { first_row, rows: end_row - first_row, ..Band::default() },
+            end_row,
+            needed: end - steps - 2,
+            with_centres: first_row <= end - behind_second,
+            front_row: Vec::new(),
+            valid_from: table.valid_from,
+            budget: MOST_BYTES.saturating_sub(table.memory_bytes()),
+        };
+        for piece in between_kinks(&kinks, first_row) {
+            let quintet = builder.quintet(piece);
+            builder.refine(piece, quintet, MOST_HALVINGS, f64::INFINITY)?;
+        }
+        let BandBuilder { mut band, front_row, valid_from, .. } = builder;
+        band.index();
+        table.valid_from = valid_from;
+        table.bands.insert(0, band);
+        behind = Row::new(track, &front_row);
+        if valid_from > first_row as f64 {
+            break;
+        }
+    }
+    Some(table)
+}

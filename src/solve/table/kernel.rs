@@ -1,0 +1,182 @@
+//! A frame from the table: every handle behind the head by itself, eight at a time.
+//!
+//! Called by the follower table only, through [`write()`]. The loops over [`LANES`] have a fixed length, so that the
+//! compiler turns them into vectors.
+
+use std::f64::consts::{PI, TAU};
+
+use super::rows::{Alpha, Band, LANES, Lanes, Rows};
+use crate::solve::Chain;
+
+/// What a frame needs to know besides the table.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moment {
+    /// Where the second handle stands.
+    pub alpha: Alpha,
+    /// Its derivative by time, 1/s; negative while the handle goes forward.
+    pub alpha_per_second: f64,
+}
+
+/// x, y, heading, speed, vx and vy of neighbouring handles.
+type Outputs = [[f64; LANES]; 6];
+
+/// One piece of a band at one moment.
+#[derive(Debug, Clone, Copy)]
+struct Local {
+    beta: f64,
+    beta_per_second: f64,
+    /// 1 or -1: the sign of all speeds.
+    sign: f64,
+}
+
+/// Writes all handles but the head. `K` and `H` are the coefficients of a coordinate and of a heading; `FUSED` says
+/// that the processor multiplies and adds in one instruction.
+///
+/// The heading of the last handle is not its own.
+#[inline(always)]
+pub(super) fn write<const K: usize, const H: usize, const FUSED: bool, const VELOCITIES: bool>(
+    rows: &Rows,
+    moment: &Moment,
+    chain: &mut Chain,
+) {
+    let Alpha { row, phase } = moment.alpha;
+    let end = row + chain.handles() - 1;
+    let mut next = row;
+    for band in &rows.bands[rows.band_of(row)..] {
+        let piece = band.piece_at(phase);
+        let per_alpha = band.pieces[piece].beta_per_alpha();
+        let local = Local {
+            beta: band.pieces[piece].beta(phase),
+            beta_per_second: per_alpha * moment.alpha_per_second,
+            sign: -moment.alpha_per_second.signum(),
+        };
+        let band_end = end.min(band.first_row + band.rows);
+        write_band::<K, H, FUSED, VELOCITIES>(band, piece, &local, next..band_end, row, chain);
+        next = band_end;
+        if next == end {
+            break;
+        }
+    }
+}
+
+/// Writes the handles of some rows of a band; the second handle stands in row `second`.
+#[inline(always)]
+fn write_band<const K: usize, const H: usize, const FUSED: bool, const VELOCITIES: bool>(
+    band: &Band,
+    piece: usize,
+    local: &Local,
+    rows: std::ops::Range<usize>,
+    second: usize,
+    chain: &mut Chain,
+) {
+    let per_block = 2 * K + H;
+    let first_block = (rows.start - band.first_row) / LANES;
+    let blocks = (rows.end - band.first_row).div_ceil(LANES) - first_block;
+    let begin = (piece * (band.rows / LANES) + first_block) * per_block;
+    let coefficients = &band.coefficients[begin..][..blocks * per_block];
+    let first_row = band.first_row + first_block * LANES;
+    let whole = usize::from(first_row < rows.start)..(rows.end - first_row) / LANES;
+    // No closure here: where one is not inlined, it knows nothing of the caller's instructions.
+    let last = (whole.end < blocks && whole.end >= whole.start).then_some(whole.end);
+    for partial in (whole.start > 0).then_some(0).into_iter().chain(last) {
+        let row = first_row + partial * LANES;
+        let lanes = rows.start.max(row) - row..rows.end.min(row + LANES) - row;
+        let outputs = outputs::<K, H, FUSED, VELOCITIES>(&coefficients[partial * per_block..][..per_block], local);
+        store_some::<VELOCITIES>(&outputs, lanes, chain, row + 1, second);
+    }
+    // Whole blocks are stored straight from registers.
+    if whole.start < whole.end {
+        let handle = first_row + whole.start * LANES + 1 - second;
+        let Chain { x, y, heading, speed, vx, vy } = &mut *chain;
+        let number = whole.end - whole.start;
+        let [x, y, heading, speed, vx, vy] =
+            [x, y, heading, speed, vx, vy].map(|list| &mut list[handle..].as_chunks_mut::<LANES>().0[..number]);
+        let coefficients = &coefficients[whole.start * per_block..][..number * per_block];
+        for (index, block) in coefficients.chunks_exact(per_block).enumerate().take(number) {
+            let outputs = outputs::<K, H, FUSED, VELOCITIES>(block, local);
+            x[index] = outputs[0];
+            y[index] = outputs[1];
+            heading[index] = outputs[2];
+            if VELOCITIES {
+                speed[index] = outputs[3];
+                vx[index] = outputs[4];
+                vy[index] = outputs[5];
+            }
+        }
+    }
+}
+
+/// Writes a part of the lanes.
+#[inline(always)]
+fn store_some<const VELOCITIES: bool>(
+    outputs: &Outputs,
+    lanes: std::ops::Range<usize>,
+    chain: &mut Chain,
+    after_row: usize,
+    second: usize,
+) {
+    let [x, y, heading, speed, vx, vy] = outputs;
+    for lane in lanes {
+        let handle = after_row + lane - second;
+        chain.x[handle] = x[lane];
+        chain.y[handle] = y[lane];
+        chain.heading[handle] = heading[lane];
+        if VELOCITIES {
+            chain.speed[handle] = speed[lane];
+            chain.vx[handle] = vx[lane];
+            chain.vy[handle] = vy[lane];
+        }
+    }
+}
+
+/// The polynomials of one block, Horner's scheme for values and slopes; without velocities the last three are
+/// unspecified.
+#[inline(always)]
+fn outputs<const K: usize, const H: usize, const FUSED: bool, const VELOCITIES: bool>(
+    block: &[Lanes],
+    local: &Local,
+) -> Outputs {
+    let block = &block[..2 * K + H];
+    let [mut x, mut y] = [block[K - 1].0, block[2 * K - 1].0];
+    let [mut vx, mut vy] = [[0.0; LANES]; 2];
+    let mut heading = block[2 * K + H - 1].0;
+    for power in (0..K - 1).rev() {
+        for lane in 0..LANES {
+            if VELOCITIES {
+                vx[lane] = multiply_add::<FUSED>(vx[lane], local.beta, x[lane]);
+                vy[lane] = multiply_add::<FUSED>(vy[lane], local.beta, y[lane]);
+            }
+            x[lane] = multiply_add::<FUSED>(x[lane], local.beta, block[power].0[lane]);
+            y[lane] = multiply_add::<FUSED>(y[lane], local.beta, block[K + power].0[lane]);
+        }
+    }
+    for power in (0..H - 1).rev() {
+        for (heading, coefficient) in heading.iter_mut().zip(&block[2 * K + power].0) {
+            *heading = multiply_add::<FUSED>(*heading, local.beta, *coefficient);
+        }
+    }
+    let mut speed = [0.0; LANES];
+    for lane in 0..LANES {
+        heading[lane] = within_half_turn(heading[lane]);
+        if VELOCITIES {
+            vx[lane] *= local.beta_per_second;
+            vy[lane] *= local.beta_per_second;
+            speed[lane] = local.sign * multiply_add::<FUSED>(vx[lane], vx[lane], vy[lane] * vy[lane]).sqrt();
+        }
+    }
+    [x, y, heading, speed, vx, vy]
+}
+
+/// `x * y + z`: one rounding where the processor has the instruction, two where it would be a library call.
+#[inline(always)]
+fn multiply_add<const FUSED: bool>(x: f64, y: f64, z: f64) -> f64 {
+    if FUSED { x.mul_add(y, z) } else { x * y + z }
+}
+
+/// An angle less than a turn outside of (-pi, pi], brought into it.
+#[inline(always)]
+pub(super) fn within_half_turn(angle: f64) -> f64 {
+    let down = if angle > PI { TAU } else { 0.0 };
+    let up = if angle <= -PI { TAU } else { 0.0 };
+    angle - down + up
+}

@@ -1,0 +1,109 @@
+//! How the table is laid out before it is made: how far forward it reaches, its bands of rows, and the phases at which
+//! the path's junctions cut it.
+//!
+//! Called by [`super::band`] only.
+
+use super::beginning::Beginning;
+use super::rows::Piece;
+use super::track::Track;
+use crate::linkage;
+use crate::model::curve::Segment;
+use crate::model::path::Param;
+use crate::model::team::Team;
+
+/// Kinks nearer together than this, in links, are taken for one.
+const SAME_KINK: f64 = 1e-11;
+
+/// Rows ahead of the team, at most: a longer way has a table of its beginning.
+const MOST_ROWS_AHEAD: usize = 1 << 15;
+
+/// Rows of the frontmost band; each further one reaches twice as far back.
+const FIRST_BAND: usize = 8;
+
+/// The first row of each band and the row behind it, from the rear forward.
+pub(super) fn bands(end: usize) -> Vec<(usize, usize)> {
+    let mut begins = vec![0];
+    let mut next = FIRST_BAND;
+    // The last band is not to be a short one.
+    while next + next / 2 <= end {
+        begins.push(next);
+        next *= 2;
+    }
+    let ends = begins.iter().skip(1).copied().chain([end]);
+    let mut bands: Vec<(usize, usize)> = begins.iter().copied().zip(ends).collect();
+    bands.reverse();
+    bands
+}
+
+/// The foremost place to which the second handle comes.
+pub(super) fn foremost(track: &Track, team: &Team) -> Option<Param> {
+    let reach = track.path.length().min(MOST_ROWS_AHEAD as f64 * team.link(1));
+    let second = |travelled: f64| linkage::follower(track.path, track.path.param_at(travelled), team.link(0)).ok();
+    let mut foremost = second(0.0)?;
+    let mut farther = |place: Param| {
+        if track.path.arc_length(foremost, place) > 0.0 {
+            foremost = place;
+        }
+    };
+    let step = team.link(0).max(team.link(1));
+    let (mut good, mut bad) = (0.0, f64::INFINITY);
+    while bad == f64::INFINITY && good < reach {
+        let next = (good + step).min(reach);
+        match second(next) {
+            Some(place) => {
+                farther(place);
+                good = next;
+            }
+            None => bad = next,
+        }
+    }
+    for _ in 0..if bad.is_finite() { 40 } else { 0 } {
+        let middle = 0.5 * (good + bad);
+        match second(middle) {
+            Some(place) => {
+                farther(place);
+                good = middle;
+            }
+            None => bad = middle,
+        }
+    }
+    Some(foremost)
+}
+
+/// Alpha of every junction at which the path's curvature changes, in order of phase.
+pub(super) fn kinks(track: &Track, beginning: &Beginning, link: f64, end: usize) -> Vec<f64> {
+    let path = track.path;
+    let mut kinks: Vec<f64> = (1..path.segments())
+        .filter_map(|segment| {
+            let junction = Param { segment, at: path.first(segment) };
+            let before = Param { segment: segment - 1, at: path.last(segment - 1) };
+            if let (Segment::Line(_), Segment::Line(_)) = (path.segment(before), path.segment(junction)) {
+                return None;
+            }
+            let (mut place, mut links) = (junction, 0.0);
+            loop {
+                if let Some(alpha) = beginning.alpha(place) {
+                    break Some(end as f64 + alpha - links);
+                }
+                place = track.follower(place, link)?;
+                links += 1.0;
+            }
+        })
+        .filter(|alpha| *alpha >= 0.0)
+        .collect();
+    kinks.sort_by(|a, b| a.fract().total_cmp(&b.fract()));
+    kinks
+}
+
+/// The pieces into which the kinks of a band cut the phases.
+pub(super) fn between_kinks(kinks: &[f64], first_row: usize) -> Vec<Piece> {
+    let mut cuts = vec![0.0];
+    for kink in kinks.iter().filter(|kink| **kink >= first_row as f64) {
+        let phase = kink.fract();
+        if phase - cuts[cuts.len() - 1] > SAME_KINK && phase < 1.0 - SAME_KINK {
+            cuts.push(phase);
+        }
+    }
+    cuts.push(1.0);
+    cuts.windows(2).map(|cut| Piece { begin: cut[0], end: cut[1] }).collect()
+}

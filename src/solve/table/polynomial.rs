@@ -1,0 +1,102 @@
+//! Polynomials on -1..1 with given slopes, and how to shorten them.
+//!
+//! Called by the making of the table only.
+
+use nalgebra::SMatrix;
+
+/// The polynomial of degree `N` with given slopes at `N` nodes; its constant is left at zero.
+///
+/// Values are not used: half of their rounding would come back in the slopes between them, and the more the shorter the
+/// piece. They are left to the proof: where the slope's error is the first neglected power's, which is zero at the
+/// nodes, the value is farthest off at nodes.
+#[derive(Debug, Clone)]
+pub(super) struct SlopeFit<const N: usize> {
+    from_slopes: SMatrix<f64, N, N>,
+}
+
+impl<const N: usize> SlopeFit<N> {
+    /// For `N` different nodes.
+    pub(super) fn new(nodes: &[f64; N]) -> Self {
+        let slopes = SMatrix::<f64, N, N>::from_fn(|row, power| nodes[row].powi(power as i32));
+        Self { from_slopes: slopes.try_inverse().expect("different nodes determine the polynomial") }
+    }
+
+    /// The coefficients from the first power on.
+    pub(super) fn coefficients(&self, slopes: [f64; N]) -> [f64; N] {
+        let slope: [f64; N] = (self.from_slopes * SMatrix::<f64, N, 1>::from(slopes)).into();
+        std::array::from_fn(|power| slope[power] / (power + 1) as f64)
+    }
+}
+
+/// The polynomial of the fifth degree that is zero in the middle and has given slopes at -1, -1/2, 0, 1/2 and 1.
+/// See [`SlopeFit`].
+pub(super) fn from_slopes([a, b, c, d, e]: [f64; 5]) -> [f64; 6] {
+    // Newton's divided differences of five equidistant numbers, by power.
+    let (near, far) = (0.5 * (d - b), 0.5 * (e - a));
+    let (near_bend, far_bend) = (0.5 * ((d - c) - (c - b)), 0.5 * ((e - c) - (c - a)));
+    let linear = (8.0 * near - far) / 3.0;
+    let cubic = far - linear;
+    let square = (16.0 * near_bend - far_bend) / 3.0;
+    let fourth = far_bend - square;
+    [0.0, c, linear / 2.0, square / 3.0, cubic / 4.0, fourth / 5.0]
+}
+
+/// Value and slope at `beta`.
+#[inline(always)]
+pub(super) fn horner<const N: usize>(coefficients: &[f64; N], beta: f64) -> (f64, f64) {
+    coefficients.iter().rev().fold((0.0, 0.0), |(value, slope), c| (value * beta + c, slope * beta + value))
+}
+
+/// Takes the powers from `keep` on out of a polynomial of at most the fifth degree, and gives a bound of what that
+/// changes in -1..1: each power is replaced by the polynomial next to it (Lanczos' economisation; Press et al.,
+/// Numerical Recipes, 3rd ed., section 5.11).
+pub(super) fn economise(coefficients: &mut [f64; 6], keep: usize) -> f64 {
+    /// The power less the Chebyshev polynomial of its degree, scaled: coefficients of the lower powers.
+    const REPLACEMENTS: [[f64; 5]; 6] = [
+        [0.0; 5],
+        [0.0; 5],
+        [0.5, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 0.75, 0.0, 0.0, 0.0],
+        [-0.125, 0.0, 1.0, 0.0, 0.0],
+        [0.0, -0.3125, 0.0, 1.25, 0.0],
+    ];
+    let mut bound = 0.0;
+    for power in (keep..6).rev() {
+        let taken = std::mem::take(&mut coefficients[power]);
+        for (coefficient, share) in coefficients.iter_mut().zip(REPLACEMENTS[power]) {
+            *coefficient += taken * share;
+        }
+        bound += taken.abs() / 2f64.powi(power as i32 - 1);
+    }
+    bound
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_polynomial_is_found_again_from_its_slopes() {
+        let wanted = [0.0, -1.0, 0.5, 2.0, -0.7, 0.1];
+        let found = from_slopes([-1.0, -0.5, 0.0, 0.5, 1.0].map(|beta| horner(&wanted, beta).1));
+        let nodes = [-1.0, -0.6, 0.0, 0.7, 1.0];
+        let fitted = SlopeFit::new(&nodes).coefficients(nodes.map(|beta| horner(&wanted, beta).1));
+        for ((found, fitted), wanted) in found.into_iter().skip(1).zip(fitted).zip(wanted.into_iter().skip(1)) {
+            assert!((found - wanted).abs() < 1e-14 && (fitted - wanted).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn a_shortened_polynomial_is_as_near_as_promised() {
+        let whole = [0.3, -1.0, 0.5, 2.0, -0.7, 0.1];
+        for keep in 2..6 {
+            let mut shortened = whole;
+            let bound = economise(&mut shortened, keep);
+            assert!(shortened[keep..].iter().all(|c| *c == 0.0));
+            let error =
+                |k: i32| (horner(&whole, 0.05 * f64::from(k)).0 - horner(&shortened, 0.05 * f64::from(k)).0).abs();
+            let worst = (-20..=20).map(error).fold(0.0, f64::max);
+            assert!(worst <= bound + 1e-15 && worst > 0.3 * bound, "{keep}: {worst} of {bound}");
+        }
+    }
+}

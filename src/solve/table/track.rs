@@ -1,0 +1,166 @@
+//! Places along a path relative to each other, to the last digit however far from the origin, and the step from a
+//! handle to the one ahead of it.
+//!
+//! In: a path and places on it. Out: displacements, places at a link's distance, [`Node`]s. Called by the making of the
+//! table only; no frame comes here.
+
+use crate::linkage::{self, link_pose};
+use crate::model::Vector;
+use crate::model::curve::{Coordinate, Curve, Line, Segment};
+use crate::model::path::{Param, Path};
+use crate::model::spiral::Direction;
+
+/// A path with the coordinates at which its segments join.
+#[derive(Debug)]
+pub(super) struct Track<'a> {
+    pub path: &'a Path,
+    first: Vec<Coordinate>,
+    last: Vec<Coordinate>,
+}
+
+/// Where one handle of a chain of equal links stands, and how that changes with alpha, the number of links (and
+/// fractions of one) behind a fixed place of the chain.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Node {
+    pub at: Param,
+    pub tangent: Vector,
+    /// Metres along the path, against the travel, per unit of alpha.
+    pub spacing: f64,
+    /// Direction of the link that the handle leads, radians, and its derivative by alpha.
+    pub heading: f64,
+    pub heading_rate: f64,
+}
+
+/// How a link lies: from the rear handle to the front one, and how it turns.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pose {
+    pub heading: f64,
+    /// The speed of the rear handle over that of the front one.
+    pub speed_ratio: f64,
+    /// Radians per metre of the front handle's travel.
+    pub heading_per_metre: f64,
+}
+
+/// A step shorter than this, in links, is the last of a Newton iteration: the next would be below the last digit.
+const LAST_STEP: f64 = 1e-9;
+
+impl<'a> Track<'a> {
+    pub(super) fn new(path: &'a Path) -> Self {
+        let segments = 0..path.segments();
+        let first = segments.clone().map(|segment| path.first(segment)).collect();
+        Self { path, first, last: segments.map(|segment| path.last(segment)).collect() }
+    }
+
+    /// The vector from one place to another, relative to its own length as exact as a double.
+    pub(super) fn displacement(&self, from: Param, to: Param) -> Vector {
+        if from.segment > to.segment {
+            return -self.displacement(to, from);
+        }
+        if from.segment < to.segment {
+            let end = Param { segment: from.segment, at: self.last[from.segment] };
+            let next = Param { segment: from.segment + 1, at: self.first[from.segment + 1] };
+            return self.displacement(from, end) + self.displacement(next, to);
+        }
+        match self.path.segment(from) {
+            Segment::Line(Line { direction, .. }) => to.at.minus(from.at) * direction,
+            Segment::Arc(arc) => {
+                // The chord is parallel to the tangent half way.
+                let half = 0.5 * to.at.minus(from.at);
+                2.0 * arc.radius * half.sin() * arc.tangent(from.at.plus(half))
+            }
+            // A "link" of one metre has the displacement as its direction.
+            Segment::Spiral(_) => link_pose(self.path, to, from, 1.0).direction,
+        }
+    }
+
+    /// The place about `metres` further along, exact to first order: for a guess, or the last step of an iteration.
+    ///
+    /// The last segment is taken to go on beyond its end. `None` at the centre of a spiral.
+    pub(super) fn moved(&self, from: Param, metres: f64) -> Option<Param> {
+        let mut place = from;
+        let mut left = metres;
+        loop {
+            let rate = signed_rate(self.path.segment(place), place.at);
+            let by = left / rate;
+            let ahead = metres > 0.0;
+            let next = if ahead { place.segment + 1 } else { place.segment.wrapping_sub(1) };
+            let end = if ahead { self.last[place.segment] } else { self.first[place.segment] };
+            let over = (by - end.minus(place.at)) * rate;
+            if next < self.first.len() && over.abs() > 0.0 && (over > 0.0) == ahead {
+                let at = if ahead { self.first[next] } else { self.last[next] };
+                place = Param { segment: next, at };
+                left = over;
+                continue;
+            }
+            place.at = place.at.plus(by);
+            let sound = place.at.high > 0.0 || !matches!(self.path.segment(place), Segment::Spiral(_));
+            return sound.then_some(place);
+        }
+    }
+
+    /// The place near `moving` that is `link` metres from `fixed`.
+    fn settled(&self, mut moving: Param, fixed: Param, link: f64) -> Option<Param> {
+        for _ in 0..20 {
+            let offset = self.displacement(fixed, moving);
+            let distance = offset.norm();
+            let step = (link - distance) * distance / offset.dot(&self.path.tangent(moving));
+            if step.is_nan() || step.abs() >= 0.5 * link {
+                return None;
+            }
+            moving = self.moved(moving, step)?;
+            if step.abs() < LAST_STEP * link {
+                return Some(moving);
+            }
+        }
+        None
+    }
+
+    /// The first place behind `front` at a link's distance.
+    pub(super) fn follower(&self, front: Param, link: f64) -> Option<Param> {
+        let rear = linkage::follower(self.path, front, link).ok()?;
+        // On one segment it was found in the segment's own coordinate, and has all its digits.
+        if rear.segment == front.segment { Some(rear) } else { self.settled(rear, front, link) }
+    }
+
+    /// The node one link ahead of `rear`, with `gap` metres as a guess of how far that is; the guess is improved.
+    pub(super) fn ahead(&self, rear: &Node, gap: &mut f64, link: f64) -> Option<Node> {
+        let at = self.settled(self.moved(rear.at, *gap)?, rear.at, link)?;
+        if at.segment == rear.at.segment {
+            *gap = at.at.minus(rear.at.at) * signed_rate(self.path.segment(at), rear.at.at);
+        }
+        let tangent = self.path.tangent(at);
+        let pose = self.pose((at, tangent), (rear.at, rear.tangent), link)?;
+        let spacing = rear.spacing / pose.speed_ratio;
+        if !(spacing > 0.0 && spacing < f64::INFINITY) {
+            return None;
+        }
+        Some(Node { at, tangent, spacing, heading: pose.heading, heading_rate: -spacing * pose.heading_per_metre })
+    }
+
+    /// How the link between two places lies, given with their tangents; `None` at a stall or a lock.
+    pub(super) fn pose(&self, front: (Param, Vector), rear: (Param, Vector), link: f64) -> Option<Pose> {
+        let direction = self.displacement(rear.0, front.0) / link;
+        let (front_cosine, rear_cosine) = (direction.dot(&front.1), direction.dot(&rear.1));
+        let speed_ratio = front_cosine / rear_cosine;
+        let turning = direction.perp(&(front.1 - speed_ratio * rear.1));
+        let heading = direction.y.atan2(direction.x);
+        (rear_cosine > 0.0).then_some(Pose { heading, speed_ratio, heading_per_metre: turning / link })
+    }
+
+    /// The place exactly `metres` of arc length further along its own segment.
+    pub(super) fn advanced(&self, from: Param, metres: f64) -> Param {
+        Param { segment: from.segment, at: self.path.segment(from).advance(from.at, metres) }
+    }
+}
+
+/// Metres of travel per unit of a segment's coordinate.
+pub(super) fn signed_rate(segment: &Segment, at: Coordinate) -> f64 {
+    match segment {
+        Segment::Line(_) => 1.0,
+        Segment::Arc(arc) => arc.radius,
+        Segment::Spiral(spiral) => {
+            let rate = spiral.radius_per_radian() * 1f64.hypot(at.high);
+            if spiral.direction() == Direction::Inward { -rate } else { rate }
+        }
+    }
+}

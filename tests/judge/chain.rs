@@ -1,0 +1,185 @@
+//! A team on a path: where its handles are, all places that they come through, and the first stall and lock of any link.
+//!
+//! A handle's place is a function of the one ahead of it, so the stretch of path that it covers while the head goes from
+//! one place to another is the image of the stretch that the handle ahead covers: as long as the follower does not jump,
+//! what lies between its places at the ends and those where it turns round. No event between two looks is missed that
+//! way, however briefly it lasts.
+
+use super::geometry::{Path, Place, Vector};
+use super::links::{Link, Look};
+
+pub struct Team {
+    pub benches: usize,
+    pub head_length: f64,
+    pub body_length: f64,
+    pub width: f64,
+    pub hole_inset: f64,
+}
+
+impl Team {
+    pub fn link(&self, bench: usize) -> f64 {
+        (if bench == 0 { self.head_length } else { self.body_length }) - 2.0 * self.hole_inset
+    }
+}
+
+/// A stretch of path that a handle covers.
+#[derive(Clone, Copy)]
+pub struct Span {
+    pub low: Place,
+    pub high: Place,
+}
+
+impl Span {
+    fn around(places: impl Iterator<Item = Place>) -> Self {
+        let span = places.fold(None, |span: Option<Self>, place| match span {
+            None => Some(Self { low: place, high: place }),
+            Some(Self { low, high }) => Some(Self {
+                low: if place.s < low.s { place } else { low },
+                high: if place.s > high.s { place } else { high },
+            }),
+        });
+        span.expect("at least one place")
+    }
+}
+
+/// The team with its head at one place.
+#[derive(Clone)]
+pub struct Pose {
+    pub head: f64,
+    pub handles: Vec<Handle>,
+}
+
+#[derive(Clone, Copy)]
+pub struct Handle {
+    pub place: Place,
+    pub point: Vector,
+    pub tangent: Vector,
+    /// Metres per metre of the head, forward.
+    pub speed: f64,
+    /// Cosines at the front and the rear handle of the bench that this handle leads; NaN for the last.
+    pub front_cosine: f64,
+    pub rear_cosine: f64,
+}
+
+/// Metres before a lock in which rounding may have put the team past it.
+pub fn last_bits(lock: f64) -> f64 {
+    1e-12 * (1.0 + lock)
+}
+
+pub struct Chain<'a> {
+    pub path: &'a Path,
+    pub team: &'a Team,
+    links: [Link<'a>; 2],
+}
+
+impl<'a> Chain<'a> {
+    pub fn new(path: &'a Path, team: &'a Team) -> Self {
+        Self { path, team, links: [0, 1].map(|bench| Link::new(path, team.link(bench))) }
+    }
+
+    fn link(&self, bench: usize) -> &Link<'a> {
+        &self.links[bench.min(1)]
+    }
+
+    /// Whether both searches for stalls and jumps came to their end.
+    pub fn is_complete(&self) -> bool {
+        self.links.iter().all(|link| link.complete)
+    }
+
+    pub fn pose(&self, head: f64) -> Pose {
+        let mut place = self.path.place_at(head);
+        let mut speed = 1.0;
+        let mut handles = Vec::with_capacity(self.team.benches + 1);
+        for bench in 0..self.team.benches {
+            let Look { rear, front_cosine, rear_cosine, .. } = self.link(bench).look(place);
+            let (point, tangent) = self.path.point_and_tangent(place);
+            handles.push(Handle { place, point, tangent, speed, front_cosine, rear_cosine });
+            place = rear;
+            speed *= front_cosine / rear_cosine;
+        }
+        let (point, tangent) = self.path.point_and_tangent(place);
+        handles.push(Handle { place, point, tangent, speed, front_cosine: f64::NAN, rear_cosine: f64::NAN });
+        Pose { head, handles }
+    }
+
+    /// Whether a link stands at the start where its follower has jumped: such a start is illegal.
+    pub fn starts_beyond_a_jump(&self) -> bool {
+        let beyond =
+            |(bench, handle): (usize, &Handle)| self.link(bench).jumps.iter().any(|jump| jump.0 <= handle.place.s);
+        self.pose(0.0).handles[..self.team.benches].iter().enumerate().any(beyond)
+    }
+
+    /// What the handle behind covers.
+    fn image(&self, bench: usize, span: Span) -> Span {
+        let link = self.link(bench);
+        let ends = [span.low, span.high].into_iter().map(|place| self.path.follower(place, link.length));
+        Span::around(ends.chain(link.stalls_between(span.low.s, span.high.s).map(|look| look.rear)))
+    }
+
+    /// What each handle covers while the head goes from one pose to another, no lock being between.
+    pub fn spans(&self, from: &Pose, to: &Pose) -> Vec<Span> {
+        let mut spans = Vec::with_capacity(from.handles.len());
+        let mut turns = false;
+        for (k, (one, other)) in from.handles.iter().zip(&to.handles).enumerate() {
+            let mut span = Span::around([one.place, other.place].into_iter());
+            // Only behind a handle that turns round is there more than the ends tell.
+            if turns {
+                let image = self.image(k - 1, spans[k - 1]);
+                span = Span::around([span.low, span.high, image.low, image.high].into_iter());
+            }
+            turns |= k < self.team.benches && self.link(k).stalls_between(span.low.s, span.high.s).next().is_some();
+            spans.push(span);
+        }
+        spans
+    }
+
+    /// The first bench of which `happens` holds of the stretch that its front handle covers from the start on.
+    fn first_bench(&self, head: f64, happens: impl Fn(&Link, Span) -> bool) -> Option<usize> {
+        let mut span = Span { low: self.path.place_at(0.0), high: self.path.place_at(head) };
+        for bench in 0..self.team.benches {
+            if happens(self.link(bench), span) {
+                return Some(bench);
+            }
+            if self.link(bench).jump_between(span.low.s, span.high.s).is_some() {
+                return None;
+            }
+            span = self.image(bench, span);
+        }
+        None
+    }
+
+    /// The least metres of the head up to `most` at which `happens` holds of some bench's stretch.
+    fn first(&self, most: f64, happens: impl Fn(&Link, Span) -> bool) -> Option<(f64, usize)> {
+        self.first_bench(most, &happens)?;
+        let (mut low, mut high) = (0.0, most);
+        // Stretches only grow, so what holds once holds ever after.
+        loop {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                break;
+            }
+            if self.first_bench(middle, &happens).is_some() { high = middle } else { low = middle }
+        }
+        // In the last bits before one link's jump its follower may be past the jump, and the next link's with it.
+        let bench = self.first_bench((high + last_bits(high)).min(most), &happens)?;
+        Some((high, bench))
+    }
+
+    /// The first lock of any link: metres of the head, the bench, and whether it may be none.
+    pub fn lock(&self) -> Option<(f64, usize, bool)> {
+        let jumps = |link: &Link, span: Span| link.jump_between(span.low.s, span.high.s).is_some();
+        let (at, bench) = self.first(self.path.end, jumps)?;
+        let place = self.pose(at).handles[bench].place.s;
+        let nearest = self.link(bench).jumps.iter().min_by(|a, b| (a.0 - place).abs().total_cmp(&(b.0 - place).abs()));
+        Some((at, bench, nearest.is_some_and(|(_, doubtful)| *doubtful)))
+    }
+
+    /// The first stall of any link, before the end of the motion.
+    pub fn stall(&self, end: f64) -> Option<(f64, usize)> {
+        let start = self.pose(0.0);
+        if let Some(bench) = start.handles.iter().position(|handle| handle.front_cosine <= 0.0) {
+            return Some((0.0, bench));
+        }
+        self.first(end, |link, span| link.stalls_between(span.low.s, span.high.s).next().is_some())
+    }
+}
