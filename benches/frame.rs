@@ -7,7 +7,6 @@
 use std::f64::consts::TAU;
 
 use bench_dragon::live::Publisher;
-use bench_dragon::messages::FrameHeader;
 use bench_dragon::model::path::Path;
 use bench_dragon::model::team::Team;
 use bench_dragon::motion::timeline::Timeline;
@@ -18,7 +17,8 @@ use bench_dragon::solve::paper::{Paper, PaperRules};
 use bench_dragon::solve::table::{FollowerTable, Instructions};
 use bench_dragon::solve::{Chain, Solver, Velocities};
 use bench_dragon::transports::iceoryx2::{Offer, SharedMemoryPublisher};
-use bench_dragon::transports::stage;
+use bench_dragon::wire::FrameHeader;
+use bench_dragon::wire::convert::stage;
 use divan::Bencher;
 use divan::counter::ItemsCount;
 

@@ -18,8 +18,10 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use anstyle::AnsiColor;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::{Scene, SceneError};
+use bench_dragon::show::state::FrameState;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -113,6 +115,15 @@ impl Output {
     /// Writes what is left.
     pub fn finish(mut self) -> Result<(), CommandError> {
         Ok(self.writer.flush()?)
+    }
+}
+
+/// The colour of a state or level on the terminal.
+pub fn level_colour(state: FrameState) -> AnsiColor {
+    match state {
+        FrameState::Moving => AnsiColor::Green,
+        FrameState::Approaching => AnsiColor::Yellow,
+        FrameState::Contact | FrameState::Stall | FrameState::Lock | FrameState::PathEnd => AnsiColor::Red,
     }
 }
 

@@ -2,18 +2,18 @@
 //!
 //! Data flows one way, and each module uses only those above it in this list:
 //!
-//! - [`messages`]: the memory layouts that go over the wire.
 //! - [`model`]: curves and the path made of them, the board, the separation of two boards. Pure functions.
 //! - [`linkage`]: links on a path: the follower and how a link lies.
 //! - [`solve`]: from the head's travel to the state of every handle; several solvers behind one interface.
 //! - [`motion`]: a team on a path: its solver, its events, its clearance.
 //! - [`scene`]: the file a user writes, checked and turned into the types above.
 //! - [`show`]: from a scene and a tick to one frame, deterministic.
+//! - [`wire`]: the memory layouts that go over the wire, and every conversion to them.
 //! - [`plan`]: the least pitch and the greatest speed, for a choreographer.
 //! - [`live`]: the fixed-rate loop, its clock, its statistics.
 //! - [`transports`]: iceoryx2 shared memory and ROS 2 topics, as publishers of the loop.
 //! - [`trade`]: accuracy against cost, measured for every solver on a scene and this machine.
-//! - [`subscribers`]: the terminal monitor and the stage picture; they know the messages only.
+//! - [`subscribers`]: the terminal monitor and the stage picture; they know the wire only.
 
 #![deny(missing_docs)]
 
@@ -22,7 +22,6 @@ compile_error!("choose one ROS 2 distribution: `--no-default-features --features
 
 pub mod linkage;
 pub mod live;
-pub mod messages;
 pub mod model;
 pub mod motion;
 pub mod plan;
@@ -32,3 +31,4 @@ pub mod solve;
 pub mod subscribers;
 pub mod trade;
 pub mod transports;
+pub mod wire;

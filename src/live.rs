@@ -9,11 +9,12 @@ pub mod statistics;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::messages::{FrameHeader, LoopStatus};
 use crate::show::{Frame, Show};
+use crate::wire::convert::{Stamps, collision_alert, frame_header};
+use crate::wire::{CollisionAlert, FrameHeader, LoopStatus};
 
 use clock::{Deadlines, monotonic_ns, realtime_ns, sleep_until};
-use statistics::{Announcement, Sample};
+use statistics::Sample;
 
 /// Nanoseconds between two calls of [`Publisher::maintain`].
 const MAINTENANCE_NS: u64 = 100_000_000;
@@ -66,8 +67,6 @@ pub struct LoopOptions {
     pub run_id: u64,
     /// Frames per second.
     pub rate: f64,
-    /// Simulated seconds per second, for the headers.
-    pub time_scale: f64,
     /// The number of periods after which the loop ends; `None` to go on until it is told to stop.
     pub periods: Option<u64>,
 }
@@ -112,7 +111,7 @@ pub struct Reports {
     /// One sample a frame.
     pub samples: rtrb::Producer<Sample>,
     /// Every alert.
-    pub announcements: rtrb::Producer<Announcement>,
+    pub alerts: rtrb::Producer<CollisionAlert>,
 }
 
 /// Publishes a frame a period until `stop` is set or the periods are over.
@@ -151,7 +150,13 @@ pub fn run_loop(
             return Ok(counts);
         }
         let frame = frames.frame(tick);
-        let header = header(&options, &counts, &deadlines, frame);
+        let stamps = Stamps {
+            run_id: options.run_id,
+            sequence: counts.frames,
+            stamp_ns: realtime_ns(),
+            deadline_ns: deadlines.of(tick),
+        };
+        let header = frame_header(frame, stamps);
         for publisher in publishers.iter_mut() {
             if let Err(error) = publisher.publish(&header, frame) {
                 counts.end = End::Error;
@@ -159,7 +164,7 @@ pub fn run_loop(
             }
         }
         counts.frames += 1;
-        report(&mut reports, frame, &counts, lateness_ns, woke_ns, publishers);
+        report(&mut reports, &header, frame, &counts, lateness_ns, woke_ns, publishers);
         tick += 1;
     }
 }
@@ -183,26 +188,11 @@ fn wait(deadline_ns: u64, stop: &AtomicBool, publishers: &mut [Box<dyn Publisher
     }
 }
 
-fn header(options: &LoopOptions, counts: &Counts, deadlines: &Deadlines, frame: &Frame) -> FrameHeader {
-    FrameHeader {
-        run_id: options.run_id,
-        sequence: counts.frames,
-        tick: frame.tick,
-        stamp_ns: realtime_ns(),
-        sent_ns: 0,
-        deadline_ns: deadlines.of(frame.tick),
-        sim_time: frame.sim_time,
-        time_scale: options.time_scale,
-        min_clearance: frame.min_clearance,
-        handles: frame.chain.handles() as u32,
-        state: frame.state as u32,
-    }
-}
-
 /// Hands the statistics thread what it counts. Where that thread is behind by the whole queue, the sample is lost and
 /// the thread sees so by its sequence.
 fn report(
     reports: &mut Reports,
+    header: &FrameHeader,
     frame: &Frame,
     counts: &Counts,
     lateness_ns: u64,
@@ -210,9 +200,8 @@ fn report(
     publishers: &[Box<dyn Publisher>],
 ) {
     for alert in &frame.alerts {
-        let announcement = Announcement { sim_time: frame.sim_time, alert: *alert };
         // A full queue loses the line on the terminal, never the alert that was published.
-        let _ = reports.announcements.push(announcement);
+        let _ = reports.alerts.push(collision_alert(header, alert));
     }
     let sample = Sample {
         tick: frame.tick,

@@ -4,9 +4,9 @@
 //! commands call it.
 
 pub mod alerts;
+pub mod state;
 
 use crate::linkage::NoFollower;
-use crate::messages::State;
 use crate::motion::clearance::{ClearanceMonitor, PairClearance};
 use crate::motion::event::{Event, EventKind};
 use crate::motion::timeline::{TimedEvent, Timeline};
@@ -14,7 +14,8 @@ use crate::motion::{Choice, Method};
 use crate::scene::{AtEnd, OnContact, Scene};
 use crate::solve::{Chain, Solver, Velocities};
 
-use alerts::{Alert, AlertLevel};
+use alerts::{Alert, LevelTracker};
+use state::{FrameState, PlaybackState};
 
 /// One moment of the show.
 #[derive(Debug, Clone)]
@@ -23,8 +24,12 @@ pub struct Frame {
     pub tick: u64,
     /// Simulated seconds since the start of the scene.
     pub sim_time: f64,
+    /// Simulated seconds per second of wall time, as in force; unchanged once the show has ended.
+    pub time_scale: f64,
     /// The latest event passed, or `Approaching`, or `Moving`.
-    pub state: State,
+    pub state: FrameState,
+    /// `Ended` once the show has frozen, else `Playing`.
+    pub playback: PlaybackState,
     /// Where every handle is.
     pub chain: Chain,
     /// Metres between the nearest two boards that share no handle; NaN where none is computed.
@@ -101,7 +106,7 @@ pub struct Show {
     freeze_time: f64,
     ticks_per_show: u64,
     clearance: Option<ClearanceMonitor>,
-    level: Option<AlertLevel>,
+    level: Option<LevelTracker>,
     /// Metres of overlap that no search has let pass; `None` where the solver does not follow the searched motion.
     overlap_tolerance: Option<f64>,
     solved_time: Option<f64>,
@@ -129,13 +134,15 @@ impl Show {
         let stops = scene.alerts.is_some() && playback.on_contact == OnContact::Stop;
         let freeze_time = timeline.freeze(stops).time;
         let clearance = scene.alerts.map(|_| scene.motion.clearance_monitor());
-        let level = scene.alerts.map(|rules| AlertLevel::new(rules, playback.rate));
+        let level = scene.alerts.map(|rules| LevelTracker::new(rules, playback.rate));
         let Choice { solver, reason } = scene.motion.solver(scene.velocities);
         let exact = !matches!(scene.motion.method(), Method::Paper(_));
         let frame = Frame {
             tick: 0,
             sim_time: playback.start,
-            state: State::Moving,
+            time_scale: playback.time_scale,
+            state: FrameState::Moving,
+            playback: PlaybackState::Playing,
             chain: Chain::new(scene.team().handles()),
             min_clearance: f64::NAN,
             alerts: Vec::with_capacity(alerts::MOST_PER_FRAME),
@@ -194,6 +201,8 @@ impl Show {
         self.frame.tick = tick;
         self.frame.shows_played = shows_played;
         self.frame.sim_time = sim_time;
+        let ended = sim_time >= self.freeze_time;
+        self.frame.playback = if ended { PlaybackState::Ended } else { PlaybackState::Playing };
         self.solve(sim_time);
         let closest = self.measure_clearance();
         self.record_unforeseen_contact(closest);
@@ -210,7 +219,7 @@ impl Show {
         if solve_at_or_just_before(self.solver.as_mut(), sim_time, &mut self.frame.chain).is_err() {
             self.frame.unsolved_frames += 1;
         }
-        if sim_time >= self.freeze_time && self.velocities == Velocities::Computed {
+        if self.frame.playback == PlaybackState::Ended && self.velocities == Velocities::Computed {
             let Chain { speed, vx, vy, .. } = &mut self.frame.chain;
             [speed, vx, vy].into_iter().for_each(|numbers| numbers.fill(0.0));
         }
@@ -246,25 +255,15 @@ impl Show {
         let frame = &mut self.frame;
         frame.alerts.clear();
         let passed = self.timeline.latest_passed(frame.sim_time);
-        frame.state = passed.map_or(State::Moving, |passed| state_of(passed.event.kind));
+        frame.state = passed.map_or(FrameState::Moving, |passed| passed.event.kind.into());
         let Some(level) = &mut self.level else { return };
         if restarted {
             level.restart();
         }
         level.update(tick_of_show, frame.sim_time, &self.timeline, closest, &mut frame.alerts);
         if passed.is_none() {
-            frame.state = level.current();
+            frame.state = level.current().into();
         }
-    }
-}
-
-/// The state in which an event leaves the show.
-pub fn state_of(kind: EventKind) -> State {
-    match kind {
-        EventKind::Contact => State::Contact,
-        EventKind::Stall => State::Stall,
-        EventKind::Lock => State::Lock,
-        EventKind::PathEnd => State::PathEnd,
     }
 }
 

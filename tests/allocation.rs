@@ -10,12 +10,12 @@ use std::sync::atomic::AtomicBool;
 
 use bench_dragon::live::statistics::queues;
 use bench_dragon::live::{Frames, LoopOptions, Publisher, run_loop};
-use bench_dragon::messages::State;
 use bench_dragon::scene::{AtEnd, Scene};
+use bench_dragon::show::state::FrameState;
 use bench_dragon::show::{Frame, Playback, Show};
 use bench_dragon::subscribers::connection::Subscription;
 use bench_dragon::transports::iceoryx2::{Offer, SharedMemoryPublisher};
-use bench_dragon::transports::stage;
+use bench_dragon::wire::convert::stage;
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
@@ -109,7 +109,7 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     let subscription = Subscription::new(&name).unwrap();
     let connection = subscription.connect().unwrap().unwrap();
     let (reports, _inbox) = queues();
-    let options = LoopOptions { run_id: 1, rate: 500.0, time_scale: 20.0, periods: Some(1000) };
+    let options = LoopOptions { run_id: 1, rate: 500.0, periods: Some(1000) };
     let mut watched = Watched { show, before: None, loans: 0, states: [0; 6], shows_played: 0 };
     let counts = run_loop(&mut watched, &mut publishers, options, reports, &AtomicBool::new(false)).unwrap();
     let during = allocations() - watched.before.unwrap();
@@ -118,7 +118,7 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     assert!(ros2_thread.end().frames > 100);
     // Without these the test would prove nothing about alerts, contacts and loops.
     assert!(counts.frames > 500, "{counts:?}");
-    assert!(watched.states[State::Approaching as usize] > 0 && watched.states[State::Contact as usize] > 0);
+    assert!(watched.states[FrameState::Approaching as usize] > 0 && watched.states[FrameState::Contact as usize] > 0);
     assert!(watched.shows_played >= 2, "{}", watched.shows_played);
     assert!(connection.frames(|header, handles| assert_eq!(header.handles as usize, handles.len())) > 0);
 }

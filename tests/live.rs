@@ -6,6 +6,10 @@ mod processes;
 
 use serde_json::Value;
 
+use bench_dragon::transports::iceoryx2::{node, service_name};
+use bench_dragon::wire::HandlePose;
+use iceoryx2::prelude::ZeroCopySend;
+use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use processes::{Place, Process, example, json_lines, program, python, scene_file, summary, text, unique, wait};
 
 #[test]
@@ -105,7 +109,11 @@ fn a_late_subscriber_gets_the_contact_that_has_happened() {
     let alerts: Vec<_> = lines.iter().filter(|line| line["type"] == "alert").collect();
     assert_eq!(alerts.len(), 1, "{alerts:?}");
     assert_eq!(alerts[0]["level"], "contact");
-    assert_eq!((alerts[0]["bench_a"].as_u64(), alerts[0]["bench_b"].as_u64()), (Some(0), Some(8)));
+    assert_eq!(
+        (&alerts[0]["event"], &alerts[0]["event_bench_a"], &alerts[0]["event_bench_b"]),
+        (&"contact".into(), &0.into(), &8.into())
+    );
+    assert!(alerts[0]["run_id"].as_str().unwrap().parse::<u64>().is_ok(), "a number that JavaScript would round");
     assert!((alerts[0]["event_time"].as_f64().unwrap() - 412.473837682115).abs() < 1e-10);
     let second = lines.iter().rfind(|line| line["type"] == "second").unwrap();
     assert_eq!(second["sim_time"], alerts[0]["event_time"], "the show is frozen at the contact");
@@ -148,8 +156,88 @@ fn signals_end_a_run_cleanly_and_leave_nothing_behind() {
 }
 
 #[test]
+fn python_reads_a_frame_and_an_alert_by_the_design_alone() {
+    let publisher = Process::start(program("design").args([
+        "run",
+        "--json",
+        "--start",
+        "405",
+        "--time-scale",
+        "0.1",
+        "--duration",
+        "60",
+    ]));
+    let arguments = ["tests/python/by_design.py", "--name", &unique("design")];
+    let output = Process::start(python().args(arguments)).output_within(60);
+    publisher.signal(nix::sys::signal::Signal::SIGINT);
+    let lines = json_lines(&output);
+    let of = |kind: &str| lines.iter().find(|line| line["type"] == kind).unwrap_or_else(|| panic!("{output:?}"));
+    let (frame, alert) = (&of("frame")["fields"], &of("alert")["fields"]);
+    // run_id, sequence, tick, stamp_ns, sent_ns, deadline_ns; sim_time, time_scale, min_clearance; handles, state,
+    // playback, cue, epoch, reserved.
+    let tick = frame[2].as_f64().unwrap();
+    assert_eq!(frame[6].as_f64(), Some(405.0 + 0.1 * tick / 60.0));
+    assert_eq!(frame[7], 0.1);
+    assert!((0.0..0.1).contains(&frame[8].as_f64().unwrap()), "{frame}");
+    assert_eq!(frame.as_array().unwrap()[9..], [224, 1, 0, 0, 0, 0].map(Value::from));
+    let handles = of("frame")["handles"].as_array().unwrap();
+    let distance = |axis: usize| handles[1][axis].as_f64().unwrap() - handles[0][axis].as_f64().unwrap();
+    assert!((distance(0).hypot(distance(1)) - 2.86).abs() < 1e-12);
+    // run_id, tick, stamp_ns; sim_time, event_time, time_to_event, clearance, x, y, event_x, event_y; level, bench_a,
+    // bench_b, event, event_bench_a, event_bench_b.
+    assert_eq!(alert[0], frame[0]);
+    let number = |at: usize| alert[at].as_f64().unwrap();
+    assert!((number(4) - 412.473837682115).abs() < 1e-10 && number(5) == number(4) - number(3), "{alert}");
+    assert!((0.0..0.1).contains(&number(6)) && (7..11).all(|at| number(at).abs() < 9.0), "{alert}");
+    assert_eq!((&alert[11], &alert[14]), (&1.into(), &2.into()));
+    assert_eq!((&alert[15], &alert[16]), (&0.into(), &8.into()));
+    assert_eq!(alert[12], 0, "the head is one of the nearest two");
+}
+
+/// The header of layout 1, as a program of an earlier version has it.
+#[derive(Debug, Default, Clone, Copy, ZeroCopySend)]
+#[type_name("bench_dragon/FrameHeader/1")]
+#[repr(C)]
+struct OldHeader {
+    stamps: [u64; 6],
+    numbers: [f64; 3],
+    handles: u32,
+    state: u32,
+}
+
+#[test]
+fn another_layout_is_refused_with_a_sentence() {
+    let (name, node) = (unique("layouts"), node().unwrap());
+    let service = service_name(&name, "poses").unwrap();
+    let old = || node.service_builder(&service).publish_subscribe::<[HandlePose]>().user_header::<OldHeader>();
+    let arguments = ["examples/python/subscribe.py", "--seconds", "20", "--name", &name];
+
+    // A publisher of layout 1, and readers and a publisher of today.
+    let kept = old().create().unwrap();
+    for refused in [&["watch", "--duration", "10"][..], &["run", "--duration", "10"]] {
+        let output = Process::start(program("layouts").args(refused)).output_within(60);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{refused:?}: {said}");
+        assert!(said.contains("another layout of its messages") && said.contains("version"), "{refused:?}: {said}");
+    }
+    let output = Process::start(python().args(arguments)).output_within(30);
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("another layout than bench_dragon_messages.py"), "{said}");
+    drop(kept);
+
+    // A publisher of today, and a reader of layout 1.
+    let _publisher = Process::start(program("layouts").args(["run", "--json", "--start", "300", "--duration", "60"]));
+    let refused = (0..600).map(|_| old().open().err()).find(|error| {
+        wait(0.1);
+        *error != Some(PublishSubscribeOpenError::DoesNotExist)
+    });
+    assert_eq!(refused, Some(Some(PublishSubscribeOpenError::IncompatibleTypes)));
+}
+
+#[test]
 fn python_sees_the_same_layouts() {
-    use bench_dragon::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
+    use bench_dragon::wire::{CollisionAlert, FrameHeader, LoopStatus, Stage};
     use std::mem::offset_of;
     let code = "import sys; sys.path.insert(0, 'examples/python')\n\
                 from bench_dragon_messages import *\n\
@@ -167,16 +255,18 @@ fn python_sees_the_same_layouts() {
     }
     let expected = [
         layout!(HandlePose 1: x y heading vx vy),
-        layout!(FrameHeader 1: run_id sequence tick stamp_ns sent_ns deadline_ns sim_time time_scale min_clearance handles state),
-        layout!(CollisionAlert 1: run_id tick stamp_ns sim_time event_time time_to_event clearance x y level bench_a bench_b reserved),
+        layout!(FrameHeader 2: run_id sequence tick stamp_ns sent_ns deadline_ns sim_time time_scale min_clearance handles state
+            playback cue epoch reserved),
+        layout!(CollisionAlert 2: run_id tick stamp_ns sim_time event_time time_to_event clearance x y event_x event_y level
+            bench_a bench_b event event_bench_a event_bench_b),
         layout!(LoopStatus 2: run_id tick sequence stamp_ns sim_time rate measured_rate overruns skipped shows_played
             unforeseen_contacts unsolved_frames
             lateness_p50_second lateness_p99_second lateness_max_second lateness_p50_total lateness_p99_total
             lateness_p999_total lateness_max_total step_p50_second step_p99_second step_max_second step_p50_total
             step_p99_total step_p999_total step_max_total resident_bytes subscribers file_descriptors scene),
-        layout!(Stage 2: run_id stamp_ns pitch start_turn hole_inset head_length body_length width benches pieces path),
+        layout!(Stage 3: run_id stamp_ns pitch start_turn hole_inset head_length body_length width benches segments path),
         "40".to_owned(),
     ];
     assert_eq!(said.lines().collect::<Vec<_>>(), expected, "{}", text(&output.stderr));
-    assert_eq!([size_of::<HandlePose>(), size_of::<FrameHeader>(), size_of::<CollisionAlert>()], [40, 80, 88]);
+    assert_eq!([size_of::<HandlePose>(), size_of::<FrameHeader>(), size_of::<CollisionAlert>()], [40, 96, 112]);
 }

@@ -3,11 +3,12 @@
 
 use std::collections::BTreeMap;
 
-use bench_dragon::messages::{
-    CollisionAlert, FrameHeader, HandlePose, LoopStatus, NO_BENCH, PIECE_ARC, PIECE_INWARD_SPIRAL, PIECE_LINE,
-    PIECE_OUTWARD_SPIRAL, Stage, StagePiece, State,
-};
+use bench_dragon::show::state::{FrameState, Level, PlaybackState};
 use bench_dragon::transports::ros2::messages::{HandlePoses, Header, Stamped, type_name};
+use bench_dragon::wire::{
+    CollisionAlert, FrameHeader, HandlePose, LoopStatus, NO_BENCH, SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE,
+    SEGMENT_OUTWARD_SPIRAL, Stage, StageSegment,
+};
 use serde::Serialize;
 use serde_reflection::{ContainerFormat, Format, Registry, Samples, Tracer, TracerConfig};
 
@@ -80,7 +81,7 @@ fn fields_types_and_order_are_those_of_the_interface_files() {
         ("CollisionAlert", on_the_wire(&Stamped::alert(CollisionAlert::default()))),
         ("LoopStatus", on_the_wire(&Stamped::status(LoopStatus::default()))),
         ("Stage", on_the_wire(&Stamped::stage(Stage::default()))),
-        ("StagePiece", on_the_wire(&StagePiece::default())),
+        ("StageSegment", on_the_wire(&StageSegment::default())),
     ] {
         assert_eq!(interface(name).fields, wire, "{name}");
     }
@@ -106,24 +107,28 @@ fn type_names_are_those_that_ros_2_gives_the_interface_files() {
 }
 
 #[test]
-fn constants_are_the_states_and_levels() {
-    let constants = |prefix: &str, states: &[State], name: fn(State) -> &'static str| -> BTreeMap<String, u32> {
-        states.iter().map(|state| (format!("{prefix}{}", name(*state).to_uppercase()), *state as u32)).collect()
+fn constants_are_the_states_levels_and_playback() {
+    fn constants<const N: usize>(prefix: &str, of: [(&str, u32); N]) -> BTreeMap<String, u32> {
+        of.into_iter().map(|(name, number)| (format!("{prefix}{}", name.to_uppercase()), number)).collect()
+    }
+    let states = constants("STATE_", FrameState::ALL.map(|state| (state.name(), state as u32)));
+    let levels = constants("LEVEL_", Level::ALL.map(|level| (level.name(), level as u32)));
+    let events = FrameState::ALL.map(|state| state.event().map(|event| (event.name(), state as u32)));
+    let events = constants("EVENT_", [("none", 0), events[2].unwrap(), events[3].unwrap(), events[4].unwrap()]);
+    let playback = constants("PLAYBACK_", PlaybackState::ALL.map(|playback| (playback.name(), playback as u32)));
+    let no_bench = BTreeMap::from([("NO_BENCH".to_owned(), NO_BENCH)]);
+    let joined = |parts: &[&BTreeMap<String, u32>]| -> BTreeMap<String, u32> {
+        parts.iter().flat_map(|part| part.iter().map(|(name, number)| (name.clone(), *number))).collect()
     };
-    let states = [State::Moving, State::Approaching, State::Contact, State::Stall, State::Lock, State::PathEnd];
-    assert_eq!(interface("HandlePoses").constants, constants("STATE_", &states, State::name));
-    let mut levels = constants("LEVEL_", &states[..5], State::level_name);
-    levels.insert("NO_BENCH".to_owned(), NO_BENCH);
-    assert_eq!(interface("CollisionAlert").constants, levels);
-    let pieces = [
-        ("LINE", PIECE_LINE),
-        ("ARC", PIECE_ARC),
-        ("INWARD_SPIRAL", PIECE_INWARD_SPIRAL),
-        ("OUTWARD_SPIRAL", PIECE_OUTWARD_SPIRAL),
+    assert_eq!(interface("HandlePoses").constants, joined(&[&states, &playback]));
+    assert_eq!(interface("CollisionAlert").constants, joined(&[&levels, &events, &no_bench]));
+    let segments = [
+        ("LINE", SEGMENT_LINE),
+        ("ARC", SEGMENT_ARC),
+        ("INWARD_SPIRAL", SEGMENT_INWARD_SPIRAL),
+        ("OUTWARD_SPIRAL", SEGMENT_OUTWARD_SPIRAL),
     ];
-    let pieces = pieces.map(|(name, kind)| (name.to_owned(), kind));
-    assert_eq!(interface("StagePiece").constants, BTreeMap::from(pieces));
-    assert_eq!(State::from_wire(states.len() as u32), None, "a state that the interface files do not know");
+    assert_eq!(interface("StageSegment").constants, constants("", segments));
 }
 
 #[test]

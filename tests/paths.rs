@@ -2,7 +2,6 @@
 //! subscriber relies on at the junctions.
 
 use bench_dragon::linkage::follower;
-use bench_dragon::messages::State;
 use bench_dragon::model::path::Path;
 use bench_dragon::model::team::Team;
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
@@ -10,6 +9,7 @@ use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::plan::{greatest_speed, least_pitch};
 use bench_dragon::scene::Scene;
+use bench_dragon::show::state::FrameState;
 use bench_dragon::show::{Playback, Show};
 use bench_dragon::solve::newton::Newton;
 use bench_dragon::solve::{Chain, Velocities};
@@ -96,7 +96,7 @@ fn nothing_jumps_at_the_junctions_and_no_alert_flickers() {
     for tick in 0..20_000 {
         let frame = show.frame(tick);
         alerts += frame.alerts.len();
-        assert_eq!(frame.state, State::Moving);
+        assert_eq!(frame.state, FrameState::Moving);
         if let Some(before) = &before {
             for i in 0..frame.chain.handles() {
                 let moved = (frame.chain.x[i] - before.x[i], frame.chain.y[i] - before.y[i]);

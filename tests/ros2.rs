@@ -97,20 +97,22 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_what_msgs_sa
     let times: Vec<f64> = alerts.iter().map(|alert| alert["sim_time"].as_f64().unwrap()).collect();
     assert!(times.len() <= 12 && times.is_sorted(), "{times:?}");
     let alert = alerts.last().unwrap();
-    assert_eq!((&alert["level"], &alert["bench_a"], &alert["bench_b"]), (&2.into(), &0.into(), &8.into()));
+    assert_eq!((&alert["level"], &alert["event"]), (&2.into(), &2.into()));
+    assert_eq!((&alert["event_bench_a"], &alert["event_bench_b"]), (&0.into(), &8.into()));
     assert!((alert["event_time"].as_f64().unwrap() - 412.473837682115).abs() < 1e-9);
 
     let stages = messages(&lines, topics[1]);
     assert_eq!(stages.len(), 1);
     assert_eq!(stages[0]["pitch"], 0.55);
     assert_eq!(stages[0]["benches"], 223);
-    assert_eq!(stages[0]["pieces"], 1);
+    assert_eq!(stages[0]["segments"], 1);
     assert_eq!(stages[0]["path"][0]["kind"], 2);
     assert_eq!(stages[0]["header"]["frame_id"], "stage");
 
     let handles = messages(&lines, "handles");
     let frame = handles.last().unwrap();
     assert_eq!((&frame["handles"], &frame["count"], &frame["state"]), (&224.into(), &224.into(), &2.into()));
+    assert_eq!((&frame["playback"], &frame["epoch"], &frame["cue"]), (&3.into(), &0.into(), &0.into()));
     let [sec, nanosec] = ["sec", "nanosec"].map(|part| frame["header"]["stamp"][part].as_u64().unwrap());
     assert_eq!(frame["stamp_ns"].as_u64(), Some(sec * 1_000_000_000 + nanosec));
     let handle = |index: usize| ["x", "y"].map(|coordinate| frame["poses"][index][coordinate].as_f64().unwrap());
@@ -132,7 +134,7 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_what_msgs_sa
     assert!((direction.1 - (head[1] - second[1]) / 2.86).abs() < 1e-9, "{direction:?}");
     let contact = &markers[223];
     assert_eq!((&contact["ns"], &contact["type"], &contact["action"]), (&"contact".into(), &2.into(), &0.into()));
-    assert_eq!(contact["pose"]["position"]["x"], alert["x"]);
+    assert_eq!(contact["pose"]["position"]["x"], alert["event_x"]);
 
     // Every publisher's diagnostics are on one topic.
     let diagnostics = messages(&lines, "diagnostics");

@@ -3,9 +3,10 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-use bench_dragon::messages::State;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::{AtEnd, OnContact, Scene};
+use bench_dragon::show::alerts::Alert;
+use bench_dragon::show::state::{FrameState, Level, PlaybackState};
 use bench_dragon::show::{Frame, Playback, Show};
 use proptest::prelude::*;
 
@@ -54,10 +55,11 @@ fn time_does_not_drift_in_a_billion_ticks() {
 fn the_show_freezes_exactly_at_the_contact() {
     let mut show = show(Playback { start: 412.0, ..playback() });
     let moving = show.frame(28).clone();
-    assert_eq!(moving.state, State::Approaching);
+    assert_eq!((moving.playback, moving.time_scale), (PlaybackState::Playing, 1.0));
+    assert_eq!(moving.state, FrameState::Approaching);
     for tick in [29, 30, 1_000_000] {
         let frame = show.frame(tick);
-        assert_eq!(frame.state, State::Contact);
+        assert_eq!((frame.state, frame.playback, frame.time_scale), (FrameState::Contact, PlaybackState::Ended, 1.0));
         assert!((frame.sim_time - 412.473837682115).abs() < 1e-10);
         assert!(frame.min_clearance.abs() < 1e-9, "{}", frame.min_clearance);
         assert!(frame.chain.vx.iter().chain(&frame.chain.vy).all(|velocity| *velocity == 0.0));
@@ -68,22 +70,22 @@ fn the_show_freezes_exactly_at_the_contact() {
 fn a_loop_begins_again_where_it_began() {
     let mut show = show(Playback { start: 412.0, at_end: AtEnd::Loop, ..playback() });
     let first = show.frame(0).clone();
-    assert_eq!(show.frame(29).state, State::Contact);
+    assert_eq!(show.frame(29).state, FrameState::Contact);
     let again = show.frame(30);
     assert_eq!((again.sim_time, again.shows_played), (412.0, 1));
     assert_eq!(again.chain, first.chain);
-    assert_eq!(again.state, State::Approaching);
+    assert_eq!((again.state, again.playback), (FrameState::Approaching, PlaybackState::Playing));
 }
 
 #[test]
 fn a_start_after_the_contact_is_in_contact_at_once() {
     let mut stopped = show(Playback { start: 420.0, ..playback() });
-    assert_eq!(stopped.frame(0).state, State::Contact);
+    assert_eq!(stopped.frame(0).state, FrameState::Contact);
     assert!((stopped.frame(1).sim_time - 412.473837682115).abs() < 1e-10);
     let mut going_on = show(Playback { start: 420.0, on_contact: OnContact::Continue, ..playback() });
     let frame = going_on.frame(0);
-    assert_eq!((frame.state, frame.sim_time), (State::Contact, 420.0));
-    assert_eq!(frame.alerts.iter().map(|alert| alert.level).collect::<Vec<_>>(), [State::Contact]);
+    assert_eq!((frame.state, frame.sim_time), (FrameState::Contact, 420.0));
+    assert_eq!(frame.alerts.iter().map(|alert| alert.level).collect::<Vec<_>>(), [Level::Contact]);
 }
 
 #[test]
@@ -95,7 +97,7 @@ fn without_alerts_and_velocities_neither_is_computed() {
     for tick in 0..100 {
         let frame = show.frame(tick);
         assert!(frame.min_clearance.is_nan() && frame.alerts.is_empty());
-        assert_eq!(frame.state, State::Moving);
+        assert_eq!(frame.state, FrameState::Moving);
         let chain = &frame.chain;
         assert!(chain.vx.iter().chain(&chain.vy).chain(&chain.speed).all(|velocity| velocity.is_nan()));
     }
@@ -111,7 +113,7 @@ fn a_tick_past_the_lock_freezes_the_show_at_it() {
         assert_eq!(show.frame(0).sim_time, 0.0);
         for tick in [1, 2, 10_000_000_000] {
             let frame = show.frame(tick);
-            assert_eq!((frame.sim_time, frame.state), (lock, State::Lock));
+            assert_eq!((frame.sim_time, frame.state), (lock, FrameState::Lock));
             assert!(frame.chain.vx.iter().chain(&frame.chain.speed).all(|speed| *speed == 0.0));
             assert!(frame.chain.x.iter().chain(&frame.chain.heading).all(|number| number.is_finite()));
         }
@@ -128,18 +130,21 @@ fn boards_that_overlap_unforeseen_are_a_contact_at_once() {
     let mut alerts = Vec::new();
     for tick in 0..600 {
         let frame = show.frame(tick);
-        alerts.extend(frame.alerts.iter().copied().filter(|alert| alert.level == State::Contact));
+        alerts.extend(frame.alerts.iter().copied().filter(|alert| alert.level == Level::Contact));
         let overlapping = frame.sim_time > 412.473837682115;
-        assert_eq!((frame.state == State::Contact, frame.unforeseen_contacts), (overlapping, u64::from(overlapping)));
+        assert_eq!(
+            (frame.state == FrameState::Contact, frame.unforeseen_contacts),
+            (overlapping, u64::from(overlapping))
+        );
         assert_eq!(frame.unsolved_frames, 0);
     }
-    let [alert] = alerts[..] else { panic!("{alerts:?}") };
-    assert_eq!((alert.bench_a, alert.bench_b), (Some(0), Some(8)));
-    assert!((alert.event_time - 412.474).abs() < 1e-9, "{alert:?}");
+    let [Alert { event: Some(contact), .. }] = alerts[..] else { panic!("{alerts:?}") };
+    assert_eq!((contact.event.bench_a, contact.event.bench_b), (Some(0), Some(8)));
+    assert!((contact.time - 412.474).abs() < 1e-9, "{contact:?}");
 }
 
 /// The levels announced over a whole show, repeats left out, and the times of the events as announced.
-fn levels(rate: f64, time_scale: f64, start: f64, on_contact: OnContact) -> (Vec<State>, Vec<(State, f64)>) {
+fn levels(rate: f64, time_scale: f64, start: f64, on_contact: OnContact) -> (Vec<Level>, Vec<(Level, f64)>) {
     let mut show = show(Playback { rate, time_scale, start, on_contact, at_end: AtEnd::Hold });
     let ticks = ((show.freeze_time() - start) * rate / time_scale).ceil() as u64 + 2;
     let (mut levels, mut events) = (Vec::new(), Vec::new());
@@ -148,8 +153,8 @@ fn levels(rate: f64, time_scale: f64, start: f64, on_contact: OnContact) -> (Vec
             if levels.last() != Some(&alert.level) {
                 levels.push(alert.level);
             }
-            if alert.level >= State::Contact {
-                events.push((alert.level, alert.event_time));
+            if alert.level >= Level::Contact {
+                events.push((alert.level, alert.event.unwrap().time));
             }
         }
     }
@@ -158,9 +163,9 @@ fn levels(rate: f64, time_scale: f64, start: f64, on_contact: OnContact) -> (Vec
 
 #[test]
 fn the_paper_scene_never_flickers() {
-    use State::{Approaching, Contact, Lock, Moving, Stall};
-    assert_eq!(levels(60.0, 1.0, 0.0, OnContact::Stop).0, [Moving, Approaching, Contact]);
-    assert_eq!(levels(60.0, 1.0, 0.0, OnContact::Continue).0, [Moving, Approaching, Contact, Stall, Lock]);
+    use Level::{Approaching, Clear, Contact, Lock, Stall};
+    assert_eq!(levels(60.0, 1.0, 0.0, OnContact::Stop).0, [Clear, Approaching, Contact]);
+    assert_eq!(levels(60.0, 1.0, 0.0, OnContact::Continue).0, [Clear, Approaching, Contact, Stall, Lock]);
 }
 
 proptest! {
@@ -169,9 +174,9 @@ proptest! {
     /// What is announced depends neither on the rate nor on the time scale.
     #[test]
     fn events_do_not_depend_on_the_rate(exponent in -0.3f64..3.7, time_scale in 0.5f64..2.0) {
-        use State::{Approaching, Contact, Lock, Moving, Stall};
+        use Level::{Approaching, Clear, Contact, Lock, Stall};
         let (levels, events) = levels(10f64.powf(exponent), time_scale, 380.0, OnContact::Continue);
-        prop_assert_eq!(levels, [Moving, Approaching, Contact, Stall, Lock]);
+        prop_assert_eq!(levels, [Clear, Approaching, Contact, Stall, Lock]);
         for ((_, time), truth) in events.iter().zip([412.473837682115, 432.758134083656, 432.917924228383]) {
             prop_assert!((time - truth).abs() < 1e-10);
         }

@@ -7,8 +7,8 @@ mod processes;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use bench_dragon::messages::LoopStatus;
 use bench_dragon::subscribers::connection::Subscription;
+use bench_dragon::wire::LoopStatus;
 use nix::sys::signal::Signal::{SIGINT, SIGKILL};
 use nix::sys::signal::kill;
 use nix::unistd::Pid;
@@ -197,7 +197,7 @@ fn the_status_comes_once_a_second_and_adds_up() {
     // Six full seconds have passed and the last status is the end's.
     assert!((5..=8).contains(&statuses.len()), "{}", statuses.len());
     for status in &statuses {
-        assert_eq!((status.scene_name(), status.rate), ("paper", 50.0));
+        assert_eq!((status.scene.as_str(), status.rate), ("paper", 50.0));
         assert_eq!(status.sequence + 1 + status.skipped, status.tick + 1, "{status:?}");
         assert!(frames.contains(&(status.sequence, status.tick, status.run_id)), "{status:?}");
         assert_eq!(status.sim_time, 300.0 + status.tick as f64 / 50.0);

@@ -94,8 +94,8 @@ fn a_program_reads_the_documented_layout() {
     assert_eq!(stage["path"][0]["kind"], "inward_spiral");
     assert_eq!(stage["path"][0]["theta_first"], 32.0 * std::f64::consts::PI);
     let bytes = frame(&mut socket);
-    assert_eq!(bytes.len(), 64 + 16 * 224);
-    assert_eq!(bytes[..4], [1, 0, 0, 0], "version 1, moving");
+    assert_eq!(bytes.len(), 72 + 16 * 224);
+    assert_eq!(bytes[..4], [2, 0, 0, 0], "version 2, moving, playing");
     assert_eq!(bytes[4..8], 224_u32.to_le_bytes());
     assert!((f64_at(&bytes, 8) - 300.0).abs() < 1e-3);
     assert_eq!(f64_at(&bytes, 16), 1e-6);
@@ -103,10 +103,11 @@ fn a_program_reads_the_documented_layout() {
     assert!(u64_at(&bytes, 40) <= monotonic_ns());
     let clearance = f32_at(&bytes, 56);
     assert!((0.0..0.25).contains(&clearance), "{clearance} m");
+    assert_eq!(bytes[60..72], [0; 12], "the first show, no cue");
     let truth = truth_at_300();
     assert_eq!(truth.len(), 224);
     for (handle, [x, y, speed]) in truth.iter().enumerate() {
-        let told = [0, 4, 8, 12].map(|at| f32_at(&bytes, 64 + 16 * handle + at));
+        let told = [0, 4, 8, 12].map(|at| f32_at(&bytes, 72 + 16 * handle + at));
         assert!((told[0] - x).hypot(told[1] - y) < 2e-6, "handle {handle} is at {told:?}, not {x}, {y}");
         assert!((told[3] - speed).abs() < 1e-6, "handle {handle}: {told:?}, not {speed} m/s");
         let bench = handle.min(222);

@@ -11,6 +11,8 @@ import numpy as np
 NO_BENCH = 0xFFFFFFFF
 STATES = ("moving", "approaching", "contact", "stall", "lock", "path_end")
 LEVELS = ("clear", "approaching", "contact", "stall", "lock")
+EVENTS = {0: None, 2: "contact", 3: "stall", 4: "lock", 5: "path_end"}
+PLAYBACK = ("playing", "paused", "held", "ended")
 
 
 class _Message(ctypes.Structure):
@@ -26,22 +28,32 @@ class HandlePose(_Message):
 
 
 class FrameHeader(_Message):
+    """What is true of a whole frame: `STATES[state]`, `PLAYBACK[playback]`; epoch grows when simulated time jumps."""
+
+    LAYOUT = 2
     _fields_ = [
         (name, ctypes.c_uint64) for name in ("run_id", "sequence", "tick", "stamp_ns", "sent_ns", "deadline_ns")
     ] + [
         ("sim_time", ctypes.c_double),
         ("time_scale", ctypes.c_double),
         ("min_clearance", ctypes.c_double),
-        ("handles", ctypes.c_uint32),
-        ("state", ctypes.c_uint32),
-    ]
+    ] + [(name, ctypes.c_uint32) for name in ("handles", "state", "playback", "cue", "epoch", "reserved")]
 
 
 class CollisionAlert(_Message):
+    """The nearest two boards now, and the event the alert is about: `LEVELS[level]`, `EVENTS[event]`."""
+
+    LAYOUT = 2
     _fields_ = (
         [(name, ctypes.c_uint64) for name in ("run_id", "tick", "stamp_ns")]
-        + [(name, ctypes.c_double) for name in ("sim_time", "event_time", "time_to_event", "clearance", "x", "y")]
-        + [(name, ctypes.c_uint32) for name in ("level", "bench_a", "bench_b", "reserved")]
+        + [
+            (name, ctypes.c_double)
+            for name in ("sim_time", "event_time", "time_to_event", "clearance", "x", "y", "event_x", "event_y")
+        ]
+        + [
+            (name, ctypes.c_uint32)
+            for name in ("level", "bench_a", "bench_b", "event", "event_bench_a", "event_bench_b")
+        ]
     )
 
 
@@ -79,11 +91,11 @@ class LoopStatus(_Message):
     )
 
 
-PIECES = ("line", "arc", "inward_spiral", "outward_spiral")
+SEGMENTS = ("line", "arc", "inward_spiral", "outward_spiral")
 
 
-class StagePiece(ctypes.Structure):
-    """One piece of the path; `PIECES[kind]` says which curve it is."""
+class StageSegment(ctypes.Structure):
+    """One segment of the path; `SEGMENTS[kind]` says which curve it is."""
 
     _fields_ = [
         (name, ctypes.c_double)
@@ -92,16 +104,16 @@ class StagePiece(ctypes.Structure):
 
 
 class Stage(_Message):
-    """The team's measures and the path: `path[:pieces]`."""
+    """The team's measures and the path: `path[:segments]`."""
 
-    LAYOUT = 2
+    LAYOUT = 3
     _fields_ = (
         [("run_id", ctypes.c_uint64), ("stamp_ns", ctypes.c_uint64)]
         + [
             (name, ctypes.c_double)
             for name in ("pitch", "start_turn", "hole_inset", "head_length", "body_length", "width")
         ]
-        + [("benches", ctypes.c_uint32), ("pieces", ctypes.c_uint32), ("path", StagePiece * 32)]
+        + [("benches", ctypes.c_uint32), ("segments", ctypes.c_uint32), ("path", StageSegment * 32)]
     )
 
 

@@ -25,6 +25,18 @@ LEVELS = {
 }
 
 
+EVENTS = {
+    CollisionAlert.EVENT_CONTACT: "contact",
+    CollisionAlert.EVENT_STALL: "stall",
+    CollisionAlert.EVENT_LOCK: "lock",
+}
+
+
+def benches(*numbers):
+    """Benches as people call them, counted from 1."""
+    return " and ".join(f"bench {number + 1}" for number in numbers if number != CollisionAlert.NO_BENCH)
+
+
 class Alerts(Node):
     """Prints what comes. Who joins late gets the alert that holds: the publisher keeps it."""
 
@@ -37,14 +49,12 @@ class Alerts(Node):
 
     def _receive(self, alert):
         text = f"t = {alert.sim_time:.3f} s  {LEVELS.get(alert.level, alert.level)}"
-        # People count benches from 1.
-        benches = [str(bench + 1) for bench in (alert.bench_a, alert.bench_b) if bench != CollisionAlert.NO_BENCH]
-        if benches:
-            text += f"  bench {' and '.join(benches)}"
-        if len(benches) == 2:
-            text += f", {alert.clearance * 1000.0:.1f} mm apart"
+        if alert.event in EVENTS:
+            text += f"  {EVENTS[alert.event]}: {benches(alert.event_bench_a, alert.event_bench_b)}"
         if alert.time_to_event > 0.0:
-            text += f"  in {alert.time_to_event:.1f} s"
+            text += f" in {alert.time_to_event:.1f} s"
+        if alert.bench_a != CollisionAlert.NO_BENCH:
+            text += f"; nearest now are {benches(alert.bench_a, alert.bench_b)}, {alert.clearance * 1000.0:.1f} mm apart"
         self.get_logger().info(text)
 
 

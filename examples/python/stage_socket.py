@@ -14,17 +14,32 @@ import time
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-VERSION = 1
-HEADER = struct.Struct("<BBHI d d Q Q Q Q f I")
+VERSION = 2
+HEADER = struct.Struct("<BBBxI d d Q Q Q Q f I I 4x")
 HANDLE = struct.Struct("<4f")
 STATES = ["moving", "approaching", "contact", "stall", "lock", "path_end"]
+PLAYBACK = ["playing", "paused", "held", "ended"]
 
 
 def frame(message):
     """The header as a dictionary and one (x, y, heading, speed) for each handle."""
-    version, state, _, handles, sim_time, time_scale, sequence, run_id, sent_ns, tick, clearance, _ = HEADER.unpack_from(message)
-    if version != VERSION:
-        raise SystemExit(f"the server speaks version {version} of the layout, this program version {VERSION}")
+    if message[0] != VERSION:
+        raise SystemExit(f"the server speaks version {message[0]} of the layout, this program version {VERSION}")
+    (
+        _,
+        state,
+        playback,
+        handles,
+        sim_time,
+        time_scale,
+        sequence,
+        run_id,
+        sent_ns,
+        tick,
+        clearance,
+        epoch,
+        cue,
+    ) = HEADER.unpack_from(message)
     header = {
         "state": STATES[state],
         "handles": handles,
@@ -35,6 +50,9 @@ def frame(message):
         "sent_ns": sent_ns,
         "tick": tick,
         "clearance": clearance,
+        "playback": PLAYBACK[playback],
+        "epoch": epoch,
+        "cue": cue,
     }
     return header, list(HANDLE.iter_unpack(memoryview(message)[HEADER.size :]))
 

@@ -11,17 +11,22 @@ import time
 
 import iceoryx2 as iox2
 import numpy as np
-from bench_dragon_messages import STATES, CollisionAlert, FrameHeader, HandlePose, handles_of
+from bench_dragon_messages import EVENTS, PLAYBACK, STATES, CollisionAlert, FrameHeader, HandlePose, handles_of
 
 iox2.set_log_level(iox2.LogLevel.Fatal)
 
 
 def wait_for(opening):
-    """Opens a service as soon as its publisher has made it."""
+    """Opens a service as soon as its publisher has made it; ends where its messages have another layout."""
     while True:
         try:
             return opening()
-        except iox2.PublishSubscribeOpenError:
+        except iox2.PublishSubscribeOpenError as error:
+            if "IncompatibleTypes" in str(error):
+                raise SystemExit(
+                    "the publisher's messages have another layout than bench_dragon_messages.py: "
+                    "take that file from the publisher's version of bench-dragon"
+                ) from error
             time.sleep(0.1)
         except iox2.EventOpenError:
             time.sleep(0.1)
@@ -72,6 +77,8 @@ def main():
                     "tick": header.tick,
                     "sim_time": header.sim_time,
                     "state": STATES[header.state],
+                    "playback": PLAYBACK[header.playback],
+                    "epoch": header.epoch,
                     "handles": len(handles),
                     "head": [float(handles["x"][0]), float(handles["y"][0])],
                     "link": link,
@@ -88,7 +95,16 @@ def main():
         while alerts is not None and (alert := alerts.receive()) is not None:
             message = alert.payload().contents
             if arguments.json:
-                print(json.dumps({"type": "alert", "level": message.level, "tick": message.tick}))
+                line = {
+                    "type": "alert",
+                    "tick": message.tick,
+                    "level": message.level,
+                    "event": EVENTS[message.event],
+                    "event_time": message.event_time,
+                    "event_benches": [message.event_bench_a, message.event_bench_b],
+                }
+                # NaN is no JSON.
+                print(json.dumps({key: None if value != value else value for key, value in line.items()}))
             alert.delete()
     if arguments.json:
         print(json.dumps({"type": "end", "received": received, "missed": missed}))

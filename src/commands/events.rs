@@ -85,10 +85,5 @@ pub fn least_clearance(scene: &Scene, timeline: &Timeline, common: &Common) -> S
 
 /// A bench as people call it, counted from 1.
 pub fn bench_name(scene: &Scene, bench: u32) -> String {
-    let count = bench as usize + 1;
-    match count {
-        1 => "bench 1 (the head)".to_owned(),
-        _ if count == scene.team().benches => format!("bench {count} (the tail)"),
-        _ => format!("bench {count}"),
-    }
+    bench_dragon::wire::sentence::bench_name(bench, scene.team().benches as u32)
 }

@@ -9,24 +9,24 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 
-use anstyle::{AnsiColor, Style};
+use anstyle::Style;
 use bench_dragon::live::clock::realtime_ns;
-use bench_dragon::live::statistics::{self, Announcement, Inbox, Percentiles, Run, Summary};
+use bench_dragon::live::statistics::{self, Inbox, Percentiles, Run, Summary};
 use bench_dragon::live::{Counts, End, LoopOptions, Publisher, StatusPublisher, run_loop};
-use bench_dragon::messages::{Stage, State};
 use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::{Accepted, AtEnd, Scene};
 use bench_dragon::show::{Playback, Show};
-use bench_dragon::transports;
 use bench_dragon::transports::iceoryx2::{self, Offer, OpenError, SharedMemoryPublisher, StatusSender};
+use bench_dragon::wire::sentence::{Figures, alert_sentence};
+use bench_dragon::wire::{CollisionAlert, Stage, convert};
 use serde::Serialize;
 
 use self::ros2::{Ros2, Ros2Summary};
 
-use super::events::{bench_name, sentence};
+use super::events::sentence;
 use super::punctuality::Punctuality;
-use super::{CommandError, Common, Output, number, search_timeline, stop_on_signals, warn_of_gap};
+use super::{CommandError, Common, Output, level_colour, number, search_timeline, stop_on_signals, warn_of_gap};
 
 /// Arguments of `run`.
 #[derive(Debug, clap::Args)]
@@ -177,7 +177,7 @@ impl RunSession<'_> {
 
     fn stage(&self) -> Stage {
         let scene = self.scene;
-        transports::stage(self.run_id, realtime_ns(), &scene.motion)
+        convert::stage(self.run_id, realtime_ns(), &scene.motion)
     }
 
     fn open_shared_memory(&self) -> Result<SharedMemoryPublisher, CommandError> {
@@ -198,9 +198,9 @@ impl RunSession<'_> {
     }
 
     fn loop_options(&self) -> LoopOptions {
-        let Playback { rate, time_scale, .. } = self.playback;
+        let rate = self.playback.rate;
         let periods = self.arguments.duration.map(|seconds| LoopOptions::periods_of(seconds, rate));
-        LoopOptions { run_id: self.run_id, rate, time_scale, periods }
+        LoopOptions { run_id: self.run_id, rate, periods }
     }
 
     fn collect(
@@ -219,7 +219,7 @@ impl RunSession<'_> {
             rate: self.playback.rate,
             scene: &self.scene.name,
             sinks,
-            announce: Box::new(|announcement| self.print_alert(announcement)),
+            announce: Box::new(|alert| self.print_alert(alert)),
         };
         Ok(statistics::collect(inbox, run, done))
     }
@@ -261,32 +261,13 @@ impl RunSession<'_> {
     }
 
     /// One line an alert, with the countdown in wall time.
-    fn print_alert(&self, announcement: &Announcement) {
-        if self.common.quiet || self.common.json {
-            return;
-        }
-        let alert = &announcement.alert;
-        let colour = match alert.level {
-            State::Moving => AnsiColor::Green,
-            State::Approaching => AnsiColor::Yellow,
-            _ => AnsiColor::Red,
-        };
-        let style =
-            if std::io::stderr().is_terminal() { Style::new().fg_color(Some(colour.into())) } else { Style::new() };
-        let benches: Vec<_> =
-            [alert.bench_a, alert.bench_b].into_iter().flatten().map(|bench| bench_name(self.scene, bench)).collect();
-        let benches = benches.join(" and ");
-        let what = match (alert.level, alert.time_to_event.is_nan()) {
-            (State::Approaching, false) => format!(
-                "next event in {:.1} s; nearest are {benches}, {:.4} m apart",
-                alert.time_to_event / self.playback.time_scale,
-                alert.clearance
-            ),
-            (State::Approaching, true) => format!("{benches} are {:.4} m apart", alert.clearance),
-            (State::Moving, _) => format!("nothing within {:.4} m", alert.clearance),
-            _ => format!("at {:.6} s: {benches}", alert.event_time),
-        };
-        eprintln!("{:>10.3} s  {style}{:<11}{style:#} {what}", announcement.sim_time, alert.level.level_name());
+    fn print_alert(&self, alert: &CollisionAlert) {
+        let Some(level) = alert.alert_level().filter(|_| !self.common.quiet && !self.common.json) else { return };
+        let colour = Style::new().fg_color(Some(level_colour(level.into()).into()));
+        let style = if std::io::stderr().is_terminal() { colour } else { Style::new() };
+        let figures = Figures::Shown { time_scale: self.playback.time_scale };
+        let said = alert_sentence(alert, self.scene.team().benches as u32, figures);
+        eprintln!("{:>10.3} s  {style}{:<11}{style:#} {said}", alert.sim_time, level.name());
     }
 
     fn print_summary(&self, counts: &Counts, summary: &Summary, ros2: Option<Ros2Summary>) -> Result<(), CommandError> {

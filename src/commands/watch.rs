@@ -4,13 +4,17 @@ use std::io::{IsTerminal, Write, stdout};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use anstyle::{AnsiColor, Style};
-use bench_dragon::messages::{CollisionAlert, LoopStatus, NO_BENCH, State};
+use anstyle::Style;
+use bench_dragon::motion::event::EventKind;
+use bench_dragon::show::state::{FrameState, Level, PlaybackState};
 use bench_dragon::subscribers::monitor::{Latency, Monitor, News, Presence, Second};
+use bench_dragon::wire::json::AlertObject;
+use bench_dragon::wire::sentence::{Figures, alert_sentence};
+use bench_dragon::wire::{CollisionAlert, LoopStatus};
 use crossterm::{cursor, execute, terminal};
 use serde::Serialize;
 
-use super::{CommandError, Common, stop_on_signals, wall_seconds};
+use super::{CommandError, Common, level_colour, stop_on_signals, wall_seconds};
 
 /// Arguments of `watch`.
 #[derive(Debug, clap::Args)]
@@ -20,33 +24,17 @@ pub struct WatchArguments {
     duration: Option<f64>,
 }
 
-/// One line of `watch --json`.
+/// The line of `watch --json` each second; the other kind of line is an [`AlertObject`].
 #[derive(Serialize)]
-#[serde(tag = "type", rename_all = "snake_case")]
-enum Line {
-    Second {
-        tick: Option<u64>,
-        sim_time: Option<f64>,
-        state: &'static str,
-        rate: f64,
-        received: u64,
-        missed: u64,
-        latency_ns: Option<Latency>,
-    },
-    Alert {
-        run_id: u64,
-        tick: u64,
-        stamp_ns: u64,
-        sim_time: f64,
-        event_time: f64,
-        time_to_event: f64,
-        clearance: f64,
-        x: f64,
-        y: f64,
-        level: &'static str,
-        bench_a: Option<u32>,
-        bench_b: Option<u32>,
-    },
+#[serde(tag = "type", rename = "second")]
+struct SecondLine {
+    tick: Option<u64>,
+    sim_time: Option<f64>,
+    state: &'static str,
+    rate: f64,
+    received: u64,
+    missed: u64,
+    latency_ns: Option<Latency>,
 }
 
 /// How the monitor shows itself.
@@ -73,7 +61,7 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
     let over = |at: Instant| arguments.duration.is_some_and(|seconds| (at - began).as_secs_f64() >= seconds);
     let interval = Duration::from_secs(1);
     let mut next = began + interval;
-    let mut screen = Screen { display, name: &common.name, time_scale: 1.0, drawn: 0 };
+    let mut screen = Screen { display, name: &common.name, time_scale: 1.0, benches: 0, drawn: 0 };
     if display != Display::Json {
         eprintln!("Watching \"{}\"; Ctrl-C ends.", common.name);
     }
@@ -90,6 +78,9 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
         let mut news = Vec::new();
         let timeout = next.saturating_duration_since(now).min(Duration::from_millis(200));
         monitor.step(timeout, |item| news.push(item))?;
+        if let Some(header) = monitor.header() {
+            (screen.time_scale, screen.benches) = (header.time_scale, header.handles.saturating_sub(1));
+        }
         for item in news {
             screen.tell(&item)?;
         }
@@ -101,23 +92,21 @@ struct Screen<'a> {
     display: Display,
     name: &'a str,
     time_scale: f64,
+    benches: u32,
     /// Lines on the terminal that the next second overwrites.
     drawn: u16,
 }
 
 impl Screen<'_> {
     fn show_second(&mut self, second: &Second) -> Result<(), CommandError> {
-        if let Some(header) = second.header {
-            self.time_scale = header.time_scale;
-        }
         let mut output = stdout().lock();
         match self.display {
             Display::Json => {
                 let known = second.header.filter(|_| second.presence != Presence::Waiting);
-                let line = Line::Second {
+                let line = SecondLine {
                     tick: known.map(|header| header.tick),
                     sim_time: known.map(|header| header.sim_time),
-                    state: second.state().map_or("waiting", State::name),
+                    state: second.state().map_or("waiting", FrameState::name),
                     rate: second.rate,
                     received: second.received,
                     missed: second.missed,
@@ -155,7 +144,7 @@ impl Screen<'_> {
         let mut output = stdout().lock();
         if self.display == Display::Json {
             if let News::Alert(alert) = news {
-                write_json(&mut output, &alert_line(alert))?;
+                write_json(&mut output, &AlertObject::from(alert))?;
             }
             return Ok(output.flush()?);
         }
@@ -166,7 +155,7 @@ impl Screen<'_> {
             }
             News::Gone => writeln!(output, "The publisher of \"{}\" has ended; waiting for the next.", self.name)?,
             News::FellSilent => writeln!(output, "The publisher of \"{}\" is there but sends nothing.", self.name)?,
-            News::Alert(alert) => writeln!(output, "{}", self.alert_sentence(alert))?,
+            News::Alert(alert) => writeln!(output, "{}", self.alert_line(alert))?,
         }
         Ok(output.flush()?)
     }
@@ -175,12 +164,14 @@ impl Screen<'_> {
         let Some(header) = second.header.filter(|_| second.presence != Presence::Waiting) else {
             return vec![format!("waiting for a publisher of \"{}\"", self.name)];
         };
-        let state = second.state().unwrap_or(State::Moving);
+        let state = second.state().unwrap_or(FrameState::Moving);
         let style = self.style(state);
         let latency = second.latency.map_or("no frames".to_owned(), |latency| {
             let us = |ns: u64| ns as f64 / 1000.0;
             format!("p50 {:.1} p99 {:.1} max {:.1} us", us(latency.p50), us(latency.p99), us(latency.max))
         });
+        let playback = header.playback_state().filter(|playback| *playback != PlaybackState::Playing);
+        let playback = playback.map_or(String::new(), |playback| format!(" ({})", playback.name()));
         let silent = if second.presence == Presence::Silent { " (silent)" } else { "" };
         let clearance = if header.min_clearance.is_nan() {
             "not computed".to_owned()
@@ -190,7 +181,7 @@ impl Screen<'_> {
         };
         let mut lines = vec![
             format!(
-                "t {:>10.3} s  tick {}  {style}{}{style:#}{silent}{}",
+                "t {:>10.3} s  tick {}  {style}{}{style:#}{playback}{silent}{}",
                 header.sim_time,
                 header.tick,
                 state.name(),
@@ -210,38 +201,23 @@ impl Screen<'_> {
     /// Wall time to the event that the latest alert announced.
     fn countdown(&self, second: &Second, sim_time: f64) -> String {
         let ahead =
-            second.alert.filter(|alert| alert.level == State::Approaching as u32 && alert.event_time > sim_time);
+            second.alert.filter(|alert| alert.alert_level() == Some(Level::Approaching) && alert.event_time > sim_time);
         ahead.map_or(String::new(), |alert| {
-            format!("  next event in {:.1} s", (alert.event_time - sim_time) / self.time_scale)
+            let event = alert.event_kind().map_or("event", EventKind::name);
+            format!("  {event} in {:.1} s", (alert.event_time - sim_time) / self.time_scale)
         })
     }
 
-    fn alert_sentence(&self, alert: &CollisionAlert) -> String {
-        let level = State::from_wire(alert.level).unwrap_or(State::Moving);
-        let style = self.style(level);
-        let benches = match (alert.bench_a, alert.bench_b) {
-            (NO_BENCH, _) => String::new(),
-            _ if level == State::Moving => String::new(),
-            (a, NO_BENCH) => format!(", bench {} (counting from 1)", a + 1),
-            (a, b) => format!(", benches {} and {} (counting from 1)", a + 1, b + 1),
-        };
-        let when = match level {
-            State::Approaching if alert.time_to_event.is_nan() => ": two boards are near each other".to_owned(),
-            State::Approaching => format!(": next event in {:.1} s", alert.time_to_event / self.time_scale),
-            State::Moving => ": nothing near".to_owned(),
-            _ => format!(" at {:.6} s, ({:.3}, {:.3}) m", alert.event_time, alert.x, alert.y),
-        };
-        format!("{:>10.3} s  {style}{}{style:#}{when}{benches}", alert.sim_time, level.level_name())
+    fn alert_line(&self, alert: &CollisionAlert) -> String {
+        let level = alert.alert_level().unwrap_or(Level::Clear);
+        let style = self.style(level.into());
+        let said = alert_sentence(alert, self.benches, Figures::Shown { time_scale: self.time_scale });
+        format!("{:>10.3} s  {style}{:<11}{style:#} {said}", alert.sim_time, level.name())
     }
 
-    fn style(&self, state: State) -> Style {
-        let colour = match state {
-            State::Moving => AnsiColor::Green,
-            State::Approaching => AnsiColor::Yellow,
-            _ => AnsiColor::Red,
-        };
+    fn style(&self, state: FrameState) -> Style {
         match self.display {
-            Display::Terminal => Style::new().bold().fg_color(Some(colour.into())),
+            Display::Terminal => Style::new().bold().fg_color(Some(level_colour(state).into())),
             _ => Style::new(),
         }
     }
@@ -251,7 +227,7 @@ fn status_line(status: &LoopStatus) -> String {
     let us = |ns: u64| ns as f64 / 1000.0;
     format!(
         "publisher: scene {}  overruns {}  skipped {}  lateness p99 {:.1} us  step p99 {:.1} us  memory {:.1} MB",
-        status.scene_name(),
+        status.scene.as_str(),
         status.overruns,
         status.skipped,
         us(status.lateness_p99_total),
@@ -260,28 +236,7 @@ fn status_line(status: &LoopStatus) -> String {
     )
 }
 
-fn alert_line(alert: &CollisionAlert) -> Line {
-    let bench = |bench: u32| (bench != NO_BENCH).then_some(bench);
-    let CollisionAlert { run_id, tick, stamp_ns, sim_time, event_time, time_to_event, clearance, x, y, .. } = *alert;
-    let level = State::from_wire(alert.level).unwrap_or(State::Moving).level_name();
-    let (bench_a, bench_b) = (bench(alert.bench_a), bench(alert.bench_b));
-    Line::Alert {
-        run_id,
-        tick,
-        stamp_ns,
-        sim_time,
-        event_time,
-        time_to_event,
-        clearance,
-        x,
-        y,
-        level,
-        bench_a,
-        bench_b,
-    }
-}
-
-fn write_json(output: &mut impl Write, line: &Line) -> Result<(), CommandError> {
+fn write_json(output: &mut impl Write, line: &impl Serialize) -> Result<(), CommandError> {
     serde_json::to_writer(&mut *output, line).map_err(std::io::Error::from)?;
     Ok(writeln!(output)?)
 }

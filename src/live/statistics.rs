@@ -11,12 +11,12 @@ use serde::{Deserialize, Serialize};
 
 use super::clock::realtime_ns;
 use super::{Counts, StatusPublisher};
-use crate::messages::{LoopStatus, SCENE_NAME_BYTES};
-use crate::show::alerts::Alert;
+use crate::wire::{CollisionAlert, LoopStatus, SceneName};
 
-/// Seconds at the highest rate that the queue of samples holds.
+/// Samples that their queue holds: three seconds of the highest rate.
 const QUEUED_SAMPLES: usize = 1 << 16;
-const QUEUED_ANNOUNCEMENTS: usize = 1 << 10;
+/// Alerts that their queue holds.
+const QUEUED_ALERTS: usize = 1 << 10;
 /// The longest lateness and step cost that is told apart: an hour.
 const LONGEST_NS: u64 = 3_600_000_000_000;
 
@@ -43,27 +43,18 @@ pub struct Sample {
     pub subscribers: u32,
 }
 
-/// An alert, for printing.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Announcement {
-    /// Simulated seconds of its frame.
-    pub sim_time: f64,
-    /// The alert.
-    pub alert: Alert,
-}
-
 /// The queues between the loop and this thread.
 pub fn queues() -> (super::Reports, Inbox) {
     let (samples, sample_inbox) = rtrb::RingBuffer::new(QUEUED_SAMPLES);
-    let (announcements, announcement_inbox) = rtrb::RingBuffer::new(QUEUED_ANNOUNCEMENTS);
-    let reports = super::Reports { samples, announcements };
-    (reports, Inbox { samples: sample_inbox, announcements: announcement_inbox })
+    let (alerts, alert_inbox) = rtrb::RingBuffer::new(QUEUED_ALERTS);
+    let reports = super::Reports { samples, alerts };
+    (reports, Inbox { samples: sample_inbox, alerts: alert_inbox })
 }
 
 /// This thread's ends of the queues.
 pub struct Inbox {
     samples: rtrb::Consumer<Sample>,
-    announcements: rtrb::Consumer<Announcement>,
+    alerts: rtrb::Consumer<CollisionAlert>,
 }
 
 /// Percentiles of a duration, nanoseconds.
@@ -98,13 +89,13 @@ pub struct Summary {
     pub lost_samples: u64,
 }
 
-/// The same two durations over some stretch of time.
-struct Stretch {
+/// The distributions of the two durations over some time.
+struct Histograms {
     lateness: Histogram<u64>,
     step: Histogram<u64>,
 }
 
-impl Stretch {
+impl Histograms {
     fn new() -> Self {
         // 1 ns to an hour with three digits are bounds the constructor accepts.
         let histogram = || Histogram::new_with_bounds(1, LONGEST_NS, 3).expect("valid bounds");
@@ -138,12 +129,12 @@ pub struct Run<'a> {
     /// Where the status goes.
     pub sinks: Vec<Box<dyn StatusPublisher>>,
     /// What is done with each alert.
-    pub announce: Box<dyn FnMut(&Announcement) + 'a>,
+    pub announce: Box<dyn FnMut(&CollisionAlert) + 'a>,
 }
 
 /// Collects until `done` is set and the queues are empty.
 pub fn collect(mut inbox: Inbox, mut run: Run, done: &AtomicBool) -> Summary {
-    let (mut total, mut second) = (Stretch::new(), Stretch::new());
+    let (mut total, mut second) = (Histograms::new(), Histograms::new());
     let period_ns = (1e9 / run.rate) as u64;
     let mut frames_before = 0;
     let mut latest: Option<Sample> = None;
@@ -152,8 +143,8 @@ pub fn collect(mut inbox: Inbox, mut run: Run, done: &AtomicBool) -> Summary {
     loop {
         // Read before the queues are emptied: what was pushed before it was set is then still seen.
         let ending = done.load(Ordering::Acquire);
-        while let Ok(announcement) = inbox.announcements.pop() {
-            (run.announce)(&announcement);
+        while let Ok(alert) = inbox.alerts.pop() {
+            (run.announce)(&alert);
         }
         while let Ok(sample) = inbox.samples.pop() {
             total.record(&sample, period_ns);
@@ -179,9 +170,9 @@ pub fn collect(mut inbox: Inbox, mut run: Run, done: &AtomicBool) -> Summary {
     }
 }
 
-fn status(run: &Run, sample: &Sample, measured_rate: f64, second: &Stretch, total: &Stretch) -> LoopStatus {
-    let [late, late_total] = [second, total].map(|stretch| Percentiles::of(&stretch.lateness));
-    let [step, step_total] = [second, total].map(|stretch| Percentiles::of(&stretch.step));
+fn status(run: &Run, sample: &Sample, measured_rate: f64, second: &Histograms, total: &Histograms) -> LoopStatus {
+    let [late, late_total] = [second, total].map(|histograms| Percentiles::of(&histograms.lateness));
+    let [step, step_total] = [second, total].map(|histograms| Percentiles::of(&histograms.step));
     LoopStatus {
         run_id: run.run_id,
         tick: sample.tick,
@@ -212,7 +203,7 @@ fn status(run: &Run, sample: &Sample, measured_rate: f64, second: &Stretch, tota
         resident_bytes: resident_bytes(),
         subscribers: sample.subscribers,
         file_descriptors: file_descriptors(),
-        scene: padded(run.scene),
+        scene: SceneName::new(run.scene),
     }
 }
 
@@ -227,12 +218,4 @@ fn resident_bytes() -> u64 {
 /// Open file descriptors of this process; 0 where /proc does not tell.
 fn file_descriptors() -> u32 {
     std::fs::read_dir("/proc/self/fd").map_or(0, |entries| entries.count() as u32)
-}
-
-/// A name as UTF-8 bytes, cut at a character's end.
-fn padded(name: &str) -> [u8; SCENE_NAME_BYTES] {
-    let mut bytes = [0; SCENE_NAME_BYTES];
-    let end = (0..=name.len().min(SCENE_NAME_BYTES)).rev().find(|end| name.is_char_boundary(*end)).unwrap_or(0);
-    bytes[..end].copy_from_slice(&name.as_bytes()[..end]);
-    bytes
 }

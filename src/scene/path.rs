@@ -19,8 +19,8 @@ use crate::model::root::bisect_predicate;
 use crate::model::spiral::{Direction, Spiral};
 use crate::model::team::Team;
 
-/// The most segments of a route: what a stage message has room for, less the line on which the team stands.
-const MOST_STEPS: usize = crate::messages::MOST_PIECES - 1;
+/// The most segments of a route.
+pub(crate) const MOST_STEPS: usize = 31;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -10,8 +10,8 @@ use iceoryx2::prelude::*;
 use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 use crate::transports::iceoryx2::{OpenError, check_room_to_subscribe, node, remains, reserve_pages, service_name};
+use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 
 type Receiver<Payload, Header> = Port<ipc::Service, Payload, Header>;
 

@@ -5,8 +5,9 @@ use std::time::{Duration, Instant};
 use hdrhistogram::Histogram;
 
 use crate::live::clock::monotonic_ns;
-use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, State};
+use crate::show::state::FrameState;
 use crate::transports::iceoryx2::OpenError;
+use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus};
 
 use super::connection::{Connection, Subscription};
 
@@ -78,9 +79,8 @@ pub struct Second {
 
 impl Second {
     /// The state of the latest frame, or `None` while waiting.
-    pub fn state(&self) -> Option<State> {
-        let header = self.header.filter(|_| self.presence != Presence::Waiting)?;
-        State::from_wire(header.state)
+    pub fn state(&self) -> Option<FrameState> {
+        self.header.filter(|_| self.presence != Presence::Waiting)?.frame_state()
     }
 }
 
@@ -216,6 +216,11 @@ impl Monitor {
                 tell(News::Gone);
             }
         }
+    }
+
+    /// The latest frame's header, if there was ever one.
+    pub fn header(&self) -> Option<FrameHeader> {
+        self.header
     }
 
     /// The figures since the last call, which a caller asks for about once a second.

@@ -23,11 +23,11 @@ use ::iceoryx2::service::builder::publish_subscribe::{
 };
 use ::iceoryx2::service::port_factory::{event, publish_subscribe};
 
-use super::{alert_message, handle_pose};
 use crate::live::clock::monotonic_ns;
 use crate::live::{PublishError, Publisher, StatusPublisher};
-use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 use crate::show::Frame;
+use crate::wire::convert::{collision_alert, handle_pose};
+use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 
 /// Nodes that may have a service open at once beyond one a subscriber: the publisher's, and those that died and have
 /// not been cleaned up after yet.
@@ -98,8 +98,9 @@ pub enum OpenError {
     },
     /// A service of this name exists with other properties.
     #[error(
-        "the service \"{0}\" exists with another layout or other limits: a program of another version has it open; \
-         stop that, or choose another name with --name"
+        "the service \"{0}\" exists with another layout of its messages, or with other limits: a program of another \
+         version of bench-dragon has it open; stop that or take the same version for both, or choose another name with \
+         --name"
     )]
     Incompatible(String),
     /// The service admits no more subscribers.
@@ -243,7 +244,7 @@ impl SharedMemoryPublisher {
     fn send_alerts(&self, header: &FrameHeader, frame: &Frame) -> Result<(), String> {
         let Some(port) = &self.alerts else { return Ok(()) };
         for alert in &frame.alerts {
-            port.send_copy(alert_message(header, alert)).map_err(|error| error.to_string())?;
+            port.send_copy(collision_alert(header, alert)).map_err(|error| error.to_string())?;
         }
         Ok(())
     }

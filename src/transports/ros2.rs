@@ -15,11 +15,11 @@ use std::thread::JoinHandle;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::{alert_message, handle_pose};
 use crate::live::{PublishError, Publisher, StatusPublisher};
-use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 use crate::scene::ros2::Ros2Settings;
 use crate::show::Frame;
+use crate::wire::convert::{collision_alert, handle_pose};
+use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 
 use environment::{Network, check_name};
 
@@ -186,7 +186,7 @@ impl Publisher for Ros2Publisher {
     fn publish(&mut self, header: &FrameHeader, frame: &Frame) -> Result<(), PublishError> {
         for alert in &frame.alerts {
             // A thread that is 256 alerts behind has other troubles than this one.
-            let _ = self.alerts.push(alert_message(header, alert));
+            let _ = self.alerts.push(collision_alert(header, alert));
         }
         if !self.due(header.tick) {
             return Ok(());

@@ -22,14 +22,16 @@ from ros2_peer import TOPICS, quality
 # CDR: 4 bytes that say little-endian, then sec, nanosec, and "stage" with its length.
 STAMP = struct.Struct("<4xiI")
 AFTER_HEADER = 4 + 24
+# run_id to deadline_ns, three numbers, handles to reserved.
+FRAME_HEADER = 6 * 8 + 3 * 8 + 6 * 4
 ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 
 
 def of_handles(raw):
     """Stamp and handles (x, y, heading, vx, vy) of a HandlePoses."""
-    # run_id to deadline_ns, three numbers, handles, state; then the length of the sequence.
-    count = struct.unpack_from("<I", raw, AFTER_HEADER + 6 * 8 + 3 * 8 + 8)[0]
-    first = AFTER_HEADER + 6 * 8 + 3 * 8 + 16
+    # The frame header; then the length of the sequence, and four bytes so that its numbers are aligned.
+    count = struct.unpack_from("<I", raw, AFTER_HEADER + FRAME_HEADER)[0]
+    first = AFTER_HEADER + FRAME_HEADER + 8
     return np.frombuffer(raw, "<f8", 5 * count, first).reshape(count, 5)
 
 

@@ -1,8 +1,8 @@
 //! What `run` does about ROS 2: opens its topics where they are asked for, or says why this build has none.
 
 use bench_dragon::live::{Publisher, StatusPublisher};
-use bench_dragon::messages::Stage;
 use bench_dragon::scene::Scene;
+use bench_dragon::wire::Stage;
 use serde::Serialize;
 
 use crate::commands::CommandError;

@@ -10,9 +10,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::live::clock::monotonic_ns;
 use crate::live::statistics::Percentiles;
-use crate::messages::{FrameHeader, HandlePose, LoopStatus, Stage};
 use crate::subscribers::connection::{Connection, Subscription};
 use crate::transports::iceoryx2::OpenError;
+use crate::wire::{FrameHeader, HandlePose, LoopStatus, Stage};
 
 /// How often services are looked for that were not there yet.
 const COMPLETION: Duration = Duration::from_millis(100);

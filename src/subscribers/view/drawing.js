@@ -135,9 +135,9 @@ function outline(context, { x, y, c, s, l, w }) {
  * The path of a stage, in metres. A spiral on which the team comes in is drawn as far out as `reach`: the team stands
  * there.
  */
-export function pathOf({ pitch, path: pieces }, reach) {
+export function pathOf({ pitch, path: segments }, reach) {
   const path = new Path2D();
-  for (const { kind, x, y, heading, length, curvature, theta_first, theta_last } of pieces) {
+  for (const { kind, x, y, heading, length, curvature, theta_first, theta_last } of segments) {
     const c = Math.cos(heading), s = Math.sin(heading);
     if (kind === "line") {
       path.moveTo(x, y);
@@ -260,7 +260,10 @@ export function draw(context, camera, palette, scene) {
   mark(0, palette.ink, 2.5);
   if (count > 1) mark(count - 1, palette.ink, 1.5);
   const danger = alert && alert.level !== "clear";
-  const pair = danger ? [alert.bench_a, alert.bench_b].filter((bench) => bench !== null && bench < count) : [];
+  // While approaching the nearest two boards are marked, afterwards those of the event.
+  const approaching = alert?.level === "approaching";
+  const concerned = approaching ? [alert.bench_a, alert.bench_b] : [alert?.event_bench_a, alert?.event_bench_b];
+  const pair = danger ? concerned.filter((bench) => bench !== null && bench < count) : [];
   for (const bench of pair) {
     mark(bench, palette.ground, 7);
     mark(bench, palette.danger, 4);
@@ -270,7 +273,7 @@ export function draw(context, camera, palette, scene) {
     mark(chosen, palette.ink, 4, [7, 4]);
   }
   // Alerts come once a second, and the place of an approach moves with the boards.
-  const place = alert?.level === "approaching" && pair.length === 2 ? nearest(stage, places, ...pair) : alert;
+  const place = approaching && pair.length === 2 ? nearest(stage, places, ...pair) : { x: alert?.event_x, y: alert?.event_y };
   if (danger && place.x !== null) target(context, place, palette, pixel);
   if (!pair.includes(0)) label("HEAD", head.x + head.l * head.c, head.y + head.l * head.s, palette.ink);
   if (count > 1) label("TAIL", tail.x - tail.l * tail.c, tail.y - tail.l * tail.s, palette.ink);

@@ -38,17 +38,18 @@ pub(super) fn read(subscription: &Subscription, sender: &watch::Sender<Picture>,
 
 /// Hands on what comes until the publisher is gone.
 fn follow(subscription: &Subscription, mut connection: Connection, sender: &watch::Sender<Picture>, stop: &AtomicBool) {
-    let mut picture = Picture::default();
+    let (mut picture, mut benches) = (Picture::default(), 0);
     let (mut heard, mut looked) = (Instant::now(), Instant::now());
     while !stop.load(Ordering::Relaxed) {
         std::thread::sleep(GLANCE);
         let mut fresh = false;
         while let Some(stage) = connection.stage() {
             picture.stage = wire::stage(&stage).into();
+            benches = stage.benches;
             fresh = true;
         }
         while let Some(alert) = connection.alert() {
-            picture.alert = wire::alert(&alert).into();
+            picture.alert = wire::alert(&alert, benches).into();
             fresh = true;
         }
         if let Some(frame) = connection.newest_frame(wire::frame) {

@@ -71,7 +71,7 @@ function pass() {
   still = !widened;
   const { a, b, part } = between;
   // Nothing is drawn twice: a show that stands still costs nothing.
-  const all = [newest.run, newest.state, newest.handles[3], a.due, b.due, part, camera.x, camera.y, camera.zoom, camera.reach, camera.width, camera.height, camera.ratio, range?.low, range?.high, alert?.level, alert?.x, alert?.bench_a, alert?.bench_b, chosen, palette.ground].join();
+  const all = [newest.run, newest.state, newest.handles[3], a.due, b.due, part, camera.x, camera.y, camera.zoom, camera.reach, camera.width, camera.height, camera.ratio, range?.low, range?.high, alert?.level, alert?.event_x, alert?.bench_a, alert?.bench_b, chosen, palette.ground].join();
   if (all !== last) {
     draw(context, camera, palette, { stage, places, speeds: newest.handles, range, ground, path, alert, chosen });
     last = all;
@@ -105,27 +105,12 @@ function remaining(seconds) {
   return hours ? [`${hours}:${pad(minutes)}:${pad(whole % 60)}`, "h"] : [`${minutes}:${pad(whole % 60)}`, "min"];
 }
 
-function pairOf(alert) {
-  const benches = [alert?.bench_a, alert?.bench_b].filter((bench) => bench != null).map((bench) => bench + 1);
-  return benches.length === 2 ? `benches ${benches[0]} and ${benches[1]}` : benches.length ? `bench ${benches[0]}` : "";
-}
-
+/** The server puts the alert into words; those of a level that the frames have not reached, or have left, do not count. */
 function sentence(level, alert) {
-  const pair = pairOf(alert), place = alert?.x != null ? ` at (${alert.x.toFixed(2)}, ${alert.y.toFixed(2)}) m` : "";
-  switch (level) {
-    case "approaching":
-      return pair ? `Approaching: ${pair} are closest.` : "Approaching.";
-    case "contact":
-      return pair ? `Contact: ${pair} touch${place}.` : "Two benches touch.";
-    case "stall":
-      return `Stall: ${pair || "a bench"} stands square to the path and pushes back all behind it.`;
-    case "lock":
-      return `Lock: ${pair || "a bench"} is folded, the motion cannot go on.`;
-    case "path_end":
-      return "The head has reached the end of the path.";
-    default:
-      return "";
-  }
+  if (level === "path_end") return "The head has reached the end of the path.";
+  if (level === "moving" || alert?.level !== level) return "";
+  const words = alert.sentence[0].toUpperCase() + alert.sentence.slice(1);
+  return level === "approaching" ? `Approaching. ${words}.` : `${words}.`;
 }
 
 let spokenAt = Infinity;
@@ -141,7 +126,7 @@ function countdown(level, alert, now) {
   const ahead = (level === "moving" || level === "approaching") && seconds > -1;
   const [number, unit] = ahead ? remaining(Math.max(0, seconds)) : ["", ""];
   element("countdown").hidden = !ahead;
-  put("until", ahead ? (level === "approaching" ? "danger in" : "next danger in") : "");
+  put("until", ahead ? `${level === "approaching" ? "" : "next "}${alert.event} in` : "");
   if (element("left").dataset.text !== number + unit) {
     element("left").dataset.text = number + unit;
     // The number is made as large as the panel is wide.

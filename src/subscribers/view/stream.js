@@ -1,8 +1,8 @@
 // The stream: receives frames, stage and alerts, comes back by itself, and says where everything is at a moment
 // between two frames. Knows nothing of the page.
 
-const VERSION = 1;
-const HEADER_BYTES = 64;
+const VERSION = 2;
+const HEADER_BYTES = 72;
 /** More frames a second than this make no motion smoother once it is interpolated. */
 const MOST_FRAMES = 125;
 /** Frames further apart than this (ms) are shown one after another: straight lines between them would be wrong. */
@@ -26,6 +26,7 @@ function frameOf(data, at) {
     run: String(bytes.getBigUint64(32, true)),
     sent: Number(bytes.getBigUint64(40, true)) / 1e6,
     clearance: bytes.getFloat32(56, true),
+    epoch: bytes.getUint32(60, true),
     handles: new Float32Array(data, HEADER_BYTES),
     // Milliseconds of wall time since the show's beginning, on the publisher's clock.
     due: (1000 * time) / scale,
@@ -52,7 +53,7 @@ class Playback {
 
   push(frame) {
     const last = this.newest;
-    if (last && (last.run !== frame.run || frame.due < last.due || last.handles.length !== frame.handles.length)) this.clear();
+    if (last && (last.run !== frame.run || last.epoch !== frame.epoch || frame.due < last.due || last.handles.length !== frame.handles.length)) this.clear();
     if (last && last === this.newest && last.due === frame.due) {
       // The show stands still.
       this.frames[this.frames.length - 1] = frame;

@@ -1,34 +1,40 @@
 //! What a browser receives: frames as bytes, and JSON for what changes seldom. Called by the server only.
 //!
-//! Everything is little-endian. A frame is a header of 64 bytes and 16 bytes for each handle, head first:
+//! Everything is little-endian. A frame is a header of 72 bytes and 16 bytes for each handle, head first:
 //!
 //! | byte | type | what |
 //! |---|---|---|
-//! | 0 | u8 | version of this layout: 1 |
+//! | 0 | u8 | version of this layout: 2 |
 //! | 1 | u8 | state: 0 moving, 1 approaching, 2 contact, 3 stall, 4 lock, 5 path end |
-//! | 2 | u16 | 0 |
+//! | 2 | u8 | playback: 0 playing, 1 paused, 2 held, 3 ended |
+//! | 3 | u8 | 0 |
 //! | 4 | u32 | number of handles |
 //! | 8 | f64 | simulated time, s |
-//! | 16 | f64 | simulated seconds per second of wall time |
+//! | 16 | f64 | simulated seconds per second of wall time; 0 while paused or held |
 //! | 24 | u64 | sequence: counts the frames published in this run; a browser skips some |
 //! | 32 | u64 | run: new for every start of a publisher |
 //! | 40 | u64 | CLOCK_MONOTONIC in ns when the publisher sent the frame |
 //! | 48 | u64 | tick |
 //! | 56 | f32 | least clearance, m; NaN where not computed |
-//! | 60 | u32 | 0 |
-//! | 64 + 16 k | 4 x f32 | handle k: x, y (m), heading (rad), speed without sign (m per simulated second; NaN where not computed) |
+//! | 60 | u32 | epoch: grows by one at every jump of simulated time |
+//! | 64 | u32 | the latest cue passed, from 1; 0 where none has been |
+//! | 68 | u32 | 0 |
+//! | 72 + 16 k | 4 x f32 | handle k: x, y (m), heading (rad), speed without sign (m per simulated second; NaN where not computed) |
 
+use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::messages::{CollisionAlert, FrameHeader, HandlePose, NO_BENCH, Stage, StagePiece, State};
+use crate::wire::json::{AlertObject, Exact};
+use crate::wire::sentence::{Figures, alert_sentence};
+use crate::wire::{CollisionAlert, FrameHeader, HandlePose, Stage, StageSegment};
 
-const VERSION: u8 = 1;
-const HEADER_BYTES: usize = 64;
+const VERSION: u8 = 2;
+const HEADER_BYTES: usize = 72;
 const HANDLE_BYTES: usize = 16;
 
 pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER_BYTES + HANDLE_BYTES * handles.len());
-    bytes.extend([VERSION, header.state as u8, 0, 0]);
+    bytes.extend([VERSION, header.state as u8, header.playback as u8, 0]);
     bytes.extend((handles.len() as u32).to_le_bytes());
     bytes.extend(header.sim_time.to_le_bytes());
     bytes.extend(header.time_scale.to_le_bytes());
@@ -36,7 +42,9 @@ pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
         bytes.extend(number.to_le_bytes());
     }
     bytes.extend((header.min_clearance as f32).to_le_bytes());
-    bytes.extend([0; 4]);
+    for number in [header.epoch, header.cue, 0] {
+        bytes.extend(number.to_le_bytes());
+    }
     for pose in handles {
         for number in [pose.x, pose.y, pose.heading, pose.vx.hypot(pose.vy)] {
             bytes.extend((number as f32).to_le_bytes());
@@ -47,26 +55,28 @@ pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
 
 pub(super) fn stage(stage: &Stage) -> String {
     let Stage { run_id, pitch, start_turn, hole_inset, head_length, body_length, width, benches, .. } = *stage;
-    json!({"type": "stage", "run_id": exact(run_id), "pitch": pitch, "start_turn": start_turn,
+    json!({"type": "stage", "run_id": Exact(run_id), "pitch": pitch, "start_turn": start_turn,
         "hole_inset": hole_inset, "head_length": head_length, "body_length": body_length, "width": width,
-        "benches": benches, "path": stage.path_in_use().iter().map(piece).collect::<Vec<_>>()})
+        "benches": benches, "path": stage.path_in_use().iter().map(segment).collect::<Vec<_>>()})
     .to_string()
 }
 
-fn piece(piece: &StagePiece) -> Value {
-    let StagePiece { x, y, heading, length, curvature, theta_first, theta_last, .. } = *piece;
-    json!({"kind": piece.kind_name(), "x": x, "y": y, "heading": heading, "length": length, "curvature": curvature,
+fn segment(segment: &StageSegment) -> Value {
+    let StageSegment { x, y, heading, length, curvature, theta_first, theta_last, .. } = *segment;
+    json!({"kind": segment.kind_name(), "x": x, "y": y, "heading": heading, "length": length, "curvature": curvature,
         "theta_first": theta_first, "theta_last": theta_last})
 }
 
-pub(super) fn alert(alert: &CollisionAlert) -> String {
-    let bench = |bench: u32| (bench != NO_BENCH).then_some(bench);
-    json!({"type": "alert", "run_id": exact(alert.run_id),
-        "level": State::from_wire(alert.level).unwrap_or(State::Moving).level_name(),
-        "sim_time": alert.sim_time, "event_time": alert.event_time, "time_to_event": alert.time_to_event,
-        "clearance": alert.clearance, "x": alert.x, "y": alert.y,
-        "bench_a": bench(alert.bench_a), "bench_b": bench(alert.bench_b)})
-    .to_string()
+/// An alert and what it says, in a team of so many benches; its figures stand beside it on the page.
+pub(super) fn alert(alert: &CollisionAlert, benches: u32) -> String {
+    #[derive(Serialize)]
+    struct Said {
+        #[serde(flatten)]
+        alert: AlertObject,
+        sentence: String,
+    }
+    let said = Said { alert: alert.into(), sentence: alert_sentence(alert, benches, Figures::Omitted) };
+    json!(said).to_string()
 }
 
 /// No publisher is there; `reason` says why where it is one that cannot be used.
@@ -76,12 +86,7 @@ pub(super) fn waiting(reason: Option<&str>) -> String {
 
 /// The answer to a question for the time: CLOCK_MONOTONIC, which frames are stamped with.
 pub(super) fn clock(monotonic_ns: u64) -> String {
-    json!({"type": "clock", "monotonic_ns": exact(monotonic_ns)}).to_string()
-}
-
-/// JavaScript rounds numbers beyond 2^53, so these travel as text.
-fn exact(number: u64) -> Value {
-    Value::String(number.to_string())
+    json!({"type": "clock", "monotonic_ns": Exact(monotonic_ns)}).to_string()
 }
 
 #[cfg(test)]
@@ -100,31 +105,33 @@ mod tests {
             min_clearance: 0.25,
             handles: 2,
             state: 2,
+            playback: 3,
+            cue: 5,
+            epoch: 4,
             ..FrameHeader::default()
         };
         let pose = HandlePose { x: 8.75, y: -1.5, heading: 0.5, vx: 3.0, vy: -4.0 };
         let still = HandlePose { vx: f64::NAN, ..pose };
         let bytes = frame(&header, &[pose, still]);
-        assert_eq!(bytes.len(), 96);
-        assert_eq!(bytes[..8], [1, 2, 0, 0, 2, 0, 0, 0]);
+        assert_eq!(bytes.len(), 104);
+        assert_eq!(bytes[..8], [2, 2, 3, 0, 2, 0, 0, 0]);
         assert_eq!(bytes[8..16], 405.5_f64.to_le_bytes());
         assert_eq!(bytes[16..24], 2.0_f64.to_le_bytes());
         assert_eq!(bytes[24..32], 7_u64.to_le_bytes());
         assert_eq!(bytes[32..40], [0xff; 8]);
         assert_eq!(bytes[40..48], [0, 0, 0, 0, 0, 0, 0, 0x10]);
         assert_eq!(bytes[48..56], 9_u64.to_le_bytes());
-        assert_eq!(bytes[56..64], [0, 0, 0x80, 0x3e, 0, 0, 0, 0]);
-        let numbers: Vec<_> = bytes[64..].chunks(4).map(|four| f32::from_le_bytes(four.try_into().unwrap())).collect();
+        assert_eq!(bytes[56..72], [0, 0, 0x80, 0x3e, 4, 0, 0, 0, 5, 0, 0, 0, 0, 0, 0, 0]);
+        let numbers: Vec<_> = bytes[72..].chunks(4).map(|four| f32::from_le_bytes(four.try_into().unwrap())).collect();
         assert_eq!(numbers[..7], [8.75, -1.5, 0.5, 5.0, 8.75, -1.5, 0.5]);
         assert!(numbers[7].is_nan());
     }
 
     #[test]
-    fn an_alert_without_benches_or_event_has_nulls() {
-        let nothing =
-            CollisionAlert { bench_a: NO_BENCH, bench_b: NO_BENCH, event_time: f64::NAN, ..Default::default() };
-        let text: Value = serde_json::from_str(&alert(&nothing)).unwrap();
-        assert_eq!(text["level"], "clear");
-        assert!(["bench_a", "bench_b", "event_time"].iter().all(|key| text[key].is_null()), "{text}");
+    fn an_alert_says_in_words_what_its_numbers_say() {
+        let alert_of = CollisionAlert { level: 1, event: 2, event_bench_a: 0, event_bench_b: 8, ..Default::default() };
+        let json: Value = serde_json::from_str(&alert(&alert_of, 9)).unwrap();
+        assert_eq!((&json["type"], &json["event"]), (&"alert".into(), &"contact".into()));
+        assert_eq!(json["sentence"], "contact: bench 1 (the head) and bench 9 (the tail) (counting from 1)");
     }
 }

@@ -5,9 +5,11 @@
 
 use serde::Serialize;
 
-use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, NO_BENCH, Stage, State};
 use crate::model::Point;
 use crate::model::board::Board;
+use crate::motion::event::EventKind;
+use crate::show::state::Level;
+use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 
 /// The frame of all coordinates: metres, x to the right, y up, origin at the centre.
 pub const FRAME_ID: &str = "stage";
@@ -316,7 +318,7 @@ impl MarkerArray {
         }
         let mut contact = Marker::new("contact", 0, SPHERE);
         contact.scale = Xyz { x: stage.width, y: stage.width, z: stage.width };
-        contact.color = colour(State::Contact);
+        contact.color = colour(Level::Contact);
         markers.push(contact);
         Self { markers }
     }
@@ -330,18 +332,19 @@ impl MarkerArray {
         alert: Option<&CollisionAlert>,
     ) {
         let stamp = Time::of(frame.stamp_ns);
-        let level = alert.and_then(|alert| State::from_wire(alert.level)).unwrap_or(State::Moving);
-        let concerned = |bench: usize| {
-            level != State::Moving
-                && alert.is_some_and(|alert| [alert.bench_a, alert.bench_b].contains(&(bench as u32)))
-        };
+        let level = level_of(alert);
+        let marked = alert.map_or(Vec::new(), |alert| match level {
+            Level::Clear => Vec::new(),
+            Level::Approaching => alert.nearest_benches().collect(),
+            Level::Contact | Level::Stall | Level::Lock => alert.event_benches().collect(),
+        });
         let benches = self.markers.len() - 1;
         for (bench, (marker, pair)) in self.markers[..benches].iter_mut().zip(handles.windows(2)).enumerate() {
             let points = [Point::new(pair[0].x, pair[0].y), Point::new(pair[1].x, pair[1].y)];
             let centre = Board::from_handles(points[0], points[1], stage.hole_inset, stage.width).centre;
             marker.header.stamp = stamp;
             marker.pose = Pose::flat(centre.x, centre.y, pair[0].heading);
-            marker.color = match (concerned(bench), bench) {
+            marker.color = match (marked.contains(&(bench as u32)), bench) {
                 (true, _) => colour(level),
                 (false, 0) => Color { r: 0.85, g: 0.65, b: 0.13, a: 1.0 },
                 _ => Color { r: 0.55, g: 0.35, b: 0.2, a: 1.0 },
@@ -349,20 +352,25 @@ impl MarkerArray {
         }
         let contact = &mut self.markers[benches];
         contact.header.stamp = stamp;
-        let place = alert.filter(|alert| level >= State::Contact && alert.x.is_finite());
+        let place = alert.filter(|alert| level.has_happened() && alert.event_x.is_finite());
         contact.action = if place.is_some() { ADD } else { DELETE };
         if let Some(alert) = place {
-            contact.pose = Pose::flat(alert.x, alert.y, 0.0);
+            contact.pose = Pose::flat(alert.event_x, alert.event_y, 0.0);
         }
     }
 }
 
+/// The level of the latest alert; clear before the first.
+fn level_of(alert: Option<&CollisionAlert>) -> Level {
+    alert.and_then(CollisionAlert::alert_level).unwrap_or(Level::Clear)
+}
+
 /// The colour of a level.
-fn colour(level: State) -> Color {
+fn colour(level: Level) -> Color {
     match level {
-        State::Moving => Color { r: 0.2, g: 0.6, b: 0.3, a: 1.0 },
-        State::Approaching => Color { r: 1.0, g: 0.75, b: 0.0, a: 1.0 },
-        _ => Color { r: 0.9, g: 0.1, b: 0.1, a: 1.0 },
+        Level::Clear => Color { r: 0.2, g: 0.6, b: 0.3, a: 1.0 },
+        Level::Approaching => Color { r: 1.0, g: 0.75, b: 0.0, a: 1.0 },
+        Level::Contact | Level::Stall | Level::Lock => Color { r: 0.9, g: 0.1, b: 0.1, a: 1.0 },
     }
 }
 
@@ -415,7 +423,7 @@ impl DiagnosticArray {
         discarded: u64,
     ) -> Self {
         let value = |key: &str, value: String| KeyValue { key: key.to_owned(), value };
-        let level = alert.and_then(|alert| State::from_wire(alert.level)).unwrap_or(State::Moving);
+        let level = level_of(alert);
         let the_loop = DiagnosticStatus {
             level: if skipped_since > 0 { WARN } else { OK },
             name: format!("{name}: loop"),
@@ -432,27 +440,34 @@ impl DiagnosticArray {
             ],
         };
         let mut values = vec![
-            value("level", level.level_name().to_owned()),
+            value("level", level.name().to_owned()),
             value("sim_time (s)", format!("{:.3}", status.sim_time)),
-            value("scene", status.scene_name().to_owned()),
+            value("scene", status.scene.as_str().to_owned()),
         ];
         if let Some(alert) = alert {
-            let bench = |bench: u32| if bench == NO_BENCH { "none".to_owned() } else { bench.to_string() };
             values.push(value("clearance (m)", format!("{:.4}", alert.clearance)));
             values.push(value("time to event (s)", format!("{:.3}", alert.event_time - status.sim_time)));
-            values.push(value("benches (from 0)", format!("{}, {}", bench(alert.bench_a), bench(alert.bench_b))));
+            values.push(value("nearest benches (from 0)", listed(alert.nearest_benches())));
+            values.push(value("event", alert.event_kind().map_or("none", EventKind::name).to_owned()));
+            values.push(value("event benches (from 0)", listed(alert.event_benches())));
         }
         let dragon = DiagnosticStatus {
             level: match level {
-                State::Moving => OK,
-                State::Approaching => WARN,
-                _ => ERROR,
+                Level::Clear => OK,
+                Level::Approaching => WARN,
+                Level::Contact | Level::Stall | Level::Lock => ERROR,
             },
             name: format!("{name}: dragon"),
-            message: level.level_name().to_owned(),
+            message: level.name().to_owned(),
             hardware_id: name.to_owned(),
             values,
         };
         Self { header: Header::of(status.stamp_ns), status: vec![the_loop, dragon] }
     }
+}
+
+/// Benches in a row, or "none".
+fn listed(benches: impl Iterator<Item = u32>) -> String {
+    let names: Vec<_> = benches.map(|bench| bench.to_string()).collect();
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }

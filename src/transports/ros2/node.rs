@@ -17,8 +17,8 @@ use super::environment::{Network, Range};
 use super::messages::{DiagnosticArray, HandlePoses, Header, MarkerArray, Pose, PoseArray, Stamped, Time, type_name};
 use super::{Inbox, Ros2Error, Ros2Offer, Shared, Snapshot};
 use crate::live::clock::{monotonic_ns, sleep_until};
-use crate::messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 use crate::scene::ros2::{Durability, Qos, Reliability, Topic};
+use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 
 /// How long a subscriber that has died counts as slow: its lease.
 const LEASE_SECONDS: f64 = 12.0;
@@ -28,8 +28,8 @@ const UNACKNOWLEDGED_BYTES: f64 = 64_000_000.0;
 const UNACKNOWLEDGED_MESSAGES: f64 = 8192.0;
 /// More bytes than a message has besides its handles.
 const HEADER_BYTES: usize = 200;
-/// More bytes than a message has that is not of every frame.
-const SELDOM_BYTES: usize = 2000;
+/// More bytes than any message has that is not of every frame; the largest of them is the stage.
+const SELDOM_BYTES: usize = HEADER_BYTES + size_of::<Stage>();
 /// Nanoseconds after a frame's deadline at which it is looked for, and between two looks.
 const FIRST_LOOK_NS: u64 = 300_000;
 const LOOK_NS: u64 = 500_000;
@@ -308,5 +308,36 @@ impl Topics {
             let message = DiagnosticArray::of(&self.name, status, alert, skipped_since, discarded);
             port.send(Arc::new(message), shared);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rustdds::CDRSerializerAdapter;
+    use rustdds::no_key::SerializerAdapter;
+
+    use super::*;
+    use crate::wire::SceneName;
+
+    fn bytes<Message: Serialize>(message: &Message) -> usize {
+        CDRSerializerAdapter::<Message>::to_bytes(message).unwrap().len()
+    }
+
+    #[test]
+    fn no_message_is_larger_than_its_bound() {
+        let status = LoopStatus { scene: SceneName::new(&"n".repeat(100)), ..LoopStatus::default() };
+        let alert = CollisionAlert { level: 1, event: 2, ..CollisionAlert::default() };
+        // iceoryx2 takes no longer name.
+        let diagnostics = DiagnosticArray::of(&"n".repeat(255), &status, Some(&alert), u64::MAX, u64::MAX);
+        let seldom = [
+            bytes(&Stamped::stage(Stage::default())),
+            bytes(&Stamped::status(status)),
+            bytes(&Stamped::alert(alert)),
+            bytes(&diagnostics),
+        ];
+        assert!(seldom.iter().all(|bytes| *bytes < SELDOM_BYTES), "{seldom:?} bytes of {SELDOM_BYTES}");
+        let poses = vec![HandlePose::default(); 224];
+        let frame = HandlePoses { header: Header::of(0), frame: FrameHeader::default(), poses };
+        assert!(bytes(&frame) < HEADER_BYTES + 224 * size_of::<HandlePose>());
     }
 }

@@ -1,66 +1,16 @@
-//! What goes over the wire: the fixed memory layouts that publishers write and subscribers in any language read.
+//! The memory layouts that publishers write and subscribers in any language read.
 //!
-//! This room depends on nothing else in the crate. Transports write these types, subscribers read them, and
-//! `examples/python/bench_dragon_messages.py` and `msgs/` describe the same bytes for other languages. Everything is
-//! little-endian, `#[repr(C)]` and without implicit padding. A type's name ends in the version of its layout, so that
-//! a subscriber built for another layout is refused instead of reading nonsense.
+//! Depends on nothing but serde and iceoryx2's [`ZeroCopySend`]: states, levels and kinds are plain numbers here, and
+//! [`convert`](super::convert) is where they get their types. Everything is little-endian, `#[repr(C)]` and without
+//! implicit padding. A type's name ends in the version of its layout, so that a subscriber built for another layout is
+//! refused instead of reading nonsense. `examples/python/bench_dragon_messages.py` and `msgs/` describe the same bytes
+//! for other languages.
 
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Serialize, Serializer};
 
 /// The bench number that means "no bench".
 pub const NO_BENCH: u32 = u32::MAX;
-
-/// What the dragon is doing: the `state` of a [`FrameHeader`] and, up to [`State::Lock`], the `level` of a
-/// [`CollisionAlert`] (where 0 is called `clear`).
-///
-/// A state is the latest event passed and stays until the show ends or loops.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-#[repr(u32)]
-pub enum State {
-    /// Nothing has happened and nothing is near.
-    Moving = 0,
-    /// An event is near in time, or two boards are near each other.
-    Approaching = 1,
-    /// Two boards that share no handle have touched.
-    Contact = 2,
-    /// A link stands square to the path at its front handle: what follows is pushed backwards.
-    Stall = 3,
-    /// A link stands square to the path at its rear handle: the motion cannot go on.
-    Lock = 4,
-    /// The head has reached the end of the path.
-    PathEnd = 5,
-}
-
-impl State {
-    /// The state of a number on the wire, or `None` for a number this layout does not know.
-    pub fn from_wire(number: u32) -> Option<Self> {
-        [Self::Moving, Self::Approaching, Self::Contact, Self::Stall, Self::Lock, Self::PathEnd]
-            .into_iter()
-            .find(|state| *state as u32 == number)
-    }
-
-    /// The name used in JSON and on the terminal for a frame's state: `moving`, `approaching`, ...
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Moving => "moving",
-            Self::Approaching => "approaching",
-            Self::Contact => "contact",
-            Self::Stall => "stall",
-            Self::Lock => "lock",
-            Self::PathEnd => "path_end",
-        }
-    }
-
-    /// The name used for an alert's level: as [`State::name`], but 0 is `clear`.
-    pub fn level_name(self) -> &'static str {
-        match self {
-            Self::Moving => "clear",
-            other => other.name(),
-        }
-    }
-}
 
 /// Where one handle is and how it moves. Payload of `<name>/poses` is a slice of these, head first.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
@@ -82,7 +32,7 @@ pub struct HandlePose {
 
 /// What is true of a whole frame. User header of `<name>/poses`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
-#[type_name("bench_dragon/FrameHeader/1")]
+#[type_name("bench_dragon/FrameHeader/2")]
 #[repr(C)]
 pub struct FrameHeader {
     /// New for every start of a publisher: a change means that it was started again.
@@ -99,20 +49,34 @@ pub struct FrameHeader {
     pub deadline_ns: u64,
     /// Simulated seconds since the start of the scene.
     pub sim_time: f64,
-    /// Simulated seconds per second of wall time.
+    /// Simulated seconds per second of wall time, as in force; 0 while paused or held, unchanged once the show has
+    /// ended.
     pub time_scale: f64,
     /// Metres between the nearest two boards that share no handle, negative when they overlap; NaN where the scene
     /// has no `[alerts]` or fewer than three benches.
     pub min_clearance: f64,
     /// The number of handles in the payload.
     pub handles: u32,
-    /// A [`State`] as its number.
+    /// 0 moving, 1 approaching, 2 contact, 3 stall, 4 lock, 5 path end.
     pub state: u32,
+    /// 0 playing, 1 paused, 2 held, 3 ended.
+    pub playback: u32,
+    /// The latest cue passed, counted from 1; 0 where none has been.
+    pub cue: u32,
+    /// Grows by one at every jump of simulated time, such as the beginning of the next loop: who interpolates starts
+    /// anew.
+    pub epoch: u32,
+    /// Always 0.
+    pub reserved: u32,
 }
 
-/// A change of the alert level, or the countdown towards one. Payload of `<name>/alerts`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
-#[type_name("bench_dragon/CollisionAlert/1")]
+/// A change of the alert level, or the countdown towards an event. Payload of `<name>/alerts`.
+///
+/// `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, at every level. The fields
+/// that begin with `event` are the event the alert is about: the next contact, stall or lock while the level is clear
+/// or approaching, the one that has happened otherwise.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ZeroCopySend)]
+#[type_name("bench_dragon/CollisionAlert/2")]
 #[repr(C)]
 pub struct CollisionAlert {
     /// The run this alert belongs to, as in [`FrameHeader::run_id`].
@@ -129,28 +93,96 @@ pub struct CollisionAlert {
     pub time_to_event: f64,
     /// Metres between the nearest two boards in that frame, as [`FrameHeader::min_clearance`].
     pub clearance: f64,
-    /// Where it happens, metres right of the centre; NaN where there is no place.
+    /// The midpoint between the nearest two boards, metres right of the centre; NaN under three benches.
     pub x: f64,
-    /// Where it happens, metres up from the centre; NaN where there is no place.
+    /// The midpoint between the nearest two boards, metres up from the centre; NaN under three benches.
     pub y: f64,
-    /// A [`State`] up to `Lock` as its number; 0 is called clear.
+    /// Where the event happens, metres right of the centre: the touching point of a contact, the rear handle of the
+    /// bench that stalls or locks; NaN where there is no event.
+    pub event_x: f64,
+    /// Where the event happens, metres up from the centre; NaN where there is no event.
+    pub event_y: f64,
+    /// 0 clear, 1 approaching, 2 contact, 3 stall, 4 lock.
     pub level: u32,
-    /// The first bench concerned, or [`NO_BENCH`].
+    /// The first of the nearest two benches, from 0, or [`NO_BENCH`].
     pub bench_a: u32,
-    /// The second bench concerned, or [`NO_BENCH`].
+    /// The second of the nearest two benches, or [`NO_BENCH`].
     pub bench_b: u32,
-    /// Always 0.
-    pub reserved: u32,
+    /// The event: 0 none, else as [`FrameHeader::state`].
+    pub event: u32,
+    /// The bench that stalls or locks, or the first of two that touch, or [`NO_BENCH`].
+    pub event_bench_a: u32,
+    /// The second of two benches that touch, or [`NO_BENCH`].
+    pub event_bench_b: u32,
+}
+
+impl Default for CollisionAlert {
+    /// Clear, with no event, no benches and no numbers.
+    fn default() -> Self {
+        const NONE: f64 = f64::NAN;
+        Self {
+            run_id: 0,
+            tick: 0,
+            stamp_ns: 0,
+            sim_time: 0.0,
+            event_time: NONE,
+            time_to_event: NONE,
+            clearance: NONE,
+            x: NONE,
+            y: NONE,
+            event_x: NONE,
+            event_y: NONE,
+            level: 0,
+            bench_a: NO_BENCH,
+            bench_b: NO_BENCH,
+            event: 0,
+            event_bench_a: NO_BENCH,
+            event_bench_b: NO_BENCH,
+        }
+    }
 }
 
 /// Bytes kept for a scene's name in [`LoopStatus`].
-pub const SCENE_NAME_BYTES: usize = 64;
+const SCENE_NAME_BYTES: usize = 64;
+
+/// A scene's name as UTF-8, cut at a character's end and padded with zeros. In JSON and ROS 2 a plain string.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend)]
+#[repr(C)]
+pub struct SceneName([u8; SCENE_NAME_BYTES]);
+
+impl SceneName {
+    /// As much of a name as there is room for.
+    pub fn new(name: &str) -> Self {
+        let mut bytes = [0; SCENE_NAME_BYTES];
+        let end = (0..=name.len().min(SCENE_NAME_BYTES)).rev().find(|end| name.is_char_boundary(*end)).unwrap_or(0);
+        bytes[..end].copy_from_slice(&name.as_bytes()[..end]);
+        Self(bytes)
+    }
+
+    /// What stands before the zeros.
+    pub fn as_str(&self) -> &str {
+        let end = self.0.iter().position(|byte| *byte == 0).unwrap_or(SCENE_NAME_BYTES);
+        std::str::from_utf8(&self.0[..end]).unwrap_or_default()
+    }
+}
+
+impl Default for SceneName {
+    fn default() -> Self {
+        Self([0; SCENE_NAME_BYTES])
+    }
+}
+
+impl Serialize for SceneName {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.as_str())
+    }
+}
 
 /// How the loop is doing, once a second. Payload of `<name>/status`.
 ///
-/// Layout 2 added the unforeseen contacts and the unsolved frames. `_second` figures are of the last second alone, `_total` figures since the start of the run; all durations are in
-/// nanoseconds.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ZeroCopySend)]
+/// Layout 2 added the unforeseen contacts and the unsolved frames. `_second` figures are of the last second alone,
+/// `_total` figures since the start of the run; all durations are in nanoseconds.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/LoopStatus/2")]
 #[repr(C)]
 pub struct LoopStatus {
@@ -212,83 +244,27 @@ pub struct LoopStatus {
     pub subscribers: u32,
     /// Open file descriptors of the publisher.
     pub file_descriptors: u32,
-    /// The scene's name as UTF-8, cut at a character's end and padded with zeros. In JSON and ROS 2 a plain string.
-    #[serde(serialize_with = "as_text")]
-    pub scene: [u8; SCENE_NAME_BYTES],
-}
-
-impl Default for LoopStatus {
-    /// All zeros, and no name: arrays this long have no default of their own that could be derived from.
-    fn default() -> Self {
-        Self {
-            run_id: 0,
-            tick: 0,
-            sequence: 0,
-            stamp_ns: 0,
-            sim_time: 0.0,
-            rate: 0.0,
-            measured_rate: 0.0,
-            overruns: 0,
-            skipped: 0,
-            shows_played: 0,
-            unforeseen_contacts: 0,
-            unsolved_frames: 0,
-            lateness_p50_second: 0,
-            lateness_p99_second: 0,
-            lateness_max_second: 0,
-            lateness_p50_total: 0,
-            lateness_p99_total: 0,
-            lateness_p999_total: 0,
-            lateness_max_total: 0,
-            step_p50_second: 0,
-            step_p99_second: 0,
-            step_max_second: 0,
-            step_p50_total: 0,
-            step_p99_total: 0,
-            step_p999_total: 0,
-            step_max_total: 0,
-            resident_bytes: 0,
-            subscribers: 0,
-            file_descriptors: 0,
-            scene: [0; SCENE_NAME_BYTES],
-        }
-    }
-}
-
-impl LoopStatus {
     /// The scene's name.
-    pub fn scene_name(&self) -> &str {
-        text(&self.scene)
-    }
+    pub scene: SceneName,
 }
 
-/// What stands before the zeros.
-fn text(bytes: &[u8; SCENE_NAME_BYTES]) -> &str {
-    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(SCENE_NAME_BYTES);
-    std::str::from_utf8(&bytes[..end]).unwrap_or_default()
-}
+/// The most segments of a path that a [`Stage`] has room for.
+pub const MOST_SEGMENTS: usize = 32;
 
-fn as_text<S: Serializer>(bytes: &[u8; SCENE_NAME_BYTES], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(text(bytes))
-}
+/// The `kind` of a [`StageSegment`]: straight on.
+pub const SEGMENT_LINE: u32 = 0;
+/// The `kind` of a [`StageSegment`]: part of a circle.
+pub const SEGMENT_ARC: u32 = 1;
+/// The `kind` of a [`StageSegment`]: inward along r = pitch theta / 2 pi.
+pub const SEGMENT_INWARD_SPIRAL: u32 = 2;
+/// The `kind` of a [`StageSegment`]: outward along that spiral, turned by half a turn about the centre.
+pub const SEGMENT_OUTWARD_SPIRAL: u32 = 3;
 
-/// The most pieces of a path that a [`Stage`] has room for.
-pub const MOST_PIECES: usize = 32;
-
-/// The `kind` of a [`StagePiece`]: straight on.
-pub const PIECE_LINE: u32 = 0;
-/// The `kind` of a [`StagePiece`]: part of a circle.
-pub const PIECE_ARC: u32 = 1;
-/// The `kind` of a [`StagePiece`]: inward along r = pitch theta / 2 pi.
-pub const PIECE_INWARD_SPIRAL: u32 = 2;
-/// The `kind` of a [`StagePiece`]: outward along that spiral, turned by half a turn about the centre.
-pub const PIECE_OUTWARD_SPIRAL: u32 = 3;
-
-/// One piece of the path in a [`Stage`].
+/// One segment of the path in a [`Stage`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend, Serialize)]
-#[type_name("bench_dragon/StagePiece/2")]
+#[type_name("bench_dragon/StageSegment/3")]
 #[repr(C)]
-pub struct StagePiece {
+pub struct StageSegment {
     /// Where it begins, metres right of the centre.
     pub x: f64,
     /// Where it begins, metres up from the centre.
@@ -303,20 +279,20 @@ pub struct StagePiece {
     pub theta_first: f64,
     /// Of a spiral, the polar angle at which it ends, radians; else NaN.
     pub theta_last: f64,
-    /// [`PIECE_LINE`], [`PIECE_ARC`], [`PIECE_INWARD_SPIRAL`] or [`PIECE_OUTWARD_SPIRAL`].
+    /// [`SEGMENT_LINE`], [`SEGMENT_ARC`], [`SEGMENT_INWARD_SPIRAL`] or [`SEGMENT_OUTWARD_SPIRAL`].
     pub kind: u32,
     /// Always 0.
     pub reserved: u32,
 }
 
-impl StagePiece {
+impl StageSegment {
     /// The name of its kind: `line`, `arc`, `inward_spiral`, `outward_spiral`, or `unknown` for a later layout's.
     pub fn kind_name(&self) -> &'static str {
         match self.kind {
-            PIECE_LINE => "line",
-            PIECE_ARC => "arc",
-            PIECE_INWARD_SPIRAL => "inward_spiral",
-            PIECE_OUTWARD_SPIRAL => "outward_spiral",
+            SEGMENT_LINE => "line",
+            SEGMENT_ARC => "arc",
+            SEGMENT_INWARD_SPIRAL => "inward_spiral",
+            SEGMENT_OUTWARD_SPIRAL => "outward_spiral",
             _ => "unknown",
         }
     }
@@ -324,10 +300,11 @@ impl StagePiece {
 
 /// What a subscriber needs to draw the stage. Payload of `<name>/stage`, sent at the start and kept for late joiners.
 ///
-/// The head's board has a length of its own; all that follow have one length. Layout 2 added the pieces of the path;
-/// the team may stand further back than the first piece begins, on the same spiral or line.
+/// The head's board has a length of its own; all that follow have one length. Layout 2 added the segments of the
+/// path, layout 3 gave them their name; the team may stand further back than the first segment begins, on the same
+/// spiral or line.
 #[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend, Serialize)]
-#[type_name("bench_dragon/Stage/2")]
+#[type_name("bench_dragon/Stage/3")]
 #[repr(C)]
 pub struct Stage {
     /// The run, as in [`FrameHeader::run_id`].
@@ -348,15 +325,15 @@ pub struct Stage {
     pub width: f64,
     /// The number of benches; one less than the number of handles.
     pub benches: u32,
-    /// The number of pieces in use, at most [`MOST_PIECES`].
-    pub pieces: u32,
-    /// The pieces of the path in the order of travel; those not in use are zero.
-    pub path: [StagePiece; MOST_PIECES],
+    /// The number of segments in use, at most [`MOST_SEGMENTS`].
+    pub segments: u32,
+    /// The segments of the path in the order of travel; those not in use are zero.
+    pub path: [StageSegment; MOST_SEGMENTS],
 }
 
 impl Stage {
-    /// The pieces of the path that are in use.
-    pub fn path_in_use(&self) -> &[StagePiece] {
-        &self.path[..(self.pieces as usize).min(MOST_PIECES)]
+    /// The segments of the path that are in use.
+    pub fn path_in_use(&self) -> &[StageSegment] {
+        &self.path[..(self.segments as usize).min(MOST_SEGMENTS)]
     }
 }

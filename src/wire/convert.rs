@@ -1,0 +1,248 @@
+//! From frames, chains, alerts and motions to the layouts, and from a layout's numbers back to states, levels and events.
+//!
+//! Each conversion stands here and nowhere else. Called by the loop and the transports, and by every subscriber that
+//! wants more than a number.
+
+use crate::model::path::{OutlineKind, SegmentOutline};
+use crate::model::spiral::Direction;
+use crate::motion::Motion;
+use crate::motion::event::EventKind;
+use crate::show::Frame;
+use crate::show::alerts::Alert;
+use crate::show::state::{FrameState, Level, PlaybackState};
+use crate::solve::Chain;
+
+use super::layouts::{
+    CollisionAlert, FrameHeader, HandlePose, MOST_SEGMENTS, NO_BENCH, SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE,
+    SEGMENT_OUTWARD_SPIRAL, Stage, StageSegment,
+};
+
+/// A route of the most steps, and the line on which its team stands, fit into a stage.
+const _: () = assert!(crate::scene::path::MOST_STEPS < MOST_SEGMENTS);
+
+/// What of a header is not the frame's own but the run's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stamps {
+    /// The run.
+    pub run_id: u64,
+    /// Frames published before this one.
+    pub sequence: u64,
+    /// CLOCK_REALTIME now, ns.
+    pub stamp_ns: u64,
+    /// CLOCK_MONOTONIC at which the period should have begun, ns.
+    pub deadline_ns: u64,
+}
+
+/// The header of a frame, complete but for `sent_ns`, which a publisher sets just before sending.
+pub fn frame_header(frame: &Frame, stamps: Stamps) -> FrameHeader {
+    let Stamps { run_id, sequence, stamp_ns, deadline_ns } = stamps;
+    FrameHeader {
+        run_id,
+        sequence,
+        tick: frame.tick,
+        stamp_ns,
+        sent_ns: 0,
+        deadline_ns,
+        sim_time: frame.sim_time,
+        time_scale: frame.time_scale,
+        min_clearance: frame.min_clearance,
+        handles: frame.chain.handles() as u32,
+        state: frame.state as u32,
+        playback: frame.playback as u32,
+        cue: 0,
+        epoch: frame.shows_played as u32,
+        reserved: 0,
+    }
+}
+
+/// One handle of a chain. Panics if there is no such handle.
+pub fn handle_pose(chain: &Chain, handle: usize) -> HandlePose {
+    HandlePose {
+        x: chain.x[handle],
+        y: chain.y[handle],
+        heading: chain.heading[handle],
+        vx: chain.vx[handle],
+        vy: chain.vy[handle],
+    }
+}
+
+/// The message of an alert that goes with a frame.
+pub fn collision_alert(header: &FrameHeader, alert: &Alert) -> CollisionAlert {
+    let FrameHeader { run_id, tick, stamp_ns, sim_time, .. } = *header;
+    let mut message =
+        CollisionAlert { run_id, tick, stamp_ns, sim_time, level: alert.level as u32, ..Default::default() };
+    if let Some(nearest) = alert.nearest {
+        let midpoint = nalgebra::center(&nearest.point_a, &nearest.point_b);
+        message.clearance = nearest.value;
+        (message.x, message.y) = (midpoint.x, midpoint.y);
+        (message.bench_a, message.bench_b) = (nearest.bench_a as u32, nearest.bench_b as u32);
+    }
+    if let Some(timed) = alert.event {
+        message.event_time = timed.time;
+        message.time_to_event = timed.time - sim_time;
+        message.event = FrameState::from(timed.event.kind) as u32;
+        message.event_bench_a = timed.event.bench_a.unwrap_or(NO_BENCH);
+        message.event_bench_b = timed.event.bench_b.unwrap_or(NO_BENCH);
+        if let Some(place) = timed.event.place {
+            (message.event_x, message.event_y) = (place.x, place.y);
+        }
+    }
+    message
+}
+
+/// The stage of a motion.
+pub fn stage(run_id: u64, stamp_ns: u64, motion: &Motion) -> Stage {
+    let team = motion.team();
+    let mut path = [StageSegment::default(); MOST_SEGMENTS];
+    let (mut segments, mut pitch, mut start_turn) = (0, f64::NAN, f64::NAN);
+    for (slot, outline) in path.iter_mut().zip(motion.outline()) {
+        *slot = stage_segment(&outline);
+        if let OutlineKind::Spiral { direction: Direction::Inward, pitch: metres, first, .. } = outline.kind {
+            (pitch, start_turn) = (metres, first / std::f64::consts::TAU);
+        }
+        segments += 1;
+    }
+    Stage {
+        run_id,
+        stamp_ns,
+        pitch,
+        start_turn,
+        hole_inset: team.hole_inset,
+        head_length: team.head_length,
+        body_length: team.body_length,
+        width: team.width,
+        benches: team.benches as u32,
+        segments,
+        path,
+    }
+}
+
+fn stage_segment(outline: &SegmentOutline) -> StageSegment {
+    let (kind, curvature, theta_first, theta_last) = match outline.kind {
+        OutlineKind::Line => (SEGMENT_LINE, 0.0, f64::NAN, f64::NAN),
+        OutlineKind::Arc { curvature } => (SEGMENT_ARC, curvature, f64::NAN, f64::NAN),
+        OutlineKind::Spiral { direction: Direction::Inward, first, last, .. } => {
+            (SEGMENT_INWARD_SPIRAL, f64::NAN, first, last)
+        }
+        OutlineKind::Spiral { direction: Direction::Outward, first, last, .. } => {
+            (SEGMENT_OUTWARD_SPIRAL, f64::NAN, first, last)
+        }
+    };
+    let SegmentOutline { start, heading, length, .. } = *outline;
+    StageSegment { x: start.x, y: start.y, heading, length, curvature, theta_first, theta_last, kind, reserved: 0 }
+}
+
+impl FrameHeader {
+    /// The state, or `None` for a number that this layout does not know.
+    pub fn frame_state(&self) -> Option<FrameState> {
+        of_number(&FrameState::ALL, self.state)
+    }
+
+    /// Whether the show plays, or `None` for a number that this layout does not know.
+    pub fn playback_state(&self) -> Option<PlaybackState> {
+        of_number(&PlaybackState::ALL, self.playback)
+    }
+}
+
+impl CollisionAlert {
+    /// The level, or `None` for a number that this layout does not know.
+    pub fn alert_level(&self) -> Option<Level> {
+        of_number(&Level::ALL, self.level)
+    }
+
+    /// What the alert is about; `None` where it is about no event.
+    pub fn event_kind(&self) -> Option<EventKind> {
+        of_number(&FrameState::ALL, self.event)?.event()
+    }
+
+    /// The nearest benches in this frame, from 0.
+    pub fn nearest_benches(&self) -> impl Iterator<Item = u32> {
+        benches(self.bench_a, self.bench_b)
+    }
+
+    /// The benches of the event, from 0.
+    pub fn event_benches(&self) -> impl Iterator<Item = u32> {
+        benches(self.event_bench_a, self.event_bench_b)
+    }
+}
+
+/// The value with a number on the wire: values are numbered in order, from 0.
+fn of_number<T: Copy>(all: &[T], number: u32) -> Option<T> {
+    all.get(number as usize).copied()
+}
+
+fn benches(a: u32, b: u32) -> impl Iterator<Item = u32> {
+    [a, b].into_iter().filter(|bench| *bench != NO_BENCH)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Point;
+    use crate::motion::clearance::PairClearance;
+    use crate::motion::event::Event;
+    use crate::motion::timeline::TimedEvent;
+
+    const NEAREST: PairClearance = PairClearance {
+        value: 0.25,
+        bench_a: 3,
+        bench_b: 17,
+        point_a: Point::new(1.0, 2.0),
+        point_b: Point::new(2.0, 6.0),
+    };
+
+    fn timed(kind: EventKind, bench_b: Option<u32>) -> TimedEvent {
+        let event = Event { kind, travelled: 412.0, bench_a: Some(0), bench_b, place: Some(Point::new(-1.0, -2.0)) };
+        TimedEvent { event, time: 412.5 }
+    }
+
+    #[test]
+    fn numbers_are_those_of_the_design_and_come_back() {
+        let states = FrameState::ALL.map(|state| (state as u32, state.name()));
+        let expected = [(0, "moving"), (1, "approaching"), (2, "contact"), (3, "stall"), (4, "lock"), (5, "path_end")];
+        assert_eq!(states, expected);
+        let levels = Level::ALL.map(|level| (level as u32, level.name()));
+        assert_eq!(levels, [(0, "clear"), (1, "approaching"), (2, "contact"), (3, "stall"), (4, "lock")]);
+        let playback = PlaybackState::ALL.map(|playback| (playback as u32, playback.name()));
+        assert_eq!(playback, [(0, "playing"), (1, "paused"), (2, "held"), (3, "ended")]);
+        let header = |state, playback| FrameHeader { state, playback, ..Default::default() };
+        assert_eq!(header(4, 3).frame_state(), Some(FrameState::Lock));
+        assert_eq!(header(4, 3).playback_state(), Some(PlaybackState::Ended));
+        assert_eq!((header(6, 4).frame_state(), header(6, 4).playback_state()), (None, None));
+        let alert = |level, event| CollisionAlert { level, event, ..Default::default() };
+        assert_eq!(alert(1, 2).alert_level(), Some(Level::Approaching));
+        assert_eq!(alert(1, 2).event_kind(), Some(EventKind::Contact));
+        assert_eq!(alert(0, 0).event_kind(), None);
+        assert_eq!((alert(5, 6).alert_level(), alert(5, 6).event_kind()), (None, None));
+    }
+
+    #[test]
+    fn an_alert_has_the_nearest_pair_and_the_event_each_in_its_place() {
+        let header = FrameHeader { run_id: 7, tick: 9, stamp_ns: 11, sim_time: 402.5, ..Default::default() };
+        let event = Some(timed(EventKind::Contact, Some(8)));
+        let message = collision_alert(&header, &Alert { level: Level::Approaching, event, nearest: Some(NEAREST) });
+        assert_eq!((message.run_id, message.tick, message.stamp_ns, message.sim_time), (7, 9, 11, 402.5));
+        assert_eq!((message.level, message.event), (1, 2));
+        assert_eq!((message.event_time, message.time_to_event), (412.5, 10.0));
+        assert_eq!((message.bench_a, message.bench_b, message.clearance), (3, 17, 0.25));
+        assert_eq!((message.x, message.y), (1.5, 4.0));
+        assert_eq!((message.event_bench_a, message.event_bench_b), (0, 8));
+        assert_eq!((message.event_x, message.event_y), (-1.0, -2.0));
+    }
+
+    #[test]
+    fn a_stall_has_one_bench_and_nothing_at_all_has_none() {
+        let header = FrameHeader { sim_time: 420.0, ..Default::default() };
+        let stall = Some(timed(EventKind::Stall, None));
+        let message = collision_alert(&header, &Alert { level: Level::Stall, event: stall, nearest: None });
+        assert_eq!((message.level, message.event, message.event_bench_b), (3, 3, NO_BENCH));
+        assert_eq!(message.event_benches().collect::<Vec<_>>(), [0]);
+        assert!(message.clearance.is_nan() && message.x.is_nan() && message.y.is_nan());
+        let message = collision_alert(&header, &Alert { level: Level::Clear, event: None, nearest: None });
+        assert_eq!((message.event, message.bench_a, message.event_bench_a), (0, NO_BENCH, NO_BENCH));
+        assert!(
+            [message.event_time, message.time_to_event, message.event_x, message.event_y].iter().all(|n| n.is_nan())
+        );
+        assert_eq!(message.nearest_benches().chain(message.event_benches()).count(), 0);
+    }
+}

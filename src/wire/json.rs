@@ -1,0 +1,91 @@
+//! Messages as JSON: the names of numbers, null where there is nothing, and text where a double is too small.
+//!
+//! In: a layout. Out: what serde writes. Called by `watch --json` and the stage picture's server.
+
+use serde::Serialize;
+
+use super::layouts::{CollisionAlert, NO_BENCH};
+use crate::motion::event::EventKind;
+use crate::show::state::Level;
+
+/// A whole number that JavaScript would round, as text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Exact(pub u64);
+
+impl Serialize for Exact {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(&self.0)
+    }
+}
+
+/// A [`CollisionAlert`] with the fields of the layout in their order. Numbers that are not one become null.
+#[derive(Debug, Clone, Serialize)]
+#[serde(tag = "type", rename = "alert")]
+pub struct AlertObject {
+    run_id: Exact,
+    tick: u64,
+    stamp_ns: Exact,
+    sim_time: f64,
+    event_time: f64,
+    time_to_event: f64,
+    clearance: f64,
+    x: f64,
+    y: f64,
+    event_x: f64,
+    event_y: f64,
+    level: &'static str,
+    bench_a: Option<u32>,
+    bench_b: Option<u32>,
+    event: Option<&'static str>,
+    event_bench_a: Option<u32>,
+    event_bench_b: Option<u32>,
+}
+
+impl From<&CollisionAlert> for AlertObject {
+    fn from(alert: &CollisionAlert) -> Self {
+        let bench = |bench: u32| (bench != NO_BENCH).then_some(bench);
+        Self {
+            run_id: Exact(alert.run_id),
+            tick: alert.tick,
+            stamp_ns: Exact(alert.stamp_ns),
+            sim_time: alert.sim_time,
+            event_time: alert.event_time,
+            time_to_event: alert.time_to_event,
+            clearance: alert.clearance,
+            x: alert.x,
+            y: alert.y,
+            event_x: alert.event_x,
+            event_y: alert.event_y,
+            level: alert.alert_level().map_or("unknown", Level::name),
+            bench_a: bench(alert.bench_a),
+            bench_b: bench(alert.bench_b),
+            event: alert.event_kind().map(EventKind::name),
+            event_bench_a: bench(alert.event_bench_a),
+            event_bench_b: bench(alert.event_bench_b),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_alert_about_nothing_has_nulls() {
+        let json = serde_json::to_value(AlertObject::from(&CollisionAlert::default())).unwrap();
+        assert_eq!((json["type"].as_str(), json["level"].as_str()), (Some("alert"), Some("clear")));
+        let nulls = json.as_object().unwrap().iter().filter(|(_, value)| value.is_null()).count();
+        // event_time, time_to_event, clearance, two places, two pairs of benches, and the event.
+        assert_eq!(nulls, 12, "{json}");
+    }
+
+    #[test]
+    fn numbers_beyond_a_double_are_text() {
+        let alert =
+            CollisionAlert { run_id: u64::MAX, stamp_ns: (1 << 60) + 1, level: 2, event: 4, ..Default::default() };
+        let json = serde_json::to_value(AlertObject::from(&alert)).unwrap();
+        assert_eq!(json["run_id"], "18446744073709551615");
+        assert_eq!(json["stamp_ns"], "1152921504606846977");
+        assert_eq!((json["level"].as_str(), json["event"].as_str()), (Some("contact"), Some("lock")));
+    }
+}

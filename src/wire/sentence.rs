@@ -1,0 +1,150 @@
+//! Alerts in words, for people: benches are counted from 1, and the sentence says so.
+//!
+//! In: a [`CollisionAlert`] and the number of benches. Out: a sentence. Called by `run`, `watch` and the stage picture's
+//! server, so that all of them say the same.
+
+use super::layouts::CollisionAlert;
+use crate::motion::event::EventKind;
+use crate::show::state::Level;
+
+/// Whether a sentence holds what changes from frame to frame: the time until the event, and the clearance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Figures {
+    /// It does.
+    Shown {
+        /// Simulated seconds per second of wall time, in which the time until the event is given.
+        time_scale: f64,
+    },
+    /// It does not: they stand beside the sentence.
+    Omitted,
+}
+
+/// A bench as people call it, counted from 1.
+pub fn bench_name(bench: u32, benches: u32) -> String {
+    let number = u64::from(bench) + 1;
+    match number {
+        1 => "bench 1 (the head)".to_owned(),
+        _ if number == u64::from(benches) => format!("bench {number} (the tail)"),
+        _ => format!("bench {number}"),
+    }
+}
+
+/// What an alert says, in a team of so many benches: what has happened, or what is coming and which two are nearest.
+pub fn alert_sentence(alert: &CollisionAlert, benches: u32, figures: Figures) -> String {
+    let happened = alert.alert_level().is_some_and(Level::has_happened);
+    let said = match (happened, alert.event_kind()) {
+        (true, Some(kind)) => happening(alert, kind, benches),
+        (true, None) => "at an unknown place".to_owned(),
+        (false, kind) => {
+            let coming = kind.map(|kind| coming(alert, kind, benches, figures));
+            let coming = coming.unwrap_or_else(|| "no contact, stall or lock ahead".to_owned());
+            match nearest(alert, benches, figures) {
+                Some(nearest) => format!("{coming}; {nearest}"),
+                None => coming,
+            }
+        }
+    };
+    if said.contains("bench ") { format!("{said} (counting from 1)") } else { said }
+}
+
+fn happening(alert: &CollisionAlert, kind: EventKind, benches: u32) -> String {
+    let who = names(alert.event_benches(), benches);
+    let (time, place) = (alert.event_time, format!("({:.3}, {:.3}) m", alert.event_x, alert.event_y));
+    match kind {
+        EventKind::Contact => format!("{who} touch at {place}, t = {time:.6} s"),
+        EventKind::Stall => {
+            format!("{who} stalls, t = {time:.6} s: from the handle at {place} on, the team is pushed backwards")
+        }
+        EventKind::Lock => format!("{who} locks, its rear handle at {place}, t = {time:.6} s: the motion cannot go on"),
+        EventKind::PathEnd => format!("the head reaches the end of the path, t = {time:.6} s"),
+    }
+}
+
+fn coming(alert: &CollisionAlert, kind: EventKind, benches: u32, figures: Figures) -> String {
+    let who = names(alert.event_benches(), benches);
+    let when = match figures {
+        Figures::Shown { time_scale } => format!(" in {:.1} s", alert.time_to_event / time_scale),
+        Figures::Omitted => String::new(),
+    };
+    format!("{}: {who}{when}", kind.name())
+}
+
+/// Zero has no sign for people: a touch is solved to the last bits, on either side.
+fn nearest(alert: &CollisionAlert, benches: u32, figures: Figures) -> Option<String> {
+    alert.nearest_benches().next()?;
+    let nearest = format!("nearest now are {}", names(alert.nearest_benches(), benches));
+    if figures == Figures::Omitted {
+        return Some(nearest);
+    }
+    let clearance = (alert.clearance * 1e4).round() / 1e4 + 0.0;
+    let apart =
+        if clearance < 0.0 { format!("overlap by {:.4} m", -clearance) } else { format!("{clearance:.4} m apart") };
+    Some(format!("{nearest}, {apart}"))
+}
+
+fn names(concerned: impl Iterator<Item = u32>, benches: u32) -> String {
+    concerned.map(|bench| bench_name(bench, benches)).collect::<Vec<_>>().join(" and ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::NO_BENCH;
+
+    const SHOWN: Figures = Figures::Shown { time_scale: 2.0 };
+
+    fn alert(level: Level, kind: Option<EventKind>) -> CollisionAlert {
+        let event = kind.map_or(0, |kind| crate::show::state::FrameState::from(kind) as u32);
+        CollisionAlert {
+            level: level as u32,
+            bench_a: 0,
+            bench_b: 9,
+            clearance: 0.0031,
+            event,
+            event_time: 412.473837682,
+            time_to_event: 13.0,
+            event_bench_a: 0,
+            event_bench_b: 8,
+            event_x: 1.25,
+            event_y: -0.5,
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn what_comes_has_its_kind_its_benches_and_its_time() {
+        let coming = alert(Level::Approaching, Some(EventKind::Contact));
+        let nearest = "nearest now are bench 1 (the head) and bench 10, 0.0031 m apart (counting from 1)";
+        let sentence = |figures| alert_sentence(&coming, 223, figures);
+        assert_eq!(sentence(SHOWN), format!("contact: bench 1 (the head) and bench 9 in 6.5 s; {nearest}"));
+        let words = "contact: bench 1 (the head) and bench 9; nearest now are bench 1 (the head) and bench 10 (counting from 1)";
+        assert_eq!(sentence(Figures::Omitted), words);
+        let stall = CollisionAlert {
+            event_bench_b: NO_BENCH,
+            bench_a: NO_BENCH,
+            bench_b: NO_BENCH,
+            ..alert(Level::Clear, Some(EventKind::Stall))
+        };
+        assert_eq!(alert_sentence(&stall, 2, SHOWN), "stall: bench 1 (the head) in 6.5 s (counting from 1)");
+        let nothing = alert(Level::Approaching, None);
+        assert_eq!(alert_sentence(&nothing, 223, SHOWN), format!("no contact, stall or lock ahead; {nearest}"));
+    }
+
+    #[test]
+    fn what_has_happened_has_its_place_and_its_time() {
+        let contact = alert(Level::Contact, Some(EventKind::Contact));
+        assert_eq!(
+            alert_sentence(&contact, 9, SHOWN),
+            "bench 1 (the head) and bench 9 (the tail) touch at (1.250, -0.500) m, t = 412.473838 s (counting from 1)"
+        );
+        let lock = CollisionAlert { event_bench_b: NO_BENCH, ..alert(Level::Lock, Some(EventKind::Lock)) };
+        let said = alert_sentence(&lock, 223, SHOWN);
+        assert!(said.starts_with("bench 1 (the head) locks, its rear handle at (1.250, -0.500) m"), "{said}");
+    }
+
+    #[test]
+    fn an_alert_about_nothing_names_nobody() {
+        let nothing = CollisionAlert::default();
+        assert_eq!(alert_sentence(&nothing, 2, SHOWN), "no contact, stall or lock ahead");
+    }
+}
