@@ -7,7 +7,7 @@ mod processes;
 use serde_json::Value;
 
 use bench_dragon::transports::iceoryx2::{node, service_name};
-use bench_dragon::wire::HandlePose;
+use bench_dragon::wire::{FrameHeader, HandlePose};
 use iceoryx2::prelude::ZeroCopySend;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use processes::{Place, Process, example, json_lines, program, python, scene_file, summary, text, unique, wait};
@@ -226,6 +226,16 @@ fn another_layout_is_refused_with_a_sentence() {
     assert!(said.contains("another layout than bench_dragon_messages.py"), "{said}");
     drop(kept);
 
+    // Frames of today and alerts of another layout.
+    let [poses, alerts] = ["poses", "alerts"].map(|suffix| service_name(&unique("other"), suffix).unwrap());
+    let _poses =
+        node.service_builder(&poses).publish_subscribe::<[HandlePose]>().user_header::<FrameHeader>().create().unwrap();
+    let _alerts = node.service_builder(&alerts).publish_subscribe::<u64>().create().unwrap();
+    let output = Process::start(program("other").args(["watch", "--duration", "10"])).output_within(60);
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("/alerts\" exists with another layout of its messages"), "{said}");
+
     // A publisher of today, and a reader of layout 1.
     let _publisher = Process::start(program("layouts").args(["run", "--json", "--start", "300", "--duration", "60"]));
     let refused = (0..600).map(|_| old().open().err()).find(|error| {
@@ -237,7 +247,7 @@ fn another_layout_is_refused_with_a_sentence() {
 
 #[test]
 fn python_sees_the_same_layouts() {
-    use bench_dragon::wire::{CollisionAlert, FrameHeader, LoopStatus, Stage};
+    use bench_dragon::wire::{CollisionAlert, LoopStatus, Stage};
     use std::mem::offset_of;
     let code = "import sys; sys.path.insert(0, 'examples/python')\n\
                 from bench_dragon_messages import *\n\

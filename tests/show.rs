@@ -3,11 +3,14 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
+use bench_dragon::motion::clearance::least_clearance_all_pairs;
+use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::{AtEnd, OnContact, Scene};
 use bench_dragon::show::alerts::Alert;
 use bench_dragon::show::state::{FrameState, Level, PlaybackState};
 use bench_dragon::show::{Frame, Playback, Show};
+use bench_dragon::wire::convert::{Stamps, frame_header};
 use proptest::prelude::*;
 
 fn paper_timeline() -> Timeline {
@@ -75,6 +78,31 @@ fn a_loop_begins_again_where_it_began() {
     assert_eq!((again.sim_time, again.shows_played), (412.0, 1));
     assert_eq!(again.chain, first.chain);
     assert_eq!((again.state, again.playback), (FrameState::Approaching, PlaybackState::Playing));
+    let stamps = Stamps { run_id: 1, sequence: 30, stamp_ns: 2, deadline_ns: 3 };
+    let [before, after] = [&first, again].map(|frame| frame_header(frame, stamps));
+    assert_eq!((before.epoch, after.epoch), (0, 1), "who interpolates starts anew");
+    assert_eq!((after.tick, after.sequence, after.handles, after.time_scale), (30, 30, 224, 1.0));
+}
+
+/// The nearest two boards are those of the frame at every level; the event is the one ahead, then the one that happened.
+#[test]
+fn an_alert_knows_what_it_is_about_and_who_is_nearest_now() {
+    let mut show = show(Playback { start: 380.0, rate: 10.0, ..playback() });
+    let contact = *show.timeline().find(EventKind::Contact).unwrap();
+    let mut levels = Vec::new();
+    for tick in 0..330 {
+        let frame = show.frame(tick).clone();
+        for alert in &frame.alerts {
+            assert_eq!(alert.event, Some(contact), "at {} s", frame.sim_time);
+            let all = least_clearance_all_pairs(&frame.chain, Scene::paper().team()).unwrap();
+            let nearest = alert.nearest.unwrap();
+            assert_eq!((nearest.bench_a, nearest.bench_b, nearest.value), (all.bench_a, all.bench_b, all.value));
+            assert_eq!(nearest.value, frame.min_clearance);
+            levels.push(alert.level);
+        }
+    }
+    levels.dedup();
+    assert_eq!(levels, [Level::Clear, Level::Approaching, Level::Contact]);
 }
 
 #[test]

@@ -7,6 +7,7 @@ use std::time::Duration;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::subscriber::Subscriber as Port;
 use iceoryx2::prelude::*;
+use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError as Open;
 use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
@@ -69,7 +70,6 @@ impl Subscription {
         let name = service_name(&self.name, "poses")?;
         let opened =
             self.node.service_builder(&name).publish_subscribe::<[HandlePose]>().user_header::<FrameHeader>().open();
-        use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError as Open;
         let poses_service = match opened {
             Ok(service) => service,
             // Not there yet, or just coming or going.
@@ -93,9 +93,9 @@ impl Subscription {
         let connection = Connection {
             poses,
             poses_service,
-            alerts: self.receiver("alerts"),
-            status: self.receiver("status"),
-            stage: self.receiver("stage"),
+            alerts: self.receiver("alerts")?,
+            status: self.receiver("status")?,
+            stage: self.receiver("stage")?,
             tick: self.listener(),
         };
         reserve_pages()?;
@@ -106,12 +106,19 @@ impl Subscription {
     /// one without alerts never makes that one.
     ///
     /// # Errors
-    /// [`OpenError::Full`] where a service is there now and the memory for it is not.
+    /// [`OpenError::Full`] where a service is there now and the memory for it is not, [`OpenError::Incompatible`] where
+    /// its messages have another layout.
     pub fn complete(&self, connection: &mut Connection) -> Result<(), OpenError> {
         let missing = connection.missing();
-        connection.alerts = connection.alerts.take().or_else(|| self.receiver("alerts"));
-        connection.status = connection.status.take().or_else(|| self.receiver("status"));
-        connection.stage = connection.stage.take().or_else(|| self.receiver("stage"));
+        if connection.alerts.is_none() {
+            connection.alerts = self.receiver("alerts")?;
+        }
+        if connection.status.is_none() {
+            connection.status = self.receiver("status")?;
+        }
+        if connection.stage.is_none() {
+            connection.stage = self.receiver("stage")?;
+        }
         connection.tick = connection.tick.take().or_else(|| self.listener());
         if connection.missing() < missing { reserve_pages() } else { Ok(()) }
     }
@@ -122,11 +129,17 @@ impl Subscription {
         connection.poses_service.dynamic_config().number_of_publishers() > 0
     }
 
-    /// A port of a service that may be absent: the scene has no alerts, say.
-    fn receiver<Message: ZeroCopySend + std::fmt::Debug>(&self, service: &str) -> Option<Receiver<Message, ()>> {
-        let name = service_name(&self.name, service).ok()?;
-        let factory = self.node.service_builder(&name).publish_subscribe::<Message>().open().ok()?;
-        factory.subscriber_builder().create().ok()
+    /// A port of a service that may be absent: the scene has no alerts, say. One with another layout is refused.
+    fn receiver<Message: ZeroCopySend + std::fmt::Debug>(
+        &self,
+        service: &str,
+    ) -> Result<Option<Receiver<Message, ()>>, OpenError> {
+        let name = service_name(&self.name, service)?;
+        match self.node.service_builder(&name).publish_subscribe::<Message>().open() {
+            Ok(factory) => Ok(factory.subscriber_builder().create().ok()),
+            Err(Open::IncompatibleTypes | Open::VersionMismatch) => Err(OpenError::Incompatible(name.to_string())),
+            Err(_) => Ok(None),
+        }
     }
 
     fn listener(&self) -> Option<Listener<ipc::Service>> {
