@@ -11,7 +11,7 @@ import time
 
 import iceoryx2 as iox2
 import numpy as np
-from bench_dragon_messages import EVENTS, PLAYBACK, STATES, CollisionAlert, FrameHeader, HandlePose, handles_of
+from bench_dragon_messages import EVENTS, NO_BENCH, PLAYBACK, STATES, CollisionAlert, FrameHeader, HandlePose, handles_of
 
 iox2.set_log_level(iox2.LogLevel.Fatal)
 
@@ -101,7 +101,9 @@ def main():
                     "level": message.level,
                     "event": EVENTS[message.event],
                     "event_time": message.event_time,
-                    "event_benches": [message.event_bench_a, message.event_bench_b],
+                    "event_benches": [
+                        bench for bench in (message.event_bench_a, message.event_bench_b) if bench != NO_BENCH
+                    ],
                 }
                 # NaN is no JSON.
                 print(json.dumps({key: None if value != value else value for key, value in line.items()}))

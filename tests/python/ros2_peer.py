@@ -126,7 +126,7 @@ def from_file(name, known):
 
 KNOWN = {"std_msgs/Header": Header}
 KNOWN["HandlePose"] = from_file("HandlePose", KNOWN)
-KNOWN["StagePiece"] = from_file("StagePiece", KNOWN)
+KNOWN["StageSegment"] = from_file("StageSegment", KNOWN)
 TOPICS = {
     "handles": from_file("HandlePoses", KNOWN),
     "alerts": from_file("CollisionAlert", KNOWN),
