@@ -6,7 +6,7 @@
 
 pub mod convert;
 pub mod json;
-mod layouts;
+pub mod layouts;
 pub mod sentence;
 
 pub use layouts::*;
