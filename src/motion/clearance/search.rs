@@ -20,8 +20,8 @@ const MOST_SCANS: usize = 16;
 /// How far beyond the limit carried bounds go, in lengths of a body board.
 const SKIN: f64 = 0.05;
 
-/// Metres of movement after which carried bounds are made anew, lest rounding add up.
-const MOST_MOVED: f64 = 1e4;
+/// Metres of closing after which carried bounds are made anew, lest rounding add up to more than is allowed for.
+const MOST_MOVED: f64 = 100.0;
 
 /// For every bench, how near it can be to those behind it, carried from frame to frame.
 ///
