@@ -4,7 +4,7 @@
 //! make a piece: their slopes carry its polynomials, their places prove them; where they do not, the piece is cut in
 //! two. The next band starts from the frontmost row of this one. Called by [`super::FollowerTable::new`] only.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::rc::Rc;
 
 use super::beginning::Beginning;
@@ -14,7 +14,9 @@ use super::rows::{Band, LANES, Lanes, Order, Piece, Rows};
 use super::track::{Node, Track};
 use crate::linkage;
 use crate::model::Vector;
+use crate::model::curve::Segment;
 use crate::model::path::Param;
+use crate::model::spiral::Direction;
 use crate::model::team::Team;
 
 /// Halvings of what lies between two kinks, at most.
@@ -22,6 +24,9 @@ const MOST_HALVINGS: usize = 9;
 
 /// Bytes of a table, at most.
 const MOST_BYTES: usize = 150 << 20;
+
+/// The part of these that any phases may take.
+const LEAST_SHARE: f64 = 0.125;
 
 /// What part of its allowance a halved piece may still use up if halving is to go on: less gain is rounding, not shape.
 const LEAST_GAIN: f64 = 0.75;
@@ -164,7 +169,9 @@ impl BandBuilder<'_> {
         }
         self.front_row.extend(quintet_at(strands, self.band.rows - 1).map(|nodes| (piece, nodes.map(|node| *node))));
         self.band.pieces.push(piece);
-        (size_of_val(self.band.coefficients.as_slice()) <= self.budget).then_some(())
+        // Where the first phases take too much, so will all of them; a part of them may take more than its share.
+        let share = piece.end.max(LEAST_SHARE);
+        (size_of_val(self.band.coefficients.as_slice()) as f64 <= self.budget as f64 * share).then_some(())
     }
 
     /// Adds the polynomials of a piece.
@@ -250,11 +257,27 @@ impl BandBuilder<'_> {
     /// Whether the node before this one of a strand is where the linkage says the follower is.
     fn is_first_follower(&self, strand: &Strand, index: usize) -> bool {
         let Some(before) = index.checked_sub(1) else { return true };
-        let (front, rear) = (strand[index].at, strand[before].at);
-        let Ok(found) = linkage::follower(self.track.path, front, self.link) else { return false };
-        let size = self.track.path.point(front).coords.norm();
-        self.track.displacement(found, rear).norm() <= 1e-6 * self.link + 1e-13 * size
+        is_follower(self.track, strand[before].at, strand[index].at, self.link)
     }
+}
+
+/// Whether a place at a link's distance is where the linkage says the follower of `front` is.
+fn is_follower(track: &Track, place: Param, front: Param, link: f64) -> bool {
+    let apart = place.at.minus(front.at).abs();
+    // As long as the distance has grown all the way.
+    let nearest = match track.path.segment(front) {
+        Segment::Line(_) => true,
+        Segment::Arc(_) => apart <= FRAC_PI_2,
+        Segment::Spiral(spiral) => {
+            apart <= FRAC_PI_2 && (spiral.direction() == Direction::Inward || front.at.high >= 1.0 + FRAC_PI_2)
+        }
+    };
+    if nearest && place.segment == front.segment {
+        return true;
+    }
+    let Ok(found) = linkage::follower(track.path, front, link) else { return false };
+    let size = track.path.point(front).coords.norm();
+    track.displacement(found, place).norm() <= 1e-6 * link + 1e-13 * size
 }
 
 /// The nodes of a row's five strands, the row counted forward from the band's last; `None` where a strand ends before.
@@ -289,8 +312,12 @@ pub(super) fn rows(track: &Track, team: &Team, order: Order) -> Option<Rows> {
     let link = team.link(1);
     let foremost = foremost(track, team)?;
     let second = track.follower(track.path.param_at(0.0), team.link(0))?;
-    // One strand tells how many rows there are, with some to spare.
+    // One strand tells how many rows there are, with some to spare; where each takes half a turn there are the fewest.
     let mut node = beginning.node(track, 0.0);
+    let fewest = (track.path.arc_length(node.at, foremost) / (FRAC_PI_2 * link)).max(0.0) as usize;
+    if fewest.saturating_mul(order.per_row() * size_of::<f64>()) > MOST_BYTES {
+        return None;
+    }
     let (mut gap, mut steps, mut behind_second) = (link, 0, 0);
     while track.path.arc_length(foremost, node.at) < 0.0 {
         steps += 1;

@@ -4,11 +4,13 @@
 //! In: a path and places on it. Out: displacements, places at a link's distance, [`Node`]s. Called by the making of the
 //! table only; no frame comes here.
 
+use std::f64::consts::PI;
+
 use crate::linkage::{self, link_pose};
 use crate::model::Vector;
 use crate::model::curve::{Coordinate, Curve, Line, Segment};
 use crate::model::path::{Param, Path};
-use crate::model::spiral::Direction;
+use crate::model::spiral::{Direction, Spiral};
 
 /// A path with the coordinates at which its segments join.
 #[derive(Debug)]
@@ -115,6 +117,22 @@ impl<'a> Track<'a> {
         None
     }
 
+    /// The place `link` metres ahead of another, about `gap` metres of travel ahead, where both are on one segment.
+    fn ahead_on_segment(&self, rear: Param, gap: f64, link: f64) -> Option<Param> {
+        let segment = self.path.segment(rear);
+        let by = match segment {
+            Segment::Line(_) => link,
+            Segment::Arc(arc) => 2.0 * (0.5 * link / arc.radius).asin(),
+            Segment::Spiral(spiral) => spiral_angle(spiral, rear.at, gap, link)?,
+        };
+        let at = Param { at: rear.at.plus(by), ..rear };
+        let over = at.at.minus(self.last[rear.segment]);
+        let inward = matches!(segment, Segment::Spiral(spiral) if spiral.direction() == Direction::Inward);
+        let beyond = if inward { over < 0.0 } else { over > 0.0 };
+        let sound = at.at.high > 0.0 || !matches!(segment, Segment::Spiral(_));
+        (by.is_finite() && sound && (!beyond || rear.segment + 1 == self.last.len())).then_some(at)
+    }
+
     /// The first place behind `front` at a link's distance.
     pub(super) fn follower(&self, front: Param, link: f64) -> Option<Param> {
         let rear = linkage::follower(self.path, front, link).ok()?;
@@ -124,7 +142,10 @@ impl<'a> Track<'a> {
 
     /// The node one link ahead of `rear`, with `gap` metres as a guess of how far that is; the guess is improved.
     pub(super) fn ahead(&self, rear: &Node, gap: &mut f64, link: f64) -> Option<Node> {
-        let at = self.settled(self.moved(rear.at, *gap)?, rear.at, link)?;
+        let at = match self.ahead_on_segment(rear.at, *gap, link) {
+            Some(at) => at,
+            None => self.settled(self.moved(rear.at, *gap)?, rear.at, link)?,
+        };
         if at.segment == rear.at.segment {
             *gap = at.at.minus(rear.at.at) * signed_rate(self.path.segment(at), rear.at.at);
         }
@@ -163,4 +184,30 @@ pub(super) fn signed_rate(segment: &Segment, at: Coordinate) -> f64 {
             if spiral.direction() == Direction::Inward { -rate } else { rate }
         }
     }
+}
+
+/// The angle from a place on a spiral to the one `link` metres away, about `gap` metres of travel ahead, by Newton's
+/// method for (g d)^2 + 4 r (r + g d) sin^2(d/2) = link^2 (law of cosines), r the radius and g its growth.
+fn spiral_angle(spiral: &Spiral, from: Coordinate, gap: f64, link: f64) -> Option<f64> {
+    let (r, a) = (spiral.radius(from), spiral.radius_per_radian());
+    let (growth, sign) = if spiral.direction() == Direction::Inward { (-a, -1.0) } else { (a, 1.0) };
+    // What rounds off here would add up along the rows.
+    let (square, low) = (link * link, link.mul_add(link, -(link * link)));
+    let mut d = gap / r.hypot(a);
+    for _ in 0..20 {
+        let (sine, cosine) = (0.5 * d).sin_cos();
+        let rise = growth * d;
+        let other = r + rise;
+        let value = (2.0 * r * sine).mul_add(2.0 * other * sine, -square) + rise.mul_add(rise, -low);
+        let slope = 2.0 * growth * rise + 4.0 * r * sine * (growth * sine + other * cosine);
+        let step = value / slope;
+        d -= step;
+        if !(d > 0.0 && d < PI && r + growth * d > 0.0) {
+            return None;
+        }
+        if step.abs() < LAST_STEP * d {
+            return Some(sign * d);
+        }
+    }
+    None
 }
