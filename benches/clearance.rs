@@ -10,6 +10,7 @@ use bench_dragon::model::separation::{separation_board_board, signed_distance_bo
 use bench_dragon::model::team::Team;
 use bench_dragon::motion::clearance::{ClearanceMonitor, board, least_clearance_all_pairs};
 use bench_dragon::solve::newton::Newton;
+use bench_dragon::solve::table::FollowerTable;
 use bench_dragon::solve::{Chain, Velocities};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
@@ -57,6 +58,12 @@ fn procession() -> Path {
     bends.build().expect("its segments join")
 }
 
+/// A monitor with the table of the motion.
+fn monitor(path: &Path, team: Team) -> ClearanceMonitor {
+    let table = FollowerTable::new(path, team, 1.0, Velocities::Omitted).expect("these paths have a table");
+    ClearanceMonitor::new(path, team, &table)
+}
+
 fn run(bencher: Bencher, mut monitor: ClearanceMonitor, chains: &[(Chain, f64)]) {
     bencher.counter(ItemsCount::new(FRAMES)).bench_local(|| {
         for (chain, travelled) in chains {
@@ -72,21 +79,21 @@ const CASES: [(usize, usize); 8] =
 #[divan::bench(args = CASES)]
 fn live(bencher: Bencher, (benches, percent): (usize, usize)) {
     let chains = chains(&spiral(), team(benches), at(percent), 60.0);
-    run(bencher, ClearanceMonitor::new(&spiral(), team(benches)), &chains);
+    run(bencher, monitor(&spiral(), team(benches)), &chains);
 }
 
 /// Metres of travel: in along the spiral, in the turn, and between the lanes that still come in.
 #[divan::bench(args = [50.0, 110.0, 200.0, 300.0, 400.0])]
 fn live_on_the_turnaround(bencher: Bencher, travelled: f64) {
     let chains = chains(&turnaround(), team(223), travelled, 60.0);
-    run(bencher, ClearanceMonitor::new(&turnaround(), team(223)), &chains);
+    run(bencher, monitor(&turnaround(), team(223)), &chains);
 }
 
 /// Metres of travel. On the straight lines at the beginning all neighbours are equally near, so that all are tested.
 #[divan::bench(args = [10.0, 60.0, 90.0, 120.0, 200.0])]
 fn live_on_the_procession(bencher: Bencher, travelled: f64) {
     let chains = chains(&procession(), team(60), travelled, 60.0);
-    run(bencher, ClearanceMonitor::new(&procession(), team(60)), &chains);
+    run(bencher, monitor(&procession(), team(60)), &chains);
 }
 
 #[divan::bench(args = CASES)]
@@ -107,18 +114,18 @@ fn live_without_table_by_rate(bencher: Bencher, rate: f64) {
 fn live_on_less_than_a_turn(bencher: Bencher) {
     let spiral = Path::spiral(PITCH, 60.0);
     let chains = chains(&spiral, team(100), 0.0, 60.0);
-    run(bencher, ClearanceMonitor::new(&spiral, team(100)), &chains);
+    run(bencher, monitor(&spiral, team(100)), &chains);
 }
 
 /// What the table of bounds costs once, before the show, with the follower table from which it is made.
 #[divan::bench(args = [223, 1_000, 5_000, 10_000], sample_count = 5, sample_size = 1)]
 fn make_monitor(benches: usize) -> ClearanceMonitor {
-    ClearanceMonitor::new(&spiral(), team(benches))
+    monitor(&spiral(), team(benches))
 }
 
 #[divan::bench(sample_count = 5, sample_size = 1)]
 fn make_monitor_of_the_turnaround() -> ClearanceMonitor {
-    ClearanceMonitor::new(&turnaround(), team(223))
+    monitor(&turnaround(), team(223))
 }
 
 /// A peer: the distances of all pairs by parry2d.

@@ -42,6 +42,8 @@ pub struct Choice {
     pub solver: Box<dyn Solver>,
     /// Its name, its settings and the reason, for people.
     pub reason: String,
+    /// The table that the solver interpolates in, if it does.
+    table: Option<FollowerTable>,
 }
 
 /// A motion that cannot be.
@@ -146,20 +148,20 @@ impl Motion {
                 let why = "as exact as doubles allow, and the cheapest that is";
                 table(why).unwrap_or_else(|| {
                     let reason = format!("newton: {no_table}, and {accuracy:e} m is met by exact motion alone");
-                    Choice { solver: Box::new(newton()), reason }
+                    Choice { solver: Box::new(newton()), reason, table: None }
                 })
             }
             (Method::FollowerTable, _) => table("named by the scene").unwrap_or_else(|| {
                 let reason = format!("newton: the scene names follower_table, but {no_table}");
-                Choice { solver: Box::new(newton()), reason }
+                Choice { solver: Box::new(newton()), reason, table: None }
             }),
             (Method::Paper(rules), Some((spiral, start))) => {
                 let paper = Paper::new(*spiral, start.high, self.team, self.head_speed, velocities, rules);
                 let reason = "paper: named by the scene; its head is too fast by sqrt(1 + 1/theta^2)".to_owned();
-                Choice { solver: Box::new(paper), reason }
+                Choice { solver: Box::new(paper), reason, table: None }
             }
             (Method::Newton | Method::Paper(_), _) => {
-                Choice { solver: Box::new(newton()), reason: "newton: named by the scene".to_owned() }
+                Choice { solver: Box::new(newton()), reason: "newton: named by the scene".to_owned(), table: None }
             }
         }
     }
@@ -171,14 +173,19 @@ impl Motion {
             String::new()
         };
         let reason = format!("follower_table ({}){valid}: {why}", table.instructions().name());
-        Choice { solver: Box::new(table), reason }
+        Choice { solver: Box::new(table.clone()), reason, table: Some(table) }
     }
 
     /// The live clearance of this motion's frames.
-    pub fn clearance_monitor(&self) -> ClearanceMonitor {
-        match self.method {
-            Method::Paper(_) => ClearanceMonitor::without_table(self.team),
-            _ => ClearanceMonitor::new(&self.path, self.team),
+    /// `choice` is the solver of the same frames, whose table it shares.
+    pub fn clearance_monitor(&self, choice: &Choice) -> ClearanceMonitor {
+        let made_here = match self.method {
+            Method::Newton => FollowerTable::new(&self.path, self.team, self.head_speed, Velocities::Omitted),
+            Method::Accuracy(_) | Method::FollowerTable | Method::Paper(_) => None,
+        };
+        match choice.table.as_ref().or(made_here.as_ref()) {
+            Some(table) => ClearanceMonitor::new(&self.path, self.team, table),
+            None => ClearanceMonitor::without_table(self.team),
         }
     }
 

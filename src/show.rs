@@ -133,9 +133,10 @@ impl Show {
         timeline.reserve_contact();
         let stops = scene.alerts.is_some() && playback.on_contact == OnContact::Stop;
         let freeze_time = timeline.freeze(stops).time;
-        let clearance = scene.alerts.map(|_| scene.motion.clearance_monitor());
         let level = scene.alerts.map(|rules| LevelTracker::new(rules, playback.rate));
-        let Choice { solver, reason } = scene.motion.solver(scene.velocities);
+        let choice = scene.motion.solver(scene.velocities);
+        let clearance = scene.alerts.map(|_| scene.motion.clearance_monitor(&choice));
+        let Choice { solver, reason, .. } = choice;
         let exact = !matches!(scene.motion.method(), Method::Paper(_));
         let frame = Frame {
             tick: 0,

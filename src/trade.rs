@@ -393,14 +393,14 @@ fn first_overlapping_sample(scene: &Scene, contact: f64, end: f64, interval: f64
 fn live_clearance_ns(scene: &Scene, end: f64) -> f64 {
     const RUNS: usize = 20;
     const RUN: usize = 40;
-    let mut solver = scene.motion.solver(scene.velocities).solver;
+    let mut choice = scene.motion.solver(scene.velocities);
     let mut chain = Chain::new(scene.team().handles());
-    let mut monitor = scene.motion.clearance_monitor();
+    let mut monitor = scene.motion.clearance_monitor(&choice);
     let mut times = Vec::with_capacity(RUNS * RUN);
     for run in 0..RUNS {
         for frame in 0..RUN {
             let time = 0.99 * end * run as f64 / RUNS as f64 + frame as f64 / scene.rate;
-            if time >= end || solver.solve(time, &mut chain).is_err() {
+            if time >= end || choice.solver.solve(time, &mut chain).is_err() {
                 break;
             }
             let began = Instant::now();

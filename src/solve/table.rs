@@ -14,6 +14,8 @@ mod polynomial;
 pub(crate) mod rows;
 mod track;
 
+use std::sync::Arc;
+
 use head::{HeadBuilder, HeadTable};
 use kernel::{Moment, within_half_turn};
 pub use rows::Order;
@@ -85,8 +87,9 @@ pub struct FollowerTable {
     head_speed: f64,
     velocities: Velocities,
     instructions: Instructions,
-    rows: Rows,
-    head: HeadTable,
+    /// Shared, so that a clone costs little.
+    rows: Arc<Rows>,
+    head: Arc<HeadTable>,
     newton: Newton,
     fallbacks: u64,
 }
@@ -112,6 +115,7 @@ impl FollowerTable {
         rows.bands.iter_mut().for_each(|band| band.centres = Vec::new());
         let newton = Newton::new(path.clone(), team, head_speed, velocities);
         let instructions = Instructions::available()[0];
+        let (rows, head) = (Arc::new(rows), Arc::new(head));
         Some(Self { head_speed, velocities, instructions, rows, head, newton, fallbacks: 0 })
     }
 

@@ -22,7 +22,6 @@ use crate::model::board::Board;
 use crate::model::path::Path;
 use crate::model::separation::separation_board_board;
 use crate::model::team::Team;
-use crate::solve::Velocities;
 use crate::solve::table::FollowerTable;
 use crate::solve::table::rows::{Alpha, Band, Rows};
 
@@ -99,24 +98,23 @@ pub(super) struct BoundTable {
 }
 
 impl BoundTable {
-    /// The table for a team on a path; `None` where it would be too large or too much work, or where there is no T.
-    pub(super) fn new(path: &Path, team: &Team) -> Option<Self> {
+    /// The table for a team on a path with its follower table; `None` where it would be too large or too much work.
+    pub(super) fn new(path: &Path, team: &Team, follower: &FollowerTable) -> Option<Self> {
         if team.benches < 3 {
             return None;
         }
-        let follower = FollowerTable::new(path, *team, 1.0, Velocities::Omitted)?;
         let rows = follower.rows().rows();
         if rows > MOST_ROWS {
             return None;
         }
-        let knots = head_knots(path, &follower, team.link(1))?;
+        let knots = head_knots(path, follower, team.link(1))?;
         let mut table = Self {
             rows,
             bounds: vec![f32::NEG_INFINITY; CELLS * rows],
             begins: vec![0; CELLS * rows],
             heads: vec![None; knots.len()],
             neighbours: vec![Neighbour::UNKNOWN],
-            follower,
+            follower: follower.clone(),
         };
         let mut lists = ListBuilder::new(team, rows);
         for cell in 0..CELLS {

@@ -12,12 +12,22 @@ fn team(benches: usize, width: f64) -> Team {
     Team { benches, head_length: 3.41, body_length: 2.2, width, hole_inset: 0.275 }
 }
 
+fn bound_table(path: &Path, team: &Team) -> Option<BoundTable> {
+    BoundTable::new(path, team, &FollowerTable::new(path, *team, 1.0, Velocities::Omitted)?)
+}
+
+/// A monitor with the table of the motion, where there is one.
+fn with_table(path: &Path, team: Team) -> ClearanceMonitor {
+    let table = FollowerTable::new(path, team, 1.0, Velocities::Omitted);
+    table.map_or_else(|| ClearanceMonitor::without_table(team), |table| ClearanceMonitor::new(path, team, &table))
+}
+
 /// Monitors with and without a table against all pairs, one frame after the other, as far as there are chains. Returns
 /// the number of frames and what the first monitor did.
 fn agree(team: Team, path: &Path, travels: &[f64]) -> (usize, ClearanceCounters) {
     let solver = Newton::new(path.clone(), team, 1.0, Velocities::Omitted);
     let mut chain = Chain::new(team.handles());
-    let mut monitors = [ClearanceMonitor::new(path, team), ClearanceMonitor::without_table(team)];
+    let mut monitors = [with_table(path, team), ClearanceMonitor::without_table(team)];
     let mut compared = 0;
     for &travelled in travels {
         if solver.solve_at(travelled, &mut chain).is_err() {
@@ -96,7 +106,7 @@ fn the_closest_points_are_the_clearance_apart() {
 fn the_paper_scene_touches_where_it_should() {
     let (team, path) = (team(223, 0.3), Path::spiral(0.55, 16.0));
     let mut chain = Chain::new(team.handles());
-    let mut monitor = ClearanceMonitor::new(&path, team);
+    let mut monitor = with_table(&path, team);
     let solver = Newton::new(path, team, 1.0, Velocities::Omitted);
     let mut at = |travelled: f64| {
         solver.solve_at(travelled, &mut chain).unwrap();
@@ -132,7 +142,7 @@ fn few_pairs_are_tested() {
 fn too_few_benches_have_no_clearance() {
     for benches in [1, 2] {
         let team = team(benches, 0.3);
-        for mut monitor in [ClearanceMonitor::new(&procession(), team), ClearanceMonitor::without_table(team)] {
+        for mut monitor in [with_table(&procession(), team), ClearanceMonitor::without_table(team)] {
             assert_eq!(monitor.least_clearance(&Chain::new(team.handles()), 0.0), None);
         }
     }
@@ -168,7 +178,7 @@ fn check_bounds(table: &BoundTable, path: &Path, team: &Team, travelled: f64) ->
 #[test]
 fn bounds_of_the_paper_scene_are_close() {
     let (team, path) = (team(223, 0.3), Path::spiral(0.55, 16.0));
-    let table = BoundTable::new(&path, &team).unwrap();
+    let table = bound_table(&path, &team).unwrap();
     for k in 0..390 {
         let slack = check_bounds(&table, &path, &team, 1.001 * f64::from(k) + 0.2).unwrap();
         assert!(slack < 0.01, "{slack} m after {k} m");
@@ -177,11 +187,11 @@ fn bounds_of_the_paper_scene_are_close() {
 
 #[test]
 fn there_is_a_table_only_where_it_is_of_use() {
-    let table = |turns: f64, team: Team| BoundTable::new(&Path::spiral(0.55, turns), &team);
+    let table = |turns: f64, team: Team| bound_table(&Path::spiral(0.55, turns), &team);
     assert!(table(16.0, team(2, 0.3)).is_none(), "no pair counts");
     assert!(table(16.0, team(20_000, 0.3)).is_none(), "too long");
     let crowded = Team { benches: 10_000, body_length: 1.0, hole_inset: 0.475, ..team(3, 0.3) };
-    assert!(BoundTable::new(&Path::spiral(0.31, 16.0), &crowded).is_none(), "hundreds of boards about every one");
+    assert!(bound_table(&Path::spiral(0.31, 16.0), &crowded).is_none(), "hundreds of boards about every one");
 }
 
 fn any_team() -> impl Strategy<Value = Team> {
@@ -239,7 +249,7 @@ proptest! {
     fn no_boards_are_nearer_than_the_bounds(
         team in any_team(), path in any_lanes(), places in prop::collection::vec(0.0..1.0f64, 12),
     ) {
-        if let Some(table) = BoundTable::new(&path, &team) {
+        if let Some(table) = bound_table(&path, &team) {
             for place in places {
                 check_bounds(&table, &path, &team, place * path.length());
             }
