@@ -284,8 +284,10 @@ fn two_hosts_find_each_other_by_multicast_or_where_the_subscriber_names_the_publ
     ] {
         hosts.set_multicast(multicast);
         let mut run = program("hosts");
-        run.args(["run", "--ros2", "--json", "--duration", "7"]);
+        run.args(["run", "--ros2", "--json", "--duration", "9"]);
         let publisher = Process::start(on("left", &run).env("ROS_AUTOMATIC_DISCOVERY_RANGE", range));
+        // A subscriber announces itself to its static peers in a burst when it starts: somebody must be there to hear it.
+        std::thread::sleep(std::time::Duration::from_secs(2));
         let subscriber = peer("hosts", "5", &["poses"]);
         let reader = Process::start(on("right", &subscriber).env("CYCLONEDDS_URI", peers));
         let output = reader.output_within(40);
