@@ -423,7 +423,20 @@ fn frames_have_the_bits_they_had() {
     }
 }
 
-const GOLDEN: [(&str, &str, u64); 0] = [];
+const GOLDEN: [(&str, &str, u64); 12] = [
+    ("paper", "newton", 0xb40aca31845b91e3),
+    ("paper", "follower_table (AVX-512)", 0x70710b94d07541e9),
+    ("paper", "follower_table (AVX2 and FMA)", 0x70710b94d07541e9),
+    ("paper", "follower_table (portable)", 0x510351ee79d20005),
+    ("turnaround", "newton", 0x724bcfbf23324f3b),
+    ("turnaround", "follower_table (AVX-512)", 0x3143c365033aebb4),
+    ("turnaround", "follower_table (AVX2 and FMA)", 0x3143c365033aebb4),
+    ("turnaround", "follower_table (portable)", 0x02d2fa78c99b3990),
+    ("procession", "newton", 0xd7c900bb92e96ee7),
+    ("procession", "follower_table (AVX-512)", 0x580192ef8b8d08e0),
+    ("procession", "follower_table (AVX2 and FMA)", 0x580192ef8b8d08e0),
+    ("procession", "follower_table (portable)", 0xc3c5ce95d5a83fbc),
+];
 
 /// Numbers between two others, evenly by magnitude.
 fn magnitude(least: f64, most: f64) -> impl Strategy<Value = f64> {

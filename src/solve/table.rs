@@ -185,23 +185,17 @@ impl FollowerTable {
 
     #[inline(always)]
     fn read_off_with<const FUSED: bool>(&self, travelled: f64, chain: &mut Chain) {
-        match (self.rows.order.coefficients, self.velocities) {
-            (6, Velocities::Computed) => self.read_off_order::<6, 5, FUSED, true>(travelled, chain),
-            (6, Velocities::Omitted) => self.read_off_order::<6, 5, FUSED, false>(travelled, chain),
-            (_, Velocities::Computed) => self.read_off_order::<4, 3, FUSED, true>(travelled, chain),
-            (_, Velocities::Omitted) => self.read_off_order::<4, 3, FUSED, false>(travelled, chain),
+        match self.velocities {
+            Velocities::Computed => self.read_off_wanted::<FUSED, true>(travelled, chain),
+            Velocities::Omitted => self.read_off_wanted::<FUSED, false>(travelled, chain),
         }
     }
 
     #[inline(always)]
-    fn read_off_order<const K: usize, const H: usize, const FUSED: bool, const VELOCITIES: bool>(
-        &self,
-        travelled: f64,
-        chain: &mut Chain,
-    ) {
+    fn read_off_wanted<const FUSED: bool, const VELOCITIES: bool>(&self, travelled: f64, chain: &mut Chain) {
         let sample = self.head.at(travelled);
         let moment = Moment { alpha: sample.alpha, alpha_per_second: sample.alpha_per_metre * self.head_speed };
-        kernel::write::<K, H, FUSED, VELOCITIES>(&self.rows, &moment, chain);
+        kernel::write::<FUSED, VELOCITIES>(&self.rows, &moment, chain);
         let last = chain.handles() - 1;
         chain.heading[last] = chain.heading[last - 1];
         chain.x[0] = sample.x;

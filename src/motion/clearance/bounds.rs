@@ -292,24 +292,18 @@ fn handles(rows: &Rows, cell: usize) -> (usize, Vec<Quadratic>) {
     for band in &rows.bands {
         let pieces = band.piece_at(begin)..=band.piece_at(end);
         for row in first.max(band.first_row)..band.first_row + band.rows {
-            handles.push(handle(rows, band, pieces.clone(), row, (begin, end)));
+            handles.push(handle(band, pieces.clone(), row, (begin, end)));
         }
     }
     (first, handles)
 }
 
 /// A handle while its phase goes from `begin` to `end`, which are in these pieces.
-fn handle(
-    rows: &Rows,
-    band: &Band,
-    pieces: std::ops::RangeInclusive<usize>,
-    row: usize,
-    (begin, end): (f64, f64),
-) -> Quadratic {
+fn handle(band: &Band, pieces: std::ops::RangeInclusive<usize>, row: usize, (begin, end): (f64, f64)) -> Quadratic {
     let middle = 0.5 * (begin + end);
     let at = |piece: usize, phase: f64| {
         let beta = band.pieces[piece].beta(phase);
-        let [x, y] = band.coordinates(&rows.order, piece, row);
+        let [x, y] = band.coordinates(piece, row);
         let value = |c: [f64; 6]| c.iter().rev().fold(0.0, |value, c| value * beta + c);
         Vector::new(value(x), value(y))
     };
@@ -322,7 +316,7 @@ fn handle(
         let betas = local(band.pieces[piece].beta(part.0), band.pieces[piece].beta(part.1));
         let times = local(time(part.0), time(part.1));
         let miss: [f64; 2] = std::array::from_fn(|axis| {
-            let coefficients = band.coordinates(&rows.order, piece, row)[axis];
+            let coefficients = band.coordinates(piece, row)[axis];
             largest_difference(coefficients, betas, quadratic.terms.map(|term| term[axis]), times)
         });
         quadratic.error = quadratic.error.max(miss[0].hypot(miss[1]));

@@ -306,6 +306,10 @@ pub(super) fn within_half_turn(angle: f64) -> f64 {
     }
 }
 
+/// The first row of bands so far behind that shorter polynomials and more pieces serve a frame better: it then waits for
+/// memory, of which each piece of a row takes less.
+const FAR_ROW: usize = 512;
+
 /// The table for `team` on `path`; `None` where there is none, or a too large one.
 pub(super) fn rows(track: &Track, team: &Team, order: Order) -> Option<Rows> {
     let beginning = Beginning::new(track, team)?;
@@ -340,12 +344,13 @@ pub(super) fn rows(track: &Track, team: &Team, order: Order) -> Option<Rows> {
     let nodes = [0.0, 0.25, 0.5, 0.75, 1.0].map(|alpha| beginning.node(track, alpha));
     let mut behind = Row::new(track, &[(whole, nodes)]);
     for (first_row, end_row) in bands(end) {
+        let order = if first_row >= FAR_ROW { order.of_far_rows() } else { order };
         let mut builder = BandBuilder {
             track,
             order,
             link,
             behind,
-            band: Band { first_row, rows: end_row - first_row, ..Band::default() },
+            band: Band::new(first_row, end_row - first_row, order),
             end_row,
             needed: end - steps - 2,
             with_centres: first_row <= end - behind_second,

@@ -29,16 +29,11 @@ struct Local {
     sign: f64,
 }
 
-/// Writes all handles but the head. `K` and `H` are the coefficients of a coordinate and of a heading; `FUSED` says
-/// that the processor multiplies and adds in one instruction.
+/// Writes all handles but the head. `FUSED` says that the processor multiplies and adds in one instruction.
 ///
 /// The heading of the last handle is not its own.
 #[inline(always)]
-pub(super) fn write<const K: usize, const H: usize, const FUSED: bool, const VELOCITIES: bool>(
-    rows: &Rows,
-    moment: &Moment,
-    chain: &mut Chain,
-) {
+pub(super) fn write<const FUSED: bool, const VELOCITIES: bool>(rows: &Rows, moment: &Moment, chain: &mut Chain) {
     let Alpha { row, phase } = moment.alpha;
     let end = row + chain.handles() - 1;
     let mut next = row;
@@ -51,7 +46,13 @@ pub(super) fn write<const K: usize, const H: usize, const FUSED: bool, const VEL
             sign: -moment.alpha_per_second.signum(),
         };
         let band_end = end.min(band.first_row + band.rows);
-        write_band::<K, H, FUSED, VELOCITIES>(band, piece, &local, next..band_end, row, chain);
+        let handled = next..band_end;
+        // The orders that a band can have: see `Order`.
+        match band.order.coefficients {
+            6 => write_band::<6, 5, FUSED, VELOCITIES>(band, piece, &local, handled, row, chain),
+            5 => write_band::<5, 4, FUSED, VELOCITIES>(band, piece, &local, handled, row, chain),
+            _ => write_band::<4, 3, FUSED, VELOCITIES>(band, piece, &local, handled, row, chain),
+        }
         next = band_end;
         if next == end {
             break;
@@ -59,7 +60,8 @@ pub(super) fn write<const K: usize, const H: usize, const FUSED: bool, const VEL
     }
 }
 
-/// Writes the handles of some rows of a band; the second handle stands in row `second`.
+/// Writes the handles of some rows of a band; the second handle stands in row `second`. `K` and `H` are the coefficients of
+/// a coordinate and of a heading.
 #[inline(always)]
 fn write_band<const K: usize, const H: usize, const FUSED: bool, const VELOCITIES: bool>(
     band: &Band,

@@ -43,6 +43,11 @@ impl Order {
     /// As exact as doubles allow.
     pub const EXACT: Self = Self { coefficients: 6, heading_coefficients: 5, tolerance: 5e-15, speed_tolerance: 3e-13 };
 
+    /// The order for rows far behind.
+    pub(super) fn of_far_rows(self) -> Self {
+        if self.coefficients == 6 { Self { coefficients: 5, heading_coefficients: 4, ..self } } else { self }
+    }
+
     /// Coefficients of a row in a piece.
     pub(super) fn per_row(&self) -> usize {
         2 * self.coefficients + self.heading_coefficients
@@ -73,11 +78,13 @@ impl Piece {
 }
 
 /// Neighbouring rows whose phases are cut in the same way.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(crate) struct Band {
     /// The band's first row and how many it has: multiples of [`LANES`].
     pub first_row: usize,
     pub rows: usize,
+    /// How long its polynomials are.
+    pub(super) order: Order,
     /// In order of phase, from 0 to 1 without a gap.
     pub pieces: Vec<Piece>,
     /// By piece, then by block of [`LANES`] rows, then x, y and heading by power: see [`Band::block`].
@@ -98,6 +105,12 @@ pub(super) struct Local {
 }
 
 impl Band {
+    /// A band without pieces.
+    pub(super) fn new(first_row: usize, rows: usize, order: Order) -> Self {
+        let (pieces, coefficients, centres, piece_of_share) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { first_row, rows, order, pieces, coefficients, centres, piece_of_share }
+    }
+
     /// The number of the piece that holds a phase from 0 to 1.
     #[inline(always)]
     pub(crate) fn piece_at(&self, phase: f64) -> usize {
@@ -111,15 +124,15 @@ impl Band {
 
     /// The coefficients of the `LANES` rows from `first_row + LANES * block` on: those of x by power, then of y, then
     /// of the heading, metres and radians.
-    pub(crate) fn block(&self, order: &Order, piece: usize, block: usize) -> &[Lanes] {
-        let blocks = self.rows / LANES;
-        &self.coefficients[(piece * blocks + block) * order.per_row()..][..order.per_row()]
+    pub(crate) fn block(&self, piece: usize, block: usize) -> &[Lanes] {
+        let (blocks, per_row) = (self.rows / LANES, self.order.per_row());
+        &self.coefficients[(piece * blocks + block) * per_row..][..per_row]
     }
 
-    /// The coefficients of x and y of one row, by power, metres; those beyond the table's order are zero.
-    pub(crate) fn coordinates(&self, order: &Order, piece: usize, row: usize) -> [[f64; 6]; 2] {
-        let local = row - self.first_row;
-        let block = self.block(order, piece, local / LANES);
+    /// The coefficients of x and y of one row, by power, metres; those beyond the band's order are zero.
+    pub(crate) fn coordinates(&self, piece: usize, row: usize) -> [[f64; 6]; 2] {
+        let (local, order) = (row - self.first_row, &self.order);
+        let block = self.block(piece, local / LANES);
         std::array::from_fn(|quantity| {
             std::array::from_fn(|power| {
                 if power < order.coefficients {
@@ -207,7 +220,7 @@ impl Rows {
         let piece = band.piece_at(alpha.phase);
         let centre = (*band.centres.get(piece * band.rows + alpha.row.checked_sub(band.first_row)?)?)?;
         let (beta, per_alpha) = (band.pieces[piece].beta(alpha.phase), band.pieces[piece].beta_per_alpha());
-        let [x, y] = band.coordinates(&self.order, piece, alpha.row).map(|mut coefficients| {
+        let [x, y] = band.coordinates(piece, alpha.row).map(|mut coefficients| {
             coefficients[0] = 0.0;
             horner(&coefficients, beta)
         });
