@@ -163,6 +163,11 @@ pub fn warn_of_gap(timeline: &Timeline) {
     }
 }
 
+/// Whether a stream is a terminal whose user has not asked for no colour (`NO_COLOR`, see no-color.org).
+pub fn shows_colour(stream: &impl io::IsTerminal) -> bool {
+    stream.is_terminal() && !anstyle_query::no_color()
+}
+
 /// A flag that SIGINT and SIGTERM set.
 pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CommandError> {
     let stop = Arc::new(AtomicBool::new(false));

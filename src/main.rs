@@ -2,7 +2,6 @@
 
 mod commands;
 
-use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -76,7 +75,7 @@ fn main() -> ExitCode {
 }
 
 fn error_label() -> &'static str {
-    if std::io::stderr().is_terminal() { "\x1b[1;31merror\x1b[0m" } else { "error" }
+    if commands::shows_colour(&std::io::stderr()) { "\x1b[1;31merror\x1b[0m" } else { "error" }
 }
 
 fn set_up_logging(common: &Common) {

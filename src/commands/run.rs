@@ -4,7 +4,6 @@ mod ros2;
 
 use std::collections::hash_map::RandomState;
 use std::hash::BuildHasher;
-use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
@@ -26,7 +25,9 @@ use self::ros2::{Ros2, Ros2Summary};
 
 use super::events::sentence;
 use super::punctuality::Punctuality;
-use super::{CommandError, Common, Output, level_colour, number, search_timeline, stop_on_signals, warn_of_gap};
+use super::{
+    CommandError, Common, Output, level_colour, number, search_timeline, shows_colour, stop_on_signals, warn_of_gap,
+};
 
 /// Arguments of `run`.
 #[derive(Debug, clap::Args)]
@@ -264,7 +265,7 @@ impl RunSession<'_> {
     fn print_alert(&self, alert: &CollisionAlert) {
         let Some(level) = alert.alert_level().filter(|_| !self.common.quiet && !self.common.json) else { return };
         let colour = Style::new().fg_color(Some(level_colour(level.into()).into()));
-        let style = if std::io::stderr().is_terminal() { colour } else { Style::new() };
+        let style = if shows_colour(&std::io::stderr()) { colour } else { Style::new() };
         let figures = Figures::Shown { time_scale: self.playback.time_scale };
         let said = alert_sentence(alert, self.scene.team().benches as u32, figures);
         eprintln!("{:>10.3} s  {style}{:<11}{style:#} {said}", alert.sim_time, level.name());

@@ -14,7 +14,7 @@ use bench_dragon::wire::{CollisionAlert, LoopStatus};
 use crossterm::{cursor, execute, terminal};
 use serde::Serialize;
 
-use super::{CommandError, Common, level_colour, stop_on_signals, wall_seconds};
+use super::{CommandError, Common, level_colour, shows_colour, stop_on_signals, wall_seconds};
 
 /// Arguments of `watch`.
 #[derive(Debug, clap::Args)]
@@ -116,11 +116,14 @@ impl Screen<'_> {
             }
             Display::Lines => writeln!(output, "{}", self.lines(second).join("; "))?,
             Display::Terminal => {
-                self.rub_out(&mut output)?;
+                self.clear_previous(&mut output)?;
                 let lines = self.lines(second);
+                // A wrapped line would take two rows, and the next second would clear one too few.
+                execute!(output, terminal::DisableLineWrap)?;
                 for line in &lines {
                     writeln!(output, "{line}")?;
                 }
+                execute!(output, terminal::EnableLineWrap)?;
                 self.drawn = lines.len() as u16;
             }
         }
@@ -128,7 +131,7 @@ impl Screen<'_> {
     }
 
     /// Removes what the last second drew, so that news scroll up above the figures.
-    fn rub_out(&mut self, output: &mut impl Write) -> std::io::Result<()> {
+    fn clear_previous(&mut self, output: &mut impl Write) -> std::io::Result<()> {
         if self.drawn > 0 {
             execute!(
                 output,
@@ -148,7 +151,7 @@ impl Screen<'_> {
             }
             return Ok(output.flush()?);
         }
-        self.rub_out(&mut output)?;
+        self.clear_previous(&mut output)?;
         match news {
             News::Started { run_id } => {
                 writeln!(output, "A publisher of \"{}\" is running (run {run_id:016x}).", self.name)?
@@ -217,7 +220,9 @@ impl Screen<'_> {
 
     fn style(&self, state: FrameState) -> Style {
         match self.display {
-            Display::Terminal => Style::new().bold().fg_color(Some(level_colour(state).into())),
+            Display::Terminal if shows_colour(&stdout()) => {
+                Style::new().bold().fg_color(Some(level_colour(state).into()))
+            }
             _ => Style::new(),
         }
     }
