@@ -3,6 +3,7 @@
 //! In: TOML text, or what the command line overrides. Out: a [`Scene`], whose existence is the proof that every number
 //! is in range and that the start is legal. Errors name the file, the line, the field and what was expected.
 
+pub mod accepted;
 pub mod path;
 pub mod ros2;
 
@@ -11,6 +12,7 @@ use std::path::Path as FilePath;
 use serde::Deserialize;
 use toml::Spanned;
 
+pub use self::accepted::Accepted;
 use self::path::RawPath;
 use self::ros2::{RawRos2, Ros2Settings};
 use crate::model::team::Team;
@@ -22,77 +24,6 @@ use crate::solve::paper::PaperRules;
 const PAPER: &str = include_str!("../config/paper.toml");
 /// Subscribers that each iceoryx2 service admits at once where the scene does not say.
 const DEFAULT_SUBSCRIBERS: usize = 8;
-
-/// A closed range of accepted numbers and their unit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Accepted {
-    /// The least number accepted.
-    pub least: f64,
-    /// The greatest number accepted.
-    pub greatest: f64,
-    /// The unit, as in "metres".
-    pub unit: &'static str,
-}
-
-impl Accepted {
-    /// Pitch and lengths of boards.
-    pub const LENGTH: Self = Self { least: 1e-3, greatest: 1e4, unit: "metres" };
-    /// The turn on which the head starts.
-    pub const START_TURN: Self = Self { least: 1e-9, greatest: 1e7, unit: "turns" };
-    /// The first radius of a turnaround over the second.
-    pub const ARC_RATIO: Self = Self { least: 1e-3, greatest: 1e3, unit: "metres per metre" };
-    /// Metres of path before or after a turnaround.
-    pub const ROUTE: Self = Self { least: 0.0, greatest: 1e9, unit: "metres" };
-    /// A line or arc of a route.
-    pub const LEG: Self = Self { least: 1e-3, greatest: 1e9, unit: "metres" };
-    /// How far an arc of a route turns.
-    pub const ARC_TURNS: Self = Self { least: 1e-6, greatest: 1e3, unit: "turns" };
-    /// The direction in which a route begins.
-    pub const HEADING: Self = Self { least: -1.0, greatest: 1.0, unit: "turns" };
-    /// A coordinate on the stage.
-    pub const PLACE: Self = Self { least: -1e9, greatest: 1e9, unit: "metres" };
-    /// Speed of the head.
-    pub const SPEED: Self = Self { least: 1e-9, greatest: 1e6, unit: "metres per second" };
-    /// Frames per second.
-    pub const RATE: Self = Self { least: 0.1, greatest: 20_000.0, unit: "frames per second" };
-    /// Simulated seconds per second of wall time.
-    pub const TIME_SCALE: Self = Self { least: 1e-6, greatest: 1e6, unit: "simulated seconds per second" };
-    /// Position error asked for.
-    pub const ACCURACY: Self = Self { least: 1e-18, greatest: 1e3, unit: "metres" };
-    /// Times and clearances at which a warning is given.
-    pub const WARNING: Self = Self { least: 0.0, greatest: 1e9, unit: "seconds or metres" };
-    /// Seconds of the paper's time step and difference interval, radians of its tolerance.
-    pub const PAPER_RULE: Self = Self { least: 1e-15, greatest: 1e3, unit: "seconds or radians" };
-    /// The number of benches.
-    pub const BENCHES: Self = Self { least: 1.0, greatest: 1e6, unit: "benches" };
-    /// Frames a subscriber may fall behind.
-    pub const QUEUE: Self = Self { least: 1.0, greatest: 1e6, unit: "frames" };
-    /// Subscribers at once.
-    pub const SUBSCRIBERS: Self = Self { least: 1.0, greatest: 256.0, unit: "subscribers" };
-    /// Messages that a ROS 2 topic keeps.
-    pub const DEPTH: Self = Self { least: 1.0, greatest: 1e3, unit: "messages" };
-
-    /// The number itself where it is within the range.
-    ///
-    /// # Errors
-    /// One sentence that names the field, the number and the range.
-    pub fn check(self, field: &str, number: f64) -> Result<f64, String> {
-        // A comparison with NaN is false, so that NaN is refused here too.
-        if number >= self.least && number <= self.greatest {
-            Ok(number)
-        } else {
-            let Self { least, greatest, unit } = self;
-            let [least, greatest] = [least, greatest].map(short);
-            Err(format!("{field} is {number}, expected a number from {least} to {greatest} {unit}"))
-        }
-    }
-}
-
-/// A number as people write it: 256, 20000, 1e6.
-fn short(number: f64) -> String {
-    let plain = number.to_string();
-    if plain.len() <= 6 { plain } else { format!("{number:e}") }
-}
 
 /// Input that cannot be used, in one sentence that says where and what was expected.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
