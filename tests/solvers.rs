@@ -19,7 +19,7 @@ use bench_dragon::solve::reference::Reference;
 use bench_dragon::solve::table::{FollowerTable, Instructions};
 use bench_dragon::solve::{Chain, Solver, Velocities};
 use proptest::prelude::*;
-use proptest::test_runner::{Config, TestRunner};
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
 const ACCURACY: f64 = 1e-9;
 
@@ -484,13 +484,26 @@ fn routes() -> impl Strategy<Value = Subject> {
     )
 }
 
+/// A seed of this run's own, printed so that a failure can be had again.
+fn long_seed() -> [u8; 32] {
+    let seed = std::time::SystemTime::UNIX_EPOCH.elapsed().unwrap().as_nanos() as u64;
+    println!("seed {seed}");
+    std::array::from_fn(|byte| seed.to_le_bytes()[byte % 8])
+}
+
 /// Random subjects: every solver at a random time, the velocities as central differences, and how often a table served.
 fn random_subjects(subjects: impl Strategy<Value = Subject>, least_share_of_tables: f64) {
     let long = std::env::var("BENCH_DRAGON_LONG").is_ok_and(|value| value == "1");
     let config = Config { cases: if long { 100_000 } else { 300 }, failure_persistence: None, ..Config::default() };
     let (cases, tables, compared) = (config.cases, Cell::new(0), Cell::new(0u64));
     let case = (subjects, 0.0..0.995f64);
-    TestRunner::new(config)
+    // The same scenes in every run, unless the long one is asked for.
+    let seed = if long {
+        TestRng::from_seed(RngAlgorithm::ChaCha, &long_seed())
+    } else {
+        TestRng::deterministic_rng(RngAlgorithm::ChaCha)
+    };
+    TestRunner::new_with_rng(config, seed)
         .run(&case, |(subject, share)| {
             let time = share * subject.end;
             let mut reference = subject.reference();
