@@ -197,7 +197,7 @@ impl Screen<'_> {
                 second.head.x, second.head.y, header.handles
             ),
         ];
-        lines.extend(second.status.as_ref().map(status_line));
+        lines.extend(second.status.iter().flat_map(status_lines));
         lines
     }
 
@@ -228,17 +228,18 @@ impl Screen<'_> {
     }
 }
 
-fn status_line(status: &LoopStatus) -> String {
+/// How the publisher does, in lines that fit a terminal of 80 columns.
+fn status_lines(status: &LoopStatus) -> [String; 2] {
     let us = |ns: u64| ns as f64 / 1000.0;
-    format!(
-        "publisher: scene {}  overruns {}  skipped {}  lateness p99 {:.1} us  step p99 {:.1} us  memory {:.1} MB",
-        status.scene.as_str(),
-        status.overruns,
-        status.skipped,
-        us(status.lateness_p99_total),
-        us(status.step_p99_total),
-        status.resident_bytes as f64 / 1e6
-    )
+    [
+        format!("publisher: scene {}  overruns {}  skipped {}", status.scene.as_str(), status.overruns, status.skipped),
+        format!(
+            "lateness p99 {:.1} us  step p99 {:.1} us  memory {:.1} MB",
+            us(status.lateness_p99_total),
+            us(status.step_p99_total),
+            status.resident_bytes as f64 / 1e6
+        ),
+    ]
 }
 
 fn write_json(output: &mut impl Write, line: &impl Serialize) -> Result<(), CommandError> {
