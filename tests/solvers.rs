@@ -200,8 +200,8 @@ fn errors<'a>(solver: &mut dyn Solver, rows: impl Iterator<Item = &'a Row>) -> (
     (position, speed)
 }
 
-/// The README's table of errors against 50 digits, as this test measures it: nothing may be twice as far off as is
-/// printed there, and nothing printed may be less than a quarter of what is measured.
+/// The README's table of errors against 50 digits, as this test measures it: nothing may be more than twice as far off as
+/// is printed there.
 #[test]
 fn the_readme_says_how_exact_every_solver_is() {
     let readme = include_str!("../README.md");

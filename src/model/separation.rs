@@ -3,7 +3,8 @@
 //! - [`separation_board_board`]: the largest gap along an edge normal (the separating axis theorem). Overlapping: minus
 //!   the least translation that parts the boards. Apart: at most the distance, and equal to it unless two corners are
 //!   nearest.
-//! - [`signed_distance_board_board`] (with its points: [`clearance_board_board`]): the Euclidean distance apart, the separation overlapping.
+//! - [`signed_distance_board_board`] (its points: [`closest_points_board_board`]): the Euclidean distance apart, the
+//!   separation overlapping.
 //!
 //! Positions are subtracted before anything else, so that the error is a few units in the last place of the boards'
 //! size and of their distance, plus what the centres themselves have lost. Swapping the boards gives the same bits.
@@ -86,22 +87,7 @@ pub fn separation_board_board(a: &Board, b: &Board) -> f64 {
 /// The nearest points of two convex polygons that are apart include a corner of one of them.
 #[inline]
 pub fn signed_distance_board_board(a: &Board, b: &Board) -> f64 {
-    distance_from_separation(a, b, separation_board_board(a, b))
-}
-
-/// The clearance when it is at most `limit`, else `None`: most pairs are dismissed by the separation alone.
-#[inline]
-pub fn signed_distance_within(a: &Board, b: &Board, limit: f64) -> Option<f64> {
     let separation = separation_board_board(a, b);
-    if separation > limit {
-        return None;
-    }
-    let clearance = distance_from_separation(a, b, separation);
-    (clearance <= limit).then_some(clearance)
-}
-
-#[inline]
-fn distance_from_separation(a: &Board, b: &Board, separation: f64) -> f64 {
     if separation <= 0.0 {
         return separation;
     }
@@ -109,23 +95,6 @@ fn distance_from_separation(a: &Board, b: &Board, separation: f64) -> f64 {
     let from_b = Relative::new(a, b).nearest_corner_squared(b, a);
     // Rounding must not make the distance less than its lower bound, nor a gap a touch.
     from_a.min(from_b).sqrt().max(separation)
-}
-
-/// The clearance of two boards and where it is taken.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Clearance {
-    /// Metres: the [`signed_distance_board_board`].
-    pub value: f64,
-    /// The closest point of the first board.
-    pub point_a: Point,
-    /// The closest point of the second board.
-    pub point_b: Point,
-}
-
-/// The clearance of two boards with the points at which it is taken.
-pub fn clearance_board_board(a: &Board, b: &Board) -> Clearance {
-    let (point_a, point_b) = closest_points_board_board(a, b);
-    Clearance { value: signed_distance_board_board(a, b), point_a, point_b }
 }
 
 /// The two closest points, the first on `a`, the second on `b`.
