@@ -16,7 +16,7 @@ use bench_dragon::solve::newton::Newton;
 use bench_dragon::solve::paper::{Paper, PaperRules};
 use bench_dragon::solve::table::{FollowerTable, Instructions};
 use bench_dragon::solve::{Chain, Solver, Velocities};
-use bench_dragon::transports::iceoryx2::{Offer, SharedMemoryPublisher};
+use bench_dragon::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
 use bench_dragon::wire::FrameHeader;
 use bench_dragon::wire::convert::stage;
 use divan::Bencher;
@@ -192,7 +192,7 @@ fn publish_over_iceoryx2(bencher: Bencher) {
     let playback = Playback { start: 200.0, ..Playback::of(&scene) };
     let mut show =
         Show::new(&scene, scene.motion.timeline(&mut |_| ()), playback).expect("200 s is before the contact");
-    let offer = Offer {
+    let offer = PublisherConfig {
         name: format!("bench_{}_frame", std::process::id()),
         handles: scene.team().handles(),
         queue: 64,

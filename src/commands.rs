@@ -4,7 +4,7 @@ pub mod check;
 pub mod draw;
 pub mod events;
 pub mod plan;
-mod punctuality;
+mod realtime_scheduling;
 pub mod run;
 pub mod soak;
 pub mod solve;

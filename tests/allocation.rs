@@ -14,7 +14,7 @@ use bench_dragon::scene::{AtEnd, Scene};
 use bench_dragon::show::state::FrameState;
 use bench_dragon::show::{Frame, Playback, Show};
 use bench_dragon::subscribers::connection::Subscription;
-use bench_dragon::transports::iceoryx2::{Offer, SharedMemoryPublisher};
+use bench_dragon::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
 use bench_dragon::wire::convert::stage;
 
 thread_local! {
@@ -79,7 +79,7 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     let timeline = scene.motion.timeline(&mut |_| ());
     let show = Show::new(&scene, timeline, playback).unwrap();
     let name = format!("test_{}_allocation", std::process::id());
-    let offer = Offer {
+    let config = PublisherConfig {
         name: name.clone(),
         handles: scene.team().handles(),
         queue: 64,
@@ -87,22 +87,22 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
         alerts: true,
         stage: stage(1, 0, &scene.motion),
     };
-    let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(SharedMemoryPublisher::open(&offer).unwrap())];
+    let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(SharedMemoryPublisher::open(&config).unwrap())];
     #[cfg(feature = "ros2")]
     let ros2_thread = {
         use bench_dragon::scene::ros2::Ros2Settings;
         use bench_dragon::transports::ros2::environment::{Network, Range};
         let settings = Ros2Settings { rate: Some(100.0), ..Ros2Settings::default() };
-        let offer = bench_dragon::transports::ros2::Ros2Offer {
+        let config = bench_dragon::transports::ros2::Ros2Config {
             name: name.clone(),
             handles: scene.team().handles(),
             loop_rate: 500.0,
             settings,
             alerts: true,
-            stage: offer.stage,
+            stage: config.stage,
         };
         let network = Network { domain: 93, range: Range::Localhost };
-        let (publisher, _status, thread) = bench_dragon::transports::ros2::start(offer, network).unwrap();
+        let (publisher, _status, thread) = bench_dragon::transports::ros2::start(config, network).unwrap();
         publishers.push(Box::new(publisher));
         thread
     };

@@ -16,7 +16,7 @@ use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::{Accepted, AtEnd, Scene};
 use bench_dragon::show::{Playback, Show};
-use bench_dragon::transports::iceoryx2::{self, Offer, OpenError, SharedMemoryPublisher, StatusSender};
+use bench_dragon::transports::iceoryx2::{self, OpenError, PublisherConfig, SharedMemoryPublisher, StatusSender};
 use bench_dragon::wire::sentence::{Figures, alert_sentence};
 use bench_dragon::wire::{CollisionAlert, Stage, convert};
 use serde::Serialize;
@@ -24,7 +24,7 @@ use serde::Serialize;
 use self::ros2::{Ros2, Ros2Summary};
 
 use super::events::sentence;
-use super::punctuality::Punctuality;
+use super::realtime_scheduling::RealtimeScheduling;
 use super::{
     CommandError, Common, Output, level_colour, number, search_timeline, shows_colour, stop_on_signals, warn_of_gap,
 };
@@ -57,7 +57,7 @@ pub struct RunArguments {
     #[arg(long)]
     ros2: bool,
     #[command(flatten)]
-    punctuality: Punctuality,
+    scheduling: RealtimeScheduling,
     /// End when the process that started this one ends
     #[arg(long, hide = true)]
     end_with_parent: bool,
@@ -114,7 +114,7 @@ struct RunSession<'a> {
 impl RunSession<'_> {
     /// Runs the loop on one thread and the statistics on another.
     fn run(&self, mut show: Show, stop: &Arc<AtomicBool>) -> Result<(), CommandError> {
-        iceoryx2::remains::keep_removing();
+        iceoryx2::stale_files::spawn_reaper();
         let ros2 = self.open_ros2()?;
         let (reports, inbox) = statistics::queues();
         let done = AtomicBool::new(false);
@@ -127,8 +127,8 @@ impl RunSession<'_> {
         };
         let ended = std::thread::scope(|threads| {
             let looping = threads.spawn(|| {
-                let punctual = self.arguments.punctuality.prepare_thread();
-                let ready = punctual.and_then(|awake| Ok((self.open_shared_memory()?, awake)));
+                let prepared = self.arguments.scheduling.prepare_thread();
+                let ready = prepared.and_then(|awake| Ok((self.open_shared_memory()?, awake)));
                 let (publisher, _awake) = match ready {
                     Ok(ready) => ready,
                     Err(error) => {
@@ -184,7 +184,7 @@ impl RunSession<'_> {
     fn open_shared_memory(&self) -> Result<SharedMemoryPublisher, CommandError> {
         let scene = self.scene;
         let handles = scene.team().handles();
-        Ok(SharedMemoryPublisher::open(&Offer {
+        Ok(SharedMemoryPublisher::open(&PublisherConfig {
             name: self.common.name.clone(),
             handles,
             queue: self.queue(),

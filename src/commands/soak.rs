@@ -17,7 +17,7 @@ use bench_dragon::subscribers::soak::verdict::{Limits, Verdict};
 use bench_dragon::transports::iceoryx2;
 use indicatif::ProgressBar;
 
-use super::punctuality::Punctuality;
+use super::realtime_scheduling::RealtimeScheduling;
 use super::{CommandError, Common, Output, progress_bar, stop_on_signals, wall_seconds};
 
 /// How long a slow subscriber sleeps: longer than a queue of 64 frames lasts at 60 Hz.
@@ -48,7 +48,7 @@ pub struct SoakArguments {
     #[arg(long, value_name = "FILE", help_heading = "The test")]
     report: Option<PathBuf>,
     #[command(flatten)]
-    punctuality: Punctuality,
+    scheduling: RealtimeScheduling,
     /// Frames that subscribers which keep up may miss, all together
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Limits")]
     max_missed: u64,
@@ -171,7 +171,7 @@ impl SoakArguments {
         let mut publisher: Vec<OsString> = vec!["--loop".into(), "--end-with-parent".into()];
         publisher.extend(self.ros2.then(|| "--ros2".into()));
         publisher.extend(self.rate.into_iter().flat_map(|rate| ["--rate".into(), rate.to_string().into()]));
-        publisher.extend(self.punctuality.arguments());
+        publisher.extend(self.scheduling.arguments());
         let role = |role, count| std::iter::repeat_n(role, count);
         let roles = role(Role::Steady, self.subscribers)
             .chain(role(Role::Slow, self.slow))

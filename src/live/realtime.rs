@@ -1,4 +1,4 @@
-//! What the operating system can do for a punctual thread: timer slack, real-time priority, locked memory, a CPU of
+//! What the operating system can do for a thread with deadlines: timer slack, real-time priority, locked memory, a CPU of
 //! its own, CPUs that stay awake. Called once, on the loop's thread, before the loop.
 
 use std::fs::{File, OpenOptions};

@@ -11,7 +11,7 @@ use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError as 
 use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use crate::transports::iceoryx2::{OpenError, check_room_to_subscribe, node, remains, reserve_pages, service_name};
+use crate::transports::iceoryx2::{OpenError, check_room_to_subscribe, node, reserve_pages, service_name, stale_files};
 use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 
 type Receiver<Payload, Header> = Port<ipc::Service, Payload, Header>;
@@ -58,7 +58,7 @@ impl Subscription {
     pub fn with_wake(name: &str, wake: Wake) -> Result<Self, OpenError> {
         service_name(name, "poses")?;
         check_room_to_subscribe()?;
-        remains::keep_removing();
+        stale_files::spawn_reaper();
         Ok(Self { node: node()?, name: name.to_owned(), wake })
     }
 

@@ -4,7 +4,7 @@
 //! since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/alerts`, `/status`,
 //! `/stage` and the event service `<name>/tick`.
 
-pub mod remains;
+pub mod stale_files;
 
 use std::collections::BTreeSet;
 use std::fs::OpenOptions;
@@ -38,7 +38,7 @@ const SMALL_QUEUE: usize = 16;
 const QUEUE_BYTES: usize = 64_000_000;
 /// Where Linux keeps shared memory.
 const SHARED_MEMORY: &str = "/dev/shm";
-/// How long a half made service may stop a publisher; [`remains`] needs less to remove it.
+/// How long a incomplete service may stop a publisher; [`stale_files`] needs less to remove it.
 const PATIENCE: Duration = Duration::from_secs(6);
 /// What a subscriber needs of it for its own bookkeeping, and more.
 const SUBSCRIBER_BYTES: u64 = 500_000;
@@ -75,12 +75,12 @@ pub enum OpenError {
         /// Bytes left.
         free: u64,
     },
-    /// A service stays half made.
+    /// A service stays incomplete.
     #[error(
-        "the service \"{0}\" is half made and nobody finishes it: stop every program that uses it, or choose another \
+        "the service \"{0}\" is incomplete and nobody completes it: stop every program that uses it, or choose another \
          name with --name"
     )]
-    HalfMade(String),
+    Incomplete(String),
     /// There is no room even for bookkeeping.
     #[error("{SHARED_MEMORY} has {free} bytes left, which is too little: remove what fills it, or make it larger")]
     Full {
@@ -142,7 +142,7 @@ pub fn service_name(name: &str, service: &str) -> Result<ServiceName, OpenError>
 /// [`OpenError::AnotherUsers`] where another user's processes keep this one out, [`OpenError::Failed`] where iceoryx2
 /// cannot make one for another reason.
 pub fn node() -> Result<Node<ipc::Service>, OpenError> {
-    remains::remove_unfinished_files();
+    stale_files::remove_unfinished_files();
     let made = NodeBuilder::new().signal_handling_mode(SignalHandlingMode::Disabled).create::<ipc::Service>();
     made.map_err(|error| {
         let folder = Config::global_config().global.root_path().to_string();
@@ -164,7 +164,7 @@ fn frame_bytes(handles: usize) -> usize {
 
 /// What a publisher offers.
 #[derive(Debug, Clone)]
-pub struct Offer {
+pub struct PublisherConfig {
     /// The name under which services appear.
     pub name: String,
     /// Handles in a frame.
@@ -199,34 +199,34 @@ impl SharedMemoryPublisher {
     ///
     /// # Errors
     /// [`OpenError`]: each names what is in the way and what to do.
-    pub fn open(offer: &Offer) -> Result<Self, OpenError> {
-        patiently(|| Self::open_now(offer))
+    pub fn open(config: &PublisherConfig) -> Result<Self, OpenError> {
+        retry_while_incomplete(|| Self::open_now(config))
     }
 
-    fn open_now(offer: &Offer) -> Result<Self, OpenError> {
-        let name = offer.name.as_str();
+    fn open_now(config: &PublisherConfig) -> Result<Self, OpenError> {
+        let name = config.name.as_str();
         service_name(name, "poses")?;
-        check_room(offer)?;
+        check_room(config)?;
         let node = node()?;
-        let frame_service = frames(&node, offer)?;
+        let frame_service = frames(&node, config)?;
         let poses = frame_service
             .publisher_builder()
-            .initial_max_slice_len(offer.handles)
+            .initial_max_slice_len(config.handles)
             .allocation_strategy(AllocationStrategy::Static)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|error| port_error(name, "poses", error))?;
-        let alerts = if offer.alerts { Some(sender(&node, name, "alerts", offer.subscribers)?) } else { None };
-        let stage = sender(&node, name, "stage", offer.subscribers)?;
-        stage.send_copy(offer.stage).map_err(|error| failed(name, "stage", error))?;
+        let alerts = if config.alerts { Some(sender(&node, name, "alerts", config.subscribers)?) } else { None };
+        let stage = sender(&node, name, "stage", config.subscribers)?;
+        stage.send_copy(config.stage).map_err(|error| failed(name, "stage", error))?;
         let tick_service = node
             .service_builder(&service_name(name, "tick")?)
             .event()
-            .max_listeners(offer.subscribers)
-            .max_nodes(offer.subscribers + SPARE_NODES)
+            .max_listeners(config.subscribers)
+            .max_nodes(config.subscribers + SPARE_NODES)
             .open_or_create()
             .map_err(|error| match error {
-                EventOpenOrCreateError::EventOpenError(EventOpenError::HangsInCreation) => half_made(name, "tick"),
+                EventOpenOrCreateError::EventOpenError(EventOpenError::HangsInCreation) => incomplete(name, "tick"),
                 other => failed(name, "tick", other),
             })?;
         let tick = tick_service.notifier_builder().create().map_err(|error| failed(name, "tick", error))?;
@@ -288,7 +288,7 @@ impl StatusSender {
     /// # Errors
     /// As [`SharedMemoryPublisher::open`].
     pub fn open(name: &str, subscribers: usize) -> Result<Self, OpenError> {
-        patiently(|| {
+        retry_while_incomplete(|| {
             let node = node()?;
             let status = sender(&node, name, "status", subscribers)?;
             reserve_pages()?;
@@ -306,11 +306,11 @@ impl StatusPublisher for StatusSender {
 }
 
 /// Refuses queues that the shared memory has no room for.
-fn check_room(offer: &Offer) -> Result<(), OpenError> {
-    let Offer { queue, subscribers, .. } = *offer;
+fn check_room(config: &PublisherConfig) -> Result<(), OpenError> {
+    let PublisherConfig { queue, subscribers, .. } = *config;
     // Two frames that a subscriber may hold, two loans, the history, and a little for bookkeeping.
     let frames = subscribers * (queue + 2) + 4;
-    let needed = (frames * frame_bytes(offer.handles)) as u64 + 2_000_000;
+    let needed = (frames * frame_bytes(config.handles)) as u64 + 2_000_000;
     match free_bytes() {
         Some(free) if free < needed => Err(OpenError::NoRoom { queue, subscribers, needed, free }),
         _ => Ok(()),
@@ -356,8 +356,11 @@ pub fn reserve_pages() -> Result<(), OpenError> {
 
 /// The service of frames. One left by a watcher can have shorter queues than this publisher would make: it is used as
 /// it is.
-fn frames(node: &Node<ipc::Service>, offer: &Offer) -> Result<Service<[HandlePose], FrameHeader>, OpenError> {
-    let full_name = service_name(&offer.name, "poses")?;
+fn frames(
+    node: &Node<ipc::Service>,
+    config: &PublisherConfig,
+) -> Result<Service<[HandlePose], FrameHeader>, OpenError> {
+    let full_name = service_name(&config.name, "poses")?;
     let builder = || {
         node.service_builder(&full_name)
             .publish_subscribe::<[HandlePose]>()
@@ -366,9 +369,9 @@ fn frames(node: &Node<ipc::Service>, offer: &Offer) -> Result<Service<[HandlePos
             .enable_safe_overflow(true)
     };
     let made = builder()
-        .max_subscribers(offer.subscribers)
-        .max_nodes(offer.subscribers + SPARE_NODES)
-        .subscriber_max_buffer_size(offer.queue)
+        .max_subscribers(config.subscribers)
+        .max_nodes(config.subscribers + SPARE_NODES)
+        .subscriber_max_buffer_size(config.queue)
         .open_or_create();
     match made {
         Err(PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
@@ -376,7 +379,7 @@ fn frames(node: &Node<ipc::Service>, offer: &Offer) -> Result<Service<[HandlePos
         )) => {
             log::warn!(
                 "a subscriber keeps \"{full_name}\" open with shorter queues than {} frames: those are used",
-                offer.queue
+                config.queue
             );
             builder().open().map_err(|error| service_error(&full_name, PublishSubscribeOpenOrCreateError::from(error)))
         }
@@ -411,7 +414,7 @@ fn sender<Message: ZeroCopySend + std::fmt::Debug + Copy>(
 fn service_error(service: &ServiceName, error: PublishSubscribeOpenOrCreateError) -> OpenError {
     use PublishSubscribeOpenError as Open;
     if matches!(error, PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(Open::HangsInCreation)) {
-        return OpenError::HalfMade(service.to_string());
+        return OpenError::Incomplete(service.to_string());
     }
     let incompatible = match &error {
         PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(open) => !matches!(
@@ -437,17 +440,19 @@ fn port_error(name: &str, service: &str, error: PublisherCreateError) -> OpenErr
     }
 }
 
-fn half_made(name: &str, service: &str) -> OpenError {
-    OpenError::HalfMade(format!("{name}/{service}"))
+fn incomplete(name: &str, service: &str) -> OpenError {
+    OpenError::Incomplete(format!("{name}/{service}"))
 }
 
-/// Tries again while a service is half made: its maker is about to finish it, or was killed, and then its file is removed
-/// after a while ([`remains`]).
-fn patiently<Opened>(open: impl Fn() -> Result<Opened, OpenError>) -> Result<Opened, OpenError> {
+/// Tries again while a service is incomplete: its maker is about to finish it, or was killed, and then its file is removed
+/// after a while ([`stale_files`]).
+fn retry_while_incomplete<Opened>(open: impl Fn() -> Result<Opened, OpenError>) -> Result<Opened, OpenError> {
     let began = Instant::now();
     loop {
         match open() {
-            Err(OpenError::HalfMade(_)) if began.elapsed() < PATIENCE => std::thread::sleep(Duration::from_millis(100)),
+            Err(OpenError::Incomplete(_)) if began.elapsed() < PATIENCE => {
+                std::thread::sleep(Duration::from_millis(100))
+            }
             other => return other,
         }
     }

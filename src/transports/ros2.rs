@@ -51,7 +51,7 @@ pub enum Ros2Error {
 
 /// What is offered on ROS 2.
 #[derive(Debug, Clone)]
-pub struct Ros2Offer {
+pub struct Ros2Config {
     /// The namespace of the topics.
     pub name: String,
     /// Handles in a frame.
@@ -77,7 +77,7 @@ struct Snapshot {
 struct Shared {
     stop: AtomicBool,
     /// Frames that found the queue full.
-    turned_away: AtomicU64,
+    rejected: AtomicU64,
     counts: Counters,
 }
 
@@ -133,14 +133,15 @@ struct Inbox {
 ///
 /// # Errors
 /// [`Ros2Error`]: each says what to change.
-pub fn start(offer: Ros2Offer, network: Network) -> Result<(Ros2Publisher, Ros2Status, Ros2Thread), Ros2Error> {
-    check_name(&offer.name)?;
-    let rate = offer.settings.rate_of(offer.loop_rate);
-    let depth = queue_depth(offer.handles, rate);
+pub fn start(config: Ros2Config, network: Network) -> Result<(Ros2Publisher, Ros2Status, Ros2Thread), Ros2Error> {
+    check_name(&config.name)?;
+    let rate = config.settings.rate_of(config.loop_rate);
+    let depth = queue_depth(config.handles, rate);
     // One more than the queue holds is under way: being filled, or being published.
     let (mut free_producer, free) = RingBuffer::new(depth + 2);
     for _ in 0..depth + 2 {
-        let snapshot = Snapshot { header: FrameHeader::default(), handles: vec![HandlePose::default(); offer.handles] };
+        let snapshot =
+            Snapshot { header: FrameHeader::default(), handles: vec![HandlePose::default(); config.handles] };
         // The ring has just as many places.
         let _ = free_producer.push(Box::new(snapshot));
     }
@@ -156,10 +157,10 @@ pub fn start(offer: Ros2Offer, network: Network) -> Result<(Ros2Publisher, Ros2S
         shared: Arc::clone(&shared),
     };
     let (opened, opening) = mpsc::channel();
-    let share = rate / offer.loop_rate;
+    let share = rate / config.loop_rate;
     let handle = std::thread::Builder::new()
         .name("ros2".to_owned())
-        .spawn(move || node::serve(&offer, rate, network, inbox, &opened))
+        .spawn(move || node::serve(&config, rate, network, inbox, &opened))
         .map_err(|error| Ros2Error::Failed(error.to_string()))?;
     let thread = Ros2Thread { shared: Arc::clone(&shared), handle: Some(handle) };
     opening.recv().unwrap_or_else(|_| Err(Ros2Error::Failed("its thread ended early".to_owned())))?;
@@ -194,7 +195,7 @@ impl Publisher for Ros2Publisher {
         // Only this end fills the queue, so that it still has room below.
         let free = if self.filled.is_full() { None } else { self.free.pop().ok() };
         let Some(mut snapshot) = free else {
-            self.shared.turned_away.fetch_add(1, Ordering::Relaxed);
+            self.shared.rejected.fetch_add(1, Ordering::Relaxed);
             return Ok(());
         };
         snapshot.header = FrameHeader { sent_ns: crate::live::clock::monotonic_ns(), ..*header };
@@ -224,7 +225,7 @@ impl Ros2Thread {
     pub fn counts(&self) -> Ros2Counts {
         let Counters { frames, skipped, discarded } = &self.shared.counts;
         let [frames, skipped, discarded] = [frames, skipped, discarded].map(|count| count.load(Ordering::Relaxed));
-        Ros2Counts { frames, skipped: skipped + self.shared.turned_away.load(Ordering::Relaxed), discarded }
+        Ros2Counts { frames, skipped: skipped + self.shared.rejected.load(Ordering::Relaxed), discarded }
     }
 
     /// Ends the thread once it has published what is queued; the node has then left the graph.

@@ -34,7 +34,7 @@ pub struct Ros2 {
 #[cfg(feature = "ros2")]
 pub fn open(scene: &Scene, name: &str, loop_rate: f64, stage: Stage) -> Result<Ros2, CommandError> {
     use bench_dragon::scene::ros2::Topic;
-    use bench_dragon::transports::ros2::{Ros2Error, Ros2Offer, environment, start};
+    use bench_dragon::transports::ros2::{Ros2Config, Ros2Error, environment, start};
 
     let settings = scene.ros2.clone().unwrap_or_default();
     let refused = |error: Ros2Error| match error {
@@ -61,8 +61,8 @@ pub fn open(scene: &Scene, name: &str, loop_rate: f64, stage: Stage) -> Result<R
         topics.join(", ")
     );
     let handles = scene.team().handles();
-    let offer = Ros2Offer { name: name.to_owned(), handles, loop_rate, settings, alerts, stage };
-    let (publisher, status, thread) = start(offer, network).map_err(refused)?;
+    let config = Ros2Config { name: name.to_owned(), handles, loop_rate, settings, alerts, stage };
+    let (publisher, status, thread) = start(config, network).map_err(refused)?;
     let end = move || {
         let counts = thread.end();
         Ros2Summary { frames: counts.frames, skipped: counts.skipped, discarded: counts.discarded }

@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use super::environment::{Network, Range};
 use super::messages::{DiagnosticArray, HandlePoses, Header, MarkerArray, Pose, PoseArray, Stamped, Time, type_name};
-use super::{Inbox, Ros2Error, Ros2Offer, Shared, Snapshot};
+use super::{Inbox, Ros2Config, Ros2Error, Shared, Snapshot};
 use crate::live::clock::{monotonic_ns, sleep_until};
 use crate::scene::ros2::{Durability, Qos, Reliability, Topic};
 use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
@@ -40,13 +40,13 @@ const LINGER: Duration = Duration::from_millis(100);
 
 /// Opens the topics, tells `opened` how that went, and publishes until told to stop.
 pub(super) fn serve(
-    offer: &Ros2Offer,
+    config: &Ros2Config,
     rate: f64,
     network: Network,
     mut inbox: Inbox,
     opened: &mpsc::Sender<Result<(), Ros2Error>>,
 ) {
-    let mut topics = match Topics::open(offer, rate, network) {
+    let mut topics = match Topics::open(config, rate, network) {
         Ok(topics) => topics,
         Err(error) => {
             let _ = opened.send(Err(error));
@@ -56,7 +56,7 @@ pub(super) fn serve(
     topics.publish_stage(&inbox.shared);
     let _ = opened.send(Ok(()));
     let period_ns = (1e9 / rate) as u64;
-    let mut turned_away = 0;
+    let mut rejected = 0;
     let mut look_at = 0;
     loop {
         // Read before the queues are emptied: what was put there before it was set is then still published.
@@ -65,9 +65,9 @@ pub(super) fn serve(
         while let Ok(alert) = inbox.alerts.pop() {
             topics.publish_alert(alert, &inbox.shared);
         }
-        let turned_away_now = inbox.shared.turned_away.load(Ordering::Relaxed);
-        let newest_only = turned_away_now > turned_away;
-        turned_away = turned_away_now;
+        let rejected_now = inbox.shared.rejected.load(Ordering::Relaxed);
+        let newest_only = rejected_now > rejected;
+        rejected = rejected_now;
         let mut deadline_ns = None;
         while let Ok(snapshot) = inbox.filled.pop() {
             if newest_only && !inbox.filled.is_empty() {
@@ -155,7 +155,7 @@ impl<Message: Serialize + Clone> Stream<Message> {
 struct Maker<'a> {
     context: Context,
     node: Node,
-    offer: &'a Ros2Offer,
+    config: &'a Ros2Config,
     rate: f64,
 }
 
@@ -168,7 +168,7 @@ impl Maker<'_> {
         each: usize,
         message: impl FnOnce() -> Message,
     ) -> Result<Option<Stream<Message>>, Ros2Error> {
-        let bytes = HEADER_BYTES + self.offer.handles * each;
+        let bytes = HEADER_BYTES + self.config.handles * each;
         let port = self.port(topic, type_name, bytes, self.rate)?;
         Ok(port.map(|port| Stream { port, message: Arc::new(message()) }))
     }
@@ -181,8 +181,8 @@ impl Maker<'_> {
         bytes: usize,
         rate: f64,
     ) -> Result<Option<Port<Message>>, Ros2Error> {
-        let Some(qos) = self.offer.settings.topics.get(&topic) else { return Ok(None) };
-        let name = topic.path(&self.offer.name);
+        let Some(qos) = self.config.settings.topics.get(&topic) else { return Ok(None) };
+        let name = topic.path(&self.config.name);
         let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(format!("topic {name}: {error}"));
         let participant = self.context.domain_participant();
         // Made here and not through the node, whose quality of service knows no limit of memory.
@@ -217,7 +217,7 @@ fn policies(qos: Qos, bytes: usize, rate: f64) -> QosPolicies {
 }
 
 impl Topics {
-    fn open(offer: &Ros2Offer, rate: f64, network: Network) -> Result<Self, Ros2Error> {
+    fn open(config: &Ros2Config, rate: f64, network: Network) -> Result<Self, Ros2Error> {
         let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(error.to_string());
         let mut builder = DomainParticipantBuilder::new(network.domain);
         if network.range == Range::Localhost {
@@ -225,15 +225,15 @@ impl Topics {
         }
         let participant = builder.build().map_err(|error| failed(&error))?;
         let context = Context::from_domain_participant(participant).map_err(|error| failed(&error))?;
-        let node_name = NodeName::new(&format!("/{}", offer.name), "publisher").map_err(|error| failed(&error))?;
+        let node_name = NodeName::new(&format!("/{}", config.name), "publisher").map_err(|error| failed(&error))?;
         // Fewer endpoints, fewer complaints of subscribers that look for what RustDDS cannot send.
         let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
         let node = context.new_node(node_name, options).map_err(|error| failed(&error))?;
-        let mut maker = Maker { context, node, offer, rate };
-        let (stage, handles) = (offer.stage, offer.handles);
+        let mut maker = Maker { context, node, config, rate };
+        let (stage, handles) = (config.stage, config.handles);
         let header = || Header::of(0);
         Ok(Self {
-            name: offer.name.clone(),
+            name: config.name.clone(),
             stage,
             handles: maker.stream(Topic::Handles, type_name::HANDLE_POSES, 40, || HandlePoses {
                 header: header(),
@@ -245,7 +245,7 @@ impl Topics {
                 poses: vec![Pose::of(&HandlePose::default()); handles],
             })?,
             markers: maker.stream(Topic::Markers, type_name::MARKER_ARRAY, 300, || MarkerArray::of(&stage))?,
-            alerts: if offer.alerts {
+            alerts: if config.alerts {
                 maker.port(Topic::Alerts, type_name::COLLISION_ALERT, SELDOM_BYTES, 1.0)?
             } else {
                 None

@@ -5,7 +5,7 @@
 //! - in shared memory: it waits for ever for somebody to finish the file, and so does the program that made the node;
 //! - among the services: every later attempt to open that service fails.
 //!
-//! Whoever makes a node calls [`remove_unfinished_files`] before, and [`keep_removing`] on a thread that is not real-time.
+//! Whoever makes a node calls [`remove_unfinished_files`] before, and [`spawn_reaper`] on a thread that is not real-time.
 //! Whether a file is unfinished shows in its mode, which its maker sets last.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -26,7 +26,7 @@ const UNFINISHED: u32 = 0o600;
 const UNFINISHED_MEMORY: u32 = 0o200;
 /// Making a file takes less than a thousandth of this.
 const LONGEST_MAKING: Duration = Duration::from_secs(2);
-/// How often [`keep_removing`] looks.
+/// How often [`spawn_reaper`] looks.
 const INTERVAL: Duration = Duration::from_millis(500);
 
 /// Whether a listed node's process is there.
@@ -68,7 +68,7 @@ pub fn remove_unfinished_files() {
 }
 
 /// Has a thread of this process remove unfinished shared memory and services of killed processes from now on.
-pub fn keep_removing() {
+pub fn spawn_reaper() {
     static STARTED: Once = Once::new();
     STARTED.call_once(|| {
         std::thread::spawn(|| {

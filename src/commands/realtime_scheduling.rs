@@ -1,4 +1,4 @@
-//! How punctual the loop is to be: the options that `run` takes and `soak` hands on to the `run` it starts.
+//! Real-time scheduling of the loop: the options that `run` takes and `soak` passes to the `run` it starts.
 
 use std::ffi::OsString;
 use std::fs::File;
@@ -9,8 +9,8 @@ use super::CommandError;
 
 /// What the operating system is asked for.
 #[derive(Debug, clap::Args)]
-#[command(next_help_heading = "Punctuality")]
-pub struct Punctuality {
+#[command(next_help_heading = "Real-time scheduling")]
+pub struct RealtimeScheduling {
     /// Run the loop with this real-time priority, 1 to 99 (SCHED_FIFO), and lock its memory
     #[arg(long, value_name = "PRIORITY", value_parser = clap::value_parser!(u8).range(1..=99))]
     realtime: Option<u8>,
@@ -23,7 +23,7 @@ pub struct Punctuality {
     cpu_latency: Option<u32>,
 }
 
-impl Punctuality {
+impl RealtimeScheduling {
     /// Asks for it, on the loop's thread. The CPUs stay awake for as long as what is returned is kept.
     ///
     /// # Errors
