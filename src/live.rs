@@ -106,6 +106,17 @@ pub struct Counts {
     pub end: End,
 }
 
+/// What a transport with a queue of its own has done with the frames of the loop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+pub struct Deliveries {
+    /// Frames sent.
+    pub frames: u64,
+    /// Frames left out because the transport was behind.
+    pub skipped: u64,
+    /// Messages that the transport's own queues did not take, because a receiver was slow or dead.
+    pub discarded: u64,
+}
+
 /// The queues from the loop to the statistics thread, allocated beforehand.
 pub struct Reports {
     /// One sample a frame.
@@ -212,7 +223,7 @@ fn report(
         counts: *counts,
         lateness_ns,
         step_ns: monotonic_ns().saturating_sub(woke_ns),
-        subscribers: publishers.first().map_or(0, |publisher| publisher.subscribers()),
+        subscribers: publishers.iter().map(|publisher| publisher.subscribers()).sum(),
     };
     let _ = reports.samples.push(sample);
 }

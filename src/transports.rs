@@ -1,5 +1,91 @@
-//! Where frames go: publishers of the loop. They know messages and frames, never the solver, and not each other.
+//! The ways out of this process: one trait, a list, a folder each.
+//!
+//! In: a scene, the loop's rate, the stage. Out: for each transport that the scene asks for, a [`Publisher`] for the
+//! loop's thread and a [`StatusPublisher`] for the statistics thread. Transports know frames and messages, no solver, and
+//! not each other. [`background`] is for those that would keep the loop waiting. Called by the `run` command.
 
+pub mod background;
 pub mod iceoryx2;
 #[cfg(feature = "ros2")]
 pub mod ros2;
+
+use crate::live::{Deliveries, Publisher, StatusPublisher};
+use crate::scene::Scene;
+use crate::wire::Stage;
+
+/// What every transport is told of the run.
+#[derive(Debug, Clone, Copy)]
+pub struct TransportConfig<'a> {
+    /// The name under which services and topics appear.
+    pub name: &'a str,
+    /// The scene, which says what to publish.
+    pub scene: &'a Scene,
+    /// Frames per second of the loop.
+    pub loop_rate: f64,
+    /// The stage.
+    pub stage: Stage,
+}
+
+/// Why a transport cannot be used: one sentence, which says what to change.
+#[derive(Debug, thiserror::Error)]
+pub enum TransportError {
+    /// What the user asked for cannot be had.
+    #[error("{0}")]
+    BadInput(String),
+    /// Anything else.
+    #[error("{0}")]
+    Failed(String),
+}
+
+/// A way out of this process.
+///
+/// It is made before the loop's thread has its priority, so that threads of its own do not inherit that. Its ends are
+/// opened by the threads that use them: ports of iceoryx2, for one, stay on the thread that made them.
+pub trait Transport: Send {
+    /// What it offers, in one line for people.
+    fn describe(&self) -> String;
+
+    /// Opens the end of the loop, on the loop's thread. Called once.
+    ///
+    /// # Errors
+    /// [`TransportError`]
+    fn publisher(&mut self) -> Result<Box<dyn Publisher>, TransportError>;
+
+    /// Opens the end of the statistics, on their thread, after [`publisher`](Self::publisher). Called once.
+    ///
+    /// # Errors
+    /// [`TransportError`]
+    fn status(&mut self) -> Result<Box<dyn StatusPublisher>, TransportError>;
+
+    /// Takes leave once both ends are dropped: its name in the summary, and what it delivered, where it has a queue.
+    fn finish(self: Box<Self>) -> Option<(&'static str, Deliveries)>;
+}
+
+/// Makes a transport; `None` where the scene does not ask for it.
+type Open = fn(&TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError>;
+
+/// Every transport there is.
+const TRANSPORTS: [Open; 2] = [iceoryx2::open, ros2_if_built];
+
+/// The transports that the scene asks for.
+///
+/// # Errors
+/// The first [`TransportError`]
+pub fn open(config: &TransportConfig) -> Result<Vec<Box<dyn Transport>>, TransportError> {
+    TRANSPORTS.iter().filter_map(|open| open(config).transpose()).collect()
+}
+
+#[cfg(feature = "ros2")]
+use ros2::open as ros2_if_built;
+
+#[cfg(not(feature = "ros2"))]
+fn ros2_if_built(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError> {
+    match config.scene.ros2 {
+        None => Ok(None),
+        Some(_) => Err(TransportError::BadInput(
+            "ROS 2 is asked for and this program was built without it: build it with the feature \"jazzy\" or \
+             \"humble\""
+                .to_owned(),
+        )),
+    }
+}

@@ -9,12 +9,12 @@ use std::cell::Cell;
 use std::sync::atomic::AtomicBool;
 
 use bench_dragon::live::statistics::queues;
-use bench_dragon::live::{Frames, LoopOptions, Publisher, run_loop};
+use bench_dragon::live::{Frames, LoopOptions, run_loop};
 use bench_dragon::scene::{AtEnd, Scene};
 use bench_dragon::show::state::FrameState;
 use bench_dragon::show::{Frame, Playback, Show};
 use bench_dragon::subscribers::connection::Subscription;
-use bench_dragon::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
+use bench_dragon::transports::{self, TransportConfig};
 use bench_dragon::wire::convert::stage;
 
 thread_local! {
@@ -79,33 +79,18 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     let timeline = scene.motion.timeline(&mut |_| ());
     let show = Show::new(&scene, timeline, playback).unwrap();
     let name = format!("test_{}_allocation", std::process::id());
-    let config = PublisherConfig {
-        name: name.clone(),
-        handles: scene.team().handles(),
-        queue: 64,
-        subscribers: 8,
-        alerts: true,
-        stage: stage(1, 0, &scene.motion),
-    };
-    let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(SharedMemoryPublisher::open(&config).unwrap())];
+    let config = TransportConfig { name: &name, scene: &scene, loop_rate: 500.0, stage: stage(1, 0, &scene.motion) };
+    let mut transports = transports::open(&config).unwrap();
     #[cfg(feature = "ros2")]
-    let ros2_thread = {
+    {
         use bench_dragon::scene::ros2::Ros2Settings;
         use bench_dragon::transports::ros2::environment::{Network, Range};
+        use bench_dragon::transports::ros2::open_on;
         let settings = Ros2Settings { rate: Some(100.0), ..Ros2Settings::default() };
-        let config = bench_dragon::transports::ros2::Ros2Config {
-            name: name.clone(),
-            handles: scene.team().handles(),
-            loop_rate: 500.0,
-            settings,
-            alerts: true,
-            stage: config.stage,
-        };
         let network = Network { domain: 93, range: Range::Localhost };
-        let (publisher, _status, thread) = bench_dragon::transports::ros2::start(config, network).unwrap();
-        publishers.push(Box::new(publisher));
-        thread
-    };
+        transports.push(open_on(network, &config, &settings).unwrap());
+    }
+    let mut publishers: Vec<_> = transports.iter_mut().map(|transport| transport.publisher().unwrap()).collect();
     let subscription = Subscription::new(&name).unwrap();
     let connection = subscription.connect().unwrap().unwrap();
     let (reports, _inbox) = queues();
@@ -114,8 +99,10 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     let counts = run_loop(&mut watched, &mut publishers, options, reports, &AtomicBool::new(false)).unwrap();
     let during = allocations() - watched.before.unwrap();
     assert_eq!(during, watched.loans, "the loop allocates more than iceoryx2's loans do, in {counts:?}");
-    #[cfg(feature = "ros2")]
-    assert!(ros2_thread.end().frames > 100);
+    drop(publishers);
+    for (name, deliveries) in transports.into_iter().filter_map(|transport| transport.finish()) {
+        assert!(deliveries.frames > 100, "{name}: {deliveries:?}");
+    }
     // Without these the test would prove nothing about alerts, contacts and loops.
     assert!(counts.frames > 500, "{counts:?}");
     assert!(watched.states[FrameState::Approaching as usize] > 0 && watched.states[FrameState::Contact as usize] > 0);

@@ -1,8 +1,8 @@
 //! `run`: the live publisher.
 
-mod ros2;
-
+use std::collections::BTreeMap;
 use std::collections::hash_map::RandomState;
+use std::fs::File;
 use std::hash::BuildHasher;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,17 +11,16 @@ use std::sync::mpsc;
 use anstyle::Style;
 use bench_dragon::live::clock::realtime_ns;
 use bench_dragon::live::statistics::{self, Inbox, Percentiles, Run, Summary};
-use bench_dragon::live::{Counts, End, LoopOptions, Publisher, StatusPublisher, run_loop};
+use bench_dragon::live::{Counts, Deliveries, End, LoopOptions, Publisher, run_loop};
 use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::{Accepted, AtEnd, Scene};
 use bench_dragon::show::{Playback, Show};
-use bench_dragon::transports::iceoryx2::{self, OpenError, PublisherConfig, SharedMemoryPublisher, StatusSender};
+use bench_dragon::transports::iceoryx2::{OpenError, service_name};
+use bench_dragon::transports::{self, Transport, TransportConfig, TransportError};
 use bench_dragon::wire::sentence::{Figures, alert_sentence};
-use bench_dragon::wire::{CollisionAlert, Stage, convert};
+use bench_dragon::wire::{CollisionAlert, convert};
 use serde::Serialize;
-
-use self::ros2::{Ros2, Ros2Summary};
 
 use super::events::sentence;
 use super::realtime_scheduling::RealtimeScheduling;
@@ -72,15 +71,19 @@ struct SummaryLine {
     wakeup_ns: Percentiles,
     step_ns: Percentiles,
     end: End,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    ros2: Option<Ros2Summary>,
+    /// What each transport with a queue of its own has delivered, by its name.
+    #[serde(flatten)]
+    deliveries: BTreeMap<&'static str, Deliveries>,
 }
 
 /// Publishes the scene until its duration is over or a signal comes.
 pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError> {
-    let scene = common.load_scene()?;
+    let mut scene = common.load_scene()?;
+    if arguments.ros2 {
+        scene.ros2.get_or_insert_default();
+    }
     let playback = arguments.playback(&scene)?;
-    iceoryx2::service_name(&common.name, "poses")?;
+    service_name(&common.name, "poses")?;
     let timeline = if scene.alerts.is_some() {
         search_timeline(&scene, common)
     } else {
@@ -99,6 +102,9 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
     session.run(show, &stop)
 }
 
+/// What the loop's thread prepares: its publishers; the transports, for the other threads; and what keeps CPUs awake.
+type LoopEnds = (Vec<Box<dyn Publisher>>, Vec<Box<dyn Transport>>, Option<File>);
+
 /// All that the threads of a run have in common.
 struct RunSession<'a> {
     common: &'a Common,
@@ -114,88 +120,60 @@ struct RunSession<'a> {
 impl RunSession<'_> {
     /// Runs the loop on one thread and the statistics on another.
     fn run(&self, mut show: Show, stop: &Arc<AtomicBool>) -> Result<(), CommandError> {
-        iceoryx2::stale_files::spawn_reaper();
-        let ros2 = self.open_ros2()?;
+        let transports = self.open_transports()?;
         let (reports, inbox) = statistics::queues();
         let done = AtomicBool::new(false);
         let (opened, opening) = mpsc::channel();
-        let (over_ros2, ros2_status, end_ros2, ros2_sentence) = match ros2 {
-            Some(Ros2 { publisher, status, end, sentence }) => {
-                (Some(publisher), Some(status), Some(end), Some(sentence))
-            }
-            None => (None, None, None, None),
-        };
         let ended = std::thread::scope(|threads| {
             let looping = threads.spawn(|| {
-                let prepared = self.arguments.scheduling.prepare_thread();
-                let ready = prepared.and_then(|awake| Ok((self.open_shared_memory()?, awake)));
-                let (publisher, _awake) = match ready {
-                    Ok(ready) => ready,
+                let (mut publishers, _awake) = match self.prepare_loop(transports) {
+                    Ok((publishers, transports, awake)) => {
+                        let _ = opened.send(Ok(transports));
+                        (publishers, awake)
+                    }
                     Err(error) => {
                         let _ = opened.send(Err(error));
                         return None;
                     }
                 };
-                let _ = opened.send(Ok(()));
-                let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(publisher)];
-                if let Some(publisher) = over_ros2 {
-                    publishers.push(publisher);
-                }
                 Some(run_loop(&mut show, &mut publishers, self.loop_options(), reports, stop))
             });
-            // The thread sends exactly once; should it have died, joining it tells.
-            let ready = opening.recv().unwrap_or(Ok(()));
-            let summary = ready.and_then(|()| {
-                self.print_start(ros2_sentence.as_deref())?;
+            // The thread sends exactly once; should it have died, nothing comes.
+            let transports = opening.recv().unwrap_or_else(|_| Err(lost("loop's")));
+            let collected = transports.and_then(|transports| {
+                self.print_start(&transports);
                 let collecting = threads.spawn(|| {
                     // Without statistics the loop would run unseen.
-                    self.collect(inbox, ros2_status, &done).inspect_err(|_| stop.store(true, Ordering::Relaxed))
+                    self.collect(inbox, transports, &done).inspect_err(|_| stop.store(true, Ordering::Relaxed))
                 });
                 let outcome = looping.join();
                 done.store(true, Ordering::Release);
-                let summary = collecting.join().map_err(|_| lost("statistics"))??;
-                Ok((outcome.map_err(|_| lost("loop's"))?, summary))
+                let collected = collecting.join().map_err(|_| lost("statistics"))??;
+                Ok((outcome.map_err(|_| lost("loop's"))?, collected))
             });
-            match summary? {
-                (Some(Ok(counts)), summary) => Ok((counts, summary, None)),
-                (Some(Err((counts, error))), summary) => Ok((counts, summary, Some(error))),
+            match collected? {
+                (Some(Ok(counts)), collected) => Ok((counts, collected, None)),
+                (Some(Err((counts, error))), collected) => Ok((counts, collected, Some(error))),
                 (None, _) => Err(lost("loop's")),
             }
         });
-        let ros2 = end_ros2.map(|end| end());
-        let (counts, summary, error) = ended?;
-        self.print_summary(&counts, &summary, ros2)?;
+        let (counts, (summary, transports), error) = ended?;
+        let deliveries = transports.into_iter().filter_map(|transport| transport.finish()).collect();
+        self.print_summary(&counts, &summary, deliveries)?;
         error.map_or(Ok(()), |error| Err(CommandError::Failed(error.to_string())))
     }
 
-    /// The ROS 2 topics, where the scene or the command line asks for them.
-    fn open_ros2(&self) -> Result<Option<Ros2>, CommandError> {
-        if !self.arguments.ros2 && self.scene.ros2.is_none() {
-            return Ok(None);
-        }
-        ros2::open(self.scene, &self.common.name, self.playback.rate, self.stage()).map(Some)
+    fn open_transports(&self) -> Result<Vec<Box<dyn Transport>>, CommandError> {
+        let stage = convert::stage(self.run_id, realtime_ns(), &self.scene.motion);
+        let (name, scene, loop_rate) = (&self.common.name, self.scene, self.playback.rate);
+        Ok(transports::open(&TransportConfig { name, scene, loop_rate, stage })?)
     }
 
-    fn stage(&self) -> Stage {
-        let scene = self.scene;
-        convert::stage(self.run_id, realtime_ns(), &scene.motion)
-    }
-
-    fn open_shared_memory(&self) -> Result<SharedMemoryPublisher, CommandError> {
-        let scene = self.scene;
-        let handles = scene.team().handles();
-        Ok(SharedMemoryPublisher::open(&PublisherConfig {
-            name: self.common.name.clone(),
-            handles,
-            queue: self.queue(),
-            subscribers: scene.subscribers,
-            alerts: scene.alerts.is_some(),
-            stage: self.stage(),
-        })?)
-    }
-
-    fn queue(&self) -> usize {
-        self.scene.queue.unwrap_or_else(|| iceoryx2::default_queue(self.scene.team().handles(), self.scene.subscribers))
+    /// What the loop's thread does first: asks the system for what it was told to, opens its ends of the transports.
+    fn prepare_loop(&self, mut transports: Vec<Box<dyn Transport>>) -> Result<LoopEnds, CommandError> {
+        let awake = self.arguments.scheduling.prepare_thread()?;
+        let publishers = transports.iter_mut().map(|transport| transport.publisher()).collect::<Result<_, _>>()?;
+        Ok((publishers, transports, awake))
     }
 
     fn loop_options(&self) -> LoopOptions {
@@ -207,30 +185,25 @@ impl RunSession<'_> {
     fn collect(
         &self,
         inbox: Inbox,
-        ros2: Option<Box<dyn StatusPublisher + Send>>,
+        mut transports: Vec<Box<dyn Transport>>,
         done: &AtomicBool,
-    ) -> Result<Summary, CommandError> {
-        let mut sinks: Vec<Box<dyn StatusPublisher>> =
-            vec![Box::new(StatusSender::open(&self.common.name, self.scene.subscribers)?)];
-        if let Some(status) = ros2 {
-            sinks.push(status);
-        }
+    ) -> Result<(Summary, Vec<Box<dyn Transport>>), CommandError> {
         let run = Run {
             run_id: self.run_id,
             rate: self.playback.rate,
             scene: &self.scene.name,
-            sinks,
+            sinks: transports.iter_mut().map(|transport| transport.status()).collect::<Result<_, _>>()?,
             announce: Box::new(|alert| self.print_alert(alert)),
         };
-        Ok(statistics::collect(inbox, run, done))
+        Ok((statistics::collect(inbox, run, done), transports))
     }
 
     /// What a person wants to know at the start, on standard error: standard output is for the summary.
-    fn print_start(&self, ros2: Option<&str>) -> Result<(), CommandError> {
+    fn print_start(&self, transports: &[Box<dyn Transport>]) {
         if self.common.quiet || self.common.json {
-            return Ok(());
+            return;
         }
-        let (scene, name, playback) = (self.scene, &self.common.name, self.playback);
+        let (scene, playback) = (self.scene, self.playback);
         eprintln!("Scene \"{}\": {} benches, {} handles.", scene.name, scene.team().benches, scene.team().handles());
         eprintln!("Solver {}.", self.solver);
         let scale = if playback.time_scale == 1.0 {
@@ -239,15 +212,7 @@ impl RunSession<'_> {
             format!(", {} simulated seconds per second", number(playback.time_scale))
         };
         eprintln!("{} frames per second{scale}, from {} s.", number(playback.rate), number(playback.start));
-        let alerts = if scene.alerts.is_some() { ", /alerts" } else { "" };
-        eprintln!(
-            "iceoryx2 services: {name}/poses{alerts}, /status, /stage, /tick (queues of {} frames for {} subscribers).",
-            self.queue(),
-            scene.subscribers
-        );
-        if let Some(sentence) = ros2 {
-            eprintln!("{sentence}");
-        }
+        transports.iter().for_each(|transport| eprintln!("{}", transport.describe()));
         match scene.alerts {
             Some(_) => eprintln!("Ahead, in simulated time:"),
             None => eprintln!("No alerts: contact and stall are not computed. Ahead, in simulated time:"),
@@ -258,7 +223,6 @@ impl RunSession<'_> {
         if self.timeline.find(EventKind::Contact).is_some_and(|contact| contact.time == 0.0) {
             log::warn!("boards overlap at the start of this scene");
         }
-        Ok(())
     }
 
     /// One line an alert, with the countdown in wall time.
@@ -271,7 +235,12 @@ impl RunSession<'_> {
         eprintln!("{:>10.3} s  {style}{:<11}{style:#} {said}", alert.sim_time, level.name());
     }
 
-    fn print_summary(&self, counts: &Counts, summary: &Summary, ros2: Option<Ros2Summary>) -> Result<(), CommandError> {
+    fn print_summary(
+        &self,
+        counts: &Counts,
+        summary: &Summary,
+        deliveries: BTreeMap<&'static str, Deliveries>,
+    ) -> Result<(), CommandError> {
         let Counts { frames, overruns, skipped, end } = *counts;
         let Summary { wakeup_ns, step_ns, lost_samples } = *summary;
         let mut output = Output::standard();
@@ -279,7 +248,7 @@ impl RunSession<'_> {
             log::warn!("{lost_samples} frames are missing from the percentiles: the machine left them no time");
         }
         if self.common.json {
-            output.json(&SummaryLine { frames, overruns, skipped, wakeup_ns, step_ns, end, ros2 })?;
+            output.json(&SummaryLine { frames, overruns, skipped, wakeup_ns, step_ns, end, deliveries })?;
         } else {
             output.line(&format!(
                 "{frames} frames published, {overruns} overruns, {skipped} periods skipped (ended by {}).",
@@ -299,9 +268,9 @@ impl RunSession<'_> {
                     us(of.max)
                 ))?;
             }
-            if let Some(Ros2Summary { frames, skipped, discarded }) = ros2 {
+            for (name, Deliveries { frames, skipped, discarded }) in deliveries {
                 output.line(&format!(
-                    "  ROS 2: {frames} frames published, {skipped} skipped, {discarded} messages discarded."
+                    "  {name}: {frames} frames sent, {skipped} skipped, {discarded} messages discarded."
                 ))?;
             }
         }
@@ -331,11 +300,17 @@ impl RunArguments {
     }
 }
 
+impl From<TransportError> for CommandError {
+    fn from(error: TransportError) -> Self {
+        match error {
+            TransportError::BadInput(sentence) => Self::BadInput(sentence),
+            TransportError::Failed(sentence) => Self::Failed(sentence),
+        }
+    }
+}
+
 impl From<OpenError> for CommandError {
     fn from(error: OpenError) -> Self {
-        match error {
-            OpenError::Name { .. } => Self::BadInput(error.to_string()),
-            _ => Self::Failed(error.to_string()),
-        }
+        TransportError::from(error).into()
     }
 }

@@ -4,125 +4,41 @@
 //! since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/alerts`, `/status`,
 //! `/stage` and the event service `<name>/tick`.
 
+mod error;
+mod memory;
 pub mod stale_files;
 
-use std::collections::BTreeSet;
-use std::fs::OpenOptions;
 use std::io::ErrorKind;
 use std::time::{Duration, Instant};
 
 use ::iceoryx2::config::Config;
 use ::iceoryx2::port::notifier::Notifier;
 use ::iceoryx2::port::publisher::Publisher as Port;
-use ::iceoryx2::port::publisher::PublisherCreateError;
 use ::iceoryx2::port::update_connections::UpdateConnections;
 use ::iceoryx2::prelude::*;
 use ::iceoryx2::service::builder::event::{EventOpenError, EventOpenOrCreateError};
-use ::iceoryx2::service::builder::publish_subscribe::{
-    PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
-};
+use ::iceoryx2::service::builder::publish_subscribe::{PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError};
 use ::iceoryx2::service::port_factory::{event, publish_subscribe};
 
+use super::{Transport, TransportConfig, TransportError};
 use crate::live::clock::monotonic_ns;
-use crate::live::{PublishError, Publisher, StatusPublisher};
+use crate::live::{Deliveries, PublishError, Publisher, StatusPublisher};
 use crate::show::Frame;
 use crate::wire::convert::{collision_alert, handle_pose};
 use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
+
+pub use error::OpenError;
+use error::{failed, incomplete, port_error, service_error};
+use memory::check_room;
+pub use memory::{check_room_to_subscribe, default_queue, reserve_pages};
 
 /// Nodes that may have a service open at once beyond one a subscriber: the publisher's, and those that died and have
 /// not been cleaned up after yet.
 const SPARE_NODES: usize = 32;
 /// Alerts and statuses that a subscriber may fall behind.
 const SMALL_QUEUE: usize = 16;
-/// The shared memory that the queues of frames may take by default.
-const QUEUE_BYTES: usize = 64_000_000;
-/// Where Linux keeps shared memory.
-const SHARED_MEMORY: &str = "/dev/shm";
-/// How long a incomplete service may stop a publisher; [`stale_files`] needs less to remove it.
+/// How long an incomplete service may stop a publisher; [`stale_files`] needs less to remove it.
 const PATIENCE: Duration = Duration::from_secs(6);
-/// What a subscriber needs of it for its own bookkeeping, and more.
-const SUBSCRIBER_BYTES: u64 = 500_000;
-
-/// Why the shared memory cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum OpenError {
-    /// iceoryx2 has no services of such a name.
-    #[error("--name is \"{name}\", expected a name for services of iceoryx2: not empty, at most {most} bytes")]
-    Name {
-        /// The name given.
-        name: String,
-        /// The most bytes a name may have.
-        most: usize,
-    },
-    /// Somebody publishes under this name already.
-    #[error(
-        "another publisher is running under the name \"{0}\": stop it, or choose another name for this one with --name"
-    )]
-    AlreadyPublished(String),
-    /// The queues would not fit.
-    #[error(
-        "the queues of {queue} frames for {subscribers} subscribers need {needed} bytes of shared memory and \
-         {SHARED_MEMORY} has {free} left: lower publish.queue or publish.subscribers in the scene, or make \
-         {SHARED_MEMORY} larger"
-    )]
-    NoRoom {
-        /// Frames in a queue.
-        queue: usize,
-        /// Subscribers that may come.
-        subscribers: usize,
-        /// Bytes needed.
-        needed: u64,
-        /// Bytes left.
-        free: u64,
-    },
-    /// A service stays incomplete.
-    #[error(
-        "the service \"{0}\" is incomplete and nobody completes it: stop every program that uses it, or choose another \
-         name with --name"
-    )]
-    Incomplete(String),
-    /// There is no room even for bookkeeping.
-    #[error("{SHARED_MEMORY} has {free} bytes left, which is too little: remove what fills it, or make it larger")]
-    Full {
-        /// Bytes left.
-        free: u64,
-    },
-    /// The services on this machine belong to another user.
-    #[error(
-        "{folder} belongs to another user, who keeps all others out: run as that user, or build every program that is to \
-         take part with the feature any_user"
-    )]
-    AnotherUsers {
-        /// The folder that cannot be entered.
-        folder: String,
-    },
-    /// A service of this name exists with other properties.
-    #[error(
-        "the service \"{0}\" exists with another layout of its messages, or with other limits: a program of another \
-         version of bench-dragon has it open; stop that or take the same version for both, or choose another name with \
-         --name"
-    )]
-    Incompatible(String),
-    /// The service admits no more subscribers.
-    #[error(
-        "\"{service}\" has {most} subscribers, which is as many as its publisher admits (publish.subscribers in its \
-         scene): end one first, or raise that and start the publisher again"
-    )]
-    TooManySubscribers {
-        /// The service.
-        service: String,
-        /// Subscribers admitted.
-        most: usize,
-    },
-    /// Anything else.
-    #[error("iceoryx2 could not open \"{service}\": {reason}")]
-    Failed {
-        /// The service.
-        service: String,
-        /// What iceoryx2 says.
-        reason: String,
-    },
-}
 
 /// The name of one of a publisher's services.
 ///
@@ -153,15 +69,6 @@ pub fn node() -> Result<Node<ipc::Service>, OpenError> {
     })
 }
 
-/// Frames a subscriber may fall behind, where the scene does not say: at most 64 MB for all subscribers together.
-pub fn default_queue(handles: usize, subscribers: usize) -> usize {
-    (QUEUE_BYTES / frame_bytes(handles) / subscribers).clamp(2, 64)
-}
-
-fn frame_bytes(handles: usize) -> usize {
-    size_of::<FrameHeader>() + handles * size_of::<HandlePose>()
-}
-
 /// What a publisher offers.
 #[derive(Debug, Clone)]
 pub struct PublisherConfig {
@@ -177,6 +84,52 @@ pub struct PublisherConfig {
     pub alerts: bool,
     /// The stage, sent once and kept for late subscribers.
     pub stage: Stage,
+}
+
+/// The services of a run.
+struct Iceoryx2(PublisherConfig);
+
+/// The services that the scene asks for, which every scene does; nothing is opened yet but a thread that removes
+/// [`stale_files`].
+///
+/// # Errors
+/// [`TransportError::BadInput`] for a name that iceoryx2 cannot take.
+pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError> {
+    let TransportConfig { name, scene, stage, .. } = *config;
+    service_name(name, "poses")?;
+    stale_files::spawn_reaper();
+    let (handles, subscribers) = (scene.team().handles(), scene.subscribers);
+    Ok(Some(Box::new(Iceoryx2(PublisherConfig {
+        name: name.to_owned(),
+        handles,
+        queue: scene.queue.unwrap_or_else(|| default_queue(handles, subscribers)),
+        subscribers,
+        alerts: scene.alerts.is_some(),
+        stage,
+    }))))
+}
+
+impl Transport for Iceoryx2 {
+    fn describe(&self) -> String {
+        let PublisherConfig { name, queue, subscribers, alerts, .. } = &self.0;
+        let alerts = if *alerts { ", /alerts" } else { "" };
+        format!(
+            "iceoryx2 services: {name}/poses{alerts}, /status, /stage, /tick (queues of {queue} frames for \
+             {subscribers} subscribers)."
+        )
+    }
+
+    fn publisher(&mut self) -> Result<Box<dyn Publisher>, TransportError> {
+        Ok(Box::new(SharedMemoryPublisher::open(&self.0)?))
+    }
+
+    fn status(&mut self) -> Result<Box<dyn StatusPublisher>, TransportError> {
+        Ok(Box::new(StatusSender::open(&self.0.name, self.0.subscribers)?))
+    }
+
+    fn finish(self: Box<Self>) -> Option<(&'static str, Deliveries)> {
+        None
+    }
 }
 
 type Service<Payload, Header> = publish_subscribe::PortFactory<ipc::Service, Payload, Header>;
@@ -305,55 +258,6 @@ impl StatusPublisher for StatusSender {
     }
 }
 
-/// Refuses queues that the shared memory has no room for.
-fn check_room(config: &PublisherConfig) -> Result<(), OpenError> {
-    let PublisherConfig { queue, subscribers, .. } = *config;
-    // Two frames that a subscriber may hold, two loans, the history, and a little for bookkeeping.
-    let frames = subscribers * (queue + 2) + 4;
-    let needed = (frames * frame_bytes(config.handles)) as u64 + 2_000_000;
-    match free_bytes() {
-        Some(free) if free < needed => Err(OpenError::NoRoom { queue, subscribers, needed, free }),
-        _ => Ok(()),
-    }
-}
-
-/// Refuses to subscribe where the shared memory is as good as full.
-///
-/// # Errors
-/// [`OpenError::Full`].
-pub fn check_room_to_subscribe() -> Result<(), OpenError> {
-    match free_bytes() {
-        Some(free) if free < SUBSCRIBER_BYTES => Err(OpenError::Full { free }),
-        _ => Ok(()),
-    }
-}
-
-/// What is left of the shared memory; `None` where there is no such folder: iceoryx2 itself will say what is wrong.
-fn free_bytes() -> Option<u64> {
-    let space = nix::sys::statvfs::statvfs(SHARED_MEMORY).ok()?;
-    Some(space.blocks_available() * space.fragment_size())
-}
-
-/// Has the system set aside every page of the shared memory that this process has mapped. Without this a page is looked
-/// for when it is first written, and should others have filled the memory by then, the process is killed with SIGBUS.
-///
-/// # Errors
-/// [`OpenError::Full`] where the pages are not there.
-pub fn reserve_pages() -> Result<(), OpenError> {
-    let full = || OpenError::Full { free: free_bytes().unwrap_or(0) };
-    // Linux has this file for every process.
-    let maps = std::fs::read_to_string("/proc/self/maps").unwrap_or_default();
-    let mapped: BTreeSet<_> = maps.lines().filter_map(|line| Some(&line[line.find(SHARED_MEMORY)?..])).collect();
-    // A file that is removed meanwhile needs no pages.
-    for file in mapped.into_iter().filter_map(|file| OpenOptions::new().read(true).write(true).open(file).ok()) {
-        let length = file.metadata().map_or(0, |of| of.len());
-        if length > 0 {
-            nix::fcntl::posix_fallocate(&file, 0, length as i64).map_err(|_| full())?;
-        }
-    }
-    Ok(())
-}
-
 /// The service of frames. One left by a watcher can have shorter queues than this publisher would make: it is used as
 /// it is.
 fn frames(
@@ -411,39 +315,6 @@ fn sender<Message: ZeroCopySend + std::fmt::Debug + Copy>(
         .map_err(|error| port_error(name, service, error))
 }
 
-fn service_error(service: &ServiceName, error: PublishSubscribeOpenOrCreateError) -> OpenError {
-    use PublishSubscribeOpenError as Open;
-    if matches!(error, PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(Open::HangsInCreation)) {
-        return OpenError::Incomplete(service.to_string());
-    }
-    let incompatible = match &error {
-        PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(open) => !matches!(
-            open,
-            Open::DoesNotExist | Open::InternalFailure | Open::Interrupt | Open::InsufficientPermissions
-        ),
-        PublishSubscribeOpenOrCreateError::PublishSubscribeCreateError(create) => {
-            matches!(create, PublishSubscribeCreateError::AlreadyExists)
-        }
-        _ => false,
-    };
-    if incompatible {
-        OpenError::Incompatible(format!("{service} ({error:?})"))
-    } else {
-        OpenError::Failed { service: service.to_string(), reason: format!("{error:?}") }
-    }
-}
-
-fn port_error(name: &str, service: &str, error: PublisherCreateError) -> OpenError {
-    match error {
-        PublisherCreateError::ExceedsMaxSupportedPublishers => OpenError::AlreadyPublished(name.to_owned()),
-        other => failed(name, service, other),
-    }
-}
-
-fn incomplete(name: &str, service: &str) -> OpenError {
-    OpenError::Incomplete(format!("{name}/{service}"))
-}
-
 /// Tries again while a service is incomplete: its maker is about to finish it, or was killed, and then its file is removed
 /// after a while ([`stale_files`]).
 fn retry_while_incomplete<Opened>(open: impl Fn() -> Result<Opened, OpenError>) -> Result<Opened, OpenError> {
@@ -456,8 +327,4 @@ fn retry_while_incomplete<Opened>(open: impl Fn() -> Result<Opened, OpenError>) 
             other => return other,
         }
     }
-}
-
-fn failed(name: &str, service: &str, error: impl std::fmt::Debug) -> OpenError {
-    OpenError::Failed { service: format!("{name}/{service}"), reason: format!("{error:?}") }
 }

@@ -1,43 +1,25 @@
 //! ROS 2 topics, by ros2-client on RustDDS: on a thread of their own, at a rate of their own.
 //!
-//! [`Ros2Publisher`] is the loop's end: it copies a frame into memory that was set aside and goes on, without a lock,
-//! an allocation or a system call. [`Ros2Thread`] is the other end: it owns everything of ROS and takes frames from a
-//! queue; where it falls behind it goes on with the newest and counts what it left out. The `run` command opens both.
+//! In: a scene with `[publish.ros2]` and the process's environment. Out: a [`Transport`]. Called by the list of transports.
 
 pub mod environment;
 pub mod messages;
 mod node;
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc;
-use std::thread::JoinHandle;
+use crate::live::{Deliveries, Publisher, StatusPublisher};
+use crate::scene::ros2::{Ros2Settings, Topic};
+use crate::wire::Stage;
 
-use rtrb::{Consumer, Producer, RingBuffer};
-
-use crate::live::{PublishError, Publisher, StatusPublisher};
-use crate::scene::ros2::Ros2Settings;
-use crate::show::Frame;
-use crate::wire::convert::{collision_alert, handle_pose};
-use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
-
-use environment::{Network, check_name};
-
-/// Seconds of frames that the ROS 2 thread may fall behind before it goes on with the newest.
-const QUEUED_SECONDS: f64 = 0.25;
-/// The least and the most frames in that queue.
-const QUEUED_FRAMES: (usize, usize) = (4, 256);
-/// The memory that queue may take.
-const QUEUED_BYTES: usize = 64_000_000;
-/// Alerts in their queue; one a second is usual.
-const QUEUED_ALERTS: usize = 256;
+use super::background::{self, BackgroundConfig, BackgroundError, BackgroundPublisher, BackgroundStatus};
+use super::{Transport, TransportConfig, TransportError};
+use environment::{Network, check_name, other_distribution};
 
 /// Why there are no ROS 2 topics.
 #[derive(Debug, thiserror::Error)]
 pub enum Ros2Error {
     /// ROS 2 takes no such name.
     #[error(
-        "--name is \"{0}\", which ROS 2 cannot take: expected words of letters, digits and single underscores, not \
+        "the name is \"{0}\", which ROS 2 cannot take: expected words of letters, digits and single underscores, not \
          beginning with a digit, joined by slashes"
     )]
     Name(String),
@@ -49,202 +31,106 @@ pub enum Ros2Error {
     Failed(String),
 }
 
+impl From<Ros2Error> for TransportError {
+    fn from(error: Ros2Error) -> Self {
+        match error {
+            Ros2Error::Failed(_) => Self::Failed(error.to_string()),
+            Ros2Error::Name(_) | Ros2Error::Environment(_) => Self::BadInput(error.to_string()),
+        }
+    }
+}
+
 /// What is offered on ROS 2.
 #[derive(Debug, Clone)]
-pub struct Ros2Config {
+struct Ros2Config {
     /// The namespace of the topics.
-    pub name: String,
+    name: String,
     /// Handles in a frame.
-    pub handles: usize,
-    /// Frames per second of the loop.
-    pub loop_rate: f64,
+    handles: usize,
+    /// Frames per second.
+    rate: f64,
     /// What the scene says.
-    pub settings: Ros2Settings,
+    settings: Ros2Settings,
     /// Whether there are alerts.
-    pub alerts: bool,
+    alerts: bool,
     /// The stage.
-    pub stage: Stage,
+    stage: Stage,
+    /// Where to be found.
+    network: Network,
 }
 
-/// One frame on its way to the ROS 2 thread.
-struct Snapshot {
-    header: FrameHeader,
-    handles: Vec<HandlePose>,
+/// The open topics.
+struct Ros2 {
+    description: String,
+    publisher: Option<BackgroundPublisher>,
+    status: Option<BackgroundStatus>,
+    thread: background::BackgroundThread,
 }
 
-/// What the two ends tell each other besides the queues.
-#[derive(Default)]
-struct Shared {
-    stop: AtomicBool,
-    /// Frames that found the queue full.
-    rejected: AtomicU64,
-    counts: Counters,
-}
-
-/// See [`Ros2Counts`].
-#[derive(Default)]
-struct Counters {
-    frames: AtomicU64,
-    skipped: AtomicU64,
-    discarded: AtomicU64,
-}
-
-/// What the ROS 2 thread has done.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Ros2Counts {
-    /// Frames published.
-    pub frames: u64,
-    /// Frames left out because the thread was behind.
-    pub skipped: u64,
-    /// Messages that a full queue of RustDDS did not take, because a reliable subscriber was slow or dead.
-    pub discarded: u64,
-}
-
-/// The loop's end.
-pub struct Ros2Publisher {
-    /// Frames per frame of the loop, at most 1.
-    share: f64,
-    latest_slot: Option<u64>,
-    free: Consumer<Box<Snapshot>>,
-    filled: Producer<Box<Snapshot>>,
-    alerts: Producer<CollisionAlert>,
-    shared: Arc<Shared>,
-}
-
-/// The statistics thread's end.
-pub struct Ros2Status(mpsc::Sender<LoopStatus>);
-
-/// The ROS 2 thread. Dropping it ends the thread and takes the node off the graph.
-pub struct Ros2Thread {
-    shared: Arc<Shared>,
-    handle: Option<JoinHandle<()>>,
-}
-
-/// The ROS 2 thread's ends of the queues.
-struct Inbox {
-    free: Producer<Box<Snapshot>>,
-    filled: Consumer<Box<Snapshot>>,
-    alerts: Consumer<CollisionAlert>,
-    status: mpsc::Receiver<LoopStatus>,
-    shared: Arc<Shared>,
-}
-
-/// Starts the ROS 2 thread and returns when its topics exist.
+/// Opens the topics that the scene asks for, on the network that the environment names.
 ///
 /// # Errors
-/// [`Ros2Error`]: each says what to change.
-pub fn start(config: Ros2Config, network: Network) -> Result<(Ros2Publisher, Ros2Status, Ros2Thread), Ros2Error> {
-    check_name(&config.name)?;
-    let rate = config.settings.rate_of(config.loop_rate);
-    let depth = queue_depth(config.handles, rate);
-    // One more than the queue holds is under way: being filled, or being published.
-    let (mut free_producer, free) = RingBuffer::new(depth + 2);
-    for _ in 0..depth + 2 {
-        let snapshot =
-            Snapshot { header: FrameHeader::default(), handles: vec![HandlePose::default(); config.handles] };
-        // The ring has just as many places.
-        let _ = free_producer.push(Box::new(snapshot));
+/// [`TransportError`]
+pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError> {
+    let Some(settings) = &config.scene.ros2 else { return Ok(None) };
+    let variable = |name: &str| std::env::var(name).ok();
+    let network = Network::of(variable)?;
+    if let Some(warning) = other_distribution(variable) {
+        log::warn!("{warning}");
     }
-    let (filled, filled_consumer) = RingBuffer::new(depth);
-    let (alerts, alerts_consumer) = RingBuffer::new(QUEUED_ALERTS);
-    let (status, status_receiver) = mpsc::channel();
-    let shared = Arc::new(Shared::default());
-    let inbox = Inbox {
-        free: free_producer,
-        filled: filled_consumer,
-        alerts: alerts_consumer,
-        status: status_receiver,
-        shared: Arc::clone(&shared),
-    };
-    let (opened, opening) = mpsc::channel();
-    let share = rate / config.loop_rate;
-    let handle = std::thread::Builder::new()
-        .name("ros2".to_owned())
-        .spawn(move || node::serve(&config, rate, network, inbox, &opened))
-        .map_err(|error| Ros2Error::Failed(error.to_string()))?;
-    let thread = Ros2Thread { shared: Arc::clone(&shared), handle: Some(handle) };
-    opening.recv().unwrap_or_else(|_| Err(Ros2Error::Failed("its thread ended early".to_owned())))?;
-    let publisher = Ros2Publisher { share, latest_slot: None, free, filled, alerts, shared };
-    Ok((publisher, Ros2Status(status), thread))
+    Ok(Some(open_on(network, config, settings)?))
 }
 
-fn queue_depth(handles: usize, rate: f64) -> usize {
-    let (least, most) = QUEUED_FRAMES;
-    let affordable = QUEUED_BYTES / (handles * size_of::<HandlePose>());
-    ((rate * QUEUED_SECONDS) as usize).clamp(least, most).min(affordable.max(least))
+/// Opens the topics of `settings` on a network.
+///
+/// # Errors
+/// [`Ros2Error`]
+pub fn open_on(
+    network: Network,
+    config: &TransportConfig,
+    settings: &Ros2Settings,
+) -> Result<Box<dyn Transport>, Ros2Error> {
+    let TransportConfig { name, scene, loop_rate, stage } = *config;
+    check_name(name)?;
+    if let Some(rate) = settings.rate.filter(|rate| *rate > loop_rate) {
+        log::warn!("publish.ros2.rate is {rate}, more than the loop's {loop_rate}: ROS 2 gets {loop_rate} a second");
+    }
+    let (alerts, rate, handles) = (scene.alerts.is_some(), settings.rate_of(loop_rate), scene.team().handles());
+    let topics = settings.topics.keys().filter(|topic| alerts || **topic != Topic::Alerts);
+    let topics: Vec<String> = topics.map(|topic| topic.path(name)).collect();
+    let description =
+        format!("ROS 2 topics ({}, at {rate} frames per second): {}.", network.sentence(), topics.join(", "));
+    let background = BackgroundConfig { name: "ros2", handles, loop_rate, rate };
+    let settings = settings.clone();
+    let config = Ros2Config { name: name.to_owned(), handles, rate, settings, alerts, stage, network };
+    let started = background::start(background, move || node::Topics::open(&config));
+    let (publisher, status, thread) = started.map_err(|error| match error {
+        BackgroundError::Open(error) => error,
+        BackgroundError::Thread(reason) => Ros2Error::Failed(reason),
+    })?;
+    Ok(Box::new(Ros2 { description, publisher: Some(publisher), status: Some(status), thread }))
 }
 
-impl Ros2Publisher {
-    /// Whether a frame of this tick is one for ROS 2: as many per second as its rate says, spread evenly.
-    fn due(&mut self, tick: u64) -> bool {
-        // At most 20,000 ticks a second: beyond 2^53 they would have run for 14,000 years.
-        let slot = (tick as f64 * self.share) as u64;
-        self.latest_slot.replace(slot) != Some(slot)
-    }
-}
-
-impl Publisher for Ros2Publisher {
-    fn publish(&mut self, header: &FrameHeader, frame: &Frame) -> Result<(), PublishError> {
-        for alert in &frame.alerts {
-            // A thread that is 256 alerts behind has other troubles than this one.
-            let _ = self.alerts.push(collision_alert(header, alert));
-        }
-        if !self.due(header.tick) {
-            return Ok(());
-        }
-        // Only this end fills the queue, so that it still has room below.
-        let free = if self.filled.is_full() { None } else { self.free.pop().ok() };
-        let Some(mut snapshot) = free else {
-            self.shared.rejected.fetch_add(1, Ordering::Relaxed);
-            return Ok(());
-        };
-        snapshot.header = FrameHeader { sent_ns: crate::live::clock::monotonic_ns(), ..*header };
-        for (handle, pose) in snapshot.handles.iter_mut().enumerate() {
-            *pose = handle_pose(&frame.chain, handle);
-        }
-        let _ = self.filled.push(snapshot);
-        Ok(())
+impl Transport for Ros2 {
+    fn describe(&self) -> String {
+        self.description.clone()
     }
 
-    fn maintain(&mut self) {}
-
-    fn subscribers(&self) -> u32 {
-        0
-    }
-}
-
-impl StatusPublisher for Ros2Status {
-    fn publish_status(&mut self, status: &LoopStatus) {
-        // The thread ends before the statistics do: the last status then has no receiver.
-        let _ = self.0.send(*status);
-    }
-}
-
-impl Ros2Thread {
-    /// What it has done so far.
-    pub fn counts(&self) -> Ros2Counts {
-        let Counters { frames, skipped, discarded } = &self.shared.counts;
-        let [frames, skipped, discarded] = [frames, skipped, discarded].map(|count| count.load(Ordering::Relaxed));
-        Ros2Counts { frames, skipped: skipped + self.shared.rejected.load(Ordering::Relaxed), discarded }
-    }
-
-    /// Ends the thread once it has published what is queued; the node has then left the graph.
-    pub fn end(mut self) -> Ros2Counts {
-        self.join();
-        self.counts()
-    }
-
-    fn join(&mut self) {
-        self.shared.stop.store(true, Ordering::Release);
-        if let Some(handle) = self.handle.take() {
-            // A panic has been printed by then.
-            let _ = handle.join();
+    fn publisher(&mut self) -> Result<Box<dyn Publisher>, TransportError> {
+        match self.publisher.take() {
+            Some(publisher) => Ok(Box::new(publisher)),
+            None => Err(TransportError::Failed("the ROS 2 publisher is taken".to_owned())),
         }
     }
-}
 
-impl Drop for Ros2Thread {
-    fn drop(&mut self) {
-        self.join();
+    fn status(&mut self) -> Result<Box<dyn StatusPublisher>, TransportError> {
+        match self.status.take() {
+            Some(status) => Ok(Box::new(status)),
+            None => Err(TransportError::Failed("the ROS 2 status is taken".to_owned())),
+        }
+    }
+
+    fn finish(self: Box<Self>) -> Option<(&'static str, Deliveries)> {
+        Some(("ros2", self.thread.finish()))
     }
 }

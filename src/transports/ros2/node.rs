@@ -1,11 +1,9 @@
-//! The ROS 2 thread: its node, its topics, and the loop that publishes what the queues bring.
+//! The ROS 2 node and its topics: the sink of the background thread.
 //!
-//! Started by the transport's `start`; everything of ros2-client lives and dies on this thread.
+//! Everything of ros2-client lives and dies on that thread.
 
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
-use std::sync::mpsc;
 use std::time::Duration;
 
 use ros2_client::{Context, Node, NodeName, NodeOptions, Publisher};
@@ -13,11 +11,11 @@ use rustdds::policy::{self, ResourceLimits};
 use rustdds::{DomainParticipantBuilder, QosPolicies, QosPolicyBuilder, TopicKind};
 use serde::Serialize;
 
-use super::environment::{Network, Range};
+use super::environment::Range;
 use super::messages::{DiagnosticArray, HandlePoses, Header, MarkerArray, Pose, PoseArray, Stamped, Time, type_name};
-use super::{Inbox, Ros2Config, Ros2Error, Shared, Snapshot};
-use crate::live::clock::{monotonic_ns, sleep_until};
+use super::{Ros2Config, Ros2Error};
 use crate::scene::ros2::{Durability, Qos, Reliability, Topic};
+use crate::transports::background::Sink;
 use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 
 /// How long a subscriber that has died counts as slow: its lease.
@@ -30,74 +28,11 @@ const UNACKNOWLEDGED_MESSAGES: f64 = 8192.0;
 const HEADER_BYTES: usize = 200;
 /// More bytes than any message has that is not of every frame; the largest of them is the stage.
 const SELDOM_BYTES: usize = HEADER_BYTES + size_of::<Stage>();
-/// Nanoseconds after a frame's deadline at which it is looked for, and between two looks.
-const FIRST_LOOK_NS: u64 = 300_000;
-const LOOK_NS: u64 = 500_000;
-/// The longest sleep: what is sent seldom waits no longer.
-const LONGEST_SLEEP_NS: u64 = 50_000_000;
 /// How long a reliable subscriber is given for the last messages.
 const LINGER: Duration = Duration::from_millis(100);
 
-/// Opens the topics, tells `opened` how that went, and publishes until told to stop.
-pub(super) fn serve(
-    config: &Ros2Config,
-    rate: f64,
-    network: Network,
-    mut inbox: Inbox,
-    opened: &mpsc::Sender<Result<(), Ros2Error>>,
-) {
-    let mut topics = match Topics::open(config, rate, network) {
-        Ok(topics) => topics,
-        Err(error) => {
-            let _ = opened.send(Err(error));
-            return;
-        }
-    };
-    topics.publish_stage(&inbox.shared);
-    let _ = opened.send(Ok(()));
-    let period_ns = (1e9 / rate) as u64;
-    let mut rejected = 0;
-    let mut look_at = 0;
-    loop {
-        // Read before the queues are emptied: what was put there before it was set is then still published.
-        let ending = inbox.shared.stop.load(Ordering::Acquire);
-        sleep_until(look_at);
-        while let Ok(alert) = inbox.alerts.pop() {
-            topics.publish_alert(alert, &inbox.shared);
-        }
-        let rejected_now = inbox.shared.rejected.load(Ordering::Relaxed);
-        let newest_only = rejected_now > rejected;
-        rejected = rejected_now;
-        let mut deadline_ns = None;
-        while let Ok(snapshot) = inbox.filled.pop() {
-            if newest_only && !inbox.filled.is_empty() {
-                inbox.shared.counts.skipped.fetch_add(1, Ordering::Relaxed);
-            } else {
-                topics.publish_frame(&snapshot, &inbox.shared);
-                inbox.shared.counts.frames.fetch_add(1, Ordering::Relaxed);
-            }
-            deadline_ns = Some(snapshot.header.deadline_ns);
-            // The ring has a place for every snapshot there is.
-            let _ = inbox.free.push(snapshot);
-        }
-        while let Ok(status) = inbox.status.try_recv() {
-            topics.publish_status(&status, &inbox.shared);
-        }
-        if ending {
-            std::thread::sleep(LINGER);
-            return;
-        }
-        let now = monotonic_ns();
-        look_at = match deadline_ns {
-            Some(deadline_ns) => (deadline_ns + period_ns + FIRST_LOOK_NS).max(now),
-            None => now + LOOK_NS,
-        };
-        look_at = look_at.min(now + LONGEST_SLEEP_NS);
-    }
-}
-
 /// The publishers that the scene asks for, and the messages they send, whose memory is used again.
-struct Topics {
+pub(super) struct Topics {
     name: String,
     stage: Stage,
     handles: Option<Stream<HandlePoses>>,
@@ -109,6 +44,8 @@ struct Topics {
     diagnostics: Option<Port<DiagnosticArray>>,
     latest_alert: Option<CollisionAlert>,
     skipped_periods: u64,
+    /// Messages that a full queue of RustDDS did not take, because a reliable subscriber was slow or dead.
+    discarded: u64,
     // Dropped after the publishers: they belong to it.
     _node: Node,
 }
@@ -117,21 +54,21 @@ struct Topics {
 struct Port<Message: Serialize> {
     publisher: Publisher<Arc<Message>>,
     topic: String,
-    complained: bool,
+    reported: bool,
 }
 
 impl<Message: Serialize> Port<Message> {
-    /// Sends a message. What a full queue does not take is counted, and said once.
-    fn send(&mut self, message: Arc<Message>, shared: &Shared) {
+    /// Sends a message. What a full queue does not take is counted, and reported once.
+    fn send(&mut self, message: Arc<Message>, discarded: &mut u64) {
         if self.publisher.publish(message).is_ok() {
             return;
         }
-        shared.counts.discarded.fetch_add(1, Ordering::Relaxed);
-        if !self.complained {
-            self.complained = true;
+        *discarded += 1;
+        if !self.reported {
+            self.reported = true;
             log::warn!(
                 "ROS 2 topic {}: a reliable subscriber is so slow, or dead, that messages are discarded until it is \
-                 back or its lease ends (said once)",
+                 back or its lease ends (reported once)",
                 self.topic
             );
         }
@@ -145,9 +82,9 @@ struct Stream<Message: Serialize> {
 }
 
 impl<Message: Serialize + Clone> Stream<Message> {
-    fn publish(&mut self, shared: &Shared, change: impl FnOnce(&mut Message)) {
+    fn publish(&mut self, discarded: &mut u64, change: impl FnOnce(&mut Message)) {
         change(Arc::make_mut(&mut self.message));
-        self.port.send(Arc::clone(&self.message), shared);
+        self.port.send(Arc::clone(&self.message), discarded);
     }
 }
 
@@ -156,7 +93,6 @@ struct Maker<'a> {
     context: Context,
     node: Node,
     config: &'a Ros2Config,
-    rate: f64,
 }
 
 impl Maker<'_> {
@@ -169,7 +105,7 @@ impl Maker<'_> {
         message: impl FnOnce() -> Message,
     ) -> Result<Option<Stream<Message>>, Ros2Error> {
         let bytes = HEADER_BYTES + self.config.handles * each;
-        let port = self.port(topic, type_name, bytes, self.rate)?;
+        let port = self.port(topic, type_name, bytes, self.config.rate)?;
         Ok(port.map(|port| Stream { port, message: Arc::new(message()) }))
     }
 
@@ -190,7 +126,7 @@ impl Maker<'_> {
             .create_topic(format!("rt{name}"), type_name.to_owned(), &policies(*qos, bytes, rate), TopicKind::NoKey)
             .map_err(|error| failed(&error))?;
         let publisher = self.node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
-        Ok(Some(Port { publisher, topic: name, complained: false }))
+        Ok(Some(Port { publisher, topic: name, reported: false }))
     }
 }
 
@@ -217,7 +153,8 @@ fn policies(qos: Qos, bytes: usize, rate: f64) -> QosPolicies {
 }
 
 impl Topics {
-    fn open(config: &Ros2Config, rate: f64, network: Network) -> Result<Self, Ros2Error> {
+    pub(super) fn open(config: &Ros2Config) -> Result<Self, Ros2Error> {
+        let Ros2Config { network, stage, handles, .. } = *config;
         let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(error.to_string());
         let mut builder = DomainParticipantBuilder::new(network.domain);
         if network.range == Range::Localhost {
@@ -229,10 +166,9 @@ impl Topics {
         // Fewer endpoints, fewer complaints of subscribers that look for what RustDDS cannot send.
         let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
         let node = context.new_node(node_name, options).map_err(|error| failed(&error))?;
-        let mut maker = Maker { context, node, config, rate };
-        let (stage, handles) = (config.stage, config.handles);
+        let mut maker = Maker { context, node, config };
         let header = || Header::of(0);
-        Ok(Self {
+        let mut topics = Self {
             name: config.name.clone(),
             stage,
             handles: maker.stream(Topic::Handles, type_name::HANDLE_POSES, 40, || HandlePoses {
@@ -255,35 +191,33 @@ impl Topics {
             diagnostics: maker.port(Topic::Diagnostics, type_name::DIAGNOSTIC_ARRAY, SELDOM_BYTES, 1.0)?,
             latest_alert: None,
             skipped_periods: 0,
+            discarded: 0,
             _node: maker.node,
-        })
+        };
+        topics.publish_stage();
+        Ok(topics)
     }
 
-    fn publish_stage(&mut self, shared: &Shared) {
+    fn publish_stage(&mut self) {
         if let Some(port) = &mut self.stages {
-            port.send(Arc::new(Stamped::stage(self.stage)), shared);
+            port.send(Arc::new(Stamped::stage(self.stage)), &mut self.discarded);
         }
     }
+}
 
-    fn publish_alert(&mut self, alert: CollisionAlert, shared: &Shared) {
-        self.latest_alert = Some(alert);
-        if let Some(port) = &mut self.alerts {
-            port.send(Arc::new(Stamped::alert(alert)), shared);
-        }
-    }
-
-    fn publish_frame(&mut self, snapshot: &Snapshot, shared: &Shared) {
-        let Snapshot { header, handles } = snapshot;
+impl Sink for Topics {
+    fn frame(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
         let stamp = Time::of(header.stamp_ns);
+        let discarded = &mut self.discarded;
         if let Some(stream) = &mut self.handles {
-            stream.publish(shared, |message| {
+            stream.publish(discarded, |message| {
                 message.header.stamp = stamp;
                 message.frame = *header;
                 message.poses.copy_from_slice(handles);
             });
         }
         if let Some(stream) = &mut self.poses {
-            stream.publish(shared, |message| {
+            stream.publish(discarded, |message| {
                 message.header.stamp = stamp;
                 for (pose, handle) in message.poses.iter_mut().zip(handles) {
                     *pose = Pose::of(handle);
@@ -292,22 +226,36 @@ impl Topics {
         }
         if let Some(stream) = &mut self.markers {
             let (stage, alert) = (&self.stage, self.latest_alert.as_ref());
-            stream.publish(shared, |message| message.update(header, handles, stage, alert));
+            stream.publish(discarded, |message| message.update(header, handles, stage, alert));
         }
     }
 
-    fn publish_status(&mut self, status: &LoopStatus, shared: &Shared) {
+    fn alert(&mut self, alert: CollisionAlert) {
+        self.latest_alert = Some(alert);
+        if let Some(port) = &mut self.alerts {
+            port.send(Arc::new(Stamped::alert(alert)), &mut self.discarded);
+        }
+    }
+
+    fn status(&mut self, status: &LoopStatus) {
         if let Some(port) = &mut self.status {
-            port.send(Arc::new(Stamped::status(*status)), shared);
+            port.send(Arc::new(Stamped::status(*status)), &mut self.discarded);
         }
         if let Some(port) = &mut self.diagnostics {
             let skipped_since = status.skipped - self.skipped_periods;
             self.skipped_periods = status.skipped;
-            let discarded = shared.counts.discarded.load(Ordering::Relaxed);
             let alert = self.latest_alert.as_ref();
-            let message = DiagnosticArray::of(&self.name, status, alert, skipped_since, discarded);
-            port.send(Arc::new(message), shared);
+            let message = DiagnosticArray::of(&self.name, status, alert, skipped_since, self.discarded);
+            port.send(Arc::new(message), &mut self.discarded);
         }
+    }
+
+    fn discarded(&self) -> u64 {
+        self.discarded
+    }
+
+    fn linger(&self) -> Duration {
+        LINGER
     }
 }
 

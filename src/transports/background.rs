@@ -1,0 +1,295 @@
+//! What keeps a slow transport off the loop: a queue, a thread, and a rate of its own.
+//!
+//! [`BackgroundPublisher`] is the loop's end: it copies a frame into memory that was set aside and returns, without a
+//! lock, an allocation or a system call. The thread owns the transport's [`Sink`] and takes frames from the queue; where
+//! it falls behind it continues with the newest and counts what it left out. Called by the transports that need it.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use crate::live::clock::{monotonic_ns, sleep_until};
+use crate::live::{Deliveries, PublishError, Publisher, StatusPublisher};
+use crate::show::Frame;
+use crate::wire::convert::{collision_alert, handle_pose};
+use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus};
+
+/// Seconds of frames that the thread may fall behind before it continues with the newest.
+const QUEUED_SECONDS: f64 = 0.25;
+/// The least and the most frames in that queue.
+const QUEUED_FRAMES: (usize, usize) = (4, 256);
+/// The memory that queue may take.
+const QUEUED_BYTES: usize = 64_000_000;
+/// Alerts in their queue; one a second is usual.
+const QUEUED_ALERTS: usize = 256;
+/// Nanoseconds after a frame's deadline at which the queue is polled for it, and between two polls from then on.
+const FIRST_POLL_NS: u64 = 300_000;
+const POLL_INTERVAL_NS: u64 = 500_000;
+/// The longest sleep: messages that are sent seldom wait no longer.
+const LONGEST_SLEEP_NS: u64 = 50_000_000;
+
+/// What a transport does with what comes, on the thread. It is made there and dropped there.
+pub trait Sink {
+    /// Sends a frame.
+    fn frame(&mut self, header: &FrameHeader, handles: &[HandlePose]);
+
+    /// Sends an alert.
+    fn alert(&mut self, alert: CollisionAlert);
+
+    /// Sends the loop's status.
+    fn status(&mut self, status: &LoopStatus);
+
+    /// Messages so far that a full queue of the transport's own did not take.
+    fn discarded(&self) -> u64;
+
+    /// How long receivers are given for the last messages before the sink is dropped.
+    fn linger(&self) -> Duration;
+}
+
+/// What the queue is made for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BackgroundConfig {
+    /// The thread's name.
+    pub name: &'static str,
+    /// Handles in a frame.
+    pub handles: usize,
+    /// Frames per second of the loop.
+    pub loop_rate: f64,
+    /// Frames per second to send, at most those of the loop.
+    pub rate: f64,
+}
+
+/// One frame on its way to the thread.
+struct Snapshot {
+    header: FrameHeader,
+    handles: Vec<HandlePose>,
+}
+
+/// What the ends share besides the queues.
+#[derive(Default)]
+struct Shared {
+    stop: AtomicBool,
+    /// Frames that found the queue full.
+    rejected: AtomicU64,
+    frames: AtomicU64,
+    skipped: AtomicU64,
+    discarded: AtomicU64,
+}
+
+/// The loop's end.
+pub struct BackgroundPublisher {
+    /// Frames per frame of the loop, at most 1.
+    share: f64,
+    latest_slot: Option<u64>,
+    free: Consumer<Box<Snapshot>>,
+    filled: Producer<Box<Snapshot>>,
+    alerts: Producer<CollisionAlert>,
+    shared: Arc<Shared>,
+}
+
+/// The statistics thread's end.
+pub struct BackgroundStatus(mpsc::Sender<LoopStatus>);
+
+/// The thread. Dropping it sends what is queued, ends the thread and drops the sink.
+pub struct BackgroundThread {
+    shared: Arc<Shared>,
+    handle: Option<JoinHandle<()>>,
+}
+
+/// The thread's ends of the queues.
+struct Inbox {
+    free: Producer<Box<Snapshot>>,
+    filled: Consumer<Box<Snapshot>>,
+    alerts: Consumer<CollisionAlert>,
+    status: mpsc::Receiver<LoopStatus>,
+    shared: Arc<Shared>,
+}
+
+/// Why there is no thread with a sink.
+#[derive(Debug, thiserror::Error)]
+pub enum BackgroundError<E> {
+    /// The sink could not be made.
+    #[error(transparent)]
+    Open(#[from] E),
+    /// The system gave no thread, or it ended early.
+    #[error("its thread could not be started: {0}")]
+    Thread(String),
+}
+
+/// Starts a thread, has it make its sink with `open`, and returns when that exists.
+///
+/// # Errors
+/// [`BackgroundError`]
+pub fn start<S: Sink, E: Send + 'static>(
+    config: BackgroundConfig,
+    open: impl FnOnce() -> Result<S, E> + Send + 'static,
+) -> Result<(BackgroundPublisher, BackgroundStatus, BackgroundThread), BackgroundError<E>> {
+    let depth = queue_depth(config.handles, config.rate);
+    // Besides those in the queue one is being filled and one is being sent.
+    let (mut free_producer, free) = RingBuffer::new(depth + 2);
+    for _ in 0..depth + 2 {
+        let snapshot =
+            Snapshot { header: FrameHeader::default(), handles: vec![HandlePose::default(); config.handles] };
+        // The ring has just as many places.
+        let _ = free_producer.push(Box::new(snapshot));
+    }
+    let (filled, filled_consumer) = RingBuffer::new(depth);
+    let (alerts, alerts_consumer) = RingBuffer::new(QUEUED_ALERTS);
+    let (status, status_receiver) = mpsc::channel();
+    let shared = Arc::new(Shared::default());
+    let inbox = Inbox {
+        free: free_producer,
+        filled: filled_consumer,
+        alerts: alerts_consumer,
+        status: status_receiver,
+        shared: Arc::clone(&shared),
+    };
+    let (opened, opening) = mpsc::channel();
+    let period_ns = (1e9 / config.rate) as u64;
+    let thread = move || match open() {
+        Ok(sink) => {
+            let _ = opened.send(Ok(()));
+            serve(sink, period_ns, inbox);
+        }
+        Err(error) => drop(opened.send(Err(error))),
+    };
+    let handle = std::thread::Builder::new().name(config.name.to_owned()).spawn(thread);
+    let handle = handle.map_err(|error| BackgroundError::Thread(error.to_string()))?;
+    let thread = BackgroundThread { shared: Arc::clone(&shared), handle: Some(handle) };
+    match opening.recv() {
+        Ok(opened) => opened?,
+        // It panicked, which it has printed.
+        Err(_) => return Err(BackgroundError::Thread("it ended early".to_owned())),
+    }
+    let share = config.rate / config.loop_rate;
+    let publisher = BackgroundPublisher { share, latest_slot: None, free, filled, alerts, shared };
+    Ok((publisher, BackgroundStatus(status), thread))
+}
+
+fn queue_depth(handles: usize, rate: f64) -> usize {
+    let (least, most) = QUEUED_FRAMES;
+    let affordable = QUEUED_BYTES / (handles * size_of::<HandlePose>());
+    ((rate * QUEUED_SECONDS) as usize).clamp(least, most).min(affordable.max(least))
+}
+
+/// Sends what the queues bring until the thread is to stop.
+fn serve(mut sink: impl Sink, period_ns: u64, mut inbox: Inbox) {
+    let Shared { stop, rejected, frames, skipped, discarded } = &*inbox.shared;
+    let mut rejected_before = 0;
+    let mut poll_at = 0;
+    loop {
+        // Read before the queues are emptied: what was put there before it was set is then still sent.
+        let ending = stop.load(Ordering::Acquire);
+        sleep_until(poll_at);
+        while let Ok(alert) = inbox.alerts.pop() {
+            sink.alert(alert);
+        }
+        let rejected_now = rejected.load(Ordering::Relaxed);
+        let newest_only = rejected_now > rejected_before;
+        rejected_before = rejected_now;
+        let mut deadline_ns = None;
+        while let Ok(snapshot) = inbox.filled.pop() {
+            if newest_only && !inbox.filled.is_empty() {
+                skipped.fetch_add(1, Ordering::Relaxed);
+            } else {
+                sink.frame(&snapshot.header, &snapshot.handles);
+                frames.fetch_add(1, Ordering::Relaxed);
+            }
+            deadline_ns = Some(snapshot.header.deadline_ns);
+            // The ring has a place for every snapshot there is.
+            let _ = inbox.free.push(snapshot);
+        }
+        while let Ok(status) = inbox.status.try_recv() {
+            sink.status(&status);
+        }
+        discarded.store(sink.discarded(), Ordering::Relaxed);
+        if ending {
+            std::thread::sleep(sink.linger());
+            return;
+        }
+        let now = monotonic_ns();
+        poll_at = match deadline_ns {
+            Some(deadline_ns) => (deadline_ns + period_ns + FIRST_POLL_NS).max(now),
+            None => now + POLL_INTERVAL_NS,
+        };
+        poll_at = poll_at.min(now + LONGEST_SLEEP_NS);
+    }
+}
+
+impl BackgroundPublisher {
+    /// Whether a frame of this tick is to be sent: as many per second as the rate says, spread evenly.
+    fn due(&mut self, tick: u64) -> bool {
+        // At most 20,000 ticks a second: beyond 2^53 they would have run for 14,000 years.
+        let slot = (tick as f64 * self.share) as u64;
+        self.latest_slot.replace(slot) != Some(slot)
+    }
+}
+
+impl Publisher for BackgroundPublisher {
+    fn publish(&mut self, header: &FrameHeader, frame: &Frame) -> Result<(), PublishError> {
+        for alert in &frame.alerts {
+            // A thread that is 256 alerts behind has other troubles than this one.
+            let _ = self.alerts.push(collision_alert(header, alert));
+        }
+        if !self.due(header.tick) {
+            return Ok(());
+        }
+        // Only this end fills the queue, so that it still has room below.
+        let free = if self.filled.is_full() { None } else { self.free.pop().ok() };
+        let Some(mut snapshot) = free else {
+            self.shared.rejected.fetch_add(1, Ordering::Relaxed);
+            return Ok(());
+        };
+        snapshot.header = FrameHeader { sent_ns: monotonic_ns(), ..*header };
+        for (handle, pose) in snapshot.handles.iter_mut().enumerate() {
+            *pose = handle_pose(&frame.chain, handle);
+        }
+        let _ = self.filled.push(snapshot);
+        Ok(())
+    }
+
+    fn maintain(&mut self) {}
+
+    fn subscribers(&self) -> u32 {
+        0
+    }
+}
+
+impl StatusPublisher for BackgroundStatus {
+    fn publish_status(&mut self, status: &LoopStatus) {
+        // The thread may have ended: the last status then has no receiver.
+        let _ = self.0.send(*status);
+    }
+}
+
+impl BackgroundThread {
+    /// Ends the thread once it has sent what is queued; what it has done.
+    pub fn finish(mut self) -> Deliveries {
+        self.join();
+        let Shared { rejected, frames, skipped, discarded, .. } = &*self.shared;
+        let [rejected, frames, skipped, discarded] =
+            [rejected, frames, skipped, discarded].map(|count| count.load(Ordering::Relaxed));
+        Deliveries { frames, skipped: skipped + rejected, discarded }
+    }
+
+    fn join(&mut self) {
+        self.shared.stop.store(true, Ordering::Release);
+        if let Some(handle) = self.handle.take() {
+            // A panic has been printed by then.
+            let _ = handle.join();
+        }
+    }
+}
+
+impl Drop for BackgroundThread {
+    fn drop(&mut self) {
+        self.join();
+    }
+}
+
+#[cfg(test)]
+mod tests;

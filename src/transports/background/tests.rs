@@ -1,0 +1,153 @@
+//! The queue, the thread and the rate divider, with a sink that a test can hold up.
+
+use std::sync::Mutex;
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::show::alerts::Alert;
+use crate::show::state::{FrameState, Level, PlaybackState};
+use crate::solve::Chain;
+
+const HANDLES: usize = 3;
+
+/// What a sink was given.
+#[derive(Debug, PartialEq)]
+enum Sent {
+    Frame { tick: u64, x: Vec<f64> },
+    Alert { tick: u64 },
+    Status { tick: u64 },
+}
+
+/// A sink that sends nothing while the test holds the lock.
+struct Recorder {
+    sent: Sender<Sent>,
+    gate: Arc<Mutex<()>>,
+}
+
+impl Recorder {
+    fn send(&self, sent: Sent) {
+        let _open = self.gate.lock().unwrap();
+        self.sent.send(sent).unwrap();
+    }
+}
+
+impl Sink for Recorder {
+    fn frame(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
+        self.send(Sent::Frame { tick: header.tick, x: handles.iter().map(|pose| pose.x).collect() });
+    }
+
+    fn alert(&mut self, alert: CollisionAlert) {
+        self.send(Sent::Alert { tick: alert.tick });
+    }
+
+    fn status(&mut self, status: &LoopStatus) {
+        self.send(Sent::Status { tick: status.tick });
+    }
+
+    fn discarded(&self) -> u64 {
+        7
+    }
+
+    fn linger(&self) -> Duration {
+        Duration::ZERO
+    }
+}
+
+type Ends = (BackgroundPublisher, BackgroundStatus, BackgroundThread);
+
+fn recorder(loop_rate: f64, rate: f64) -> (Ends, Receiver<Sent>, Arc<Mutex<()>>) {
+    let (sent, receiver) = channel();
+    let gate = Arc::new(Mutex::new(()));
+    let sink = Recorder { sent, gate: Arc::clone(&gate) };
+    let config = BackgroundConfig { name: "test", handles: HANDLES, loop_rate, rate };
+    (start(config, move || Ok::<_, std::io::Error>(sink)).unwrap(), receiver, gate)
+}
+
+fn frame(tick: u64, alerts: usize) -> Frame {
+    let mut chain = Chain::new(HANDLES);
+    chain.x.iter_mut().enumerate().for_each(|(handle, x)| *x = (10 * tick + handle as u64) as f64);
+    Frame {
+        tick,
+        sim_time: tick as f64,
+        time_scale: 1.0,
+        state: FrameState::Moving,
+        playback: PlaybackState::Playing,
+        chain,
+        min_clearance: f64::NAN,
+        alerts: vec![Alert { level: Level::Clear, event: None, nearest: None }; alerts],
+        shows_played: 0,
+        unforeseen_contacts: 0,
+        unsolved_frames: 0,
+    }
+}
+
+fn publish(publisher: &mut BackgroundPublisher, tick: u64, alerts: usize) {
+    publisher.publish(&FrameHeader { tick, ..FrameHeader::default() }, &frame(tick, alerts)).unwrap();
+}
+
+#[test]
+fn what_is_published_is_sent_in_order_and_whole() {
+    let ((mut publisher, mut status, thread), sent, _) = recorder(60.0, 60.0);
+    for tick in 0..4 {
+        publish(&mut publisher, tick, usize::from(tick == 2));
+    }
+    status.publish_status(&LoopStatus { tick: 3, ..LoopStatus::default() });
+    drop((publisher, status));
+    assert_eq!(thread.finish(), Deliveries { frames: 4, skipped: 0, discarded: 7 });
+    let all: Vec<Sent> = sent.iter().collect();
+    let ticks = |of: fn(&Sent) -> Option<u64>| all.iter().filter_map(of).collect::<Vec<_>>();
+    assert_eq!(ticks(|sent| if let Sent::Frame { tick, .. } = sent { Some(*tick) } else { None }), [0, 1, 2, 3]);
+    assert_eq!(ticks(|sent| if let Sent::Alert { tick } = sent { Some(*tick) } else { None }), [2]);
+    assert_eq!(ticks(|sent| if let Sent::Status { tick } = sent { Some(*tick) } else { None }), [3]);
+    assert!(all.contains(&Sent::Frame { tick: 3, x: vec![30.0, 31.0, 32.0] }), "{all:?}");
+}
+
+#[test]
+fn a_sink_that_is_held_up_costs_frames_and_never_the_loop() {
+    let ((mut publisher, _status, thread), sent, gate) = recorder(60.0, 60.0);
+    let depth = queue_depth(HANDLES, 60.0) as u64;
+    let held = gate.lock().unwrap();
+    // This would never return if the loop's end waited for the sink.
+    for tick in 0..10 * depth {
+        publish(&mut publisher, tick, usize::from(tick == 9 * depth));
+    }
+    drop(held);
+    while !matches!(sent.recv_timeout(Duration::from_secs(10)).unwrap(), Sent::Alert { .. }) {}
+    // What comes once it is free again is sent: the one left over of the burst, and then this.
+    publish(&mut publisher, 10 * depth, 0);
+    drop(publisher);
+    let done = thread.finish();
+    assert_eq!(done.frames + done.skipped, 10 * depth + 1, "{done:?}");
+    assert!(done.skipped >= 8 * depth, "{done:?}");
+    let last =
+        sent.iter().filter_map(|sent| if let Sent::Frame { tick, .. } = sent { Some(tick) } else { None }).last();
+    assert_eq!(last, Some(10 * depth));
+}
+
+#[test]
+fn a_sink_that_cannot_be_made_is_an_error() {
+    let config = BackgroundConfig { name: "test", handles: HANDLES, loop_rate: 60.0, rate: 60.0 };
+    let refused = start(config, || Err::<Recorder, _>(std::io::Error::other("no such network")));
+    assert!(matches!(refused, Err(BackgroundError::Open(error)) if error.to_string() == "no such network"));
+}
+
+proptest! {
+    #[test]
+    fn the_rate_is_kept_and_spread_evenly(loop_rate in 0.1f64..20_000.0, share in 0.0001f64..=1.0) {
+        let rate = share * loop_rate;
+        let (_, free) = RingBuffer::new(0);
+        let ((filled, _), (alerts, _)) = (RingBuffer::new(0), RingBuffer::new(0));
+        let shared = Arc::default();
+        let mut publisher =
+            BackgroundPublisher { share: rate / loop_rate, latest_slot: None, free, filled, alerts, shared };
+        let due: Vec<u64> = (0..20_000).filter(|tick| publisher.due(*tick)).collect();
+        let expected = 20_000.0 * share;
+        prop_assert!((due.len() as f64 - expected).abs() <= 1.0, "{} of {expected}", due.len());
+        let interval = 1.0 / share;
+        for pair in due.windows(2) {
+            prop_assert!(((pair[1] - pair[0]) as f64 - interval).abs() <= 1.0, "{pair:?}, {interval}");
+        }
+    }
+}
