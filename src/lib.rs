@@ -18,7 +18,7 @@
 #![deny(missing_docs)]
 
 #[cfg(all(feature = "jazzy", feature = "humble"))]
-compile_error!("choose one ROS 2 distribution: `--no-default-features --features humble` for Humble");
+compile_error!("choose one ROS 2 distribution: `--no-default-features --features cli,humble` for Humble");
 
 pub mod linkage;
 pub mod live;

@@ -4,6 +4,7 @@
 //! thread of its own, and [`statistics`] on another, which takes what the loop counts from a queue that never blocks.
 
 pub mod clock;
+#[cfg(feature = "cli")]
 pub mod realtime;
 pub mod statistics;
 

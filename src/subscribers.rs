@@ -2,5 +2,7 @@
 
 pub mod connection;
 pub mod monitor;
+#[cfg(feature = "cli")]
 pub mod soak;
+#[cfg(feature = "cli")]
 pub mod view;

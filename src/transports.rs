@@ -32,6 +32,12 @@ pub enum TransportError {
     /// What the user asked for cannot be had.
     #[error("{0}")]
     BadInput(String),
+    /// The transport cannot take such a name.
+    #[error("{0}")]
+    IllegalName(String),
+    /// Others use this name.
+    #[error("{0}")]
+    NameInUse(String),
     /// Anything else.
     #[error("{0}")]
     Failed(String),

@@ -304,6 +304,8 @@ impl From<TransportError> for CommandError {
     fn from(error: TransportError) -> Self {
         match error {
             TransportError::BadInput(sentence) => Self::BadInput(sentence),
+            TransportError::IllegalName(sentence) => Self::BadInput(format!("--name: {sentence}")),
+            TransportError::NameInUse(sentence) => Self::Failed(format!("{sentence} (--name)")),
             TransportError::Failed(sentence) => Self::Failed(sentence),
         }
     }

@@ -35,7 +35,8 @@ impl From<Ros2Error> for TransportError {
     fn from(error: Ros2Error) -> Self {
         match error {
             Ros2Error::Failed(_) => Self::Failed(error.to_string()),
-            Ros2Error::Name(_) | Ros2Error::Environment(_) => Self::BadInput(error.to_string()),
+            Ros2Error::Name(_) => Self::IllegalName(error.to_string()),
+            Ros2Error::Environment(_) => Self::BadInput(error.to_string()),
         }
     }
 }

@@ -13,7 +13,7 @@ use crate::transports::TransportError;
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     /// iceoryx2 has no services of such a name.
-    #[error("--name is \"{name}\", expected a name for services of iceoryx2: not empty, at most {most} bytes")]
+    #[error("the name is \"{name}\", expected a name for services of iceoryx2: not empty, at most {most} bytes")]
     Name {
         /// The name given.
         name: String,
@@ -21,9 +21,7 @@ pub enum OpenError {
         most: usize,
     },
     /// Somebody publishes under this name already.
-    #[error(
-        "another publisher is running under the name \"{0}\": stop it, or choose another name for this one with --name"
-    )]
+    #[error("another publisher is running under the name \"{0}\": stop it, or choose another name for this one")]
     AlreadyPublished(String),
     /// The queues would not fit.
     #[error(
@@ -44,7 +42,7 @@ pub enum OpenError {
     /// A service stays incomplete.
     #[error(
         "the service \"{0}\" is incomplete and nobody completes it: stop every program that uses it, or choose another \
-         name with --name"
+         name"
     )]
     Incomplete(String),
     /// There is no room even for bookkeeping.
@@ -65,8 +63,8 @@ pub enum OpenError {
     /// A service of this name exists with other properties.
     #[error(
         "the service \"{0}\" exists with another layout of its messages, or with other limits: a program of another \
-         version of bench-dragon has it open; stop that or take the same version for both, or choose another name with \
-         --name"
+         version of bench-dragon has it open; stop that or take the same version for both, or choose another \
+         name"
     )]
     Incompatible(String),
     /// The service admits no more subscribers.
@@ -92,9 +90,13 @@ pub enum OpenError {
 
 impl From<OpenError> for TransportError {
     fn from(error: OpenError) -> Self {
+        let sentence = error.to_string();
         match error {
-            OpenError::Name { .. } => Self::BadInput(error.to_string()),
-            _ => Self::Failed(error.to_string()),
+            OpenError::Name { .. } => Self::IllegalName(sentence),
+            OpenError::AlreadyPublished(_) | OpenError::Incomplete(_) | OpenError::Incompatible(_) => {
+                Self::NameInUse(sentence)
+            }
+            _ => Self::Failed(sentence),
         }
     }
 }

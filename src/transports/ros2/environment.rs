@@ -108,7 +108,7 @@ pub fn other_distribution(variable: impl Fn(&str) -> Option<String>) -> Option<S
     let distribution = variable("ROS_DISTRO").filter(|name| !name.is_empty() && name != built.as_str())?;
     Some(format!(
         "ROS_DISTRO is {distribution} and this program was built for {built}: topics arrive, but `ros2 node list` may \
-         not show it (for Humble, build with `--no-default-features --features humble`)"
+         not show it (for Humble, build with `--no-default-features --features cli,humble`)"
     ))
 }
 

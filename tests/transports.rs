@@ -1,0 +1,134 @@
+//! What every transport promises, seen from another process: one suite, which each of them runs.
+//!
+//! A transport joins by a reader in tests/python/transport_peer.py and a line in the list below.
+
+mod processes;
+
+use std::collections::BTreeMap;
+use std::process::Command;
+
+use processes::{Process, json_lines, program, python, scene_file, summary, text, unique, wait};
+use serde_json::Value;
+
+const RATE: u64 = 50;
+const START: f64 = 405.0;
+const CONTACT: f64 = 412.473837682115;
+
+fn peer(transport: &str, name: &str, seconds: u64) -> Command {
+    let mut command = python();
+    let seconds = seconds.to_string();
+    command.args(["tests/python/transport_peer.py", "--transport", transport]);
+    command.args(["--name", &unique(name), "--seconds", &seconds]);
+    command
+}
+
+/// A publisher over all transports, for some seconds.
+fn publisher(name: &str, seconds: u64) -> Process {
+    let scene = scene_file(name, &[]);
+    if cfg!(feature = "ros2") {
+        let topics =
+            format!("[publish.ros2]\nrate = {RATE}\ntopics = [\"handles\", \"alerts\", \"stage\", \"status\"]\n");
+        std::fs::write(&scene, format!("{}\n{topics}", std::fs::read_to_string(&scene).unwrap())).unwrap();
+    }
+    let mut command = program(name);
+    command.args(["--scene", scene.to_str().unwrap(), "--json", "run", "--rate", &RATE.to_string()]);
+    command.args(["--start", &START.to_string(), "--duration", &seconds.to_string()]);
+    Process::start(&mut command)
+}
+
+/// What came of a kind, by run, in the order of coming.
+fn by_run<'a>(lines: &'a [Value], kind: &str) -> BTreeMap<u64, Vec<&'a Value>> {
+    let mut runs: BTreeMap<u64, Vec<&Value>> = BTreeMap::new();
+    for line in lines.iter().filter(|line| line["type"] == kind) {
+        runs.entry(line["run_id"].as_u64().unwrap()).or_default().push(line);
+    }
+    runs
+}
+
+fn number(line: &Value, field: &str) -> u64 {
+    line[field].as_u64().unwrap_or_else(|| panic!("{field} of {line}"))
+}
+
+/// The frames of one run: none lost from the first that came, each with the time of its tick and whole content.
+fn check_frames(frames: &[&Value]) {
+    for pair in frames.windows(2) {
+        assert_eq!(number(pair[1], "sequence"), number(pair[0], "sequence") + 1, "{} after {}", pair[1], pair[0]);
+        assert!(number(pair[1], "tick") > number(pair[0], "tick"));
+    }
+    for frame in frames {
+        let expected = START + number(frame, "tick") as f64 / RATE as f64;
+        assert_eq!(frame["sim_time"].as_f64(), Some(expected.min(CONTACT)), "{frame}");
+        assert_eq!((number(frame, "handles"), number(frame, "count")), (224, 224), "{frame}");
+        assert!((frame["link"].as_f64().unwrap() - 2.86).abs() < 1e-12, "{frame}");
+        assert_eq!((number(frame, "state"), number(frame, "epoch")), (1, 0), "{frame}");
+    }
+}
+
+/// The alerts of one run: the level that holds at the start, then its countdown once a second.
+fn check_alerts(alerts: &[&Value], seconds: u64) {
+    for alert in alerts {
+        assert_eq!((number(alert, "level"), number(alert, "event")), (1, 2), "{alert}");
+        assert!((alert["event_time"].as_f64().unwrap() - CONTACT).abs() < 1e-9, "{alert}");
+        assert_eq!((number(alert, "event_bench_a"), number(alert, "event_bench_b")), (0, 8), "{alert}");
+    }
+    let ticks: Vec<u64> = alerts.iter().map(|alert| number(alert, "tick") / RATE).collect();
+    assert!(ticks.windows(2).all(|pair| pair[1] > pair[0]), "one alert a second: {ticks:?}");
+    assert!(!ticks.is_empty() && ticks.len() as u64 <= seconds, "{ticks:?}");
+}
+
+fn suite(transport: &str) {
+    let name = format!("suite_{transport}");
+    let mut early = Process::start(&mut peer(transport, &name, 14));
+    let ready = early.lines();
+    ready.until("ready", 20);
+    let first = publisher(&name, 5);
+    // The debug build makes its tables for seconds: the late one waits for what the early one has got.
+    ready.until("frame", 60);
+    wait(1.5);
+    let late = Process::start(&mut peer(transport, &name, 2)).output_within(30);
+    let summary_of_first = summary(&first.output_within(60));
+    let summary_of_second = summary(&publisher(&name, 3).output_within(60));
+    let lines: Vec<Value> = ready.rest(60).iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+
+    // One that was there before the publisher, through two of them.
+    let [frames, stages, alerts, statuses] = ["frame", "stage", "alert", "status"].map(|kind| by_run(&lines, kind));
+    assert_eq!(frames.len(), 2, "two publishers are two runs");
+    for (run, frames) in &frames {
+        check_frames(frames);
+        assert_eq!(stages[run].len(), 1, "{:?}", stages[run]);
+        assert_eq!(number(stages[run][0], "benches"), 223);
+        assert_eq!(stages[run][0]["body_length"], 2.2);
+        check_alerts(&alerts[run], 5);
+        assert!(statuses[run].len() >= 2, "{:?}", statuses[run]);
+        assert!(statuses[run].iter().all(|status| status["rate"] == RATE as f64), "{:?}", statuses[run]);
+    }
+    let mut sent: Vec<u64> = [&summary_of_first, &summary_of_second].map(|line| number(line, "frames")).to_vec();
+    let mut last: Vec<u64> = frames.values().map(|frames| number(frames.last().unwrap(), "sequence") + 1).collect();
+    (sent.sort_unstable(), last.sort_unstable());
+    assert_eq!(last, sent, "the last frame came too");
+    assert_eq!(number(lines.last().unwrap(), "publishers"), 0, "the publisher has left: {:?}", lines.last());
+
+    // One that came late: the stage, and the alert that holds.
+    assert!(late.status.success(), "{}", text(&late.stderr));
+    let lines = json_lines(&late);
+    let [frames, stages, alerts] = ["frame", "stage", "alert"].map(|kind| by_run(&lines, kind));
+    assert_eq!((frames.len(), stages.len(), alerts.len()), (1, 1, 1), "{lines:?}");
+    for (run, frames) in &frames {
+        check_frames(frames);
+        assert_eq!(stages[run].len(), 1, "{:?}", stages[run]);
+        check_alerts(&alerts[run], 5);
+        assert!(number(frames[0], "tick") > RATE, "it was not late");
+        assert!(number(alerts[run][0], "tick") <= number(frames[0], "tick"), "the alert that holds is not there");
+    }
+}
+
+#[test]
+fn iceoryx2_keeps_what_every_transport_promises() {
+    suite("iceoryx2");
+}
+
+#[cfg(feature = "ros2")]
+#[test]
+fn ros2_keeps_what_every_transport_promises() {
+    suite("ros2");
+}
