@@ -1,0 +1,58 @@
+"""Shows where the head is at the moment of display, 20 times a second, whatever the rate of the topic.
+
+    source /opt/ros/jazzy/setup.bash && source install/setup.bash        # with bench_dragon_msgs built, see docs/ros2.md
+    python3 examples/python/ros2_display.py [--name bench_dragon] [--delay 0.1]
+
+Between two messages the handles are interpolated by their velocities (hermite.py): ten messages a second are exact to
+some 20 nanometres, where the newest message alone is a tenth of a second old.
+"""
+
+import argparse
+import time
+
+import numpy as np
+from hermite import HermiteReader
+
+HANDLE_POSE = np.dtype([(field, "<f8") for field in ("x", "y", "heading", "vx", "vy")])
+
+
+def handles_of(message):
+    """The poses of a bench_dragon_msgs/HandlePoses as a structured array."""
+    return np.array([tuple(getattr(pose, field) for field in HANDLE_POSE.names) for pose in message.poses], HANDLE_POSE)
+
+
+def main():
+    import rclpy
+    from bench_dragon_msgs.msg import HandlePoses
+    from rclpy.executors import ExternalShutdownException
+    from rclpy.node import Node
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--name", default="bench_dragon")
+    parser.add_argument("--delay", type=float, default=0.1, help="seconds behind the present: a period and a little")
+    arguments = parser.parse_args()
+    rclpy.init()
+    node, reader = Node("bench_dragon_display"), HermiteReader()
+    # A message carries the fields of the frame's header by their names.
+    node.create_subscription(
+        HandlePoses, f"/{arguments.name}/handles", lambda message: reader.push(message, handles_of(message)), 10
+    )
+
+    def show():
+        # CLOCK_MONOTONIC of the publisher's machine, on which this is meant to run too.
+        shown = reader.at(time.monotonic_ns() - int(1e9 * arguments.delay))
+        if shown is not None:
+            moment, handles = shown
+            node.get_logger().info(f"t = {moment:.4f} s  head ({handles['x'][0]:.4f}, {handles['y'][0]:.4f}) m")
+
+    node.create_timer(0.05, show)
+    try:
+        rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+
+
+if __name__ == "__main__":
+    main()

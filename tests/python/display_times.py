@@ -1,0 +1,60 @@
+"""Interpolates a publisher's frames at random moments of display, as the examples for Python do.
+
+    display_times.py --transport iceoryx2|ros2 --name NAME --seconds S --delay D
+
+Prints a JSON line with the simulated time, the places and the headings for each moment.
+"""
+
+import argparse
+import json
+import pathlib
+import random
+import sys
+import time
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
+
+import hermite  # noqa: E402
+import ros2_display  # noqa: E402
+
+
+def ros2_frames(name, seconds):
+    import ros2_peer as peer
+    from cyclonedds.domain import DomainParticipant
+    from cyclonedds.sub import DataReader
+    from cyclonedds.topic import Topic
+
+    topic = Topic(DomainParticipant(0), f"rt/{name}/handles", peer.TOPICS["handles"])
+    reader = DataReader(topic.participant, topic, qos=peer.quality("reliable", "volatile"))
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        for sample in reader.take(N=100):
+            if isinstance(sample, peer.TOPICS["handles"]):
+                yield sample, ros2_display.handles_of(sample)
+        yield None
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--transport", choices=["iceoryx2", "ros2"], required=True)
+    parser.add_argument("--name", required=True)
+    parser.add_argument("--seconds", type=float, required=True)
+    parser.add_argument("--delay", type=float, required=True)
+    arguments = parser.parse_args()
+    frames = {"iceoryx2": hermite.frames, "ros2": ros2_frames}[arguments.transport]
+    chance, reader, count = random.Random(7), hermite.HermiteReader(), 0
+    for frame in frames(arguments.name, arguments.seconds):
+        if frame is not None:
+            reader.push(*frame)
+            count += 1
+        elif count > 2:
+            time.sleep(chance.uniform(0.001, 0.02))
+            moment, handles = reader.at(time.monotonic_ns() - int(1e9 * arguments.delay))
+            line = {"time": float(moment)} | {field: handles[field].tolist() for field in ("x", "y", "heading")}
+            print(json.dumps(line))
+        else:
+            time.sleep(0.001)
+
+
+if __name__ == "__main__":
+    main()
