@@ -74,16 +74,28 @@ static DIFFERENCES: LazyLock<Vec<String>> = LazyLock::new(|| {
     differences
 });
 
-/// The lines from the first to the last that differ, with the number of the first.
+/// The lines that only one of two texts has, by their longest common subsequence.
 fn difference(found: &str, wanted: &str) -> String {
-    let (found, wanted) = (Vec::from_iter(found.lines()), Vec::from_iter(wanted.lines()));
-    let same = |pairs: &mut dyn Iterator<Item = (&&str, &&str)>| pairs.take_while(|(one, other)| one == other).count();
-    let before = same(&mut found.iter().zip(&wanted));
-    let behind = same(&mut found[before..].iter().rev().zip(wanted[before..].iter().rev()));
-    let changed = |sign: &str, lines: &[&str]| -> String {
-        lines[before..lines.len() - behind].iter().map(|line| format!("{sign} {line}\n")).collect()
-    };
-    format!("@@ line {} @@\n{}{}", before + 1, changed("-", &found), changed("+", &wanted))
+    let (found, wanted): (Vec<_>, Vec<_>) = (found.lines().collect(), wanted.lines().collect());
+    // How many lines the ends of both texts, from a line of each on, have in common.
+    let mut common = vec![vec![0; wanted.len() + 1]; found.len() + 1];
+    for (i, j) in (0..found.len()).rev().flat_map(|i| (0..wanted.len()).rev().map(move |j| (i, j))) {
+        let skipped = common[i + 1][j].max(common[i][j + 1]);
+        common[i][j] = if found[i] == wanted[j] { common[i + 1][j + 1] + 1 } else { skipped };
+    }
+    let (mut text, mut i, mut j) = (String::new(), 0, 0);
+    while i < found.len() || j < wanted.len() {
+        if i < found.len() && j < wanted.len() && found[i] == wanted[j] {
+            (i, j) = (i + 1, j + 1);
+        } else if i < found.len() && (j == wanted.len() || common[i + 1][j] >= common[i][j + 1]) {
+            text += &format!("{:>4} - {}\n", i + 1, found[i]);
+            i += 1;
+        } else {
+            text += &format!("{:>4} + {}\n", j + 1, wanted[j]);
+            j += 1;
+        }
+    }
+    text
 }
 
 #[test]
