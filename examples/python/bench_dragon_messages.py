@@ -1,3 +1,6 @@
+# Generated from src/wire/layouts.rs, src/show/state.rs and src/motion/event.rs, not written by hand:
+# BENCH_DRAGON_WRITE=1 cargo test --test msgs
+# What stands below MESSAGES is written by hand.
 """The memory layouts of bench-dragon's messages, once, for every Python subscriber.
 
 Each class is what iceoryx2 compares with the publisher's type: its name ends in the layout's version, so that a
@@ -8,11 +11,76 @@ import ctypes
 
 import numpy as np
 
+# The bench number that means "no bench".
 NO_BENCH = 0xFFFFFFFF
-STATES = ("moving", "approaching", "contact", "stall", "lock", "path_end")
-LEVELS = ("clear", "approaching", "contact", "stall", "lock")
-EVENTS = {0: None, 2: "contact", 3: "stall", 4: "lock", 5: "path_end"}
-PLAYBACK = ("playing", "paused", "held", "ended")
+
+# What the dragon is doing: the latest event passed, which stays until the show ends or loops, or what is near.
+STATES = (
+    # Nothing has happened and nothing is near.
+    "moving",
+    # An event is near in time, or two boards are near each other.
+    "approaching",
+    # Two boards that share no handle have touched.
+    "contact",
+    # A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
+    "stall",
+    # A link is in a singular configuration: the motion cannot go on.
+    "lock",
+    # The head has reached the end of the path.
+    "path_end",
+)
+
+# How serious an alert is.
+LEVELS = (
+    # Nothing has happened and nothing is near.
+    "clear",
+    # An event is near in time, or two boards are near each other.
+    "approaching",
+    # Two boards that share no handle have touched.
+    "contact",
+    # A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
+    "stall",
+    # A link is in a singular configuration: the motion cannot go on.
+    "lock",
+)
+
+# What an alert may be about, by the number of the state that the event leads to.
+EVENTS = {
+    # No event.
+    0: None,
+    # Two boards that share no handle first touch.
+    2: "contact",
+    # A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
+    3: "stall",
+    # A link is in a singular configuration: its rear handle would have to jump, and the motion cannot go on.
+    4: "lock",
+    # The head reaches the end of the path.
+    5: "path_end",
+}
+
+# Whether simulated time goes on.
+PLAYBACK = (
+    # Simulated time goes on.
+    "playing",
+    # Simulated time stands still until it is resumed.
+    "paused",
+    # Simulated time stands still until the hold is released.
+    "held",
+    # The show has frozen at its end.
+    "ended",
+)
+
+# The values of `StageSegment.kind`.
+SEGMENTS = (
+    # Straight on.
+    "line",
+    # Part of a circle.
+    "arc",
+    # Inward along r = pitch theta / 2 pi.
+    "inward_spiral",
+    # Outward along that spiral, turned by half a turn about the centre.
+    "outward_spiral",
+)
 
 
 class _Message(ctypes.Structure):
@@ -24,100 +92,266 @@ class _Message(ctypes.Structure):
 
 
 class HandlePose(_Message):
-    _fields_ = [(name, ctypes.c_double) for name in ("x", "y", "heading", "vx", "vy")]
+    """Where one handle is and how it moves.
+
+    Over iceoryx2 the payload of `<name>/poses` is a slice of these, the head first.
+    """
+
+    LAYOUT = 1
+    _fields_ = [
+        # Metres to the right of the centre, frame `stage`.
+        ("x", ctypes.c_double),
+        # Metres up from the centre, frame `stage`.
+        ("y", ctypes.c_double),
+        # Radians in (-pi, pi]: the direction of the bench this handle leads (from handle i+1 to handle i); the last
+        # handle takes the last bench's.
+        ("heading", ctypes.c_double),
+        # Velocity along x in simulation, metres per simulated second; NaN where the scene asks for no velocities.
+        ("vx", ctypes.c_double),
+        # Velocity along y in simulation, metres per simulated second; NaN where the scene asks for no velocities.
+        ("vy", ctypes.c_double),
+    ]
 
 
 class FrameHeader(_Message):
-    """What is true of a whole frame: `STATES[state]`, `PLAYBACK[playback]`; epoch grows when simulated time jumps."""
+    """What is true of a whole frame.
+
+    Over iceoryx2 the user header of `<name>/poses`.
+    """
 
     LAYOUT = 2
     _fields_ = [
-        (name, ctypes.c_uint64) for name in ("run_id", "sequence", "tick", "stamp_ns", "sent_ns", "deadline_ns")
-    ] + [
+        # New for every start of a publisher: a change means that it was started again.
+        ("run_id", ctypes.c_uint64),
+        # Counts the frames published in this run from 0, without gaps: over iceoryx2 a gap means that frames were
+        # missed. A topic with a lower rate leaves some out.
+        ("sequence", ctypes.c_uint64),
+        # The number of the period; jumps over periods that were skipped.
+        ("tick", ctypes.c_uint64),
+        # CLOCK_REALTIME in nanoseconds when the frame was begun: for people and for ROS.
+        ("stamp_ns", ctypes.c_uint64),
+        # CLOCK_MONOTONIC of the publisher's machine in nanoseconds just before the frame was sent: for latencies.
+        ("sent_ns", ctypes.c_uint64),
+        # CLOCK_MONOTONIC of the publisher's machine in nanoseconds at which this period should have begun: for
+        # lateness.
+        ("deadline_ns", ctypes.c_uint64),
+        # Simulated seconds since the start of the scene.
         ("sim_time", ctypes.c_double),
+        # Simulated seconds per second of wall time, as in force; 0 while paused or held, unchanged once the show has
+        # ended.
         ("time_scale", ctypes.c_double),
+        # Metres between the nearest two boards that share no handle, negative when they overlap; NaN where the scene
+        # has no `[alerts]` or fewer than three benches.
         ("min_clearance", ctypes.c_double),
-    ] + [(name, ctypes.c_uint32) for name in ("handles", "state", "playback", "cue", "epoch", "reserved")]
+        # The number of handles in this frame.
+        ("handles", ctypes.c_uint32),
+        # What the dragon is doing: one of `STATES`.
+        ("state", ctypes.c_uint32),
+        # Whether simulated time goes on: one of `PLAYBACK`.
+        ("playback", ctypes.c_uint32),
+        # The latest cue passed, counted from 1; 0 where none has been.
+        ("cue", ctypes.c_uint32),
+        # Grows by one at every jump of simulated time, such as the beginning of the next loop: who interpolates starts
+        # anew.
+        ("epoch", ctypes.c_uint32),
+        # Always 0.
+        ("reserved", ctypes.c_uint32),
+    ]
 
 
 class CollisionAlert(_Message):
-    """The nearest two boards now, and the event the alert is about: `LEVELS[level]`, `EVENTS[event]`."""
+    """A change of the alert level, or a step of the countdown towards an event.
+
+    `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, at every level. The fields
+    that begin with `event` are the event the alert is about: the next contact, stall or lock while the level is clear
+    or approaching, the one that has happened otherwise.
+
+    Over iceoryx2 the payload of `<name>/alerts`.
+    """
 
     LAYOUT = 2
-    _fields_ = (
-        [(name, ctypes.c_uint64) for name in ("run_id", "tick", "stamp_ns")]
-        + [
-            (name, ctypes.c_double)
-            for name in ("sim_time", "event_time", "time_to_event", "clearance", "x", "y", "event_x", "event_y")
-        ]
-        + [
-            (name, ctypes.c_uint32)
-            for name in ("level", "bench_a", "bench_b", "event", "event_bench_a", "event_bench_b")
-        ]
-    )
+    _fields_ = [
+        # The run this alert belongs to, as `FrameHeader.run_id`.
+        ("run_id", ctypes.c_uint64),
+        # The tick of the frame this alert goes with.
+        ("tick", ctypes.c_uint64),
+        # CLOCK_REALTIME in nanoseconds of that frame.
+        ("stamp_ns", ctypes.c_uint64),
+        # Simulated seconds of that frame.
+        ("sim_time", ctypes.c_double),
+        # Simulated seconds at which the event happens or happened; NaN where there is none.
+        ("event_time", ctypes.c_double),
+        # `event_time - sim_time`, simulated seconds; negative once it has passed; NaN where there is no event.
+        ("time_to_event", ctypes.c_double),
+        # Metres between the nearest two boards in that frame, negative when they overlap; NaN where there are fewer
+        # than three benches.
+        ("clearance", ctypes.c_double),
+        # The midpoint between the nearest two boards, metres right of the centre; NaN where there are fewer than three
+        # benches.
+        ("x", ctypes.c_double),
+        # The midpoint between the nearest two boards, metres up from the centre; NaN where there are fewer than three
+        # benches.
+        ("y", ctypes.c_double),
+        # Where the event happens, metres right of the centre: the touching point of a contact, the rear handle of the
+        # bench that stalls or locks; NaN where there is no event.
+        ("event_x", ctypes.c_double),
+        # Where the event happens, metres up from the centre; NaN where there is no event.
+        ("event_y", ctypes.c_double),
+        # How serious the alert is: one of `LEVELS`.
+        ("level", ctypes.c_uint32),
+        # The first of the nearest two benches, from 0, or `NO_BENCH`.
+        ("bench_a", ctypes.c_uint32),
+        # The second of the nearest two benches, or `NO_BENCH`.
+        ("bench_b", ctypes.c_uint32),
+        # What kind of event: one of `EVENTS`, with the number of the frame's state that it leads to; 0 where there is
+        # none.
+        ("event", ctypes.c_uint32),
+        # The bench that stalls or locks, or the first of two that touch, or `NO_BENCH`.
+        ("event_bench_a", ctypes.c_uint32),
+        # The second of two benches that touch, or `NO_BENCH`.
+        ("event_bench_b", ctypes.c_uint32),
+    ]
 
 
 class LoopStatus(_Message):
+    """How the loop is doing, once a second.
+
+    Figures that end in `_second` are of the last second alone, those that end in `_total` since the start of the run;
+    all durations are in nanoseconds.
+
+    Over iceoryx2 the payload of `<name>/status`. Layout 2 added the unforeseen contacts and the unsolved frames.
+    """
+
     LAYOUT = 2
-    _fields_ = (
-        [(name, ctypes.c_uint64) for name in ("run_id", "tick", "sequence", "stamp_ns")]
-        + [(name, ctypes.c_double) for name in ("sim_time", "rate", "measured_rate")]
-        + [
-            (name, ctypes.c_uint64)
-            for name in (
-                "overruns",
-                "skipped",
-                "shows_played",
-                "unforeseen_contacts",
-                "unsolved_frames",
-                "lateness_p50_second",
-                "lateness_p99_second",
-                "lateness_max_second",
-                "lateness_p50_total",
-                "lateness_p99_total",
-                "lateness_p999_total",
-                "lateness_max_total",
-                "step_p50_second",
-                "step_p99_second",
-                "step_max_second",
-                "step_p50_total",
-                "step_p99_total",
-                "step_p999_total",
-                "step_max_total",
-                "resident_bytes",
-            )
-        ]
-        + [("subscribers", ctypes.c_uint32), ("file_descriptors", ctypes.c_uint32), ("scene", ctypes.c_uint8 * 64)]
-    )
-
-
-SEGMENTS = ("line", "arc", "inward_spiral", "outward_spiral")
-
-
-class StageSegment(ctypes.Structure):
-    """One segment of the path; `SEGMENTS[kind]` says which curve it is."""
-
     _fields_ = [
-        (name, ctypes.c_double)
-        for name in ("x", "y", "heading", "length", "curvature", "theta_first", "theta_last")
-    ] + [("kind", ctypes.c_uint32), ("reserved", ctypes.c_uint32)]
+        # The run, as `FrameHeader.run_id`.
+        ("run_id", ctypes.c_uint64),
+        # The tick of the latest frame.
+        ("tick", ctypes.c_uint64),
+        # The sequence of the latest frame.
+        ("sequence", ctypes.c_uint64),
+        # CLOCK_REALTIME in nanoseconds when this was written.
+        ("stamp_ns", ctypes.c_uint64),
+        # Simulated seconds of the latest frame.
+        ("sim_time", ctypes.c_double),
+        # The rate asked for, frames per second.
+        ("rate", ctypes.c_double),
+        # Frames published in the last second, divided by its true length.
+        ("measured_rate", ctypes.c_double),
+        # Incidents in which at least one period was skipped, since the start.
+        ("overruns", ctypes.c_uint64),
+        # Periods skipped, since the start.
+        ("skipped", ctypes.c_uint64),
+        # Times the show has been played to its end and begun again.
+        ("shows_played", ctypes.c_uint64),
+        # Contacts that no search had found before the show, since the start: 0 unless a search is wrong or gave up.
+        ("unforeseen_contacts", ctypes.c_uint64),
+        # Frames for whose time there was no solution, so that the one before was shown again, since the start.
+        ("unsolved_frames", ctypes.c_uint64),
+        # Wake-up lateness of the last second: median, ns.
+        ("lateness_p50_second", ctypes.c_uint64),
+        # Wake-up lateness of the last second: 99th percentile, ns.
+        ("lateness_p99_second", ctypes.c_uint64),
+        # Wake-up lateness of the last second: maximum, ns.
+        ("lateness_max_second", ctypes.c_uint64),
+        # Wake-up lateness since the start: median, ns.
+        ("lateness_p50_total", ctypes.c_uint64),
+        # Wake-up lateness since the start: 99th percentile, ns.
+        ("lateness_p99_total", ctypes.c_uint64),
+        # Wake-up lateness since the start: 99.9th percentile, ns.
+        ("lateness_p999_total", ctypes.c_uint64),
+        # Wake-up lateness since the start: maximum, ns.
+        ("lateness_max_total", ctypes.c_uint64),
+        # Step cost of the last second: median, ns.
+        ("step_p50_second", ctypes.c_uint64),
+        # Step cost of the last second: 99th percentile, ns.
+        ("step_p99_second", ctypes.c_uint64),
+        # Step cost of the last second: maximum, ns.
+        ("step_max_second", ctypes.c_uint64),
+        # Step cost since the start: median, ns.
+        ("step_p50_total", ctypes.c_uint64),
+        # Step cost since the start: 99th percentile, ns.
+        ("step_p99_total", ctypes.c_uint64),
+        # Step cost since the start: 99.9th percentile, ns.
+        ("step_p999_total", ctypes.c_uint64),
+        # Step cost since the start: maximum, ns.
+        ("step_max_total", ctypes.c_uint64),
+        # Resident memory of the publisher, bytes.
+        ("resident_bytes", ctypes.c_uint64),
+        # Subscribers of the frames that are connected over iceoryx2.
+        ("subscribers", ctypes.c_uint32),
+        # Open file descriptors of the publisher.
+        ("file_descriptors", ctypes.c_uint32),
+        # The scene's name.
+        ("scene", ctypes.c_uint8 * 64),
+    ]
+
+
+class StageSegment(_Message):
+    """One segment of the path in a `Stage`."""
+
+    LAYOUT = 3
+    _fields_ = [
+        # Where it begins, metres right of the centre.
+        ("x", ctypes.c_double),
+        # Where it begins, metres up from the centre.
+        ("y", ctypes.c_double),
+        # Direction of travel there, radians counter-clockwise from x.
+        ("heading", ctypes.c_double),
+        # Metres along it.
+        ("length", ctypes.c_double),
+        # Of an arc, 1/m, positive where it turns left; of a line 0; of a spiral NaN.
+        ("curvature", ctypes.c_double),
+        # Of a spiral, the polar angle at which it begins, radians (for an outward one: before it is turned); else NaN.
+        ("theta_first", ctypes.c_double),
+        # Of a spiral, the polar angle at which it ends, radians; else NaN.
+        ("theta_last", ctypes.c_double),
+        # Which curve it is: one of `SEGMENTS`.
+        ("kind", ctypes.c_uint32),
+        # Always 0.
+        ("reserved", ctypes.c_uint32),
+    ]
 
 
 class Stage(_Message):
-    """The team's measures and the path: `path[:segments]`."""
+    """What a subscriber needs to draw the stage. Sent at the start and kept for late joiners.
+
+    The head's board has a length of its own; all that follow have one length. The team may stand further back than the
+    first segment begins, on the same spiral or line.
+
+    Over iceoryx2 the payload of `<name>/stage`. Layout 2 added the segments of the path, layout 3 gave them their name.
+    """
 
     LAYOUT = 3
-    _fields_ = (
-        [("run_id", ctypes.c_uint64), ("stamp_ns", ctypes.c_uint64)]
-        + [
-            (name, ctypes.c_double)
-            for name in ("pitch", "start_turn", "hole_inset", "head_length", "body_length", "width")
-        ]
-        + [("benches", ctypes.c_uint32), ("segments", ctypes.c_uint32), ("path", StageSegment * 32)]
-    )
+    _fields_ = [
+        # The run, as `FrameHeader.run_id`.
+        ("run_id", ctypes.c_uint64),
+        # CLOCK_REALTIME in nanoseconds when this was written.
+        ("stamp_ns", ctypes.c_uint64),
+        # Metres per turn of the spiral or spirals; NaN where the path has none.
+        ("pitch", ctypes.c_double),
+        # The turn on which the head starts (theta = 2 pi start_turn); NaN where it does not start on a spiral.
+        ("start_turn", ctypes.c_double),
+        # Metres from the centre of a handle's hole to the nearest end of the board.
+        ("hole_inset", ctypes.c_double),
+        # Metres along the head's board.
+        ("head_length", ctypes.c_double),
+        # Metres along every other board.
+        ("body_length", ctypes.c_double),
+        # Metres across every board.
+        ("width", ctypes.c_double),
+        # The number of benches; one less than the number of handles.
+        ("benches", ctypes.c_uint32),
+        # The number of segments in use, at most 32.
+        ("segments", ctypes.c_uint32),
+        # The segments of the path in the order of travel; those not in use are zero.
+        ("path", StageSegment * 32),
+    ]
 
 
 MESSAGES = (HandlePose, FrameHeader, CollisionAlert, LoopStatus, Stage)
+
+# From here on written by hand.
 
 HANDLE_POSE = np.dtype([(name, "<f8") for name, _ in HandlePose._fields_])
 

@@ -1,7 +1,8 @@
 //! How a show stands: the state of a frame, the level of an alert, and whether the show plays. Each type holds what can
 //! be and nothing else.
 //!
-//! Called by the show; the wire numbers the values of each type in their order, from 0.
+//! Called by the show; the wire numbers the values of each type in their order, from 0. The constants in `msgs/msg`
+//! and in the Python layouts are generated from here, doc comments included: see `wire::layouts`.
 
 use crate::motion::event::EventKind;
 
@@ -82,9 +83,9 @@ pub enum Level {
     Approaching,
     /// Two boards that share no handle have touched.
     Contact,
-    /// A link has stalled.
+    /// A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
     Stall,
-    /// A link has locked.
+    /// A link is in a singular configuration: the motion cannot go on.
     Lock,
 }
 
@@ -119,11 +120,11 @@ impl Level {
 /// Whether simulated time goes on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum PlaybackState {
-    /// It does.
+    /// Simulated time goes on.
     Playing,
-    /// It stands still until it is resumed.
+    /// Simulated time stands still until it is resumed.
     Paused,
-    /// It stands still until the hold is released.
+    /// Simulated time stands still until the hold is released.
     Held,
     /// The show has frozen at its end.
     Ended,

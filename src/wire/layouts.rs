@@ -3,8 +3,12 @@
 //! Depends on nothing but serde and iceoryx2's [`ZeroCopySend`]: states, levels and kinds are plain numbers here, and
 //! [`convert`](super::convert) is where they get their types. Everything is little-endian, `#[repr(C)]` and without
 //! implicit padding. A type's name ends in the version of its layout, so that a subscriber built for another layout is
-//! refused instead of reading nonsense. `examples/python/bench_dragon_messages.py` and `msgs/` describe the same bytes
-//! for other languages.
+//! refused instead of reading nonsense.
+//!
+//! `msgs/msg` and `examples/python/bench_dragon_messages.py` are generated from this file, doc comments included, by
+//! `BENCH_DRAGON_WRITE=1 cargo test --test msgs`. The comments are therefore for readers of all three languages; what
+//! is true of iceoryx2 alone stands in a paragraph that begins with "Over iceoryx2" and is left out of `msgs/msg`. A
+//! link to a constant or to an enum of `show::state` gives the ROS 2 message those constants.
 
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Serialize, Serializer};
@@ -12,14 +16,16 @@ use serde::{Serialize, Serializer};
 /// The bench number that means "no bench".
 pub const NO_BENCH: u32 = u32::MAX;
 
-/// Where one handle is and how it moves. Payload of `<name>/poses` is a slice of these, head first.
+/// Where one handle is and how it moves.
+///
+/// Over iceoryx2 the payload of `<name>/poses` is a slice of these, the head first.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/HandlePose/1")]
 #[repr(C)]
 pub struct HandlePose {
-    /// Metres to the right of the spiral's centre, frame `stage`.
+    /// Metres to the right of the centre, frame `stage`.
     pub x: f64,
-    /// Metres up from the spiral's centre, frame `stage`.
+    /// Metres up from the centre, frame `stage`.
     pub y: f64,
     /// Radians in (-pi, pi]: the direction of the bench this handle leads (from handle i+1 to handle i); the last
     /// handle takes the last bench's.
@@ -30,22 +36,25 @@ pub struct HandlePose {
     pub vy: f64,
 }
 
-/// What is true of a whole frame. User header of `<name>/poses`.
+/// What is true of a whole frame.
+///
+/// Over iceoryx2 the user header of `<name>/poses`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/FrameHeader/2")]
 #[repr(C)]
 pub struct FrameHeader {
     /// New for every start of a publisher: a change means that it was started again.
     pub run_id: u64,
-    /// Counts the frames published in this run from 0, without gaps: a gap means that frames were missed.
+    /// Counts the frames published in this run from 0, without gaps: over iceoryx2 a gap means that frames were missed.
+    /// A topic with a lower rate leaves some out.
     pub sequence: u64,
     /// The number of the period; jumps over periods that were skipped.
     pub tick: u64,
     /// CLOCK_REALTIME in nanoseconds when the frame was begun: for people and for ROS.
     pub stamp_ns: u64,
-    /// CLOCK_MONOTONIC in nanoseconds just before the frame was sent: for latencies.
+    /// CLOCK_MONOTONIC of the publisher's machine in nanoseconds just before the frame was sent: for latencies.
     pub sent_ns: u64,
-    /// CLOCK_MONOTONIC in nanoseconds at which this period should have begun: for lateness.
+    /// CLOCK_MONOTONIC of the publisher's machine in nanoseconds at which this period should have begun: for lateness.
     pub deadline_ns: u64,
     /// Simulated seconds since the start of the scene.
     pub sim_time: f64,
@@ -55,11 +64,11 @@ pub struct FrameHeader {
     /// Metres between the nearest two boards that share no handle, negative when they overlap; NaN where the scene
     /// has no `[alerts]` or fewer than three benches.
     pub min_clearance: f64,
-    /// The number of handles in the payload.
+    /// The number of handles in this frame.
     pub handles: u32,
-    /// 0 moving, 1 approaching, 2 contact, 3 stall, 4 lock, 5 path end.
+    /// What the dragon is doing: one of [`FrameState`](crate::show::state::FrameState).
     pub state: u32,
-    /// 0 playing, 1 paused, 2 held, 3 ended.
+    /// Whether simulated time goes on: one of [`PlaybackState`](crate::show::state::PlaybackState).
     pub playback: u32,
     /// The latest cue passed, counted from 1; 0 where none has been.
     pub cue: u32,
@@ -70,16 +79,18 @@ pub struct FrameHeader {
     pub reserved: u32,
 }
 
-/// A change of the alert level, or the countdown towards an event. Payload of `<name>/alerts`.
+/// A change of the alert level, or a step of the countdown towards an event.
 ///
 /// `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, at every level. The fields
 /// that begin with `event` are the event the alert is about: the next contact, stall or lock while the level is clear
 /// or approaching, the one that has happened otherwise.
+///
+/// Over iceoryx2 the payload of `<name>/alerts`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/CollisionAlert/2")]
 #[repr(C)]
 pub struct CollisionAlert {
-    /// The run this alert belongs to, as in [`FrameHeader::run_id`].
+    /// The run this alert belongs to, as [`FrameHeader::run_id`].
     pub run_id: u64,
     /// The tick of the frame this alert goes with.
     pub tick: u64,
@@ -91,24 +102,28 @@ pub struct CollisionAlert {
     pub event_time: f64,
     /// `event_time - sim_time`, simulated seconds; negative once it has passed; NaN where there is no event.
     pub time_to_event: f64,
-    /// Metres between the nearest two boards in that frame, as [`FrameHeader::min_clearance`].
+    /// Metres between the nearest two boards in that frame, negative when they overlap; NaN where there are fewer than
+    /// three benches.
     pub clearance: f64,
-    /// The midpoint between the nearest two boards, metres right of the centre; NaN under three benches.
+    /// The midpoint between the nearest two boards, metres right of the centre; NaN where there are fewer than three
+    /// benches.
     pub x: f64,
-    /// The midpoint between the nearest two boards, metres up from the centre; NaN under three benches.
+    /// The midpoint between the nearest two boards, metres up from the centre; NaN where there are fewer than three
+    /// benches.
     pub y: f64,
     /// Where the event happens, metres right of the centre: the touching point of a contact, the rear handle of the
     /// bench that stalls or locks; NaN where there is no event.
     pub event_x: f64,
     /// Where the event happens, metres up from the centre; NaN where there is no event.
     pub event_y: f64,
-    /// 0 clear, 1 approaching, 2 contact, 3 stall, 4 lock.
+    /// How serious the alert is: one of [`Level`](crate::show::state::Level).
     pub level: u32,
     /// The first of the nearest two benches, from 0, or [`NO_BENCH`].
     pub bench_a: u32,
     /// The second of the nearest two benches, or [`NO_BENCH`].
     pub bench_b: u32,
-    /// The event: 0 none, else as [`FrameHeader::state`].
+    /// What kind of event: one of [`EventKind`](crate::motion::event::EventKind), with the number of the frame's state
+    /// that it leads to; 0 where there is none.
     pub event: u32,
     /// The bench that stalls or locks, or the first of two that touch, or [`NO_BENCH`].
     pub event_bench_a: u32,
@@ -178,15 +193,17 @@ impl Serialize for SceneName {
     }
 }
 
-/// How the loop is doing, once a second. Payload of `<name>/status`.
+/// How the loop is doing, once a second.
 ///
-/// Layout 2 added the unforeseen contacts and the unsolved frames. `_second` figures are of the last second alone,
-/// `_total` figures since the start of the run; all durations are in nanoseconds.
+/// Figures that end in `_second` are of the last second alone, those that end in `_total` since the start of the run;
+/// all durations are in nanoseconds.
+///
+/// Over iceoryx2 the payload of `<name>/status`. Layout 2 added the unforeseen contacts and the unsolved frames.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/LoopStatus/2")]
 #[repr(C)]
 pub struct LoopStatus {
-    /// The run, as in [`FrameHeader::run_id`].
+    /// The run, as [`FrameHeader::run_id`].
     pub run_id: u64,
     /// The tick of the latest frame.
     pub tick: u64,
@@ -240,7 +257,7 @@ pub struct LoopStatus {
     pub step_max_total: u64,
     /// Resident memory of the publisher, bytes.
     pub resident_bytes: u64,
-    /// Subscribers of `<name>/poses` that are connected.
+    /// Subscribers of the frames that are connected over iceoryx2.
     pub subscribers: u32,
     /// Open file descriptors of the publisher.
     pub file_descriptors: u32,
@@ -251,13 +268,13 @@ pub struct LoopStatus {
 /// The most segments of a path that a [`Stage`] has room for.
 pub const MOST_SEGMENTS: usize = 32;
 
-/// The `kind` of a [`StageSegment`]: straight on.
+/// Straight on.
 pub const SEGMENT_LINE: u32 = 0;
-/// The `kind` of a [`StageSegment`]: part of a circle.
+/// Part of a circle.
 pub const SEGMENT_ARC: u32 = 1;
-/// The `kind` of a [`StageSegment`]: inward along r = pitch theta / 2 pi.
+/// Inward along r = pitch theta / 2 pi.
 pub const SEGMENT_INWARD_SPIRAL: u32 = 2;
-/// The `kind` of a [`StageSegment`]: outward along that spiral, turned by half a turn about the centre.
+/// Outward along that spiral, turned by half a turn about the centre.
 pub const SEGMENT_OUTWARD_SPIRAL: u32 = 3;
 
 /// One segment of the path in a [`Stage`].
@@ -279,7 +296,7 @@ pub struct StageSegment {
     pub theta_first: f64,
     /// Of a spiral, the polar angle at which it ends, radians; else NaN.
     pub theta_last: f64,
-    /// [`SEGMENT_LINE`], [`SEGMENT_ARC`], [`SEGMENT_INWARD_SPIRAL`] or [`SEGMENT_OUTWARD_SPIRAL`].
+    /// Which curve it is: one of [`SEGMENT_*`](SEGMENT_LINE).
     pub kind: u32,
     /// Always 0.
     pub reserved: u32,
@@ -298,16 +315,17 @@ impl StageSegment {
     }
 }
 
-/// What a subscriber needs to draw the stage. Payload of `<name>/stage`, sent at the start and kept for late joiners.
+/// What a subscriber needs to draw the stage. Sent at the start and kept for late joiners.
 ///
-/// The head's board has a length of its own; all that follow have one length. Layout 2 added the segments of the
-/// path, layout 3 gave them their name; the team may stand further back than the first segment begins, on the same
-/// spiral or line.
+/// The head's board has a length of its own; all that follow have one length. The team may stand further back than the
+/// first segment begins, on the same spiral or line.
+///
+/// Over iceoryx2 the payload of `<name>/stage`. Layout 2 added the segments of the path, layout 3 gave them their name.
 #[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend, Serialize)]
 #[type_name("bench_dragon/Stage/3")]
 #[repr(C)]
 pub struct Stage {
-    /// The run, as in [`FrameHeader::run_id`].
+    /// The run, as [`FrameHeader::run_id`].
     pub run_id: u64,
     /// CLOCK_REALTIME in nanoseconds when this was written.
     pub stamp_ns: u64,
