@@ -104,7 +104,8 @@ fn suite(transport: &str) {
     }
     let mut sent: Vec<u64> = [&summary_of_first, &summary_of_second].map(|line| number(line, "frames")).to_vec();
     let mut last: Vec<u64> = frames.values().map(|frames| number(frames.last().unwrap(), "sequence") + 1).collect();
-    (sent.sort_unstable(), last.sort_unstable());
+    sent.sort_unstable();
+    last.sort_unstable();
     assert_eq!(last, sent, "the last frame came too");
     assert_eq!(number(lines.last().unwrap(), "publishers"), 0, "the publisher has left: {:?}", lines.last());
 
