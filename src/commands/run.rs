@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 
 use anstyle::Style;
-use bench_dragon::live::clock::realtime_ns;
+use bench_dragon::live::clock::{SystemClock, realtime_ns};
 use bench_dragon::live::statistics::{self, Inbox, Percentiles, Run, Summary};
 use bench_dragon::live::{Counts, End, LoopOptions, Publisher, StatusPublisher, run_loop};
 use bench_dragon::motion::event::EventKind;
@@ -141,7 +141,7 @@ impl RunSession<'_> {
                 if let Some(publisher) = over_ros2 {
                     publishers.push(publisher);
                 }
-                Some(run_loop(&mut show, &mut publishers, self.loop_options(), reports, stop))
+                Some(run_loop(&SystemClock, &mut show, &mut publishers, self.loop_options(), reports, stop))
             });
             // The thread sends exactly once; should it have died, joining it tells.
             let ready = opening.recv().unwrap_or(Ok(()));
@@ -222,7 +222,7 @@ impl RunSession<'_> {
             sinks,
             announce: Box::new(|alert| self.print_alert(alert)),
         };
-        Ok(statistics::collect(inbox, run, done))
+        Ok(statistics::collect(&SystemClock, inbox, run, done))
     }
 
     /// What a person wants to know at the start, on standard error: standard output is for the summary.
@@ -273,7 +273,8 @@ impl RunSession<'_> {
 
     fn print_summary(&self, counts: &Counts, summary: &Summary, ros2: Option<Ros2Summary>) -> Result<(), CommandError> {
         let Counts { frames, overruns, skipped, end } = *counts;
-        let Summary { wakeup_ns, step_ns, lost_samples } = *summary;
+        let Summary { wakeup_ns, step_ns, samples } = *summary;
+        let lost_samples = frames - samples;
         let mut output = Output::standard();
         if lost_samples > 0 {
             log::warn!("{lost_samples} frames are missing from the percentiles: the machine left them no time");
