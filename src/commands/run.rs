@@ -88,7 +88,8 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
         warn_of_gap(&timeline);
         timeline
     };
-    let show = Show::new(&scene, timeline, playback).map_err(|error| CommandError::BadInput(error.to_string()))?;
+    let show =
+        Show::new(&scene, timeline, playback).map_err(|error| CommandError::BadInput(format!("--start: {error}")))?;
     let stop = stop_on_signals()?;
     if arguments.end_with_parent {
         super::soak::end_with_parent()?;
