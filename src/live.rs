@@ -189,8 +189,8 @@ pub fn run_loop<C: Clock>(
     }
 }
 
-/// Waits for a deadline; false where `stop` was set first. Long waits are cut up, so that late subscribers are let in and
-/// a stop is heeded in time.
+/// Waits for a deadline; false where `stop` was set first. Long waits are cut up, so that late subscribers are let in
+/// and a stop is heeded in time.
 fn wait<C: Clock>(
     clock: &C,
     deadline_ns: u64,

@@ -50,8 +50,8 @@ fn allocations() -> u64 {
 /// Frames after which the run is over, however long the machine takes for them: three showings and more.
 const FRAMES: u64 = 1000;
 
-/// A show that remembers what had been allocated when its second frame was computed, and which states it showed. It sets
-/// the stop flag with its last frame.
+/// A show that remembers what had been allocated when its second frame was computed, and which states it showed. It
+/// sets the stop flag with its last frame.
 struct Watched<'a> {
     show: Show,
     stop: &'a AtomicBool,

@@ -10,7 +10,7 @@ use crate::wire::{LoopStatus, SceneName};
 
 /// The longest lateness and step cost that a histogram distinguishes: an hour.
 const LONGEST_NS: u64 = 3_600_000_000_000;
-/// Entries that one late wake-up makes in a histogram, at most: a second at the highest rate, in less than a millisecond.
+/// Entries that one late wake-up makes in a histogram, at most: a second's periods at the highest rate.
 const MOST_ENTRIES: u64 = 20_000;
 const SECOND_NS: u64 = 1_000_000_000;
 
@@ -82,8 +82,9 @@ impl Histograms {
         Self { lateness: histogram(), step: histogram() }
     }
 
-    /// Counts a sample. A late wake-up delays every period it covers, and each counts with what was left of it: HdrHistogram's
-    /// correction for coordinated omission. Where it covers very many, neighbours share an entry.
+    /// Counts a sample. A late wake-up delays every period it covers, and each counts with what was left of it:
+    /// HdrHistogram's correction for coordinated omission. Where it covers very many, neighbours share an entry, so that
+    /// an hour's stop does not hold the thread up.
     fn record(&mut self, sample: &Sample, period_ns: u64) {
         let values = (sample.lateness_ns / period_ns).max(1);
         let stride = values.div_ceil(MOST_ENTRIES);

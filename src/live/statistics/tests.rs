@@ -215,11 +215,27 @@ fn the_thread_gives_each_sink_a_status_a_second_and_every_alert_in_order() {
     assert!(statuses[0].resident_bytes > 100_000 && statuses[0].file_descriptors > 2);
 }
 
+/// A run that ends while its status is being sent: the last sample comes in between.
+struct LastMoment {
+    reports: crate::live::Reports,
+    done: Rc<AtomicBool>,
+}
+
+impl StatusPublisher for LastMoment {
+    fn publish_status(&mut self, _status: &LoopStatus) {
+        if !self.done.swap(true, Ordering::Release) {
+            self.reports.samples.push(sample(1, 0, 0)).unwrap();
+        }
+    }
+}
+
 #[test]
 fn what_was_pushed_before_the_end_is_collected() {
     let (mut reports, inbox) = queues();
     let clock = SimulatedClock::new(START_NS, []);
     reports.samples.push(sample(0, 0, 0)).unwrap();
-    let run = Run { run_id: 11, rate: 30.0, scene: "paper", sinks: Vec::new(), announce: Box::new(|_| ()) };
-    assert_eq!(collect(&clock, inbox, run, &AtomicBool::new(true)).samples, 1);
+    let done = Rc::new(AtomicBool::new(false));
+    let sinks: Vec<Box<dyn StatusPublisher>> = vec![Box::new(LastMoment { reports, done: Rc::clone(&done) })];
+    let run = Run { run_id: 11, rate: 30.0, scene: "paper", sinks, announce: Box::new(|_| ()) };
+    assert_eq!(collect(&clock, inbox, run, &done).samples, 2);
 }
