@@ -13,16 +13,22 @@ use iceoryx2::prelude::ZeroCopySend;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use processes::{Place, Process, example, json_lines, program, python, scene_file, summary, text, unique, wait};
 
-/// Returns once a publisher has made all its services, the status last.
-fn wait_for_publisher(name: &str) {
-    let (node, status) = (node().unwrap(), service_name(name, "status").unwrap());
+/// Returns once something is so, however long a slow machine takes.
+fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
     for _ in 0..600 {
-        if node.service_builder(&status).publish_subscribe::<LoopStatus>().open().is_ok() {
+        if holds() {
             return;
         }
         wait(0.1);
     }
-    panic!("no publisher in a minute");
+    panic!("a minute has passed without {what}");
+}
+
+/// Returns once a publisher has made all its services, the status last.
+fn wait_for_publisher(name: &str) {
+    let (node, status) = (node().unwrap(), service_name(name, "status").unwrap());
+    let open = || node.service_builder(&status).publish_subscribe::<LoopStatus>().open();
+    wait_until("a publisher", || open().is_ok());
 }
 
 /// Subscribers that come in the middle and outlast the publisher: none misses a frame, the last one included.
@@ -90,7 +96,7 @@ fn alerts_come_once_each_and_in_order_in_rust_and_in_python() {
     let scene = scene_file("continue", &[("on_contact = \"stop\"", "on_contact = \"continue\"")]);
     for rate in ["60", "1000"] {
         let name = format!("alerts{rate}");
-        let monitor = Process::start(program(&name).args(["watch", "--json", "--duration", "12"]));
+        let monitor = Process::start(program(&name).args(["watch", "--json"]));
         let arguments = ["examples/python/subscribe.py", "--json", "--seconds", "11", "--name"];
         let listener = Process::start(python().args(arguments).arg(unique(&name)));
         wait(1.5);
@@ -115,6 +121,8 @@ fn alerts_come_once_each_and_in_order_in_rust_and_in_python() {
         let names = ["clear", "approaching", "contact", "stall", "lock"];
         let expected: Vec<_> = names.map(str::to_owned).into();
         summary(&publisher.output_within(30));
+        wait(1.0);
+        monitor.signal(nix::sys::signal::Signal::SIGINT);
         let (watched, count) =
             levels(json_lines(&monitor.output_within(30)), &|line| line["level"].as_str().unwrap().into());
         assert_eq!(watched, expected);
@@ -130,7 +138,8 @@ fn alerts_come_once_each_and_in_order_in_rust_and_in_python() {
 #[test]
 fn a_late_subscriber_gets_the_contact_that_has_happened() {
     let _publisher = Process::start(program("late").args(["run", "--json", "--start", "412", "--duration", "30"]));
-    wait(3.0);
+    wait_for_publisher(&unique("late"));
+    wait(2.0);
     let lines =
         json_lines(&Process::start(program("late").args(["watch", "--json", "--duration", "2"])).output_within(20));
     let alerts: Vec<_> = lines.iter().filter(|line| line["type"] == "alert").collect();
@@ -173,8 +182,7 @@ fn signals_end_a_run_cleanly_and_leave_nothing_behind() {
     for (signal, rate) in [(SIGINT, "60"), (SIGTERM, "0.1")] {
         let place = Place::new("signals");
         let publisher = Process::start(place.program().args(["run", "--json", "--rate", rate]));
-        wait(1.5);
-        assert!(place.left_behind().len() > 1, "the publisher runs in its own place");
+        wait_until("a publisher in its own place", || place.left_behind().len() > 1);
         publisher.signal(signal);
         let summary = summary(&publisher.output_within(5));
         assert_eq!(summary["end"], "signal");
