@@ -10,7 +10,7 @@ use bench_dragon::live::Publisher;
 use bench_dragon::model::path::Path;
 use bench_dragon::model::team::Team;
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::scene::Scene;
+use bench_dragon::scene::{AtEnd, Scene};
 use bench_dragon::show::{Playback, Show};
 use bench_dragon::solve::newton::Newton;
 use bench_dragon::solve::paper::{Paper, PaperRules};
@@ -155,11 +155,11 @@ fn show(bencher: Bencher, with: &str) {
     }
     scene.velocities = if with.contains("velocities") { Velocities::Computed } else { Velocities::Omitted };
     let timeline = scene.motion.timeline(&mut |_| ());
-    let playback = Playback { start: 200.0, ..Playback::of(&scene) };
+    let playback = Playback { start: 200.0, at_end: AtEnd::Loop, ..Playback::of(&scene) };
     let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
     let mut tick = 0;
     bencher.bench_local(|| {
-        tick = if tick < 12_000 { tick + 1 } else { 0 };
+        tick += 1;
         divan::black_box(show.frame(tick));
     });
 }
@@ -192,7 +192,7 @@ fn publish_over_iceoryx2(bencher: Bencher) {
     let playback = Playback { start: 200.0, ..Playback::of(&scene) };
     let mut show =
         Show::new(&scene, scene.motion.timeline(&mut |_| ()), playback).expect("200 s is before the contact");
-    let offer = PublisherConfig {
+    let config = PublisherConfig {
         name: format!("bench_{}_frame", std::process::id()),
         handles: scene.team().handles(),
         queue: 64,
@@ -200,7 +200,7 @@ fn publish_over_iceoryx2(bencher: Bencher) {
         alerts: true,
         stage: stage(1, 0, &scene.motion),
     };
-    let mut publisher = SharedMemoryPublisher::open(&offer).expect("the name holds this process's number");
+    let mut publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");
     let frame = show.frame(0);
     let header = FrameHeader { handles: 224, ..FrameHeader::default() };
     bencher.bench_local(|| publisher.publish(&header, frame).expect("nobody else uses this service"));

@@ -1,12 +1,17 @@
 //! The live loop: wait for the deadline, compute the frame, hand it to the publishers, count.
 //!
-//! Knows [`Frame`] and [`Publisher`]; knows no transport and no solver. The `run` command calls [`run_loop`] on a
-//! thread of its own, and [`statistics`] on another, which takes what the loop counts from a queue that never blocks.
+//! In: [`Frames`] and a [`Clock`]. Out: frames to every [`Publisher`], samples and alerts to a queue that never blocks.
+//! Knows no transport and no solver. The `run` command calls [`run_loop`] on a thread of its own, and [`statistics`] on
+//! another, which empties that queue.
 
 pub mod clock;
 #[cfg(feature = "cli")]
 pub mod realtime;
+#[cfg(test)]
+mod simulated;
 pub mod statistics;
+#[cfg(test)]
+mod tests;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -14,7 +19,7 @@ use crate::show::{Frame, Show};
 use crate::wire::convert::{Stamps, collision_alert, frame_header};
 use crate::wire::{CollisionAlert, FrameHeader, LoopStatus};
 
-use clock::{Deadlines, monotonic_ns, realtime_ns, sleep_until};
+use clock::{Clock, Deadlines};
 use statistics::Sample;
 
 /// Nanoseconds between two calls of [`Publisher::maintain`].
@@ -51,7 +56,7 @@ pub struct PublishError(pub String);
 
 /// Where frames come from, by tick.
 pub trait Frames {
-    /// The frame of a tick; ticks are asked in increasing order.
+    /// The frame of a tick. Each call's tick is greater than the one before.
     fn frame(&mut self, tick: u64) -> &Frame;
 }
 
@@ -68,7 +73,7 @@ pub struct LoopOptions {
     pub run_id: u64,
     /// Frames per second.
     pub rate: f64,
-    /// The number of periods after which the loop ends; `None` to go on until it is told to stop.
+    /// The number of periods after which the loop ends; `None` for a loop that only its stop flag ends.
     pub periods: Option<u64>,
 }
 
@@ -88,13 +93,14 @@ impl LoopOptions {
 pub enum End {
     /// Its periods were over.
     Duration,
-    /// It was told to stop.
+    /// Its stop flag was set.
     Signal,
     /// A publisher failed.
     Error,
 }
 
-/// What the loop counted. `frames + skipped` is the number of periods elapsed.
+/// What the loop counted. `frames + skipped` is the number of periods elapsed; where a publisher failed, those before
+/// the period in which it did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counts {
     /// Frames published.
@@ -128,12 +134,13 @@ pub struct Reports {
 
 /// Publishes a frame a period until `stop` is set or the periods are over.
 ///
-/// A frame is computed in its own period, however late: if one or more whole periods have passed meanwhile, they are
-/// skipped and counted, and the loop goes on in phase with its first deadline. Nothing is caught up.
+/// A frame is computed in its own period, however late. Periods that have wholly passed meanwhile are skipped and
+/// counted, never caught up; later deadlines do not shift.
 ///
 /// # Errors
 /// The first [`PublishError`], with what was counted until then.
-pub fn run_loop(
+pub fn run_loop<C: Clock>(
+    clock: &C,
     frames: &mut dyn Frames,
     publishers: &mut [Box<dyn Publisher>],
     options: LoopOptions,
@@ -141,33 +148,35 @@ pub fn run_loop(
     stop: &AtomicBool,
 ) -> Result<Counts, (Counts, PublishError)> {
     let mut counts = Counts { frames: 0, overruns: 0, skipped: 0, end: End::Signal };
-    let deadlines = Deadlines::starting_now(options.rate);
-    let mut maintained = 0;
+    let periods = options.periods.unwrap_or(u64::MAX);
+    let deadlines = Deadlines::starting_at(clock.monotonic_ns(), options.rate);
+    let mut maintenance_due_ns = 0;
     let mut tick = 0;
     loop {
         let deadline_ns = deadlines.of(tick);
-        if !wait(deadline_ns, stop, publishers, &mut maintained) {
-            return Ok(counts);
-        }
-        let woke_ns = monotonic_ns();
-        let lateness_ns = woke_ns.saturating_sub(deadline_ns);
-        let present = deadlines.latest_at(woke_ns).max(tick).min(options.periods.unwrap_or(u64::MAX));
-        if present > tick {
+        let reached = wait(clock, deadline_ns, stop, publishers, &mut maintenance_due_ns);
+        let woke_ns = clock.monotonic_ns();
+        // The first period that has not wholly passed. A stop counts those before it too.
+        let current = deadlines.latest_at(woke_ns).max(tick).min(periods);
+        if current > tick {
             counts.overruns += 1;
-            counts.skipped += present - tick;
-            tick = present;
+            counts.skipped += current - tick;
+            tick = current;
         }
-        if options.periods.is_some_and(|periods| tick >= periods) {
+        if tick >= periods {
             counts.end = End::Duration;
             return Ok(counts);
         }
-        let frame = frames.frame(tick);
+        if !reached {
+            return Ok(counts);
+        }
         let stamps = Stamps {
             run_id: options.run_id,
             sequence: counts.frames,
-            stamp_ns: realtime_ns(),
+            stamp_ns: clock.realtime_ns(),
             deadline_ns: deadlines.of(tick),
         };
+        let frame = frames.frame(tick);
         let header = frame_header(frame, stamps);
         for publisher in publishers.iter_mut() {
             if let Err(error) = publisher.publish(&header, frame) {
@@ -176,55 +185,52 @@ pub fn run_loop(
             }
         }
         counts.frames += 1;
-        report(&mut reports, &header, frame, &counts, lateness_ns, woke_ns, publishers);
+        let sample = Sample {
+            tick,
+            sim_time: frame.sim_time,
+            shows_played: frame.shows_played,
+            unforeseen_contacts: frame.unforeseen_contacts,
+            unsolved_frames: frame.unsolved_frames,
+            counts,
+            lateness_ns: woke_ns.saturating_sub(deadline_ns),
+            step_ns: clock.monotonic_ns().saturating_sub(woke_ns),
+            subscribers: publishers.iter().map(|publisher| publisher.subscribers()).sum(),
+        };
+        report(&mut reports, &header, frame, sample);
         tick += 1;
     }
 }
 
-/// Waits for a deadline; false if the loop is to stop. Long waits are cut up, so that late subscribers are let in and
-/// a stop is heeded in time.
-fn wait(deadline_ns: u64, stop: &AtomicBool, publishers: &mut [Box<dyn Publisher>], maintained: &mut u64) -> bool {
+/// Waits for a deadline; false where `stop` was set first. Long waits are cut up, so that late subscribers are let in
+/// and a stop is heeded in time.
+fn wait<C: Clock>(
+    clock: &C,
+    deadline_ns: u64,
+    stop: &AtomicBool,
+    publishers: &mut [Box<dyn Publisher>],
+    maintenance_due_ns: &mut u64,
+) -> bool {
     loop {
         if stop.load(Ordering::Relaxed) {
             return false;
         }
-        let now = monotonic_ns();
-        if now >= *maintained + MAINTENANCE_NS {
+        let now = clock.monotonic_ns();
+        if now >= *maintenance_due_ns {
             publishers.iter_mut().for_each(|publisher| publisher.maintain());
-            *maintained = now;
+            *maintenance_due_ns = now + MAINTENANCE_NS;
         }
         if now >= deadline_ns {
             return true;
         }
-        sleep_until(deadline_ns.min(*maintained + MAINTENANCE_NS));
+        clock.sleep_until(deadline_ns.min(*maintenance_due_ns));
     }
 }
 
-/// Hands the statistics thread what it counts. Where that thread is behind by the whole queue, the sample is lost and
-/// the thread sees so by its sequence.
-fn report(
-    reports: &mut Reports,
-    header: &FrameHeader,
-    frame: &Frame,
-    counts: &Counts,
-    lateness_ns: u64,
-    woke_ns: u64,
-    publishers: &[Box<dyn Publisher>],
-) {
+/// Hands the statistics thread what it counts, and the alerts. Where that thread is behind by the whole queue, the
+/// sample or the line on the terminal is lost, never the frame or the alert that was published.
+fn report(reports: &mut Reports, header: &FrameHeader, frame: &Frame, sample: Sample) {
     for alert in &frame.alerts {
-        // A full queue loses the line on the terminal, never the alert that was published.
         let _ = reports.alerts.push(collision_alert(header, alert));
     }
-    let sample = Sample {
-        tick: frame.tick,
-        sim_time: frame.sim_time,
-        shows_played: frame.shows_played,
-        unforeseen_contacts: frame.unforeseen_contacts,
-        unsolved_frames: frame.unsolved_frames,
-        counts: *counts,
-        lateness_ns,
-        step_ns: monotonic_ns().saturating_sub(woke_ns),
-        subscribers: publishers.iter().map(|publisher| publisher.subscribers()).sum(),
-    };
     let _ = reports.samples.push(sample);
 }

@@ -1,9 +1,10 @@
 //! The show: from a scene and a tick to one [`Frame`], the same bits every time.
 //!
-//! Knows the solver, the events and the alert rules; knows no clock and no transport. The live loop and the offline
-//! commands call it.
+//! In: a scene, its timeline, and ticks. Out: frames. Knows the solver, the events and the alert rules; knows no wall
+//! clock and no transport. The live loop calls it.
 
 pub mod alerts;
+pub mod clock;
 pub mod state;
 
 use crate::linkage::NoFollower;
@@ -15,6 +16,7 @@ use crate::scene::{AtEnd, OnContact, Scene};
 use crate::solve::{Chain, Solver, Velocities};
 
 use alerts::{Alert, LevelTracker};
+use clock::{ShowClock, ShowTime};
 use state::{FrameState, PlaybackState};
 
 /// One moment of the show.
@@ -44,9 +46,6 @@ pub struct Frame {
     pub unsolved_frames: u64,
 }
 
-/// Ticks beyond which a show counts as endless: at 20 kHz, fourteen million years.
-const LONGEST_SHOW: f64 = 9e18;
-
 /// How a scene is played: what the command line may override.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Playback {
@@ -63,48 +62,36 @@ pub struct Playback {
 }
 
 impl Playback {
-    /// The playback a scene asks for: from its start, in real time.
+    /// The playback that a scene states: from its start, in real time.
     pub fn of(scene: &Scene) -> Self {
         Self { start: 0.0, time_scale: 1.0, rate: scene.rate, on_contact: scene.on_contact, at_end: scene.at_end }
     }
-
-    /// Simulated seconds of a tick, unclamped: from integers, so that nothing drifts.
-    fn sim_time(&self, tick: u64) -> f64 {
-        self.start + self.time_scale * tick as f64 / self.rate
-    }
-
-    /// The ticks of one showing: up to and including the first whose time is at or past `freeze`.
-    fn ticks_per_show(&self, freeze: f64) -> u64 {
-        let estimate = (freeze - self.start) * self.rate / self.time_scale;
-        if estimate >= LONGEST_SHOW {
-            return u64::MAX;
-        }
-        let estimate = estimate.max(0.0) as u64;
-        // The estimate is off by rounding; the clock itself decides.
-        let mut tick = estimate.saturating_sub(2 + estimate / (1 << 50));
-        while self.sim_time(tick) < freeze {
-            tick += 1;
-        }
-        tick + 1
-    }
 }
 
-/// A start that cannot be played, in one sentence.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct StartError(String);
+/// A start that is not before the motion's end.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error(
+    "{start} s is outside the motion, expected at least 0 and less than {end} s, at which it ends ({})",
+    kind.name()
+)]
+pub struct StartError {
+    /// Simulated seconds at which the show was to begin.
+    pub start: f64,
+    /// Simulated seconds at which the motion ends.
+    pub end: f64,
+    /// What ends it.
+    pub kind: EventKind,
+}
 
 /// A scene being played.
 pub struct Show {
-    playback: Playback,
+    clock: ShowClock,
     solver: Box<dyn Solver>,
     solver_reason: String,
     velocities: Velocities,
     /// What the head travels in a simulated second; not a number where the method does not follow the path exactly.
     metres_per_second: f64,
     timeline: Timeline,
-    freeze_time: f64,
-    ticks_per_show: u64,
     clearance: Option<ClearanceMonitor>,
     level: Option<LevelTracker>,
     /// Metres of overlap that no search has let pass; `None` where the solver does not follow the searched motion.
@@ -124,10 +111,7 @@ impl Show {
     pub fn new(scene: &Scene, timeline: Timeline, playback: Playback) -> Result<Self, StartError> {
         let end = timeline.end();
         if !(playback.start >= 0.0 && playback.start < end.time) {
-            let (name, time, start) = (end.event.kind.name(), end.time, playback.start);
-            return Err(StartError(format!(
-                "--start is {start} s, expected at least 0 and less than {time} s, at which the motion ends ({name})"
-            )));
+            return Err(StartError { start: playback.start, end: end.time, kind: end.event.kind });
         }
         let mut timeline = if scene.alerts.is_some() { timeline } else { timeline.end_only() };
         timeline.reserve_contact();
@@ -152,14 +136,12 @@ impl Show {
             unsolved_frames: 0,
         };
         Ok(Self {
-            ticks_per_show: playback.ticks_per_show(freeze_time),
-            playback,
+            clock: ShowClock::new(&playback, freeze_time),
             solver,
             solver_reason: reason,
             velocities: scene.velocities,
             metres_per_second: scene.motion.travelled_at(1.0),
             timeline,
-            freeze_time,
             clearance,
             level,
             overlap_tolerance: exact.then_some(ROUNDING_OVERLAP * scene.team().longest_link()),
@@ -180,7 +162,7 @@ impl Show {
 
     /// Simulated seconds at which the show freezes.
     pub fn freeze_time(&self) -> f64 {
-        self.freeze_time
+        self.clock.freeze_time()
     }
 
     /// Pairs of boards tested for their separation so far: none where the scene has no alerts.
@@ -192,22 +174,16 @@ impl Show {
     ///
     /// Ticks are given in increasing order; some may be left out. The same sequence of ticks gives the same bits.
     pub fn frame(&mut self, tick: u64) -> &Frame {
-        let shows_played = match self.playback.at_end {
-            AtEnd::Hold => 0,
-            AtEnd::Loop => tick / self.ticks_per_show,
-        };
-        let tick_of_show = tick - shows_played * self.ticks_per_show;
+        let ShowTime { sim_time, shows_played, ended } = self.clock.at(tick);
         let restarted = shows_played != self.frame.shows_played;
-        let sim_time = self.playback.sim_time(tick_of_show).min(self.freeze_time);
         self.frame.tick = tick;
         self.frame.shows_played = shows_played;
         self.frame.sim_time = sim_time;
-        let ended = sim_time >= self.freeze_time;
         self.frame.playback = if ended { PlaybackState::Ended } else { PlaybackState::Playing };
         self.solve(sim_time);
         let closest = self.measure_clearance();
         self.record_unforeseen_contact(closest);
-        self.update_state(tick_of_show, restarted, closest);
+        self.update_state(restarted, closest);
         &self.frame
     }
 
@@ -233,7 +209,7 @@ impl Show {
         least
     }
 
-    /// Boards that overlap while no contact has happened are a contact now, whatever the searches said.
+    /// Boards that overlap while no contact has happened are a contact now, whatever the searches found.
     fn record_unforeseen_contact(&mut self, closest: Option<PairClearance>) {
         let (Some(tolerance), Some(closest)) = (self.overlap_tolerance, closest) else { return };
         let time = self.frame.sim_time;
@@ -252,7 +228,7 @@ impl Show {
         self.timeline.record_contact(TimedEvent { event, time });
     }
 
-    fn update_state(&mut self, tick_of_show: u64, restarted: bool, closest: Option<PairClearance>) {
+    fn update_state(&mut self, restarted: bool, closest: Option<PairClearance>) {
         let frame = &mut self.frame;
         frame.alerts.clear();
         let passed = self.timeline.latest_passed(frame.sim_time);
@@ -261,7 +237,7 @@ impl Show {
         if restarted {
             level.restart();
         }
-        level.update(tick_of_show, frame.sim_time, &self.timeline, closest, &mut frame.alerts);
+        level.update(frame.tick, frame.sim_time, &self.timeline, closest, &mut frame.alerts);
         if passed.is_none() {
             frame.state = level.current().into();
         }

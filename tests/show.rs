@@ -148,7 +148,7 @@ fn a_tick_past_the_lock_freezes_the_show_at_it() {
     }
 }
 
-/// A show that no search has looked into, as when one gave up: the frames themselves tell of the contact.
+/// A show whose events no search has found, as when one gave up: the frames themselves show the contact.
 #[test]
 fn boards_that_overlap_unforeseen_are_a_contact_at_once() {
     let scene = Scene::paper();

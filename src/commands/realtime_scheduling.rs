@@ -30,7 +30,7 @@ impl RealtimeScheduling {
     /// Bad input: there is no such CPU. What the user has no right to is a warning.
     pub fn prepare_thread(&self) -> Result<Option<File>, CommandError> {
         if let Some(cpu) = self.cpu {
-            realtime::pin_to_cpu(cpu).map_err(CommandError::BadInput)?;
+            realtime::pin_to_cpu(cpu).map_err(|error| CommandError::BadInput(format!("--cpu: {error}")))?;
         }
         realtime::set_timer_slack();
         if let Some(priority) = self.realtime {

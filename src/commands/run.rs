@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 
 use anstyle::Style;
-use bench_dragon::live::clock::realtime_ns;
+use bench_dragon::live::clock::{SystemClock, realtime_ns};
 use bench_dragon::live::statistics::{self, Inbox, Percentiles, Run, Summary};
 use bench_dragon::live::{Counts, Deliveries, End, LoopOptions, Publisher, run_loop};
 use bench_dragon::motion::event::EventKind;
@@ -91,7 +91,8 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
         warn_of_gap(&timeline);
         timeline
     };
-    let show = Show::new(&scene, timeline, playback).map_err(|error| CommandError::BadInput(error.to_string()))?;
+    let show =
+        Show::new(&scene, timeline, playback).map_err(|error| CommandError::BadInput(format!("--start: {error}")))?;
     let stop = stop_on_signals()?;
     if arguments.end_with_parent {
         super::soak::end_with_parent()?;
@@ -136,7 +137,7 @@ impl RunSession<'_> {
                         return None;
                     }
                 };
-                Some(run_loop(&mut show, &mut publishers, self.loop_options(), reports, stop))
+                Some(run_loop(&SystemClock, &mut show, &mut publishers, self.loop_options(), reports, stop))
             });
             // The thread sends exactly once; should it have died, nothing comes.
             let transports = opening.recv().unwrap_or_else(|_| Err(lost("loop's")));
@@ -195,7 +196,7 @@ impl RunSession<'_> {
             sinks: transports.iter_mut().map(|transport| transport.status()).collect::<Result<_, _>>()?,
             announce: Box::new(|alert| self.print_alert(alert)),
         };
-        Ok((statistics::collect(inbox, run, done), transports))
+        Ok((statistics::collect(&SystemClock, inbox, run, done), transports))
     }
 
     /// What a person wants to know at the start, on standard error: standard output is for the summary.
@@ -242,7 +243,8 @@ impl RunSession<'_> {
         deliveries: BTreeMap<&'static str, Deliveries>,
     ) -> Result<(), CommandError> {
         let Counts { frames, overruns, skipped, end } = *counts;
-        let Summary { wakeup_ns, step_ns, lost_samples } = *summary;
+        let Summary { wakeup_ns, step_ns, samples } = *summary;
+        let lost_samples = frames - samples;
         let mut output = Output::standard();
         if lost_samples > 0 {
             log::warn!("{lost_samples} frames are missing from the percentiles: the machine left them no time");

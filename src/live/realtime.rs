@@ -1,5 +1,5 @@
-//! What the operating system can do for a thread with deadlines: timer slack, real-time priority, locked memory, a CPU of
-//! its own, CPUs that stay awake. Called once, on the loop's thread, before the loop.
+//! What the operating system can do for a thread with deadlines: timer slack, real-time priority, locked memory, a CPU
+//! of its own, CPUs that stay awake. Called by the commands, once, on the loop's thread, before the loop.
 
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -43,40 +43,47 @@ pub fn become_realtime(priority: u8) {
     }
 }
 
-/// Where Linux takes wishes for the CPUs' wake-up latency (Documentation/power/pm_qos_interface.rst).
+/// Where Linux takes limits of the CPUs' wake-up latency (Documentation/power/pm_qos_interface.rst).
 const CPU_LATENCY_DEVICE: &str = "/dev/cpu_dma_latency";
 
 /// Lets no CPU of this machine sleep so deeply that it takes more than `microseconds` to wake up, for as long as the
-/// returned file is open. With 0 idle CPUs do not sleep at all. cyclictest does the same unasked.
+/// returned file is open. With 0 idle CPUs do not sleep at all. cyclictest does the same by default.
 ///
 /// Without the right to it a warning says how to get it.
 pub fn limit_cpu_latency(microseconds: u32) -> Option<File> {
     // The device reads a signed 32-bit number; no CPU takes longer than what that holds.
-    let wish = i32::try_from(microseconds).unwrap_or(i32::MAX);
+    let limit = i32::try_from(microseconds).unwrap_or(i32::MAX);
     let opened = OpenOptions::new().write(true).open(CPU_LATENCY_DEVICE);
     opened
-        .and_then(|mut device| device.write_all(&wish.to_ne_bytes()).map(|()| device))
+        .and_then(|mut device| device.write_all(&limit.to_ne_bytes()).map(|()| device))
         .inspect_err(|error| {
             log::warn!(
-                "the CPUs' wake-up latency could not be limited ({CPU_LATENCY_DEVICE}: {error}): idle CPUs go on \
-                 sleeping. To allow it, run as root or grant write access to that file"
+                "the CPUs' wake-up latency could not be limited ({CPU_LATENCY_DEVICE}: {error}): idle CPUs still \
+                 sleep. To allow it, run as root or grant write access to that file"
             );
         })
         .ok()
 }
 
+/// A CPU that is not there, or on which this thread may not run.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("no CPU {cpu} for this thread, expected one of {available:?}")]
+pub struct CpuError {
+    /// The CPU.
+    pub cpu: usize,
+    /// Those on which the thread may run.
+    pub available: Vec<usize>,
+}
+
 /// Keeps this thread on one CPU.
 ///
 /// # Errors
-/// One sentence where there is no such CPU, or the thread may not run on it.
-pub fn pin_to_cpu(cpu: usize) -> Result<(), String> {
+/// [`CpuError`] where there is no such CPU, or the thread may not run on it.
+pub fn pin_to_cpu(cpu: usize) -> Result<(), CpuError> {
     let cores = core_affinity::get_core_ids().unwrap_or_default();
     let core = cores.iter().find(|core| core.id == cpu);
     match core {
         Some(core) if core_affinity::set_for_current(*core) => Ok(()),
-        _ => {
-            let known: Vec<_> = cores.iter().map(|core| core.id.to_string()).collect();
-            Err(format!("--cpu is {cpu}, expected one of {}", known.join(", ")))
-        }
+        _ => Err(CpuError { cpu, available: cores.iter().map(|core| core.id).collect() }),
     }
 }

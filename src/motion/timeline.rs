@@ -33,7 +33,7 @@ pub struct Timeline {
 impl Timeline {
     /// The events, a lock or path end among them, in any order, and the simulated seconds up to which they are all there
     /// are, where a search gave up before the motion's end.
-    pub(super) fn new(mut events: Vec<TimedEvent>, searched_until: Option<f64>) -> Self {
+    pub(crate) fn new(mut events: Vec<TimedEvent>, searched_until: Option<f64>) -> Self {
         // At one time, in the order of the kinds.
         events.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.event.kind.cmp(&b.event.kind)));
         Self { events, searched_until }

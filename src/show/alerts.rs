@@ -1,6 +1,10 @@
 //! The alert rules: from the timeline and the clearance to a level that does not flicker, and the alerts that go out.
 //!
-//! Called by the show, once a frame.
+//! In: a frame's tick, time and nearest pair, and the events. Out: the level, and the alerts of that frame. Called by
+//! the show, once a frame.
+
+#[cfg(test)]
+mod tests;
 
 use crate::motion::clearance::PairClearance;
 use crate::motion::timeline::{TimedEvent, Timeline};
@@ -8,8 +12,9 @@ use crate::scene::AlertRules;
 
 use super::state::Level;
 
-/// More alerts than this cannot go with one frame: each event once, and one for approaching or clear.
-pub const MOST_PER_FRAME: usize = 8;
+/// More alerts than this cannot go with one frame: contact, stall and lock, all passed in one step. Approaching and
+/// clear go alone.
+pub const MOST_PER_FRAME: usize = 3;
 
 /// How far clearance must have opened again, as a multiple of the clearance that raised the level: without a gap
 /// between the two, a clearance that swings about the threshold would make the level flicker.
@@ -37,103 +42,119 @@ pub struct Alert {
 pub struct LevelTracker {
     rules: AlertRules,
     rate: f64,
-    level: Level,
-    /// Nothing has been sent yet: the current level goes out whatever it is.
-    fresh: bool,
-    /// The tick of the show at which the level was last announced as new.
-    since: u64,
+    /// The level announced last; `None` before the first frame.
+    announced: Option<Level>,
+    /// The tick at which it was announced.
+    announced_tick: u64,
     /// Whole seconds of wall time since then that have been counted down.
-    counted: u64,
+    seconds_counted: u64,
     /// Time of the last frame of this show; before the first, none.
-    previous: Option<f64>,
-    /// Since when the clearance has been open enough to release the level.
+    previous_time: Option<f64>,
+    /// Since when the clearance has been wide enough to release the level.
     open_since: Option<f64>,
 }
 
 impl LevelTracker {
-    /// The level before the first frame of a show at `rate` frames per second.
+    /// The level before the first frame of a run at `rate` frames per second.
     pub fn new(rules: AlertRules, rate: f64) -> Self {
-        Self { rules, rate, level: Level::Clear, fresh: true, since: 0, counted: 0, previous: None, open_since: None }
+        Self {
+            rules,
+            rate,
+            announced: None,
+            announced_tick: 0,
+            seconds_counted: 0,
+            previous_time: None,
+            open_since: None,
+        }
     }
 
     /// The level now.
     pub fn current(&self) -> Level {
-        self.level
+        self.announced.unwrap_or(Level::Clear)
     }
 
-    /// The show begins again: the next frame decides the level anew.
-    pub fn restart(&mut self) {
-        self.previous = None;
-        self.open_since = None;
-        self.since = 0;
-        self.counted = 0;
-    }
-
-    /// Decides the level of a frame and adds the alerts that go with it.
+    /// The show begins again: the next frame decides the level anew, and announces it if it is another one.
     ///
-    /// Every event since the last frame is announced, however many a step has passed, so that what a subscriber hears
-    /// does not depend on the rate; the first frame of a show announces only where it stands.
+    /// The countdown is of wall time and runs on.
+    pub fn restart(&mut self) {
+        self.previous_time = None;
+        self.open_since = None;
+    }
+
+    /// Decides the level of a frame and adds the alerts that go with it. `tick` grows from call to call, through every
+    /// restart; `sim_time` does not fall but at a restart.
+    ///
+    /// Every event since the last frame is announced, however many a step has passed, so that what a subscriber
+    /// receives of them does not depend on the rate. The first frame of a show announces the latest event passed alone.
     pub fn update(
         &mut self,
-        tick_of_show: u64,
+        tick: u64,
         sim_time: f64,
         timeline: &Timeline,
-        closest: Option<PairClearance>,
+        nearest: Option<PairClearance>,
         alerts: &mut Vec<Alert>,
     ) {
-        let clearance = closest.map_or(f64::NAN, |closest| closest.value);
         let alertable = timeline.events().iter().filter_map(|timed| Some((timed, Level::of(timed.event.kind)?)));
         let passed = alertable.filter(|(timed, _)| timed.time <= sim_time);
-        let announced = match self.previous {
+        let count = passed.clone().count();
+        let new = match self.previous_time {
             Some(previous) => passed.clone().filter(|(timed, _)| timed.time > previous).count(),
-            None => passed.clone().count().min(1),
+            None => count.min(1),
         };
-        let happened = passed.clone().count();
-        for (timed, level) in passed.skip(happened - announced) {
-            if self.fresh || self.level != level {
-                self.announce(level, tick_of_show);
-                alerts.push(Alert { level, event: Some(*timed), nearest: closest });
+        for (timed, level) in passed.skip(count - new) {
+            if self.announce_if_changed(level, tick) {
+                alerts.push(Alert { level, event: Some(*timed), nearest });
             }
         }
-        if happened == 0 {
+        if count == 0 {
             let next = timeline.next_alertable(sim_time);
-            let level = self.level_ahead(sim_time, clearance, next);
-            let changed = self.fresh || level != self.level;
-            if changed {
-                self.announce(level, tick_of_show);
-            }
-            if changed || (level == Level::Approaching && self.counts_down(tick_of_show)) {
-                alerts.push(Alert { level, event: next.copied(), nearest: closest });
+            let level = self.level_before_events(sim_time, nearest, next);
+            let changed = self.announce_if_changed(level, tick);
+            if changed || (level == Level::Approaching && self.second_is_over(tick)) {
+                alerts.push(Alert { level, event: next.copied(), nearest });
             }
         }
-        self.previous = Some(sim_time);
+        self.previous_time = Some(sim_time);
     }
 
-    fn announce(&mut self, level: Level, tick_of_show: u64) {
-        self.level = level;
-        self.fresh = false;
-        self.since = tick_of_show;
-        self.counted = 0;
+    /// Takes a level on; whether it is another one than that announced last.
+    fn announce_if_changed(&mut self, level: Level, tick: u64) -> bool {
+        let changed = self.announced != Some(level);
+        if changed {
+            self.announced = Some(level);
+            self.announced_tick = tick;
+            self.seconds_counted = 0;
+        }
+        changed
     }
 
     /// `Approaching` or `Clear`, where no event has passed.
-    fn level_ahead(&mut self, sim_time: f64, clearance: f64, next: Option<&TimedEvent>) -> Level {
-        let soon = next.is_some_and(|timed| timed.time - sim_time <= self.rules.approach_time);
-        let standing = self.level == Level::Approaching && self.previous.is_some();
-        let threshold = self.rules.approach_clearance;
-        // NaN, where there are no two boards to compare, is never near.
-        let closed = clearance <= HYSTERESIS_RATIO * threshold;
-        self.open_since = if closed { None } else { self.open_since.or(Some(sim_time)) };
-        let calm = self.open_since.is_some_and(|since| sim_time - since >= RELEASE_HOLD * self.rules.approach_time);
-        let near = if standing { !calm } else { clearance < threshold };
-        if soon || near { Level::Approaching } else { Level::Clear }
+    fn level_before_events(
+        &mut self,
+        sim_time: f64,
+        nearest: Option<PairClearance>,
+        next: Option<&TimedEvent>,
+    ) -> Level {
+        let AlertRules { approach_time, approach_clearance } = self.rules;
+        let event_is_near = next.is_some_and(|timed| timed.time - sim_time <= approach_time);
+        // Without a pair there is nothing to be near.
+        let clearance = nearest.map_or(f64::INFINITY, |nearest| nearest.value);
+        let open = clearance > HYSTERESIS_RATIO * approach_clearance;
+        self.open_since = if open { self.open_since.or(Some(sim_time)) } else { None };
+        let held = self.announced == Some(Level::Approaching) && self.previous_time.is_some();
+        let boards_are_near = if held {
+            self.open_since.is_none_or(|since| sim_time - since < RELEASE_HOLD * approach_time)
+        } else {
+            clearance < approach_clearance
+        };
+        if event_is_near || boards_are_near { Level::Approaching } else { Level::Clear }
     }
 
     /// Whether another second of wall time has passed since the level was announced.
-    fn counts_down(&mut self, tick_of_show: u64) -> bool {
-        let seconds = ((tick_of_show - self.since) as f64 / self.rate) as u64;
-        let due = seconds > self.counted;
-        self.counted = seconds;
-        due
+    fn second_is_over(&mut self, tick: u64) -> bool {
+        let seconds = ((tick - self.announced_tick) as f64 / self.rate) as u64;
+        let over = seconds > self.seconds_counted;
+        self.seconds_counted = seconds;
+        over
     }
 }

@@ -1,5 +1,4 @@
-//! How a show stands: the state of a frame, the level of an alert, and whether the show plays. Each type holds what can
-//! be and nothing else.
+//! The state of a frame, the level of an alert, and whether the show plays: each a type without impossible values.
 //!
 //! Called by the show; the wire numbers the values of each type in their order, from 0. The constants in `msgs/msg`
 //! and in the Python layouts are generated from here, doc comments included: see `wire::layouts`.
@@ -17,7 +16,7 @@ pub enum FrameState {
     Contact,
     /// A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
     Stall,
-    /// A link is in a singular configuration: the motion cannot go on.
+    /// A link is in a singular configuration: the motion cannot continue.
     Lock,
     /// The head has reached the end of the path.
     PathEnd,
@@ -93,7 +92,7 @@ impl Level {
     /// Every level, in the order of their numbers on the wire.
     pub const ALL: [Self; 5] = [Self::Clear, Self::Approaching, Self::Contact, Self::Stall, Self::Lock];
 
-    /// The level that an event raises; `None` for the end of the path, which alerts nobody.
+    /// The level that an event raises; `None` for the end of the path, which raises none.
     pub fn of(kind: EventKind) -> Option<Self> {
         match kind {
             EventKind::Contact => Some(Self::Contact),
@@ -117,10 +116,10 @@ impl Level {
     }
 }
 
-/// Whether simulated time goes on.
+/// Whether simulated time advances.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum PlaybackState {
-    /// Simulated time goes on.
+    /// Simulated time advances.
     Playing,
     /// Simulated time stands still until it is resumed.
     Paused,
