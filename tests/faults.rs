@@ -320,11 +320,11 @@ fn without_ros2_there_is_no_network_socket() {
     let publisher = Process::start(place.program().args(["run", "--json"]));
     let steady = observer(&place);
     steady.1.until("\"status\":{", 20);
-    let network: BTreeSet<String> = ["tcp", "tcp6", "udp", "udp6", "raw", "raw6", "udplite", "udplite6", "packet"]
-        .iter()
-        .filter_map(|protocol| std::fs::read_to_string(format!("/proc/net/{protocol}")).ok())
-        .flat_map(|table| table.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
-        .collect();
+    let protocols = ["tcp", "tcp6", "udp", "udp6", "raw", "raw6", "udplite", "udplite6", "packet"];
+    let tables = protocols.iter().filter_map(|protocol| std::fs::read_to_string(format!("/proc/net/{protocol}")).ok());
+    let tables: Vec<String> = tables.collect();
+    assert!(tables.len() >= 4, "the tables of network sockets cannot be read");
+    let network: BTreeSet<&str> = tables.iter().flat_map(|table| table.split_whitespace()).collect();
     let mut sockets = 0;
     for process in [&publisher, &steady.0] {
         for descriptor in std::fs::read_dir(format!("/proc/{}/fd", process.id())).unwrap().flatten() {

@@ -6,7 +6,8 @@ mod processes;
 use std::process::{Command, Output};
 
 use processes::{
-    Process, can_run, json_lines, not_run, program, python, python_modules, scene_file, summary, text, unique, wait,
+    Process, can_run, json_lines, long, not_run, program, python, python_modules, scene_file, summary, text, unique,
+    wait,
 };
 use serde_json::Value;
 
@@ -43,7 +44,7 @@ fn both_kinds_of_subscriber_get_the_frames_of_the_shared_memory() {
     if !can_run(python_modules(&["cyclonedds", "iceoryx2", "numpy"])) {
         return;
     }
-    let seconds = if std::env::var_os("BENCH_DRAGON_LONG").is_some() { 60 } else { 10 };
+    let seconds = if long() { 60 } else { 10 };
     let run = (seconds + 4).to_string();
     let publisher =
         Process::start(program("content").args(["run", "--ros2", "--json", "--start", "300", "--duration", &run]));

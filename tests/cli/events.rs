@@ -91,7 +91,9 @@ fn events_of_scenes_with_the_same_last_turns_differ_by_the_way_there() {
     };
     for (name, turn) in [("school", 6.0), ("long", 60.0)] {
         let further = length(turn) - length(16.0);
-        for (event, paper) in scene(name).json(&["events"]).iter().zip(scene("paper").json(&["events"])) {
+        let (events, of_paper) = (scene(name).json(&["events"]), scene("paper").json(&["events"]));
+        assert_eq!(events.len(), of_paper.len(), "{name}");
+        for (event, paper) in events.iter().zip(of_paper) {
             let (time, expected) = (event["time"].as_f64().unwrap(), paper["time"].as_f64().unwrap() + further);
             assert!((time - expected).abs() < 1e-9, "{name}: {event}, expected {expected}");
             assert_eq!((&event["bench_a"], &event["bench_b"]), (&paper["bench_a"], &paper["bench_b"]));
