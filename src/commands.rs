@@ -1,5 +1,14 @@
 //! The subcommands, one file each: what a person types becomes calls of the library. Called by `main` only.
 
+/// In place of the standard library's, which panics where nobody reads standard error any more: a closed pipe ends
+/// quietly.
+macro_rules! eprintln {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), $($text)*);
+    }};
+}
+
 pub mod check;
 pub mod draw;
 pub mod events;

@@ -1,5 +1,6 @@
 //! The command line: reads arguments, sets up logging, runs one subcommand, turns its error into an exit code.
 
+#[macro_use]
 mod commands;
 
 use std::process::ExitCode;

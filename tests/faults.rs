@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::Signal::{SIGBUS, SIGCONT, SIGINT, SIGKILL, SIGSTOP, SIGTERM};
 use serde_json::Value;
 
-use processes::{Lines, Place, Process, json_lines, long, scene_file, summary, text, wait};
+use processes::{Lines, Place, Process, can_run, is_root, json_lines, long, root, scene_file, summary, text, wait};
 
 /// A subscriber that checks every frame: its process, and an observation a second.
 fn observer(place: &Place) -> (Process, Lines) {
@@ -243,19 +243,34 @@ fn one_subscriber_too_many_is_told_the_limit_and_the_setting() {
     }
 }
 
-/// A shell in which /dev/shm is a small memory of its own, with `$PROGRAM` for the program.
+/// A shell in which /dev/shm is a small memory of its own.
+fn in_small_shared_memory(size: &str, script: &str) -> Command {
+    let mut command = Command::new("unshare");
+    command.args(if is_root() { vec!["--mount"] } else { vec!["--mount", "--map-root-user"] });
+    command.args(["sh", "-c", &format!("mount -t tmpfs -o size={size} tmpfs /dev/shm && {script}")]);
+    command
+}
+
+/// Requires the right to mount a /dev/shm of one's own.
+fn mounts() -> Result<(), String> {
+    let output = in_small_shared_memory("1m", "true").output().map_err(|error| format!("no unshare ({error})"))?;
+    let refused = || format!("no mount of one's own may be made here: {}", text(&output.stderr).trim());
+    if output.status.success() { Ok(()) } else { Err(refused()) }
+}
+
+/// A script run to its end in such a shell, with `$PROGRAM` for the program.
 fn with_shared_memory(size: &str, script: &str) -> Output {
     let place = Place::new("small");
-    let root = std::fs::metadata("/proc/self").unwrap().uid() == 0;
-    let mut command = Command::new("unshare");
-    command.args(if root { vec!["--mount"] } else { vec!["--mount", "--map-root-user"] });
-    command.args(["sh", "-c", &format!("mount -t tmpfs -o size={size} tmpfs /dev/shm && {script}")]);
+    let mut command = in_small_shared_memory(size, script);
     command.current_dir(place.folder()).env("PROGRAM", env!("CARGO_BIN_EXE_bench-dragon"));
     Process::start(&mut command).output_within(60)
 }
 
 #[test]
 fn too_little_shared_memory_is_refused_with_figures() {
+    if !can_run(mounts()) {
+        return;
+    }
     for size in ["100k", "1m", "6m"] {
         let said = refusal(&with_shared_memory(size, "exec \"$PROGRAM\" run --json --duration 1"));
         for part in ["/dev/shm", "6817792 bytes", "publish.queue", "publish.subscribers"] {
@@ -269,6 +284,9 @@ fn too_little_shared_memory_is_refused_with_figures() {
 
 #[test]
 fn shared_memory_that_others_fill_does_not_stop_a_publisher() {
+    if !can_run(mounts()) {
+        return;
+    }
     // The slow one keeps taking frames out of the pool, so that every page of it is written.
     let output = with_shared_memory(
         "7m",
@@ -302,11 +320,11 @@ fn without_ros2_there_is_no_network_socket() {
     let publisher = Process::start(place.program().args(["run", "--json"]));
     let steady = observer(&place);
     steady.1.until("\"status\":{", 20);
-    let network: BTreeSet<String> = ["tcp", "tcp6", "udp", "udp6", "raw", "raw6", "udplite", "udplite6", "packet"]
-        .iter()
-        .filter_map(|protocol| std::fs::read_to_string(format!("/proc/net/{protocol}")).ok())
-        .flat_map(|table| table.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
-        .collect();
+    let protocols = ["tcp", "tcp6", "udp", "udp6", "raw", "raw6", "udplite", "udplite6", "packet"];
+    let tables = protocols.iter().filter_map(|protocol| std::fs::read_to_string(format!("/proc/net/{protocol}")).ok());
+    let tables: Vec<String> = tables.collect();
+    assert!(tables.len() >= 4, "the tables of network sockets cannot be read");
+    let network: BTreeSet<&str> = tables.iter().flat_map(|table| table.split_whitespace()).collect();
     let mut sockets = 0;
     for process in [&publisher, &steady.0] {
         for descriptor in std::fs::read_dir(format!("/proc/{}/fd", process.id())).unwrap().flatten() {
@@ -341,8 +359,7 @@ fn as_nobody(place: &Place, arguments: &[&str]) -> Output {
 /// Another user reads nothing, unless the program was built to let everybody in.
 #[test]
 fn another_user_is_kept_out_or_let_in_as_the_build_says() {
-    if std::fs::metadata("/proc/self").unwrap().uid() != 0 {
-        println!("not tried: only root can become another user");
+    if !can_run(root("become another user")) {
         return;
     }
     let place = Place::new("users");

@@ -221,8 +221,17 @@ fn a_lock_has_a_place_and_a_time_that_can_be_asked_for() {
     let timeline = timeline(&scene);
     let place = timeline.find(Lock).expect("a lock").event.place.expect("a place");
     assert!(place.x.is_finite() && place.y.is_finite());
-    let (code, _, said) = answer(&["solve", "--at", "lock"]);
-    assert_eq!(code, 0, "{said}");
+    let on_scene = |arguments: &[&str]| {
+        let (code, stdout, said) = answer(&[&["--scene", "tests/scenes/x2.toml"], arguments].concat());
+        assert_eq!(code, 0, "{arguments:?}: {said}");
+        stdout
+    };
+    let events = on_scene(&["--json", "events"]);
+    let (_, time) = events.lines().last().and_then(|line| line.split_once("\"time\":")).unwrap();
+    let time = time.split(',').next().unwrap();
+    for time in ["lock", time] {
+        assert!(on_scene(&["solve", "--at", time]).lines().count() > 1, "{time}");
+    }
 }
 
 /// A show that ends approaching and begins approaching counts down in every round.

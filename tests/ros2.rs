@@ -5,7 +5,10 @@ mod processes;
 
 use std::process::{Command, Output};
 
-use processes::{Process, json_lines, program, python, scene_file, summary, text, unique, wait};
+use processes::{
+    Process, can_run, json_lines, long, not_run, program, python, python_modules, scene_file, summary, text, unique,
+    wait,
+};
 use serde_json::Value;
 
 /// A Cyclone DDS process that prints what it gets of these topics.
@@ -38,7 +41,10 @@ fn end(output: &Output) -> Value {
 
 #[test]
 fn both_kinds_of_subscriber_get_the_frames_of_the_shared_memory() {
-    let seconds = if std::env::var_os("BENCH_DRAGON_LONG").is_some() { 60 } else { 10 };
+    if !can_run(python_modules(&["cyclonedds", "iceoryx2", "numpy"])) {
+        return;
+    }
+    let seconds = if long() { 60 } else { 10 };
     let run = (seconds + 4).to_string();
     let publisher =
         Process::start(program("content").args(["run", "--ros2", "--json", "--start", "300", "--duration", &run]));
@@ -62,6 +68,9 @@ fn both_kinds_of_subscriber_get_the_frames_of_the_shared_memory() {
 
 #[test]
 fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_what_msgs_says() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
     let scene = scene_file("all_topics", &[]);
     let all = "[publish.ros2]\nrate = 30.0\n\
                topics = [\"handles\", \"poses\", \"alerts\", \"stage\", \"diagnostics\", \"markers\", \"status\"]\n";
@@ -156,6 +165,9 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_what_msgs_sa
 
 #[test]
 fn a_clean_end_leaves_the_graph_at_once() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
     let publisher = Process::start(program("gone").args(["run", "--ros2", "--json", "--duration", "3"]));
     let watcher = Process::start(&mut peer("gone", "6", &["poses"]));
     summary(&publisher.output_within(30));
@@ -166,6 +178,9 @@ fn a_clean_end_leaves_the_graph_at_once() {
 
 #[test]
 fn the_domain_is_the_environments() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
     let mut run = program("domain");
     let publisher = Process::start(run.env("ROS_DOMAIN_ID", "7").args(["run", "--ros2", "--json", "--duration", "6"]));
     let same = Process::start(peer("domain", "4", &["poses"]).args(["--domain", "7"]));
@@ -202,6 +217,9 @@ fn what_ros_2_cannot_do_is_refused_in_a_sentence() {
 
 #[test]
 fn a_reliable_subscriber_that_stops_reading_holds_nobody_up() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
     // 5,000 benches fill the memory that a topic may take within six seconds.
     let scene = scene_file(
         "stopped",
@@ -269,7 +287,13 @@ const STATIC_PEER: &str = "<CycloneDDS><Domain><Discovery><ParticipantIndex>auto
 
 #[test]
 fn two_hosts_find_each_other_by_multicast_or_where_the_subscriber_names_the_publishers_host() {
-    let Some(hosts) = Hosts::new() else { return };
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let hosts = match Hosts::new() {
+        Ok(hosts) => hosts,
+        Err(why) => return not_run(&format!("two hosts need network namespaces (root and iproute2): {}", why.trim())),
+    };
     let on = |host: &str, command: &Command| {
         let mut inside = Command::new("ip");
         inside.args(["netns", "exec", &unique(host)]).arg(command.get_program()).args(command.get_args());
@@ -312,30 +336,23 @@ impl Hosts {
         }
     }
 
-    /// `None`, with the reason printed, where this process may not make namespaces.
-    fn new() -> Option<Self> {
+    /// # Errors
+    /// The reason why this process may not make namespaces.
+    fn new() -> Result<Self, String> {
         let ends = ["l", "r"].map(|side| format!("bd{side}{}", std::process::id()));
         let hosts = Self { ends };
         let ends = &hosts.ends;
         let [left, right] = ["left", "right"].map(unique);
-        let made = ip(&format!("netns add {left}")).and_then(|()| {
-            ip(&format!("netns add {right}"))?;
-            ip(&format!("link add {} netns {left} type veth peer name {} netns {right}", ends[0], ends[1]))?;
-            for (host, end, address) in [(&left, &ends[0], "10.77.0.1/24"), (&right, &ends[1], "10.77.0.2/24")] {
-                ip(&format!("-n {host} address add {address} dev {end}"))?;
-                ip(&format!("-n {host} link set lo up"))?;
-                ip(&format!("-n {host} link set {end} up multicast on"))?;
-                ip(&format!("-n {host} route add default dev {end}"))?;
-            }
-            Ok(())
-        });
-        match made {
-            Ok(()) => Some(hosts),
-            Err(reason) => {
-                println!("skipped: two hosts need network namespaces (root and iproute2): {}", reason.trim());
-                None
-            }
+        ip(&format!("netns add {left}"))?;
+        ip(&format!("netns add {right}"))?;
+        ip(&format!("link add {} netns {left} type veth peer name {} netns {right}", ends[0], ends[1]))?;
+        for (host, end, address) in [(&left, &ends[0], "10.77.0.1/24"), (&right, &ends[1], "10.77.0.2/24")] {
+            ip(&format!("-n {host} address add {address} dev {end}"))?;
+            ip(&format!("-n {host} link set lo up"))?;
+            ip(&format!("-n {host} link set {end} up multicast on"))?;
+            ip(&format!("-n {host} route add default dev {end}"))?;
         }
+        Ok(hosts)
     }
 }
 
@@ -355,6 +372,9 @@ impl Drop for Hosts {
 
 #[test]
 fn the_example_that_needs_no_ros_prints_the_frames() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
     let publisher = Process::start(program("example").args(["run", "--ros2", "--json", "--duration", "7"]));
     let mut example = python();
     example.args(["examples/python/cyclone_listener.py", "--name", &unique("example"), "--seconds", "4.5"]);

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use bench_dragon::live::clock::monotonic_ns;
 use nix::sys::signal::Signal;
-use processes::{Process, program, python, text, unique, wait};
+use processes::{Process, can_run, chromium, program, python, python_modules, text, unique, wait};
 use serde_json::Value;
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{ClientRequestBuilder, Message, WebSocket};
@@ -120,6 +120,9 @@ fn a_program_reads_the_documented_layout() {
 
 #[test]
 fn the_python_example_reads_the_socket() {
+    if !can_run(python_modules(&["websockets"])) {
+        return;
+    }
     let (_server, address) = server("example");
     let _publisher = publisher("example", &["--start", "300", "--time-scale", "1e-6"]);
     let url = format!("ws://{address}/frames");
@@ -227,6 +230,9 @@ fn an_address_that_cannot_be_used_is_one_sentence() {
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 fn in_a_browser(scenario: &str) {
+    if !can_run(chromium().and_then(|()| python_modules(&["playwright", "numpy"]))) {
+        return;
+    }
     let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let arguments =
         ["tests/python/stage_picture.py", scenario, env!("CARGO_BIN_EXE_bench-dragon"), &unique(&scenario[..6])];

@@ -2,7 +2,8 @@
 
 #![allow(dead_code, reason = "not every test file uses all of it")]
 
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::mpsc::{Receiver, channel};
@@ -31,6 +32,16 @@ impl Process {
 
     pub fn signal(&self, signal: nix::sys::signal::Signal) {
         nix::sys::signal::kill(nix::unistd::Pid::from_raw(self.0.id() as i32), signal).unwrap();
+    }
+
+    /// Closes the reading end of standard output, as `| head` does once it has enough.
+    pub fn close_stdout(&mut self) {
+        drop(self.0.stdout.take());
+    }
+
+    /// Closes the reading end of standard error.
+    pub fn close_stderr(&mut self) {
+        drop(self.0.stderr.take());
     }
 
     /// Lines of standard output as they come; `output_within` is then not to be called.
@@ -211,9 +222,61 @@ pub fn summary(output: &Output) -> Value {
     json_lines(output).pop().unwrap()
 }
 
+fn is_set(variable: &str) -> bool {
+    std::env::var_os(variable).is_some_and(|value| value == "1")
+}
+
 /// Whether tests that take minutes are asked for.
 pub fn long() -> bool {
-    std::env::var_os("BENCH_DRAGON_LONG").is_some_and(|value| value == "1")
+    is_set("BENCH_DRAGON_LONG")
+}
+
+/// Prints a line that is seen even where the test passes: libtest captures `println!` and `eprintln!` only.
+pub fn aloud(line: &str) {
+    let _ = std::io::stderr().write_all(format!("{line}\n").as_bytes());
+}
+
+/// Reports that the test at hand, or a part of it, does not run. Where every test has to run
+/// (`BENCH_DRAGON_REQUIRE_ALL=1`, which `tests/run` sets), that is a failure.
+pub fn not_run(why: &str) {
+    let thread = std::thread::current();
+    let test = thread.name().unwrap_or("a test");
+    aloud(&format!("NOT RUN: {test}: {why}"));
+    assert!(!is_set("BENCH_DRAGON_REQUIRE_ALL"), "{test} did not run: {why}");
+}
+
+/// Whether a test's requirement is met; reports where it is not.
+#[must_use]
+pub fn can_run(requirement: Result<(), String>) -> bool {
+    requirement.inspect_err(|why| not_run(why)).is_ok()
+}
+
+/// Requires modules of the tests' Python (`BENCH_DRAGON_PYTHON`, or `python3`).
+pub fn python_modules(modules: &[&str]) -> Result<(), String> {
+    let code = "import importlib.util, sys; print(*[m for m in sys.argv[1:] if not importlib.util.find_spec(m)])";
+    let found = python().args(["-c", code]).args(modules).output();
+    let output = found.map_err(|error| format!("no Python ({error})"))?;
+    let missing = text(&output.stdout);
+    if output.status.success() && missing.trim().is_empty() {
+        Ok(())
+    } else {
+        Err(format!("Python has no {}; tests/run installs it", missing.trim()))
+    }
+}
+
+/// Requires the browser that `tests/python/stage_picture.py` starts.
+pub fn chromium() -> Result<(), String> {
+    let program = Path::new("/usr/bin/chromium");
+    if program.exists() { Ok(()) } else { Err(format!("no {}; tests/run installs it", program.display())) }
+}
+
+pub fn is_root() -> bool {
+    std::fs::metadata("/proc/self").unwrap().uid() == 0
+}
+
+/// Requires the rights of root.
+pub fn root(what_for: &str) -> Result<(), String> {
+    if is_root() { Ok(()) } else { Err(format!("only root can {what_for}")) }
 }
 
 pub fn wait(seconds: f64) {

@@ -1,0 +1,232 @@
+//! `plan`, `draw` and `trade`: their keys and figures, and pictures that another program can read.
+
+use std::path::Path;
+
+use bench_dragon::motion::event::EventKind;
+use bench_dragon::plan::{greatest_speed, least_pitch};
+use serde_json::Value;
+
+use crate::events::time_of;
+use crate::processes::{Process, aloud, can_run, long, python, python_modules, text};
+use crate::scenes::{DEADLINE, SceneFile, assert_keys, numbers, same_bits, scene, scenes};
+
+const REACH: f64 = 4.5;
+const LIMIT: f64 = 2.0;
+const PLAN_PITCH: [&str; 4] = ["plan", "pitch", "--reach-radius", "4.5"];
+const PLAN_SPEED: [&str; 4] = ["plan", "speed", "--max-handle-speed", "2"];
+
+/// The scenes without those that have the same tables as one before them.
+fn different(tables: &[&str]) -> Vec<SceneFile> {
+    let mut seen = Vec::new();
+    let is_new = |scene: &SceneFile| {
+        let content: Vec<_> = tables.iter().map(|table| scene.content[*table].clone()).collect();
+        let new = !seen.contains(&content);
+        seen.push(content);
+        new
+    };
+    scenes().into_iter().filter(is_new).collect()
+}
+
+/// The answer depends on the team alone.
+#[test]
+fn plan_pitch_has_its_keys_for_every_team_and_the_bits_of_the_library() {
+    let teams = different(&["team"]);
+    assert!(teams.len() >= 4, "only {} teams", teams.len());
+    for scene in teams {
+        let line = scene.answer(&[&["--json"], &PLAN_PITCH[..]].concat());
+        let plan: Value = serde_json::from_str(&line).unwrap();
+        assert_keys(&plan, &["plan", "value", "bench_a", "bench_b", "head_radius"]);
+        assert_eq!(plan["plan"], "pitch");
+        let [a, b] = ["bench_a", "bench_b"].map(|key| plan[key].as_u64().unwrap() as usize);
+        assert!(a + 1 < b && b < scene.benches(), "{}: {plan}", scene.name);
+        assert!(plan["head_radius"].as_f64().unwrap() >= REACH, "{}: {plan}", scene.name);
+        if scene.name == "school" {
+            let known = least_pitch(scene.load().team(), REACH, &mut |_| ()).unwrap();
+            let [value, .., radius] = numbers(&line)[..] else { panic!("{line}") };
+            assert!(same_bits(value, known.value) && same_bits(radius, known.head_radius), "{line} {known:?}");
+            let said = scene.answer(&PLAN_PITCH);
+            assert!(said.contains("4.5 m") && said.contains(&format!("{value:.10} m per turn")), "{said}");
+            assert!(said.contains(&format!("bench {}", b + 1)) && said.contains("counting from 1"), "{said}");
+        }
+    }
+}
+
+#[test]
+fn plan_speed_has_its_keys_or_names_what_forbids_it() {
+    let mut planned = 0;
+    for scene in different(&["team", "path", "motion"]) {
+        if scene.benches() > 1000 && !long() {
+            aloud(&format!("plan speed: not on {} without BENCH_DRAGON_LONG=1", scene.name));
+            continue;
+        }
+        let output = scene.run(&[&["--json"], &PLAN_SPEED[..]].concat());
+        let said = text(&output.stderr);
+        if output.status.code() == Some(2) {
+            // Near a lock a handle is faster than any limit.
+            assert!(output.stdout.is_empty() && said.lines().count() == 1, "{}: {said}", scene.name);
+            let lock = time_of(&scene, EventKind::Lock).unwrap();
+            let runs_into_it = said.contains("lock") && said.contains(&lock.to_string());
+            assert!(runs_into_it || said.contains("too long to be searched"), "{}: {said}", scene.name);
+            continue;
+        }
+        assert_eq!((output.status.code(), said.as_str()), (Some(0), ""), "{}", scene.name);
+        let line = text(&output.stdout);
+        let plan: Value = serde_json::from_str(&line).unwrap();
+        assert_keys(&plan, &["plan", "value", "time", "handle", "ratio"]);
+        assert_eq!(plan["plan"], "speed");
+        let [value, time, handle, ratio] = numbers(&line)[..] else { panic!("{line}") };
+        assert!((value * ratio - LIMIT).abs() < 1e-12 && ratio >= 1.0, "{}: {plan}", scene.name);
+        assert!((handle as usize) < scene.handles() && time >= 0.0, "{}: {plan}", scene.name);
+        planned += 1;
+        if scene.benches() <= 60 {
+            let loaded = scene.load();
+            let timeline = loaded.motion.timeline(&mut |_| ());
+            let known = greatest_speed(&loaded, &timeline, LIMIT, &mut |_| ()).unwrap();
+            for (printed, known) in [(value, known.value), (time, known.time), (ratio, known.ratio)] {
+                assert!(same_bits(printed, known), "{}: {plan}", scene.name);
+            }
+            let said = scene.answer(&PLAN_SPEED);
+            assert!(said.contains(&format!("{value:.10} m/s")), "{said}");
+            assert!(said.contains(&format!("handle {} (counting from 1)", handle + 1.0)), "{said}");
+        }
+    }
+    assert!(planned >= 4, "only {planned} scenes have a greatest speed");
+}
+
+/// What another program finds in SVG files: for each, the number of elements of each name, and all its texts.
+fn read_svg(files: &[&Path]) -> Vec<Value> {
+    let code = "import collections, json, sys, xml.etree.ElementTree as tree\n\
+                svg = '{http://www.w3.org/2000/svg}'\n\
+                for file in sys.argv[1:]:\n\
+                \x20   root = tree.parse(file).getroot()\n\
+                \x20   assert root.tag == svg + 'svg', root.tag\n\
+                \x20   names = collections.Counter(element.tag.removeprefix(svg) for element in root.iter())\n\
+                \x20   texts = [''.join(element.itertext()).strip() for element in root.iter(svg + 'text')]\n\
+                \x20   print(json.dumps({'names': names, 'texts': texts}))\n";
+    let output = Process::start(python().args(["-c", code]).args(files)).output_within(DEADLINE);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    text(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+/// Benches whose boards lie within a square about the centre, by the handles that `solve` prints.
+fn boards_within(scene: &SceneFile, time: &str, radius: f64) -> usize {
+    let csv = scene.answer(&["solve", "--at", time]);
+    let rows = csv.lines().skip(1).map(|line| line.split(',').map(|field| field.parse().unwrap()).collect());
+    let rows: Vec<Vec<f64>> = rows.collect();
+    let [half, inset] = [0.5 * scene.number("team", "width"), scene.number("team", "hole_inset")];
+    let inside = |bench: &usize| {
+        let (front, rear) = (&rows[*bench], &rows[bench + 1]);
+        let link = (front[2] - rear[2]).hypot(front[3] - rear[3]);
+        let along = [(front[2] - rear[2]) / link, (front[3] - rear[3]) / link];
+        [(front, inset, half), (front, inset, -half), (rear, -inset, half), (rear, -inset, -half)].iter().all(
+            |(handle, ahead, left)| {
+                let x = handle[2] + ahead * along[0] - left * along[1];
+                let y = handle[3] + ahead * along[1] + left * along[0];
+                x.abs() <= radius && y.abs() <= radius
+            },
+        )
+    };
+    (0..scene.benches()).filter(inside).count()
+}
+
+#[test]
+fn draw_makes_an_svg_with_every_bench_in_it() {
+    if !can_run(python_modules(&["xml.etree"])) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let (mut files, mut expected) = (Vec::new(), Vec::new());
+    for scene in scenes() {
+        let file = |kind: &str| folder.path().join(format!("{}-{kind}.svg", scene.name));
+        let [all, near] = ["all", "near"].map(file);
+        assert_eq!(scene.answer(&["draw", "--at", "1", "-o", all.to_str().unwrap()]), "", "{}", scene.name);
+        let end = scene.json(&["events"]).pop().unwrap()["event"].as_str().unwrap().to_owned();
+        // To standard output, at the end of the motion, with what is near the centre only.
+        std::fs::write(&near, scene.answer(&["draw", "--at", &end, "--radius", "12.5"])).unwrap();
+        let title = |time: f64| format!("{} at {time} s", scene.name);
+        expected.push((all, scene.benches(), title(1.0)));
+        let time = scene.json(&["events"]).pop().unwrap()["time"].as_f64().unwrap();
+        expected.push((near, boards_within(&scene, &end, 12.5), title(time)));
+    }
+    // What XML would take for markup.
+    let odd = scene("school").with(&folder, "", "name", "a < b & \"c\" > 'd'");
+    let file = folder.path().join("odd.svg");
+    std::fs::write(&file, odd.answer(&["draw"])).unwrap();
+    expected.push((file, 20, "a < b & \"c\" > 'd' at 0 s".to_owned()));
+    files.extend(expected.iter().map(|(file, ..)| file.as_path()));
+    let found = read_svg(&files);
+    assert_eq!(found.len(), expected.len());
+    for (svg, (file, benches, title)) in found.iter().zip(&expected) {
+        assert_eq!(svg["names"]["polygon"].as_u64().unwrap_or(0), *benches as u64, "{}", file.display());
+        assert!(svg["names"]["polyline"].as_u64().unwrap() > 0, "{} has no path", file.display());
+        let texts: Vec<&str> = svg["texts"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+        assert!(texts.contains(&title.as_str()), "{}: no {title} in {texts:?}", file.display());
+    }
+}
+
+const MEASUREMENT: [&str; 10] = [
+    "solver",
+    "frame_ns",
+    "frame_ns_p99",
+    "frames_timed",
+    "max_position_error",
+    "max_speed_error",
+    "contact_time_error",
+    "max_link_error",
+    "memory_bytes",
+    "on_front",
+];
+
+/// `trade` measures for seconds, and for minutes on long teams. Its figures are of this machine: nothing here compares
+/// them with another's.
+#[test]
+fn trade_has_its_keys_for_every_solver() {
+    let folder = tempfile::tempdir().unwrap();
+    let plot = folder.path().join("plot.svg");
+    let mut measured = 0;
+    for scene in scenes() {
+        if scene.benches() > 60 && !long() {
+            aloud(&format!("trade: not on {} without BENCH_DRAGON_LONG=1", scene.name));
+            continue;
+        }
+        measured += 1;
+        let arguments = ["--json", "trade", "--plot", plot.to_str().unwrap()];
+        let output = Process::start(&mut scene.command(&arguments)).output_within(10 * DEADLINE);
+        assert_eq!((output.status.code(), text(&output.stderr).as_str()), (Some(0), ""), "{}", scene.name);
+        let lines: Vec<Value> = text(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        let has_contact = time_of(&scene, EventKind::Contact).is_some();
+        for (index, line) in lines.iter().enumerate() {
+            let collision = (index == 0).then_some("collision");
+            assert_keys(line, &MEASUREMENT.into_iter().chain(collision).collect::<Vec<_>>());
+            assert_eq!(line["contact_time_error"].is_number(), has_contact, "{line}");
+            assert!(line["frame_ns"].as_f64().unwrap() > 0.0, "{line}");
+            assert!(line["frame_ns_p99"].as_f64() >= line["frame_ns"].as_f64(), "{line}");
+            assert!(line["frames_timed"].as_u64().unwrap() > 0, "{line}");
+            let error = |key: &str| line[key].as_f64().unwrap();
+            if line["solver"].as_str().unwrap().starts_with("paper") {
+                assert!(error("max_position_error") > 1e-3, "the paper's head is too fast: {line}");
+            } else {
+                assert!(error("max_position_error") < 1e-9 && error("max_link_error") < 1e-9, "{line}");
+            }
+        }
+        for way in lines[0]["collision"].as_array().unwrap() {
+            assert_keys(way, &["method", "frame_ns", "search_s", "contact_time_error"]);
+            assert!(way["frame_ns"].is_null() != way["search_s"].is_null(), "{way}");
+        }
+        // On the front is who has nobody both faster and more exact.
+        let [cost, error] = ["frame_ns", "max_position_error"]
+            .map(|key| lines.iter().map(|line| line[key].as_f64().unwrap()).collect::<Vec<_>>());
+        for (i, line) in lines.iter().enumerate() {
+            let beaten = (0..lines.len()).any(|j| cost[j] < cost[i] && error[j] < error[i]);
+            assert!(!(beaten && line["on_front"] == true), "{line} is on the front: {lines:?}");
+        }
+        assert!(lines.iter().any(|line| line["on_front"] == true), "{lines:?}");
+        assert!(lines.iter().any(|line| line["solver"] == "newton"), "{lines:?}");
+        if can_run(python_modules(&["xml.etree"])) {
+            let svg = &read_svg(&[&plot])[0];
+            let texts = svg["texts"].as_array().unwrap();
+            assert!(lines.iter().all(|line| texts.contains(&line["solver"])), "{svg}");
+        }
+    }
+    assert!(measured >= 2, "only {measured} scenes are small");
+}
