@@ -10,7 +10,7 @@ use std::sync::mpsc;
 
 use anstyle::Style;
 use bench_dragon::live::clock::realtime_ns;
-use bench_dragon::live::statistics::{self, Inbox, Percentiles, Run, Summary};
+use bench_dragon::live::statistics::{self, Inbox, Run, RunSummary, Summary, TransportCounts};
 use bench_dragon::live::{Counts, End, LoopOptions, Publisher, StatusPublisher, run_loop};
 use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::Timeline;
@@ -19,9 +19,8 @@ use bench_dragon::show::{Playback, Show};
 use bench_dragon::transports::iceoryx2::{self, OpenError, PublisherConfig, SharedMemoryPublisher, StatusSender};
 use bench_dragon::wire::sentence::{Figures, alert_sentence};
 use bench_dragon::wire::{CollisionAlert, Stage, convert};
-use serde::Serialize;
 
-use self::ros2::{Ros2, Ros2Summary};
+use self::ros2::Ros2;
 
 use super::events::sentence;
 use super::realtime_scheduling::RealtimeScheduling;
@@ -61,19 +60,6 @@ pub struct RunArguments {
     /// End when the process that started this one ends
     #[arg(long, hide = true)]
     end_with_parent: bool,
-}
-
-/// The line of `run --json`.
-#[derive(Serialize)]
-struct SummaryLine {
-    frames: u64,
-    overruns: u64,
-    skipped: u64,
-    wakeup_ns: Percentiles,
-    step_ns: Percentiles,
-    end: End,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    ros2: Option<Ros2Summary>,
 }
 
 /// Publishes the scene until its duration is over or a signal comes.
@@ -271,7 +257,12 @@ impl RunSession<'_> {
         eprintln!("{:>10.3} s  {style}{:<11}{style:#} {said}", alert.sim_time, level.name());
     }
 
-    fn print_summary(&self, counts: &Counts, summary: &Summary, ros2: Option<Ros2Summary>) -> Result<(), CommandError> {
+    fn print_summary(
+        &self,
+        counts: &Counts,
+        summary: &Summary,
+        ros2: Option<TransportCounts>,
+    ) -> Result<(), CommandError> {
         let Counts { frames, overruns, skipped, end } = *counts;
         let Summary { wakeup_ns, step_ns, lost_samples } = *summary;
         let mut output = Output::standard();
@@ -279,7 +270,7 @@ impl RunSession<'_> {
             log::warn!("{lost_samples} frames are missing from the percentiles: the machine left them no time");
         }
         if self.common.json {
-            output.json(&SummaryLine { frames, overruns, skipped, wakeup_ns, step_ns, end, ros2 })?;
+            output.json(&RunSummary { frames, overruns, skipped, wakeup_ns, step_ns, end, ros2 })?;
         } else {
             output.line(&format!(
                 "{frames} frames published, {overruns} overruns, {skipped} periods skipped (ended by {}).",
@@ -299,7 +290,7 @@ impl RunSession<'_> {
                     us(of.max)
                 ))?;
             }
-            if let Some(Ros2Summary { frames, skipped, discarded }) = ros2 {
+            if let Some(TransportCounts { frames, skipped, discarded }) = ros2 {
                 output.line(&format!(
                     "  ROS 2: {frames} frames published, {skipped} skipped, {discarded} messages discarded."
                 ))?;

@@ -10,7 +10,7 @@ use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
 
 use super::clock::realtime_ns;
-use super::{Counts, StatusPublisher};
+use super::{Counts, End, StatusPublisher};
 use crate::wire::{CollisionAlert, LoopStatus, SceneName};
 
 /// Samples that their queue holds: three seconds of the highest rate.
@@ -87,6 +87,37 @@ pub struct Summary {
     pub step_ns: Percentiles,
     /// Samples that the queue could not hold, which the percentiles do not know of.
     pub lost_samples: u64,
+}
+
+/// The summary of a run: what `run --json` prints at its end, and a soak test reads.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RunSummary {
+    /// Frames published.
+    pub frames: u64,
+    /// Incidents in which at least one period was skipped.
+    pub overruns: u64,
+    /// Periods skipped.
+    pub skipped: u64,
+    /// Wake-up lateness against the intended deadlines.
+    pub wakeup_ns: Percentiles,
+    /// Cost of a step.
+    pub step_ns: Percentiles,
+    /// Why the loop ended.
+    pub end: End,
+    /// What went out over ROS 2, where it was open.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ros2: Option<TransportCounts>,
+}
+
+/// What a transport with a queue and a thread of its own has done.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TransportCounts {
+    /// Frames published.
+    pub frames: u64,
+    /// Frames left out because the transport's thread was behind.
+    pub skipped: u64,
+    /// Messages that a full queue of the transport did not take, because a reliable subscriber was slow or dead.
+    pub discarded: u64,
 }
 
 /// The distributions of the two durations over some time.

@@ -1,6 +1,6 @@
-//! A subscriber's ends of a publisher's services, opened when they appear and kept while publishers come and go.
+//! A subscriber's ends of a publisher's services: the thin layer over iceoryx2. In: a name. Out: what is in the queues.
 //!
-//! The monitor and the stage picture read through it.
+//! It keeps no time and no counts: when to open, read and let go is up to the [`feed`](super::feed), which calls it.
 
 use std::time::Duration;
 
@@ -38,24 +38,16 @@ pub struct Subscription {
 pub enum Wake {
     /// The publisher wakes it, which costs the publisher some microseconds for every frame.
     OnFrame,
-    /// It looks by itself as often as it likes, which costs the publisher nothing.
+    /// It polls as often as it likes, which costs the publisher nothing.
     Never,
 }
 
 impl Subscription {
-    /// A subscription to the services of `name`, none of which need exist yet, that is woken by each frame.
+    /// A subscription to the services of `name`, none of which need exist yet.
     ///
     /// # Errors
-    /// [`OpenError`] for a name that iceoryx2 cannot take.
-    pub fn new(name: &str) -> Result<Self, OpenError> {
-        Self::with_wake(name, Wake::OnFrame)
-    }
-
-    /// As [`new`](Self::new), woken as `wake` says.
-    ///
-    /// # Errors
-    /// [`OpenError`] for a name that iceoryx2 cannot take.
-    pub fn with_wake(name: &str, wake: Wake) -> Result<Self, OpenError> {
+    /// [`OpenError`] for a name that iceoryx2 cannot take, or where this process may not use the shared memory.
+    pub fn new(name: &str, wake: Wake) -> Result<Self, OpenError> {
         service_name(name, "poses")?;
         check_room_to_subscribe()?;
         stale_files::spawn_reaper();
@@ -81,6 +73,10 @@ impl Subscription {
                 return Err(OpenError::Failed { service: name.to_string(), reason: format!("{error:?}") });
             }
         };
+        // Other subscribers keep a service when its publisher has gone. One more would keep it from being made anew.
+        if poses_service.dynamic_config().number_of_publishers() == 0 {
+            return Ok(None);
+        }
         check_room_to_subscribe()?;
         use iceoryx2::port::subscriber::SubscriberCreateError;
         let poses = poses_service.subscriber_builder().create().map_err(|error| match error {
@@ -108,7 +104,7 @@ impl Subscription {
     /// # Errors
     /// [`OpenError::Full`] where a service is there now and the memory for it is not, [`OpenError::Incompatible`] where
     /// its messages have another layout.
-    pub fn complete(&self, connection: &mut Connection) -> Result<(), OpenError> {
+    pub fn open_missing_services(&self, connection: &mut Connection) -> Result<(), OpenError> {
         let missing = connection.missing();
         if connection.alerts.is_none() {
             connection.alerts = self.receiver("alerts")?;

@@ -15,6 +15,7 @@ use std::thread::JoinHandle;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
+use crate::live::statistics::TransportCounts;
 use crate::live::{PublishError, Publisher, StatusPublisher};
 use crate::scene::ros2::Ros2Settings;
 use crate::show::Frame;
@@ -81,23 +82,12 @@ struct Shared {
     counts: Counters,
 }
 
-/// See [`Ros2Counts`].
+/// See [`TransportCounts`].
 #[derive(Default)]
 struct Counters {
     frames: AtomicU64,
     skipped: AtomicU64,
     discarded: AtomicU64,
-}
-
-/// What the ROS 2 thread has done.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Ros2Counts {
-    /// Frames published.
-    pub frames: u64,
-    /// Frames left out because the thread was behind.
-    pub skipped: u64,
-    /// Messages that a full queue of RustDDS did not take, because a reliable subscriber was slow or dead.
-    pub discarded: u64,
 }
 
 /// The loop's end.
@@ -222,14 +212,14 @@ impl StatusPublisher for Ros2Status {
 
 impl Ros2Thread {
     /// What it has done so far.
-    pub fn counts(&self) -> Ros2Counts {
+    pub fn counts(&self) -> TransportCounts {
         let Counters { frames, skipped, discarded } = &self.shared.counts;
         let [frames, skipped, discarded] = [frames, skipped, discarded].map(|count| count.load(Ordering::Relaxed));
-        Ros2Counts { frames, skipped: skipped + self.shared.rejected.load(Ordering::Relaxed), discarded }
+        TransportCounts { frames, skipped: skipped + self.shared.rejected.load(Ordering::Relaxed), discarded }
     }
 
     /// Ends the thread once it has published what is queued; the node has then left the graph.
-    pub fn end(mut self) -> Ros2Counts {
+    pub fn end(mut self) -> TransportCounts {
         self.join();
         self.counts()
     }

@@ -1,22 +1,11 @@
 //! What `run` does about ROS 2: opens its topics where they are asked for, or says why this build has none.
 
+use bench_dragon::live::statistics::TransportCounts;
 use bench_dragon::live::{Publisher, StatusPublisher};
 use bench_dragon::scene::Scene;
 use bench_dragon::wire::Stage;
-use serde::Serialize;
 
 use crate::commands::CommandError;
-
-/// What the ROS 2 side has done, for the summary.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub struct Ros2Summary {
-    /// Frames published.
-    pub frames: u64,
-    /// Frames left out because the ROS 2 thread was behind.
-    pub skipped: u64,
-    /// Messages that a full queue did not take.
-    pub discarded: u64,
-}
 
 /// The ends of an open ROS 2 transport.
 pub struct Ros2 {
@@ -25,7 +14,7 @@ pub struct Ros2 {
     /// For the statistics.
     pub status: Box<dyn StatusPublisher + Send>,
     /// Leaves the graph.
-    pub end: Box<dyn FnOnce() -> Ros2Summary>,
+    pub end: Box<dyn FnOnce() -> TransportCounts>,
     /// Topics and network in one sentence.
     pub sentence: String,
 }
@@ -63,10 +52,7 @@ pub fn open(scene: &Scene, name: &str, loop_rate: f64, stage: Stage) -> Result<R
     let handles = scene.team().handles();
     let config = Ros2Config { name: name.to_owned(), handles, loop_rate, settings, alerts, stage };
     let (publisher, status, thread) = start(config, network).map_err(refused)?;
-    let end = move || {
-        let counts = thread.end();
-        Ros2Summary { frames: counts.frames, skipped: counts.skipped, discarded: counts.discarded }
-    };
+    let end = move || thread.end();
     Ok(Ros2 { publisher: Box::new(publisher), status: Box::new(status), end: Box::new(end), sentence })
 }
 
