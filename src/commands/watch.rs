@@ -40,6 +40,9 @@ struct IntervalLine {
     latency_ns: Option<Latency>,
 }
 
+/// Where an alert's words begin on the terminal: behind its time.
+const INDENT: &str = "              ";
+
 /// How reports and events are printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Display {
@@ -65,7 +68,7 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
     let over = |at: Instant| arguments.duration.is_some_and(|seconds| (at - began).as_secs_f64() >= seconds);
     let interval = Duration::from_secs(1);
     let mut next = began + interval;
-    let mut screen = Screen { display, name: &common.name, time_scale: 1.0, benches: 0, drawn: 0 };
+    let mut screen = Screen { display, name: &common.name, time_scale: 1.0, benches: 0, drawn: Vec::new() };
     if display != Display::Json {
         eprintln!("Watching \"{}\"; Ctrl-C ends.", common.name);
     }
@@ -95,8 +98,8 @@ struct Screen<'a> {
     name: &'a str,
     time_scale: f64,
     benches: u32,
-    /// Lines on the terminal that the next report overwrites.
-    drawn: u16,
+    /// The lines of the last report that stand on the terminal, which the next one replaces.
+    drawn: Vec<String>,
 }
 
 impl Screen<'_> {
@@ -119,30 +122,28 @@ impl Screen<'_> {
             Display::Lines => writeln!(output, "{}", self.lines(report).join("; "))?,
             Display::Terminal => {
                 self.clear_previous(&mut output)?;
-                let lines = self.lines(report);
-                // A wrapped line would take two rows, and the next report would clear one too few.
-                execute!(output, terminal::DisableLineWrap)?;
-                for line in &lines {
-                    writeln!(output, "{line}")?;
-                }
-                execute!(output, terminal::EnableLineWrap)?;
-                self.drawn = lines.len() as u16;
+                self.drawn = self.lines(report);
+                self.draw(&mut output)?;
             }
         }
         Ok(output.flush()?)
     }
 
-    /// Clears the last report, so that events scroll up above the figures.
-    fn clear_previous(&mut self, output: &mut impl Write) -> std::io::Result<()> {
-        if self.drawn > 0 {
-            execute!(
-                output,
-                cursor::MoveToPreviousLine(self.drawn),
-                terminal::Clear(terminal::ClearType::FromCursorDown)
-            )?;
-            self.drawn = 0;
+    /// Draws the last report below all events.
+    fn draw(&self, output: &mut impl Write) -> std::io::Result<()> {
+        // A wrapped line would take two rows, and the next report would clear one too few.
+        execute!(output, terminal::DisableLineWrap)?;
+        self.drawn.iter().try_for_each(|line| writeln!(output, "{line}"))?;
+        execute!(output, terminal::EnableLineWrap)
+    }
+
+    /// Clears the last report from the terminal.
+    fn clear_previous(&self, output: &mut impl Write) -> std::io::Result<()> {
+        if self.drawn.is_empty() {
+            return Ok(());
         }
-        Ok(())
+        let rows = self.drawn.len() as u16;
+        execute!(output, cursor::MoveToPreviousLine(rows), terminal::Clear(terminal::ClearType::FromCursorDown))
     }
 
     /// Prints what a person wants to know at once; a machine gets the alerts.
@@ -167,8 +168,18 @@ impl Screen<'_> {
             FeedEvent::Frame { .. } | FeedEvent::Stage(_) | FeedEvent::Status(_) => return Ok(()),
         };
         let mut output = stdout().lock();
+        if self.display == Display::Lines {
+            writeln!(output, "{line}")?;
+            return Ok(output.flush()?);
+        }
         self.clear_previous(&mut output)?;
-        writeln!(output, "{line}")?;
+        if matches!(event, FeedEvent::Started { .. } | FeedEvent::Gone) {
+            // The last report is of another publisher, or of none.
+            self.drawn.clear();
+        }
+        let columns = terminal::size().map_or(80, |(columns, _)| columns.into());
+        writeln!(output, "{}", textwrap::fill(&line, textwrap::Options::new(columns).subsequent_indent(INDENT)))?;
+        self.draw(&mut output)?;
         Ok(output.flush()?)
     }
 

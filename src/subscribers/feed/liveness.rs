@@ -18,7 +18,8 @@ pub struct Liveness {
     last_test: Instant,
     /// [`SILENCE`], or longer for a publisher of a low rate.
     silence: Duration,
-    silent: bool,
+    /// Whether frames come, as far as has been reported.
+    sending: bool,
 }
 
 /// What a test of the publisher has shown.
@@ -33,13 +34,13 @@ pub enum Change {
 impl Liveness {
     /// A publisher that was alive when the connection to it was made, at `now`.
     pub fn connected_at(now: Instant) -> Self {
-        Self { last_frame: now, last_test: now, silence: SILENCE, silent: false }
+        Self { last_frame: now, last_test: now, silence: SILENCE, sending: false }
     }
 
     /// Takes in that frames came.
     pub fn frame_at(&mut self, now: Instant) {
         self.last_frame = now;
-        self.silent = false;
+        self.sending = true;
     }
 
     /// Takes in the publisher's rate, in frames per second. One that is no rate changes nothing.
@@ -49,8 +50,8 @@ impl Liveness {
         }
     }
 
-    /// Tests the publisher with `is_alive` where that is due, and returns what has changed: a silence is reported
-    /// once, until frames come again.
+    /// Tests the publisher with `is_alive` where that is due, and returns what has changed. A silence is reported once
+    /// after each time that frames came.
     pub fn test(&mut self, now: Instant, is_alive: impl FnOnce() -> bool) -> Option<Change> {
         let since = |then| now.saturating_duration_since(then);
         if since(self.last_frame) < LIVENESS_INTERVAL || since(self.last_test) < LIVENESS_INTERVAL {
@@ -60,8 +61,8 @@ impl Liveness {
         if !is_alive() {
             return Some(Change::Gone);
         }
-        let fell_silent = !self.silent && since(self.last_frame) >= self.silence;
-        self.silent |= fell_silent;
+        let fell_silent = self.sending && since(self.last_frame) >= self.silence;
+        self.sending &= !fell_silent;
         fell_silent.then_some(Change::Silent)
     }
 }
@@ -135,6 +136,12 @@ mod tests {
         let seen = changes(Some(60.0), &[0, 2000], u64::MAX, 4000);
         let [(first, Change::Silent), (second, Change::Silent)] = seen[..] else { panic!("{seen:?}") };
         assert!((500..=700).contains(&first) && (2500..=2700).contains(&second), "{seen:?}");
+    }
+
+    #[test]
+    fn a_publisher_that_has_sent_nothing_yet_has_not_stopped() {
+        assert_eq!(changes(None, &[], u64::MAX, 4000), []);
+        assert!(matches!(changes(None, &[], 1000, 4000)[..], [(1000..=1200, Change::Gone)]));
     }
 
     #[test]
