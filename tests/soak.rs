@@ -113,8 +113,8 @@ fn a_broken_limit_fails_even_when_interrupted() {
 fn children(process: &Process) -> Vec<(Pid, String)> {
     let id = process.id();
     let children = std::fs::read_to_string(format!("/proc/{id}/task/{id}/children")).unwrap();
-    let told = |child: &str| std::fs::read_to_string(format!("/proc/{child}/cmdline")).unwrap_or_default();
-    children.split_whitespace().map(|child| (Pid::from_raw(child.parse().unwrap()), told(child))).collect()
+    let command = |child: &str| std::fs::read_to_string(format!("/proc/{child}/cmdline")).unwrap_or_default();
+    children.split_whitespace().map(|child| (Pid::from_raw(child.parse().unwrap()), command(child))).collect()
 }
 
 fn exists(process: Pid) -> bool {
@@ -128,7 +128,7 @@ fn a_publisher_that_dies_fails_the_test_at_once() {
     soak.args(["soak", "--json", "--duration", "8h", "--rate", "100", "--subscribers", "2"]).args(ANY_SPEED);
     let soak = Process::start(&mut soak);
     wait(4.0);
-    let publisher = children(&soak).into_iter().find(|(_, told)| told.contains("\0run\0")).unwrap().0;
+    let publisher = children(&soak).into_iter().find(|(_, command)| command.contains("\0run\0")).unwrap().0;
     kill(publisher, SIGKILL).unwrap();
     let output = soak.output_within(60);
     assert_eq!(output.status.code(), Some(1));

@@ -253,7 +253,12 @@ pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result
 /// Has this process killed when the one that started it ends, so that nothing is left behind.
 pub fn end_with_parent() -> Result<(), CommandError> {
     let set = nix::sys::prctl::set_pdeathsig(nix::sys::signal::Signal::SIGTERM);
-    set.map_err(|error| CommandError::Failed(format!("the end of the parent cannot be watched: {error}")))
+    set.map_err(|error| CommandError::Failed(format!("the end of the parent cannot be watched: {error}")))?;
+    // A parent that ended before that sends no signal any more.
+    if nix::unistd::getppid().as_raw() == 1 {
+        return Err(CommandError::Failed("the program that started this one has ended".to_owned()));
+    }
+    Ok(())
 }
 
 /// A share as a person writes it: `0.01%`, `0.0001`.

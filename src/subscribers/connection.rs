@@ -125,7 +125,7 @@ impl Subscription {
         connection.poses_service.dynamic_config().number_of_publishers() > 0
     }
 
-    /// A port of a service that may be absent: the scene has no alerts, say. One with another layout is refused.
+    /// A port of a service that may be absent: a scene can be without alerts. One with another layout is refused.
     fn receiver<Message: ZeroCopySend + std::fmt::Debug>(
         &self,
         service: &str,

@@ -1,9 +1,9 @@
 //! The feed of a publisher's services, through any number of publishers: what every subscriber command stands on.
 //!
 //! In: the services of a name, over [`connection`](super::connection). Out: a [`FeedEvent`] for all that comes and
-//! changes. Connecting, opening services that appear later, telling a silent publisher from a dead one ([`liveness`]),
-//! gaps and new runs ([`sequence`]) are here and nowhere else; `watch`, the stage picture and the subscribers of the
-//! soak test call [`Feed::poll`] in a loop and handle the events.
+//! changes. Connecting, opening services that appear later, distinguishing a silent publisher from a dead one
+//! ([`liveness`]), gaps and new runs ([`sequence`]) are here and nowhere else; `watch`, the stage picture and the
+//! subscribers of the soak test call [`Feed::poll`] in a loop and handle the events.
 
 pub mod liveness;
 pub mod sequence;

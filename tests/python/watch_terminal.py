@@ -89,9 +89,10 @@ class Terminal:
             self.stream.feed(printed)
 
     def read_until(self, condition):
+        self.read_until_quiet()
         while not condition(self.rows()):
             assert self.child.poll() is None, "the monitor has ended"
-            self.read(0.05)
+            self.read_until_quiet()
 
     def read_until_quiet(self):
         """Shows what is printed until nothing has been for a while."""
