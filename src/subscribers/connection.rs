@@ -75,6 +75,9 @@ impl Subscription {
         };
         // Other subscribers keep a service when its publisher has gone. One more would keep it from being made anew.
         if poses_service.dynamic_config().number_of_publishers() == 0 {
+            self.service::<CollisionAlert>("alerts")?;
+            self.service::<LoopStatus>("status")?;
+            self.service::<Stage>("stage")?;
             return Ok(None);
         }
         check_room_to_subscribe()?;
@@ -125,14 +128,22 @@ impl Subscription {
         connection.poses_service.dynamic_config().number_of_publishers() > 0
     }
 
-    /// A port of a service that may be absent: a scene can be without alerts. One with another layout is refused.
+    /// A port of a service that may be absent: a scene can be without alerts.
     fn receiver<Message: ZeroCopySend + std::fmt::Debug>(
         &self,
         service: &str,
     ) -> Result<Option<Receiver<Message, ()>>, OpenError> {
+        Ok(self.service(service)?.and_then(|service| service.subscriber_builder().create().ok()))
+    }
+
+    /// A service that may be absent. One with another layout is refused.
+    fn service<Message: ZeroCopySend + std::fmt::Debug>(
+        &self,
+        service: &str,
+    ) -> Result<Option<PortFactory<ipc::Service, Message, ()>>, OpenError> {
         let name = service_name(&self.name, service)?;
         match self.node.service_builder(&name).publish_subscribe::<Message>().open() {
-            Ok(factory) => Ok(factory.subscriber_builder().create().ok()),
+            Ok(service) => Ok(Some(service)),
             Err(Open::IncompatibleTypes | Open::VersionMismatch) => Err(OpenError::Incompatible(name.to_string())),
             Err(_) => Ok(None),
         }

@@ -1,5 +1,5 @@
 //! How the processes of a soak test are started, signalled and read: a thread for each pipe turns its lines into
-//! [`ProcessEvent`]s. Called by the [`fleet`](super::fleet).
+//! events. Called by the [`fleet`](super::fleet).
 
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Read};
