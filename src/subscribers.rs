@@ -1,6 +1,11 @@
-//! Programs that watch a running publisher from another process. They know the messages only, never the solver.
+//! Programs in processes of their own that subscribe to a running publisher. They know the messages only, never the
+//! solver.
+//!
+//! Each is a handler of the events of one [`feed`]: a new one needs a file for itself and its line in the list of
+//! commands.
 
 pub mod connection;
+pub mod feed;
 pub mod hermite;
 pub mod monitor;
 #[cfg(feature = "cli")]

@@ -14,7 +14,7 @@ use bench_dragon::live::{Frames, LoopOptions, run_loop};
 use bench_dragon::scene::{AtEnd, Scene};
 use bench_dragon::show::state::FrameState;
 use bench_dragon::show::{Frame, Playback, Show};
-use bench_dragon::subscribers::connection::Subscription;
+use bench_dragon::subscribers::connection::{Subscription, Wake};
 use bench_dragon::transports::{self, TransportConfig};
 use bench_dragon::wire::convert::stage;
 
@@ -100,7 +100,7 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
         transports.push(open_on(network, &config, &settings).unwrap());
     }
     let mut publishers: Vec<_> = transports.iter_mut().map(|transport| transport.publisher().unwrap()).collect();
-    let subscription = Subscription::new(&name).unwrap();
+    let subscription = Subscription::new(&name, Wake::OnFrame).unwrap();
     let connection = subscription.connect().unwrap().unwrap();
     let (reports, _inbox) = queues();
     let options = LoopOptions { run_id: 1, rate: 500.0, periods: None };

@@ -7,7 +7,8 @@ mod processes;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use bench_dragon::subscribers::connection::Subscription;
+use bench_dragon::subscribers::connection::Wake;
+use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
 use bench_dragon::wire::LoopStatus;
 use nix::sys::signal::Signal::{SIGINT, SIGKILL};
 use nix::sys::signal::kill;
@@ -23,7 +24,7 @@ fn number(value: &Value, key: &str) -> u64 {
     value[key].as_u64().unwrap_or_else(|| panic!("no {key} in {value}"))
 }
 
-/// What was judged, by name: whether it passed, and its value.
+/// The checks of limits, by name: whether each passed, and its value.
 fn judgements(report: &Value) -> BTreeMap<&str, (bool, f64)> {
     let all = report["judgements"].as_array().unwrap().iter();
     let value = |one: &Value| one["value"].as_f64().unwrap_or(f64::NAN);
@@ -62,7 +63,7 @@ fn twenty_seconds_pass_with_nothing_missed() {
             }
             // 1.5 s at 250 Hz are more than a queue of 64 holds.
             "slow" => assert!(number(seen, "missed") > 1000, "{subscriber}"),
-            _ => assert!(number(subscriber, "lives") >= 3, "{subscriber}"),
+            _ => assert!(number(subscriber, "incarnations") >= 3, "{subscriber}"),
         }
     }
     let rows = report["history"]["rows"].as_array().unwrap();
@@ -108,12 +109,12 @@ fn a_broken_limit_fails_even_when_interrupted() {
     place.assert_clean();
 }
 
-/// Processes that a process has started, and what they were told.
+/// Processes that a process has started, and their command lines.
 fn children(process: &Process) -> Vec<(Pid, String)> {
     let id = process.id();
     let children = std::fs::read_to_string(format!("/proc/{id}/task/{id}/children")).unwrap();
-    let told = |child: &str| std::fs::read_to_string(format!("/proc/{child}/cmdline")).unwrap_or_default();
-    children.split_whitespace().map(|child| (Pid::from_raw(child.parse().unwrap()), told(child))).collect()
+    let command = |child: &str| std::fs::read_to_string(format!("/proc/{child}/cmdline")).unwrap_or_default();
+    children.split_whitespace().map(|child| (Pid::from_raw(child.parse().unwrap()), command(child))).collect()
 }
 
 fn exists(process: Pid) -> bool {
@@ -127,7 +128,7 @@ fn a_publisher_that_dies_fails_the_test_at_once() {
     soak.args(["soak", "--json", "--duration", "8h", "--rate", "100", "--subscribers", "2"]).args(ANY_SPEED);
     let soak = Process::start(&mut soak);
     wait(4.0);
-    let publisher = children(&soak).into_iter().find(|(_, told)| told.contains("\0run\0")).unwrap().0;
+    let publisher = children(&soak).into_iter().find(|(_, command)| command.contains("\0run\0")).unwrap().0;
     kill(publisher, SIGKILL).unwrap();
     let output = soak.output_within(60);
     assert_eq!(output.status.code(), Some(1));
@@ -149,7 +150,7 @@ fn nobody_outlives_a_killed_soak_test() {
     drop(soak);
     let deadline = Instant::now() + Duration::from_secs(20);
     while children.iter().any(|(child, _)| exists(*child)) {
-        assert!(Instant::now() < deadline, "{children:?} go on");
+        assert!(Instant::now() < deadline, "{children:?} still run");
         wait(0.05);
     }
     place.assert_clean();
@@ -177,21 +178,17 @@ fn what_cannot_be_is_refused_before_it_starts() {
 fn the_status_comes_once_a_second_and_adds_up() {
     let publisher =
         Process::start(program("status").args(["run", "--json", "--rate", "50", "--start", "300", "--duration", "6"]));
-    let subscription = Subscription::new(&unique("status")).unwrap();
-    let mut connection = None;
+    let mut feed = Feed::new(&unique("status"), FeedOptions { wake: Wake::OnFrame, frames: Frames::All }).unwrap();
     let mut statuses: Vec<LoopStatus> = Vec::new();
     let mut frames = Vec::new();
     let end = Instant::now() + Duration::from_secs(7);
     while Instant::now() < end {
-        let Some(connection) = &mut connection else {
-            connection = subscription.connect().unwrap();
-            wait(0.01);
-            continue;
-        };
-        connection.wait(Duration::from_millis(50));
-        subscription.complete(connection).unwrap();
-        connection.frames(|header, _| frames.push((header.sequence, header.tick, header.run_id)));
-        statuses.extend(std::iter::from_fn(|| connection.status()));
+        let polled = feed.poll(Duration::from_millis(50), &mut |event| match event {
+            FeedEvent::Frame { header, .. } => frames.push((header.sequence, header.tick, header.run_id)),
+            FeedEvent::Status(status) => statuses.push(*status),
+            _ => (),
+        });
+        polled.unwrap();
     }
     let summary = summary(&publisher.output_within(20));
     // Six full seconds have passed and the last status is the end's.

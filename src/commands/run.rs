@@ -10,7 +10,7 @@ use std::sync::mpsc;
 
 use anstyle::Style;
 use bench_dragon::live::clock::{SystemClock, realtime_ns};
-use bench_dragon::live::statistics::{self, Inbox, Percentiles, Run, Summary};
+use bench_dragon::live::statistics::{self, Inbox, Run, RunSummary, Summary};
 use bench_dragon::live::{Counts, Deliveries, End, LoopOptions, Publisher, run_loop};
 use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::Timeline;
@@ -20,7 +20,6 @@ use bench_dragon::transports::iceoryx2::{OpenError, service_name};
 use bench_dragon::transports::{self, Transport, TransportConfig, TransportError};
 use bench_dragon::wire::sentence::{Figures, alert_sentence};
 use bench_dragon::wire::{CollisionAlert, convert};
-use serde::Serialize;
 
 use super::events::sentence;
 use super::realtime_scheduling::RealtimeScheduling;
@@ -62,22 +61,11 @@ pub struct RunArguments {
     end_with_parent: bool,
 }
 
-/// The line of `run --json`.
-#[derive(Serialize)]
-struct SummaryLine {
-    frames: u64,
-    overruns: u64,
-    skipped: u64,
-    wakeup_ns: Percentiles,
-    step_ns: Percentiles,
-    end: End,
-    /// What each transport with a queue of its own has delivered, by its name.
-    #[serde(flatten)]
-    deliveries: BTreeMap<&'static str, Deliveries>,
-}
-
 /// Publishes the scene until its duration is over or a signal comes.
 pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError> {
+    if arguments.end_with_parent {
+        super::soak::end_with_parent()?;
+    }
     let mut scene = common.load_scene()?;
     if arguments.ros2 {
         scene.ros2.get_or_insert_default();
@@ -94,9 +82,6 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
     let show =
         Show::new(&scene, timeline, playback).map_err(|error| CommandError::BadInput(format!("--start: {error}")))?;
     let stop = stop_on_signals()?;
-    if arguments.end_with_parent {
-        super::soak::end_with_parent()?;
-    }
     let run_id = RandomState::new().hash_one(realtime_ns());
     let (timeline, solver) = (show.timeline().clone(), show.solver_reason().to_owned());
     let session = RunSession { common, arguments, scene: &scene, playback, run_id, timeline, solver };
@@ -159,7 +144,8 @@ impl RunSession<'_> {
             }
         });
         let (counts, (summary, transports), error) = ended?;
-        let deliveries = transports.into_iter().filter_map(|transport| transport.finish()).collect();
+        let deliveries = transports.into_iter().filter_map(|transport| transport.finish());
+        let deliveries = deliveries.map(|(name, of)| (name.to_owned(), of)).collect();
         self.print_summary(&counts, &summary, deliveries)?;
         error.map_or(Ok(()), |error| Err(CommandError::Failed(error.to_string())))
     }
@@ -240,7 +226,7 @@ impl RunSession<'_> {
         &self,
         counts: &Counts,
         summary: &Summary,
-        deliveries: BTreeMap<&'static str, Deliveries>,
+        deliveries: BTreeMap<String, Deliveries>,
     ) -> Result<(), CommandError> {
         let Counts { frames, overruns, skipped, end } = *counts;
         let Summary { wakeup_ns, step_ns, samples } = *summary;
@@ -250,7 +236,7 @@ impl RunSession<'_> {
             log::warn!("{lost_samples} frames are missing from the percentiles: the machine left them no time");
         }
         if self.common.json {
-            output.json(&SummaryLine { frames, overruns, skipped, wakeup_ns, step_ns, end, deliveries })?;
+            output.json(&RunSummary { frames, overruns, skipped, wakeup_ns, step_ns, end, deliveries })?;
         } else {
             output.line(&format!(
                 "{frames} frames published, {overruns} overruns, {skipped} periods skipped (ended by {}).",

@@ -7,11 +7,16 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use bench_dragon::live::clock::realtime_ns;
+use bench_dragon::live::clock::{monotonic_ns, realtime_ns};
 use bench_dragon::scene::Accepted;
-use bench_dragon::subscribers::soak::fleet::{Fleet, FleetError, Plan, Role};
+use bench_dragon::subscribers::connection::Wake;
+use bench_dragon::subscribers::feed::{Feed, FeedOptions, Frames};
+use bench_dragon::subscribers::soak::figures;
+use bench_dragon::subscribers::soak::fleet::{Fleet, FleetError};
 use bench_dragon::subscribers::soak::history::History;
+use bench_dragon::subscribers::soak::member::Role;
 use bench_dragon::subscribers::soak::observer::Observer;
+use bench_dragon::subscribers::soak::processes::Plan;
 use bench_dragon::subscribers::soak::report::{Machine, Report, SubscriberReport};
 use bench_dragon::subscribers::soak::verdict::{Limits, Verdict};
 use bench_dragon::transports::iceoryx2;
@@ -35,10 +40,10 @@ pub struct SoakArguments {
     /// Subscribers that keep up and must miss nothing
     #[arg(long, value_name = "N", default_value_t = 3, help_heading = "The test")]
     subscribers: usize,
-    /// Subscribers that sleep longer than their queue lasts; what they miss is reported and not judged
+    /// Subscribers that sleep longer than their queue lasts; what they miss is reported and has no limit
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "The test")]
     slow: usize,
-    /// Subscribers that are killed with SIGKILL every 5 s and started again; what they miss is reported and not judged
+    /// Subscribers that are killed with SIGKILL every 5 s and started again; what they miss is reported and has no limit
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "The test")]
     flaky: usize,
     /// Publish ROS 2 topics too
@@ -71,7 +76,7 @@ pub struct SoakSubscriberArguments {
     slow: bool,
 }
 
-/// Soaks until its duration is over or a signal comes, and judges.
+/// Soaks until its duration is over or a signal comes, and prints the verdict.
 pub fn soak(common: &Common, arguments: &SoakArguments) -> Result<(), CommandError> {
     arguments.check(common)?;
     let files = arguments.report.as_deref().map(ReportFiles::create).transpose()?;
@@ -79,21 +84,21 @@ pub fn soak(common: &Common, arguments: &SoakArguments) -> Result<(), CommandErr
     let began_at = realtime_ns() / 1_000_000_000;
     let mut fleet = Fleet::start(arguments.plan(common)?, &|| !stop.load(Ordering::Relaxed))?;
     let bar = progress_bar(arguments.duration.ceil() as u64, common);
-    let mut history = History::new(fleet.columns());
+    let mut history = History::new(figures::columns(&fleet));
     let began = Instant::now();
     let mut seconds = 0.0;
     while seconds < arguments.duration && !stop.load(Ordering::Relaxed) && !fleet.publisher_has_ended() {
         let next = began + Duration::from_secs_f64((seconds.floor() + 1.0).min(arguments.duration));
         while Instant::now() < next && !stop.load(Ordering::Relaxed) && !fleet.publisher_has_ended() {
-            fleet.attend(next.saturating_duration_since(Instant::now()).min(Duration::from_millis(100)))?;
+            fleet.poll(next.saturating_duration_since(Instant::now()).min(Duration::from_millis(100)))?;
         }
         seconds = began.elapsed().as_secs_f64();
-        history.push(seconds, fleet.figures());
+        history.push(seconds, figures::row(&mut fleet));
         show_progress(&bar, &mut fleet, seconds);
     }
     fleet.finish()?;
     bar.finish_and_clear();
-    fleet.said().iter().for_each(|line| eprintln!("publisher: {line}"));
+    fleet.take_stderr().iter().for_each(|line| eprintln!("publisher: {line}"));
     let limits = arguments.limits();
     let verdict = Verdict::of(&fleet, &limits);
     let report = Report {
@@ -113,7 +118,7 @@ pub fn soak(common: &Common, arguments: &SoakArguments) -> Result<(), CommandErr
 }
 
 fn show_progress(bar: &ProgressBar, fleet: &mut Fleet, seconds: f64) {
-    for line in fleet.said() {
+    for line in fleet.take_stderr() {
         bar.suspend(|| eprintln!("publisher: {line}"));
     }
     let (rate, overruns) = fleet.status().map_or((0.0, 0), |status| (status.measured_rate, status.overruns));
@@ -135,13 +140,8 @@ fn conclude(report: &Report, common: &Common, files: Option<ReportFiles>) -> Res
     if report.verdict == "PASS" {
         return Ok(());
     }
-    let broken: Vec<_> = report
-        .judgements
-        .judgements
-        .iter()
-        .filter(|judgement| !judgement.passed)
-        .map(|judgement| judgement.name)
-        .collect();
+    let broken: Vec<_> =
+        report.judgements.checks.iter().filter(|check| !check.passed).map(|check| check.name).collect();
     Err(CommandError::Failed(format!("the soak test failed: {}", broken.join("; "))))
 }
 
@@ -224,10 +224,11 @@ impl ReportFiles {
 /// Observes until a signal comes, an observation a second on standard output.
 pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result<(), CommandError> {
     end_with_parent()?;
-    let mut observer = Observer::new(&common.name)?;
+    let mut feed = Feed::new(&common.name, FeedOptions { wake: Wake::OnFrame, frames: Frames::All })?;
+    let mut observer = Observer::default();
     let stop = stop_on_signals()?;
     let mut output = std::io::stdout().lock();
-    let mut say = |observer: &mut Observer| -> Result<(), CommandError> {
+    let mut print = |observer: &mut Observer| -> Result<(), CommandError> {
         serde_json::to_writer(&mut output, &observer.observation()).map_err(std::io::Error::from)?;
         writeln!(output)?;
         Ok(output.flush()?)
@@ -238,20 +239,26 @@ pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result
             std::thread::sleep(SLOW_PAUSE);
         }
         let now = Instant::now();
-        observer.step(next.saturating_duration_since(now).min(Duration::from_millis(200)))?;
+        let timeout = next.saturating_duration_since(now);
+        feed.poll(timeout, &mut |event| observer.handle(&event, monotonic_ns()))?;
         if now >= next {
-            say(&mut observer)?;
+            print(&mut observer)?;
             next = now + Duration::from_secs(1);
         }
     }
-    observer.step(Duration::from_millis(1))?;
-    say(&mut observer)
+    feed.poll(Duration::from_millis(1), &mut |event| observer.handle(&event, monotonic_ns()))?;
+    print(&mut observer)
 }
 
 /// Has this process killed when the one that started it ends, so that nothing is left behind.
 pub fn end_with_parent() -> Result<(), CommandError> {
-    let asked = nix::sys::prctl::set_pdeathsig(nix::sys::signal::Signal::SIGTERM);
-    asked.map_err(|error| CommandError::Failed(format!("the end of the parent cannot be watched: {error}")))
+    let set = nix::sys::prctl::set_pdeathsig(nix::sys::signal::Signal::SIGTERM);
+    set.map_err(|error| CommandError::Failed(format!("the end of the parent cannot be watched: {error}")))?;
+    // A parent that ended before that sends no signal any more.
+    if nix::unistd::getppid().as_raw() == 1 {
+        return Err(CommandError::Failed("the program that started this one has ended".to_owned()));
+    }
+    Ok(())
 }
 
 /// A share as a person writes it: `0.01%`, `0.0001`.

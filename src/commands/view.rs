@@ -19,7 +19,7 @@ pub struct ViewArguments {
     listen: IpAddr,
 }
 
-/// What `view --json` says once browsers can come.
+/// What `view --json` prints once browsers can connect.
 #[derive(Serialize)]
 struct Ready {
     r#type: &'static str,

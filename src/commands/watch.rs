@@ -5,9 +5,12 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use anstyle::Style;
+use bench_dragon::live::clock::monotonic_ns;
 use bench_dragon::motion::event::EventKind;
 use bench_dragon::show::state::{FrameState, Level, PlaybackState};
-use bench_dragon::subscribers::monitor::{Latency, Monitor, News, Presence, Second};
+use bench_dragon::subscribers::connection::Wake;
+use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
+use bench_dragon::subscribers::monitor::{IntervalReport, Latency, Monitor, Presence};
 use bench_dragon::wire::json::AlertObject;
 use bench_dragon::wire::sentence::{Figures, alert_sentence};
 use bench_dragon::wire::{CollisionAlert, LoopStatus};
@@ -27,7 +30,7 @@ pub struct WatchArguments {
 /// The line of `watch --json` each second; the other kind of line is an [`AlertObject`].
 #[derive(Serialize)]
 #[serde(tag = "type", rename = "second")]
-struct SecondLine {
+struct IntervalLine {
     tick: Option<u64>,
     sim_time: Option<f64>,
     state: &'static str,
@@ -37,14 +40,17 @@ struct SecondLine {
     latency_ns: Option<Latency>,
 }
 
-/// How the monitor shows itself.
+/// Where an alert's words begin on the terminal: behind its time.
+const INDENT: &str = "              ";
+
+/// How reports and events are printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Display {
     /// Redrawn in place.
     Terminal,
-    /// A line a second.
+    /// A line a report.
     Lines,
-    /// A JSON line a second.
+    /// A JSON line a report.
     Json,
 }
 
@@ -55,35 +61,34 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
         (false, true) => Display::Terminal,
         (false, false) => Display::Lines,
     };
-    let mut monitor = Monitor::new(&common.name)?;
+    let mut feed = Feed::new(&common.name, FeedOptions { wake: Wake::OnFrame, frames: Frames::All })?;
+    let mut monitor = Monitor::default();
     let stop = stop_on_signals()?;
     let began = Instant::now();
     let over = |at: Instant| arguments.duration.is_some_and(|seconds| (at - began).as_secs_f64() >= seconds);
     let interval = Duration::from_secs(1);
     let mut next = began + interval;
-    let mut screen = Screen { display, name: &common.name, time_scale: 1.0, benches: 0, drawn: 0 };
+    let mut screen = Screen { display, name: &common.name, time_scale: 1.0, benches: 0, drawn: Vec::new() };
     if display != Display::Json {
         eprintln!("Watching \"{}\"; Ctrl-C ends.", common.name);
     }
     while !stop.load(Ordering::Relaxed) {
         let now = Instant::now();
         if now >= next || over(now) {
-            let second = monitor.second();
-            screen.show_second(&second)?;
+            screen.print_report(&monitor.report())?;
             next = (next + interval).max(now);
         }
         if over(now) {
             break;
         }
-        let mut news = Vec::new();
-        let timeout = next.saturating_duration_since(now).min(Duration::from_millis(200));
-        monitor.step(timeout, |item| news.push(item))?;
-        if let Some(header) = monitor.header() {
-            (screen.time_scale, screen.benches) = (header.time_scale, header.handles.saturating_sub(1));
-        }
-        for item in news {
-            screen.tell(&item)?;
-        }
+        let mut printed = Ok(());
+        feed.poll(next.saturating_duration_since(now), &mut |event| {
+            monitor.handle(&event, monotonic_ns());
+            if printed.is_ok() {
+                printed = screen.print_event(&event);
+            }
+        })?;
+        printed?;
     }
     Ok(())
 }
@@ -93,89 +98,104 @@ struct Screen<'a> {
     name: &'a str,
     time_scale: f64,
     benches: u32,
-    /// Lines on the terminal that the next second overwrites.
-    drawn: u16,
+    /// The lines of the last report that stand on the terminal, which the next one replaces.
+    drawn: Vec<String>,
 }
 
 impl Screen<'_> {
-    fn show_second(&mut self, second: &Second) -> Result<(), CommandError> {
+    fn print_report(&mut self, report: &IntervalReport) -> Result<(), CommandError> {
         let mut output = stdout().lock();
         match self.display {
             Display::Json => {
-                let known = second.header.filter(|_| second.presence != Presence::Waiting);
-                let line = SecondLine {
+                let known = report.present_header();
+                let line = IntervalLine {
                     tick: known.map(|header| header.tick),
                     sim_time: known.map(|header| header.sim_time),
-                    state: second.state().map_or("waiting", FrameState::name),
-                    rate: second.rate,
-                    received: second.received,
-                    missed: second.missed,
-                    latency_ns: second.latency,
+                    state: report.state().map_or("waiting", FrameState::name),
+                    rate: report.rate,
+                    received: report.received,
+                    missed: report.missed,
+                    latency_ns: report.latency,
                 };
                 write_json(&mut output, &line)?;
             }
-            Display::Lines => writeln!(output, "{}", self.lines(second).join("; "))?,
+            Display::Lines => writeln!(output, "{}", self.lines(report).join("; "))?,
             Display::Terminal => {
                 self.clear_previous(&mut output)?;
-                let lines = self.lines(second);
-                // A wrapped line would take two rows, and the next second would clear one too few.
-                execute!(output, terminal::DisableLineWrap)?;
-                for line in &lines {
-                    writeln!(output, "{line}")?;
-                }
-                execute!(output, terminal::EnableLineWrap)?;
-                self.drawn = lines.len() as u16;
+                self.drawn = self.lines(report);
+                self.draw(&mut output)?;
             }
         }
         Ok(output.flush()?)
     }
 
-    /// Removes what the last second drew, so that news scroll up above the figures.
-    fn clear_previous(&mut self, output: &mut impl Write) -> std::io::Result<()> {
-        if self.drawn > 0 {
-            execute!(
-                output,
-                cursor::MoveToPreviousLine(self.drawn),
-                terminal::Clear(terminal::ClearType::FromCursorDown)
-            )?;
-            self.drawn = 0;
-        }
-        Ok(())
+    /// Draws the last report below all events.
+    fn draw(&self, output: &mut impl Write) -> std::io::Result<()> {
+        // A wrapped line would take two rows, and the next report would clear one too few.
+        execute!(output, terminal::DisableLineWrap)?;
+        self.drawn.iter().try_for_each(|line| writeln!(output, "{line}"))?;
+        execute!(output, terminal::EnableLineWrap)
     }
 
-    fn tell(&mut self, news: &News) -> Result<(), CommandError> {
-        let mut output = stdout().lock();
+    /// Clears the last report from the terminal.
+    fn clear_previous(&self, output: &mut impl Write) -> std::io::Result<()> {
+        if self.drawn.is_empty() {
+            return Ok(());
+        }
+        let rows = self.drawn.len() as u16;
+        execute!(output, cursor::MoveToPreviousLine(rows), terminal::Clear(terminal::ClearType::FromCursorDown))
+    }
+
+    /// Prints what a person wants to know at once; a machine gets the alerts.
+    fn print_event(&mut self, event: &FeedEvent<'_>) -> Result<(), CommandError> {
+        if let FeedEvent::Frame { header, .. } = event {
+            (self.time_scale, self.benches) = (header.time_scale, header.handles.saturating_sub(1));
+        }
         if self.display == Display::Json {
-            if let News::Alert(alert) = news {
-                write_json(&mut output, &AlertObject::from(alert))?;
+            if let FeedEvent::Alert(alert) = event {
+                let mut output = stdout().lock();
+                write_json(&mut output, &AlertObject::from(*alert))?;
+                output.flush()?;
             }
+            return Ok(());
+        }
+        let name = self.name;
+        let line = match event {
+            FeedEvent::Started { run_id } => format!("A publisher of \"{name}\" is running (run {run_id:016x})."),
+            FeedEvent::Gone => format!("The publisher of \"{name}\" has ended; waiting for the next."),
+            FeedEvent::Silent => format!("The publisher of \"{name}\" is there but sends nothing."),
+            FeedEvent::Alert(alert) => self.alert_line(alert),
+            FeedEvent::Frame { .. } | FeedEvent::Stage(_) | FeedEvent::Status(_) => return Ok(()),
+        };
+        let mut output = stdout().lock();
+        if self.display == Display::Lines {
+            writeln!(output, "{line}")?;
             return Ok(output.flush()?);
         }
         self.clear_previous(&mut output)?;
-        match news {
-            News::Started { run_id } => {
-                writeln!(output, "A publisher of \"{}\" is running (run {run_id:016x}).", self.name)?
-            }
-            News::Gone => writeln!(output, "The publisher of \"{}\" has ended; waiting for the next.", self.name)?,
-            News::FellSilent => writeln!(output, "The publisher of \"{}\" is there but sends nothing.", self.name)?,
-            News::Alert(alert) => writeln!(output, "{}", self.alert_line(alert))?,
+        if matches!(event, FeedEvent::Started { .. } | FeedEvent::Gone) {
+            // The last report is of another publisher, or of none.
+            self.drawn.clear();
         }
+        let columns = terminal::size().map_or(80, |(columns, _)| columns.into());
+        writeln!(output, "{}", textwrap::fill(&line, textwrap::Options::new(columns).subsequent_indent(INDENT)))?;
+        self.draw(&mut output)?;
         Ok(output.flush()?)
     }
 
-    fn lines(&self, second: &Second) -> Vec<String> {
-        let Some(header) = second.header.filter(|_| second.presence != Presence::Waiting) else {
+    fn lines(&self, report: &IntervalReport) -> Vec<String> {
+        let Some(header) = report.present_header() else {
             return vec![format!("waiting for a publisher of \"{}\"", self.name)];
         };
-        let state = second.state().unwrap_or(FrameState::Moving);
+        let state = report.state().unwrap_or(FrameState::Moving);
         let style = self.style(state);
-        let latency = second.latency.map_or("no frames".to_owned(), |latency| {
+        let latency = report.latency.map_or("no frames".to_owned(), |latency| {
             let us = |ns: u64| ns as f64 / 1000.0;
             format!("p50 {:.1} p99 {:.1} max {:.1} us", us(latency.p50), us(latency.p99), us(latency.max))
         });
         let playback = header.playback_state().filter(|playback| *playback != PlaybackState::Playing);
         let playback = playback.map_or(String::new(), |playback| format!(" ({})", playback.name()));
-        let silent = if second.presence == Presence::Silent { " (silent)" } else { "" };
+        let silent = if report.presence == Presence::Silent { " (silent)" } else { "" };
         let clearance = if header.min_clearance.is_nan() {
             "not computed".to_owned()
         } else {
@@ -188,23 +208,23 @@ impl Screen<'_> {
                 header.sim_time,
                 header.tick,
                 state.name(),
-                self.countdown(second, header.sim_time)
+                self.countdown(report, header.sim_time)
             ),
-            format!("rate {:.1} Hz  received {}  missed {}", second.rate, second.received, second.missed),
+            format!("rate {:.1} Hz  received {}  missed {}", report.rate, report.received, report.missed),
             format!("latency {latency}"),
             format!(
                 "head ({:.3}, {:.3}) m  {} handles  clearance {clearance}",
-                second.head.x, second.head.y, header.handles
+                report.head.x, report.head.y, header.handles
             ),
         ];
-        lines.extend(second.status.iter().flat_map(status_lines));
+        lines.extend(report.status.iter().flat_map(status_lines));
         lines
     }
 
     /// Wall time to the event that the latest alert announced.
-    fn countdown(&self, second: &Second, sim_time: f64) -> String {
+    fn countdown(&self, report: &IntervalReport, sim_time: f64) -> String {
         let ahead =
-            second.alert.filter(|alert| alert.alert_level() == Some(Level::Approaching) && alert.event_time > sim_time);
+            report.alert.filter(|alert| alert.alert_level() == Some(Level::Approaching) && alert.event_time > sim_time);
         ahead.map_or(String::new(), |alert| {
             let event = alert.event_kind().map_or("event", EventKind::name);
             format!("  {event} in {:.1} s", (alert.event_time - sim_time) / self.time_scale)
@@ -214,8 +234,8 @@ impl Screen<'_> {
     fn alert_line(&self, alert: &CollisionAlert) -> String {
         let level = alert.alert_level().unwrap_or(Level::Clear);
         let style = self.style(level.into());
-        let said = alert_sentence(alert, self.benches, Figures::Shown { time_scale: self.time_scale });
-        format!("{:>10.3} s  {style}{:<11}{style:#} {said}", alert.sim_time, level.name())
+        let sentence = alert_sentence(alert, self.benches, Figures::Shown { time_scale: self.time_scale });
+        format!("{:>10.3} s  {style}{:<11}{style:#} {sentence}", alert.sim_time, level.name())
     }
 
     fn style(&self, state: FrameState) -> Style {
@@ -228,7 +248,7 @@ impl Screen<'_> {
     }
 }
 
-/// How the publisher does, in lines that fit a terminal of 80 columns.
+/// The publisher's own figures, in lines that fit a terminal of 80 columns.
 fn status_lines(status: &LoopStatus) -> [String; 2] {
     let us = |ns: u64| ns as f64 / 1000.0;
     [

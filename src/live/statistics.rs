@@ -8,10 +8,13 @@ pub mod accumulator;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::StatusPublisher;
+use serde::{Deserialize, Serialize};
+
 use super::clock::Clock;
+use super::{Deliveries, End, StatusPublisher};
 use crate::wire::{CollisionAlert, LoopStatus};
 
 pub use accumulator::{Accumulator, Percentiles, Sample, Summary};
@@ -35,6 +38,26 @@ pub fn queues() -> (super::Reports, Inbox) {
 pub struct Inbox {
     samples: rtrb::Consumer<Sample>,
     alerts: rtrb::Consumer<CollisionAlert>,
+}
+
+/// The summary of a run: what `run --json` prints at its end, and a soak test reads.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RunSummary {
+    /// Frames published.
+    pub frames: u64,
+    /// Incidents in which at least one period was skipped.
+    pub overruns: u64,
+    /// Periods skipped.
+    pub skipped: u64,
+    /// Wake-up lateness against the intended deadlines.
+    pub wakeup_ns: Percentiles,
+    /// Cost of a step.
+    pub step_ns: Percentiles,
+    /// Why the loop ended.
+    pub end: End,
+    /// What each transport with a queue of its own has delivered, by its name.
+    #[serde(flatten)]
+    pub deliveries: BTreeMap<String, Deliveries>,
 }
 
 /// The run that statistics are made of, and where they go.

@@ -1,6 +1,6 @@
-//! A subscriber's ends of a publisher's services, opened when they appear and kept while publishers come and go.
+//! A subscriber's ends of a publisher's services: the thin layer over iceoryx2. In: a name. Out: what is in the queues.
 //!
-//! The monitor and the stage picture read through it.
+//! It keeps no time and no counts: when to open, read and let go is up to the [`feed`](super::feed), which calls it.
 
 use std::time::Duration;
 
@@ -38,24 +38,16 @@ pub struct Subscription {
 pub enum Wake {
     /// The publisher wakes it, which costs the publisher some microseconds for every frame.
     OnFrame,
-    /// It looks by itself as often as it likes, which costs the publisher nothing.
+    /// It polls as often as it likes, which costs the publisher nothing.
     Never,
 }
 
 impl Subscription {
-    /// A subscription to the services of `name`, none of which need exist yet, that is woken by each frame.
+    /// A subscription to the services of `name`, none of which need exist yet.
     ///
     /// # Errors
-    /// [`OpenError`] for a name that iceoryx2 cannot take.
-    pub fn new(name: &str) -> Result<Self, OpenError> {
-        Self::with_wake(name, Wake::OnFrame)
-    }
-
-    /// As [`new`](Self::new), woken as `wake` says.
-    ///
-    /// # Errors
-    /// [`OpenError`] for a name that iceoryx2 cannot take.
-    pub fn with_wake(name: &str, wake: Wake) -> Result<Self, OpenError> {
+    /// [`OpenError`] for a name that iceoryx2 cannot take, or where this process may not use the shared memory.
+    pub fn new(name: &str, wake: Wake) -> Result<Self, OpenError> {
         service_name(name, "poses")?;
         check_room_to_subscribe()?;
         stale_files::spawn_reaper();
@@ -81,6 +73,13 @@ impl Subscription {
                 return Err(OpenError::Failed { service: name.to_string(), reason: format!("{error:?}") });
             }
         };
+        // Other subscribers keep a service when its publisher has gone. One more would keep it from being made anew.
+        if poses_service.dynamic_config().number_of_publishers() == 0 {
+            self.service::<CollisionAlert>("alerts")?;
+            self.service::<LoopStatus>("status")?;
+            self.service::<Stage>("stage")?;
+            return Ok(None);
+        }
         check_room_to_subscribe()?;
         use iceoryx2::port::subscriber::SubscriberCreateError;
         let poses = poses_service.subscriber_builder().create().map_err(|error| match error {
@@ -108,7 +107,7 @@ impl Subscription {
     /// # Errors
     /// [`OpenError::Full`] where a service is there now and the memory for it is not, [`OpenError::Incompatible`] where
     /// its messages have another layout.
-    pub fn complete(&self, connection: &mut Connection) -> Result<(), OpenError> {
+    pub fn open_missing_services(&self, connection: &mut Connection) -> Result<(), OpenError> {
         let missing = connection.missing();
         if connection.alerts.is_none() {
             connection.alerts = self.receiver("alerts")?;
@@ -129,14 +128,22 @@ impl Subscription {
         connection.poses_service.dynamic_config().number_of_publishers() > 0
     }
 
-    /// A port of a service that may be absent: the scene has no alerts, say. One with another layout is refused.
+    /// A port of a service that may be absent: a scene can be without alerts.
     fn receiver<Message: ZeroCopySend + std::fmt::Debug>(
         &self,
         service: &str,
     ) -> Result<Option<Receiver<Message, ()>>, OpenError> {
+        Ok(self.service(service)?.and_then(|service| service.subscriber_builder().create().ok()))
+    }
+
+    /// A service that may be absent. One with another layout is refused.
+    fn service<Message: ZeroCopySend + std::fmt::Debug>(
+        &self,
+        service: &str,
+    ) -> Result<Option<PortFactory<ipc::Service, Message, ()>>, OpenError> {
         let name = service_name(&self.name, service)?;
         match self.node.service_builder(&name).publish_subscribe::<Message>().open() {
-            Ok(factory) => Ok(factory.subscriber_builder().create().ok()),
+            Ok(service) => Ok(Some(service)),
             Err(Open::IncompatibleTypes | Open::VersionMismatch) => Err(OpenError::Incompatible(name.to_string())),
             Err(_) => Ok(None),
         }

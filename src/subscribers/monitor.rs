@@ -1,20 +1,13 @@
-//! What a monitor knows of a publisher: rate, gaps, latency, state, alerts. Called by `watch`.
+//! What a monitor knows of a publisher: rate, gaps, latency, state, alert. In: the events of a [`feed`](super::feed).
+//! Out: an [`IntervalReport`] whenever one is wanted. Called by `watch`.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use hdrhistogram::Histogram;
 
-use crate::live::clock::monotonic_ns;
+use super::feed::FeedEvent;
 use crate::show::state::FrameState;
-use crate::transports::iceoryx2::OpenError;
 use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus};
-
-use super::connection::{Connection, Subscription};
-
-/// How long a publisher may be silent before it is looked for: at least this, and three periods.
-const SILENCE: Duration = Duration::from_millis(500);
-/// How often services are looked for that were not there yet.
-const COMPLETION: Duration = Duration::from_millis(100);
 
 /// Whether there is a publisher.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,23 +20,7 @@ pub enum Presence {
     Silent,
 }
 
-/// Something to tell at once.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum News {
-    /// Frames come from a run not seen before.
-    Started {
-        /// The new run.
-        run_id: u64,
-    },
-    /// The publisher has ended or died.
-    Gone,
-    /// The publisher is there but has stopped sending.
-    FellSilent,
-    /// An alert.
-    Alert(CollisionAlert),
-}
-
-/// Latency from sending to receiving over a second, nanoseconds.
+/// Latency from sending to receiving over an interval, nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct Latency {
     /// Half are at most this.
@@ -54,22 +31,22 @@ pub struct Latency {
     pub max: u64,
 }
 
-/// A second in figures.
+/// What was received since the last report, and the latest of each kind.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Second {
+pub struct IntervalReport {
     /// Whether there is a publisher.
     pub presence: Presence,
     /// The latest frame's header, if there was ever one.
     pub header: Option<FrameHeader>,
     /// The latest frame's head.
     pub head: HandlePose,
-    /// Frames received in this second, per second.
+    /// Frames received in this interval, per second.
     pub rate: f64,
     /// Frames received since the monitor started.
     pub received: u64,
     /// Gaps in the sequence since the monitor started.
     pub missed: u64,
-    /// Latency in this second; `None` if nothing came.
+    /// Latency in this interval; `None` if nothing came.
     pub latency: Option<Latency>,
     /// The latest alert.
     pub alert: Option<CollisionAlert>,
@@ -77,163 +54,86 @@ pub struct Second {
     pub status: Option<LoopStatus>,
 }
 
-impl Second {
+impl IntervalReport {
+    /// The latest frame's header while there is a publisher.
+    pub fn present_header(&self) -> Option<FrameHeader> {
+        self.header.filter(|_| self.presence != Presence::Waiting)
+    }
+
     /// The state of the latest frame, or `None` while waiting.
     pub fn state(&self) -> Option<FrameState> {
-        self.header.filter(|_| self.presence != Presence::Waiting)?.frame_state()
+        self.present_header()?.frame_state()
     }
 }
 
-/// Watches one publisher's name.
+/// Counts and keeps what comes from one publisher's name.
 pub struct Monitor {
-    subscription: Subscription,
-    connection: Option<Connection>,
     presence: Presence,
     header: Option<FrameHeader>,
     head: HandlePose,
     received: u64,
     missed: u64,
-    received_this_second: u64,
+    received_in_interval: u64,
     latency: Histogram<u64>,
-    second_began: Instant,
-    last_frame: Instant,
-    last_look: Instant,
-    last_completion: Instant,
+    interval_began: Instant,
     alert: Option<CollisionAlert>,
     status: Option<LoopStatus>,
 }
 
-impl Monitor {
-    /// A monitor of the services of `name`.
-    ///
-    /// # Errors
-    /// [`OpenError`] for a name that iceoryx2 cannot take.
-    pub fn new(name: &str) -> Result<Self, OpenError> {
-        let now = Instant::now();
-        Ok(Self {
-            subscription: Subscription::new(name)?,
-            connection: None,
+impl Default for Monitor {
+    fn default() -> Self {
+        Self {
             presence: Presence::Waiting,
             header: None,
             head: HandlePose::default(),
             received: 0,
             missed: 0,
-            received_this_second: 0,
+            received_in_interval: 0,
             // 1 ns to an hour with three digits are bounds the constructor accepts.
             latency: Histogram::new_with_bounds(1, 3_600_000_000_000, 3).expect("valid bounds"),
-            second_began: now,
-            last_frame: now,
-            last_look: now,
-            last_completion: now,
+            interval_began: Instant::now(),
             alert: None,
             status: None,
-        })
+        }
     }
+}
 
-    /// Waits for what comes, at most `timeout`, takes it in and tells `tell` the news.
-    ///
-    /// # Errors
-    /// [`OpenError`] where the publisher's services exist and cannot be used.
-    pub fn step(&mut self, timeout: Duration, mut tell: impl FnMut(News)) -> Result<(), OpenError> {
-        let Some(connection) = &self.connection else {
-            self.connection = self.subscription.connect()?;
-            if self.connection.is_none() {
-                std::thread::sleep(timeout.min(Duration::from_millis(100)));
+impl Monitor {
+    /// Takes in an event that was received at `received_ns` of CLOCK_MONOTONIC.
+    pub fn handle(&mut self, event: &FeedEvent<'_>, received_ns: u64) {
+        match *event {
+            FeedEvent::Frame { header, handles, missed } => {
+                self.presence = Presence::Publishing;
+                self.latency.saturating_record(received_ns.saturating_sub(header.sent_ns));
+                self.received += 1;
+                self.received_in_interval += 1;
+                self.missed += missed;
+                self.header = Some(*header);
+                self.head = handles.first().copied().unwrap_or_default();
             }
-            return Ok(());
-        };
-        connection.wait(timeout);
-        self.take_frames(&mut tell);
-        self.take_messages(&mut tell);
-        self.complete()?;
-        self.look_for_publisher(&mut tell);
-        Ok(())
-    }
-
-    fn take_frames(&mut self, tell: &mut impl FnMut(News)) {
-        let Some(connection) = self.connection.take() else { return };
-        let count = connection.frames(|header, handles| {
-            self.latency.saturating_record(monotonic_ns().saturating_sub(header.sent_ns));
-            let previous = self.header.filter(|previous| previous.run_id == header.run_id);
-            match previous {
-                Some(previous) => self.missed += header.sequence.saturating_sub(previous.sequence + 1),
-                None => tell(News::Started { run_id: header.run_id }),
-            }
-            self.header = Some(*header);
-            self.head = handles.first().copied().unwrap_or_default();
-        });
-        self.received += count as u64;
-        self.received_this_second += count as u64;
-        if count > 0 {
-            self.last_frame = Instant::now();
-            self.presence = Presence::Publishing;
-        }
-        self.connection = Some(connection);
-    }
-
-    fn take_messages(&mut self, tell: &mut impl FnMut(News)) {
-        let Some(connection) = &self.connection else { return };
-        while let Some(alert) = connection.alert() {
-            self.alert = Some(alert);
-            tell(News::Alert(alert));
-        }
-        while let Some(status) = connection.status() {
-            self.status = Some(status);
-        }
-    }
-
-    fn complete(&mut self) -> Result<(), OpenError> {
-        if let Some(connection) = &mut self.connection
-            && self.last_completion.elapsed() >= COMPLETION
-        {
-            self.subscription.complete(connection)?;
-            self.last_completion = Instant::now();
-        }
-        Ok(())
-    }
-
-    /// After a silence: is the publisher gone, or does it only say nothing?
-    fn look_for_publisher(&mut self, tell: &mut impl FnMut(News)) {
-        let Some(connection) = &mut self.connection else { return };
-        let period = self.status.map_or(Duration::ZERO, |status| Duration::from_secs_f64(3.0 / status.rate));
-        let due = self.last_look.elapsed() >= Duration::from_millis(200);
-        if self.last_frame.elapsed() < SILENCE.max(period) || !due {
-            return;
-        }
-        self.last_look = Instant::now();
-        if self.subscription.publisher_is_alive(connection) {
-            if self.presence == Presence::Publishing {
-                self.presence = Presence::Silent;
-                tell(News::FellSilent);
-            }
-        } else {
-            // Let go of the services, so that the next publisher can make them anew.
-            self.connection = None;
-            self.status = None;
-            self.alert = None;
-            if self.presence != Presence::Waiting {
+            FeedEvent::Alert(alert) => self.alert = Some(*alert),
+            FeedEvent::Status(status) => self.status = Some(*status),
+            FeedEvent::Silent => self.presence = Presence::Silent,
+            FeedEvent::Gone => {
                 self.presence = Presence::Waiting;
-                tell(News::Gone);
+                self.status = None;
+                self.alert = None;
             }
+            FeedEvent::Started { .. } | FeedEvent::Stage(_) => (),
         }
     }
 
-    /// The latest frame's header, if there was ever one.
-    pub fn header(&self) -> Option<FrameHeader> {
-        self.header
-    }
-
-    /// The figures since the last call, which a caller asks for about once a second.
-    pub fn second(&mut self) -> Second {
-        let elapsed = self.second_began.elapsed().as_secs_f64();
+    /// What has come since the last report, which begins a new interval.
+    pub fn report(&mut self) -> IntervalReport {
+        let elapsed = self.interval_began.elapsed().as_secs_f64();
         let at = |quantile| self.latency.value_at_quantile(quantile);
         let latency =
             (!self.latency.is_empty()).then(|| Latency { p50: at(0.5), p99: at(0.99), max: self.latency.max() });
-        let second = Second {
+        let report = IntervalReport {
             presence: self.presence,
             header: self.header,
             head: self.head,
-            rate: self.received_this_second as f64 / elapsed,
+            rate: self.received_in_interval as f64 / elapsed,
             received: self.received,
             missed: self.missed,
             latency,
@@ -241,8 +141,49 @@ impl Monitor {
             status: self.status,
         };
         self.latency.reset();
-        self.received_this_second = 0;
-        self.second_began = Instant::now();
-        second
+        self.received_in_interval = 0;
+        self.interval_began = Instant::now();
+        report
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_report_counts_its_interval_and_all_that_came_before() {
+        let mut monitor = Monitor::default();
+        let handles = [HandlePose { x: 3.0, ..HandlePose::default() }];
+        for (sequence, missed) in [(0, 0), (5, 4)] {
+            let header = FrameHeader { sequence, sent_ns: 1000, ..FrameHeader::default() };
+            monitor.handle(&FeedEvent::Frame { header: &header, handles: &handles, missed }, 3000);
+        }
+        let first = monitor.report();
+        assert_eq!((first.presence, first.received, first.missed), (Presence::Publishing, 2, 4));
+        assert_eq!((first.latency.unwrap().max, first.head.x), (2000, 3.0));
+        assert!(first.rate > 0.0);
+        let second = monitor.report();
+        assert_eq!((second.received, second.missed, second.rate, second.latency), (2, 4, 0.0, None));
+    }
+
+    #[test]
+    fn nothing_of_a_publisher_that_is_gone_is_shown_as_present() {
+        let mut monitor = Monitor::default();
+        let header = FrameHeader::default();
+        let events = [
+            FeedEvent::Frame { header: &header, handles: &[], missed: 0 },
+            FeedEvent::Alert(&CollisionAlert::default()),
+            FeedEvent::Status(&LoopStatus::default()),
+        ];
+        events.iter().for_each(|event| monitor.handle(event, 0));
+        let present = monitor.report();
+        assert!(present.state().is_some() && present.alert.is_some() && present.status.is_some());
+        monitor.handle(&FeedEvent::Silent, 0);
+        assert_eq!(monitor.report().presence, Presence::Silent);
+        monitor.handle(&FeedEvent::Gone, 0);
+        let gone = monitor.report();
+        assert_eq!((gone.presence, gone.state(), gone.alert, gone.status), (Presence::Waiting, None, None, None));
+        assert!(gone.header.is_some(), "what was last received is still known");
     }
 }

@@ -1,13 +1,18 @@
-//! The soak test: a publisher and its subscribers as processes, watched for hours, and a verdict.
+//! The soak test: a publisher and its subscribers as processes, observed for hours, and a verdict.
 //!
-//! The command `soak` starts a [`fleet`]; each subscriber process runs an [`observer`]; figures go into a [`history`] of
-//! bounded size; a [`verdict`] holds them against limits; a [`report`] shows them. What is judged is what subscribers
-//! received, what the publisher's status stream and summary say, and what /proc knows of its process.
+//! The command `soak` starts a [`fleet`] of processes; each subscriber process runs an [`observer`] and prints its
+//! [`observation`]; [`figures`] go into a [`history`] of bounded size; a [`verdict`] checks limits; a [`report`] shows
+//! them. What is checked is what subscribers received, what the publisher's status stream and summary contain, and what
+//! /proc reports of its process.
 
+pub mod figures;
 pub mod fleet;
 pub mod history;
+pub mod member;
+pub mod observation;
 pub mod observer;
 mod plots;
+pub mod processes;
 pub mod report;
 pub mod resources;
 pub mod verdict;

@@ -2,7 +2,7 @@
 //!
 //! Called by the `view` command. `reader` reads the shared memory on a thread of its own, since ports cannot leave the
 //! thread that made them, and hands the newest picture over; `browser` sends it to one browser at that one's pace;
-//! `wire` says how it looks on the way.
+//! `wire` is its layout on the way.
 
 mod browser;
 mod reader;
@@ -23,11 +23,14 @@ use axum::routing::get;
 use serde::Deserialize;
 use tokio::sync::watch;
 
-use super::connection::{Subscription, Wake};
+use super::connection::Wake;
+use super::feed::{Feed, FeedOptions, Frames};
 use crate::transports::iceoryx2::{OpenError, service_name};
 
-/// Browsers send questions of a few letters.
-const LONGEST_QUESTION: usize = 1024;
+/// Browsers send requests of a few letters.
+const MAX_REQUEST_BYTES: usize = 1024;
+/// Each frame that woke the server would cost the publisher more than the frame itself.
+const FEED: FeedOptions = FeedOptions { wake: Wake::Never, frames: Frames::Newest };
 
 /// The newest of everything a browser needs, each as it goes over the wire; empty where there is none.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -37,6 +40,13 @@ struct Picture {
     stage: Utf8Bytes,
     alert: Utf8Bytes,
     frame: Bytes,
+}
+
+impl Picture {
+    /// No publisher, and the reason where there is one that cannot be used.
+    fn waiting(reason: Option<&str>) -> Self {
+        Self { waiting: wire::waiting(reason).into(), ..Self::default() }
+    }
 }
 
 #[derive(Clone)]
@@ -57,9 +67,9 @@ pub enum ViewError {
          machine with --listen"
     )]
     Listen {
-        /// The address asked for.
+        /// The address given.
         address: SocketAddr,
-        /// What the system said.
+        /// What the system reported.
         source: std::io::Error,
     },
 }
@@ -86,7 +96,7 @@ pub fn serve<Refused: From<ViewError>>(
     let reader = std::thread::spawn({
         let (name, stop) = (name.to_owned(), Arc::clone(stop));
         move || {
-            let read = Subscription::with_wake(&name, Wake::Never).map(|to| reader::read(&to, &sender, &stop));
+            let read = Feed::new(&name, FEED).map(|feed| reader::read(feed, &sender, &stop));
             stop.store(true, Ordering::Relaxed);
             read
         }
@@ -134,9 +144,9 @@ fn file(kind: &'static str, text: &'static str) -> Response {
     (headers, text).into_response()
 }
 
-/// What may stand behind `/frames?`.
+/// The query of `/frames`.
 #[derive(Debug, Deserialize)]
-struct Wish {
+struct FrameQuery {
     /// At most so many frames a second; without it, all that the server reads.
     rate: Option<f64>,
 }
@@ -144,24 +154,24 @@ struct Wish {
 async fn frames(
     Shared(server): Shared<Server>,
     headers: HeaderMap,
-    Query(wish): Query<Wish>,
+    Query(query): Query<FrameQuery>,
     upgrade: WebSocketUpgrade,
 ) -> Response {
     let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
-    if !is_welcome(text(header::ORIGIN), text(header::HOST), server.loopback) {
+    if !origin_allowed(text(header::ORIGIN), text(header::HOST), server.loopback) {
         return (StatusCode::FORBIDDEN, "a page from elsewhere may not watch the stage picture").into_response();
     }
-    let gap = match wish.rate {
+    let gap = match query.rate {
         None => Duration::ZERO,
         Some(rate) if (1.0..=1e6).contains(&rate) => Duration::from_secs_f64(rate.recip()),
         Some(_) => return (StatusCode::BAD_REQUEST, "rate: expected 1 to 1000000 frames a second").into_response(),
     };
-    upgrade.max_message_size(LONGEST_QUESTION).on_upgrade(move |socket| browser::serve(socket, server.pictures, gap))
+    upgrade.max_message_size(MAX_REQUEST_BYTES).on_upgrade(move |socket| browser::serve(socket, server.pictures, gap))
 }
 
 /// Whether a WebSocket may be opened: by this server's own page or by a program, which sends no origin. On loopback
 /// the host must be a loopback name too, or a foreign name that resolves to this machine would pass as our own.
-fn is_welcome(origin: Option<&str>, host: Option<&str>, loopback: bool) -> bool {
+fn origin_allowed(origin: Option<&str>, host: Option<&str>, loopback: bool) -> bool {
     let Some(host) = host else { return false };
     let own = origin.is_none_or(|origin| origin.strip_prefix("http://").is_some_and(|o| o.eq_ignore_ascii_case(host)));
     own && (!loopback || is_loopback_name(host))
@@ -178,19 +188,19 @@ fn is_loopback_name(host: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::is_welcome;
+    use super::origin_allowed;
 
     #[test]
     fn only_our_own_page_and_programs_may_watch() {
-        assert!(is_welcome(Some("http://127.0.0.1:8080"), Some("127.0.0.1:8080"), true));
-        assert!(is_welcome(Some("http://[::1]:8080"), Some("[::1]:8080"), true));
-        assert!(is_welcome(None, Some("localhost:8080"), true));
-        assert!(is_welcome(Some("http://10.1.2.3:8080"), Some("10.1.2.3:8080"), false));
-        assert!(!is_welcome(Some("http://evil.example"), Some("127.0.0.1:8080"), true));
-        assert!(!is_welcome(Some("http://127.0.0.1:9"), Some("127.0.0.1:8080"), true));
-        assert!(!is_welcome(Some("http://evil.example:8080"), Some("evil.example:8080"), true));
-        assert!(!is_welcome(Some("http://evil.example"), Some("10.1.2.3:8080"), false));
-        assert!(!is_welcome(Some("null"), Some("127.0.0.1:8080"), true));
-        assert!(!is_welcome(None, None, true));
+        assert!(origin_allowed(Some("http://127.0.0.1:8080"), Some("127.0.0.1:8080"), true));
+        assert!(origin_allowed(Some("http://[::1]:8080"), Some("[::1]:8080"), true));
+        assert!(origin_allowed(None, Some("localhost:8080"), true));
+        assert!(origin_allowed(Some("http://10.1.2.3:8080"), Some("10.1.2.3:8080"), false));
+        assert!(!origin_allowed(Some("http://evil.example"), Some("127.0.0.1:8080"), true));
+        assert!(!origin_allowed(Some("http://127.0.0.1:9"), Some("127.0.0.1:8080"), true));
+        assert!(!origin_allowed(Some("http://evil.example:8080"), Some("evil.example:8080"), true));
+        assert!(!origin_allowed(Some("http://evil.example"), Some("10.1.2.3:8080"), false));
+        assert!(!origin_allowed(Some("null"), Some("127.0.0.1:8080"), true));
+        assert!(!origin_allowed(None, None, true));
     }
 }

@@ -4,7 +4,7 @@ use plotters::prelude::*;
 
 /// Pixels across and down.
 const SIZE: (u32, u32) = (920, 270);
-/// Colours that are told apart by people who do not see red and green, too (Okabe and Ito).
+/// Colours that are distinguished by people who do not see red and green, too (Okabe and Ito).
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 159, 0),

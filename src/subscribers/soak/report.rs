@@ -4,11 +4,15 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::fleet::{Fleet, Role, Ros2Counts, RunSummary, column_of};
+use super::figures::column_of;
+use super::fleet::Fleet;
 use super::history::History;
-use super::observer::{Latencies, Observation};
+use super::member::{Member, Role};
+use super::observation::{Latencies, Observation};
 use super::plots::{Line, Scale, escaped, plot};
 use super::verdict::Verdict;
+use crate::live::Deliveries;
+use crate::live::statistics::RunSummary;
 
 /// All that is known of a soak test.
 #[derive(Debug, Serialize)]
@@ -17,7 +21,7 @@ pub struct Report {
     pub verdict: &'static str,
     /// Each limit and its value.
     pub judgements: Verdict,
-    /// What was typed.
+    /// The command line.
     pub command: Vec<String>,
     /// The version of this program.
     pub version: &'static str,
@@ -27,7 +31,7 @@ pub struct Report {
     pub began_at: u64,
     /// Wall time from all subscribers' receiving to the end, seconds.
     pub seconds: f64,
-    /// What the publisher said of itself at its end; null if it did not end in good order.
+    /// The summary that the publisher printed at its end; null if it did not end in good order.
     pub publisher: Option<RunSummary>,
     /// What each subscriber saw.
     pub subscribers: Vec<SubscriberReport>,
@@ -35,7 +39,7 @@ pub struct Report {
     pub history: History,
 }
 
-/// What a subscriber saw in all its lives.
+/// What a subscriber saw in all its incarnations.
 #[derive(Debug, Serialize)]
 pub struct SubscriberReport {
     /// Its name.
@@ -43,7 +47,7 @@ pub struct SubscriberReport {
     /// What it was for.
     pub role: Role,
     /// Processes it has been.
-    pub lives: u64,
+    pub incarnations: u64,
     /// Counts and latencies; those of the last second are left out.
     pub seen: Observation,
 }
@@ -77,10 +81,10 @@ impl Machine {
 impl SubscriberReport {
     /// Those of a fleet.
     pub fn all(fleet: &Fleet) -> Vec<Self> {
-        let report = |member: &super::fleet::Member| Self {
+        let report = |member: &Member| Self {
             label: member.label.clone(),
             role: member.role,
-            lives: member.lives,
+            incarnations: member.incarnations,
             seen: Observation { second: None, ..member.seen() },
         };
         fleet.members().iter().map(report).collect()
@@ -91,7 +95,7 @@ impl Report {
     /// Lines for people: the verdict, each limit, each subscriber.
     pub fn lines(&self) -> Vec<String> {
         let mut lines = vec![format!("{} after {:.1} s", self.verdict, self.seconds)];
-        lines.extend(self.judgements.judgements.iter().map(|judgement| format!("  {}", judgement.line())));
+        lines.extend(self.judgements.checks.iter().map(|check| format!("  {}", check.line())));
         lines.extend(self.subscribers.iter().map(|subscriber| {
             let seen = &subscriber.seen;
             let latency = seen.total.map_or_else(String::new, |Latencies { since_sent, since_deadline }| {
@@ -104,16 +108,23 @@ impl Report {
                     us(since_deadline.p99)
                 )
             });
-            let lives = if subscriber.lives > 1 { format!(" in {} lives", subscriber.lives) } else { String::new() };
-            format!("  {}: {} received{lives}, {} missed{latency}", subscriber.label, seen.received, seen.missed)
+            let incarnations = match subscriber.incarnations {
+                1 => String::new(),
+                several => format!(" in {several} incarnations"),
+            };
+            format!("  {}: {} received{incarnations}, {} missed{latency}", subscriber.label, seen.received, seen.missed)
         }));
-        lines.extend(self.ros2_sentence().map(|sentence| format!("  {sentence}")));
+        lines.extend(self.deliveries().map(|sentence| format!("  {sentence}")));
         lines
     }
 
-    fn ros2_sentence(&self) -> Option<String> {
-        let Ros2Counts { frames, skipped, discarded } = self.publisher.as_ref()?.ros2?;
-        Some(format!("ROS 2: {frames} frames published, {skipped} skipped, {discarded} messages discarded"))
+    /// A sentence for each transport of the publisher that counts what it delivers.
+    fn deliveries(&self) -> impl Iterator<Item = String> {
+        self.publisher.iter().flat_map(|summary| &summary.deliveries).map(
+            |(name, Deliveries { frames, skipped, discarded })| {
+                format!("{name}: {frames} frames sent, {skipped} skipped, {discarded} messages discarded")
+            },
+        )
     }
 
     /// One page that needs nothing else.
@@ -125,7 +136,7 @@ impl Report {
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Soak test: {verdict}</title>\n\
              <style>{STYLE}</style></head><body>\n<h1>Soak test: <span class=\"{verdict}\">{verdict}</span></h1>\n\
              <p><code>{command}</code></p>\n<p>{seconds:.1} s on {processor}, {cores} logical processors, Linux {kernel}; \
-             bench-dragon {version}.</p>\n{limits}{subscribers}{ros2}{plots}<p>Each point stands for {per_row} s and is the \
+             bench-dragon {version}.</p>\n{limits}{subscribers}{deliveries}{plots}<p>Each point stands for {per_row} s and is the \
              greatest value of its seconds. All latencies are CLOCK_MONOTONIC; those since the deadline include the \
              periods that were skipped.</p>\n</body></html>\n",
             verdict = self.verdict,
@@ -137,7 +148,7 @@ impl Report {
             version = self.version,
             limits = self.table_of_limits(),
             subscribers = self.table_of_subscribers(),
-            ros2 = self.ros2_sentence().map_or_else(String::new, |sentence| format!("<p>{sentence}.</p>\n")),
+            deliveries = self.deliveries().map(|sentence| format!("<p>{sentence}.</p>\n")).collect::<String>(),
             plots = self.plots(),
             per_row = self.history.seconds_per_row(),
         );
@@ -145,12 +156,11 @@ impl Report {
     }
 
     fn table_of_limits(&self) -> String {
-        let rows = self.judgements.judgements.iter().map(|judgement| {
-            let word = if judgement.passed { "PASS" } else { "FAIL" };
-            let value =
-                if judgement.value.is_nan() { "not known".to_owned() } else { judgement.unit.show(judgement.value) };
-            let limit = judgement.unit.show(judgement.limit);
-            format!("<tr><td>{}<td>{value}<td>{limit}<td class=\"{word}\">{word}\n", judgement.name)
+        let rows = self.judgements.checks.iter().map(|check| {
+            let word = if check.passed { "PASS" } else { "FAIL" };
+            let value = if check.value.is_nan() { "not known".to_owned() } else { check.unit.show(check.value) };
+            let limit = check.unit.show(check.limit);
+            format!("<tr><td>{}<td>{value}<td>{limit}<td class=\"{word}\">{word}\n", check.name)
         });
         format!("<table><tr><th>limit<th>found<th>at most<th>\n{}</table>\n", rows.collect::<String>())
     }
@@ -158,7 +168,7 @@ impl Report {
     fn table_of_subscribers(&self) -> String {
         let us = |ns: u64| format!("{:.1}", ns as f64 / 1e3);
         let rows = self.subscribers.iter().map(|subscriber| {
-            let SubscriberReport { label, lives, seen, .. } = subscriber;
+            let SubscriberReport { label, incarnations, seen, .. } = subscriber;
             let latencies = seen.total.map_or_else(
                 || "<td><td><td><td>".to_owned(),
                 |total| {
@@ -168,12 +178,12 @@ impl Report {
                 },
             );
             format!(
-                "<tr><td>{label}<td>{lives}<td>{}<td>{}<td>{}<td>{:.1e}{latencies}\n",
+                "<tr><td>{label}<td>{incarnations}<td>{}<td>{}<td>{}<td>{:.1e}{latencies}\n",
                 seen.received, seen.missed, seen.disordered, seen.worst_link_error
             )
         });
         format!(
-            "<table><tr><th>subscriber<th>lives<th>received<th>missed<th>out of order<th>worst link, m<th>latency p50, \
+            "<table><tr><th>subscriber<th>incarnations<th>received<th>missed<th>out of order<th>worst link, m<th>latency p50, \
              us<th>p99<th>max<th>since deadline p99\n{}</table>\n",
             rows.collect::<String>()
         )

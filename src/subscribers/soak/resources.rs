@@ -1,4 +1,4 @@
-//! What a process holds, as /proc tells it from outside. The soak test asks about its publisher.
+//! What a process holds, read from /proc. Called by the soak test for its publisher.
 
 use std::collections::BTreeSet;
 use std::os::unix::fs::MetadataExt;

@@ -2,7 +2,10 @@
 
 use serde::Serialize;
 
-use super::fleet::{Fleet, Member, Role};
+use super::fleet::Fleet;
+use super::member::{Member, Role};
+use super::observation::Observation;
+use crate::live::statistics::RunSummary;
 
 /// A deadline may be this far from first deadline + tick / rate: both are rounded to whole nanoseconds.
 const ROUNDING_NS: f64 = 2.0;
@@ -48,12 +51,12 @@ impl Unit {
 
 /// One limit and what was found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Judgement {
-    /// What was judged.
+pub struct LimitCheck {
+    /// What is limited.
     pub name: &'static str,
     /// The most that it may be.
     pub limit: f64,
-    /// What it was; NaN (null in JSON) if the test was too short, or ended too badly, to say.
+    /// What it was; NaN (null in JSON) where it is not known, because the publisher left no summary.
     pub value: f64,
     /// How both are to be read.
     pub unit: Unit,
@@ -61,9 +64,9 @@ pub struct Judgement {
     pub passed: bool,
 }
 
-impl Judgement {
+impl LimitCheck {
     fn new(name: &'static str, unit: Unit, limit: f64, value: f64) -> Self {
-        // What could not be found is no pass.
+        // A value that is not known does not pass.
         Self { name, limit, value, unit, passed: value <= limit }
     }
 
@@ -80,53 +83,53 @@ impl Judgement {
 #[serde(transparent)]
 pub struct Verdict {
     /// Each of them.
-    pub judgements: Vec<Judgement>,
+    pub checks: Vec<LimitCheck>,
 }
 
 impl Verdict {
-    /// Judges a fleet that has finished.
+    /// The verdict on a fleet that has finished.
     pub fn of(fleet: &Fleet, limits: &Limits) -> Self {
         let steady: Vec<_> = fleet.members().iter().filter(|member| member.role == Role::Steady).collect();
-        let of_all = |count: fn(&super::observer::Observation) -> u64| {
+        let of_all = |count: fn(&Observation) -> u64| {
             fleet.members().iter().map(|member| count(&member.seen())).sum::<u64>() as f64
         };
-        let count = |name, limit, value| Judgement::new(name, Unit::Count, limit, value);
+        let count = |name, limit, value| LimitCheck::new(name, Unit::Count, limit, value);
         let summary = fleet.summary();
-        let of_summary = |value: fn(&super::fleet::RunSummary) -> f64| summary.map_or(f64::NAN, value);
+        let of_summary = |value: fn(&RunSummary) -> f64| summary.map_or(f64::NAN, value);
         let phase = fleet.members().iter().map(|member| member.seen().phase_error_ns).fold(0.0, f64::max);
-        let mut judgements = vec![
+        let mut checks = vec![
             count("frames missed by steady subscribers", limits.missed as f64, missed(fleet, &steady)),
-            Judgement::new(
+            LimitCheck::new(
                 "periods skipped",
                 Unit::Share,
                 limits.skipped_share,
                 of_summary(|summary| summary.skipped as f64 / (summary.frames + summary.skipped) as f64),
             ),
-            Judgement::new(
+            LimitCheck::new(
                 "wake-up lateness, 99.9th percentile",
                 Unit::Nanoseconds,
                 limits.lateness_p999_ns as f64,
                 of_summary(|summary| summary.wakeup_ns.p999 as f64),
             ),
         ];
-        // A test of less than a minute has nothing to say of memory.
-        judgements.extend(fleet.resident_growth().map(|growth| {
+        // A test of less than a minute has not measured growth.
+        checks.extend(fleet.resident_growth().map(|growth| {
             let limit = limits.resident_growth_bytes as f64;
-            Judgement::new("growth of resident memory after the first minute", Unit::Bytes, limit, growth as f64)
+            LimitCheck::new("growth of resident memory after the first minute", Unit::Bytes, limit, growth as f64)
         }));
-        judgements.extend([
-            count("frames out of order, or with times that cannot be", 0.0, of_all(|seen| seen.disordered)),
+        checks.extend([
+            count("frames out of order, or with inconsistent timestamps", 0.0, of_all(|seen| seen.disordered)),
             count("frames with a link of a wrong length", 0.0, of_all(|seen| seen.wrong_links)),
-            Judgement::new("drift of the tick against CLOCK_MONOTONIC", Unit::Nanoseconds, ROUNDING_NS, phase),
+            LimitCheck::new("drift of the tick against CLOCK_MONOTONIC", Unit::Nanoseconds, ROUNDING_NS, phase),
             count("counts that publisher and subscribers disagree on", 0.0, disagreements(fleet, &steady)),
             count("processes that ended by themselves or hung", 0.0, lost(fleet)),
         ]);
-        Self { judgements }
+        Self { checks }
     }
 
     /// Whether every limit was kept.
     pub fn passed(&self) -> bool {
-        self.judgements.iter().all(|judgement| judgement.passed)
+        self.checks.iter().all(|check| check.passed)
     }
 
     /// `PASS` or `FAIL`.
@@ -159,6 +162,6 @@ fn disagreements(fleet: &Fleet, steady: &[&Member]) -> f64 {
 }
 
 fn lost(fleet: &Fleet) -> f64 {
-    let subscribers = fleet.members().iter().filter(|member| member.ended_by_itself).count();
+    let subscribers = fleet.members().iter().filter(|member| member.failed()).count();
     (subscribers + usize::from(fleet.summary().is_none())) as f64
 }

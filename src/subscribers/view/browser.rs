@@ -1,8 +1,8 @@
-//! Sends the newest picture to one browser, at the pace at which that one takes it. Called by the server.
+//! Sends the newest picture to one browser, at the pace at which it reads. Called by the server.
 //!
-//! A socket's buffers hold seconds of frames, so that it may be written to says nothing about what the other side has
+//! A socket's buffers hold seconds of frames, so a socket that can be written to is no sign that the other side has
 //! read. Each frame is therefore followed by a ping, which every WebSocket answers by itself once it has read that
-//! far, and no more than [`UNDER_WAY`] frames go unanswered: what a slow browser cannot take it never gets.
+//! far, and no more than [`MAX_IN_FLIGHT`] frames stay unanswered: a slow browser gets fewer frames, not later ones.
 
 use std::time::Duration;
 
@@ -14,28 +14,28 @@ use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout};
 use super::{Picture, wire};
 use crate::live::clock::monotonic_ns;
 
-/// Frames that may be on their way to a browser: enough for 60 a second over a network that takes 50 ms.
-const UNDER_WAY: u64 = 3;
-/// How often a browser is asked whether it is still there.
-const ASK: Duration = Duration::from_secs(10);
-/// Silence after which it is not.
-const PATIENCE: Duration = Duration::from_secs(30);
+/// Frames that may be in flight to a browser: enough for 60 a second over a network that takes 50 ms.
+const MAX_IN_FLIGHT: u64 = 3;
+/// How often a browser is sent a ping even where it gets no frames.
+const PING_INTERVAL: Duration = Duration::from_secs(10);
+/// A browser that sends nothing for so long, or takes so long to be written to, is gone.
+const TIMEOUT: Duration = Duration::from_secs(30);
 
 /// Serves a browser until it goes. `gap` is the least time between two frames.
 pub(super) async fn serve(socket: WebSocket, mut pictures: watch::Receiver<Picture>, gap: Duration) {
     let (mut sink, mut stream) = socket.split();
-    let mut ask = interval(ASK);
-    ask.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut pings = interval(PING_INTERVAL);
+    pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let (mut sent, mut answered) = (0, 0);
-    let (mut due, mut heard) = (Instant::now(), Instant::now());
+    let (mut due, mut last_received) = (Instant::now(), Instant::now());
     let mut known = Picture::default();
     pictures.mark_changed();
     loop {
-        let taken = sent - answered < UNDER_WAY;
+        let has_credit = sent - answered < MAX_IN_FLIGHT;
         let messages = tokio::select! {
             message = stream.next() => {
                 let Some(Ok(message)) = message else { return };
-                heard = Instant::now();
+                last_received = Instant::now();
                 match message {
                     Message::Close(_) => return,
                     Message::Pong(count) => {
@@ -44,16 +44,16 @@ pub(super) async fn serve(socket: WebSocket, mut pictures: watch::Receiver<Pictu
                         answered = count.clamp(answered, sent);
                         continue;
                     }
-                    Message::Text(question) if question == "clock" => vec![text(wire::clock(monotonic_ns()))],
+                    Message::Text(request) if request == "clock" => vec![text(wire::clock(monotonic_ns()))],
                     _ => continue,
                 }
             }
-            changed = wait_for(&mut pictures, due), if taken => {
+            changed = wait_for(&mut pictures, due), if has_credit => {
                 if changed.is_err() {
                     return;
                 }
                 let picture = pictures.borrow_and_update().clone();
-                let mut messages = news(&picture, &known);
+                let mut messages = changed_messages(&picture, &known);
                 if picture.frame != known.frame && !picture.frame.is_empty() {
                     sent += 1;
                     due = (due + gap).max(Instant::now() - gap);
@@ -62,14 +62,14 @@ pub(super) async fn serve(socket: WebSocket, mut pictures: watch::Receiver<Pictu
                 known = picture;
                 messages
             }
-            _ = ask.tick() => {
-                if heard.elapsed() > PATIENCE {
+            _ = pings.tick() => {
+                if last_received.elapsed() > TIMEOUT {
                     return;
                 }
                 vec![ping(sent)]
             }
         };
-        if !matches!(timeout(PATIENCE, send(&mut sink, messages)).await, Ok(Ok(()))) {
+        if !matches!(timeout(TIMEOUT, send(&mut sink, messages)).await, Ok(Ok(()))) {
             return;
         }
     }
@@ -82,7 +82,7 @@ async fn wait_for(pictures: &mut watch::Receiver<Picture>, due: Instant) -> Resu
 }
 
 /// The messages about what has changed besides the frame.
-fn news(picture: &Picture, known: &Picture) -> Vec<Message> {
+fn changed_messages(picture: &Picture, known: &Picture) -> Vec<Message> {
     let parts = |of: &Picture| [of.waiting.clone(), of.stage.clone(), of.alert.clone()];
     let changed = parts(picture).into_iter().zip(parts(known)).filter(|(new, old)| new != old && !new.is_empty());
     changed.map(|(new, _)| Message::Text(new)).collect()

@@ -11,7 +11,7 @@ const colour = (style, name) => style.getPropertyValue(name).trim();
 const channels = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 const mixed = (from, to, part) => `rgb(${from.map((one, k) => Math.round(one + (to[k] - one) * part)).join(" ")})`;
 
-/** What the style sheet says, looked up once for each change of theme. */
+/** The colours of the style sheet, looked up once for each change of theme. */
 export function paletteOf(element) {
   const style = getComputedStyle(element);
   const [slow, middle, fast] = ["--slow", "--middle", "--fast"].map((name) => channels(colour(style, name)));
@@ -321,7 +321,7 @@ function benches(context, camera, palette, { stage, places, speeds, range }) {
   context.fill();
 }
 
-/** Chevrons that say which way it goes. */
+/** Chevrons in the direction of travel. */
 function headSign(context, { x, y, c, s, l, w }, palette, pixel) {
   context.beginPath();
   for (const at of [0.85, 0.6, 0.35]) {

@@ -1,74 +1,72 @@
-//! Reads the shared memory and keeps the newest picture. Called by the server, on a thread of its own.
+//! Reads the shared memory and keeps the newest picture. In: the events of a [`feed`](crate::subscribers::feed). Out:
+//! a [`Picture`] in a channel. Called by the server, on a thread of its own.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use tokio::sync::watch;
 
-use super::super::connection::{Connection, Subscription};
 use super::{Picture, wire};
+use crate::subscribers::feed::{Feed, FeedEvent};
 
-/// How often frames are looked for: some browsers draw 240 times a second, none needs more. To be woken by each
-/// frame instead would cost the publisher more than the frame itself.
-const GLANCE: Duration = Duration::from_millis(4);
-/// How often a silent publisher is looked for, and missing services are opened.
-const LOOK: Duration = Duration::from_millis(200);
+/// How often frames are polled: some browsers draw 240 times a second, none needs more. To be woken by each frame
+/// instead would cost the publisher more than the frame itself.
+const POLL_INTERVAL: Duration = Duration::from_millis(4);
+/// How long to wait where the services cannot be used, before the next attempt.
+const RETRY_INTERVAL: Duration = Duration::from_millis(200);
 
 /// Keeps the picture up to date until `stop` is set, through any number of publishers.
-pub(super) fn read(subscription: &Subscription, sender: &watch::Sender<Picture>, stop: &AtomicBool) {
-    let mut told = None;
+pub(super) fn read(mut feed: Feed, sender: &watch::Sender<Picture>, stop: &AtomicBool) {
+    let mut reader = Reader { picture: Picture::waiting(None), benches: 0 };
+    let mut reason: Option<String> = None;
+    sender.send_replace(reader.picture.clone());
     while !stop.load(Ordering::Relaxed) {
-        let reason = match subscription.connect() {
-            Ok(Some(connection)) => {
-                follow(subscription, connection, sender, stop);
-                None
+        let mut changed = false;
+        let polled = feed.poll(POLL_INTERVAL, &mut |event| changed |= reader.handle(event));
+        // The services may become usable while this continues: a program of another version ends, a subscriber leaves.
+        let now = polled.err().map(|error| error.to_string());
+        if now != reason {
+            now.iter().for_each(|sentence| log::warn!("{sentence}"));
+            if now.is_some() || !changed {
+                reader.picture = Picture::waiting(now.as_deref());
             }
-            Ok(None) => None,
-            // It may be mended while this goes on: a program of another version ends, a subscriber leaves.
-            Err(error) => Some(error.to_string()),
-        };
-        if reason.is_some() && reason != told {
-            log::warn!("{}", reason.as_deref().unwrap_or_default());
+            changed = true;
         }
-        sender.send_replace(Picture { waiting: wire::waiting(reason.as_deref()).into(), ..Picture::default() });
-        told = reason;
-        std::thread::sleep(LOOK);
+        if changed {
+            sender.send_replace(reader.picture.clone());
+        }
+        if now.is_some() {
+            std::thread::sleep(RETRY_INTERVAL);
+        }
+        reason = now;
     }
 }
 
-/// Hands on what comes until the publisher is gone.
-fn follow(subscription: &Subscription, mut connection: Connection, sender: &watch::Sender<Picture>, stop: &AtomicBool) {
-    let (mut picture, mut benches) = (Picture::default(), 0);
-    let (mut heard, mut looked) = (Instant::now(), Instant::now());
-    while !stop.load(Ordering::Relaxed) {
-        std::thread::sleep(GLANCE);
-        let mut fresh = false;
-        while let Some(stage) = connection.stage() {
-            picture.stage = wire::stage(&stage).into();
-            benches = stage.benches;
-            fresh = true;
-        }
-        while let Some(alert) = connection.alert() {
-            picture.alert = wire::alert(&alert, benches).into();
-            fresh = true;
-        }
-        if let Some(frame) = connection.newest_frame(wire::frame) {
-            picture.frame = frame.into();
-            heard = Instant::now();
-            fresh = true;
-        }
-        if fresh {
-            sender.send_replace(picture.clone());
-        }
-        if looked.elapsed() > LOOK {
-            looked = Instant::now();
-            if subscription.complete(&mut connection).is_err() {
-                // Connecting anew tells why.
-                return;
+/// The newest of everything, as far as it has come.
+struct Reader {
+    picture: Picture,
+    /// The size of the team, which an alert's sentence needs.
+    benches: u32,
+}
+
+impl Reader {
+    /// Takes in an event; whether the picture has changed.
+    fn handle(&mut self, event: FeedEvent<'_>) -> bool {
+        match event {
+            FeedEvent::Stage(stage) => {
+                self.picture.stage = wire::stage(stage).into();
+                self.benches = stage.benches;
             }
-            if heard.elapsed() > LOOK && !subscription.publisher_is_alive(&connection) {
-                return;
+            FeedEvent::Alert(alert) => self.picture.alert = wire::alert(alert, self.benches).into(),
+            FeedEvent::Frame { header, handles, .. } => self.picture.frame = wire::frame(header, handles).into(),
+            FeedEvent::Gone => {
+                self.picture = Picture::waiting(None);
+                return true;
             }
+            // The page counts the time since the latest frame by itself.
+            FeedEvent::Silent | FeedEvent::Started { .. } | FeedEvent::Status(_) => return false,
         }
+        self.picture.waiting = Default::default();
+        true
     }
 }

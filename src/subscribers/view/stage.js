@@ -52,7 +52,7 @@ function pass() {
   fitCanvas();
   const now = performance.now(), { playback, stage, alert } = stream, { newest } = playback;
   picture.received = stream.received;
-  tell(now);
+  updateText(now);
   if (!newest || !stage) return drawNothing();
   const between = playback.between(now);
   places = interpolated(between, places);
@@ -158,8 +158,8 @@ function detail(stage, handles) {
   put("bench", `Bench ${chosen + 1} of ${count}${name}: front handle at (${handles[k].toFixed(3)}, ${handles[k + 1].toFixed(3)}) m, ${Number.isNaN(speed) ? "speed not sent" : `${speed.toFixed(3)} m/s`}, heading ${degrees}°`);
 }
 
-let told = 0, counted = { at: 0, received: 0 }, perSecond = 0;
-function tell(now) {
+let figuresAt = 0, counted = { at: 0, received: 0 }, perSecond = 0;
+function updateText(now) {
   const { playback, stage, alert } = stream, { newest } = playback;
   const level = newest && stage ? STATES[newest.state] ?? "moving" : "waiting", before = document.body.dataset.level;
   if (before !== level) document.body.dataset.level = level;
@@ -179,8 +179,8 @@ function tell(now) {
   put("alert", sentence(level, alert));
   if (level === "moving" && before !== level) put("spoken", before === "waiting" ? "The dragon moves." : "Clear again.");
   // The rest changes too often to be read at every pass.
-  if (now - told < 100) return;
-  told = now;
+  if (now - figuresAt < 100) return;
+  figuresAt = now;
   meter(stage, newest.clearance);
   put("speeds", Number.isNaN(newest.handles[3]) ? "not sent" : still ? "at rest" : range ? `${range.low.toFixed(2)}–${range.high.toFixed(2)}` : "");
   put("time", `t = ${playback.time(now).toFixed(1)} s${newest.scale === 1 ? "" : ` (× ${+newest.scale.toPrecision(3)})`}`);
@@ -200,7 +200,7 @@ function showFollow() {
 }
 function follow() {
   camera.follow = !camera.follow;
-  // Near enough to tell the benches apart, however large the stage is.
+  // Near enough to distinguish the benches, however large the stage is.
   const near = Math.max(2.5, camera.reach / (5 * (stream.stage?.head_length ?? camera.reach)));
   if (camera.follow && camera.zoom < near) camera.zoom = near;
   showFollow();
@@ -218,13 +218,13 @@ function choose(bench) {
   chosen = bench;
   element("pick").value = bench >= 0 ? bench + 1 : "";
 }
-function wear(theme) {
+function setTheme(theme) {
   document.documentElement.dataset.theme = theme;
   palette = paletteOf(canvas);
 }
-function darken() {
+function toggleTheme() {
   const theme = document.documentElement.dataset.theme ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
-  wear(theme === "dark" ? "light" : "dark");
+  setTheme(theme === "dark" ? "light" : "dark");
 }
 async function fill() {
   if (document.fullscreenElement) return document.exitFullscreen();
@@ -265,7 +265,7 @@ canvas.addEventListener("wheel", (event) => {
 }, { passive: false });
 const keys = {
   "+": () => camera.zoomAt(1.25), "=": () => camera.zoomAt(1.25), "-": () => camera.zoomAt(0.8), 0: whole, Home: whole,
-  f: follow, t: darken, p: fill, Escape: () => choose(-1),
+  f: follow, t: toggleTheme, p: fill, Escape: () => choose(-1),
   ArrowLeft: () => pan(60, 0), ArrowRight: () => pan(-60, 0), ArrowUp: () => pan(0, 60), ArrowDown: () => pan(0, -60),
 };
 onkeydown = (event) => {
@@ -273,9 +273,9 @@ onkeydown = (event) => {
   keys[event.key.length === 1 ? event.key.toLowerCase() : event.key]?.();
 };
 element("pick").oninput = ({ target }) => (chosen = target.value === "" ? -1 : Math.floor(target.value) - 1);
-Object.entries({ follow, whole, theme: darken, full: fill, nearer: keys["+"], farther: keys["-"] }).forEach(([id, act]) => (element(id).onclick = act));
+Object.entries({ follow, whole, theme: toggleTheme, full: fill, nearer: keys["+"], farther: keys["-"] }).forEach(([id, act]) => (element(id).onclick = act));
 matchMedia("(prefers-color-scheme: dark)").onchange = () => (palette = paletteOf(canvas));
-// The address may say how the picture begins, for a screen without a keyboard: #dark, #light,follow and so on.
-const begin = { dark: () => wear("dark"), light: () => wear("light"), follow };
+// The address may set how the picture begins, for a screen without a keyboard: #dark, #light,follow and so on.
+const begin = { dark: () => setTheme("dark"), light: () => setTheme("light"), follow };
 location.hash.slice(1).split(",").forEach((word) => begin[word]?.());
 pass();

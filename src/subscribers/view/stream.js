@@ -1,4 +1,4 @@
-// The stream: receives frames, stage and alerts, comes back by itself, and says where everything is at a moment
+// The stream: receives frames, stage and alerts, reconnects by itself, and interpolates where everything is
 // between two frames. Knows nothing of the page.
 
 const VERSION = 2;
@@ -7,10 +7,10 @@ const HEADER_BYTES = 72;
 const MOST_FRAMES = 125;
 /** Frames further apart than this (ms) are shown one after another: straight lines between them would be wrong. */
 const LONGEST_GAP = 1000;
-/** The clock is asked for this often (ms); a server that has not answered by the next time is gone. */
-const ASK = 5000;
-/** How much of the past (ms) says how irregularly frames come. */
-const MEMORY = 2000;
+/** The clock is requested this often (ms); a server that has not answered by the next time is gone. */
+const CLOCK_INTERVAL = 5000;
+/** The window of the past (ms) from which the jitter of the frames is estimated. */
+const JITTER_WINDOW = 2000;
 
 /** A frame, as the server's layout has it. Null for a layout of another version. */
 function frameOf(data, at) {
@@ -62,7 +62,7 @@ class Playback {
     this.frames.push(frame);
     if (this.frames.length > 64) this.frames.shift();
     this.offsets.push({ at: frame.at, offset: frame.at - frame.due });
-    while (this.offsets[0].at < frame.at - MEMORY) this.offsets.shift();
+    while (this.offsets[0].at < frame.at - JITTER_WINDOW) this.offsets.shift();
     const offsets = this.offsets.map((one) => one.offset).sort((a, b) => a - b);
     this.earliest = offsets[0];
     const spread = offsets[Math.floor(0.95 * (offsets.length - 1))] - offsets[0];
@@ -112,40 +112,40 @@ export class Stream {
     const scheme = location.protocol === "https:" ? "wss" : "ws";
     const socket = new WebSocket(`${scheme}://${location.host}/frames?rate=${MOST_FRAMES}`);
     socket.binaryType = "arraybuffer";
-    let asked = null, nearest = Infinity;
+    let requested = null, nearest = Infinity;
     const again = () => {
-      clearInterval(asking);
+      clearInterval(requests);
       socket.onopen = socket.onmessage = socket.onclose = null;
       socket.close();
       this.forget("waiting for the server");
       setTimeout(() => this.open(), this.retry);
       this.retry = Math.min(4000, 2 * this.retry);
     };
-    const ask = () => {
-      // Without waiting for a goodbye: a machine that was switched off says none.
-      if (asked !== null || socket.readyState !== WebSocket.OPEN) return again();
-      asked = performance.now();
+    const requestClock = () => {
+      // Without waiting for the socket to close: a machine that was switched off never closes it.
+      if (requested !== null || socket.readyState !== WebSocket.OPEN) return again();
+      requested = performance.now();
       socket.send("clock");
     };
-    const asking = setInterval(ask, ASK);
+    const requests = setInterval(requestClock, CLOCK_INTERVAL);
     socket.onclose = again;
     socket.onopen = () => {
       this.retry = 250;
       this.trouble = "waiting for a publisher";
-      ask();
+      requestClock();
     };
     socket.onmessage = ({ data }) => {
       if (typeof data !== "string") return this.receive(data);
       const message = JSON.parse(data);
       if (message.type === "clock") {
-        // The shortest way there and back says most about how the two clocks lie to each other.
-        const now = performance.now(), way = now - asked;
-        asked = null;
+        // The shortest round trip bounds the offset between the two clocks best.
+        const now = performance.now(), way = now - requested;
+        requested = null;
         if (way <= nearest) {
           nearest = way;
           this.clock = Number(message.monotonic_ns) / 1e6 - (now - way / 2);
         }
-      } else this.tell(message);
+      } else this.handle(message);
     };
   }
 
@@ -155,7 +155,7 @@ export class Stream {
     this.stages = this.alerts = null;
   }
 
-  tell(message) {
+  handle(message) {
     if (message.type === "waiting") this.forget(message.reason ?? "waiting for a publisher");
     if (message.type === "stage") this.stages = message;
     if (message.type === "alert") this.alerts = message;

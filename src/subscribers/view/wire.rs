@@ -67,24 +67,24 @@ fn segment(segment: &StageSegment) -> Value {
         "theta_first": theta_first, "theta_last": theta_last})
 }
 
-/// An alert and what it says, in a team of so many benches; its figures stand beside it on the page.
+/// An alert and its sentence, in a team of so many benches; the page shows its figures beside it.
 pub(super) fn alert(alert: &CollisionAlert, benches: u32) -> String {
     #[derive(Serialize)]
-    struct Said {
+    struct AlertMessage {
         #[serde(flatten)]
         alert: AlertObject,
         sentence: String,
     }
-    let said = Said { alert: alert.into(), sentence: alert_sentence(alert, benches, Figures::Omitted) };
-    json!(said).to_string()
+    let message = AlertMessage { alert: alert.into(), sentence: alert_sentence(alert, benches, Figures::Omitted) };
+    json!(message).to_string()
 }
 
-/// No publisher is there; `reason` says why where it is one that cannot be used.
+/// No publisher is there, or one that cannot be used for this `reason`.
 pub(super) fn waiting(reason: Option<&str>) -> String {
     json!({"type": "waiting", "reason": reason}).to_string()
 }
 
-/// The answer to a question for the time: CLOCK_MONOTONIC, which frames are stamped with.
+/// The response to `clock`: CLOCK_MONOTONIC, which frames are stamped with.
 pub(super) fn clock(monotonic_ns: u64) -> String {
     json!({"type": "clock", "monotonic_ns": Exact(monotonic_ns)}).to_string()
 }
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn an_alert_says_in_words_what_its_numbers_say() {
+    fn an_alert_carries_the_sentence_of_its_numbers() {
         let alert_of = CollisionAlert { level: 1, event: 2, event_bench_a: 0, event_bench_b: 8, ..Default::default() };
         let json: Value = serde_json::from_str(&alert(&alert_of, 9)).unwrap();
         assert_eq!((&json["type"], &json["event"]), (&"alert".into(), &"contact".into()));

@@ -1,0 +1,193 @@
+//! The feed of a publisher's services, through any number of publishers: what every subscriber command stands on.
+//!
+//! In: the services of a name, over [`connection`](super::connection). Out: a [`FeedEvent`] for all that comes and
+//! changes. Connecting, opening services that appear later, distinguishing a silent publisher from a dead one
+//! ([`liveness`]), gaps and new runs ([`sequence`]) are here and nowhere else; `watch`, the stage picture and the
+//! subscribers of the soak test call [`Feed::poll`] in a loop and handle the events.
+
+pub mod liveness;
+pub mod sequence;
+
+use std::time::{Duration, Instant};
+
+use super::connection::{Connection, Subscription, Wake};
+use crate::transports::iceoryx2::OpenError;
+use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
+use liveness::{Change, Liveness};
+use sequence::SequenceTracker;
+
+/// How often it is tried to connect while there is no publisher.
+const CONNECT_INTERVAL: Duration = Duration::from_millis(20);
+/// How often services are opened that were not there yet.
+const OPEN_INTERVAL: Duration = Duration::from_millis(100);
+
+/// Which of the frames that have come since the last poll are handed over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Frames {
+    /// Every one, oldest first.
+    All,
+    /// The newest; the others cost no more than their receiving.
+    Newest,
+}
+
+/// How a feed reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FeedOptions {
+    /// Whether each frame wakes the reader.
+    pub wake: Wake,
+    /// Which frames are handed over.
+    pub frames: Frames,
+}
+
+/// What comes from a publisher, and what becomes of it.
+#[derive(Debug, Clone, Copy)]
+pub enum FeedEvent<'a> {
+    /// Frames come from a run that the latest frame was not of. Its first frame follows.
+    Started {
+        /// The run.
+        run_id: u64,
+    },
+    /// A frame.
+    Frame {
+        /// Its header.
+        header: &'a FrameHeader,
+        /// Its handles, head first.
+        handles: &'a [HandlePose],
+        /// Frames of the run between the one before and this that were not handed over: they were lost, or passed over
+        /// by [`Frames::Newest`].
+        missed: u64,
+    },
+    /// The stage, at the start of each run.
+    Stage(&'a Stage),
+    /// An alert.
+    Alert(&'a CollisionAlert),
+    /// The status of the publisher's loop.
+    Status(&'a LoopStatus),
+    /// The publisher is alive and has stopped sending. The next frame ends that.
+    Silent,
+    /// The publisher has ended or died, and all that it sent has been handed over.
+    Gone,
+}
+
+/// The services of one name.
+pub struct Feed {
+    subscription: Subscription,
+    frames: Frames,
+    sequence: SequenceTracker,
+    next_connect: Instant,
+    connected: Option<Connected>,
+}
+
+/// A connection, and what is known of the publisher at its other end.
+struct Connected {
+    connection: Connection,
+    liveness: Liveness,
+    last_open: Instant,
+    /// Whether anything has come.
+    received: bool,
+}
+
+impl Feed {
+    /// A feed of the services of `name`, none of which need exist yet.
+    ///
+    /// # Errors
+    /// [`OpenError`] for a name that iceoryx2 cannot take, or where this process may not use the shared memory.
+    pub fn new(name: &str, options: FeedOptions) -> Result<Self, OpenError> {
+        Ok(Self {
+            subscription: Subscription::new(name, options.wake)?,
+            frames: options.frames,
+            sequence: SequenceTracker::default(),
+            next_connect: Instant::now(),
+            connected: None,
+        })
+    }
+
+    /// Waits until something comes, at most `timeout`, and hands all that has come to `handle`. Does what is due
+    /// besides, so it is to be called again and again, a few times a second at least; it may return sooner and with
+    /// nothing.
+    ///
+    /// # Errors
+    /// [`OpenError`] where the services exist and cannot be used. The feed has let go of them then, and the next call
+    /// connects anew: what is in the way may have gone.
+    pub fn poll(&mut self, timeout: Duration, handle: &mut dyn FnMut(FeedEvent<'_>)) -> Result<(), OpenError> {
+        let Some(connected) = &mut self.connected else { return self.connect(timeout) };
+        connected.connection.wait(timeout.min(OPEN_INTERVAL));
+        connected.receive(self.frames, &mut self.sequence, handle);
+        if connected.last_open.elapsed() >= OPEN_INTERVAL {
+            connected.last_open = Instant::now();
+            if let Err(error) = self.subscription.open_missing_services(&mut connected.connection) {
+                self.connected = None;
+                return Err(error);
+            }
+        }
+        let is_alive = || self.subscription.publisher_is_alive(&connected.connection);
+        match connected.liveness.test(Instant::now(), is_alive) {
+            None => (),
+            Some(Change::Silent) => handle(FeedEvent::Silent),
+            Some(Change::Gone) => {
+                // What it sent between the reading above and its end is still in the queues.
+                connected.receive(self.frames, &mut self.sequence, handle);
+                if connected.received {
+                    handle(FeedEvent::Gone);
+                }
+                // Services are let go of, so that the next publisher can make them anew.
+                self.connected = None;
+            }
+        }
+        Ok(())
+    }
+
+    fn connect(&mut self, timeout: Duration) -> Result<(), OpenError> {
+        let wait = self.next_connect.saturating_duration_since(Instant::now());
+        std::thread::sleep(wait.min(timeout));
+        if wait > timeout {
+            return Ok(());
+        }
+        let connection = self.subscription.connect()?;
+        let now = Instant::now();
+        self.next_connect = now + CONNECT_INTERVAL;
+        self.connected = connection.map(|connection| Connected {
+            connection,
+            liveness: Liveness::connected_at(now),
+            last_open: now,
+            received: false,
+        });
+        Ok(())
+    }
+}
+
+impl Connected {
+    /// Hands over what is in the queues: the stage first, since it explains the frames, and frames before the alerts
+    /// that belong to them.
+    fn receive(&mut self, frames: Frames, sequence: &mut SequenceTracker, handle: &mut dyn FnMut(FeedEvent<'_>)) {
+        let Self { connection, liveness, received, .. } = self;
+        let mut handle = |event: FeedEvent<'_>| {
+            *received = true;
+            handle(event);
+        };
+        while let Some(stage) = connection.stage() {
+            handle(FeedEvent::Stage(&stage));
+        }
+        let take_frame = |header: &FrameHeader, handles: &[HandlePose]| {
+            let missed = sequence.advance(header.run_id, header.sequence).unwrap_or_else(|| {
+                handle(FeedEvent::Started { run_id: header.run_id });
+                0
+            });
+            handle(FeedEvent::Frame { header, handles, missed });
+        };
+        let any = match frames {
+            Frames::All => connection.frames(take_frame) > 0,
+            Frames::Newest => connection.newest_frame(take_frame).is_some(),
+        };
+        if any {
+            liveness.frame_at(Instant::now());
+        }
+        while let Some(alert) = connection.alert() {
+            handle(FeedEvent::Alert(&alert));
+        }
+        while let Some(status) = connection.status() {
+            liveness.rate(status.rate);
+            handle(FeedEvent::Status(&status));
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! One subscriber of a soak test: its role, its present process, and what all its incarnations have seen. Kept by the
+//! [`fleet`](super::fleet), which starts and signals the processes; read by the verdict and the report.
+
+use std::process::Child;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::observation::{Latencies, Observation};
+
+/// What a subscriber is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// Reads whenever a frame comes, and must miss none.
+    Steady,
+    /// Sleeps longer than its queue lasts.
+    Slow,
+    /// Is killed with SIGKILL every few seconds and started again.
+    Flaky,
+}
+
+impl Role {
+    /// Its name in labels.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Steady => "steady",
+            Self::Slow => "slow",
+            Self::Flaky => "flaky",
+        }
+    }
+}
+
+/// Where the present process of a subscriber is in its life.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ProcessState {
+    /// It runs.
+    Running,
+    /// It was sent SIGTERM and has not ended yet.
+    Ending,
+    /// It has ended after SIGTERM.
+    Ended,
+    /// It has ended without a signal from the soak test.
+    EndedByItself,
+}
+
+/// A subscriber and all its incarnations.
+#[derive(Debug)]
+pub struct Member {
+    /// Its name in the report.
+    pub label: String,
+    /// What it is for.
+    pub role: Role,
+    /// Processes it has been so far.
+    pub incarnations: u64,
+    /// The present one's state.
+    pub state: ProcessState,
+    pub(super) child: Child,
+    pub(super) spawned: Instant,
+    /// What its former incarnations saw.
+    past: Observation,
+    /// What the present one has seen.
+    present: Observation,
+    /// The latencies that came since the last row of figures.
+    fresh: Option<Latencies>,
+}
+
+impl Member {
+    /// A subscriber whose first process has just been started.
+    pub fn new(label: String, role: Role, child: Child) -> Self {
+        Self {
+            label,
+            role,
+            incarnations: 1,
+            state: ProcessState::Running,
+            child,
+            spawned: Instant::now(),
+            past: Observation::default(),
+            present: Observation::default(),
+            fresh: None,
+        }
+    }
+
+    /// Puts the process of the next incarnation in the place of one that was killed.
+    pub fn replace(&mut self, child: Child) {
+        self.past = self.seen();
+        self.present = Observation::default();
+        self.incarnations += 1;
+        self.state = ProcessState::Running;
+        self.spawned = Instant::now();
+        self.child = child;
+    }
+
+    /// Takes in what an incarnation has seen. What a former one still had in its pipe is left out.
+    pub fn observed(&mut self, incarnation: u64, observation: Observation) {
+        if incarnation == self.incarnations {
+            self.fresh = Latencies::worst(self.fresh, observation.second);
+            self.present = observation;
+        }
+    }
+
+    /// Takes in that the process of an incarnation has ended.
+    pub fn ended(&mut self, incarnation: u64) {
+        if incarnation == self.incarnations {
+            self.state = match self.state {
+                ProcessState::Ending => ProcessState::Ended,
+                _ => ProcessState::EndedByItself,
+            };
+        }
+    }
+
+    /// What all its incarnations have seen.
+    pub fn seen(&self) -> Observation {
+        self.past.joined(&self.present)
+    }
+
+    /// What its present incarnation has seen.
+    pub fn present(&self) -> &Observation {
+        &self.present
+    }
+
+    /// The latencies that came since the last call.
+    pub fn take_fresh(&mut self) -> Option<Latencies> {
+        self.fresh.take()
+    }
+
+    /// Whether its process ended without a signal from the soak test, or did not end after one. To be called once the
+    /// fleet has finished.
+    pub fn failed(&self) -> bool {
+        self.state != ProcessState::Ended
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::process::Command;
+
+    use super::*;
+
+    fn process() -> Child {
+        let mut child = Command::new("true").spawn().unwrap();
+        child.wait().unwrap();
+        child
+    }
+
+    fn member() -> Member {
+        Member::new("flaky 1".to_owned(), Role::Flaky, process())
+    }
+
+    #[test]
+    fn only_a_process_that_ends_after_a_signal_has_not_failed() {
+        let [mut right, mut early, mut hung] = [(); 3].map(|()| member());
+        early.ended(1);
+        right.state = ProcessState::Ending;
+        hung.state = ProcessState::Ending;
+        right.ended(1);
+        assert_eq!([&right, &early, &hung].map(Member::failed), [false, true, true]);
+        assert_eq!(early.state, ProcessState::EndedByItself);
+    }
+
+    #[test]
+    fn incarnations_add_up_and_a_former_one_is_not_heard_any_more() {
+        let mut member = member();
+        let seen = |received| Observation { received, ..Observation::default() };
+        member.observed(1, seen(10));
+        member.replace(process());
+        member.observed(1, seen(500));
+        member.ended(1);
+        member.observed(2, seen(7));
+        assert_eq!((member.seen().received, member.present().received), (17, 7));
+        assert_eq!((member.state, member.incarnations), (ProcessState::Running, 2));
+    }
+}
