@@ -115,6 +115,8 @@ fn a_sink_that_is_held_up_costs_frames_and_never_the_loop() {
     }
     drop(held);
     while !matches!(sent.recv_timeout(Duration::from_secs(10)).unwrap(), Sent::Alert { .. }) {}
+    // Until the queue is empty and has room.
+    while sent.recv_timeout(Duration::from_millis(500)).is_ok() {}
     // What comes once it is free again is sent: the one left over of the burst, and then this.
     publish(&mut publisher, 10 * depth, 0);
     drop(publisher);
