@@ -4,6 +4,7 @@
 //! is in range and that the start is legal. Errors name the file, the line, the field and what was expected.
 
 pub mod accepted;
+pub mod cue;
 pub mod path;
 pub mod ros2;
 
@@ -13,6 +14,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 pub use self::accepted::Accepted;
+use self::cue::{Cue, RawCue};
 use self::path::RawPath;
 use self::ros2::{RawRos2, Ros2Settings};
 use crate::model::team::Team;
@@ -24,6 +26,8 @@ use crate::solve::paper::PaperRules;
 const PAPER: &str = include_str!("../config/paper.toml");
 /// Subscribers that each iceoryx2 service admits at once where the scene does not say.
 const DEFAULT_SUBSCRIBERS: usize = 8;
+/// Seconds of wall time for which a looping show stands at its end where the scene does not say.
+const DEFAULT_END_HOLD: f64 = 5.0;
 
 /// Input that cannot be used, in one sentence that says where and what was expected.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -82,6 +86,10 @@ pub struct Scene {
     pub on_contact: OnContact,
     /// What happens at the end.
     pub at_end: AtEnd,
+    /// Seconds of wall time for which a looping show stands at its end.
+    pub end_hold: f64,
+    /// The moments that have names, in the order of the file.
+    pub cues: Vec<Cue>,
     /// When to warn; `None` where the scene asks for no alerts.
     pub alerts: Option<AlertRules>,
     /// Frames per second.
@@ -196,6 +204,8 @@ struct RawScene {
     motion: RawMotion,
     alerts: Option<RawAlerts>,
     #[serde(default)]
+    cues: Vec<RawCue>,
+    #[serde(default)]
     publish: RawPublish,
 }
 
@@ -218,6 +228,7 @@ struct RawMotion {
     paper: Option<Spanned<PaperRules>>,
     on_contact: Option<OnContact>,
     at_end: Option<AtEnd>,
+    end_hold: Option<Spanned<f64>>,
 }
 
 #[derive(Deserialize)]
@@ -272,6 +283,10 @@ impl RawScene {
             motion,
             on_contact: self.motion.on_contact.unwrap_or(OnContact::Stop),
             at_end: self.motion.at_end.unwrap_or(AtEnd::Hold),
+            end_hold: self.motion.end_hold.as_ref().map_or(Ok(DEFAULT_END_HOLD), |seconds| {
+                source.check("motion.end_hold", seconds, Accepted::END_HOLD)
+            })?,
+            cues: self.cues.iter().map(|cue| cue.validated(source, self.alerts.is_some())).collect::<Result<_, _>>()?,
             alerts: self.alerts.as_ref().map(|alerts| alerts.validated(source)).transpose()?,
             rate,
             velocities: if velocities { Velocities::Computed } else { Velocities::Omitted },

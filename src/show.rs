@@ -5,18 +5,25 @@
 
 pub mod alerts;
 pub mod clock;
+pub mod control;
 pub mod state;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
 
 use crate::linkage::NoFollower;
 use crate::motion::clearance::{ClearanceMonitor, PairClearance};
 use crate::motion::event::{Event, EventKind};
 use crate::motion::timeline::{TimedEvent, Timeline};
 use crate::motion::{Choice, Method};
+use crate::scene::cue::CueAction;
 use crate::scene::{AtEnd, OnContact, Scene};
 use crate::solve::{Chain, Solver, Velocities};
 
 use alerts::{Alert, LevelTracker};
-use clock::{ShowClock, ShowTime};
+use clock::{CueTime, ShowClock, ShowTime};
+use control::{Code, Command};
 use state::{FrameState, PlaybackState};
 
 /// One moment of the show.
@@ -26,11 +33,11 @@ pub struct Frame {
     pub tick: u64,
     /// Simulated seconds since the start of the scene.
     pub sim_time: f64,
-    /// Simulated seconds per second of wall time, as in force; unchanged once the show has ended.
+    /// Simulated seconds per second of wall time, as in force: 0 while paused or held, unchanged once the show has ended.
     pub time_scale: f64,
     /// The latest event passed, or `Approaching`, or `Moving`.
     pub state: FrameState,
-    /// `Ended` once the show has frozen, else `Playing`.
+    /// Whether simulated time advances.
     pub playback: PlaybackState,
     /// Where every handle is.
     pub chain: Chain,
@@ -38,12 +45,70 @@ pub struct Frame {
     pub min_clearance: f64,
     /// The alerts that go with this frame, in order. Its memory is reserved once.
     pub alerts: Vec<Alert>,
+    /// Jumps of simulated time so far: loops, seeks, restarts.
+    pub epoch: u32,
+    /// The latest cue passed, counted from 1 in the order of their times; 0 where none has been.
+    pub cue: u32,
+    /// The cues reached since the frame before, in order. Its memory is reserved once.
+    pub cues: Vec<ReachedCue>,
     /// Times the show has been played to its end and begun again.
     pub shows_played: u64,
     /// Contacts so far that no search had found: boards that overlapped before any contact was due.
     pub unforeseen_contacts: u64,
     /// Frames so far for whose time there was no solution, so that the one before was shown again.
     pub unsolved_frames: u64,
+}
+
+impl Frame {
+    /// A frame of so many handles, all at the origin, before anything has happened.
+    pub fn new(handles: usize) -> Self {
+        Self {
+            tick: 0,
+            sim_time: 0.0,
+            time_scale: 1.0,
+            state: FrameState::Moving,
+            playback: PlaybackState::Playing,
+            chain: Chain::new(handles),
+            min_clearance: f64::NAN,
+            alerts: Vec::with_capacity(alerts::MOST_PER_FRAME),
+            epoch: 0,
+            cue: 0,
+            cues: Vec::new(),
+            shows_played: 0,
+            unforeseen_contacts: 0,
+            unsolved_frames: 0,
+        }
+    }
+}
+
+/// A cue that a frame has reached.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReachedCue {
+    /// Its number, from 1 in the order of the cues' times.
+    pub number: u32,
+    /// Simulated seconds at which it is.
+    pub time: f64,
+    /// Whether the show waits there for [`Command::Go`].
+    pub pauses: bool,
+    /// Its name.
+    pub name: Arc<str>,
+}
+
+/// How a command was answered, and how the show stands then.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// What became of the command.
+    pub code: Code,
+    /// The period at whose beginning it was obeyed, or a step was over.
+    pub tick: u64,
+    /// Simulated seconds of that period.
+    pub sim_time: f64,
+    /// Simulated seconds per second, as in force.
+    pub time_scale: f64,
+    /// Whether simulated time advances.
+    pub playback: PlaybackState,
+    /// The latest cue passed, from 1.
+    pub cue: u32,
 }
 
 /// How a scene is played: what the command line may override.
@@ -59,12 +124,17 @@ pub struct Playback {
     pub on_contact: OnContact,
     /// What happens once the show has frozen.
     pub at_end: AtEnd,
+    /// Seconds of wall time for which a looping show stands at its end.
+    pub end_hold: f64,
+    /// Whether the show waits at its start for [`Command::Go`].
+    pub paused: bool,
 }
 
 impl Playback {
     /// The playback that a scene states: from its start, in real time.
     pub fn of(scene: &Scene) -> Self {
-        Self { start: 0.0, time_scale: 1.0, rate: scene.rate, on_contact: scene.on_contact, at_end: scene.at_end }
+        let Scene { rate, on_contact, at_end, end_hold, .. } = *scene;
+        Self { start: 0.0, time_scale: 1.0, rate, on_contact, at_end, end_hold, paused: false }
     }
 }
 
@@ -96,7 +166,11 @@ pub struct Show {
     level: Option<LevelTracker>,
     /// Metres of overlap that no search has let pass; `None` where the solver does not follow the searched motion.
     overlap_tolerance: Option<f64>,
-    solved_time: Option<f64>,
+    /// The time that the chain was solved for, and whether it moves then.
+    solved: Option<(f64, bool)>,
+    /// In the order of their times.
+    cues: Vec<ReachedCue>,
+    missing_cues: Vec<String>,
     frame: Frame,
 }
 
@@ -122,21 +196,11 @@ impl Show {
         let clearance = scene.alerts.map(|_| scene.motion.clearance_monitor(&choice));
         let Choice { solver, reason, .. } = choice;
         let exact = !matches!(scene.motion.method(), Method::Paper(_));
-        let frame = Frame {
-            tick: 0,
-            sim_time: playback.start,
-            time_scale: playback.time_scale,
-            state: FrameState::Moving,
-            playback: PlaybackState::Playing,
-            chain: Chain::new(scene.team().handles()),
-            min_clearance: f64::NAN,
-            alerts: Vec::with_capacity(alerts::MOST_PER_FRAME),
-            shows_played: 0,
-            unforeseen_contacts: 0,
-            unsolved_frames: 0,
-        };
+        let (cues, missing_cues) = cues(scene, &timeline);
+        let cue_times = cues.iter().map(|cue| CueTime { time: cue.time, pauses: cue.pauses }).collect();
+        let frame = Frame { cues: Vec::with_capacity(2 * cues.len()), ..Frame::new(scene.team().handles()) };
         Ok(Self {
-            clock: ShowClock::new(&playback, freeze_time),
+            clock: ShowClock::new(&playback, freeze_time, cue_times),
             solver,
             solver_reason: reason,
             velocities: scene.velocities,
@@ -145,9 +209,21 @@ impl Show {
             clearance,
             level,
             overlap_tolerance: exact.then_some(ROUNDING_OVERLAP * scene.team().longest_link()),
-            solved_time: None,
+            solved: None,
+            cues,
+            missing_cues,
             frame,
         })
+    }
+
+    /// The cues of this show, in the order of their times.
+    pub fn cues(&self) -> &[ReachedCue] {
+        &self.cues
+    }
+
+    /// The names of cues before an event that does not happen, or before the scene's start.
+    pub fn missing_cues(&self) -> &[String] {
+        &self.missing_cues
     }
 
     /// The solver of this show and why it was chosen, for people.
@@ -170,33 +246,59 @@ impl Show {
         self.clearance.as_ref().map_or(0, |monitor| monitor.counters().pairs)
     }
 
-    /// The frame of a tick: time, chain, clearance, state, alerts.
+    /// Obeys a command at the beginning of the period `tick`, before its frame. `None` for a step, which
+    /// [`finished_step`](Self::finished_step) answers once it is over.
+    pub fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
+        let code = self.clock.apply(tick, command)?;
+        if code == Code::Done && matches!(command, Command::Seek(_) | Command::Restart) {
+            // Where the show stands now is news, even where it is the level of before.
+            self.level.iter_mut().for_each(LevelTracker::forget);
+        }
+        Some(self.outcome(tick, code))
+    }
+
+    /// The answer to the step that was over, or was broken off, at `tick`. To be called after its frame.
+    pub fn finished_step(&mut self, tick: u64) -> Option<Outcome> {
+        let code = self.clock.take_step_outcome()?;
+        Some(self.outcome(tick, code))
+    }
+
+    fn outcome(&mut self, tick: u64, code: Code) -> Outcome {
+        let ShowTime { sim_time, time_scale, playback, cues_passed, .. } = self.clock.advance(tick);
+        Outcome { code, tick, sim_time, time_scale, playback, cue: cues_passed as u32 }
+    }
+
+    /// The frame of a tick: time, chain, clearance, state, alerts, cues.
     ///
-    /// Ticks are given in increasing order; some may be left out. The same sequence of ticks gives the same bits.
+    /// Ticks are given in increasing order; some may be left out. The same ticks with the same commands give the same
+    /// bits.
     pub fn frame(&mut self, tick: u64) -> &Frame {
-        let ShowTime { sim_time, shows_played, ended } = self.clock.at(tick);
-        let restarted = shows_played != self.frame.shows_played;
-        self.frame.tick = tick;
-        self.frame.shows_played = shows_played;
-        self.frame.sim_time = sim_time;
-        self.frame.playback = if ended { PlaybackState::Ended } else { PlaybackState::Playing };
+        let ShowTime { sim_time, time_scale, playback, epoch, shows_played, cues_passed } = self.clock.advance(tick);
+        let jumped = epoch != self.frame.epoch;
+        let frame = &mut self.frame;
+        frame.cues.clear();
+        frame.cues.extend(self.clock.reached().iter().map(|cue| self.cues[*cue].clone()));
+        self.clock.clear_reached();
+        (frame.tick, frame.sim_time, frame.time_scale, frame.playback) = (tick, sim_time, time_scale, playback);
+        (frame.epoch, frame.shows_played, frame.cue) = (epoch, shows_played, cues_passed as u32);
         self.solve(sim_time);
         let closest = self.measure_clearance();
         self.record_unforeseen_contact(closest);
-        self.update_state(restarted, closest);
+        self.update_state(jumped, closest);
         &self.frame
     }
 
-    /// Brings the chain to a time. A frozen show is solved once.
+    /// Brings the chain to a time. A show that stands still is solved once.
     fn solve(&mut self, sim_time: f64) {
-        if self.solved_time == Some(sim_time) {
+        let moves = self.frame.playback == PlaybackState::Playing;
+        if self.solved == Some((sim_time, moves)) {
             return;
         }
-        self.solved_time = Some(sim_time);
+        self.solved = Some((sim_time, moves));
         if solve_at_or_just_before(self.solver.as_mut(), sim_time, &mut self.frame.chain).is_err() {
             self.frame.unsolved_frames += 1;
         }
-        if self.frame.playback == PlaybackState::Ended && self.velocities == Velocities::Computed {
+        if !moves && self.velocities == Velocities::Computed {
             let Chain { speed, vx, vy, .. } = &mut self.frame.chain;
             [speed, vx, vy].into_iter().for_each(|numbers| numbers.fill(0.0));
         }
@@ -228,13 +330,13 @@ impl Show {
         self.timeline.record_contact(TimedEvent { event, time });
     }
 
-    fn update_state(&mut self, restarted: bool, closest: Option<PairClearance>) {
+    fn update_state(&mut self, jumped: bool, closest: Option<PairClearance>) {
         let frame = &mut self.frame;
         frame.alerts.clear();
         let passed = self.timeline.latest_passed(frame.sim_time);
         frame.state = passed.map_or(FrameState::Moving, |passed| passed.event.kind.into());
         let Some(level) = &mut self.level else { return };
-        if restarted {
+        if jumped {
             level.restart();
         }
         level.update(frame.tick, frame.sim_time, &self.timeline, closest, &mut frame.alerts);
@@ -242,6 +344,23 @@ impl Show {
             frame.state = level.current().into();
         }
     }
+}
+
+/// The cues of a scene in the order of their times, and the names of those that have none.
+fn cues(scene: &Scene, timeline: &Timeline) -> (Vec<ReachedCue>, Vec<String>) {
+    let (mut cues, mut missing) = (Vec::new(), Vec::new());
+    for cue in &scene.cues {
+        match cue.time(&scene.motion, timeline) {
+            Some(time) => {
+                let pauses = cue.then == CueAction::Pause;
+                cues.push(ReachedCue { number: 0, time, pauses, name: cue.name.as_str().into() });
+            }
+            None => missing.push(cue.name.clone()),
+        }
+    }
+    cues.sort_by(|a, b| a.time.total_cmp(&b.time));
+    cues.iter_mut().zip(1..).for_each(|(cue, number)| cue.number = number);
+    (cues, missing)
 }
 
 /// Solves at `time`, or at the latest moment before it at which there is a solution.

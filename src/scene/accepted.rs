@@ -38,6 +38,10 @@ impl Accepted {
     pub const ACCURACY: Self = Self { least: 1e-18, greatest: 1e3, unit: "metres" };
     /// Times and clearances at which a warning is given.
     pub const WARNING: Self = Self { least: 0.0, greatest: 1e9, unit: "seconds or metres" };
+    /// Simulated seconds of a cue.
+    pub const CUE: Self = Self { least: 0.0, greatest: 1e20, unit: "seconds" };
+    /// Wall time at the end of a show before it begins again.
+    pub const END_HOLD: Self = Self { least: 0.0, greatest: 1e6, unit: "seconds" };
     /// Seconds of the paper's time step and difference interval, radians of its tolerance.
     pub const PAPER_RULE: Self = Self { least: 1e-15, greatest: 1e3, unit: "seconds or radians" };
     /// The number of benches.

@@ -81,6 +81,12 @@ impl LevelTracker {
         self.open_since = None;
     }
 
+    /// The next frame announces its level, whatever that is.
+    pub fn forget(&mut self) {
+        self.restart();
+        self.announced = None;
+    }
+
     /// Decides the level of a frame and adds the alerts that go with it. `tick` grows from call to call, through every
     /// restart; `sim_time` does not fall but at a restart.
     ///

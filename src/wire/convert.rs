@@ -49,8 +49,8 @@ pub fn frame_header(frame: &Frame, stamps: Stamps) -> FrameHeader {
         handles: frame.chain.handles() as u32,
         state: frame.state as u32,
         playback: frame.playback as u32,
-        cue: 0,
-        epoch: frame.shows_played as u32,
+        cue: frame.cue,
+        epoch: frame.epoch,
         reserved: 0,
     }
 }

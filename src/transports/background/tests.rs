@@ -7,8 +7,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::show::alerts::Alert;
-use crate::show::state::{FrameState, Level, PlaybackState};
-use crate::solve::Chain;
+use crate::show::state::Level;
 
 const HANDLES: usize = 3;
 
@@ -66,21 +65,10 @@ fn recorder(loop_rate: f64, rate: f64) -> (Ends, Receiver<Sent>, Arc<Mutex<()>>)
 }
 
 fn frame(tick: u64, alerts: usize) -> Frame {
-    let mut chain = Chain::new(HANDLES);
-    chain.x.iter_mut().enumerate().for_each(|(handle, x)| *x = (10 * tick + handle as u64) as f64);
-    Frame {
-        tick,
-        sim_time: tick as f64,
-        time_scale: 1.0,
-        state: FrameState::Moving,
-        playback: PlaybackState::Playing,
-        chain,
-        min_clearance: f64::NAN,
-        alerts: vec![Alert { level: Level::Clear, event: None, nearest: None }; alerts],
-        shows_played: 0,
-        unforeseen_contacts: 0,
-        unsolved_frames: 0,
-    }
+    let mut frame = Frame { tick, sim_time: tick as f64, ..Frame::new(HANDLES) };
+    frame.chain.x.iter_mut().enumerate().for_each(|(handle, x)| *x = (10 * tick + handle as u64) as f64);
+    frame.alerts = vec![Alert { level: Level::Clear, event: None, nearest: None }; alerts];
+    frame
 }
 
 fn publish(publisher: &mut BackgroundPublisher, tick: u64, alerts: usize) {
