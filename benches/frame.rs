@@ -155,7 +155,7 @@ fn show(bencher: Bencher, with: &str) {
     }
     scene.velocities = if with.contains("velocities") { Velocities::Computed } else { Velocities::Omitted };
     let timeline = scene.motion.timeline(&mut |_| ());
-    let playback = Playback { start: 200.0, at_end: AtEnd::Loop, ..Playback::of(&scene) };
+    let playback = Playback { start: 200.0, at_end: AtEnd::Loop, end_hold: 0.0, ..Playback::of(&scene) };
     let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
     let mut tick = 0;
     bencher.bench_local(|| {

@@ -283,9 +283,11 @@ impl RawScene {
             motion,
             on_contact: self.motion.on_contact.unwrap_or(OnContact::Stop),
             at_end: self.motion.at_end.unwrap_or(AtEnd::Hold),
-            end_hold: self.motion.end_hold.as_ref().map_or(Ok(DEFAULT_END_HOLD), |seconds| {
-                source.check("motion.end_hold", seconds, Accepted::END_HOLD)
-            })?,
+            end_hold: self
+                .motion
+                .end_hold
+                .as_ref()
+                .map_or(Ok(DEFAULT_END_HOLD), |seconds| source.check("motion.end_hold", seconds, Accepted::END_HOLD))?,
             cues: self.cues.iter().map(|cue| cue.validated(source, self.alerts.is_some())).collect::<Result<_, _>>()?,
             alerts: self.alerts.as_ref().map(|alerts| alerts.validated(source)).transpose()?,
             rate,

@@ -83,8 +83,14 @@ impl Frames for Watched<'_> {
 #[test]
 fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     let scene = Scene::paper();
-    let playback =
-        Playback { start: 400.0, rate: 500.0, time_scale: 20.0, at_end: AtEnd::Loop, ..Playback::of(&scene) };
+    let playback = Playback {
+        start: 400.0,
+        rate: 500.0,
+        time_scale: 20.0,
+        at_end: AtEnd::Loop,
+        end_hold: 0.0,
+        ..Playback::of(&scene)
+    };
     let timeline = scene.motion.timeline(&mut |_| ());
     let show = Show::new(&scene, timeline, playback).unwrap();
     let name = format!("test_{}_allocation", std::process::id());

@@ -22,7 +22,7 @@ fn show(playback: Playback) -> Show {
 }
 
 fn playback() -> Playback {
-    Playback::of(&Scene::paper())
+    Playback { end_hold: 0.0, ..Playback::of(&Scene::paper()) }
 }
 
 fn hash(frame: &Frame) -> u64 {
@@ -173,7 +173,7 @@ fn boards_that_overlap_unforeseen_are_a_contact_at_once() {
 
 /// The levels announced over a whole show, repeats left out, and the times of the events as announced.
 fn levels(rate: f64, time_scale: f64, start: f64, on_contact: OnContact) -> (Vec<Level>, Vec<(Level, f64)>) {
-    let mut show = show(Playback { rate, time_scale, start, on_contact, at_end: AtEnd::Hold });
+    let mut show = show(Playback { rate, time_scale, start, on_contact, ..playback() });
     let ticks = ((show.freeze_time() - start) * rate / time_scale).ceil() as u64 + 2;
     let (mut levels, mut events) = (Vec::new(), Vec::new());
     for tick in 0..ticks {

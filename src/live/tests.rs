@@ -8,8 +8,6 @@ use proptest::prelude::*;
 
 use super::simulated::{REALTIME_OFFSET_NS, SimulatedClock, Wake};
 use super::*;
-use crate::show::state::{FrameState, PlaybackState};
-use crate::solve::Chain;
 
 const START_NS: u64 = 5_000_000_007;
 const SECOND_NS: u64 = 1_000_000_000;
@@ -162,19 +160,7 @@ impl Setup {
         let Script { wakes, frame_ns, publish_ns, maintain_ns } = self.script;
         let clock = Rc::new(SimulatedClock::new(START_NS, wakes).stopping_at(self.stop_at_ns));
         let log = Rc::new(RefCell::new(Log::default()));
-        let frame = Frame {
-            tick: 0,
-            sim_time: 1.5,
-            time_scale: 1.0,
-            state: FrameState::Moving,
-            playback: PlaybackState::Playing,
-            chain: Chain::new(1),
-            min_clearance: f64::NAN,
-            alerts: Vec::new(),
-            shows_played: 0,
-            unforeseen_contacts: 0,
-            unsolved_frames: 0,
-        };
+        let frame = Frame { sim_time: 1.5, ..Frame::new(1) };
         let mut frames = FakeFrames { clock: clock.clone(), log: log.clone(), cost_ns: frame_ns.into(), frame };
         let publisher = FakePublisher {
             clock: clock.clone(),

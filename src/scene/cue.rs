@@ -108,12 +108,7 @@ impl RawCue {
         }
     }
 
-    fn before_event(
-        &self,
-        before: &Spanned<CueEvent>,
-        source: &Source,
-        alerts: bool,
-    ) -> Result<CueMoment, SceneError> {
+    fn before_event(&self, before: &Spanned<CueEvent>, source: &Source, alerts: bool) -> Result<CueMoment, SceneError> {
         let event = match before.get_ref() {
             CueEvent::Contact => EventKind::Contact,
             CueEvent::Stall => EventKind::Stall,

@@ -296,7 +296,7 @@ impl ShowClock {
     /// Passes cues up to a place in their order.
     fn reach(&mut self, passed: usize) {
         for cue in self.cues_passed..passed {
-            if self.reached.len() < self.reached.capacity() {
+            if self.reached.len() < 2 * self.cues.len() {
                 self.reached.push(cue);
             }
         }

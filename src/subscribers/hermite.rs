@@ -214,7 +214,8 @@ mod tests {
 
     #[test]
     fn nothing_lies_between_the_end_of_a_loop_and_its_beginning() {
-        let playback = Playback { start: 412.0, rate: 10.0, at_end: AtEnd::Loop, ..Playback::of(&scene()) };
+        let playback =
+            Playback { start: 412.0, rate: 10.0, at_end: AtEnd::Loop, end_hold: 0.0, ..Playback::of(&scene()) };
         let reader = reader(playback, 20);
         let mut handles = Vec::new();
         let jump = (1..20).find(|k| reader.frames[*k].header.epoch == 1).unwrap();
