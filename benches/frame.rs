@@ -198,6 +198,7 @@ fn publish_over_iceoryx2(bencher: Bencher) {
         queue: 64,
         subscribers: 8,
         alerts: true,
+        cues: false,
         stage: stage(1, 0, &scene.motion),
     };
     let mut publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");

@@ -10,6 +10,7 @@ macro_rules! eprintln {
 }
 
 pub mod check;
+pub mod control;
 pub mod draw;
 pub mod events;
 pub mod plan;

@@ -5,6 +5,7 @@
 //! another, which empties that queue.
 
 pub mod clock;
+pub mod control;
 #[cfg(feature = "cli")]
 pub mod realtime;
 #[cfg(test)]
@@ -15,11 +16,13 @@ mod tests;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::show::{Frame, Show};
+use crate::show::control::Command;
+use crate::show::{Frame, Outcome, Show};
 use crate::wire::convert::{Stamps, collision_alert, frame_header};
 use crate::wire::{CollisionAlert, FrameHeader, LoopStatus};
 
 use clock::{Clock, Deadlines};
+use control::Doors;
 use statistics::Sample;
 
 /// Nanoseconds between two calls of [`Publisher::maintain`].
@@ -58,11 +61,26 @@ pub struct PublishError(pub String);
 pub trait Frames {
     /// The frame of a tick. Each call's tick is greater than the one before.
     fn frame(&mut self, tick: u64) -> &Frame;
+
+    /// Obeys a command at the beginning of the period `tick`, before its frame. `None` for one that is answered by
+    /// [`finished_step`](Self::finished_step).
+    fn command(&mut self, tick: u64, command: Command) -> Option<Outcome>;
+
+    /// The answer to the step that was over, or broken off, at `tick`.
+    fn finished_step(&mut self, tick: u64) -> Option<Outcome>;
 }
 
 impl Frames for Show {
     fn frame(&mut self, tick: u64) -> &Frame {
         Show::frame(self, tick)
+    }
+
+    fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
+        Show::command(self, tick, command)
+    }
+
+    fn finished_step(&mut self, tick: u64) -> Option<Outcome> {
+        Show::finished_step(self, tick)
     }
 }
 
@@ -142,6 +160,7 @@ pub struct Reports {
 pub fn run_loop<C: Clock>(
     clock: &C,
     frames: &mut dyn Frames,
+    doors: &mut Doors,
     publishers: &mut [Box<dyn Publisher>],
     options: LoopOptions,
     mut reports: Reports,
@@ -176,6 +195,7 @@ pub fn run_loop<C: Clock>(
             stamp_ns: clock.realtime_ns(),
             deadline_ns: deadlines.of(tick),
         };
+        doors.take_one(frames, tick);
         let frame = frames.frame(tick);
         let header = frame_header(frame, stamps);
         for publisher in publishers.iter_mut() {
@@ -197,6 +217,7 @@ pub fn run_loop<C: Clock>(
             subscribers: publishers.iter().map(|publisher| publisher.subscribers()).sum(),
         };
         report(&mut reports, &header, frame, sample);
+        doors.finish_step(frames, tick);
         tick += 1;
     }
 }

@@ -23,6 +23,8 @@ struct CommandLine {
 enum Command {
     /// Publish a scene live
     Run(commands::run::RunArguments),
+    /// Conduct a running publisher: pause, rate, seek, step, hold
+    Control(commands::control::ControlArguments),
     /// Watch a running publisher from another process
     Watch(commands::watch::WatchArguments),
     /// Serve the live stage picture to a browser
@@ -51,6 +53,7 @@ fn main() -> ExitCode {
     set_up_logging(&common);
     let done = commands::end_when_shared_memory_is_full().and_then(|()| match &command {
         Command::Run(arguments) => commands::run::run(&common, arguments),
+        Command::Control(arguments) => commands::control::control(&common, arguments),
         Command::Watch(arguments) => commands::watch::watch(&common, arguments),
         Command::View(arguments) => commands::view::view(&common, arguments),
         Command::Solve(arguments) => commands::solve::solve(&common, arguments),

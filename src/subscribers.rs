@@ -5,6 +5,7 @@
 //! commands.
 
 pub mod connection;
+pub mod control;
 pub mod feed;
 pub mod hermite;
 pub mod monitor;

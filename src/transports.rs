@@ -9,6 +9,7 @@ pub mod iceoryx2;
 #[cfg(feature = "ros2")]
 pub mod ros2;
 
+use crate::live::control::Door;
 use crate::live::{Deliveries, Publisher, StatusPublisher};
 use crate::scene::Scene;
 use crate::wire::Stage;
@@ -62,6 +63,16 @@ pub trait Transport: Send {
     /// # Errors
     /// [`TransportError`]
     fn status(&mut self) -> Result<Box<dyn StatusPublisher>, TransportError>;
+
+    /// Opens a door for commands, on a thread of its own, where this transport has one; gives the door back where it has
+    /// none. Called once, before the
+    /// loop's thread is started.
+    ///
+    /// # Errors
+    /// [`TransportError`]
+    fn control(&mut self, door: Door) -> Result<Option<Door>, TransportError> {
+        Ok(Some(door))
+    }
 
     /// Takes leave once both ends are dropped: its name in the summary, and what it delivered, where it has a queue.
     fn finish(self: Box<Self>) -> Option<(&'static str, Deliveries)>;

@@ -9,11 +9,13 @@ use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use bench_dragon::live::clock::SystemClock;
+use bench_dragon::live::control::{Doors, door};
 use bench_dragon::live::statistics::queues;
 use bench_dragon::live::{Frames, LoopOptions, run_loop};
 use bench_dragon::scene::{AtEnd, Scene};
+use bench_dragon::show::control::Command;
 use bench_dragon::show::state::FrameState;
-use bench_dragon::show::{Frame, Playback, Show};
+use bench_dragon::show::{Frame, Outcome, Playback, Show};
 use bench_dragon::subscribers::connection::{Subscription, Wake};
 use bench_dragon::transports::{self, TransportConfig};
 use bench_dragon::wire::convert::stage;
@@ -78,6 +80,14 @@ impl Frames for Watched<'_> {
         self.shows_played = frame.shows_played;
         frame
     }
+
+    fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
+        self.show.command(tick, command)
+    }
+
+    fn finished_step(&mut self, tick: u64) -> Option<Outcome> {
+        self.show.finished_step(tick)
+    }
 }
 
 #[test]
@@ -109,10 +119,12 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     let subscription = Subscription::new(&name, Wake::OnFrame).unwrap();
     let connection = subscription.connect().unwrap().unwrap();
     let (reports, _inbox) = queues();
+    let (port, _door) = door();
+    let mut doors = Doors::new(vec![port]);
     let options = LoopOptions { run_id: 1, rate: 500.0, periods: None };
     let stop = AtomicBool::new(false);
     let mut watched = Watched { show, stop: &stop, frames: 0, before: None, loans: 0, states: [0; 6], shows_played: 0 };
-    let counts = run_loop(&SystemClock, &mut watched, &mut publishers, options, reports, &stop).unwrap();
+    let counts = run_loop(&SystemClock, &mut watched, &mut doors, &mut publishers, options, reports, &stop).unwrap();
     let during = allocations() - watched.before.unwrap();
     assert_eq!(during, watched.loans, "the loop allocates more than iceoryx2's loans do, in {counts:?}");
     drop(publishers);

@@ -24,7 +24,7 @@ STATES = (
     "contact",
     # A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
     "stall",
-    # A link is in a singular configuration: the motion cannot go on.
+    # A link is in a singular configuration: the motion cannot continue.
     "lock",
     # The head has reached the end of the path.
     "path_end",
@@ -58,9 +58,9 @@ EVENTS = {
     5: "path_end",
 }
 
-# Whether simulated time goes on.
+# Whether simulated time advances.
 PLAYBACK = (
-    # Simulated time goes on.
+    # Simulated time advances.
     "playing",
     # Simulated time stands still until it is resumed.
     "paused",
@@ -287,6 +287,73 @@ class LoopStatus(_Message):
     ]
 
 
+class Cue(_Message):
+    """A cue that the show has reached. Payload of `<name>/cues`.
+
+    Each is sent once, with the frame at or after it; a seek over cues sends none.
+    """
+
+    LAYOUT = 1
+    _fields_ = [
+        # The run, as in `FrameHeader.run_id`.
+        ("run_id", ctypes.c_uint64),
+        # The tick of the frame this cue goes with.
+        ("tick", ctypes.c_uint64),
+        # CLOCK_REALTIME in nanoseconds of that frame.
+        ("stamp_ns", ctypes.c_uint64),
+        # Simulated seconds of that frame.
+        ("sim_time", ctypes.c_double),
+        # Simulated seconds at which the cue is.
+        ("cue_time", ctypes.c_double),
+        # Its number, from 1 in the order of the cues' times.
+        ("number", ctypes.c_uint32),
+        # 1 where the show waits there until it is told to go, else 0.
+        ("pauses", ctypes.c_uint32),
+        # Its name.
+        ("name", ctypes.c_uint8 * 64),
+    ]
+
+
+class ControlRequest(_Message):
+    """A command to a running show. Request of `<name>/control`."""
+
+    LAYOUT = 1
+    _fields_ = [
+        # Any number of the client's; the response repeats it.
+        ("id", ctypes.c_uint64),
+        # The value of a command that has one: simulated seconds per second, simulated seconds, or periods.
+        ("value", ctypes.c_double),
+        # 0 state, 1 pause, 2 resume, 3 rate, 4 seek, 5 step, 6 restart, 7 hold, 8 release, 9 go.
+        ("command", ctypes.c_uint32),
+        # Always 0.
+        ("reserved", ctypes.c_uint32),
+    ]
+
+
+class ControlResponse(_Message):
+    """What became of a command. Response of `<name>/control`."""
+
+    LAYOUT = 1
+    _fields_ = [
+        # That of the request.
+        ("id", ctypes.c_uint64),
+        # The period at whose beginning the command was obeyed.
+        ("tick", ctypes.c_uint64),
+        # Simulated seconds of that period.
+        ("sim_time", ctypes.c_double),
+        # Simulated seconds per second, as in force.
+        ("time_scale", ctypes.c_double),
+        # 0 done, 1 already so, 2 refused in this state, 3 value out of range, 4 not understood, 5 too many waiting.
+        ("code", ctypes.c_uint32),
+        # Whether simulated time advances, as in `FrameHeader.playback`.
+        ("playback", ctypes.c_uint32),
+        # The latest cue passed, from 1; 0 where none has been.
+        ("cue", ctypes.c_uint32),
+        # Always 0.
+        ("reserved", ctypes.c_uint32),
+    ]
+
+
 class StageSegment(_Message):
     """One segment of the path in a `Stage`."""
 
@@ -349,7 +416,7 @@ class Stage(_Message):
     ]
 
 
-MESSAGES = (HandlePose, FrameHeader, CollisionAlert, LoopStatus, Stage)
+MESSAGES = (HandlePose, FrameHeader, CollisionAlert, LoopStatus, Cue, ControlRequest, ControlResponse, Stage)
 
 # From here on written by hand.
 

@@ -10,12 +10,13 @@ use std::sync::mpsc;
 
 use anstyle::Style;
 use bench_dragon::live::clock::{SystemClock, realtime_ns};
+use bench_dragon::live::control::{Doors, door};
 use bench_dragon::live::statistics::{self, Inbox, Run, RunSummary, Summary};
 use bench_dragon::live::{Counts, Deliveries, End, LoopOptions, Publisher, run_loop};
 use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::{Accepted, AtEnd, Scene};
-use bench_dragon::show::{Playback, Show};
+use bench_dragon::show::{Playback, ReachedCue, Show};
 use bench_dragon::transports::iceoryx2::{OpenError, service_name};
 use bench_dragon::transports::{self, Transport, TransportConfig, TransportError};
 use bench_dragon::wire::sentence::{Figures, alert_sentence};
@@ -51,6 +52,12 @@ pub struct RunArguments {
     /// Begin again whenever the show has ended
     #[arg(long = "loop", help_heading = "The show")]
     looping: bool,
+    /// Wait at the start until told to go (see the command `control`)
+    #[arg(long, help_heading = "The show")]
+    paused: bool,
+    /// Wall time for which a looping show stands at its end, seconds; by default the scene's
+    #[arg(long, value_name = "SECONDS", hide = true)]
+    end_hold: Option<f64>,
     /// Publish ROS 2 topics too, as the scene's [publish.ros2] says or the usual ones
     #[arg(long)]
     ros2: bool,
@@ -83,8 +90,12 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
         Show::new(&scene, timeline, playback).map_err(|error| CommandError::BadInput(format!("--start: {error}")))?;
     let stop = stop_on_signals()?;
     let run_id = RandomState::new().hash_one(realtime_ns());
+    for name in show.missing_cues() {
+        log::warn!("cue \"{name}\" has no time in this show: its event does not happen, or too early");
+    }
     let (timeline, solver) = (show.timeline().clone(), show.solver_reason().to_owned());
-    let session = RunSession { common, arguments, scene: &scene, playback, run_id, timeline, solver };
+    let cues = show.cues().to_vec();
+    let session = RunSession { common, arguments, scene: &scene, playback, run_id, timeline, cues, solver };
     session.run(show, &stop)
 }
 
@@ -99,6 +110,7 @@ struct RunSession<'a> {
     playback: Playback,
     run_id: u64,
     timeline: Timeline,
+    cues: Vec<ReachedCue>,
     /// The solver and why it was chosen.
     solver: String,
 }
@@ -106,7 +118,7 @@ struct RunSession<'a> {
 impl RunSession<'_> {
     /// Runs the loop on one thread and the statistics on another.
     fn run(&self, mut show: Show, stop: &Arc<AtomicBool>) -> Result<(), CommandError> {
-        let transports = self.open_transports()?;
+        let (transports, mut doors) = self.open_transports()?;
         let (reports, inbox) = statistics::queues();
         let done = AtomicBool::new(false);
         let (opened, opening) = mpsc::channel();
@@ -122,7 +134,7 @@ impl RunSession<'_> {
                         return None;
                     }
                 };
-                Some(run_loop(&SystemClock, &mut show, &mut publishers, self.loop_options(), reports, stop))
+                Some(run_loop(&SystemClock, &mut show, &mut doors, &mut publishers, self.loop_options(), reports, stop))
             });
             // The thread sends exactly once; should it have died, nothing comes.
             let transports = opening.recv().unwrap_or_else(|_| Err(lost("loop's")));
@@ -150,10 +162,19 @@ impl RunSession<'_> {
         error.map_or(Ok(()), |error| Err(CommandError::Failed(error.to_string())))
     }
 
-    fn open_transports(&self) -> Result<Vec<Box<dyn Transport>>, CommandError> {
+    /// The transports, and the loop's ends of those that have a door for commands.
+    fn open_transports(&self) -> Result<(Vec<Box<dyn Transport>>, Doors), CommandError> {
         let stage = convert::stage(self.run_id, realtime_ns(), &self.scene.motion);
         let (name, scene, loop_rate) = (&self.common.name, self.scene, self.playback.rate);
-        Ok(transports::open(&TransportConfig { name, scene, loop_rate, stage })?)
+        let mut transports = transports::open(&TransportConfig { name, scene, loop_rate, stage })?;
+        let mut ports = Vec::new();
+        for transport in &mut transports {
+            let (port, outer) = door();
+            if transport.control(outer)?.is_none() {
+                ports.push(port);
+            }
+        }
+        Ok((transports, Doors::new(ports)))
     }
 
     /// What the loop's thread does first: asks the system for what it was told to, opens its ends of the transports.
@@ -206,6 +227,13 @@ impl RunSession<'_> {
         }
         for timed in self.timeline.events() {
             eprintln!("{}", sentence(scene, timed));
+        }
+        for cue in &self.cues {
+            let waits = if cue.pauses { ", waits there" } else { "" };
+            eprintln!("  cue {} \"{}\" at {} s{waits}", cue.number, cue.name, number(cue.time));
+        }
+        if self.playback.paused {
+            eprintln!("Waiting at the start: bench-dragon control go");
         }
         if self.timeline.find(EventKind::Contact).is_some_and(|contact| contact.time == 0.0) {
             log::warn!("boards overlap at the start of this scene");
@@ -283,6 +311,8 @@ impl RunArguments {
             time_scale: self.time_scale,
             rate: self.rate.unwrap_or(scene.rate),
             at_end: if self.looping { AtEnd::Loop } else { scene.at_end },
+            end_hold: self.end_hold.unwrap_or(scene.end_hold),
+            paused: self.paused,
             ..Playback::of(scene)
         })
     }

@@ -168,7 +168,8 @@ impl SoakArguments {
         if let Some(scene) = &common.scene {
             shared.extend(["--scene".into(), scene.into()]);
         }
-        let mut publisher: Vec<OsString> = vec!["--loop".into(), "--end-with-parent".into()];
+        let mut publisher: Vec<OsString> =
+            ["--loop", "--end-hold", "0", "--end-with-parent"].map(OsString::from).to_vec();
         publisher.extend(self.ros2.then(|| "--ros2".into()));
         publisher.extend(self.rate.into_iter().flat_map(|rate| ["--rate".into(), rate.to_string().into()]));
         publisher.extend(self.scheduling.arguments());

@@ -53,6 +53,14 @@ impl Frames for FakeFrames {
         self.frame.tick = tick;
         &self.frame
     }
+
+    fn command(&mut self, _: u64, _: Command) -> Option<Outcome> {
+        None
+    }
+
+    fn finished_step(&mut self, _: u64) -> Option<Outcome> {
+        None
+    }
 }
 
 struct FakePublisher {
@@ -174,7 +182,8 @@ impl Setup {
         let (samples, mut received) = rtrb::RingBuffer::new(1 << 17);
         let (alerts, _) = rtrb::RingBuffer::new(1);
         let reports = Reports { samples, alerts };
-        let result = run_loop(&*clock, &mut frames, &mut publishers, options, reports, &clock.stop);
+        let result =
+            run_loop(&*clock, &mut frames, &mut Doors::default(), &mut publishers, options, reports, &clock.stop);
         drop((frames, publishers));
         Observed {
             result,

@@ -4,6 +4,7 @@
 //! since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/alerts`, `/status`,
 //! `/stage` and the event service `<name>/tick`.
 
+mod control;
 mod error;
 mod memory;
 pub mod stale_files;
@@ -22,10 +23,11 @@ use ::iceoryx2::service::port_factory::{event, publish_subscribe};
 
 use super::{Transport, TransportConfig, TransportError};
 use crate::live::clock::monotonic_ns;
+use crate::live::control::Door;
 use crate::live::{Deliveries, PublishError, Publisher, StatusPublisher};
 use crate::show::Frame;
-use crate::wire::convert::{collision_alert, handle_pose};
-use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
+use crate::wire::convert::{collision_alert, cue, handle_pose};
+use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
 
 pub use error::OpenError;
 use error::{failed, incomplete, port_error, service_error};
@@ -82,12 +84,17 @@ pub struct PublisherConfig {
     pub subscribers: usize,
     /// Whether there is an alerts service.
     pub alerts: bool,
+    /// Whether there is a cues service.
+    pub cues: bool,
     /// The stage, sent once and kept for late subscribers.
     pub stage: Stage,
 }
 
 /// The services of a run.
-struct Iceoryx2(PublisherConfig);
+struct Iceoryx2 {
+    config: PublisherConfig,
+    control: Option<control::ControlThread>,
+}
 
 /// The services that the scene asks for, which every scene does; nothing is opened yet but a thread that removes
 /// [`stale_files`].
@@ -99,32 +106,40 @@ pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, Tran
     service_name(name, "poses")?;
     stale_files::spawn_reaper();
     let (handles, subscribers) = (scene.team().handles(), scene.subscribers);
-    Ok(Some(Box::new(Iceoryx2(PublisherConfig {
+    let config = PublisherConfig {
         name: name.to_owned(),
         handles,
         queue: scene.queue.unwrap_or_else(|| default_queue(handles, subscribers)),
         subscribers,
         alerts: scene.alerts.is_some(),
+        cues: !scene.cues.is_empty(),
         stage,
-    }))))
+    };
+    Ok(Some(Box::new(Iceoryx2 { config, control: None })))
 }
 
 impl Transport for Iceoryx2 {
     fn describe(&self) -> String {
-        let PublisherConfig { name, queue, subscribers, alerts, .. } = &self.0;
+        let PublisherConfig { name, queue, subscribers, alerts, cues, .. } = &self.config;
         let alerts = if *alerts { ", /alerts" } else { "" };
+        let cues = if *cues { ", /cues" } else { "" };
         format!(
-            "iceoryx2 services: {name}/poses{alerts}, /status, /stage, /tick (queues of {queue} frames for \
+            "iceoryx2 services: {name}/poses{alerts}{cues}, /status, /stage, /tick, /control (queues of {queue} frames for \
              {subscribers} subscribers)."
         )
     }
 
     fn publisher(&mut self) -> Result<Box<dyn Publisher>, TransportError> {
-        Ok(Box::new(SharedMemoryPublisher::open(&self.0)?))
+        Ok(Box::new(SharedMemoryPublisher::open(&self.config)?))
     }
 
     fn status(&mut self) -> Result<Box<dyn StatusPublisher>, TransportError> {
-        Ok(Box::new(StatusSender::open(&self.0.name, self.0.subscribers)?))
+        Ok(Box::new(StatusSender::open(&self.config.name, self.config.subscribers)?))
+    }
+
+    fn control(&mut self, door: Door) -> Result<Option<Door>, TransportError> {
+        self.control = Some(control::ControlThread::start(&self.config.name, door)?);
+        Ok(None)
     }
 
     fn finish(self: Box<Self>) -> Option<(&'static str, Deliveries)> {
@@ -140,6 +155,7 @@ pub struct SharedMemoryPublisher {
     poses: Sender<[HandlePose], FrameHeader>,
     poses_service: Service<[HandlePose], FrameHeader>,
     alerts: Option<Sender<CollisionAlert, ()>>,
+    cues: Option<Sender<Cue, ()>>,
     stage: Sender<Stage, ()>,
     tick: Notifier<ipc::Service>,
     tick_service: event::PortFactory<ipc::Service>,
@@ -170,6 +186,7 @@ impl SharedMemoryPublisher {
             .create()
             .map_err(|error| port_error(name, "poses", error))?;
         let alerts = if config.alerts { Some(sender(&node, name, "alerts", config.subscribers)?) } else { None };
+        let cues = if config.cues { Some(sender(&node, name, "cues", config.subscribers)?) } else { None };
         let stage = sender(&node, name, "stage", config.subscribers)?;
         stage.send_copy(config.stage).map_err(|error| failed(name, "stage", error))?;
         let tick_service = node
@@ -184,7 +201,7 @@ impl SharedMemoryPublisher {
             })?;
         let tick = tick_service.notifier_builder().create().map_err(|error| failed(name, "tick", error))?;
         reserve_pages()?;
-        Ok(Self { poses, poses_service: frame_service, alerts, stage, tick, tick_service, _node: node })
+        Ok(Self { poses, poses_service: frame_service, alerts, cues, stage, tick, tick_service, _node: node })
     }
 
     fn send_frame(&self, header: &FrameHeader, frame: &Frame) -> Result<(), String> {
@@ -192,6 +209,14 @@ impl SharedMemoryPublisher {
         let mut sample = sample.write_from_fn(|handle| handle_pose(&frame.chain, handle));
         *sample.user_header_mut() = FrameHeader { sent_ns: monotonic_ns(), ..*header };
         sample.send().map(|_| ()).map_err(|error| error.to_string())
+    }
+
+    fn send_cues(&self, header: &FrameHeader, frame: &Frame) -> Result<(), String> {
+        let Some(port) = &self.cues else { return Ok(()) };
+        for reached in &frame.cues {
+            port.send_copy(cue(header, reached)).map_err(|error| error.to_string())?;
+        }
+        Ok(())
     }
 
     fn send_alerts(&self, header: &FrameHeader, frame: &Frame) -> Result<(), String> {
@@ -206,6 +231,7 @@ impl SharedMemoryPublisher {
 impl Publisher for SharedMemoryPublisher {
     fn publish(&mut self, header: &FrameHeader, frame: &Frame) -> Result<(), PublishError> {
         let sent = self.send_frame(header, frame).and_then(|()| self.send_alerts(header, frame));
+        let sent = sent.and_then(|()| self.send_cues(header, frame));
         sent.map_err(|reason| PublishError(format!("the shared memory failed: {reason}")))?;
         // Waking costs a socket write per listener, several times what sending does: it is left out for nobody.
         if self.tick_service.dynamic_config().number_of_listeners() > 0 {
@@ -219,6 +245,9 @@ impl Publisher for SharedMemoryPublisher {
         // A late subscriber gets the history of a service only when its publisher looks for new connections.
         if let Some(alerts) = &self.alerts {
             let _ = alerts.update_connections();
+        }
+        if let Some(cues) = &self.cues {
+            let _ = cues.update_connections();
         }
         let _ = self.stage.update_connections();
         let _ = self.poses.update_connections();

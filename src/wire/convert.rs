@@ -7,14 +7,15 @@ use crate::model::path::{OutlineKind, SegmentOutline};
 use crate::model::spiral::Direction;
 use crate::motion::Motion;
 use crate::motion::event::EventKind;
-use crate::show::Frame;
 use crate::show::alerts::Alert;
+use crate::show::control::Code;
 use crate::show::state::{FrameState, Level, PlaybackState};
+use crate::show::{Frame, Outcome, ReachedCue};
 use crate::solve::Chain;
 
 use super::layouts::{
-    CollisionAlert, FrameHeader, HandlePose, MOST_SEGMENTS, NO_BENCH, SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE,
-    SEGMENT_OUTWARD_SPIRAL, Stage, StageSegment,
+    CollisionAlert, ControlResponse, Cue, FrameHeader, HandlePose, MOST_SEGMENTS, NO_BENCH, SEGMENT_ARC,
+    SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, SceneName, Stage, StageSegment,
 };
 
 /// A route of the most steps, and the line on which its team stands, fit into a stage.
@@ -90,6 +91,21 @@ pub fn collision_alert(header: &FrameHeader, alert: &Alert) -> CollisionAlert {
     message
 }
 
+/// The message of a cue that a frame has reached.
+pub fn cue(header: &FrameHeader, reached: &ReachedCue) -> Cue {
+    let FrameHeader { run_id, tick, stamp_ns, sim_time, .. } = *header;
+    let ReachedCue { number, time, pauses, ref name } = *reached;
+    let (pauses, name) = (u32::from(pauses), SceneName::new(name));
+    Cue { run_id, tick, stamp_ns, sim_time, cue_time: time, number, pauses, name }
+}
+
+/// The response to a request with this id.
+pub fn control_response(id: u64, outcome: &Outcome) -> ControlResponse {
+    let Outcome { code, tick, sim_time, time_scale, playback, cue } = *outcome;
+    let (code, playback) = (code as u32, playback as u32);
+    ControlResponse { id, tick, sim_time, time_scale, code, playback, cue, reserved: 0 }
+}
+
 /// The stage of a motion.
 pub fn stage(run_id: u64, stamp_ns: u64, motion: &Motion) -> Stage {
     let team = motion.team();
@@ -136,6 +152,18 @@ impl FrameHeader {
     /// The state, or `None` for a number that this layout does not know.
     pub fn frame_state(&self) -> Option<FrameState> {
         of_number(&FrameState::ALL, self.state)
+    }
+
+    /// Whether the show plays, or `None` for a number that this layout does not know.
+    pub fn playback_state(&self) -> Option<PlaybackState> {
+        of_number(&PlaybackState::ALL, self.playback)
+    }
+}
+
+impl ControlResponse {
+    /// What became of the command, or `None` for a number that this layout does not know.
+    pub fn result(&self) -> Option<Code> {
+        of_number(&Code::ALL, self.code)
     }
 
     /// Whether the show plays, or `None` for a number that this layout does not know.

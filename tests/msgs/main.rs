@@ -27,8 +27,8 @@ use std::sync::LazyLock;
 use bench_dragon::show::state::{FrameState, Level, PlaybackState};
 use bench_dragon::transports::ros2::messages::{HandlePoses, Header, Stamped, type_name};
 use bench_dragon::wire::{
-    CollisionAlert, FrameHeader, HandlePose, LoopStatus, NO_BENCH, SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE,
-    SEGMENT_OUTWARD_SPIRAL, Stage, StageSegment,
+    CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus, NO_BENCH, SEGMENT_ARC,
+    SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, Stage, StageSegment,
 };
 use iceoryx2::prelude::ZeroCopySend;
 use serde::Serialize;
@@ -318,6 +318,9 @@ fn python_sees_the_layouts_and_the_names_of_rust() {
         layout::<FrameHeader>(),
         layout::<CollisionAlert>(),
         layout::<LoopStatus>(),
+        layout::<Cue>(),
+        layout::<ControlRequest>(),
+        layout::<ControlResponse>(),
         layout::<Stage>(),
     ];
     assert_eq!(said["messages"].as_array().unwrap().len(), messages.len(), "a message is not compared");

@@ -121,7 +121,7 @@ impl Counted {
                 self.pass();
                 Code::Done
             }
-            Rate(rate) if !(rate > 0.0) => Code::OutOfRange,
+            Rate(rate) if rate <= 0.0 => Code::OutOfRange,
             Rate(rate) if rate * UNITS as f64 == (self.scale * RATE) as f64 => Code::Already,
             Rate(rate) => {
                 (self.scale, self.at_end) = ((rate * UNITS as f64) as i64 / RATE, 0);

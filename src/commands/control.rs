@@ -1,0 +1,141 @@
+//! `control`: conducts a running publisher.
+
+use std::time::Duration;
+
+use bench_dragon::show::control::{Code, Command};
+use bench_dragon::show::state::PlaybackState;
+use bench_dragon::subscribers::control::{ControlError, Controller};
+use bench_dragon::wire::ControlResponse;
+use serde::Serialize;
+
+use super::{CommandError, Common, Output, number};
+
+/// How long a publisher is given to answer; a step answers when it is over.
+const TIMEOUT: Duration = Duration::from_secs(30);
+
+/// Arguments of `control`.
+#[derive(Debug, clap::Args)]
+pub struct ControlArguments {
+    #[command(subcommand)]
+    action: Action,
+    /// Wait at most so long for the answer, seconds: a step answers when it is over
+    #[arg(long, value_name = "SECONDS", default_value_t = TIMEOUT.as_secs_f64(), global = true)]
+    timeout: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, clap::Subcommand)]
+enum Action {
+    /// Print how the show stands
+    State,
+    /// Simulated time stands still; frames go out at full rate
+    Pause,
+    /// Simulated time advances again
+    Resume,
+    /// Pause a show that plays, resume one that is paused
+    Toggle,
+    /// Simulated seconds per second of wall time from now on
+    #[command(allow_negative_numbers = true)]
+    Rate {
+        /// 1e-6 to 1e6
+        rate: f64,
+    },
+    /// To a simulated time
+    #[command(allow_negative_numbers = true)]
+    Seek {
+        /// Seconds since the start of the scene
+        time: f64,
+    },
+    /// So many periods, then paused again
+    Step {
+        /// Periods of the loop
+        #[arg(default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1 << 53))]
+        periods: u64,
+    },
+    /// To the start of the show
+    Restart,
+    /// Stand still until released, whatever else is commanded
+    Hold,
+    /// From hold to paused
+    Release,
+    /// On from a cue that pauses, or from --paused
+    Go,
+}
+
+/// The line of `control --json`.
+#[derive(Serialize)]
+struct ResponseLine {
+    code: &'static str,
+    tick: u64,
+    sim_time: f64,
+    time_scale: f64,
+    playback: &'static str,
+    cue: u32,
+}
+
+/// Sends one command and prints what became of it.
+pub fn control(common: &Common, arguments: &ControlArguments) -> Result<(), CommandError> {
+    let timeout = Duration::try_from_secs_f64(arguments.timeout);
+    let timeout = timeout.map_err(|_| {
+        CommandError::BadInput(format!("--timeout is {}, expected a number of seconds", arguments.timeout))
+    })?;
+    let mut controller = Controller::new(&common.name)?;
+    let command = match arguments.action {
+        Action::State => Command::State,
+        Action::Pause => Command::Pause,
+        Action::Resume => Command::Resume,
+        Action::Toggle => {
+            let paused = controller.send(Command::State, timeout)?.playback_state() == Some(PlaybackState::Paused);
+            if paused { Command::Resume } else { Command::Pause }
+        }
+        Action::Rate { rate } => Command::Rate(rate),
+        Action::Seek { time } => Command::Seek(time),
+        Action::Step { periods } => Command::Step(periods),
+        Action::Restart => Command::Restart,
+        Action::Hold => Command::Hold,
+        Action::Release => Command::Release,
+        Action::Go => Command::Go,
+    };
+    let response = controller.send(command, timeout)?;
+    print(common, &response)?;
+    refusal(&response, command).map_or(Ok(()), |sentence| Err(CommandError::Failed(sentence)))
+}
+
+fn print(common: &Common, response: &ControlResponse) -> Result<(), CommandError> {
+    let code = response.result().map_or("unknown", Code::name);
+    let playback = response.playback_state().map_or("unknown", PlaybackState::name);
+    let ControlResponse { tick, sim_time, time_scale, cue, .. } = *response;
+    let mut output = Output::standard();
+    if common.json {
+        output.json(&ResponseLine { code, tick, sim_time, time_scale, playback, cue })?;
+    } else if !common.quiet {
+        let rate = if time_scale > 0.0 { format!(" at {} x", number(time_scale)) } else { String::new() };
+        output.line(&format!("{playback}{rate}, t = {sim_time:.3} s, tick {tick}"))?;
+    }
+    output.finish()
+}
+
+/// Why a command was not obeyed; `None` where it was.
+fn refusal(response: &ControlResponse, command: Command) -> Option<String> {
+    let (number_of_command, value) = command.number_and_value();
+    let name = Command::NAMES[number_of_command as usize];
+    let playback = response.playback_state().map_or("in an unknown state", PlaybackState::name);
+    match response.result() {
+        Some(Code::Done | Code::Already) => None,
+        Some(Code::Refused) if command == Command::Go => {
+            Some(format!("go is refused: the show waits for nothing ({playback})"))
+        }
+        Some(Code::Refused) => Some(format!("{name} is refused: the show is {playback}")),
+        Some(Code::OutOfRange) => Some(format!("{name} is refused: {} is out of range", number(value))),
+        Some(Code::TooMany) => Some(format!("{name} is refused: too many commands are waiting")),
+        Some(Code::NotUnderstood) | None => Some(format!("{name} is not understood by this publisher")),
+    }
+}
+
+impl From<ControlError> for CommandError {
+    fn from(error: ControlError) -> Self {
+        match error {
+            ControlError::Open(error) => error.into(),
+            other => Self::Failed(other.to_string()),
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! Conducting a running publisher over shared memory: from the command line and from Python, in every state, at an exact
+//! tick, and at no cost to the stream.
+
+mod processes;
+
+use std::process::Command;
+
+use processes::{
+    Process, can_run, json_lines, program, python, python_modules, scene_file, summary, text, unique, wait,
+};
+use serde_json::Value;
+
+fn publisher(name: &str, arguments: &[&str]) -> Process {
+    let process = Process::start(program(name).args(["run", "--json"]).args(arguments));
+    // The service of the loop's status is the last to appear.
+    for _ in 0..300 {
+        if control(name, &["state"]).0 == 0 {
+            return process;
+        }
+        wait(0.1);
+    }
+    panic!("no publisher: {}", text(&process.output_within(1).stderr).lines().last().unwrap_or_default());
+}
+
+/// Exit code, the response as printed, and the sentence on standard error.
+fn control(name: &str, arguments: &[&str]) -> (i32, Value, String) {
+    let output = program(name).args(["--json", "control"]).args(arguments).output().unwrap();
+    let line = json_lines(&output).pop().unwrap_or(Value::Null);
+    (output.status.code().unwrap(), line, text(&output.stderr))
+}
+
+fn done(name: &str, arguments: &[&str]) -> Value {
+    let (code, line, sentence) = control(name, arguments);
+    assert_eq!((code, &line["code"]), (0, &"done".into()), "{arguments:?}: {line} {sentence}");
+    line
+}
+
+fn peer(name: &str, what: &str) -> Command {
+    let mut command = python();
+    command.args(["tests/python/conduct_peer.py", "--name", &unique(name), what]);
+    command
+}
+
+#[test]
+fn the_command_line_conducts_a_show() {
+    let name = "conducted";
+    let publisher = publisher(name, &["--rate", "50", "--start", "100", "--duration", "60"]);
+    let paused = done(name, &["pause"]);
+    assert_eq!((&paused["playback"], &paused["time_scale"]), (&"paused".into(), &0.0.into()));
+    let at = paused["sim_time"].as_f64().unwrap();
+    assert_eq!(at, 100.0 + paused["tick"].as_f64().unwrap() / 50.0, "the pause is at the tick it names");
+    wait(0.3);
+    assert_eq!(done(name, &["state"])["sim_time"], at);
+    let (code, line, sentence) = control(name, &["pause"]);
+    assert_eq!((code, &line["code"]), (0, &"already".into()), "{sentence}");
+    let stepped = done(name, &["step", "10"]);
+    assert!((stepped["sim_time"].as_f64().unwrap() - (at + 10.0 / 50.0)).abs() < 1e-12);
+    assert_eq!(stepped["playback"], "paused");
+    assert_eq!(done(name, &["seek", "300.5"])["sim_time"], 300.5);
+    done(name, &["rate", "4"]);
+    let resumed = done(name, &["toggle"]);
+    assert_eq!((&resumed["playback"], &resumed["time_scale"]), (&"playing".into(), &4.0.into()));
+    let later = done(name, &["state"]);
+    let [ticks, seconds] =
+        ["tick", "sim_time"].map(|key| later[key].as_f64().unwrap() - resumed[key].as_f64().unwrap());
+    assert!((seconds - 4.0 * ticks / 50.0).abs() < 1e-9 && ticks > 0.0, "{seconds} s in {ticks} ticks");
+    assert_eq!(done(name, &["restart"])["sim_time"], 100.0);
+    // Hold is latched.
+    assert_eq!(done(name, &["hold"])["playback"], "held");
+    let (code, line, sentence) = control(name, &["resume"]);
+    assert_eq!((code, &line["code"]), (1, &"refused".into()));
+    assert!(sentence.contains("resume is refused: the show is held"), "{sentence}");
+    assert_eq!(done(name, &["release"])["playback"], "paused");
+    let (code, _, sentence) = control(name, &["seek", "1e6"]);
+    assert!(code == 1 && sentence.contains("out of range"), "{code} {sentence}");
+    let (code, _, sentence) = control("nobody", &["pause"]);
+    assert!(code == 1 && sentence.contains("nobody publishes"), "{code} {sentence}");
+    assert_eq!(control(name, &["step", "0"]).0, 2);
+    publisher.signal(nix::sys::signal::Signal::SIGINT);
+    let summary = summary(&publisher.output_within(20));
+    assert_eq!(summary["end"], "signal");
+}
+
+#[test]
+fn every_command_in_every_state_from_python() {
+    if !can_run(python_modules(&["iceoryx2", "numpy"])) {
+        return;
+    }
+    let name = "table";
+    let _publisher = publisher(name, &["--rate", "200", "--duration", "60"]);
+    let output = Process::start(&mut peer(name, "table")).output_within(60);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let lines = json_lines(&output);
+    let codes = |state: &str| -> Vec<u64> {
+        lines.iter().filter(|line| line["state"] == state).map(|line| line["code"].as_u64().unwrap()).collect()
+    };
+    // state, pause, resume, rate, seek, step, restart, hold, release, go
+    assert_eq!(codes("playing"), [0, 0, 1, 0, 0, 2, 0, 0, 2, 2]);
+    assert_eq!(codes("paused"), [0, 1, 0, 0, 0, 0, 0, 0, 2, 2]);
+    assert_eq!(codes("held"), [0, 2, 2, 2, 2, 2, 2, 1, 0, 2]);
+    // Two commands that do not exist, and six values that no show can take.
+    assert_eq!(codes("any"), [4, 4, 3, 3, 3, 3, 3, 3]);
+}
+
+#[test]
+fn a_flood_and_killed_clients_cost_the_stream_nothing() {
+    if !can_run(python_modules(&["iceoryx2", "numpy"])) {
+        return;
+    }
+    let name = "flooded";
+    let publisher = publisher(name, &["--rate", "100", "--duration", "12"]);
+    let watch = Process::start(program(name).args(["watch", "--json", "--duration", "6"]));
+    for _ in 0..2 {
+        let mut flood = Process::start(&mut peer(name, "flood"));
+        flood.lines().until("flooding", 20);
+        wait(1.0);
+        // Another is answered meanwhile.
+        done(name, &["pause"]);
+        done(name, &["resume"]);
+        flood.signal(nix::sys::signal::Signal::SIGKILL);
+    }
+    let seconds = json_lines(&watch.output_within(20));
+    let last = seconds.iter().rfind(|line| line["type"] == "second").unwrap();
+    assert_eq!(last["missed"], 0, "{last}");
+    assert!(last["received"].as_u64().unwrap() > 0);
+    let summary = summary(&publisher.output_within(30));
+    let [frames, skipped] = ["frames", "skipped"].map(|key| summary[key].as_u64().unwrap());
+    assert_eq!(frames + skipped, 1200, "{summary}");
+}
+
+#[test]
+fn a_show_waits_for_go_at_its_start_and_at_its_cues() {
+    let name = "cues";
+    let scene = scene_file(name, &[]);
+    let cues = "[[cues]]\nname = \"lamps\"\nat = 0.2\n[[cues]]\nname = \"coil\"\ntravelled = 0.5\nthen = \"pause\"\n";
+    std::fs::write(&scene, format!("{}\n{cues}", std::fs::read_to_string(&scene).unwrap())).unwrap();
+    let scene = scene.to_str().unwrap();
+    let _publisher = publisher(name, &["--scene", scene, "--rate", "50", "--paused", "--duration", "60"]);
+    let state = done(name, &["state"]);
+    assert_eq!((&state["playback"], &state["sim_time"], &state["cue"]), (&"paused".into(), &0.0.into(), &0.into()));
+    done(name, &["go"]);
+    wait(1.0);
+    let state = done(name, &["state"]);
+    assert_eq!((&state["playback"], &state["sim_time"], &state["cue"]), (&"paused".into(), &0.5.into(), &2.into()));
+    done(name, &["go"]);
+    let (code, line, sentence) = control(name, &["go"]);
+    assert!(code == 1 && line["code"] == "refused" && sentence.contains("waits for nothing"), "{line} {sentence}");
+}
