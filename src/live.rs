@@ -18,8 +18,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::show::control::Command;
 use crate::show::{Frame, Outcome, Show};
-use crate::wire::convert::{Stamps, collision_alert, frame_header};
-use crate::wire::{CollisionAlert, FrameHeader, LoopStatus};
+use crate::wire::convert::{Stamps, collision_alert, cue, frame_header};
+use crate::wire::{CollisionAlert, Cue, FrameHeader, LoopStatus};
 
 use clock::{Clock, Deadlines};
 use control::Doors;
@@ -142,12 +142,26 @@ pub struct Deliveries {
     pub discarded: u64,
 }
 
+/// What went out besides a frame, for the terminal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Announcement {
+    /// An alert.
+    Alert {
+        /// As it was published.
+        alert: CollisionAlert,
+        /// Simulated seconds per second of wall time, as in force then.
+        time_scale: f64,
+    },
+    /// A cue that the show has reached.
+    Cue(Cue),
+}
+
 /// The queues from the loop to the statistics thread, allocated beforehand.
 pub struct Reports {
     /// One sample a frame.
     pub samples: rtrb::Producer<Sample>,
-    /// Every alert.
-    pub alerts: rtrb::Producer<CollisionAlert>,
+    /// Every alert and every cue.
+    pub announcements: rtrb::Producer<Announcement>,
 }
 
 /// Publishes a frame a period until `stop` is set or the periods are over.
@@ -251,7 +265,11 @@ fn wait<C: Clock>(
 /// sample or the line on the terminal is lost, never the frame or the alert that was published.
 fn report(reports: &mut Reports, header: &FrameHeader, frame: &Frame, sample: Sample) {
     for alert in &frame.alerts {
-        let _ = reports.alerts.push(collision_alert(header, alert));
+        let announcement = Announcement::Alert { alert: collision_alert(header, alert), time_scale: header.time_scale };
+        let _ = reports.announcements.push(announcement);
+    }
+    for reached in &frame.cues {
+        let _ = reports.announcements.push(Announcement::Cue(cue(header, reached)));
     }
     let _ = reports.samples.push(sample);
 }

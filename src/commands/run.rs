@@ -12,15 +12,15 @@ use anstyle::Style;
 use bench_dragon::live::clock::{SystemClock, realtime_ns};
 use bench_dragon::live::control::{Doors, door};
 use bench_dragon::live::statistics::{self, Inbox, Run, RunSummary, Summary};
-use bench_dragon::live::{Counts, Deliveries, End, LoopOptions, Publisher, run_loop};
+use bench_dragon::live::{Announcement, Counts, Deliveries, End, LoopOptions, Publisher, run_loop};
 use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::{Accepted, AtEnd, Scene};
 use bench_dragon::show::{Playback, ReachedCue, Show};
 use bench_dragon::transports::iceoryx2::{OpenError, service_name};
 use bench_dragon::transports::{self, Transport, TransportConfig, TransportError};
+use bench_dragon::wire::convert;
 use bench_dragon::wire::sentence::{Figures, alert_sentence};
-use bench_dragon::wire::{CollisionAlert, convert};
 
 use super::events::sentence;
 use super::realtime_scheduling::RealtimeScheduling;
@@ -201,7 +201,7 @@ impl RunSession<'_> {
             rate: self.playback.rate,
             scene: &self.scene.name,
             sinks: transports.iter_mut().map(|transport| transport.status()).collect::<Result<_, _>>()?,
-            announce: Box::new(|alert| self.print_alert(alert)),
+            announce: Box::new(|announcement| self.print_announcement(announcement)),
         };
         Ok((statistics::collect(&SystemClock, inbox, run, done), transports))
     }
@@ -240,14 +240,25 @@ impl RunSession<'_> {
         }
     }
 
-    /// One line an alert, with the countdown in wall time.
-    fn print_alert(&self, alert: &CollisionAlert) {
-        let Some(level) = alert.alert_level().filter(|_| !self.common.quiet && !self.common.json) else { return };
-        let colour = Style::new().fg_color(Some(level_colour(level.into()).into()));
-        let style = if shows_colour(&std::io::stderr()) { colour } else { Style::new() };
-        let figures = Figures::Shown { time_scale: self.playback.time_scale };
-        let said = alert_sentence(alert, self.scene.team().benches as u32, figures);
-        eprintln!("{:>10.3} s  {style}{:<11}{style:#} {said}", alert.sim_time, level.name());
+    /// One line an alert, with the countdown in wall time, and one a cue.
+    fn print_announcement(&self, announcement: &Announcement) {
+        if self.common.quiet || self.common.json {
+            return;
+        }
+        match announcement {
+            Announcement::Alert { alert, time_scale } => {
+                let Some(level) = alert.alert_level() else { return };
+                let colour = Style::new().fg_color(Some(level_colour(level.into()).into()));
+                let style = if shows_colour(&std::io::stderr()) { colour } else { Style::new() };
+                let figures = Figures::Shown { time_scale: *time_scale };
+                let sentence = alert_sentence(alert, self.scene.team().benches as u32, figures);
+                eprintln!("{:>10.3} s  {style}{:<11}{style:#} {sentence}", alert.sim_time, level.name());
+            }
+            Announcement::Cue(cue) => {
+                let waits = if cue.pauses == 1 { ": waiting for go" } else { "" };
+                eprintln!("{:>10.3} s  cue {} \"{}\"{waits}", cue.sim_time, cue.number, cue.name.as_str());
+            }
+        }
     }
 
     fn print_summary(

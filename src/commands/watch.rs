@@ -12,7 +12,7 @@ use bench_dragon::subscribers::connection::Wake;
 use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
 use bench_dragon::subscribers::monitor::{IntervalReport, Latency, Monitor, Presence};
 use bench_dragon::wire::json::AlertObject;
-use bench_dragon::wire::sentence::{Figures, alert_sentence};
+use bench_dragon::wire::sentence::{Figures, alert_sentence, time_until};
 use bench_dragon::wire::{CollisionAlert, LoopStatus};
 use crossterm::{cursor, execute, terminal};
 use serde::Serialize;
@@ -227,7 +227,7 @@ impl Screen<'_> {
             report.alert.filter(|alert| alert.alert_level() == Some(Level::Approaching) && alert.event_time > sim_time);
         ahead.map_or(String::new(), |alert| {
             let event = alert.event_kind().map_or("event", EventKind::name);
-            format!("  {event} in {:.1} s", (alert.event_time - sim_time) / self.time_scale)
+            format!("  {event} {}", time_until(alert.event_time - sim_time, self.time_scale))
         })
     }
 

@@ -14,30 +14,30 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde::{Deserialize, Serialize};
 
 use super::clock::Clock;
-use super::{Deliveries, End, StatusPublisher};
-use crate::wire::{CollisionAlert, LoopStatus};
+use super::{Announcement, Deliveries, End, StatusPublisher};
+use crate::wire::LoopStatus;
 
 pub use accumulator::{Accumulator, Percentiles, Sample, Summary};
 
 /// Samples that their queue holds: three seconds of the highest rate.
 const QUEUED_SAMPLES: usize = 1 << 16;
-/// Alerts that their queue holds.
-const QUEUED_ALERTS: usize = 1 << 10;
+/// Alerts and cues that their queue holds.
+const QUEUED_ANNOUNCEMENTS: usize = 1 << 10;
 /// Nanoseconds between two emptyings of the queues.
 const POLL_INTERVAL_NS: u64 = 20_000_000;
 
 /// The queues between the loop and this thread.
 pub fn queues() -> (super::Reports, Inbox) {
     let (samples, sample_inbox) = rtrb::RingBuffer::new(QUEUED_SAMPLES);
-    let (alerts, alert_inbox) = rtrb::RingBuffer::new(QUEUED_ALERTS);
-    let reports = super::Reports { samples, alerts };
-    (reports, Inbox { samples: sample_inbox, alerts: alert_inbox })
+    let (announcements, announcement_inbox) = rtrb::RingBuffer::new(QUEUED_ANNOUNCEMENTS);
+    let reports = super::Reports { samples, announcements };
+    (reports, Inbox { samples: sample_inbox, announcements: announcement_inbox })
 }
 
 /// This thread's ends of the queues.
 pub struct Inbox {
     samples: rtrb::Consumer<Sample>,
-    alerts: rtrb::Consumer<CollisionAlert>,
+    announcements: rtrb::Consumer<Announcement>,
 }
 
 /// The summary of a run: what `run --json` prints at its end, and a soak test reads.
@@ -70,8 +70,8 @@ pub struct Run<'a> {
     pub scene: &'a str,
     /// Where the status goes.
     pub sinks: Vec<Box<dyn StatusPublisher>>,
-    /// What is done with each alert.
-    pub announce: Box<dyn FnMut(&CollisionAlert) + 'a>,
+    /// What is done with each alert and cue.
+    pub announce: Box<dyn FnMut(&Announcement) + 'a>,
 }
 
 /// Collects until `done` is set and the queues are empty.
@@ -80,8 +80,8 @@ pub fn collect<C: Clock>(clock: &C, mut inbox: Inbox, mut run: Run, done: &Atomi
     loop {
         // Read before the queues are emptied: what was pushed before it was set is then still seen.
         let ending = done.load(Ordering::Acquire);
-        while let Ok(alert) = inbox.alerts.pop() {
-            (run.announce)(&alert);
+        while let Ok(announcement) = inbox.announcements.pop() {
+            (run.announce)(&announcement);
         }
         while let Ok(sample) = inbox.samples.pop() {
             accumulator.record(&sample);

@@ -180,8 +180,8 @@ impl Setup {
         let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(publisher)];
         let options = LoopOptions { run_id: 9, rate: self.rate.hertz(), periods: self.periods };
         let (samples, mut received) = rtrb::RingBuffer::new(1 << 17);
-        let (alerts, _) = rtrb::RingBuffer::new(1);
-        let reports = Reports { samples, alerts };
+        let (announcements, _) = rtrb::RingBuffer::new(1);
+        let reports = Reports { samples, announcements };
         let result =
             run_loop(&*clock, &mut frames, &mut Doors::default(), &mut publishers, options, reports, &clock.stop);
         drop((frames, publishers));

@@ -12,7 +12,7 @@ use crate::show::state::Level;
 pub enum Figures {
     /// It does.
     Shown {
-        /// Simulated seconds per second of wall time, in which the time until the event is given.
+        /// Simulated seconds per second of wall time, in which the time until the event is given; 0 while paused.
         time_scale: f64,
     },
     /// It does not: they stand beside the sentence.
@@ -63,10 +63,15 @@ fn happening(alert: &CollisionAlert, kind: EventKind, benches: u32) -> String {
 fn coming(alert: &CollisionAlert, kind: EventKind, benches: u32, figures: Figures) -> String {
     let who = names(alert.event_benches(), benches);
     let when = match figures {
-        Figures::Shown { time_scale } => format!(" in {:.1} s", alert.time_to_event / time_scale),
+        Figures::Shown { time_scale } => format!(" {}", time_until(alert.time_to_event, time_scale)),
         Figures::Omitted => String::new(),
     };
     format!("{}: {who}{when}", kind.name())
+}
+
+/// Wall time until so many simulated seconds have passed, at a rate in force; a show that stands still comes nowhere.
+pub fn time_until(simulated_seconds: f64, time_scale: f64) -> String {
+    if time_scale > 0.0 { format!("in {:.1} s", simulated_seconds / time_scale) } else { "not while paused".to_owned() }
 }
 
 /// Zero has no sign for people: a touch is solved to the last bits, on either side.
@@ -140,6 +145,16 @@ mod tests {
         let lock = CollisionAlert { event_bench_b: NO_BENCH, ..alert(Level::Lock, Some(EventKind::Lock)) };
         let said = alert_sentence(&lock, 223, SHOWN);
         assert!(said.starts_with("bench 1 (the head) locks, its rear handle at (1.250, -0.500) m"), "{said}");
+    }
+
+    #[test]
+    fn a_show_that_stands_still_comes_to_no_event() {
+        let contact = alert(Level::Approaching, Some(EventKind::Contact));
+        let sentence = alert_sentence(&contact, 9, Figures::Shown { time_scale: 0.0 });
+        assert!(
+            sentence.starts_with("contact: bench 1 (the head) and bench 9 (the tail) not while paused"),
+            "{sentence}"
+        );
     }
 
     #[test]

@@ -8,6 +8,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::live::simulated::{REALTIME_OFFSET_NS, SimulatedClock};
 use crate::live::{Counts, End};
+use crate::wire::CollisionAlert;
 
 const SECOND_NS: u64 = 1_000_000_000;
 const START_NS: u64 = 77 * SECOND_NS + 5;
@@ -191,13 +192,17 @@ impl StatusPublisher for Statuses {
 fn the_thread_gives_each_sink_a_status_a_second_and_every_alert_in_order() {
     let (mut reports, inbox) = queues();
     (0..30).for_each(|sequence| reports.samples.push(sample(sequence, 0, 0)).unwrap());
-    let alert = |tick| CollisionAlert { tick, ..CollisionAlert::default() };
-    (0..3).for_each(|tick| reports.alerts.push(alert(tick)).unwrap());
+    let alert =
+        |tick| Announcement::Alert { alert: CollisionAlert { tick, ..CollisionAlert::default() }, time_scale: 1.0 };
+    (0..3).for_each(|tick| reports.announcements.push(alert(tick)).unwrap());
     let clock = SimulatedClock::new(START_NS, []).stopping_at(START_NS + 5 * SECOND_NS + SECOND_NS / 2);
     let (first, second) = (Rc::default(), Rc::default());
     let sinks = [&first, &second].map(|list| Box::new(Statuses(Rc::clone(list))) as Box<dyn StatusPublisher>);
     let mut announced = Vec::new();
-    let announce = Box::new(|alert: &CollisionAlert| announced.push(alert.tick));
+    let announce = Box::new(|announcement: &Announcement| {
+        let Announcement::Alert { alert, .. } = announcement else { panic!("{announcement:?}") };
+        announced.push(alert.tick);
+    });
     let run = Run { run_id: 11, rate: 30.0, scene: "paper", sinks: sinks.into(), announce };
     let summary = collect(&clock, inbox, run, &clock.stop);
 
