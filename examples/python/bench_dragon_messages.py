@@ -24,7 +24,7 @@ STATES = (
     "contact",
     # A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
     "stall",
-    # A link is in a singular configuration: the motion cannot go on.
+    # A link is in a singular configuration: the motion cannot continue.
     "lock",
     # The head has reached the end of the path.
     "path_end",
@@ -58,9 +58,9 @@ EVENTS = {
     5: "path_end",
 }
 
-# Whether simulated time goes on.
+# Whether simulated time advances.
 PLAYBACK = (
-    # Simulated time goes on.
+    # Simulated time advances.
     "playing",
     # Simulated time stands still until it is resumed.
     "paused",
