@@ -6,6 +6,7 @@
 pub mod newton;
 pub mod paper;
 pub mod reference;
+pub mod selection;
 pub mod table;
 
 use crate::linkage::NoFollower;

@@ -105,15 +105,21 @@ pub struct ClearanceMonitor {
     last_pair: Option<(usize, usize)>,
     table: Option<Box<BoundTable>>,
     carried: CarriedBounds,
+    /// Metres that a link of a frame may be off its length.
+    link_error: f64,
     counters: ClearanceCounters,
 }
 
+/// Metres that a link of an exact frame is off at most, and more.
+const EXACT_LINK_ERROR: f64 = 1e-9;
+
 impl ClearanceMonitor {
-    /// A monitor for chains of `team` whose handles are where motion along `path` has them, to 1e-9 m. From the `table` of
-    /// that motion it makes one of its own, in some 15 ms for a way of 500 links and about half a second at most: if that is
+    /// A monitor for chains of `team` whose handles are where motion along `path` has them, as far as `table` promises. From
+    /// the table it makes one of its own, in some 15 ms for a way of 500 links and about half a second at most: if that is
     /// not enough, the monitor does without.
     pub fn new(path: &Path, team: Team, table: &FollowerTable) -> Self {
-        Self { table: BoundTable::new(path, &team, table).map(Box::new), ..Self::without_table(team) }
+        let link_error = EXACT_LINK_ERROR.max(2.0 * table.accuracy());
+        Self { table: BoundTable::new(path, &team, table).map(Box::new), link_error, ..Self::without_table(team) }
     }
 
     /// A monitor for chains of `team` wherever the handles are.
@@ -124,6 +130,7 @@ impl ClearanceMonitor {
             last_pair: None,
             table: None,
             carried: CarriedBounds::new(team.benches),
+            link_error: EXACT_LINK_ERROR,
             counters: ClearanceCounters::default(),
         }
     }
@@ -146,7 +153,7 @@ impl ClearanceMonitor {
         if self.team.benches < 3 {
             return None;
         }
-        let mut search = Search::new(chain, &self.team, self.last_pair);
+        let mut search = Search::new(chain, &self.team, self.link_error, self.last_pair);
         let located = self.table.as_ref().and_then(|table| Some((table, table.locate(travelled, self.team.benches)?)));
         let unsettled = match located {
             Some((table, located)) => search.by_table(table, located),
