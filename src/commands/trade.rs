@@ -160,7 +160,7 @@ struct Label {
 impl Label {
     const HEIGHT: i32 = 13;
     /// What a letter takes, rounded up.
-    const LETTER: i32 = 6;
+    const LETTER: i32 = 5;
     /// Where labels may stand.
     const LEFTMOST: i32 = 86;
     const RIGHTMOST: i32 = 1010;

@@ -42,9 +42,15 @@ impl Local {
 
 /// The polynomials of one piece for the rows of a band, block by block.
 pub(super) trait Blocks: Copy {
+    /// The coefficients of one block.
+    type Block;
+
+    /// The blocks from one on.
+    fn blocks(self, first: usize) -> impl Iterator<Item = Self::Block>;
+
     /// The polynomials of one block, Horner's scheme for values and slopes; without velocities the last three are
     /// unspecified.
-    fn outputs<const FUSED: bool, const VELOCITIES: bool>(&self, block: usize, local: &Local) -> Outputs;
+    fn outputs<const FUSED: bool, const VELOCITIES: bool>(block: Self::Block, local: &Local) -> Outputs;
 }
 
 /// Writes all handles but the head from a table in double precision. `FUSED` says that the processor multiplies and adds
@@ -93,7 +99,8 @@ pub(super) fn write_band<B: Blocks, const FUSED: bool, const VELOCITIES: bool>(
     for partial in (whole.start > 0).then_some(0).into_iter().chain(last) {
         let row = first_row + partial * LANES;
         let lanes = rows.start.max(row) - row..rows.end.min(row + LANES) - row;
-        let outputs = source.outputs::<FUSED, VELOCITIES>(first_block + partial, local);
+        let Some(block) = source.blocks(first_block + partial).next() else { return };
+        let outputs = B::outputs::<FUSED, VELOCITIES>(block, local);
         store_some::<VELOCITIES>(&outputs, lanes, chain, row + 1, second);
     }
     // Whole blocks are stored straight from registers.
@@ -103,11 +110,11 @@ pub(super) fn write_band<B: Blocks, const FUSED: bool, const VELOCITIES: bool>(
         let number = whole.end - whole.start;
         let [x, y, heading, speed, vx, vy] =
             [x, y, heading, speed, vx, vy].map(|list| &mut list[handle..].as_chunks_mut::<LANES>().0[..number]);
-        for index in 0..number {
+        for (index, block) in source.blocks(first_block + whole.start).enumerate().take(number) {
             // Where the polynomials are short, LLVM else takes the blocks for what is to be vectorised, with gathers and
             // scatters: four times as slow.
             std::hint::black_box(());
-            let outputs = source.outputs::<FUSED, VELOCITIES>(first_block + whole.start + index, local);
+            let outputs = B::outputs::<FUSED, VELOCITIES>(block, local);
             x[index] = outputs[0];
             y[index] = outputs[1];
             heading[index] = outputs[2];
@@ -157,10 +164,17 @@ impl<'a, const K: usize, const H: usize> Doubles<'a, K, H> {
     }
 }
 
-impl<const K: usize, const H: usize> Blocks for Doubles<'_, K, H> {
+impl<'a, const K: usize, const H: usize> Blocks for Doubles<'a, K, H> {
+    type Block = &'a [Lanes];
+
     #[inline(always)]
-    fn outputs<const FUSED: bool, const VELOCITIES: bool>(&self, block: usize, local: &Local) -> Outputs {
-        let block = &self.coefficients[block * (2 * K + H)..][..2 * K + H];
+    fn blocks(self, first: usize) -> impl Iterator<Item = &'a [Lanes]> {
+        self.coefficients[first * (2 * K + H)..].chunks_exact(2 * K + H)
+    }
+
+    #[inline(always)]
+    fn outputs<const FUSED: bool, const VELOCITIES: bool>(block: &'a [Lanes], local: &Local) -> Outputs {
+        let block = &block[..2 * K + H];
         let [mut x, mut y] = [block[K - 1].0, block[2 * K - 1].0];
         let [mut vx, mut vy] = [[0.0; LANES]; 2];
         let mut heading = block[2 * K + H - 1].0;

@@ -61,10 +61,17 @@ impl<'a, const K: usize, const H: usize> PackedBlocks<'a> for Single<'a, K, H> {
     }
 }
 
-impl<const K: usize, const H: usize> Blocks for Single<'_, K, H> {
+impl<'a, const K: usize, const H: usize> Blocks for Single<'a, K, H> {
+    type Block = &'a [Singles];
+
     #[inline(always)]
-    fn outputs<const FUSED: bool, const VELOCITIES: bool>(&self, block: usize, local: &Local) -> Outputs {
-        let block = &self.coefficients[block * (2 * K + H)..][..2 * K + H];
+    fn blocks(self, first: usize) -> impl Iterator<Item = &'a [Singles]> {
+        self.coefficients[first * (2 * K + H)..].chunks_exact(2 * K + H)
+    }
+
+    #[inline(always)]
+    fn outputs<const FUSED: bool, const VELOCITIES: bool>(block: &'a [Singles], local: &Local) -> Outputs {
+        let block = &block[..2 * K + H];
         let (coordinates, headings) = block.split_at(2 * K);
         let (xs, ys) = coordinates.split_at(K);
         let beta = local.beta as f32;
@@ -94,11 +101,22 @@ impl<'a, const K: usize, const H: usize> PackedBlocks<'a> for Mixed<'a, K, H> {
     }
 }
 
-impl<const K: usize, const H: usize> Blocks for Mixed<'_, K, H> {
+impl<'a, const K: usize, const H: usize> Blocks for Mixed<'a, K, H> {
+    type Block = (&'a [Lanes], &'a [Singles]);
+
     #[inline(always)]
-    fn outputs<const FUSED: bool, const VELOCITIES: bool>(&self, block: usize, local: &Local) -> Outputs {
-        let constants = &self.constants[2 * block..][..2];
-        let block = &self.coefficients[block * (2 * (K - 1) + H)..][..2 * (K - 1) + H];
+    fn blocks(self, first: usize) -> impl Iterator<Item = (&'a [Lanes], &'a [Singles])> {
+        let per_block = 2 * (K - 1) + H;
+        let constants = self.constants[2 * first..].chunks_exact(2);
+        constants.zip(self.coefficients[first * per_block..].chunks_exact(per_block))
+    }
+
+    #[inline(always)]
+    fn outputs<const FUSED: bool, const VELOCITIES: bool>(
+        (constants, block): (&'a [Lanes], &'a [Singles]),
+        local: &Local,
+    ) -> Outputs {
+        let (constants, block) = (&constants[..2], &block[..2 * (K - 1) + H]);
         let (coordinates, headings) = block.split_at(2 * (K - 1));
         let (xs, ys) = coordinates.split_at(K - 1);
         let beta = local.beta as f32;
