@@ -95,7 +95,7 @@ fn measured(selection: &Selection, asked: f64) -> String {
     } else if selection.is_at_the_floor() {
         format!("for the {asked:e} m asked, which doubles cannot hold everywhere here")
     } else if *accuracy < asked {
-        format!("for the {asked:e} m asked, taken as {accuracy:.1e} m, a hundredth of a link")
+        format!("for the {asked:e} m asked, taken as {accuracy:.1e} m, a thousandth of a link")
     } else {
         format!("for the {asked:e} m asked")
     };

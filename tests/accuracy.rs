@@ -56,8 +56,7 @@ fn assert_kept(motion: &Motion, wish: f64, solver: &mut dyn Solver, times: &[f64
     let team = motion.team();
     let newton = Newton::new(motion.path().clone(), *team, motion.head_speed(), Velocities::Computed);
     let (mut found, mut truth) = (Chain::new(team.handles()), Chain::new(team.handles()));
-    // Less would be no chain.
-    let wish = wish.min(0.01 * team.shortest_link());
+    let wish = wish.min(1e-3 * team.shortest_link());
     for &time in times {
         if newton.solve_at(motion.head_speed() * time, &mut truth).is_err() {
             continue;

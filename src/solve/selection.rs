@@ -28,8 +28,9 @@ const MOST_HANDLES: usize = 500_000;
 /// Moments, at least.
 const FEWEST_MOMENTS: usize = 4;
 
-/// The greatest wish that is taken at its word, in links: beyond it a chain is no chain.
-const COARSEST: f64 = 0.01;
+/// The greatest wish that is taken at its word, in links. Weaker ones would make the live clearance test dozens of pairs a
+/// frame, which costs more than the frame itself can save.
+const COARSEST: f64 = 1e-3;
 
 /// Wishes up to this, metres, get links to 1e-12 of their length.
 pub const EXACT_LINKS: f64 = 1e-9;
@@ -49,7 +50,7 @@ const SHARE_MEASURED: f64 = 0.5;
 pub struct Selection {
     /// The solver.
     pub table: FollowerTable,
-    /// Metres: the wish, or a hundredth of the shortest link if that is less.
+    /// Metres: the wish, or a thousandth of the shortest link if that is less.
     pub accuracy: f64,
     /// Metres: the largest distance of a handle from the safe solver's.
     pub error: f64,

@@ -55,6 +55,14 @@ impl Instructions {
             .collect()
     }
 
+    /// The fastest for frames of so many handles. Large ones wait for memory, and the wider stores then cost a tenth: each
+    /// lies across two cache lines.
+    fn fastest(handles: usize) -> Self {
+        const LARGE: usize = 10_000;
+        let fastest = |instructions: &Self| *instructions != Self::Avx512 || handles < LARGE;
+        Self::available().into_iter().find(fastest).unwrap_or(Self::Portable)
+    }
+
     /// The name for people.
     pub fn name(self) -> &'static str {
         match self {
@@ -135,7 +143,7 @@ impl FollowerTable {
         let head = HeadBuilder::new(&track, &team, &rows).build()?;
         rows.bands.iter_mut().for_each(|band| band.centres = Vec::new());
         let newton = Newton::new(path.clone(), team, head_speed, velocities);
-        let instructions = Instructions::available()[0];
+        let instructions = Instructions::fastest(team.handles());
         let exact_bytes_per_handle = rows.bytes_per_row(team.benches);
         let (rows, head) = (Arc::new(rows), Arc::new(head));
         Some(Self {
@@ -164,7 +172,7 @@ impl FollowerTable {
     }
 
     /// The formats that frames can be read from besides the rows, the fewest bytes first.
-    pub(crate) fn formats() -> [Format; 4] {
+    pub(crate) fn formats() -> [Format; 3] {
         PackedRows::FORMATS
     }
 

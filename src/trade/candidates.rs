@@ -11,7 +11,7 @@ use crate::solve::selection;
 use crate::solve::table::{FollowerTable, Instructions};
 
 /// The wishes for accuracy that are measured, metres; the last gets the most exact table there is.
-const WISHES: [f64; 6] = [1e-2, 1e-4, 1e-6, 1e-7, 1e-9, 1e-18];
+const WISHES: [f64; 5] = [1e-4, 1e-6, 1e-7, 1e-9, 1e-18];
 
 /// All candidates for a scene, the most exact table on the fastest instructions first.
 pub(super) fn candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<Candidate> {

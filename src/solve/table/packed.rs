@@ -86,30 +86,26 @@ pub(super) struct PackedRows {
 /// Halvings of a piece of the rows, at most.
 const MOST_HALVINGS: usize = 7;
 
-/// Bytes of a packed table, at most, as a multiple of what the rows take.
+/// Bytes of a packed table, at most: a multiple of what the rows take, and so many more, which stay near the processor.
 const MOST_GROWTH: usize = 2;
+const SMALL: usize = 1 << 18;
 
 /// The relative rounding of single precision.
 const ROUNDING: f64 = 0.5 * f32::EPSILON as f64;
 
 impl PackedRows {
     /// The formats worth having, the fewest bytes first.
-    pub(super) const FORMATS: [Format; 4] = {
-        let [two, three, four] = [(2, 2), (3, 2), (4, 3)];
+    pub(super) const FORMATS: [Format; 3] = {
+        let [three, four] = [(3, 2), (4, 3)];
         const fn format(precision: Precision, (coordinate, heading): (usize, usize)) -> Format {
             Format { precision, lengths: Lengths { coordinate, heading } }
         }
-        [
-            format(Precision::Single, two),
-            format(Precision::Single, three),
-            format(Precision::Mixed, three),
-            format(Precision::Mixed, four),
-        ]
+        [format(Precision::Single, three), format(Precision::Mixed, three), format(Precision::Mixed, four)]
     };
 
     /// The rows from `foremost` on in another format; `None` where that would lose more than is allowed, or gain nothing.
     pub(super) fn new(rows: &Rows, foremost: usize, format: Format, allowed: Allowed) -> Option<Self> {
-        let mut budget = MOST_GROWTH * rows.memory_bytes();
+        let mut budget = MOST_GROWTH * rows.memory_bytes() + SMALL;
         let mut bands = Vec::with_capacity(rows.bands.len());
         for band in &rows.bands {
             let first = foremost.max(rows.valid_from as usize).clamp(band.first_row, band.first_row + band.rows);

@@ -14,7 +14,6 @@ use crate::solve::Chain;
 pub(super) fn write<const FUSED: bool, const VELOCITIES: bool>(rows: &PackedRows, moment: &Moment, chain: &mut Chain) {
     // The formats of `PackedRows::FORMATS`.
     match (rows.format.precision, rows.format.lengths.coordinate) {
-        (Precision::Single, 2) => write_bands::<Single<2, 2>, FUSED, VELOCITIES>(rows, moment, chain),
         (Precision::Single, _) => write_bands::<Single<3, 2>, FUSED, VELOCITIES>(rows, moment, chain),
         (Precision::Mixed, 3) => write_bands::<Mixed<3, 2>, FUSED, VELOCITIES>(rows, moment, chain),
         (Precision::Mixed, _) => write_bands::<Mixed<4, 3>, FUSED, VELOCITIES>(rows, moment, chain),
