@@ -161,7 +161,8 @@ const SIZES: [(usize, f64); 15] = [
     (1_000_000, 1e-4),
 ];
 
-/// Frames of what a wish for accuracy selects; prints the bytes a frame reads for a handle, and how long it took to make.
+/// Frames of what a wish for accuracy selects; prints the bytes a frame reads for a handle, and how long it took to
+/// make.
 #[divan::bench(args = SIZES, sample_count = 100, sample_size = 4)]
 fn accuracy_by_benches(bencher: Bencher, (benches, accuracy): (usize, f64)) {
     let selected = selection::cheapest(&spiral(), team(benches), 1.0, Velocities::Computed, accuracy);

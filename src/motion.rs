@@ -100,8 +100,8 @@ fn measured(selection: &Selection, asked: f64) -> String {
         format!("for the {asked:e} m asked")
     };
     format!(
-        "{error:.1e} m measured against newton at {moments} moments, {wish}; {:.0} bytes a handle, {:.2} of the most exact \
-         table's, {} kB, made in {:.0} ms",
+        "{error:.1e} m measured against newton at {moments} moments, {wish}; {:.0} bytes a handle, {:.2} of the most \
+         exact table's, {} kB, made in {:.0} ms",
         table.bytes_per_handle(),
         table.relative_cost(),
         table.memory_bytes().div_ceil(1000),

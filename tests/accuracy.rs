@@ -1,6 +1,6 @@
-//! A wish for accuracy decides: on every scene of `config/` and on random paths each wish gets a solver that keeps it, at
-//! moments that were not used for choosing it, against the safe solver and the reference of 38 digits; the weaker the wish,
-//! the fewer bytes a frame reads; events do not depend on it; the live clearance stays that of all pairs.
+//! A wish for accuracy decides: on every scene of `config/` and on random paths each wish gets a solver that keeps it,
+//! at moments that were not used for choosing it, against the safe solver and the reference of 38 digits; the weaker
+//! the wish, the fewer bytes a frame reads; events do not depend on it; the live clearance stays that of all pairs.
 
 use std::path::Path;
 
@@ -44,8 +44,8 @@ fn other_times(motion: &Motion, end: f64, count: usize) -> Vec<f64> {
     times
 }
 
-/// How far a frame may be off, handle by handle. Near a lock, where conditioning multiplies roundings, so much is allowed
-/// of these as the handle is faster than the head.
+/// How far a frame may be off, handle by handle. Near a lock, where conditioning multiplies roundings, so much is
+/// allowed of these as the handle is faster than the head.
 fn floor(motion: &Motion, time: f64, (x, y): (f64, f64), speed: f64) -> f64 {
     let haste = (speed / motion.head_speed()).abs().max(1.0);
     8.0 * f64::EPSILON * (x.hypot(y) + motion.head_speed() * time) * haste

@@ -1,8 +1,9 @@
-//! One suite that every solver runs, on every kind of path: the figures of 50 digits and the README's table of them, the
-//! promise against the reference of 38 digits, what follows from rigidity, and the same bits every time.
+//! One suite that every solver runs, on every kind of path: the figures of 50 digits and the README's table of them,
+//! the promise against the reference of 38 digits, what follows from rigidity, and the same bits every time.
 //!
 //! The promise: for the pose at the given double `time`, the error is at most max(accuracy, 8 eps (r + distance
-//! travelled)), and links hold to 1e-12 link + 4 ulp(r). `BENCH_DRAGON_LONG=1` runs 100,000 random scenes instead of 300.
+//! travelled)), and links hold to 1e-12 link + 4 ulp(r). `BENCH_DRAGON_LONG=1` runs 100,000 random scenes instead of
+//! 300.
 
 use std::cell::Cell;
 use std::f64::consts::{PI, TAU};
@@ -215,8 +216,8 @@ fn errors<'a>(solver: &mut dyn Solver, rows: impl Iterator<Item = &'a Row>) -> (
     (position, speed)
 }
 
-/// The README's table of errors against 50 digits, as this test measures it: nothing may be more than twice as far off as
-/// is printed there.
+/// The README's table of errors against 50 digits, as this test measures it: nothing may be more than twice as far off
+/// as is printed there.
 #[test]
 fn the_readme_says_how_exact_every_solver_is() {
     let readme = include_str!("../README.md");

@@ -5,9 +5,9 @@
 //! run: cost is counted in bytes, never timed. [`crate::motion`] and `trade` call it.
 //!
 //! Every candidate starts from one table of T whose own polynomials are off by a sixteenth of the wish. What a format
-//! loses of them is bounded over all phases while it is made; then frames are compared with the safe solver's at moments
-//! over the whole way, junctions and the last metres of the table included. Half the wish is left for what lies between
-//! these moments.
+//! loses of them is bounded over all phases while it is made; then frames are compared with the safe solver's at
+//! moments over the whole way, junctions and the last metres of the table included. Half the wish is left for what lies
+//! between these moments.
 
 use std::time::{Duration, Instant};
 
@@ -28,8 +28,8 @@ const MOST_HANDLES: usize = 500_000;
 /// Moments, at least.
 const FEWEST_MOMENTS: usize = 4;
 
-/// The greatest wish that is taken at its word, in links. Weaker ones would make the live clearance test dozens of pairs a
-/// frame, which costs more than the frame itself can save.
+/// The greatest wish that is taken at its word, in links. Weaker ones would make the live clearance test dozens of
+/// pairs a frame, which costs more than the frame itself can save.
 const COARSEST: f64 = 1e-3;
 
 /// Wishes up to this, metres, get links to 1e-12 of their length.
@@ -74,11 +74,12 @@ impl Selection {
     }
 }
 
-/// The cheapest table for `accuracy` metres, or the most exact one where none is as exact; `None` where there is no table
-/// for this team and path.
+/// The cheapest table for `accuracy` metres, or the most exact one where none is as exact; `None` where there is no
+/// table for this team and path.
 ///
 /// Positions are within max(accuracy, 8 eps (r + distance travelled)); headings within 2 accuracy / link; velocities
-/// within 10 accuracy / link of a handle's speed, so that a tenth of a link's way further on they lead no farther astray.
+/// within 10 accuracy / link of a handle's speed, so that a tenth of a link's way further on they lead no farther
+/// astray.
 pub fn cheapest(path: &Path, team: Team, head_speed: f64, velocities: Velocities, accuracy: f64) -> Option<Selection> {
     let began = Instant::now();
     let accuracy = accuracy.min(COARSEST * team.shortest_link());

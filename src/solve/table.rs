@@ -55,8 +55,8 @@ impl Instructions {
             .collect()
     }
 
-    /// The fastest for frames of so many handles. Large ones wait for memory, and the wider stores then cost a tenth: each
-    /// lies across two cache lines.
+    /// The fastest for frames of so many handles. Large ones wait for memory, and the wider stores then cost a tenth:
+    /// each lies across two cache lines.
     fn fastest(handles: usize) -> Self {
         const LARGE: usize = 10_000;
         let fastest = |instructions: &Self| *instructions != Self::Avx512 || handles < LARGE;

@@ -1,5 +1,5 @@
-//! The solvers that are measured: what every wish for accuracy selects, on all instructions; the safe solver; the paper's.
-//! Called by [`super::measure`] only.
+//! The solvers that are measured: what every wish for accuracy selects, on all instructions; the safe solver; the
+//! paper's. Called by [`super::measure`] only.
 
 use std::time::Instant;
 

@@ -2,11 +2,11 @@
 //! frame need only test the few pairs that can be the nearest.
 //!
 //! Where the second handle stands at T(alpha), the next ones stand at T(alpha + 1), T(alpha + 2) and so on: see
-//! [`crate::solve::table::rows`]. So how near a body bench is to those behind it depends on the alpha of its front handle
-//! alone. Every row of T is divided into [`CELLS`] equal cells, so that while one handle is in a cell, the next is in the
-//! same cell of the next row. Each (row, cell) has a list of the benches that can be near, with a proven lower bound of
-//! the signed distance to each (see [`super::moving`]), in ascending order; the last entry stands for all others. The
-//! lists' first bounds are kept once more cell by cell, where those of a whole chain lie side by side.
+//! [`crate::solve::table::rows`]. So how near a body bench is to those behind it depends on the alpha of its front
+//! handle alone. Every row of T is divided into [`CELLS`] equal cells, so that while one handle is in a cell, the next
+//! is in the same cell of the next row. Each (row, cell) has a list of the benches that can be near, with a proven
+//! lower bound of the signed distance to each (see [`super::moving`]), in ascending order; the last entry stands for
+//! all others. The lists' first bounds are kept once more cell by cell, where those of a whole chain lie side by side.
 //!
 //! The head's link differs, but while the second handle is in a cell, the head too is near a known quadratic polynomial
 //! of the cell's time. Its list holds while it is so near as was taken for granted, which every frame confirms; past a
@@ -369,8 +369,8 @@ fn head_knots(path: &Path, follower: &FollowerTable, link: f64) -> Option<Vec<Op
     Some(knots)
 }
 
-/// How the head goes from one knot to the next: the quadratic next to the cubic of their places and slopes; a frame's head
-/// may be `handle_error` metres from the path.
+/// How the head goes from one knot to the next: the quadratic next to the cubic of their places and slopes; a frame's
+/// head may be `handle_error` metres from the path.
 fn head_track(knots: &[Option<HeadKnot>], handle_error: f64) -> Option<Quadratic> {
     let [Some(begin), Some(end)] = knots else { return None };
     let middle = 0.5 * (begin.place + end.place) + 0.25 * (begin.slope - end.slope);

@@ -25,9 +25,10 @@ const MOST_MOVED: f64 = 100.0;
 
 /// For every bench, how near it can be to those behind it, carried from frame to frame.
 ///
-/// If no handle is farther than D from where it was, no point of a board is farther than [`corner_reach`] times D (a little
-/// more where links are off their length), and no two boards are nearer by more than twice that, however the handles have
-/// moved meanwhile. So what a bench was known to keep clear, less that for all movement since, it still does.
+/// If no handle is farther than D from where it was, no point of a board is farther than [`corner_reach`] times D (a
+/// little more where links are off their length), and no two boards are nearer by more than twice that, however the
+/// handles have moved meanwhile. So what a bench was known to keep clear, less that for all movement since, it still
+/// does.
 #[derive(Debug, Clone)]
 pub(super) struct CarriedBounds {
     /// The handles in the frame before.
@@ -183,8 +184,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Tests `a` against every later bench of a grid that can be within the limit; returns a lower bound of its distance
-    /// to all of them, which is at most `skin` beyond the limit.
+    /// Tests `a` against every later bench of a grid that can be within the limit; returns a lower bound of its
+    /// distance to all of them, which is at most `skin` beyond the limit.
     fn by_grid(&mut self, grid: &Grid, a: usize, skin: f64) -> f64 {
         let board_a = board(self.chain, self.team, a);
         let centre = (board_a.centre.x, board_a.centre.y);
@@ -246,8 +247,8 @@ impl<'a> Search<'a> {
         value
     }
 
-    /// A lower bound of the signed distance of `board_a` and bench `b`, from the gaps along `board_a`'s sides and without a
-    /// square root: the half link of `b` is stretched to its half board, and its width taken as if across.
+    /// A lower bound of the signed distance of `board_a` and bench `b`, from the gaps along `board_a`'s sides and
+    /// without a square root: the half link of `b` is stretched to its half board, and its width taken as if across.
     fn gap_bound(&self, board_a: &Board, b: usize) -> f64 {
         let Chain { x, y, .. } = self.chain;
         let half_link = (0.5 * (x[b] - x[b + 1]), 0.5 * (y[b] - y[b + 1]));

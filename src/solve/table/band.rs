@@ -305,8 +305,8 @@ pub(super) fn within_half_turn(angle: f64) -> f64 {
     }
 }
 
-/// The first row of bands so far behind that shorter polynomials and more pieces serve a frame better: it then waits for
-/// memory, of which each piece of a row takes less.
+/// The first row of bands so far behind that shorter polynomials and more pieces serve a frame better: it then waits
+/// for memory, of which each piece of a row takes less.
 const FAR_ROW: usize = 512;
 
 /// The table for `team` on `path`; `None` where there is none, or a too large one.

@@ -1,7 +1,7 @@
 //! A frame from the table: every handle behind the head by itself, eight at a time.
 //!
-//! Called by the follower table, and for other formats by [`super::single_kernel`]. The loops over [`LANES`] have a fixed length, so that the
-//! compiler turns them into vectors.
+//! Called by the follower table, and for other formats by [`super::single_kernel`]. The loops over [`LANES`] have a
+//! fixed length, so that the compiler turns them into vectors.
 
 use std::f64::consts::{PI, TAU};
 
@@ -53,8 +53,8 @@ pub(super) trait Blocks: Copy {
     fn outputs<const FUSED: bool, const VELOCITIES: bool>(block: Self::Block, local: &Local) -> Outputs;
 }
 
-/// Writes all handles but the head from a table in double precision. `FUSED` says that the processor multiplies and adds
-/// in one instruction.
+/// Writes all handles but the head from a table in double precision. `FUSED` says that the processor multiplies and
+/// adds in one instruction.
 ///
 /// The heading of the last handle is not its own.
 #[inline(always)]
@@ -111,8 +111,8 @@ pub(super) fn write_band<B: Blocks, const FUSED: bool, const VELOCITIES: bool>(
         let [x, y, heading, speed, vx, vy] =
             [x, y, heading, speed, vx, vy].map(|list| &mut list[handle..].as_chunks_mut::<LANES>().0[..number]);
         for (index, block) in source.blocks(first_block + whole.start).enumerate().take(number) {
-            // Where the polynomials are short, LLVM else takes the blocks for what is to be vectorised, with gathers and
-            // scatters: four times as slow.
+            // Where the polynomials are short, LLVM else takes the blocks for what is to be vectorised, with gathers
+            // and scatters: four times as slow.
             std::hint::black_box(());
             let outputs = B::outputs::<FUSED, VELOCITIES>(block, local);
             x[index] = outputs[0];

@@ -1,7 +1,9 @@
-//! The table once more in fewer bytes: shorter polynomials over shorter pieces, in single precision where that is enough.
+//! The table once more in fewer bytes: shorter polynomials over shorter pieces, in single precision where that is
+//! enough.
 //!
-//! In: the rows of T, and what may be lost. Out: the same bands with pieces of their own, and a proven bound of what was
-//! lost, over all phases and all rows that a frame can read. Made for the frame alone; the clearance reads the rows.
+//! In: the rows of T, and what may be lost. Out: the same bands with pieces of their own, and a proven bound of what
+//! was lost, over all phases and all rows that a frame can read. Made for the frame alone; the clearance reads the
+//! rows.
 //!
 //! Every polynomial of a piece is written for a part of it, exactly, and shortened by Chebyshev polynomials, which says
 //! what that changes at most; to this comes the rounding of single precision. Where it is too much, the part is halved.
@@ -103,7 +105,8 @@ impl PackedRows {
         [format(Precision::Single, three), format(Precision::Mixed, three), format(Precision::Mixed, four)]
     };
 
-    /// The rows from `foremost` on in another format; `None` where that would lose more than is allowed, or gain nothing.
+    /// The rows from `foremost` on in another format; `None` where that would lose more than is allowed, or gain
+    /// nothing.
     pub(super) fn new(rows: &Rows, foremost: usize, format: Format, allowed: Allowed) -> Option<Self> {
         let mut budget = MOST_GROWTH * rows.memory_bytes() + SMALL;
         let mut bands = Vec::with_capacity(rows.bands.len());
@@ -205,7 +208,8 @@ impl Builder<'_> {
         [x, y, heading].map(|polynomial| on_part(&polynomial, 0.5 * (begin + end), 0.5 * (end - begin)))
     }
 
-    /// Shortens the polynomials of a row; returns what that and the rounding change at most, as a part of what is allowed.
+    /// Shortens the polynomials of a row; returns what that and the rounding change at most, as a part of what is
+    /// allowed.
     fn loss(&self, polynomials: &mut Polynomials) -> f64 {
         let Lengths { coordinate, heading } = self.format.lengths;
         let [x, y, angle] = polynomials;
