@@ -155,6 +155,14 @@ impl Motion {
         Self::new(self.description.clone(), self.team, self.head_speed, method)
     }
 
+    /// Metres by which the links of this motion's frames may be off, besides rounding.
+    pub fn link_tolerance(&self) -> f64 {
+        match self.method {
+            Method::Accuracy(accuracy) => selection::link_tolerance(&self.team, accuracy),
+            _ => 0.0,
+        }
+    }
+
     /// Simulated seconds after which the head has travelled so many metres along the path, as the method has it.
     pub fn time_at(&self, travelled: f64) -> f64 {
         match (self.method, self.path.as_spiral()) {

@@ -46,6 +46,11 @@ const SHARE_OF_ROWS: f64 = 1.0 / 16.0;
 const SHARE_OF_FORMAT: f64 = 3.0 / 8.0;
 const SHARE_MEASURED: f64 = 0.5;
 
+/// Metres by which links may be off, besides rounding, where this accuracy was asked for: both ends may be off by as much.
+pub fn link_tolerance(team: &Team, accuracy: f64) -> f64 {
+    if accuracy > EXACT_LINKS { 2.0 * accuracy.min(COARSEST * team.shortest_link()) } else { 0.0 }
+}
+
 /// A table and what was measured of it.
 pub struct Selection {
     /// The solver.
