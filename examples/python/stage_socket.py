@@ -8,21 +8,22 @@ Prints the stage and the alerts as they come and the head's place once a second.
 
 import argparse
 import json
+import math
 import struct
 import time
 
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-VERSION = 2
+VERSION = 3
 HEADER = struct.Struct("<BBBxI d d Q Q Q Q f I I 4x")
-HANDLE = struct.Struct("<4f")
+HANDLE = struct.Struct("<5f")
 STATES = ["moving", "approaching", "contact", "stall", "lock", "path_end"]
 PLAYBACK = ["playing", "paused", "held", "ended"]
 
 
 def frame(message):
-    """The header as a dictionary and one (x, y, heading, speed) for each handle."""
+    """The header as a dictionary and one (x, y, heading, vx, vy) for each handle."""
     if message[0] != VERSION:
         raise SystemExit(f"the server speaks version {message[0]} of the layout, this program version {VERSION}")
     (
@@ -66,8 +67,8 @@ def follow(socket, deadline):
             header, handles = frame(message)
             if time.monotonic() - told >= 1:
                 told = time.monotonic()
-                x, y, _, speed = handles[0]
-                print(f"t = {header['sim_time']:8.3f} s  {header['state']:11} head ({x:.3f}, {y:.3f}) m  {speed:.3f} m/s", flush=True)
+                x, y, _, vx, vy = handles[0]
+                print(f"t = {header['sim_time']:8.3f} s  {header['state']:11} head ({x:.3f}, {y:.3f}) m  {math.hypot(vx, vy):.3f} m/s", flush=True)
         if time.monotonic() > deadline:
             return
 

@@ -1,7 +1,8 @@
 // The page: puts the stream into the drawing and into words, and takes the user's hand.
 
+import { STRIDE, speedOf } from "./hermite.js";
 import { Stream } from "./stream.js";
-import { Camera, Ground, benchAt, draw, interpolated, paletteOf, pathOf } from "./drawing.js";
+import { Camera, Ground, benchAt, draw, paletteOf, pathOf } from "./drawing.js";
 
 const STATES = ["moving", "approaching", "contact", "stall", "lock", "path_end"];
 const SIGNS = { moving: "○", approaching: "△", contact: "✖", stall: "■", lock: "■", path_end: "●" };
@@ -10,8 +11,11 @@ const canvas = element("stage"), context = canvas.getContext("2d", { alpha: fals
 const stream = new Stream(), camera = new Camera(), ground = new Ground();
 let palette = paletteOf(canvas), places = null, path = null, pathRun = null, chosen = -1, range = null, still = false, last = null;
 
-/** For tests and measurements: what the page has received and drawn; `latency` and `ways` in ms since the frame was sent. */
-const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, latency: [], ways: stream.ways, toPixel: (x, y) => camera.toPixel(x, y) };
+/**
+ * For tests and measurements: what the page has received and drawn. `shown` is the simulated time and the handles of the
+ * latest picture; `latency` and `ways` in ms since the frame was sent.
+ */
+const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, shown: null, latency: [], ways: stream.ways, toPixel: (x, y) => camera.toPixel(x, y) };
 window.picture = picture;
 
 function put(id, text) {
@@ -30,14 +34,17 @@ function fitCanvas() {
 /** How far from the centre the outermost bench is. */
 function reachOf(stage, handles) {
   let most = 0;
-  for (let k = 0; k < handles.length; k += 4) most = Math.max(most, Math.hypot(handles[k], handles[k + 1]));
+  for (let k = 0; k < handles.length; k += STRIDE) most = Math.max(most, Math.hypot(handles[k], handles[k + 1]));
   return most + stage.width + stage.hole_inset || 1;
 }
 
 /** The colours' scale holds all speeds and changes gently; none while nothing moves or no speeds are sent. */
-function widen(speeds) {
+function widen(handles) {
   let [low, high] = [Infinity, -Infinity];
-  for (let k = 3; k < speeds.length; k += 4) if (speeds[k] > 0) [low, high] = [Math.min(low, speeds[k]), Math.max(high, speeds[k])];
+  for (let handle = 0; handle < handles.length / STRIDE; handle++) {
+    const speed = speedOf(handles, handle);
+    if (speed > 0) [low, high] = [Math.min(low, speed), Math.max(high, speed)];
+  }
   if (!(high > 0)) return null;
   // A hair's breadth is not worth a colour.
   const wider = Math.max(0, 0.01 * high - (high - low) / 2);
@@ -54,8 +61,8 @@ function pass() {
   picture.received = stream.received;
   updateText(now);
   if (!newest || !stage) return drawNothing();
-  const between = playback.between(now);
-  places = interpolated(between, places);
+  const shown = playback.at(now, places), { from, to } = shown;
+  places = shown.handles;
   const reach = reachOf(stage, newest.handles);
   // Positions are rounded to 32 bits, which alone moves the outermost bench a little.
   if (pathRun !== newest.run || reach > 1.001 * camera.reach) {
@@ -69,20 +76,20 @@ function pass() {
   const widened = widen(newest.handles);
   range = widened ?? range;
   still = !widened;
-  const { a, b, part } = between;
   // Nothing is drawn twice: a show that stands still costs nothing.
-  const all = [newest.run, newest.state, newest.handles[3], a.due, b.due, part, camera.x, camera.y, camera.zoom, camera.reach, camera.width, camera.height, camera.ratio, range?.low, range?.high, alert?.level, alert?.event_x, alert?.bench_a, alert?.bench_b, chosen, palette.ground].join();
+  const all = [newest.run, newest.state, still, shown.time, from.epoch, camera.x, camera.y, camera.zoom, camera.reach, camera.width, camera.height, camera.ratio, range?.low, range?.high, alert?.level, alert?.event_x, alert?.bench_a, alert?.bench_b, chosen, palette.ground].join();
   if (all !== last) {
-    draw(context, camera, palette, { stage, places, speeds: newest.handles, range, ground, path, alert, chosen });
+    draw(context, camera, palette, { stage, places, newest: newest.handles, range, ground, path, alert, chosen });
     last = all;
     picture.drawn++;
-    if (stream.clock !== null && a !== b) {
-      picture.latency.push(performance.now() + stream.clock - (a.sent + (b.sent - a.sent) * part));
+    if (stream.clock !== null && from !== to) {
+      const part = (shown.time - from.time) / (to.time - from.time);
+      picture.latency.push(performance.now() + stream.clock - (from.sent + (to.sent - from.sent) * part));
       if (picture.latency.length > 600) picture.latency.shift();
     }
   }
   const head = camera.toPixel(places[0], places[1]);
-  Object.assign(picture, { state: newest.state, run: newest.run, sequence: newest.sequence, time: newest.time, head });
+  Object.assign(picture, { state: newest.state, run: newest.run, sequence: newest.sequence, time: newest.time, head, shown });
 }
 
 function drawNothing() {
@@ -92,7 +99,7 @@ function drawNothing() {
   context.setTransform(1, 0, 0, 1, 0, 0);
   context.fillStyle = palette.ground;
   context.fillRect(0, 0, canvas.width, canvas.height);
-  Object.assign(picture, { state: null, run: null, sequence: null, head: null });
+  Object.assign(picture, { state: null, run: null, sequence: null, head: null, shown: null });
 }
 
 // The words.
@@ -148,12 +155,12 @@ function meter(stage, clearance) {
 }
 
 function detail(stage, handles) {
-  const count = handles.length / 4 - 1;
+  const count = handles.length / STRIDE - 1;
   element("pick").max = count;
-  const there = chosen >= 0 && chosen < count, k = 4 * chosen;
+  const there = chosen >= 0 && chosen < count, k = STRIDE * chosen;
   element("bench").classList.toggle("chosen", there);
   if (!there) return put("bench", "Click a bench, or type its number.");
-  const name = chosen === 0 ? ", the head" : chosen === count - 1 ? ", the tail" : "", speed = handles[k + 3];
+  const name = chosen === 0 ? ", the head" : chosen === count - 1 ? ", the tail" : "", speed = speedOf(handles, chosen);
   const degrees = ((handles[k + 2] * 180) / Math.PI).toFixed(1);
   put("bench", `Bench ${chosen + 1} of ${count}${name}: front handle at (${handles[k].toFixed(3)}, ${handles[k + 1].toFixed(3)}) m, ${Number.isNaN(speed) ? "speed not sent" : `${speed.toFixed(3)} m/s`}, heading ${degrees}°`);
 }

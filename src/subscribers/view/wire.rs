@@ -1,10 +1,10 @@
 //! What a browser receives: frames as bytes, and JSON for what changes seldom. Called by the server only.
 //!
-//! Everything is little-endian. A frame is a header of 72 bytes and 16 bytes for each handle, head first:
+//! Everything is little-endian. A frame is a header of 72 bytes and 20 bytes for each handle, head first:
 //!
 //! | byte | type | what |
 //! |---|---|---|
-//! | 0 | u8 | version of this layout: 2 |
+//! | 0 | u8 | version of this layout: 3 |
 //! | 1 | u8 | state: 0 moving, 1 approaching, 2 contact, 3 stall, 4 lock, 5 path end |
 //! | 2 | u8 | playback: 0 playing, 1 paused, 2 held, 3 ended |
 //! | 3 | u8 | 0 |
@@ -19,7 +19,7 @@
 //! | 60 | u32 | epoch: grows by one at every jump of simulated time |
 //! | 64 | u32 | the latest cue passed, from 1; 0 where none has been |
 //! | 68 | u32 | 0 |
-//! | 72 + 16 k | 4 x f32 | handle k: x, y (m), heading (rad), speed without sign (m per simulated second; NaN where not computed) |
+//! | 72 + 20 k | 5 x f32 | handle k: x, y (m), heading (rad), vx, vy (m per simulated second; NaN where not computed, 0 where the show stands still) |
 
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -28,9 +28,9 @@ use crate::wire::json::{AlertObject, Exact};
 use crate::wire::sentence::{Figures, alert_sentence};
 use crate::wire::{CollisionAlert, FrameHeader, HandlePose, Stage, StageSegment};
 
-const VERSION: u8 = 2;
+const VERSION: u8 = 3;
 const HEADER_BYTES: usize = 72;
-const HANDLE_BYTES: usize = 16;
+const HANDLE_BYTES: usize = 20;
 
 pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER_BYTES + HANDLE_BYTES * handles.len());
@@ -46,7 +46,7 @@ pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
         bytes.extend(number.to_le_bytes());
     }
     for pose in handles {
-        for number in [pose.x, pose.y, pose.heading, pose.vx.hypot(pose.vy)] {
+        for number in [pose.x, pose.y, pose.heading, pose.vx, pose.vy] {
             bytes.extend((number as f32).to_le_bytes());
         }
     }
@@ -113,8 +113,8 @@ mod tests {
         let pose = HandlePose { x: 8.75, y: -1.5, heading: 0.5, vx: 3.0, vy: -4.0 };
         let still = HandlePose { vx: f64::NAN, ..pose };
         let bytes = frame(&header, &[pose, still]);
-        assert_eq!(bytes.len(), 104);
-        assert_eq!(bytes[..8], [2, 2, 3, 0, 2, 0, 0, 0]);
+        assert_eq!(bytes.len(), 112);
+        assert_eq!(bytes[..8], [3, 2, 3, 0, 2, 0, 0, 0]);
         assert_eq!(bytes[8..16], 405.5_f64.to_le_bytes());
         assert_eq!(bytes[16..24], 2.0_f64.to_le_bytes());
         assert_eq!(bytes[24..32], 7_u64.to_le_bytes());
@@ -123,8 +123,8 @@ mod tests {
         assert_eq!(bytes[48..56], 9_u64.to_le_bytes());
         assert_eq!(bytes[56..72], [0, 0, 0x80, 0x3e, 4, 0, 0, 0, 5, 0, 0, 0, 0, 0, 0, 0]);
         let numbers: Vec<_> = bytes[72..].chunks(4).map(|four| f32::from_le_bytes(four.try_into().unwrap())).collect();
-        assert_eq!(numbers[..7], [8.75, -1.5, 0.5, 5.0, 8.75, -1.5, 0.5]);
-        assert!(numbers[7].is_nan());
+        assert_eq!(numbers[..8], [8.75, -1.5, 0.5, 3.0, -4.0, 8.75, -1.5, 0.5]);
+        assert!(numbers[8].is_nan() && numbers[9] == -4.0);
     }
 
     #[test]
