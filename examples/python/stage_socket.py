@@ -18,7 +18,6 @@ from websockets.sync.client import connect
 VERSION = 3
 HEADER = struct.Struct("<BBBxI d d Q Q Q Q f I I 4x")
 HANDLE = struct.Struct("<5f")
-STATES = ["moving", "approaching", "contact", "stall", "lock", "path_end"]
 PLAYBACK = ["playing", "paused", "held", "ended"]
 
 
@@ -42,7 +41,7 @@ def frame(message):
         cue,
     ) = HEADER.unpack_from(message)
     header = {
-        "state": STATES[state],
+        "state": state,
         "handles": handles,
         "sim_time": sim_time,
         "time_scale": time_scale,
@@ -59,16 +58,20 @@ def frame(message):
 
 
 def follow(socket, deadline):
-    told = 0.0
+    told, states = 0.0, []
     for message in socket:
         if isinstance(message, str):
-            print(json.loads(message), flush=True)
+            message = json.loads(message)
+            print(message, flush=True)
+            # Which states there are, and how serious each is. The first frames may come before it.
+            states = message["states"] if message["type"] == "stage" else states
         else:
             header, handles = frame(message)
-            if time.monotonic() - told >= 1:
+            if states and time.monotonic() - told >= 1:
                 told = time.monotonic()
                 x, y, _, vx, vy = handles[0]
-                print(f"t = {header['sim_time']:8.3f} s  {header['state']:11} head ({x:.3f}, {y:.3f}) m  {math.hypot(vx, vy):.3f} m/s", flush=True)
+                name = states[header["state"]]["name"]
+                print(f"t = {header['sim_time']:8.3f} s  {name:11} head ({x:.3f}, {y:.3f}) m  {math.hypot(vx, vy):.3f} m/s", flush=True)
         if time.monotonic() > deadline:
             return
 

@@ -252,10 +252,10 @@ export function draw(context, camera, palette, scene) {
   tailSign(context, tail, palette, pixel);
   mark(0, palette.ink, 2.5);
   if (count > 1) mark(count - 1, palette.ink, 1.5);
-  const danger = alert && alert.level !== "clear";
-  // While approaching the nearest two boards are marked, afterwards those of the event.
-  const approaching = alert?.level === "approaching";
-  const concerned = approaching ? [alert.bench_a, alert.bench_b] : [alert?.event_bench_a, alert?.event_bench_b];
+  const danger = alert && alert.severity !== "ok";
+  // Until an event has happened the nearest two boards are marked, afterwards those of the event.
+  const ahead = danger && !alert.happened;
+  const concerned = ahead ? [alert.bench_a, alert.bench_b] : [alert?.event_bench_a, alert?.event_bench_b];
   const pair = danger ? concerned.filter((bench) => bench !== null && bench < count) : [];
   for (const bench of pair) {
     mark(bench, palette.ground, 7);
@@ -266,7 +266,7 @@ export function draw(context, camera, palette, scene) {
     mark(chosen, palette.ink, 4, [7, 4]);
   }
   // Alerts come once a second, and the place of an approach moves with the boards.
-  const place = approaching && pair.length === 2 ? nearest(stage, places, ...pair) : { x: alert?.event_x, y: alert?.event_y };
+  const place = ahead && pair.length === 2 ? nearest(stage, places, ...pair) : { x: alert?.event_x, y: alert?.event_y };
   if (danger && place.x !== null) target(context, place, palette, pixel);
   if (!pair.includes(0)) label("HEAD", head.x + head.l * head.c, head.y + head.l * head.s, palette.ink);
   if (count > 1) label("TAIL", tail.x - tail.l * tail.c, tail.y - tail.l * tail.s, palette.ink);

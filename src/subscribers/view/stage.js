@@ -4,8 +4,10 @@ import { STRIDE, speedOf } from "./hermite.js";
 import { Stream } from "./stream.js";
 import { Camera, Ground, benchAt, draw, paletteOf, pathOf } from "./drawing.js";
 
-const STATES = ["moving", "approaching", "contact", "stall", "lock", "path_end"];
-const SIGNS = { moving: "○", approaching: "△", contact: "✖", stall: "■", lock: "■", path_end: "●" };
+/** By severity; the list of the states, with the severity of each, comes with the stage. */
+const SIGNS = { ok: "○", warning: "△", error: "✖" };
+/** While there is nothing to show; a state that the server does not list is shown as one without danger. */
+const WAITING = { name: "waiting", severity: "ok", happened: false, sentence: null };
 const element = (id) => document.getElementById(id);
 const canvas = element("stage"), context = canvas.getContext("2d", { alpha: false });
 const stream = new Stream(), camera = new Camera(), ground = new Ground();
@@ -112,12 +114,13 @@ function remaining(seconds) {
   return hours ? [`${hours}:${pad(minutes)}:${pad(whole % 60)}`, "h"] : [`${minutes}:${pad(whole % 60)}`, "min"];
 }
 
-/** The server puts the alert into words; those of a level that the frames have not reached, or have left, do not count. */
-function sentence(level, alert) {
-  if (level === "path_end") return "The head has reached the end of the path.";
-  if (level === "moving" || alert?.level !== level) return "";
-  const words = alert.sentence[0].toUpperCase() + alert.sentence.slice(1);
-  return level === "approaching" ? `Approaching. ${words}.` : `${words}.`;
+/** The server puts alerts and states into words; those of an alert's level that the frames have not reached, or have left, do not count. */
+function sentence(state, alert) {
+  const capital = (words) => words[0].toUpperCase() + words.slice(1);
+  if (state.sentence) return `${capital(state.sentence)}.`;
+  if (state.severity === "ok" || alert?.level !== state.name) return "";
+  const words = `${capital(alert.sentence)}.`;
+  return state.happened ? words : `${capital(state.name)}. ${words}`;
 }
 
 let spokenAt = Infinity;
@@ -127,13 +130,13 @@ function speak(seconds) {
   spokenAt = mark;
 }
 
-function countdown(level, alert, now) {
+function countdown(state, alert, now) {
   const { playback } = stream, { newest } = playback;
   const seconds = alert?.event_time != null ? (alert.event_time - playback.time(now)) / newest.scale : NaN;
-  const ahead = (level === "moving" || level === "approaching") && seconds > -1;
+  const ahead = !state.happened && seconds > -1, near = state.severity !== "ok";
   const [number, unit] = ahead ? remaining(Math.max(0, seconds)) : ["", ""];
   element("countdown").hidden = !ahead;
-  put("until", ahead ? `${level === "approaching" ? "" : "next "}${alert.event} in` : "");
+  put("until", ahead ? `${near ? "" : "next "}${alert.event} in` : "");
   if (element("left").dataset.text !== number + unit) {
     element("left").dataset.text = number + unit;
     // The number is made as large as the panel is wide.
@@ -141,7 +144,7 @@ function countdown(level, alert, now) {
     element("left").textContent = number;
     element("left").append(Object.assign(document.createElement("small"), { textContent: unit }));
   }
-  speak(level === "approaching" && ahead ? seconds : Infinity);
+  speak(near && ahead ? seconds : Infinity);
 }
 
 function meter(stage, clearance) {
@@ -168,9 +171,10 @@ function detail(stage, handles) {
 let figuresAt = 0, counted = { at: 0, received: 0 }, perSecond = 0;
 function updateText(now) {
   const { playback, stage, alert } = stream, { newest } = playback;
-  const level = newest && stage ? STATES[newest.state] ?? "moving" : "waiting", before = document.body.dataset.level;
-  if (before !== level) document.body.dataset.level = level;
-  if (level === "waiting") {
+  const state = newest && stage ? stage.states[newest.state] ?? { ...WAITING, name: "unknown" } : WAITING;
+  const { dataset } = document.body, before = dataset.level, calm = state.severity === "ok" && !state.happened;
+  if (before !== state.name) Object.assign(dataset, { level: state.name, severity: state.severity, happened: state.happened });
+  if (state === WAITING) {
     put("state", `○ ${stream.trouble ?? "waiting for the stage"}`);
     put("spoken", stream.trouble ?? "");
     for (const id of ["alert", "until", "left", "metres", "speeds", "time", "rate"]) put(id, "");
@@ -180,11 +184,11 @@ function updateText(now) {
     element("meter").firstElementChild.style.width = 0;
     return;
   }
-  countdown(level, alert, now);
-  const words = level.replace("_", " "), silent = now - newest.at > Math.max(2000, 3 * playback.interval);
-  put("state", silent ? `… no frames for ${Math.floor((now - newest.at) / 1000)} s` : `${SIGNS[level]} ${words}`);
-  put("alert", sentence(level, alert));
-  if (level === "moving" && before !== level) put("spoken", before === "waiting" ? "The dragon moves." : "Clear again.");
+  countdown(state, alert, now);
+  const words = state.name.replaceAll("_", " "), silent = now - newest.at > Math.max(2000, 3 * playback.interval);
+  put("state", silent ? `… no frames for ${Math.floor((now - newest.at) / 1000)} s` : `${SIGNS[state.severity]} ${words}`);
+  put("alert", sentence(state, alert));
+  if (calm && before !== state.name) put("spoken", before === WAITING.name ? "The dragon moves." : "Clear again.");
   // The rest changes too often to be read at every pass.
   if (now - figuresAt < 100) return;
   figuresAt = now;

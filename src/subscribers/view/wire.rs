@@ -5,7 +5,7 @@
 //! | byte | type | what |
 //! |---|---|---|
 //! | 0 | u8 | version of this layout: 3 |
-//! | 1 | u8 | state: 0 moving, 1 approaching, 2 contact, 3 stall, 4 lock, 5 path end |
+//! | 1 | u8 | state: its place in the list `states` of the message `stage`, from 0 |
 //! | 2 | u8 | playback: 0 playing, 1 paused, 2 held, 3 ended |
 //! | 3 | u8 | 0 |
 //! | 4 | u32 | number of handles |
@@ -24,8 +24,9 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use crate::show::state::{FrameState, Level, Severity};
 use crate::wire::json::{AlertObject, Exact};
-use crate::wire::sentence::{Figures, alert_sentence};
+use crate::wire::sentence::{Figures, alert_sentence, state_sentence};
 use crate::wire::{CollisionAlert, FrameHeader, HandlePose, Stage, StageSegment};
 
 const VERSION: u8 = 3;
@@ -57,7 +58,8 @@ pub(super) fn stage(stage: &Stage) -> String {
     let Stage { run_id, pitch, start_turn, hole_inset, head_length, body_length, width, benches, .. } = *stage;
     json!({"type": "stage", "run_id": Exact(run_id), "pitch": pitch, "start_turn": start_turn,
         "hole_inset": hole_inset, "head_length": head_length, "body_length": body_length, "width": width,
-        "benches": benches, "path": stage.path_in_use().iter().map(segment).collect::<Vec<_>>()})
+        "benches": benches, "path": stage.path_in_use().iter().map(segment).collect::<Vec<_>>(),
+        "states": FrameState::ALL.map(state)})
     .to_string()
 }
 
@@ -67,15 +69,29 @@ fn segment(segment: &StageSegment) -> Value {
         "theta_first": theta_first, "theta_last": theta_last})
 }
 
-/// An alert and its sentence, in a team of so many benches; the page shows its figures beside it.
+/// All that a page need know of a state, so that it can show one that it has never heard of.
+fn state(state: FrameState) -> Value {
+    json!({"name": state.name(), "severity": state.severity().name(), "happened": state.event().is_some(),
+        "sentence": state_sentence(state)})
+}
+
+/// An alert, its severity and its sentence, in a team of so many benches; the page shows its figures beside it.
 pub(super) fn alert(alert: &CollisionAlert, benches: u32) -> String {
     #[derive(Serialize)]
     struct AlertMessage {
         #[serde(flatten)]
         alert: AlertObject,
+        severity: &'static str,
+        happened: bool,
         sentence: String,
     }
-    let message = AlertMessage { alert: alert.into(), sentence: alert_sentence(alert, benches, Figures::Omitted) };
+    let level = alert.alert_level();
+    let message = AlertMessage {
+        alert: alert.into(),
+        severity: level.map_or(Severity::Ok, Level::severity).name(),
+        happened: level.is_some_and(Level::has_happened),
+        sentence: alert_sentence(alert, benches, Figures::Omitted),
+    };
     json!(message).to_string()
 }
 
@@ -128,10 +144,24 @@ mod tests {
     }
 
     #[test]
+    fn the_states_stand_in_the_order_of_their_numbers() {
+        let json: Value = serde_json::from_str(&stage(&Stage::default())).unwrap();
+        let states = json["states"].as_array().unwrap();
+        assert_eq!(states.len(), FrameState::ALL.len());
+        for (state, number) in FrameState::ALL.into_iter().zip(0..) {
+            assert_eq!((state as usize, &states[number]["name"]), (number, &state.name().into()));
+        }
+        let contact = json!({"name": "contact", "severity": "error", "happened": true, "sentence": null});
+        assert_eq!(states[2], contact);
+        assert_eq!(states[5]["sentence"], "the head has reached the end of the path");
+    }
+
+    #[test]
     fn an_alert_carries_the_sentence_of_its_numbers() {
         let alert_of = CollisionAlert { level: 1, event: 2, event_bench_a: 0, event_bench_b: 8, ..Default::default() };
         let json: Value = serde_json::from_str(&alert(&alert_of, 9)).unwrap();
         assert_eq!((&json["type"], &json["event"]), (&"alert".into(), &"contact".into()));
+        assert_eq!((&json["severity"], &json["happened"]), (&"warning".into(), &false.into()));
         assert_eq!(json["sentence"], "contact: bench 1 (the head) and bench 9 (the tail) (counting from 1)");
     }
 }
