@@ -24,7 +24,7 @@ use bench_dragon::wire::{CollisionAlert, convert};
 use super::events::sentence;
 use super::realtime_scheduling::RealtimeScheduling;
 use super::{
-    CommandError, Common, Output, level_colour, number, search_timeline, shows_colour, stop_on_signals, warn_of_gap,
+    CommandError, Common, Output, number, search_timeline, severity_colour, shows_colour, stop_on_signals, warn_of_gap,
 };
 
 /// Arguments of `run`.
@@ -215,7 +215,7 @@ impl RunSession<'_> {
     /// One line an alert, with the countdown in wall time.
     fn print_alert(&self, alert: &CollisionAlert) {
         let Some(level) = alert.alert_level().filter(|_| !self.common.quiet && !self.common.json) else { return };
-        let colour = Style::new().fg_color(Some(level_colour(level.into()).into()));
+        let colour = Style::new().fg_color(Some(severity_colour(level.severity()).into()));
         let style = if shows_colour(&std::io::stderr()) { colour } else { Style::new() };
         let figures = Figures::Shown { time_scale: self.playback.time_scale };
         let said = alert_sentence(alert, self.scene.team().benches as u32, figures);
