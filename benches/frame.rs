@@ -14,6 +14,7 @@ use bench_dragon::scene::{AtEnd, Scene};
 use bench_dragon::show::{Playback, Show};
 use bench_dragon::solve::newton::Newton;
 use bench_dragon::solve::paper::{Paper, PaperRules};
+use bench_dragon::solve::selection;
 use bench_dragon::solve::table::{FollowerTable, Instructions};
 use bench_dragon::solve::{Chain, Solver, Velocities};
 use bench_dragon::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
@@ -139,6 +140,41 @@ fn make_table(benches: usize) -> FollowerTable {
 #[divan::bench(args = [10, 100, 223, 1_000, 5_000, 10_000, 20_000, 100_000], sample_count = 200, sample_size = 4)]
 fn table_by_benches(bencher: Bencher, benches: usize) {
     play(bencher, &mut follower_table(benches, Velocities::Computed), benches + 1, 60.0);
+}
+
+/// Benches and the accuracy asked for, metres.
+const SIZES: [(usize, f64); 15] = [
+    (223, 1e-12),
+    (223, 1e-9),
+    (223, 1e-4),
+    (5_000, 1e-12),
+    (5_000, 1e-9),
+    (5_000, 1e-4),
+    (20_000, 1e-12),
+    (20_000, 1e-9),
+    (20_000, 1e-4),
+    (100_000, 1e-12),
+    (100_000, 1e-9),
+    (100_000, 1e-4),
+    (1_000_000, 1e-12),
+    (1_000_000, 1e-9),
+    (1_000_000, 1e-4),
+];
+
+/// Frames of what a wish for accuracy selects; prints the bytes a frame reads for a handle, and how long it took to
+/// make.
+#[divan::bench(args = SIZES, sample_count = 100, sample_size = 4)]
+fn accuracy_by_benches(bencher: Bencher, (benches, accuracy): (usize, f64)) {
+    let selected = selection::cheapest(&spiral(), team(benches), 1.0, Velocities::Computed, accuracy);
+    let Some(selected) = selected else { return eprintln!("{benches} benches at {accuracy:e} m: no table fits") };
+    eprintln!(
+        "{benches} benches at {accuracy:e} m: {}, {:.0} bytes a handle, {:.1} MB, made in {:.0} ms",
+        selected.table.format(),
+        selected.table.bytes_per_handle(),
+        1e-6 * selected.table.memory_bytes() as f64,
+        1e3 * selected.made_in.as_secs_f64()
+    );
+    play(bencher, &mut selected.table.for_frames(), benches + 1, 60.0);
 }
 
 #[divan::bench(args = [10, 100, 223, 1_000, 5_000, 10_000, 20_000, 100_000], sample_count = 20, sample_size = 1)]

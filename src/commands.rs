@@ -31,7 +31,7 @@ use std::sync::atomic::AtomicBool;
 use anstyle::AnsiColor;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::{Scene, SceneError};
-use bench_dragon::show::state::FrameState;
+use bench_dragon::show::state::Severity;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -129,11 +129,11 @@ impl Output {
 }
 
 /// The colour of a state or level on the terminal.
-pub fn level_colour(state: FrameState) -> AnsiColor {
-    match state {
-        FrameState::Moving => AnsiColor::Green,
-        FrameState::Approaching => AnsiColor::Yellow,
-        FrameState::Contact | FrameState::Stall | FrameState::Lock | FrameState::PathEnd => AnsiColor::Red,
+pub fn severity_colour(severity: Severity) -> AnsiColor {
+    match severity {
+        Severity::Ok => AnsiColor::Green,
+        Severity::Warning => AnsiColor::Yellow,
+        Severity::Error => AnsiColor::Red,
     }
 }
 

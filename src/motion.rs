@@ -9,11 +9,13 @@ pub mod event;
 pub mod singularities;
 pub mod timeline;
 
+use crate::model::board::Board;
 use crate::model::description::PathDescription;
 use crate::model::path::{Disjoint, Path, SegmentOutline};
 use crate::model::team::Team;
 use crate::solve::newton::Newton;
 use crate::solve::paper::{self, Paper, PaperRules};
+use crate::solve::selection::{self, Selection};
 use crate::solve::table::FollowerTable;
 use crate::solve::{Solver, Velocities};
 
@@ -26,7 +28,7 @@ use timeline::{TimedClearance, TimedEvent, Timeline};
 /// How the solver is chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Method {
-    /// The cheapest solver that meets this position error, metres.
+    /// The cheapest solver that is measured to meet this position error, metres.
     Accuracy(f64),
     /// Exact motion, each follower bracketed.
     Newton,
@@ -44,6 +46,16 @@ pub struct Choice {
     pub reason: String,
     /// The table that the solver interpolates in, if it does.
     table: Option<FollowerTable>,
+}
+
+impl Choice {
+    /// Metres that the clearance of a frame can differ from that of exact motion: twice what a board's points move with
+    /// handles that are as far off as the solver promises.
+    pub fn clearance_error(&self, team: &Team) -> f64 {
+        let factor = |link| Board::displacement_factor(link, team.hole_inset, team.width);
+        let factor = factor(team.link(0)).max(factor(team.link(1)));
+        2.0 * factor * self.table.as_ref().map_or(0.0, FollowerTable::accuracy)
+    }
 }
 
 /// A motion that cannot be.
@@ -72,6 +84,30 @@ const SINGULARITIES_BUDGET: u64 = 50_000_000;
 
 /// Units of work after which the search for a contact, or for the least clearance, gives up: about half a minute.
 const CONTACT_BUDGET: u64 = 100_000_000;
+
+const NO_TABLE: &str = "there is no table for this team and path";
+
+/// What was measured of a table, for people.
+fn measured(selection: &Selection, asked: f64) -> String {
+    let Selection { table, accuracy, error, moments, made_in, .. } = selection;
+    let wish = if !selection.meets() {
+        format!("the best there is for the {asked:e} m asked")
+    } else if selection.is_at_the_floor() {
+        format!("for the {asked:e} m asked, which doubles cannot hold everywhere here")
+    } else if *accuracy < asked {
+        format!("for the {asked:e} m asked, taken as {accuracy:.1e} m, a thousandth of a link")
+    } else {
+        format!("for the {asked:e} m asked")
+    };
+    format!(
+        "{error:.1e} m measured against newton at {moments} moments, {wish}; {:.0} bytes a handle, {:.2} of the most \
+         exact table's, {} kB, made in {:.0} ms",
+        table.bytes_per_handle(),
+        table.relative_cost(),
+        table.memory_bytes().div_ceil(1000),
+        1e3 * made_in.as_secs_f64()
+    )
+}
 
 impl Motion {
     /// The motion of `team`, its head moving at `head_speed` metres per second along the path.
@@ -119,6 +155,14 @@ impl Motion {
         Self::new(self.description.clone(), self.team, self.head_speed, method)
     }
 
+    /// Metres by which the links of this motion's frames may be off, besides rounding.
+    pub fn link_tolerance(&self) -> f64 {
+        match self.method {
+            Method::Accuracy(accuracy) => selection::link_tolerance(&self.team, accuracy),
+            _ => 0.0,
+        }
+    }
+
     /// Simulated seconds after which the head has travelled so many metres along the path, as the method has it.
     pub fn time_at(&self, travelled: f64) -> f64 {
         match (self.method, self.path.as_spiral()) {
@@ -137,32 +181,32 @@ impl Motion {
 
     /// The solver, made anew.
     pub fn solver(&self, velocities: Velocities) -> Choice {
-        let newton = || Newton::new(self.path.clone(), self.team, self.head_speed, velocities);
-        let table = |why: &str| {
-            let table = FollowerTable::new(&self.path, self.team, self.head_speed, velocities);
-            table.map(|table| self.chosen_table(table, why))
+        let newton = |reason: String| {
+            let newton = Newton::new(self.path.clone(), self.team, self.head_speed, velocities);
+            Choice { solver: Box::new(newton), reason, table: None }
         };
-        let no_table = "there is no table for this team and path";
         match (self.method, self.path.as_spiral()) {
             (Method::Accuracy(accuracy), _) => {
-                let why = "as exact as doubles allow, and the cheapest that is";
-                table(why).unwrap_or_else(|| {
-                    let reason = format!("newton: {no_table}, and {accuracy:e} m is met by exact motion alone");
-                    Choice { solver: Box::new(newton()), reason, table: None }
-                })
+                match selection::cheapest(&self.path, self.team, self.head_speed, velocities, accuracy) {
+                    Some(selection) => {
+                        let why = measured(&selection, accuracy);
+                        self.chosen_table(selection.table, &why)
+                    }
+                    None => newton(format!("newton: {NO_TABLE}, and {accuracy:e} m is met by exact motion alone")),
+                }
             }
-            (Method::FollowerTable, _) => table("named by the scene").unwrap_or_else(|| {
-                let reason = format!("newton: the scene names follower_table, but {no_table}");
-                Choice { solver: Box::new(newton()), reason, table: None }
-            }),
+            (Method::FollowerTable, _) => {
+                match FollowerTable::new(&self.path, self.team, self.head_speed, velocities) {
+                    Some(table) => self.chosen_table(table, "named by the scene"),
+                    None => newton(format!("newton: the scene names follower_table, but {NO_TABLE}")),
+                }
+            }
             (Method::Paper(rules), Some((spiral, start))) => {
                 let paper = Paper::new(*spiral, start.high, self.team, self.head_speed, velocities, rules);
                 let reason = "paper: named by the scene; its head is too fast by sqrt(1 + 1/theta^2)".to_owned();
                 Choice { solver: Box::new(paper), reason, table: None }
             }
-            (Method::Newton | Method::Paper(_), _) => {
-                Choice { solver: Box::new(newton()), reason: "newton: named by the scene".to_owned(), table: None }
-            }
+            (Method::Newton | Method::Paper(_), _) => newton("newton: named by the scene".to_owned()),
         }
     }
 
@@ -172,8 +216,8 @@ impl Motion {
         } else {
             String::new()
         };
-        let reason = format!("follower_table ({}){valid}: {why}", table.instructions().name());
-        Choice { solver: Box::new(table.clone()), reason, table: Some(table) }
+        let reason = format!("follower_table ({}, {}){valid}: {why}", table.instructions().name(), table.format());
+        Choice { solver: Box::new(table.for_frames()), reason, table: Some(table) }
     }
 
     /// The live clearance of this motion's frames.

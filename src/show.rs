@@ -174,7 +174,7 @@ pub struct Show {
     frame: Frame,
 }
 
-/// Metres of overlap before the contact, as a share of the longest link, that rounding explains.
+/// Metres of overlap before the contact, as a share of the longest link, that rounding explains in an exact frame.
 const ROUNDING_OVERLAP: f64 = 1e-9;
 
 impl Show {
@@ -194,6 +194,7 @@ impl Show {
         let level = scene.alerts.map(|rules| LevelTracker::new(rules, playback.rate));
         let choice = scene.motion.solver(scene.velocities);
         let clearance = scene.alerts.map(|_| scene.motion.clearance_monitor(&choice));
+        let rounding = ROUNDING_OVERLAP * scene.team().longest_link() + choice.clearance_error(scene.team());
         let Choice { solver, reason, .. } = choice;
         let exact = !matches!(scene.motion.method(), Method::Paper(_));
         let (cues, missing_cues) = cues(scene, &timeline);
@@ -208,7 +209,7 @@ impl Show {
             timeline,
             clearance,
             level,
-            overlap_tolerance: exact.then_some(ROUNDING_OVERLAP * scene.team().longest_link()),
+            overlap_tolerance: exact.then_some(rounding),
             solved: None,
             cues,
             missing_cues,

@@ -1,11 +1,12 @@
 //! Solvers: from the head's travel to the state of every handle.
 //!
-//! They differ in cost and accuracy and stand behind [`Solver`]; [`crate::motion`] chooses one. Each that is kept lies on
-//! the measured front of error against time, but for the paper's and the reference.
+//! They differ in cost and accuracy and stand behind [`Solver`]; [`crate::motion`] chooses one. Each that is kept lies
+//! on the measured front of error against time, but for the paper's and the reference.
 
 pub mod newton;
 pub mod paper;
 pub mod reference;
+pub mod selection;
 pub mod table;
 
 use crate::linkage::NoFollower;

@@ -2,6 +2,7 @@
 //!
 //! In: a scene and its timeline. Out: one [`Measurement`] per solver. The `trade` command prints and draws them.
 
+mod candidates;
 mod collision;
 
 use std::time::Instant;
@@ -15,10 +16,8 @@ use crate::motion::Method;
 use crate::motion::event::EventKind;
 use crate::motion::timeline::Timeline;
 use crate::scene::Scene;
-use crate::solve::newton::Newton;
-use crate::solve::paper::{Paper, PaperRules};
+use crate::solve::paper::PaperRules;
 use crate::solve::reference::{Reference, ReferenceHandle};
-use crate::solve::table::{FollowerTable, Instructions};
 use crate::solve::{Chain, Solver, Velocities};
 
 /// Moments at which the error is taken, spread evenly over the show.
@@ -37,6 +36,11 @@ const TIMING_LIMIT: f64 = 0.7;
 pub struct Measurement {
     /// The solver and its settings.
     pub solver: String,
+    /// Metres that were asked for; `None` for a solver that is not chosen by its accuracy.
+    pub accuracy: Option<f64>,
+    /// Whether the wish is met wherever the motion itself does not multiply roundings by more; see
+    /// [`Measurement::noise`].
+    pub meets: Option<bool>,
     /// Nanoseconds per frame, the median over the show, without what reading the clock costs.
     pub frame_ns: f64,
     /// Nanoseconds per frame that 99 of 100 frames stay below.
@@ -45,6 +49,9 @@ pub struct Measurement {
     pub frames_timed: usize,
     /// The largest distance of a handle from the truth, metres.
     pub max_position_error: f64,
+    /// Metres below which errors are rounding: the most that 8 eps (r + distance travelled) is at any moment, times the
+    /// speed of the handle over that of the head where that is more. The same for all solvers.
+    pub noise: f64,
     /// The largest relative error of a handle's speed; `None` without velocities.
     pub max_speed_error: Option<f64>,
     /// Seconds by which this solver's contact is off; `None` where there is no contact.
@@ -53,10 +60,14 @@ pub struct Measurement {
     pub max_link_error: f64,
     /// Bytes that the solver holds.
     pub memory_bytes: usize,
+    /// Bytes of a table that a frame reads for a handle; `None` for a solver without one.
+    pub bytes_per_handle: Option<f64>,
+    /// Seconds that making the solver takes, once, measuring included.
+    pub make_s: f64,
     /// What collisions cost on this scene; stands with the first solver only.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub collision: Vec<CollisionMeasurement>,
-    /// Whether no other solver is both faster and more exact.
+    /// Whether no other solver is both faster and more exact; errors below the noise are equal.
     pub on_front: bool,
 }
 
@@ -80,7 +91,10 @@ struct Candidate {
     warm_up_frames: usize,
     solver: Box<dyn Solver>,
     contact_time_error: Option<f64>,
+    accuracy: Option<f64>,
     memory_bytes: usize,
+    bytes_per_handle: Option<f64>,
+    make_s: f64,
 }
 
 /// The truth at one moment.
@@ -97,11 +111,12 @@ pub fn measure(scene: &Scene, timeline: &Timeline, progress: &mut dyn FnMut(f64)
     let end = timeline.end().time;
     let moments = truth(scene, end, &mut |share| progress(0.5 * share))?;
     let contact = contact_errors(scene, timeline)?;
-    let candidates = candidates(scene, contact);
+    let noise = noise(scene, &moments);
+    let candidates = candidates::candidates(scene, contact);
     let count = candidates.len() as f64;
     let mut measurements = Vec::new();
     for (index, candidate) in candidates.into_iter().enumerate() {
-        measurements.push(measured(scene, candidate, &moments, end));
+        measurements.push(measured(scene, candidate, &moments, noise, end));
         progress(0.5 + 0.5 * (index + 1) as f64 / count);
     }
     mark_pareto_front(&mut measurements);
@@ -145,6 +160,17 @@ fn moments(scene: &Scene, times: &[f64], progress: &mut dyn FnMut(f64)) -> Resul
     Ok(moments)
 }
 
+/// What rounding does to a pose by itself, at most: see [`Measurement::noise`].
+fn noise(scene: &Scene, moments: &[Moment]) -> f64 {
+    let speed = scene.motion.head_speed();
+    let of_handle = |time: f64, handle: &ReferenceHandle| {
+        let reach = handle.x.high.hypot(handle.y.high) + speed * time;
+        8.0 * f64::EPSILON * reach * (handle.speed / speed).abs().max(1.0)
+    };
+    let all = moments.iter().flat_map(|moment| moment.handles.iter().map(|handle| of_handle(moment.time, handle)));
+    all.fold(0.0, f64::max)
+}
+
 /// By how much the contact times of the exact motion and of the paper's rule are off, seconds.
 #[derive(Debug, Clone, Copy)]
 struct ContactErrors {
@@ -179,83 +205,26 @@ fn contact_errors(scene: &Scene, timeline: &Timeline) -> Result<Option<ContactEr
     Ok(Some(ContactErrors { exact, paper }))
 }
 
-fn candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<Candidate> {
-    let (path, team, head_speed) = (scene.motion.path(), *scene.team(), scene.motion.head_speed());
-    let velocities = scene.velocities;
-    let exact = |name: String, solver: Box<dyn Solver>, memory_bytes| {
-        // All of them follow one motion, whose contact is found once.
-        Candidate {
-            name,
-            warm_up_frames: WARM_UP_FRAMES,
-            solver,
-            contact_time_error: contact.map(|errors| errors.exact),
-            memory_bytes,
-        }
-    };
-    let mut candidates = Vec::new();
-    for instructions in Instructions::available() {
-        let table = FollowerTable::new(path, team, head_speed, velocities);
-        if let Some(solver) = table.and_then(|solver| solver.with_instructions(instructions)) {
-            let memory = solver.memory_bytes();
-            candidates.push(exact(format!("follower_table ({})", instructions.name()), Box::new(solver), memory));
-        }
-    }
-    let newton = Newton::new(path.clone(), team, head_speed, velocities);
-    candidates.push(exact("newton".to_owned(), Box::new(newton), size_of::<Newton>()));
-    candidates.extend(paper_candidates(scene, contact));
-    candidates
-}
-
-/// The paper's solver with its own numbers and others, on a spiral.
-fn paper_candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<Candidate> {
-    let (path, team, head_speed) = (scene.motion.path(), *scene.team(), scene.motion.head_speed());
-    let Some((spiral, start)) = path.as_spiral() else { return Vec::new() };
-    // The Euler steps of one show; where there are too many, the finest would take minutes.
-    let steps_to_end = |time_step: f64| path.length() / head_speed / time_step;
-    let standard = PaperRules::default();
-    let mut rules: Vec<(String, PaperRules)> = [1e-2, 1e-3, 1e-4, 1e-5]
-        .into_iter()
-        .filter(|time_step| steps_to_end(*time_step) < 1e8)
-        .map(|time_step| (format!("paper (time step {time_step:e} s)"), PaperRules { time_step, ..standard }))
-        .collect();
-    let coarse = PaperRules { time_step: 1e-3, ..standard };
-    for bisection_tolerance in [1e-4, 1e-8] {
-        let name = format!("paper (time step 1e-3 s, tolerance {bisection_tolerance:e})");
-        rules.push((name, PaperRules { bisection_tolerance, ..coarse }));
-    }
-    for difference_interval in [0.02, 2.0] {
-        let name = format!("paper (time step 1e-3 s, differences over {difference_interval} s)");
-        rules.push((name, PaperRules { difference_interval, ..coarse }));
-    }
-    let candidate = |(name, rules)| {
-        let solver = Paper::new(*spiral, start.high, team, head_speed, scene.velocities, rules);
-        let memory_bytes = size_of::<Paper>() + 3 * 8 * team.handles();
-        Candidate {
-            name,
-            warm_up_frames: 0,
-            solver: Box::new(solver),
-            contact_time_error: contact.map(|errors| errors.paper),
-            memory_bytes,
-        }
-    };
-    rules.into_iter().map(candidate).collect()
-}
-
-fn measured(scene: &Scene, mut candidate: Candidate, moments: &[Moment], end: f64) -> Measurement {
+fn measured(scene: &Scene, mut candidate: Candidate, moments: &[Moment], noise: f64, end: f64) -> Measurement {
     let errors = errors(scene, &mut candidate, moments);
     let mut times = frame_times(scene, candidate.solver.as_mut(), end);
     times.sort_unstable();
     let quantile = |share: f64| times.get((share * times.len() as f64) as usize).map_or(f64::NAN, |ns| *ns as f64);
     Measurement {
         solver: candidate.name,
+        accuracy: candidate.accuracy,
+        meets: candidate.accuracy.map(|accuracy| errors.position <= accuracy.max(noise)),
         frame_ns: quantile(0.5),
         frame_ns_p99: quantile(0.99),
         frames_timed: times.len(),
         max_position_error: errors.position,
+        noise,
         max_speed_error: (scene.velocities == Velocities::Computed).then_some(errors.speed),
         contact_time_error: candidate.contact_time_error,
         max_link_error: errors.link,
         memory_bytes: candidate.memory_bytes,
+        bytes_per_handle: candidate.bytes_per_handle,
+        make_s: candidate.make_s,
         collision: Vec::new(),
         on_front: false,
     }
@@ -340,9 +309,41 @@ fn clock_ns() -> u64 {
 }
 
 fn mark_pareto_front(measurements: &mut [Measurement]) {
-    let points: Vec<(f64, f64)> = measurements.iter().map(|m| (m.frame_ns, m.max_position_error)).collect();
+    let points: Vec<(f64, f64)> =
+        measurements.iter().map(|m| (m.frame_ns, m.max_position_error.max(m.noise))).collect();
     for (measurement, (cost, error)) in measurements.iter_mut().zip(&points) {
         let beaten = |(c, e): &(f64, f64)| c <= cost && e <= error && (c < cost || e < error);
         measurement.on_front = !points.iter().any(beaten);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_two_solvers_below_the_noise_only_the_cheaper_is_optimal() {
+        let measurement = |frame_ns, max_position_error| Measurement {
+            solver: String::new(),
+            accuracy: None,
+            meets: None,
+            frame_ns,
+            frame_ns_p99: frame_ns,
+            frames_timed: 1,
+            max_position_error,
+            noise: 1e-12,
+            max_speed_error: None,
+            contact_time_error: None,
+            max_link_error: 0.0,
+            memory_bytes: 0,
+            bytes_per_handle: None,
+            make_s: 0.0,
+            collision: Vec::new(),
+            on_front: false,
+        };
+        let mut measurements = [(100.0, 8e-13), (200.0, 3e-13), (50.0, 1e-4), (70.0, 1e-3), (300.0, f64::NAN)]
+            .map(|(frame_ns, error)| measurement(frame_ns, error));
+        mark_pareto_front(&mut measurements);
+        assert_eq!(measurements.map(|m| m.on_front), [true, false, true, false, false]);
     }
 }

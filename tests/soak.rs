@@ -15,7 +15,7 @@ use nix::sys::signal::kill;
 use nix::unistd::Pid;
 use serde_json::Value;
 
-use processes::{Place, Process, json_lines, program, summary, text, unique, wait};
+use processes::{Place, Process, json_lines, program, scene_file, summary, text, unique, wait};
 
 /// Limits that any machine keeps.
 const ANY_SPEED: [&str; 6] = ["--max-skipped", "100%", "--max-lateness-p999", "3600s", "--max-rss-growth", "1MB"];
@@ -86,6 +86,21 @@ fn assert_is_whole_page(page: &str, subscribers: usize) {
     for outside in ["http", "src=", "href=", "@import", "url(", "<script"] {
         assert!(!addresses.contains(outside), "{outside}");
     }
+}
+
+#[test]
+fn a_scene_of_weak_accuracy_passes_with_the_links_it_promises() {
+    let place = Place::new("weak");
+    let scene = scene_file("weak", &[("accuracy = 1e-9", "accuracy = 1e-5")]);
+    let mut soak = place.program();
+    soak.args(["--scene", scene.to_str().unwrap(), "soak", "--json", "--duration", "3s", "--subscribers", "1"]);
+    let output = Process::start(soak.args(ANY_SPEED)).output_within(90);
+    assert!(output.status.success(), "{} {}", text(&output.stderr), text(&output.stdout));
+    let seen = &json_lines(&output).pop().unwrap()["subscribers"][0]["seen"];
+    assert_eq!(number(seen, "wrong_links"), 0, "{seen}");
+    let worst = seen["worst_link_error"].as_f64().unwrap();
+    // Looser than exact links are, which a subscriber that knows the scene accepts.
+    assert!((1e-9..2e-5).contains(&worst), "{worst:e} m");
 }
 
 #[test]

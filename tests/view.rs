@@ -1,7 +1,7 @@
 //! The stage picture as its users meet it: browsers, programs that read its WebSocket, and strangers.
 //!
-//! The browser is Debian's Chromium; what is done in it stands in `tests/python/stage_picture.py`. Nothing asserts a
-//! speed.
+//! The browser is Debian's Chromium; what is done in it stands in `tests/python/stage_picture.py` and `stage_motion.py`.
+//! Nothing asserts a speed.
 
 mod processes;
 
@@ -94,8 +94,8 @@ fn a_program_reads_the_documented_layout() {
     assert_eq!(stage["path"][0]["kind"], "inward_spiral");
     assert_eq!(stage["path"][0]["theta_first"], 32.0 * std::f64::consts::PI);
     let bytes = frame(&mut socket);
-    assert_eq!(bytes.len(), 72 + 16 * 224);
-    assert_eq!(bytes[..4], [2, 0, 0, 0], "version 2, moving, playing");
+    assert_eq!(bytes.len(), 72 + 20 * 224);
+    assert_eq!(bytes[..4], [3, 0, 0, 0], "version 3, moving, playing");
     assert_eq!(bytes[4..8], 224_u32.to_le_bytes());
     assert!((f64_at(&bytes, 8) - 300.0).abs() < 1e-3);
     assert_eq!(f64_at(&bytes, 16), 1e-6);
@@ -107,9 +107,9 @@ fn a_program_reads_the_documented_layout() {
     let truth = truth_at_300();
     assert_eq!(truth.len(), 224);
     for (handle, [x, y, speed]) in truth.iter().enumerate() {
-        let told = [0, 4, 8, 12].map(|at| f32_at(&bytes, 72 + 16 * handle + at));
+        let told = [0, 4, 8, 12, 16].map(|at| f32_at(&bytes, 72 + 20 * handle + at));
         assert!((told[0] - x).hypot(told[1] - y) < 2e-6, "handle {handle} is at {told:?}, not {x}, {y}");
-        assert!((told[3] - speed).abs() < 1e-6, "handle {handle}: {told:?}, not {speed} m/s");
+        assert!((told[3].hypot(told[4]) - speed).abs() < 1e-6, "handle {handle}: {told:?}, not {speed} m/s");
         let bench = handle.min(222);
         let [front, rear] = [truth[bench], truth[bench + 1]];
         let heading = (front[1] - rear[1]).atan2(front[0] - rear[0]);
@@ -230,12 +230,19 @@ fn an_address_that_cannot_be_used_is_one_sentence() {
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 fn in_a_browser(scenario: &str) {
+    run_scenario("tests/python/stage_picture.py", scenario);
+}
+
+fn in_motion(scenario: &str) {
+    run_scenario("tests/python/stage_motion.py", scenario);
+}
+
+fn run_scenario(script: &str, scenario: &str) {
     if !can_run(chromium().and_then(|()| python_modules(&["playwright", "numpy"]))) {
         return;
     }
     let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let arguments =
-        ["tests/python/stage_picture.py", scenario, env!("CARGO_BIN_EXE_bench-dragon"), &unique(&scenario[..6])];
+    let arguments = [script, scenario, env!("CARGO_BIN_EXE_bench-dragon"), &unique(&scenario[..6])];
     let output = Process::start(python().args(arguments)).output_within(180);
     println!("{}", text(&output.stdout));
     assert!(output.status.success(), "{}", text(&output.stderr));
@@ -268,7 +275,22 @@ fn five_at_once() {
 
 #[test]
 fn motion_is_smooth_at_any_rate() {
-    in_a_browser("motion_is_smooth_at_any_rate");
+    in_motion("motion_is_smooth_at_any_rate");
+}
+
+#[test]
+fn between_frames_is_where_the_solver_says() {
+    in_motion("between_frames_is_where_the_solver_says");
+}
+
+#[test]
+fn loops_are_not_joined() {
+    in_motion("loops_are_not_joined");
+}
+
+#[test]
+fn interpolation_keeps_its_rules() {
+    in_motion("interpolation_keeps_its_rules");
 }
 
 #[test]

@@ -8,21 +8,21 @@ Prints the stage and the alerts as they come and the head's place once a second.
 
 import argparse
 import json
+import math
 import struct
 import time
 
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-VERSION = 2
+VERSION = 3
 HEADER = struct.Struct("<BBBxI d d Q Q Q Q f I I 4x")
-HANDLE = struct.Struct("<4f")
-STATES = ["moving", "approaching", "contact", "stall", "lock", "path_end"]
+HANDLE = struct.Struct("<5f")
 PLAYBACK = ["playing", "paused", "held", "ended"]
 
 
 def frame(message):
-    """The header as a dictionary and one (x, y, heading, speed) for each handle."""
+    """The header as a dictionary and one (x, y, heading, vx, vy) for each handle."""
     if message[0] != VERSION:
         raise SystemExit(f"the server speaks version {message[0]} of the layout, this program version {VERSION}")
     (
@@ -41,7 +41,7 @@ def frame(message):
         cue,
     ) = HEADER.unpack_from(message)
     header = {
-        "state": STATES[state],
+        "state": state,
         "handles": handles,
         "sim_time": sim_time,
         "time_scale": time_scale,
@@ -58,16 +58,20 @@ def frame(message):
 
 
 def follow(socket, deadline):
-    told = 0.0
+    told, states = 0.0, []
     for message in socket:
         if isinstance(message, str):
-            print(json.loads(message), flush=True)
+            message = json.loads(message)
+            print(message, flush=True)
+            # Which states there are, and how serious each is. The first frames may come before it.
+            states = message["states"] if message["type"] == "stage" else states
         else:
             header, handles = frame(message)
-            if time.monotonic() - told >= 1:
+            if states and time.monotonic() - told >= 1:
                 told = time.monotonic()
-                x, y, _, speed = handles[0]
-                print(f"t = {header['sim_time']:8.3f} s  {header['state']:11} head ({x:.3f}, {y:.3f}) m  {speed:.3f} m/s", flush=True)
+                x, y, _, vx, vy = handles[0]
+                name = states[header["state"]]["name"]
+                print(f"t = {header['sim_time']:8.3f} s  {name:11} head ({x:.3f}, {y:.3f}) m  {math.hypot(vx, vy):.3f} m/s", flush=True)
         if time.monotonic() > deadline:
             return
 

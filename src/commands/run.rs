@@ -25,7 +25,7 @@ use bench_dragon::wire::sentence::{Figures, alert_sentence};
 use super::events::sentence;
 use super::realtime_scheduling::RealtimeScheduling;
 use super::{
-    CommandError, Common, Output, level_colour, number, search_timeline, shows_colour, stop_on_signals, warn_of_gap,
+    CommandError, Common, Output, number, search_timeline, severity_colour, shows_colour, stop_on_signals, warn_of_gap,
 };
 
 /// Arguments of `run`.
@@ -248,7 +248,7 @@ impl RunSession<'_> {
         match announcement {
             Announcement::Alert { alert, time_scale } => {
                 let Some(level) = alert.alert_level() else { return };
-                let colour = Style::new().fg_color(Some(level_colour(level.into()).into()));
+                let colour = Style::new().fg_color(Some(severity_colour(level.severity()).into()));
                 let style = if shows_colour(&std::io::stderr()) { colour } else { Style::new() };
                 let figures = Figures::Shown { time_scale: *time_scale };
                 let sentence = alert_sentence(alert, self.scene.team().benches as u32, figures);

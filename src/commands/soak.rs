@@ -226,7 +226,7 @@ impl ReportFiles {
 pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result<(), CommandError> {
     end_with_parent()?;
     let mut feed = Feed::new(&common.name, FeedOptions { wake: Wake::OnFrame, frames: Frames::All })?;
-    let mut observer = Observer::default();
+    let mut observer = Observer::new(common.load_scene()?.motion.link_tolerance());
     let stop = stop_on_signals()?;
     let mut output = std::io::stdout().lock();
     let mut print = |observer: &mut Observer| -> Result<(), CommandError> {

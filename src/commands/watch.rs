@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use anstyle::Style;
 use bench_dragon::live::clock::monotonic_ns;
 use bench_dragon::motion::event::EventKind;
-use bench_dragon::show::state::{FrameState, Level, PlaybackState};
+use bench_dragon::show::state::{FrameState, Level, PlaybackState, Severity};
 use bench_dragon::subscribers::connection::Wake;
 use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
 use bench_dragon::subscribers::monitor::{IntervalReport, Latency, Monitor, Presence};
@@ -17,7 +17,7 @@ use bench_dragon::wire::{CollisionAlert, LoopStatus};
 use crossterm::{cursor, execute, terminal};
 use serde::Serialize;
 
-use super::{CommandError, Common, level_colour, shows_colour, stop_on_signals, wall_seconds};
+use super::{CommandError, Common, severity_colour, shows_colour, stop_on_signals, wall_seconds};
 
 /// Arguments of `watch`.
 #[derive(Debug, clap::Args)]
@@ -188,7 +188,7 @@ impl Screen<'_> {
             return vec![format!("waiting for a publisher of \"{}\"", self.name)];
         };
         let state = report.state().unwrap_or(FrameState::Moving);
-        let style = self.style(state);
+        let style = self.style(state.severity());
         let latency = report.latency.map_or("no frames".to_owned(), |latency| {
             let us = |ns: u64| ns as f64 / 1000.0;
             format!("p50 {:.1} p99 {:.1} max {:.1} us", us(latency.p50), us(latency.p99), us(latency.max))
@@ -223,8 +223,8 @@ impl Screen<'_> {
 
     /// Wall time to the event that the latest alert announced.
     fn countdown(&self, report: &IntervalReport, sim_time: f64) -> String {
-        let ahead =
-            report.alert.filter(|alert| alert.alert_level() == Some(Level::Approaching) && alert.event_time > sim_time);
+        let warns = |level: Level| level.severity() > Severity::Ok && !level.has_happened();
+        let ahead = report.alert.filter(|alert| alert.alert_level().is_some_and(warns) && alert.event_time > sim_time);
         ahead.map_or(String::new(), |alert| {
             let event = alert.event_kind().map_or("event", EventKind::name);
             format!("  {event} {}", time_until(alert.event_time - sim_time, self.time_scale))
@@ -233,15 +233,15 @@ impl Screen<'_> {
 
     fn alert_line(&self, alert: &CollisionAlert) -> String {
         let level = alert.alert_level().unwrap_or(Level::Clear);
-        let style = self.style(level.into());
+        let style = self.style(level.severity());
         let sentence = alert_sentence(alert, self.benches, Figures::Shown { time_scale: self.time_scale });
         format!("{:>10.3} s  {style}{:<11}{style:#} {sentence}", alert.sim_time, level.name())
     }
 
-    fn style(&self, state: FrameState) -> Style {
+    fn style(&self, severity: Severity) -> Style {
         match self.display {
             Display::Terminal if shows_colour(&stdout()) => {
-                Style::new().bold().fg_color(Some(level_colour(state).into()))
+                Style::new().bold().fg_color(Some(severity_colour(severity).into()))
             }
             _ => Style::new(),
         }

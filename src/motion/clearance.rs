@@ -1,8 +1,8 @@
 //! Which two boards of a chain are nearest: all pairs as the reference, and the live way that tests few of them.
 //!
-//! In: a [`Chain`] and its [`Team`]. Out: the nearest pair. The show calls it where a scene has alerts. Pairs that share a
-//! handle never count. Both ways evaluate a pair with the same function on the same numbers, so they agree to the last
-//! bit.
+//! In: a [`Chain`] and its [`Team`]. Out: the nearest pair. The show calls it where a scene has alerts. Pairs that
+//! share a handle never count. Both ways evaluate a pair with the same function on the same numbers, so they agree to
+//! the last bit.
 
 mod bounds;
 mod grid;
@@ -94,10 +94,10 @@ pub struct ClearanceCounters {
 
 /// The live way: the same answer as [`least_clearance_all_pairs`], from a few pairs.
 ///
-/// The last nearest pair's clearance now is a first limit. Where a table serves, only those pairs are tested whose bound
-/// is within it: most often none. Its bounds hold for every frame alike, so that no jump of the show can mislead it. Where
-/// no table serves, every bench carries a bound from frame to frame, lowered by how far the handles have moved. All memory
-/// is reserved by the constructor.
+/// The last nearest pair's clearance now is a first limit. Where a table serves, only those pairs are tested whose
+/// bound is within it: most often none. Its bounds hold for every frame alike, so that no jump of the show can mislead
+/// it. Where no table serves, every bench carries a bound from frame to frame, lowered by how far the handles have
+/// moved. All memory is reserved by the constructor.
 #[derive(Debug, Clone)]
 pub struct ClearanceMonitor {
     team: Team,
@@ -105,15 +105,21 @@ pub struct ClearanceMonitor {
     last_pair: Option<(usize, usize)>,
     table: Option<Box<BoundTable>>,
     carried: CarriedBounds,
+    /// Metres that a link of a frame may be off its length.
+    link_error: f64,
     counters: ClearanceCounters,
 }
 
+/// Metres that a link of an exact frame is off at most, and more.
+const EXACT_LINK_ERROR: f64 = 1e-9;
+
 impl ClearanceMonitor {
-    /// A monitor for chains of `team` whose handles are where motion along `path` has them, to 1e-9 m. From the `table` of
-    /// that motion it makes one of its own, in some 15 ms for a way of 500 links and about half a second at most: if that is
-    /// not enough, the monitor does without.
+    /// A monitor for chains of `team` whose handles are where motion along `path` has them, as far as `table` promises.
+    /// From the table it makes one of its own, in some 15 ms for a way of 500 links and about half a second at most: if
+    /// that is not enough, the monitor does without.
     pub fn new(path: &Path, team: Team, table: &FollowerTable) -> Self {
-        Self { table: BoundTable::new(path, &team, table).map(Box::new), ..Self::without_table(team) }
+        let link_error = EXACT_LINK_ERROR.max(2.0 * table.accuracy());
+        Self { table: BoundTable::new(path, &team, table).map(Box::new), link_error, ..Self::without_table(team) }
     }
 
     /// A monitor for chains of `team` wherever the handles are.
@@ -124,6 +130,7 @@ impl ClearanceMonitor {
             last_pair: None,
             table: None,
             carried: CarriedBounds::new(team.benches),
+            link_error: EXACT_LINK_ERROR,
             counters: ClearanceCounters::default(),
         }
     }
@@ -138,15 +145,15 @@ impl ClearanceMonitor {
         self.counters
     }
 
-    /// The nearest two boards of `chain`, whose head has travelled so many metres of the path (NaN where it does not follow
-    /// the path); of several, the lowest (a, b). `None` under three benches.
+    /// The nearest two boards of `chain`, whose head has travelled so many metres of the path (NaN where it does not
+    /// follow the path); of several, the lowest (a, b). `None` under three benches.
     pub fn least_clearance(&mut self, chain: &Chain, travelled: f64) -> Option<PairClearance> {
         self.counters.frames += 1;
         self.latest = None;
         if self.team.benches < 3 {
             return None;
         }
-        let mut search = Search::new(chain, &self.team, self.last_pair);
+        let mut search = Search::new(chain, &self.team, self.link_error, self.last_pair);
         let located = self.table.as_ref().and_then(|table| Some((table, table.locate(travelled, self.team.benches)?)));
         let unsettled = match located {
             Some((table, located)) => search.by_table(table, located),

@@ -1,9 +1,34 @@
 //! The state of a frame, the level of an alert, and whether the show plays: each a type without impossible values.
 //!
+//! How serious each is stands here alone, as its [`Severity`]: colours, signs and diagnostics follow from that, so that
+//! nothing that shows a state need know which states there are.
+//!
 //! Called by the show; the wire numbers the values of each type in their order, from 0. The constants in `msgs/msg`
 //! and in the Python layouts are generated from here, doc comments included: see `wire::layouts`.
 
 use crate::motion::event::EventKind;
+
+/// How serious a state or a level is, for whatever shows it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Severity {
+    /// Nothing is wrong.
+    Ok,
+    /// Something is about to go wrong.
+    Warning,
+    /// Something has gone wrong.
+    Error,
+}
+
+impl Severity {
+    /// The name in JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Warning => "warning",
+            Self::Error => "error",
+        }
+    }
+}
 
 /// What the dragon is doing: the latest event passed, which stays until the show ends or loops, or what is near.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -34,6 +59,15 @@ impl FrameState {
             Self::Stall => Some(EventKind::Stall),
             Self::Lock => Some(EventKind::Lock),
             Self::PathEnd => Some(EventKind::PathEnd),
+        }
+    }
+
+    /// How serious it is. The end of the path is where a show is meant to end.
+    pub fn severity(self) -> Severity {
+        match self {
+            Self::Moving | Self::PathEnd => Severity::Ok,
+            Self::Approaching => Severity::Warning,
+            Self::Contact | Self::Stall | Self::Lock => Severity::Error,
         }
     }
 
@@ -104,7 +138,12 @@ impl Level {
 
     /// Whether an event has happened, rather than none or one that is coming.
     pub fn has_happened(self) -> bool {
-        self > Self::Approaching
+        FrameState::from(self).event().is_some()
+    }
+
+    /// How serious it is: as the state.
+    pub fn severity(self) -> Severity {
+        FrameState::from(self).severity()
     }
 
     /// The name in JSON and on the terminal.

@@ -9,16 +9,23 @@ mod band;
 mod beginning;
 mod head;
 mod kernel;
+mod last_row;
 mod layout;
+mod packed;
 mod polynomial;
 pub(crate) mod rows;
+mod single_kernel;
+#[cfg(test)]
+mod tests;
 mod track;
 
 use std::sync::Arc;
 
 use head::{HeadBuilder, HeadTable};
 use kernel::{Moment, within_half_turn};
-pub use rows::Order;
+use packed::PackedRows;
+pub(crate) use packed::{Allowed, Format};
+pub(crate) use rows::Tolerance;
 use rows::{Alpha, Rows};
 use track::Track;
 
@@ -46,6 +53,14 @@ impl Instructions {
             .into_iter()
             .filter(|instructions| instructions.is_available())
             .collect()
+    }
+
+    /// The fastest for frames of so many handles. Large ones wait for memory, and the wider stores then cost a tenth:
+    /// each lies across two cache lines.
+    fn fastest(handles: usize) -> Self {
+        const LARGE: usize = 10_000;
+        let fastest = |instructions: &Self| *instructions != Self::Avx512 || handles < LARGE;
+        Self::available().into_iter().find(fastest).unwrap_or(Self::Portable)
     }
 
     /// The name for people.
@@ -89,10 +104,18 @@ pub struct FollowerTable {
     instructions: Instructions,
     /// Shared, so that a clone costs little.
     rows: Arc<Rows>,
+    /// What frames are read from where it is not the rows.
+    packed: Option<Arc<PackedRows>>,
     head: Arc<HeadTable>,
     newton: Newton,
     fallbacks: u64,
+    /// Metres that its frames are off at most.
+    accuracy: f64,
+    exact_bytes_per_handle: f64,
 }
+
+/// Metres that the frames of a table as exact as doubles allow are off at most, on any path but the farthest.
+const EXACT_ACCURACY: f64 = 1e-9;
 
 impl FollowerTable {
     /// A solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve, as exact as
@@ -101,22 +124,40 @@ impl FollowerTable {
     /// `None` where there is no such table: for a single bench, for a team so long that the table would not fit, and
     /// where it was found not to be exact even at the start.
     pub fn new(path: &Path, team: Team, head_speed: f64, velocities: Velocities) -> Option<Self> {
-        Self::with_order(path, team, head_speed, velocities, Order::EXACT)
+        Self::with_tolerance(path, team, head_speed, velocities, Tolerance::EXACT)
     }
 
-    /// The same with polynomials of another length and exactness.
-    pub fn with_order(path: &Path, team: Team, head_speed: f64, velocities: Velocities, order: Order) -> Option<Self> {
-        if team.benches < 2 || !matches!((order.coefficients, order.heading_coefficients), (6, 5) | (4, 3)) {
+    /// The same as exact as asked for.
+    pub(crate) fn with_tolerance(
+        path: &Path,
+        team: Team,
+        head_speed: f64,
+        velocities: Velocities,
+        tolerance: Tolerance,
+    ) -> Option<Self> {
+        if team.benches < 2 {
             return None;
         }
         let track = Track::new(path);
-        let mut rows = band::rows(&track, &team, order)?;
+        let mut rows = band::rows(&track, &team, tolerance)?;
         let head = HeadBuilder::new(&track, &team, &rows).build()?;
         rows.bands.iter_mut().for_each(|band| band.centres = Vec::new());
         let newton = Newton::new(path.clone(), team, head_speed, velocities);
-        let instructions = Instructions::available()[0];
+        let instructions = Instructions::fastest(team.handles());
+        let exact_bytes_per_handle = rows.bytes_per_row(team.benches);
         let (rows, head) = (Arc::new(rows), Arc::new(head));
-        Some(Self { head_speed, velocities, instructions, rows, head, newton, fallbacks: 0 })
+        Some(Self {
+            head_speed,
+            velocities,
+            instructions,
+            rows,
+            packed: None,
+            head,
+            newton,
+            fallbacks: 0,
+            accuracy: EXACT_ACCURACY,
+            exact_bytes_per_handle,
+        })
     }
 
     /// The same solver with other instructions, or `None` where this processor lacks them.
@@ -124,14 +165,60 @@ impl FollowerTable {
         instructions.is_available().then_some(Self { instructions, ..self })
     }
 
+    /// The same solver with its frames read from another format; `None` where that would lose more than is allowed.
+    pub(crate) fn packed(&self, format: Format, allowed: Allowed) -> Option<Self> {
+        let packed = PackedRows::new(&self.rows, self.head.foremost_row(), format, allowed)?;
+        Some(Self { packed: Some(Arc::new(packed)), ..self.clone() })
+    }
+
+    /// The formats that frames can be read from besides the rows, the fewest bytes first.
+    pub(crate) fn formats() -> [Format; 3] {
+        PackedRows::FORMATS
+    }
+
+    /// The same solver, with the promise that its frames are off by so many metres at most.
+    pub(crate) fn promising(self, accuracy: f64) -> Self {
+        Self { accuracy: accuracy.max(EXACT_ACCURACY), ..self }
+    }
+
+    /// Metres that its frames are off at most, besides what doubles do not hold.
+    pub fn accuracy(&self) -> f64 {
+        self.accuracy
+    }
+
+    /// How its coefficients are kept, for people.
+    pub fn format(&self) -> String {
+        self.packed.as_ref().map_or_else(|| "double precision, order 6".to_owned(), |packed| packed.format.to_string())
+    }
+
+    /// Bytes of the table that a frame reads for a handle, on average over the team at the start.
+    pub fn bytes_per_handle(&self) -> f64 {
+        match &self.packed {
+            Some(packed) => packed.format.bytes_per_handle() as f64,
+            None => self.exact_bytes_per_handle,
+        }
+    }
+
+    /// [`bytes_per_handle`](Self::bytes_per_handle) as a part of what the most exact table takes.
+    pub fn relative_cost(&self) -> f64 {
+        self.bytes_per_handle() / self.exact_bytes_per_handle
+    }
+
+    /// The same solver without what its frames do not read: no clearance can be had from it.
+    pub fn for_frames(&self) -> Self {
+        let rows = if self.packed.is_some() { Arc::new(Rows::empty()) } else { self.rows.clone() };
+        Self { rows, ..self.clone() }
+    }
+
     /// The instructions it uses.
     pub fn instructions(&self) -> Instructions {
         self.instructions
     }
 
-    /// Bytes this solver holds.
+    /// Bytes that its frames need.
     pub fn memory_bytes(&self) -> usize {
-        size_of::<Self>() + self.rows.memory_bytes() + self.head.memory_bytes()
+        let table = self.packed.as_ref().map_or_else(|| self.rows.memory_bytes(), |packed| packed.memory_bytes());
+        size_of::<Self>() + table + self.head.memory_bytes()
     }
 
     /// Simulated seconds up to which frames are read off the table.
@@ -195,7 +282,10 @@ impl FollowerTable {
     fn read_off_wanted<const FUSED: bool, const VELOCITIES: bool>(&self, travelled: f64, chain: &mut Chain) {
         let sample = self.head.at(travelled);
         let moment = Moment { alpha: sample.alpha, alpha_per_second: sample.alpha_per_metre * self.head_speed };
-        kernel::write::<FUSED, VELOCITIES>(&self.rows, &moment, chain);
+        match &self.packed {
+            Some(packed) => single_kernel::write::<FUSED, VELOCITIES>(packed, &moment, chain),
+            None => kernel::write::<FUSED, VELOCITIES>(&self.rows, &moment, chain),
+        }
         let last = chain.handles() - 1;
         chain.heading[last] = chain.heading[last - 1];
         chain.x[0] = sample.x;
@@ -222,96 +312,5 @@ impl Solver for FollowerTable {
         }
         self.fallbacks += 1;
         self.newton.solve_at(travelled, chain)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::model::Point;
-    use crate::model::curve::Side;
-
-    const TEAM: Team = Team { benches: 60, head_length: 3.41, body_length: 2.2, width: 0.3, hole_inset: 0.275 };
-
-    fn paths() -> [Path; 3] {
-        let route = Path::route(Point::new(-30.0, -10.0), 0.0).line(40.0).arc(Side::Left, 6.0, 0.25).line(12.0);
-        let route = route.arc(Side::Right, 5.0, 0.5).line(10.0).arc(Side::Left, 5.0, 0.5).line(120.0);
-        let turnaround = Path::turnaround(1.7, 4.5, 2.0, 100.0, 100.0).unwrap();
-        [Path::spiral(0.55, 16.0), turnaround, route.build().unwrap()]
-    }
-
-    /// The largest differences of place, metres, of heading and of speed, relative to the head's or its own.
-    fn differences(one: &Chain, other: &Chain) -> [f64; 3] {
-        let mut most = [0.0; 3];
-        for i in 0..one.handles() {
-            let turn = (one.heading[i] - other.heading[i]).abs();
-            let rates =
-                (one.vx[i] - other.vx[i]).hypot(one.vy[i] - other.vy[i]).max((one.speed[i] - other.speed[i]).abs());
-            let place = (one.x[i] - other.x[i]).hypot(one.y[i] - other.y[i]);
-            let turn = turn.min((turn - std::f64::consts::TAU).abs());
-            for (most, now) in most.iter_mut().zip([place, turn, rates / other.speed[i].abs().max(1.0)]) {
-                *most = now.max(*most);
-            }
-        }
-        most
-    }
-
-    #[test]
-    fn the_table_agrees_with_the_safe_solver_on_every_code_path_and_across_junctions() {
-        for path in paths() {
-            let newton = Newton::new(path.clone(), TEAM, 1.0, Velocities::Computed);
-            let table = FollowerTable::new(&path, TEAM, 1.0, Velocities::Computed).unwrap();
-            let end = table.valid_until();
-            assert!(end > 200.0, "{end}");
-            let around = |junction: f64| [-1e-3, -1e-9, 0.0, 1e-9, 1e-3].map(|by| junction + by);
-            let regular = (0..=200).map(|k| end * f64::from(k) / 200.0);
-            let times: Vec<f64> = path.junctions().flat_map(around).chain(regular).collect();
-            for instructions in Instructions::available() {
-                let mut table = table.clone().with_instructions(instructions).unwrap();
-                let (mut found, mut wanted) = (Chain::new(TEAM.handles()), Chain::new(TEAM.handles()));
-                for time in times.iter().copied().filter(|time| (0.0..=end).contains(time)) {
-                    table.solve(time, &mut found).unwrap();
-                    newton.solve_at(time, &mut wanted).unwrap();
-                    let [place, heading, speed] = differences(&found, &wanted);
-                    // Both solvers may be off by what the travel's rounding does to the chain.
-                    let allowed = 2.0 * 1e-13f64.max(8.0 * f64::EPSILON * time);
-                    let name = instructions.name();
-                    assert!(
-                        place < allowed && heading < 1e-12 && speed < 2e-12,
-                        "{name} {time}: {place:e} {heading:e} {speed:e}"
-                    );
-                }
-                assert_eq!(table.fallbacks(), 0);
-            }
-        }
-    }
-
-    #[test]
-    fn a_frame_does_not_depend_on_the_ones_before_and_past_the_table_the_safe_solver_works() {
-        let path = &paths()[0];
-        let mut table = FollowerTable::new(path, TEAM, 1.0, Velocities::Omitted).unwrap();
-        let [mut first, mut again] = [Chain::new(TEAM.handles()), Chain::new(TEAM.handles())];
-        table.solve(123.4, &mut first).unwrap();
-        assert_eq!(table.solve(440.0, &mut again), Err(NoFollower));
-        assert_eq!(table.fallbacks(), 1);
-        table.solve(123.4, &mut again).unwrap();
-        assert_eq!((first.x, first.y, first.heading), (again.x, again.y, again.heading));
-    }
-
-    #[test]
-    fn a_coarser_order_is_as_exact_as_it_says() {
-        let order = Order { coefficients: 4, heading_coefficients: 3, tolerance: 1e-7, speed_tolerance: 1e-5 };
-        for path in paths() {
-            let newton = Newton::new(path.clone(), TEAM, 1.0, Velocities::Computed);
-            let mut table = FollowerTable::with_order(&path, TEAM, 1.0, Velocities::Computed, order).unwrap();
-            let (mut found, mut wanted) = (Chain::new(TEAM.handles()), Chain::new(TEAM.handles()));
-            for k in 0..=100 {
-                let time = 2.0 * f64::from(k);
-                table.solve(time, &mut found).unwrap();
-                newton.solve_at(time, &mut wanted).unwrap();
-                let [place, heading, speed] = differences(&found, &wanted);
-                assert!(place < 4e-7 && heading < 4e-6 && speed < 2e-5, "{time}: {place:e} {heading:e} {speed:e}");
-            }
-        }
     }
 }

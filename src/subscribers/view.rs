@@ -121,6 +121,7 @@ fn router(server: Server) -> Router {
         .route("/", file("text/html; charset=utf-8", include_str!("view/index.html")))
         .route("/stage.js", file("text/javascript; charset=utf-8", include_str!("view/stage.js")))
         .route("/drawing.js", file("text/javascript; charset=utf-8", include_str!("view/drawing.js")))
+        .route("/hermite.js", file("text/javascript; charset=utf-8", include_str!("view/hermite.js")))
         .route("/stream.js", file("text/javascript; charset=utf-8", include_str!("view/stream.js")))
         .route("/style.css", file("text/css; charset=utf-8", include_str!("view/style.css")))
         .route("/frames", get(frames))

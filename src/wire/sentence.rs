@@ -5,7 +5,7 @@
 
 use super::layouts::CollisionAlert;
 use crate::motion::event::EventKind;
-use crate::show::state::Level;
+use crate::show::state::{FrameState, Level};
 
 /// Whether a sentence holds what changes from frame to frame: the time until the event, and the clearance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +45,14 @@ pub fn alert_sentence(alert: &CollisionAlert, benches: u32, figures: Figures) ->
         }
     };
     if said.contains("bench ") { format!("{said} (counting from 1)") } else { said }
+}
+
+/// What a state says that no alert tells of; `None` where an alert does, or there is nothing to say.
+pub fn state_sentence(state: FrameState) -> Option<&'static str> {
+    match state {
+        FrameState::PathEnd => Some("the head has reached the end of the path"),
+        _ => None,
+    }
 }
 
 fn happening(alert: &CollisionAlert, kind: EventKind, benches: u32) -> String {
@@ -99,7 +107,7 @@ mod tests {
     const SHOWN: Figures = Figures::Shown { time_scale: 2.0 };
 
     fn alert(level: Level, kind: Option<EventKind>) -> CollisionAlert {
-        let event = kind.map_or(0, |kind| crate::show::state::FrameState::from(kind) as u32);
+        let event = kind.map_or(0, |kind| FrameState::from(kind) as u32);
         CollisionAlert {
             level: level as u32,
             bench_a: 0,

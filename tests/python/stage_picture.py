@@ -3,7 +3,8 @@
     stage_picture.py SCENARIO PROGRAM NAME
 
 Starts its own server and publishers under the service name NAME, looks at what the page shows and draws, and compares
-it with the exact positions in tests/truth. Ends with exit code 0, or with what it found instead.
+it with the exact positions in tests/truth. Ends with exit code 0, or with what it found instead. The motion between
+two frames is looked at in stage_motion.py.
 """
 
 import base64
@@ -370,36 +371,6 @@ def five_at_once():
             assert not complaints, complaints
 
 
-# How many places the head was drawn at in four seconds, and how many frames came.
-PLACES = """() => new Promise((told) => {
-    const seen = new Set(), start = performance.now(), before = picture.received;
-    const look = () => {
-        seen.add(picture.head.join());
-        performance.now() < start + 4000 ? requestAnimationFrame(look) : told([seen.size, picture.received - before]);
-    };
-    look();
-})"""
-
-
-def motion_is_smooth_at_any_rate():
-    counts = "[picture.received, picture.drawn, picture.sequence]"
-    with server() as url, browser(viewport={"width": 640, "height": 480}) as (page, complaints):
-        page.goto(url)
-        with publisher("--start", "100", "--rate", "2"):
-            drawn(page)
-            places, received = page.evaluate(PLACES)
-            assert places > 2 * received > 0, f"{places} places from {received} frames: nothing between them"
-        until(page, "document.body.dataset.level === 'waiting'", "the publisher's end")
-        with publisher("--start", "100", "--rate", "1000"):
-            drawn(page)
-            first = page.evaluate(counts)
-            time.sleep(3)
-            received, pictures, published = (now - then for now, then in zip(page.evaluate(counts), first))
-            assert 0 < received < published / 4, f"{received} of {published} frames: a page needs fewer"
-            assert pictures > 0
-        assert not complaints, complaints
-
-
 def foreign_pages_are_refused():
     """A page of another server on this very machine, which no other rule of the browser keeps away."""
     elsewhere = http.server.ThreadingHTTPServer(("127.0.0.1", 0), http.server.BaseHTTPRequestHandler)
@@ -418,18 +389,13 @@ def foreign_pages_are_refused():
         assert not opens(), "a page from elsewhere can watch"
 
 
-if __name__ == "__main__":
+def play(*scenarios):
+    """Runs the one that was named on the command line."""
     signal.signal(signal.SIGALRM, lambda *_: sys.exit(f"{SCENARIO} took more than {WATCHDOG} s"))
     signal.alarm(WATCHDOG)
-    {
-        scenario.__name__: scenario
-        for scenario in [
-            boards_are_where_the_truth_says,
-            hands_move_the_picture,
-            show_ends_in_contact,
-            publishers_come_and_go,
-            five_at_once,
-            motion_is_smooth_at_any_rate,
-            foreign_pages_are_refused,
-        ]
-    }[SCENARIO]()
+    {scenario.__name__: scenario for scenario in scenarios}[SCENARIO]()
+
+
+if __name__ == "__main__":
+    scenarios = (boards_are_where_the_truth_says, hands_move_the_picture, show_ends_in_contact)
+    play(*scenarios, publishers_come_and_go, five_at_once, foreign_pages_are_refused)

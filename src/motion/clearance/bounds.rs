@@ -2,11 +2,11 @@
 //! frame need only test the few pairs that can be the nearest.
 //!
 //! Where the second handle stands at T(alpha), the next ones stand at T(alpha + 1), T(alpha + 2) and so on: see
-//! [`crate::solve::table::rows`]. So how near a body bench is to those behind it depends on the alpha of its front handle
-//! alone. Every row of T is divided into [`CELLS`] equal cells, so that while one handle is in a cell, the next is in the
-//! same cell of the next row. Each (row, cell) has a list of the benches that can be near, with a proven lower bound of
-//! the signed distance to each (see [`super::moving`]), in ascending order; the last entry stands for all others. The
-//! lists' first bounds are kept once more cell by cell, where those of a whole chain lie side by side.
+//! [`crate::solve::table::rows`]. So how near a body bench is to those behind it depends on the alpha of its front
+//! handle alone. Every row of T is divided into [`CELLS`] equal cells, so that while one handle is in a cell, the next
+//! is in the same cell of the next row. Each (row, cell) has a list of the benches that can be near, with a proven
+//! lower bound of the signed distance to each (see [`super::moving`]), in ascending order; the last entry stands for
+//! all others. The lists' first bounds are kept once more cell by cell, where those of a whole chain lie side by side.
 //!
 //! The head's link differs, but while the second handle is in a cell, the head too is near a known quadratic polynomial
 //! of the cell's time. Its list holds while it is so near as was taken for granted, which every frame confirms; past a
@@ -41,9 +41,6 @@ const WORK_OF_BOUND: usize = 150;
 
 /// Entries of a list, at most.
 const MOST_ENTRIES: usize = 24;
-
-/// How far, in metres, a handle of a frame can be from where T says.
-const HANDLE_ERROR: f64 = 1e-9;
 
 /// Benches that can be near another one.
 #[derive(Debug, Clone, Copy)]
@@ -104,7 +101,7 @@ impl BoundTable {
             return None;
         }
         let rows = follower.rows().rows();
-        if rows > MOST_ROWS {
+        if rows == 0 || rows > MOST_ROWS {
             return None;
         }
         let knots = head_knots(path, follower, team.link(1))?;
@@ -116,7 +113,7 @@ impl BoundTable {
             neighbours: vec![Neighbour::UNKNOWN],
             follower: follower.clone(),
         };
-        let mut lists = ListBuilder::new(team, rows);
+        let mut lists = ListBuilder::new(team, rows, follower.accuracy());
         for cell in 0..CELLS {
             table.fill(cell, team, &knots, &mut lists)?;
         }
@@ -135,7 +132,7 @@ impl BoundTable {
             self.bounds[cell * self.rows + row] = self.neighbours[begin as usize].bound;
             lists.most_travel = lists.most_travel.max(mover.0.travel);
             let flat = row * CELLS + cell;
-            if let Some(track) = knots.get(flat..flat + 2).and_then(head_track) {
+            if let Some(track) = knots.get(flat..flat + 2).and_then(|knots| head_track(knots, lists.handle_error)) {
                 let head = MovingBoard::new(&track, &handles[row - first], team, 0);
                 let begin = lists.list(&(head, head.middle()), row, row + 1, &mut self.neighbours);
                 self.heads[flat] = Some(HeadCell { track, begin });
@@ -187,6 +184,8 @@ struct ListBuilder<'a> {
     side: f64,
     /// The most that a board behind the row goes, metres.
     most_travel: f64,
+    /// How far, in metres, a handle of a frame can be from where it should be: twice what T and the frame are off.
+    handle_error: f64,
     /// No bound is greater. Two benches with one between them are never farther apart than its link, so that in every
     /// frame some pair is nearer.
     farthest: f64,
@@ -195,7 +194,7 @@ struct ListBuilder<'a> {
 }
 
 impl<'a> ListBuilder<'a> {
-    fn new(team: &'a Team, rows: usize) -> Self {
+    fn new(team: &'a Team, rows: usize, handle_error: f64) -> Self {
         Self {
             team,
             boards: Vec::with_capacity(rows),
@@ -203,7 +202,8 @@ impl<'a> ListBuilder<'a> {
             grid: Grid::new(rows),
             most_travel: 0.0,
             side: 0.0,
-            farthest: team.link(1),
+            handle_error,
+            farthest: team.link(1) + 2.0 * handle_error,
             candidates: Vec::new(),
             work: 0,
         }
@@ -250,7 +250,7 @@ impl<'a> ListBuilder<'a> {
         }
         self.candidates.sort_unstable_by(|a, b| a.1.total_cmp(&b.1));
         let coordinates = board.centre.coords.norm() + reach;
-        let handle_error = HANDLE_ERROR + 64.0 * f64::EPSILON * coordinates;
+        let handle_error = self.handle_error + 64.0 * f64::EPSILON * coordinates;
         let margin = 2.0 * handle_error * corner_reach(self.team, 0).max(corner_reach(self.team, 1));
         let rounded = |bound: f64| ((bound - margin) as f32).next_down();
         let begin = neighbours.len() as u32;
@@ -369,12 +369,13 @@ fn head_knots(path: &Path, follower: &FollowerTable, link: f64) -> Option<Vec<Op
     Some(knots)
 }
 
-/// How the head goes from one knot to the next: the quadratic next to the cubic of their places and slopes.
-fn head_track(knots: &[Option<HeadKnot>]) -> Option<Quadratic> {
+/// How the head goes from one knot to the next: the quadratic next to the cubic of their places and slopes; a frame's
+/// head may be `handle_error` metres from the path.
+fn head_track(knots: &[Option<HeadKnot>], handle_error: f64) -> Option<Quadratic> {
     let [Some(begin), Some(end)] = knots else { return None };
     let middle = 0.5 * (begin.place + end.place) + 0.25 * (begin.slope - end.slope);
     let mut track = Quadratic::through(begin.place, middle, end.place);
     let cubic = 0.25 * (begin.slope + end.slope - (end.place - begin.place));
-    track.error = cubic.norm() + 1e-6;
+    track.error = cubic.norm() + 1e-6 + handle_error;
     Some(track)
 }

@@ -25,9 +25,10 @@ const MOST_MOVED: f64 = 100.0;
 
 /// For every bench, how near it can be to those behind it, carried from frame to frame.
 ///
-/// If no handle is farther than D from where it was, no point of a board is farther than [`corner_reach`] times D, and no
-/// two boards are nearer by more than twice that, however the handles have moved meanwhile. So what a bench was known to
-/// keep clear, less that for all movement since, it still does.
+/// If no handle is farther than D from where it was, no point of a board is farther than [`corner_reach`] times D (a
+/// little more where links are off their length), and no two boards are nearer by more than twice that, however the
+/// handles have moved meanwhile. So what a bench was known to keep clear, less that for all movement since, it still
+/// does.
 #[derive(Debug, Clone)]
 pub(super) struct CarriedBounds {
     /// The handles in the frame before.
@@ -52,7 +53,7 @@ impl CarriedBounds {
     }
 
     /// Goes on to the handles of a chain.
-    fn follow(&mut self, chain: &Chain, team: &Team) {
+    fn follow(&mut self, chain: &Chain, team: &Team, link_error: f64) {
         const LANES: usize = 8;
         let (mut most, mut sum) = ([0.0; LANES], [0.0; LANES]);
         let old = self.x.chunks_mut(LANES).zip(self.y.chunks_mut(LANES));
@@ -65,7 +66,8 @@ impl CarriedBounds {
                 (old_x[k], old_y[k]) = (x[k], y[k]);
             }
         }
-        let reach = corner_reach(team, 0).max(corner_reach(team, 1));
+        let shortened = 1.0 + 2.0 * link_error / team.shortest_link();
+        let reach = shortened * corner_reach(team, 0).max(corner_reach(team, 1));
         self.closed += 2.0 * reach * most.into_iter().fold(0.0, f64::max).sqrt();
         // Not a number is in the sum, too.
         if !(sum.iter().sum::<f64>() < f64::INFINITY && self.closed < MOST_MOVED) {
@@ -84,6 +86,8 @@ pub(super) struct Search<'a> {
     first: ((usize, usize), f64),
     /// A body board's length over its link's.
     board_per_link: f64,
+    /// Metres that a link may be off its length.
+    link_error: f64,
     /// Pairs tested.
     pub tested: u64,
 }
@@ -91,11 +95,11 @@ pub(super) struct Search<'a> {
 impl<'a> Search<'a> {
     /// Begins with a pair that is likely to be near.
     #[inline]
-    pub(super) fn new(chain: &'a Chain, team: &'a Team, likely: Option<(usize, usize)>) -> Self {
+    pub(super) fn new(chain: &'a Chain, team: &'a Team, link_error: f64, likely: Option<(usize, usize)>) -> Self {
         let pair = likely.unwrap_or((0, 2));
         let board_per_link = 1.0 + 2.0 * team.hole_inset / team.link(1);
         let first = (pair, f64::INFINITY);
-        let mut search = Self { chain, team, nearest: Nearest::NONE, first, board_per_link, tested: 0 };
+        let mut search = Self { chain, team, nearest: Nearest::NONE, first, board_per_link, link_error, tested: 0 };
         search.first.1 = search.test(&board(chain, team, pair.0), pair);
         search
     }
@@ -146,7 +150,7 @@ impl<'a> Search<'a> {
 
     /// Tests the pairs from bench `from` on that the carried bounds do not exclude, and renews these.
     pub(super) fn by_carried_bounds(&mut self, carried: &mut CarriedBounds, from: usize) {
-        carried.follow(self.chain, self.team);
+        carried.follow(self.chain, self.team, self.link_error);
         let skin = SKIN * (self.team.link(1) + 2.0 * self.team.hole_inset);
         let mut scans = 0;
         for start in (from..self.team.benches - 2).step_by(BOUNDS_AT_ONCE) {
@@ -173,19 +177,19 @@ impl<'a> Search<'a> {
     /// Puts the benches from one on into a grid whose squares are as large as a search goes.
     fn fill(&self, grid: &mut Grid, from: usize, skin: f64) {
         let Chain { x, y, .. } = self.chain;
-        let diameter = 2.0 * circle_radius(self.team, 1);
+        let diameter = 2.0 * self.body_radius();
         grid.clear((diameter + self.nearest.value).max(0.0) + skin);
         for bench in from..self.team.benches {
             grid.add(bench, 0.5 * (x[bench] + x[bench + 1]), 0.5 * (y[bench] + y[bench + 1]));
         }
     }
 
-    /// Tests `a` against every later bench of a grid that can be within the limit; returns a lower bound of its distance
-    /// to all of them, which is at most `skin` beyond the limit.
+    /// Tests `a` against every later bench of a grid that can be within the limit; returns a lower bound of its
+    /// distance to all of them, which is at most `skin` beyond the limit.
     fn by_grid(&mut self, grid: &Grid, a: usize, skin: f64) -> f64 {
         let board_a = board(self.chain, self.team, a);
         let centre = (board_a.centre.x, board_a.centre.y);
-        let radii = board_a.circle_radius() + circle_radius(self.team, 1);
+        let radii = board_a.circle_radius() + self.body_radius();
         let mut bound = self.nearest.value + skin;
         let distance = padded(radii + bound, radii, centre.0.abs() + centre.1.abs());
         grid.visit_near(centre, distance, a + 2, |b| bound = bound.min(self.test_unless_culled(&board_a, (a, b))));
@@ -197,7 +201,7 @@ impl<'a> Search<'a> {
         let Chain { x, y, .. } = self.chain;
         let board_a = board(self.chain, self.team, a);
         let centre = board_a.centre;
-        let radii = board_a.circle_radius() + circle_radius(self.team, 1);
+        let radii = board_a.circle_radius() + self.body_radius();
         let mut bound = self.nearest.value + skin;
         let distance = padded(radii + bound, radii, centre.x.abs() + centre.y.abs());
         let squared = |b: usize| {
@@ -213,6 +217,11 @@ impl<'a> Search<'a> {
             }
         }
         bound
+    }
+
+    /// The radius of the circle about a body board, metres, at most.
+    fn body_radius(&self) -> f64 {
+        circle_radius(self.team, 1) + 0.5 * self.link_error
     }
 
     /// Tests a pair if it can be within the limit; returns a lower bound of its distance.
@@ -238,8 +247,8 @@ impl<'a> Search<'a> {
         value
     }
 
-    /// A lower bound of the signed distance of `board_a` and bench `b`, from the gaps along `board_a`'s sides and without a
-    /// square root: the half link of `b` is stretched to its half board, and its width taken as if across.
+    /// A lower bound of the signed distance of `board_a` and bench `b`, from the gaps along `board_a`'s sides and
+    /// without a square root: the half link of `b` is stretched to its half board, and its width taken as if across.
     fn gap_bound(&self, board_a: &Board, b: usize) -> f64 {
         let Chain { x, y, .. } = self.chain;
         let half_link = (0.5 * (x[b] - x[b + 1]), 0.5 * (y[b] - y[b + 1]));
@@ -250,7 +259,9 @@ impl<'a> Search<'a> {
         let gap_along = along(offset) - along(half_link) * self.board_per_link - board_a.half_length;
         let gap_across = across(offset) - across(half_link) * self.board_per_link - board_a.half_width;
         let rounding = 1e-9 * board_a.half_length + 1e-12 * (offset.0.abs() + x[b].abs() + y[b].abs());
-        gap_along.max(gap_across) - 0.5 * self.team.width - rounding
+        // What lies beyond the handles is stretched as the link is.
+        let stretched = 0.5 * (self.board_per_link - 1.0) * self.link_error;
+        gap_along.max(gap_across) - 0.5 * self.team.width - stretched - rounding
     }
 }
 

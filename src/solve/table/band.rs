@@ -5,12 +5,13 @@
 //! two. The next band starts from the frontmost row of this one. Called by [`super::FollowerTable::new`] only.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use std::rc::Rc;
+use std::sync::Arc;
 
 use super::beginning::Beginning;
+use super::last_row::Row;
 use super::layout::{bands, between_kinks, foremost, kinks};
 use super::polynomial::{economise, from_slopes, horner};
-use super::rows::{Band, LANES, Lanes, Order, Piece, Rows};
+use super::rows::{Band, LANES, Lanes, Lengths, Piece, Rows, Tolerance};
 use super::track::{Node, Track};
 use crate::linkage;
 use crate::model::Vector;
@@ -28,6 +29,9 @@ const MOST_BYTES: usize = 150 << 20;
 /// The part of these that any phases may take.
 const LEAST_SHARE: f64 = 0.125;
 
+/// Rows of a band from which on two threads make it.
+const PARALLEL_ROWS: usize = 128;
+
 /// What part of its allowance a halved piece may still use up if halving is to go on: less gain is rounding, not shape.
 const LEAST_GAIN: f64 = 0.75;
 
@@ -41,71 +45,43 @@ const NODES: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 const LARGEST_NODAL: f64 = 0.12;
 
 /// The nodes of one phase through a band, from its last row forward, as far as the chain can stand there.
-type Strand = Rc<Vec<Node>>;
-
-/// The last row behind a band, from which its strands start.
-struct Row<'a> {
-    track: &'a Track<'a>,
-    pieces: Vec<RowPiece>,
-}
-
-/// The places of a piece in one row: metres of travel from its centre as a polynomial of beta.
-struct RowPiece {
-    piece: Piece,
-    centre: Param,
-    metres: [f64; 6],
-}
-
-impl<'a> Row<'a> {
-    /// Each piece comes out with the rounding of its own centre. Were that kept, the next band's pieces would meet
-    /// jumps and be cut in vain: here every piece continues the one before, and what adds up is spread over all
-    /// phases.
-    fn new(track: &'a Track<'a>, nodes: &[(Piece, [Node; 5])]) -> Self {
-        let mut pieces: Vec<RowPiece> = Vec::with_capacity(nodes.len());
-        for &(piece, nodes) in nodes {
-            let half = 0.5 * (piece.end - piece.begin);
-            let mut metres = from_slopes(nodes.map(|node| -half * node.spacing));
-            let centre = nodes[2].at;
-            if let Some(before) = pieces.last().filter(|before| before.piece.end == piece.begin) {
-                let reached = horner(&before.metres, 1.0).0 - track.path.arc_length(before.centre, centre);
-                metres[0] = reached - horner(&metres, -1.0).0;
-            }
-            pieces.push(RowPiece { piece, centre, metres });
-        }
-        let drift = pieces.last().map_or(0.0, |last| last.metres[0]);
-        for RowPiece { piece, metres, .. } in &mut pieces {
-            metres[0] -= drift * 0.5 * (piece.begin + piece.end);
-            metres[1] -= drift * 0.5 * (piece.end - piece.begin);
-        }
-        Self { track, pieces }
-    }
-
-    fn node(&self, phase: f64) -> Option<Node> {
-        let at = self.pieces.partition_point(|known| known.piece.end < phase);
-        let RowPiece { piece, centre, metres } = self.pieces.get(at).filter(|known| known.piece.begin <= phase)?;
-        let (offset, rate) = horner(metres, piece.beta(phase));
-        let at = self.track.advanced(*centre, offset);
-        let (tangent, spacing) = (self.track.path.tangent(at), -rate * piece.beta_per_alpha());
-        // No link of the band is led from here, so that the heading does not matter.
-        Some(Node { at, tangent, spacing, heading: 0.0, heading_rate: 0.0 })
-    }
-}
+type Strand = Arc<Vec<Node>>;
 
 /// A band being made.
 struct BandBuilder<'a> {
     track: &'a Track<'a>,
-    order: Order,
+    tolerance: Tolerance,
     link: f64,
     behind: Row<'a>,
-    band: Band,
+    first_row: usize,
+    rows: usize,
+    lengths: Lengths,
     /// The row behind the band; nothing ahead of `needed` has to be exact.
     end_row: usize,
     needed: usize,
     /// Whether the second handle can come here.
     with_centres: bool,
+    /// Bytes that the band may take.
+    budget: usize,
+}
+
+/// What has been made of a band.
+struct Made {
+    band: Band,
     front_row: Vec<(Piece, [Node; 5])>,
     valid_from: f64,
-    budget: usize,
+}
+
+impl Made {
+    /// Adds what was made of later phases.
+    fn append(&mut self, later: Self) {
+        let Self { band, front_row, valid_from } = later;
+        self.band.pieces.extend(band.pieces);
+        self.band.coefficients.extend(band.coefficients);
+        self.band.centres.extend(band.centres);
+        self.front_row.extend(front_row);
+        self.valid_from = self.valid_from.max(valid_from);
+    }
 }
 
 /// Five strands, evenly spaced over a piece.
@@ -122,16 +98,16 @@ struct Errors {
 
 impl BandBuilder<'_> {
     fn strand(&self, phase: f64) -> Strand {
-        let mut nodes = Vec::with_capacity(self.band.rows);
+        let mut nodes = Vec::with_capacity(self.rows);
         let mut gap = self.link;
         let mut rear = self.behind.node(phase);
         while let Some(node) = rear
-            && nodes.len() < self.band.rows
+            && nodes.len() < self.rows
         {
             rear = self.track.ahead(&node, &mut gap, self.link);
             nodes.extend(rear);
         }
-        Rc::new(nodes)
+        Arc::new(nodes)
     }
 
     fn quintet(&self, piece: Piece) -> Quintet {
@@ -139,51 +115,73 @@ impl BandBuilder<'_> {
     }
 
     /// Cuts a piece until its parts are exact, and adds these to the band. `None` where the table grows too large.
-    fn refine(&mut self, piece: Piece, strands: Quintet, halvings: usize, parent: f64) -> Option<()> {
+    fn refine(&self, made: &mut Made, piece: Piece, strands: Quintet, halvings: usize, parent: f64) -> Option<()> {
         let errors = self.errors(piece, &strands, halvings);
         if errors.worst <= 1.0 || !errors.curable || halvings == 0 || errors.worst > LEAST_GAIN * parent {
             if errors.worst > 1.0 {
-                self.valid_from = self.valid_from.max(errors.valid_from);
+                made.valid_from = made.valid_from.max(errors.valid_from);
             }
-            return self.keep(piece, &strands);
+            return self.keep(made, piece, &strands);
         }
         let middle = 0.5 * (piece.begin + piece.end);
         let [a, b, c, d, e] = strands;
-        for (begin, end, [front, centre, rear]) in
-            [(piece.begin, middle, [a, b, c.clone()]), (middle, piece.end, [c, d, e])]
-        {
-            let part = Piece { begin, end };
-            let quarter = 0.25 * (end - begin);
-            let (first, second) = (self.strand(begin + quarter), self.strand(end - quarter));
-            self.refine(part, [front, first, centre, second, rear], halvings - 1, errors.worst)?;
+        let refine = |made: &mut Made, part: Piece, [front, centre, rear]: [Strand; 3]| {
+            let quarter = 0.25 * (part.end - part.begin);
+            let (first, second) = (self.strand(part.begin + quarter), self.strand(part.end - quarter));
+            self.refine(made, part, [front, first, centre, second, rear], halvings - 1, errors.worst)
+        };
+        let (first, second) = (Piece { end: middle, ..piece }, Piece { begin: middle, ..piece });
+        let (first_strands, second_strands) = ([a, b, c.clone()], [c, d, e]);
+        if halvings < MOST_HALVINGS || self.rows < PARALLEL_ROWS {
+            refine(made, first, first_strands)?;
+            return refine(made, second, second_strands);
         }
-        Some(())
+        // Two threads make the same as one.
+        let mut later = self.nothing(0.0);
+        let (first, second) = std::thread::scope(|scope| {
+            let second = scope.spawn(|| refine(&mut later, second, second_strands));
+            (refine(made, first, first_strands), second.join())
+        });
+        first?;
+        second.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+        made.append(later);
+        self.is_within_budget(made, piece.end)
     }
 
-    fn keep(&mut self, piece: Piece, strands: &Quintet) -> Option<()> {
-        self.tabulate(piece, strands);
+    /// A band without pieces.
+    fn nothing(&self, valid_from: f64) -> Made {
+        let band = Band::new(self.first_row, self.rows, self.lengths);
+        Made { band, front_row: Vec::new(), valid_from }
+    }
+
+    /// Where the first phases take too much, so will all of them; a part of them may take more than its share.
+    fn is_within_budget(&self, made: &Made, phases: f64) -> Option<()> {
+        let bytes = size_of_val(made.band.coefficients.as_slice()) as f64;
+        (bytes <= self.budget as f64 * phases.max(LEAST_SHARE)).then_some(())
+    }
+
+    fn keep(&self, made: &mut Made, piece: Piece, strands: &Quintet) -> Option<()> {
+        self.tabulate(&mut made.band.coefficients, piece, strands);
         if self.with_centres {
             let middle = &strands[2];
-            let missing = std::iter::repeat_n(None, self.band.rows - middle.len());
-            self.band.centres.extend(missing.chain(middle.iter().rev().map(|node| Some(node.at))));
+            let missing = std::iter::repeat_n(None, self.rows - middle.len());
+            made.band.centres.extend(missing.chain(middle.iter().rev().map(|node| Some(node.at))));
         }
-        self.front_row.extend(quintet_at(strands, self.band.rows - 1).map(|nodes| (piece, nodes.map(|node| *node))));
-        self.band.pieces.push(piece);
-        // Where the first phases take too much, so will all of them; a part of them may take more than its share.
-        let share = piece.end.max(LEAST_SHARE);
-        (size_of_val(self.band.coefficients.as_slice()) as f64 <= self.budget as f64 * share).then_some(())
+        made.front_row.extend(quintet_at(strands, self.rows - 1).map(|nodes| (piece, nodes.map(|node| *node))));
+        made.band.pieces.push(piece);
+        self.is_within_budget(made, piece.end)
     }
 
     /// Adds the polynomials of a piece.
-    fn tabulate(&mut self, piece: Piece, strands: &Quintet) {
-        let Order { coefficients, heading_coefficients, .. } = self.order;
+    fn tabulate(&self, coefficients: &mut Vec<Lanes>, piece: Piece, strands: &Quintet) {
+        let Lengths { coordinate, heading } = self.lengths;
         let half = 0.5 * (piece.end - piece.begin);
-        let (rows, per_row) = (self.band.rows, self.order.per_row());
-        let begin = self.band.coefficients.len();
-        self.band.coefficients.resize(begin + rows / LANES * per_row, Lanes([0.0; LANES]));
+        let (rows, per_row) = (self.rows, self.lengths.per_row());
+        let begin = coefficients.len();
+        coefficients.resize(begin + rows / LANES * per_row, Lanes([0.0; LANES]));
         for (index, nodes) in (0..rows).map_while(|index| Some((index, quintet_at(strands, index)?))) {
             let row = rows - 1 - index;
-            let block = &mut self.band.coefficients[begin + row / LANES * per_row..][..per_row];
+            let block = &mut coefficients[begin + row / LANES * per_row..][..per_row];
             let mut polynomials = polynomials(half, nodes);
             let middle = nodes[2];
             let point = self.track.path.point(middle.at);
@@ -191,10 +189,10 @@ impl BandBuilder<'_> {
                 polynomial[0] += centre;
             }
             for (quantity, mut polynomial) in polynomials.into_iter().enumerate() {
-                let keep = if quantity < 2 { coefficients } else { heading_coefficients };
+                let keep = if quantity < 2 { coordinate } else { heading };
                 economise(&mut polynomial, keep);
                 for (power, coefficient) in polynomial[..keep].iter().enumerate() {
-                    block[quantity * coefficients + power].0[row % LANES] = *coefficient;
+                    block[quantity * coordinate + power].0[row % LANES] = *coefficient;
                 }
             }
         }
@@ -204,7 +202,7 @@ impl BandBuilder<'_> {
     fn errors(&self, piece: Piece, strands: &Quintet, halvings: usize) -> Errors {
         let half = 0.5 * (piece.end - piece.begin);
         let mut errors = Errors { worst: 0.0, valid_from: 0.0, curable: false };
-        for index in 0..self.end_row - self.needed.max(self.band.first_row).min(self.end_row) {
+        for index in 0..self.end_row - self.needed.max(self.first_row).min(self.end_row) {
             let row = self.end_row - 1 - index;
             let error = match quintet_at(strands, index) {
                 Some(nodes) => self.error(half, nodes, index, &strands[1]),
@@ -231,14 +229,15 @@ impl BandBuilder<'_> {
         let power = |power: usize| power as f64 * polynomials[0][power].hypot(polynomials[1][power]);
         let neglected = LARGEST_NODAL * power(5) * (power(5) / power(4)).min(1.0);
         let dropped: [f64; 3] = std::array::from_fn(|quantity| {
-            let keep = if quantity < 2 { self.order.coefficients } else { self.order.heading_coefficients };
-            economise(&mut polynomials[quantity], keep)
+            let Lengths { coordinate, heading } = self.lengths;
+            let keep = if quantity < 2 { coordinate } else { heading };
+            economise(&mut polynomials[quantity], keep).value
         });
         let [x, y, heading] = polynomials;
         let middle = nodes[2];
         // Each step rounds; the strands of a band differ by what adds up.
         let walk = (index as f64 + 8.0).sqrt() * f64::EPSILON * self.link;
-        let allowed = self.order.tolerance.min(1e-13 * self.link) + 4.0 * walk;
+        let allowed = self.tolerance.metres(self.link) + 4.0 * walk;
         let allowed_heading = 10.0 * allowed / self.link + 2.0 * f64::EPSILON;
         let (mut miss, mut turn): (f64, f64) = (0.0, 0.0);
         for (node, beta) in nodes.into_iter().zip(NODES) {
@@ -250,7 +249,7 @@ impl BandBuilder<'_> {
         let truncated = neglected + 25.0 * dropped_place;
         let worst = ((miss + dropped_place) / allowed)
             .max((turn + dropped[2]) / allowed_heading)
-            .max(truncated / (half * middle.spacing) / self.order.speed_tolerance);
+            .max(truncated / (half * middle.spacing) / self.tolerance.speed);
         if worst <= 1.0 && !self.is_first_follower(strand, index) { f64::INFINITY } else { worst }
     }
 
@@ -306,20 +305,21 @@ pub(super) fn within_half_turn(angle: f64) -> f64 {
     }
 }
 
-/// The first row of bands so far behind that shorter polynomials and more pieces serve a frame better: it then waits for
-/// memory, of which each piece of a row takes less.
+/// The first row of bands so far behind that shorter polynomials and more pieces serve a frame better: it then waits
+/// for memory, of which each piece of a row takes less.
 const FAR_ROW: usize = 512;
 
 /// The table for `team` on `path`; `None` where there is none, or a too large one.
-pub(super) fn rows(track: &Track, team: &Team, order: Order) -> Option<Rows> {
+pub(super) fn rows(track: &Track, team: &Team, tolerance: Tolerance) -> Option<Rows> {
     let beginning = Beginning::new(track, team)?;
     let link = team.link(1);
     let foremost = foremost(track, team)?;
     let second = track.follower(track.path.param_at(0.0), team.link(0))?;
     // One strand tells how many rows there are, with some to spare; where each takes half a turn there are the fewest.
     let mut node = beginning.node(track, 0.0);
+    let bytes_per_row = Lengths::NEAR.per_row() * size_of::<f64>();
     let fewest = (track.path.arc_length(node.at, foremost) / (FRAC_PI_2 * link)).max(0.0) as usize;
-    if fewest.saturating_mul(order.per_row() * size_of::<f64>()) > MOST_BYTES {
+    if fewest.saturating_mul(bytes_per_row) > MOST_BYTES {
         return None;
     }
     let (mut gap, mut steps, mut behind_second) = (link, 0, 0);
@@ -330,39 +330,40 @@ pub(super) fn rows(track: &Track, team: &Team, order: Order) -> Option<Rows> {
         }
         let Some(next) = track.ahead(&node, &mut gap, link) else { break };
         node = next;
-        if steps * order.per_row() * size_of::<f64>() > MOST_BYTES {
+        if steps * bytes_per_row > MOST_BYTES {
             return None;
         }
     }
     let end = (steps + 2).next_multiple_of(LANES);
     let kinks = kinks(track, &beginning, link, end);
     let phases = kinks.iter().map(|kink| kink.fract()).collect();
-    let mut table = Rows { order, bands: Vec::new(), kinks: phases, valid_from: 0.0 };
+    let mut table = Rows { tolerance, bands: Vec::new(), kinks: phases, valid_from: 0.0 };
     // So far behind, one piece says it all, and says it more smoothly than the beginning could for each phase by
     // itself.
     let whole = Piece { begin: 0.0, end: 1.0 };
     let nodes = [0.0, 0.25, 0.5, 0.75, 1.0].map(|alpha| beginning.node(track, alpha));
     let mut behind = Row::new(track, &[(whole, nodes)]);
     for (first_row, end_row) in bands(end) {
-        let order = if first_row >= FAR_ROW { order.of_far_rows() } else { order };
-        let mut builder = BandBuilder {
+        let lengths = if first_row >= FAR_ROW { Lengths::FAR } else { Lengths::NEAR };
+        let builder = BandBuilder {
             track,
-            order,
+            tolerance,
             link,
             behind,
-            band: Band::new(first_row, end_row - first_row, order),
+            first_row,
+            rows: end_row - first_row,
+            lengths,
             end_row,
             needed: end - steps - 2,
             with_centres: first_row <= end - behind_second,
-            front_row: Vec::new(),
-            valid_from: table.valid_from,
             budget: MOST_BYTES.saturating_sub(table.memory_bytes()),
         };
+        let mut made = builder.nothing(table.valid_from);
         for piece in between_kinks(&kinks, first_row) {
             let quintet = builder.quintet(piece);
-            builder.refine(piece, quintet, MOST_HALVINGS, f64::INFINITY)?;
+            builder.refine(&mut made, piece, quintet, MOST_HALVINGS, f64::INFINITY)?;
         }
-        let BandBuilder { mut band, front_row, valid_from, .. } = builder;
+        let Made { mut band, front_row, valid_from } = made;
         band.index();
         table.valid_from = valid_from;
         table.bands.insert(0, band);

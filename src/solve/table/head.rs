@@ -106,6 +106,12 @@ impl HeadTable {
         self.begins.last().copied().unwrap_or(0.0)
     }
 
+    /// The foremost row in which the second handle comes to stand.
+    pub(super) fn foremost_row(&self) -> usize {
+        // Alpha is within a link of the middle of its piece.
+        self.pieces.iter().map(|piece| piece.row).min().map_or(0, |row| row.saturating_sub(1))
+    }
+
     pub(super) fn memory_bytes(&self) -> usize {
         size_of_val(self.pieces.as_slice())
             + size_of_val(self.begins.as_slice())
@@ -324,8 +330,9 @@ impl<'a> HeadBuilder<'a> {
             let slope: f64 = (1..COEFFICIENTS).map(|k| k as f64 * alpha(k) * power_of(k - 1)).sum();
             let change: f64 = (2..COEFFICIENTS).map(|k| (k * (k - 1)) as f64 * alpha(k) * power_of(k - 2)).sum();
             let ratio = (slope * piece.scale * link).abs();
-            let place = rounding * ratio / MOST_ERROR.max(8.0 * rounding);
-            place.max(rounding * (change * piece.scale.powi(2) * link).abs() / ratio.max(1.0) / SPEED_ERROR)
+            let place = rounding * ratio / MOST_ERROR.max(self.rows.tolerance.place).max(8.0 * rounding);
+            let speed = rounding * (change * piece.scale.powi(2) * link).abs() / ratio.max(1.0);
+            place.max(speed / SPEED_ERROR.max(self.rows.tolerance.speed))
         });
         ends[0].max(ends[1])
     }
@@ -339,14 +346,14 @@ impl<'a> HeadBuilder<'a> {
     }
 
     fn error(&self, piece: &Piece, beta: f64, exact: &([f64; QUANTITIES], [f64; QUANTITIES])) -> f64 {
-        let order = &self.rows.order;
+        let tolerance = &self.rows.tolerance;
         let link = self.team.link(1);
         let (values, rates) = exact;
         let found = piece.at_beta(beta);
         let alpha = found.alpha.minus(Alpha { row: piece.row, phase: 0.0 });
         // Where T goes from one piece to the next, alpha jumps by what rounding has added up to along the rows.
         let walk = 2.0 * (self.rows.rows() as f64).sqrt() * f64::EPSILON * link;
-        let allowed = order.tolerance.min(1e-13 * self.team.shortest_link()) + walk;
+        let allowed = tolerance.metres(self.team.shortest_link()) + walk;
         let place = (found.x - values[0]).hypot(found.y - values[1]).max(link * (alpha - values[3]).abs());
         // The size of a slope's next power, had it fallen off as the last one did.
         let neglected = |quantities: &[usize]| {
@@ -361,6 +368,6 @@ impl<'a> HeadBuilder<'a> {
         let speed = neglected(&[3]) / rates[3].abs().max(1.0 / link);
         (place / allowed)
             .max((found.heading - values[2]).abs() / (10.0 * allowed / link + 2.0 * f64::EPSILON))
-            .max(neglected(&[0, 1]).max(speed) / order.speed_tolerance)
+            .max(neglected(&[0, 1]).max(speed) / tolerance.speed)
     }
 }

@@ -1,11 +1,11 @@
 //! A frame from the table: every handle behind the head by itself, eight at a time.
 //!
-//! Called by the follower table only, through [`write()`]. The loops over [`LANES`] have a fixed length, so that the
-//! compiler turns them into vectors.
+//! Called by the follower table, and for other formats by [`super::single_kernel`]. The loops over [`LANES`] have a
+//! fixed length, so that the compiler turns them into vectors.
 
 use std::f64::consts::{PI, TAU};
 
-use super::rows::{Alpha, Band, LANES, Lanes, Rows};
+use super::rows::{Alpha, Band, LANES, Lanes, Lengths, Piece, Rows};
 use crate::solve::Chain;
 
 /// What a frame needs to know besides the table.
@@ -18,18 +18,43 @@ pub(super) struct Moment {
 }
 
 /// x, y, heading, speed, vx and vy of neighbouring handles.
-type Outputs = [[f64; LANES]; 6];
+pub(super) type Outputs = [[f64; LANES]; 6];
 
 /// One piece of a band at one moment.
 #[derive(Debug, Clone, Copy)]
-struct Local {
-    beta: f64,
-    beta_per_second: f64,
+pub(super) struct Local {
+    pub beta: f64,
+    pub beta_per_second: f64,
     /// 1 or -1: the sign of all speeds.
-    sign: f64,
+    pub sign: f64,
 }
 
-/// Writes all handles but the head. `FUSED` says that the processor multiplies and adds in one instruction.
+impl Local {
+    #[inline(always)]
+    pub(super) fn new(piece: &Piece, moment: &Moment) -> Self {
+        Self {
+            beta: piece.beta(moment.alpha.phase),
+            beta_per_second: piece.beta_per_alpha() * moment.alpha_per_second,
+            sign: -moment.alpha_per_second.signum(),
+        }
+    }
+}
+
+/// The polynomials of one piece for the rows of a band, block by block.
+pub(super) trait Blocks: Copy {
+    /// The coefficients of one block.
+    type Block;
+
+    /// The blocks from one on.
+    fn blocks(self, first: usize) -> impl Iterator<Item = Self::Block>;
+
+    /// The polynomials of one block, Horner's scheme for values and slopes; without velocities the last three are
+    /// unspecified.
+    fn outputs<const FUSED: bool, const VELOCITIES: bool>(block: Self::Block, local: &Local) -> Outputs;
+}
+
+/// Writes all handles but the head from a table in double precision. `FUSED` says that the processor multiplies and
+/// adds in one instruction.
 ///
 /// The heading of the last handle is not its own.
 #[inline(always)]
@@ -39,51 +64,43 @@ pub(super) fn write<const FUSED: bool, const VELOCITIES: bool>(rows: &Rows, mome
     let mut next = row;
     for band in &rows.bands[rows.band_of(row)..] {
         let piece = band.piece_at(phase);
-        let per_alpha = band.pieces[piece].beta_per_alpha();
-        let local = Local {
-            beta: band.pieces[piece].beta(phase),
-            beta_per_second: per_alpha * moment.alpha_per_second,
-            sign: -moment.alpha_per_second.signum(),
-        };
-        let band_end = end.min(band.first_row + band.rows);
-        let handled = next..band_end;
-        // The orders that a band can have: see `Order`.
-        match band.order.coefficients {
-            6 => write_band::<6, 5, FUSED, VELOCITIES>(band, piece, &local, handled, row, chain),
-            5 => write_band::<5, 4, FUSED, VELOCITIES>(band, piece, &local, handled, row, chain),
-            _ => write_band::<4, 3, FUSED, VELOCITIES>(band, piece, &local, handled, row, chain),
+        let local = Local::new(&band.pieces[piece], moment);
+        let handled = next..end.min(band.first_row + band.rows);
+        next = handled.end;
+        if band.lengths == Lengths::NEAR {
+            let blocks = Doubles::<6, 5>::new(band, piece);
+            write_band::<_, FUSED, VELOCITIES>(blocks, band.first_row, &local, handled, row, chain);
+        } else {
+            let blocks = Doubles::<5, 4>::new(band, piece);
+            write_band::<_, FUSED, VELOCITIES>(blocks, band.first_row, &local, handled, row, chain);
         }
-        next = band_end;
         if next == end {
             break;
         }
     }
 }
 
-/// Writes the handles of some rows of a band; the second handle stands in row `second`. `K` and `H` are the coefficients of
-/// a coordinate and of a heading.
+/// Writes the handles of the given rows of a band; the second handle is in row `second`.
 #[inline(always)]
-fn write_band<const K: usize, const H: usize, const FUSED: bool, const VELOCITIES: bool>(
-    band: &Band,
-    piece: usize,
+pub(super) fn write_band<B: Blocks, const FUSED: bool, const VELOCITIES: bool>(
+    source: B,
+    band_row: usize,
     local: &Local,
     rows: std::ops::Range<usize>,
     second: usize,
     chain: &mut Chain,
 ) {
-    let per_block = 2 * K + H;
-    let first_block = (rows.start - band.first_row) / LANES;
-    let blocks = (rows.end - band.first_row).div_ceil(LANES) - first_block;
-    let begin = (piece * (band.rows / LANES) + first_block) * per_block;
-    let coefficients = &band.coefficients[begin..][..blocks * per_block];
-    let first_row = band.first_row + first_block * LANES;
+    let first_block = (rows.start - band_row) / LANES;
+    let blocks = (rows.end - band_row).div_ceil(LANES) - first_block;
+    let first_row = band_row + first_block * LANES;
     let whole = usize::from(first_row < rows.start)..(rows.end - first_row) / LANES;
     // No closure here: where one is not inlined, it knows nothing of the caller's instructions.
     let last = (whole.end < blocks && whole.end >= whole.start).then_some(whole.end);
     for partial in (whole.start > 0).then_some(0).into_iter().chain(last) {
         let row = first_row + partial * LANES;
         let lanes = rows.start.max(row) - row..rows.end.min(row + LANES) - row;
-        let outputs = outputs::<K, H, FUSED, VELOCITIES>(&coefficients[partial * per_block..][..per_block], local);
+        let Some(block) = source.blocks(first_block + partial).next() else { return };
+        let outputs = B::outputs::<FUSED, VELOCITIES>(block, local);
         store_some::<VELOCITIES>(&outputs, lanes, chain, row + 1, second);
     }
     // Whole blocks are stored straight from registers.
@@ -93,9 +110,11 @@ fn write_band<const K: usize, const H: usize, const FUSED: bool, const VELOCITIE
         let number = whole.end - whole.start;
         let [x, y, heading, speed, vx, vy] =
             [x, y, heading, speed, vx, vy].map(|list| &mut list[handle..].as_chunks_mut::<LANES>().0[..number]);
-        let coefficients = &coefficients[whole.start * per_block..][..number * per_block];
-        for (index, block) in coefficients.chunks_exact(per_block).enumerate().take(number) {
-            let outputs = outputs::<K, H, FUSED, VELOCITIES>(block, local);
+        for (index, block) in source.blocks(first_block + whole.start).enumerate().take(number) {
+            // Where the polynomials are short, LLVM else takes the blocks for what is to be vectorised, with gathers
+            // and scatters: four times as slow.
+            std::hint::black_box(());
+            let outputs = B::outputs::<FUSED, VELOCITIES>(block, local);
             x[index] = outputs[0];
             y[index] = outputs[1];
             heading[index] = outputs[2];
@@ -131,42 +150,60 @@ fn store_some<const VELOCITIES: bool>(
     }
 }
 
-/// The polynomials of one block, Horner's scheme for values and slopes; without velocities the last three are
-/// unspecified.
-#[inline(always)]
-fn outputs<const K: usize, const H: usize, const FUSED: bool, const VELOCITIES: bool>(
-    block: &[Lanes],
-    local: &Local,
-) -> Outputs {
-    let block = &block[..2 * K + H];
-    let [mut x, mut y] = [block[K - 1].0, block[2 * K - 1].0];
-    let [mut vx, mut vy] = [[0.0; LANES]; 2];
-    let mut heading = block[2 * K + H - 1].0;
-    for power in (0..K - 1).rev() {
-        for lane in 0..LANES {
-            if VELOCITIES {
-                vx[lane] = multiply_add::<FUSED>(vx[lane], local.beta, x[lane]);
-                vy[lane] = multiply_add::<FUSED>(vy[lane], local.beta, y[lane]);
+/// Doubles throughout; `K` and `H` are the coefficients of a coordinate and of a heading.
+#[derive(Clone, Copy)]
+struct Doubles<'a, const K: usize, const H: usize> {
+    coefficients: &'a [Lanes],
+}
+
+impl<'a, const K: usize, const H: usize> Doubles<'a, K, H> {
+    #[inline(always)]
+    fn new(band: &'a Band, piece: usize) -> Self {
+        let length = band.rows / LANES * (2 * K + H);
+        Self { coefficients: &band.coefficients[piece * length..][..length] }
+    }
+}
+
+impl<'a, const K: usize, const H: usize> Blocks for Doubles<'a, K, H> {
+    type Block = &'a [Lanes];
+
+    #[inline(always)]
+    fn blocks(self, first: usize) -> impl Iterator<Item = &'a [Lanes]> {
+        self.coefficients[first * (2 * K + H)..].chunks_exact(2 * K + H)
+    }
+
+    #[inline(always)]
+    fn outputs<const FUSED: bool, const VELOCITIES: bool>(block: &'a [Lanes], local: &Local) -> Outputs {
+        let block = &block[..2 * K + H];
+        let [mut x, mut y] = [block[K - 1].0, block[2 * K - 1].0];
+        let [mut vx, mut vy] = [[0.0; LANES]; 2];
+        let mut heading = block[2 * K + H - 1].0;
+        for power in (0..K - 1).rev() {
+            for lane in 0..LANES {
+                if VELOCITIES {
+                    vx[lane] = multiply_add::<FUSED>(vx[lane], local.beta, x[lane]);
+                    vy[lane] = multiply_add::<FUSED>(vy[lane], local.beta, y[lane]);
+                }
+                x[lane] = multiply_add::<FUSED>(x[lane], local.beta, block[power].0[lane]);
+                y[lane] = multiply_add::<FUSED>(y[lane], local.beta, block[K + power].0[lane]);
             }
-            x[lane] = multiply_add::<FUSED>(x[lane], local.beta, block[power].0[lane]);
-            y[lane] = multiply_add::<FUSED>(y[lane], local.beta, block[K + power].0[lane]);
         }
-    }
-    for power in (0..H - 1).rev() {
-        for (heading, coefficient) in heading.iter_mut().zip(&block[2 * K + power].0) {
-            *heading = multiply_add::<FUSED>(*heading, local.beta, *coefficient);
+        for power in (0..H - 1).rev() {
+            for (heading, coefficient) in heading.iter_mut().zip(&block[2 * K + power].0) {
+                *heading = multiply_add::<FUSED>(*heading, local.beta, *coefficient);
+            }
         }
-    }
-    let mut speed = [0.0; LANES];
-    for lane in 0..LANES {
-        heading[lane] = within_half_turn(heading[lane]);
-        if VELOCITIES {
-            vx[lane] *= local.beta_per_second;
-            vy[lane] *= local.beta_per_second;
-            speed[lane] = local.sign * multiply_add::<FUSED>(vx[lane], vx[lane], vy[lane] * vy[lane]).sqrt();
+        let mut speed = [0.0; LANES];
+        for lane in 0..LANES {
+            heading[lane] = within_half_turn(heading[lane]);
+            if VELOCITIES {
+                vx[lane] *= local.beta_per_second;
+                vy[lane] *= local.beta_per_second;
+                speed[lane] = local.sign * multiply_add::<FUSED>(vx[lane], vx[lane], vy[lane] * vy[lane]).sqrt();
+            }
         }
+        [x, y, heading, speed, vx, vy]
     }
-    [x, y, heading, speed, vx, vy]
 }
 
 /// `x * y + z`: one rounding where the processor has the instruction, two where it would be a library call.

@@ -17,7 +17,7 @@ pub(super) struct SlopeFit<const N: usize> {
 impl<const N: usize> SlopeFit<N> {
     /// For `N` different nodes.
     pub(super) fn new(nodes: &[f64; N]) -> Self {
-        let slopes = SMatrix::<f64, N, N>::from_fn(|row, power| nodes[row].powi(power as i32));
+        let slopes = SMatrix::<f64, N, N>::from_fn(|row, power| whole_power(nodes[row], power));
         Self { from_slopes: slopes.try_inverse().expect("different nodes determine the polynomial") }
     }
 
@@ -25,6 +25,21 @@ impl<const N: usize> SlopeFit<N> {
     pub(super) fn coefficients(&self, slopes: [f64; N]) -> [f64; N] {
         let slope: [f64; N] = (self.from_slopes * SMatrix::<f64, N, 1>::from(slopes)).into();
         std::array::from_fn(|power| slope[power] / (power + 1) as f64)
+    }
+}
+
+/// A power, always with the same rounding: what `powi` gives depends on whether the compiler knows the number.
+fn whole_power(number: f64, exponent: usize) -> f64 {
+    let (mut power, mut square, mut left) = (1.0, number, exponent);
+    loop {
+        if left % 2 == 1 {
+            power *= square;
+        }
+        left /= 2;
+        if left == 0 {
+            return power;
+        }
+        square *= square;
     }
 }
 
@@ -47,10 +62,17 @@ pub(super) fn horner<const N: usize>(coefficients: &[f64; N], beta: f64) -> (f64
     coefficients.iter().rev().fold((0.0, 0.0), |(value, slope), c| (value * beta + c, slope * beta + value))
 }
 
-/// Takes the powers from `keep` on out of a polynomial of at most the fifth degree, and gives a bound of what that
-/// changes in -1..1: each power is replaced by the polynomial next to it (Lanczos' economisation; Press et al.,
-/// Numerical Recipes, 3rd ed., section 5.11).
-pub(super) fn economise(coefficients: &mut [f64; 6], keep: usize) -> f64 {
+/// Bounds of what a change of a polynomial does to its value and to its slope in -1..1.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Change {
+    pub value: f64,
+    pub slope: f64,
+}
+
+/// Takes the powers from `keep` on out of a polynomial of at most the fifth degree, and bounds what that changes: each
+/// power is replaced by the polynomial next to it (Lanczos' economisation; Press et al., Numerical Recipes, 3rd ed.,
+/// section 5.11), so that what is dropped is a Chebyshev polynomial, whose slope is at most the square of its degree.
+pub(super) fn economise(coefficients: &mut [f64; 6], keep: usize) -> Change {
     /// The power less the Chebyshev polynomial of its degree, scaled: coefficients of the lower powers.
     const REPLACEMENTS: [[f64; 5]; 6] = [
         [0.0; 5],
@@ -60,15 +82,33 @@ pub(super) fn economise(coefficients: &mut [f64; 6], keep: usize) -> f64 {
         [-0.125, 0.0, 1.0, 0.0, 0.0],
         [0.0, -0.3125, 0.0, 1.25, 0.0],
     ];
-    let mut bound = 0.0;
+    let mut bound = Change::default();
     for power in (keep..6).rev() {
         let taken = std::mem::take(&mut coefficients[power]);
         for (coefficient, share) in coefficients.iter_mut().zip(REPLACEMENTS[power]) {
             *coefficient += taken * share;
         }
-        bound += taken.abs() / 2f64.powi(power as i32 - 1);
+        let size = taken.abs() / 2f64.powi(power as i32 - 1);
+        bound.value += size;
+        bound.slope += size * (power * power) as f64;
     }
     bound
+}
+
+/// The same polynomial on a part of -1..1, given by its middle and half its length, again over -1..1.
+pub(super) fn on_part(coefficients: &[f64; 6], middle: f64, half: f64) -> [f64; 6] {
+    let mut part = *coefficients;
+    for low in 0..5 {
+        for power in (low..5).rev() {
+            part[power] += middle * part[power + 1];
+        }
+    }
+    let mut scale = 1.0;
+    for coefficient in &mut part {
+        *coefficient *= scale;
+        scale *= half;
+    }
+    part
 }
 
 #[cfg(test)]
@@ -93,10 +133,26 @@ mod tests {
             let mut shortened = whole;
             let bound = economise(&mut shortened, keep);
             assert!(shortened[keep..].iter().all(|c| *c == 0.0));
-            let error =
-                |k: i32| (horner(&whole, 0.05 * f64::from(k)).0 - horner(&shortened, 0.05 * f64::from(k)).0).abs();
-            let worst = (-20..=20).map(error).fold(0.0, f64::max);
-            assert!(worst <= bound + 1e-15 && worst > 0.3 * bound, "{keep}: {worst} of {bound}");
+            let at = |coefficients, k: i32| horner(coefficients, 0.05 * f64::from(k));
+            let value = |k: i32| (at(&whole, k).0 - at(&shortened, k).0).abs();
+            let slope = |k: i32| (at(&whole, k).1 - at(&shortened, k).1).abs();
+            for (worst, bound) in [
+                ((-20..=20).map(value).fold(0.0, f64::max), bound.value),
+                ((-20..=20).map(slope).fold(0.0, f64::max), bound.slope),
+            ] {
+                assert!(worst <= bound + 1e-14 && worst > 0.3 * bound, "{keep}: {worst} of {bound}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_part_of_a_polynomial_has_its_values() {
+        let whole = [0.3, -1.0, 0.5, 2.0, -0.7, 0.1];
+        let part = on_part(&whole, 0.4, 0.25);
+        for k in -4..=4 {
+            let beta = 0.25 * f64::from(k);
+            let (value, slope) = (horner(&part, beta), horner(&whole, 0.4 + 0.25 * beta));
+            assert!((value.0 - slope.0).abs() < 1e-15 && (value.1 - 0.25 * slope.1).abs() < 1e-15);
         }
     }
 }

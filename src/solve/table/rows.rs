@@ -26,31 +26,45 @@ pub(crate) const LANES: usize = 8;
 #[repr(align(64))]
 pub(crate) struct Lanes(pub [f64; LANES]);
 
-/// How exact a table is, and how short its polynomials are.
+/// How exact a table is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Order {
-    /// Coefficients of each coordinate's polynomial: 6 or 4.
-    pub coefficients: usize,
-    /// Coefficients of the heading's polynomial: 5 with 6, 3 with 4.
-    pub heading_coefficients: usize,
+pub struct Tolerance {
     /// Metres that a polynomial may be off, besides rounding.
-    pub tolerance: f64,
+    pub place: f64,
+    /// The same as a part of a link.
+    pub relative: f64,
     /// What a speed may be off, relative to itself.
-    pub speed_tolerance: f64,
+    pub speed: f64,
 }
 
-impl Order {
+impl Tolerance {
     /// As exact as doubles allow.
-    pub const EXACT: Self = Self { coefficients: 6, heading_coefficients: 5, tolerance: 5e-15, speed_tolerance: 3e-13 };
+    pub const EXACT: Self = Self { place: 5e-15, relative: 1e-13, speed: 3e-13 };
 
-    /// The order for rows far behind.
-    pub(super) fn of_far_rows(self) -> Self {
-        if self.coefficients == 6 { Self { coefficients: 5, heading_coefficients: 4, ..self } } else { self }
+    /// Metres that a polynomial may be off where links are so long.
+    pub(super) fn metres(&self, link: f64) -> f64 {
+        self.place.min(self.relative * link)
     }
+}
+
+/// How long the polynomials of a band are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Lengths {
+    /// Coefficients of each coordinate.
+    pub coordinate: usize,
+    /// Coefficients of the heading.
+    pub heading: usize,
+}
+
+impl Lengths {
+    /// Those of rows at the front.
+    pub(super) const NEAR: Self = Self { coordinate: 6, heading: 5 };
+    /// Those of rows so far behind that shorter polynomials and more pieces serve a frame better.
+    pub(super) const FAR: Self = Self { coordinate: 5, heading: 4 };
 
     /// Coefficients of a row in a piece.
-    pub(super) fn per_row(&self) -> usize {
-        2 * self.coefficients + self.heading_coefficients
+    pub(super) fn per_row(self) -> usize {
+        2 * self.coordinate + self.heading
     }
 }
 
@@ -84,7 +98,7 @@ pub(crate) struct Band {
     pub first_row: usize,
     pub rows: usize,
     /// How long its polynomials are.
-    pub(super) order: Order,
+    pub(super) lengths: Lengths,
     /// In order of phase, from 0 to 1 without a gap.
     pub pieces: Vec<Piece>,
     /// By piece, then by block of [`LANES`] rows, then x, y and heading by power: see [`Band::block`].
@@ -106,50 +120,44 @@ pub(super) struct Local {
 
 impl Band {
     /// A band without pieces.
-    pub(super) fn new(first_row: usize, rows: usize, order: Order) -> Self {
+    pub(super) fn new(first_row: usize, rows: usize, lengths: Lengths) -> Self {
         let (pieces, coefficients, centres, piece_of_share) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { first_row, rows, order, pieces, coefficients, centres, piece_of_share }
+        Self { first_row, rows, lengths, pieces, coefficients, centres, piece_of_share }
     }
 
     /// The number of the piece that holds a phase from 0 to 1.
     #[inline(always)]
     pub(crate) fn piece_at(&self, phase: f64) -> usize {
-        let share = (phase * self.piece_of_share.len() as f64) as usize;
-        let mut piece = self.piece_of_share[share.min(self.piece_of_share.len() - 1)] as usize;
-        while piece + 1 < self.pieces.len() && self.pieces[piece].end <= phase {
-            piece += 1;
-        }
-        piece
+        piece_at(&self.pieces, &self.piece_of_share, phase)
     }
 
     /// The coefficients of the `LANES` rows from `first_row + LANES * block` on: those of x by power, then of y, then
     /// of the heading, metres and radians.
     pub(crate) fn block(&self, piece: usize, block: usize) -> &[Lanes] {
-        let (blocks, per_row) = (self.rows / LANES, self.order.per_row());
+        let (blocks, per_row) = (self.rows / LANES, self.lengths.per_row());
         &self.coefficients[(piece * blocks + block) * per_row..][..per_row]
     }
 
-    /// The coefficients of x and y of one row, by power, metres; those beyond the band's order are zero.
+    /// The coefficients of x and y of one row, by power, metres; those beyond the band's lengths are zero.
     pub(crate) fn coordinates(&self, piece: usize, row: usize) -> [[f64; 6]; 2] {
-        let (local, order) = (row - self.first_row, &self.order);
-        let block = self.block(piece, local / LANES);
-        std::array::from_fn(|quantity| {
-            std::array::from_fn(|power| {
-                if power < order.coefficients {
-                    block[quantity * order.coefficients + power].0[local % LANES]
-                } else {
-                    0.0
-                }
-            })
-        })
+        let length = self.lengths.coordinate;
+        [0, length].map(|begin| self.polynomial(piece, row, begin, length))
+    }
+
+    /// The coefficients of the heading of one row, by power, radians.
+    pub(super) fn heading(&self, piece: usize, row: usize) -> [f64; 6] {
+        self.polynomial(piece, row, 2 * self.lengths.coordinate, self.lengths.heading)
+    }
+
+    fn polynomial(&self, piece: usize, row: usize, begin: usize, length: usize) -> [f64; 6] {
+        let local = row - self.first_row;
+        let block = &self.block(piece, local / LANES)[begin..][..length];
+        std::array::from_fn(|power| block.get(power).map_or(0.0, |coefficient| coefficient.0[local % LANES]))
     }
 
     /// Fills `piece_of_share`, when all pieces are there.
     pub(super) fn index(&mut self) {
-        let shares = (4 * self.pieces.len()).next_power_of_two();
-        let begin = |share: usize| share as f64 / shares as f64;
-        let piece_at = |phase: f64| self.pieces.partition_point(|piece| piece.end <= phase).min(self.pieces.len() - 1);
-        self.piece_of_share = (0..shares).map(|share| piece_at(begin(share)) as u32).collect();
+        self.piece_of_share = piece_of_share(&self.pieces);
     }
 
     fn memory_bytes(&self) -> usize {
@@ -159,10 +167,29 @@ impl Band {
     }
 }
 
+/// The piece in which each of equal shares of the phases begins.
+pub(super) fn piece_of_share(pieces: &[Piece]) -> Vec<u32> {
+    let shares = (4 * pieces.len()).next_power_of_two();
+    let begin = |share: usize| share as f64 / shares as f64;
+    let piece_at = |phase: f64| pieces.partition_point(|piece| piece.end <= phase).min(pieces.len() - 1);
+    (0..shares).map(|share| piece_at(begin(share)) as u32).collect()
+}
+
+/// The number of the piece that holds a phase from 0 to 1.
+#[inline(always)]
+pub(super) fn piece_at(pieces: &[Piece], piece_of_share: &[u32], phase: f64) -> usize {
+    let share = (phase * piece_of_share.len() as f64) as usize;
+    let mut piece = piece_of_share[share.min(piece_of_share.len() - 1)] as usize;
+    while piece + 1 < pieces.len() && pieces[piece].end <= phase {
+        piece += 1;
+    }
+    piece
+}
+
 /// The table of T.
 #[derive(Debug, Clone)]
 pub(crate) struct Rows {
-    pub order: Order,
+    pub tolerance: Tolerance,
     /// From the front of the table backward.
     pub bands: Vec<Band>,
     /// The phases of the kinks, in order.
@@ -199,6 +226,11 @@ impl Alpha {
 }
 
 impl Rows {
+    /// A table without rows.
+    pub(super) fn empty() -> Self {
+        Self { tolerance: Tolerance::EXACT, bands: Vec::new(), kinks: Vec::new(), valid_from: 0.0 }
+    }
+
     /// The number of rows.
     pub(crate) fn rows(&self) -> usize {
         self.bands.last().map_or(0, |band| band.first_row + band.rows)
@@ -208,6 +240,16 @@ impl Rows {
     #[inline(always)]
     pub(crate) fn band_of(&self, row: usize) -> usize {
         self.bands.iter().position(|band| row < band.first_row + band.rows).unwrap_or(self.bands.len())
+    }
+
+    /// Bytes of one piece for a row, on average over so many rows from the rear on.
+    pub(super) fn bytes_per_row(&self, rows: usize) -> f64 {
+        let first = self.rows().saturating_sub(rows);
+        let of_band = |band: &Band| {
+            let rows = (band.first_row + band.rows).saturating_sub(first.max(band.first_row));
+            rows * band.lengths.per_row() * size_of::<f64>()
+        };
+        self.bands.iter().map(of_band).sum::<usize>() as f64 / (self.rows() - first) as f64
     }
 
     pub(super) fn memory_bytes(&self) -> usize {

@@ -44,6 +44,8 @@ pub struct Observer {
     seen: Observation,
     /// Lengths of the head's link and of every other, metres.
     links: Option<[f64; 2]>,
+    /// Metres by which links may be off besides rounding.
+    link_tolerance: f64,
     /// The first frame of the present run.
     first: FrameHeader,
     previous: Option<FrameHeader>,
@@ -52,19 +54,26 @@ pub struct Observer {
 }
 
 impl Default for Observer {
+    /// An observer of a scene whose links are exact.
     fn default() -> Self {
+        Self::new(0.0)
+    }
+}
+
+impl Observer {
+    /// An observer of a scene whose links may be off by so many metres besides rounding.
+    pub fn new(link_tolerance: f64) -> Self {
         Self {
             seen: Observation::default(),
             links: None,
+            link_tolerance,
             first: FrameHeader::default(),
             previous: None,
             second: Histograms::new(),
             total: Histograms::new(),
         }
     }
-}
 
-impl Observer {
     /// Takes in an event that was received at `received_ns` of CLOCK_MONOTONIC.
     pub fn handle(&mut self, event: &FeedEvent<'_>, received_ns: u64) {
         match *event {
@@ -152,7 +161,7 @@ impl Observer {
             let length = (pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y);
             let expected = if link == 0 { head } else { body };
             let radius = pair[1].x.hypot(pair[1].y);
-            let promised = 1e-12 * expected + 4.0 * (radius.next_up() - radius);
+            let promised = self.link_tolerance + 1e-12 * expected + 4.0 * (radius.next_up() - radius);
             let error = (length - expected).abs();
             // A length that is no number is wrong as well.
             right &= error <= promised;

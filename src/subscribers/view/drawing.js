@@ -1,5 +1,7 @@
 // The drawing: one picture of the stage on a canvas. Knows nothing of the network; keeps the camera and the ground.
 
+import { STRIDE, speedOf } from "./hermite.js";
+
 /** Steps of the colour scale. */
 const SHADES = 32;
 /** Rectangles filled at once: with thousands in one path, filling it takes six times as long. */
@@ -67,23 +69,13 @@ export class Camera {
   }
 }
 
-/** Where the handles are between two frames. */
-export function interpolated({ a, b, part }, into) {
-  const from = a.handles, to = b.handles, length = to.length;
-  const places = into?.length === length / 2 ? into : new Float32Array(length / 2);
-  for (let k = 0, j = 0; k < length; k += 4, j += 2) {
-    places[j] = from[k] + (to[k] - from[k]) * part;
-    places[j + 1] = from[k + 1] + (to[k + 1] - from[k + 1]) * part;
-  }
-  return places;
-}
-
 /** A bench's rectangle: its middle, its direction, half its length and half its width. */
 export function rectangle(stage, places, bench) {
-  const k = 2 * bench, x = places[k] - places[k + 2], y = places[k + 1] - places[k + 3], link = Math.hypot(x, y) || 1;
+  const k = STRIDE * bench, rear = k + STRIDE;
+  const x = places[k] - places[rear], y = places[k + 1] - places[rear + 1], link = Math.hypot(x, y) || 1;
   return {
-    x: (places[k] + places[k + 2]) / 2,
-    y: (places[k + 1] + places[k + 3]) / 2,
+    x: (places[k] + places[rear]) / 2,
+    y: (places[k + 1] + places[rear + 1]) / 2,
     c: x / link,
     s: y / link,
     l: (bench === 0 ? stage.head_length : stage.body_length) / 2,
@@ -94,7 +86,7 @@ export function rectangle(stage, places, bench) {
 /** The bench at a place of the stage, no further from it than `most` metres; -1 for none. */
 export function benchAt(stage, places, x, y, most) {
   let best = most, found = -1;
-  for (let bench = 0; bench < places.length / 2 - 1; bench++) {
+  for (let bench = 0; bench < places.length / STRIDE - 1; bench++) {
     const r = rectangle(stage, places, bench), along = (x - r.x) * r.c + (y - r.y) * r.s, across = (y - r.y) * r.c - (x - r.x) * r.s;
     const away = Math.hypot(Math.max(0, Math.abs(along) - r.l), Math.max(0, Math.abs(across) - r.w));
     if (away < best || (away === 0 && best === 0)) [best, found] = [away, bench];
@@ -219,7 +211,8 @@ export class Ground {
   }
 }
 
-/** Draws everything. `scene` has: stage, places, speeds (of the newest frame), scale of speeds, path, alert, chosen. */
+/** Draws everything. `scene` has: stage, places (STRIDE numbers a handle, as all handles here), newest (the
+ * handles of the newest frame, for their speeds), range of speeds, ground, path, alert, chosen. */
 export function draw(context, camera, palette, scene) {
   const { stage, places, ground, path, alert, chosen } = scene, { ratio, scale } = camera, pixel = 1 / scale;
   const world = () => inMetres(context, camera);
@@ -227,7 +220,7 @@ export function draw(context, camera, palette, scene) {
   world();
   context.lineJoin = "miter";
   benches(context, camera, palette, scene);
-  const count = places.length / 2 - 1, head = rectangle(stage, places, 0), tail = rectangle(stage, places, count - 1);
+  const count = places.length / STRIDE - 1, head = rectangle(stage, places, 0), tail = rectangle(stage, places, count - 1);
   const mark = (bench, ink, width, dashes = []) => {
     context.beginPath();
     outline(context, rectangle(stage, places, bench));
@@ -259,10 +252,10 @@ export function draw(context, camera, palette, scene) {
   tailSign(context, tail, palette, pixel);
   mark(0, palette.ink, 2.5);
   if (count > 1) mark(count - 1, palette.ink, 1.5);
-  const danger = alert && alert.level !== "clear";
-  // While approaching the nearest two boards are marked, afterwards those of the event.
-  const approaching = alert?.level === "approaching";
-  const concerned = approaching ? [alert.bench_a, alert.bench_b] : [alert?.event_bench_a, alert?.event_bench_b];
+  const danger = alert && alert.severity !== "ok";
+  // Until an event has happened the nearest two boards are marked, afterwards those of the event.
+  const ahead = danger && !alert.happened;
+  const concerned = ahead ? [alert.bench_a, alert.bench_b] : [alert?.event_bench_a, alert?.event_bench_b];
   const pair = danger ? concerned.filter((bench) => bench !== null && bench < count) : [];
   for (const bench of pair) {
     mark(bench, palette.ground, 7);
@@ -273,7 +266,7 @@ export function draw(context, camera, palette, scene) {
     mark(chosen, palette.ink, 4, [7, 4]);
   }
   // Alerts come once a second, and the place of an approach moves with the boards.
-  const place = approaching && pair.length === 2 ? nearest(stage, places, ...pair) : { x: alert?.event_x, y: alert?.event_y };
+  const place = ahead && pair.length === 2 ? nearest(stage, places, ...pair) : { x: alert?.event_x, y: alert?.event_y };
   if (danger && place.x !== null) target(context, place, palette, pixel);
   if (!pair.includes(0)) label("HEAD", head.x + head.l * head.c, head.y + head.l * head.s, palette.ink);
   if (count > 1) label("TAIL", tail.x - tail.l * tail.c, tail.y - tail.l * tail.s, palette.ink);
@@ -288,11 +281,11 @@ export function draw(context, camera, palette, scene) {
   scaleBar(context, camera, palette);
 }
 
-function benches(context, camera, palette, { stage, places, speeds, range }) {
-  const count = places.length / 2 - 1, reach = Math.max(stage.head_length, stage.body_length), shown = Array.from({ length: SHADES + 1 }, () => []);
+function benches(context, camera, palette, { stage, places, newest, range }) {
+  const count = places.length / STRIDE - 1, reach = Math.max(stage.head_length, stage.body_length), shown = Array.from({ length: SHADES + 1 }, () => []);
   const [left, bottom] = camera.toStage(0, camera.height), [right, top] = camera.toStage(camera.width, 0);
   for (let bench = 0; bench < count; bench++) {
-    const x = places[2 * bench], y = places[2 * bench + 1], speed = speeds[4 * bench + 3];
+    const x = places[STRIDE * bench], y = places[STRIDE * bench + 1], speed = speedOf(newest, bench);
     if (x < left - reach || x > right + reach || y < bottom - reach || y > top + reach) continue;
     shown[speed > 0 && range ? shadeOf(speed, range) : SHADES].push(bench);
   }
@@ -313,7 +306,7 @@ function benches(context, camera, palette, { stage, places, speeds, range }) {
   context.fillStyle = palette.ground;
   context.beginPath();
   for (const bench of shown.flat()) {
-    for (const k of [2 * bench, 2 * bench + 2]) {
+    for (const k of [STRIDE * bench, STRIDE * (bench + 1)]) {
       context.moveTo(places[k] + stage.width / 7, places[k + 1]);
       context.arc(places[k], places[k + 1], stage.width / 7, 0, 7);
     }

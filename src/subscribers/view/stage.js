@@ -1,17 +1,23 @@
 // The page: puts the stream into the drawing and into words, and takes the user's hand.
 
+import { STRIDE, speedOf } from "./hermite.js";
 import { Stream } from "./stream.js";
-import { Camera, Ground, benchAt, draw, interpolated, paletteOf, pathOf } from "./drawing.js";
+import { Camera, Ground, benchAt, draw, paletteOf, pathOf } from "./drawing.js";
 
-const STATES = ["moving", "approaching", "contact", "stall", "lock", "path_end"];
-const SIGNS = { moving: "○", approaching: "△", contact: "✖", stall: "■", lock: "■", path_end: "●" };
+/** By severity; the list of the states, with the severity of each, comes with the stage. */
+const SIGNS = { ok: "○", warning: "△", error: "✖" };
+/** While there is nothing to show; a state that the server does not list is shown as one without danger. */
+const WAITING = { name: "waiting", severity: "ok", happened: false, sentence: null };
 const element = (id) => document.getElementById(id);
 const canvas = element("stage"), context = canvas.getContext("2d", { alpha: false });
 const stream = new Stream(), camera = new Camera(), ground = new Ground();
 let palette = paletteOf(canvas), places = null, path = null, pathRun = null, chosen = -1, range = null, still = false, last = null;
 
-/** For tests and measurements: what the page has received and drawn; `latency` and `ways` in ms since the frame was sent. */
-const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, latency: [], ways: stream.ways, toPixel: (x, y) => camera.toPixel(x, y) };
+/**
+ * For tests and measurements: what the page has received and drawn. `shown` is the simulated time and the handles of the
+ * latest picture; `latency` and `ways` in ms since the frame was sent.
+ */
+const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, shown: null, latency: [], ways: stream.ways, toPixel: (x, y) => camera.toPixel(x, y) };
 window.picture = picture;
 
 function put(id, text) {
@@ -30,14 +36,17 @@ function fitCanvas() {
 /** How far from the centre the outermost bench is. */
 function reachOf(stage, handles) {
   let most = 0;
-  for (let k = 0; k < handles.length; k += 4) most = Math.max(most, Math.hypot(handles[k], handles[k + 1]));
+  for (let k = 0; k < handles.length; k += STRIDE) most = Math.max(most, Math.hypot(handles[k], handles[k + 1]));
   return most + stage.width + stage.hole_inset || 1;
 }
 
 /** The colours' scale holds all speeds and changes gently; none while nothing moves or no speeds are sent. */
-function widen(speeds) {
+function widen(handles) {
   let [low, high] = [Infinity, -Infinity];
-  for (let k = 3; k < speeds.length; k += 4) if (speeds[k] > 0) [low, high] = [Math.min(low, speeds[k]), Math.max(high, speeds[k])];
+  for (let handle = 0; handle < handles.length / STRIDE; handle++) {
+    const speed = speedOf(handles, handle);
+    if (speed > 0) [low, high] = [Math.min(low, speed), Math.max(high, speed)];
+  }
   if (!(high > 0)) return null;
   // A hair's breadth is not worth a colour.
   const wider = Math.max(0, 0.01 * high - (high - low) / 2);
@@ -54,8 +63,8 @@ function pass() {
   picture.received = stream.received;
   updateText(now);
   if (!newest || !stage) return drawNothing();
-  const between = playback.between(now);
-  places = interpolated(between, places);
+  const shown = playback.at(now, places), { from, to } = shown;
+  places = shown.handles;
   const reach = reachOf(stage, newest.handles);
   // Positions are rounded to 32 bits, which alone moves the outermost bench a little.
   if (pathRun !== newest.run || reach > 1.001 * camera.reach) {
@@ -69,20 +78,20 @@ function pass() {
   const widened = widen(newest.handles);
   range = widened ?? range;
   still = !widened;
-  const { a, b, part } = between;
   // Nothing is drawn twice: a show that stands still costs nothing.
-  const all = [newest.run, newest.state, newest.handles[3], a.due, b.due, part, camera.x, camera.y, camera.zoom, camera.reach, camera.width, camera.height, camera.ratio, range?.low, range?.high, alert?.level, alert?.event_x, alert?.bench_a, alert?.bench_b, chosen, palette.ground].join();
+  const all = [newest.run, newest.state, still, shown.time, from.epoch, camera.x, camera.y, camera.zoom, camera.reach, camera.width, camera.height, camera.ratio, range?.low, range?.high, alert?.level, alert?.event_x, alert?.bench_a, alert?.bench_b, chosen, palette.ground].join();
   if (all !== last) {
-    draw(context, camera, palette, { stage, places, speeds: newest.handles, range, ground, path, alert, chosen });
+    draw(context, camera, palette, { stage, places, newest: newest.handles, range, ground, path, alert, chosen });
     last = all;
     picture.drawn++;
-    if (stream.clock !== null && a !== b) {
-      picture.latency.push(performance.now() + stream.clock - (a.sent + (b.sent - a.sent) * part));
+    if (stream.clock !== null && from !== to) {
+      const part = (shown.time - from.time) / (to.time - from.time);
+      picture.latency.push(performance.now() + stream.clock - (from.sent + (to.sent - from.sent) * part));
       if (picture.latency.length > 600) picture.latency.shift();
     }
   }
   const head = camera.toPixel(places[0], places[1]);
-  Object.assign(picture, { state: newest.state, run: newest.run, sequence: newest.sequence, time: newest.time, head });
+  Object.assign(picture, { state: newest.state, run: newest.run, sequence: newest.sequence, time: newest.time, head, shown });
 }
 
 function drawNothing() {
@@ -92,7 +101,7 @@ function drawNothing() {
   context.setTransform(1, 0, 0, 1, 0, 0);
   context.fillStyle = palette.ground;
   context.fillRect(0, 0, canvas.width, canvas.height);
-  Object.assign(picture, { state: null, run: null, sequence: null, head: null });
+  Object.assign(picture, { state: null, run: null, sequence: null, head: null, shown: null });
 }
 
 // The words.
@@ -105,12 +114,13 @@ function remaining(seconds) {
   return hours ? [`${hours}:${pad(minutes)}:${pad(whole % 60)}`, "h"] : [`${minutes}:${pad(whole % 60)}`, "min"];
 }
 
-/** The server puts the alert into words; those of a level that the frames have not reached, or have left, do not count. */
-function sentence(level, alert) {
-  if (level === "path_end") return "The head has reached the end of the path.";
-  if (level === "moving" || alert?.level !== level) return "";
-  const words = alert.sentence[0].toUpperCase() + alert.sentence.slice(1);
-  return level === "approaching" ? `Approaching. ${words}.` : `${words}.`;
+/** The server puts alerts and states into words; those of an alert's level that the frames have not reached, or have left, do not count. */
+function sentence(state, alert) {
+  const capital = (words) => words[0].toUpperCase() + words.slice(1);
+  if (state.sentence) return `${capital(state.sentence)}.`;
+  if (state.severity === "ok" || alert?.level !== state.name) return "";
+  const words = `${capital(alert.sentence)}.`;
+  return state.happened ? words : `${capital(state.name)}. ${words}`;
 }
 
 let spokenAt = Infinity;
@@ -120,13 +130,13 @@ function speak(seconds) {
   spokenAt = mark;
 }
 
-function countdown(level, alert, now) {
+function countdown(state, alert, now) {
   const { playback } = stream, { newest } = playback;
   const seconds = alert?.event_time != null ? (alert.event_time - playback.time(now)) / newest.scale : NaN;
-  const ahead = (level === "moving" || level === "approaching") && seconds > -1;
+  const ahead = !state.happened && seconds > -1, near = state.severity !== "ok";
   const [number, unit] = ahead ? remaining(Math.max(0, seconds)) : ["", ""];
   element("countdown").hidden = !ahead;
-  put("until", ahead ? `${level === "approaching" ? "" : "next "}${alert.event} in` : "");
+  put("until", ahead ? `${near ? "" : "next "}${alert.event} in` : "");
   if (element("left").dataset.text !== number + unit) {
     element("left").dataset.text = number + unit;
     // The number is made as large as the panel is wide.
@@ -134,7 +144,7 @@ function countdown(level, alert, now) {
     element("left").textContent = number;
     element("left").append(Object.assign(document.createElement("small"), { textContent: unit }));
   }
-  speak(level === "approaching" && ahead ? seconds : Infinity);
+  speak(near && ahead ? seconds : Infinity);
 }
 
 function meter(stage, clearance) {
@@ -148,12 +158,12 @@ function meter(stage, clearance) {
 }
 
 function detail(stage, handles) {
-  const count = handles.length / 4 - 1;
+  const count = handles.length / STRIDE - 1;
   element("pick").max = count;
-  const there = chosen >= 0 && chosen < count, k = 4 * chosen;
+  const there = chosen >= 0 && chosen < count, k = STRIDE * chosen;
   element("bench").classList.toggle("chosen", there);
   if (!there) return put("bench", "Click a bench, or type its number.");
-  const name = chosen === 0 ? ", the head" : chosen === count - 1 ? ", the tail" : "", speed = handles[k + 3];
+  const name = chosen === 0 ? ", the head" : chosen === count - 1 ? ", the tail" : "", speed = speedOf(handles, chosen);
   const degrees = ((handles[k + 2] * 180) / Math.PI).toFixed(1);
   put("bench", `Bench ${chosen + 1} of ${count}${name}: front handle at (${handles[k].toFixed(3)}, ${handles[k + 1].toFixed(3)}) m, ${Number.isNaN(speed) ? "speed not sent" : `${speed.toFixed(3)} m/s`}, heading ${degrees}°`);
 }
@@ -161,9 +171,10 @@ function detail(stage, handles) {
 let figuresAt = 0, counted = { at: 0, received: 0 }, perSecond = 0;
 function updateText(now) {
   const { playback, stage, alert } = stream, { newest } = playback;
-  const level = newest && stage ? STATES[newest.state] ?? "moving" : "waiting", before = document.body.dataset.level;
-  if (before !== level) document.body.dataset.level = level;
-  if (level === "waiting") {
+  const state = newest && stage ? stage.states[newest.state] ?? { ...WAITING, name: "unknown" } : WAITING;
+  const { dataset } = document.body, before = dataset.level, calm = state.severity === "ok" && !state.happened;
+  if (before !== state.name) Object.assign(dataset, { level: state.name, severity: state.severity, happened: state.happened });
+  if (state === WAITING) {
     put("state", `○ ${stream.trouble ?? "waiting for the stage"}`);
     put("spoken", stream.trouble ?? "");
     for (const id of ["alert", "until", "left", "metres", "speeds", "time", "rate"]) put(id, "");
@@ -173,11 +184,11 @@ function updateText(now) {
     element("meter").firstElementChild.style.width = 0;
     return;
   }
-  countdown(level, alert, now);
-  const words = level.replace("_", " "), silent = now - newest.at > Math.max(2000, 3 * playback.interval);
-  put("state", silent ? `… no frames for ${Math.floor((now - newest.at) / 1000)} s` : `${SIGNS[level]} ${words}`);
-  put("alert", sentence(level, alert));
-  if (level === "moving" && before !== level) put("spoken", before === "waiting" ? "The dragon moves." : "Clear again.");
+  countdown(state, alert, now);
+  const words = state.name.replaceAll("_", " "), silent = now - newest.at > Math.max(2000, 3 * playback.interval);
+  put("state", silent ? `… no frames for ${Math.floor((now - newest.at) / 1000)} s` : `${SIGNS[state.severity]} ${words}`);
+  put("alert", sentence(state, alert));
+  if (calm && before !== state.name) put("spoken", before === WAITING.name ? "The dragon moves." : "Clear again.");
   // The rest changes too often to be read at every pass.
   if (now - figuresAt < 100) return;
   figuresAt = now;

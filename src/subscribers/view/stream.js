@@ -1,11 +1,17 @@
 // The stream: receives frames, stage and alerts, reconnects by itself, and interpolates where everything is
 // between two frames. Knows nothing of the page.
 
-const VERSION = 2;
+import { HermiteReader } from "./hermite.js";
+
+const VERSION = 3;
 const HEADER_BYTES = 72;
+/** The number of `playing` among the states of playback. */
+const PLAYING = 0;
+/** Frames that are kept: half a second of the most that come, and more than the longest gap of the slowest. */
+const KEPT_FRAMES = 64;
 /** More frames a second than this make no motion smoother once it is interpolated. */
 const MOST_FRAMES = 125;
-/** Frames further apart than this (ms) are shown one after another: straight lines between them would be wrong. */
+/** Frames further apart than this (ms) are shown one after another: the motion between them is not known. */
 const LONGEST_GAP = 1000;
 /** The clock is requested this often (ms); a server that has not answered by the next time is gone. */
 const CLOCK_INTERVAL = 5000;
@@ -16,31 +22,39 @@ const JITTER_WINDOW = 2000;
 function frameOf(data, at) {
   const bytes = new DataView(data);
   if (data.byteLength < HEADER_BYTES || bytes.getUint8(0) !== VERSION) return null;
-  const time = bytes.getFloat64(8, true), scale = bytes.getFloat64(16, true);
   return {
     at,
     state: bytes.getUint8(1),
-    time,
-    scale,
+    playing: bytes.getUint8(2) === PLAYING,
+    time: bytes.getFloat64(8, true),
+    scale: bytes.getFloat64(16, true),
     sequence: Number(bytes.getBigUint64(24, true)),
     run: String(bytes.getBigUint64(32, true)),
     sent: Number(bytes.getBigUint64(40, true)) / 1e6,
     clearance: bytes.getFloat32(56, true),
     epoch: bytes.getUint32(60, true),
     handles: new Float32Array(data, HEADER_BYTES),
-    // Milliseconds of wall time since the show's beginning, on the publisher's clock.
-    due: (1000 * time) / scale,
   };
+}
+
+/**
+ * Milliseconds of wall time from one frame to the next. Simulated time has no jitter; where it stands still, jumps or
+ * changes its rate, the moments at which the two were sent have to do.
+ */
+function elapsed(from, to) {
+  const even = from.playing && to.playing && from.epoch === to.epoch && from.scale === to.scale && to.time > from.time;
+  return even ? (1000 * (to.time - from.time)) / to.scale : Math.max(0, to.sent - from.sent);
 }
 
 /** The last frames, and a clock that runs evenly a little behind them however unevenly they come. */
 class Playback {
   constructor() {
+    this.reader = new HermiteReader(KEPT_FRAMES);
     this.clear();
   }
 
   clear() {
-    this.frames = [];
+    this.reader.clear();
     this.offsets = [];
     this.earliest = this.lag = this.shown = NaN;
     this.interval = 50;
@@ -48,48 +62,43 @@ class Playback {
   }
 
   get newest() {
-    return this.frames.at(-1) ?? null;
+    return this.reader.newest;
   }
 
   push(frame) {
     const last = this.newest;
-    if (last && (last.run !== frame.run || last.epoch !== frame.epoch || frame.due < last.due || last.handles.length !== frame.handles.length)) this.clear();
-    if (last && last === this.newest && last.due === frame.due) {
-      // The show stands still.
-      this.frames[this.frames.length - 1] = frame;
-      return;
-    }
-    this.frames.push(frame);
-    if (this.frames.length > 64) this.frames.shift();
+    if (last && (last.run !== frame.run || last.handles.length !== frame.handles.length)) this.clear();
+    // The frame's place on the clock of the publisher: wall time since the first frame that came.
+    frame.due = this.newest ? last.due + elapsed(last, frame) : 0;
+    this.reader.push(frame);
     this.offsets.push({ at: frame.at, offset: frame.at - frame.due });
     while (this.offsets[0].at < frame.at - JITTER_WINDOW) this.offsets.shift();
     const offsets = this.offsets.map((one) => one.offset).sort((a, b) => a - b);
     this.earliest = offsets[0];
     const spread = offsets[Math.floor(0.95 * (offsets.length - 1))] - offsets[0];
-    const count = Math.min(this.frames.length, 16);
-    if (count > 1) this.interval = (frame.due - this.frames.at(-count).due) / (count - 1);
+    const { frames } = this.reader, count = Math.min(frames.length, 16);
+    if (count > 1) this.interval = (frame.due - frames.at(-count).due) / (count - 1);
     this.lag = Math.min(this.interval, LONGEST_GAP) + Math.min(spread, 100);
   }
 
   /** The show's time now, in seconds, as far as the newest frame reaches or a little further. */
   time(now) {
     const { newest } = this;
-    return (Math.min(now - this.earliest, newest.due + this.interval) * newest.scale) / 1000;
+    if (!newest.playing) return newest.time;
+    return newest.time + (Math.min(now - this.earliest - newest.due, this.interval) * newest.scale) / 1000;
   }
 
-  /** The two frames to draw between, and how far from the first to the second. */
-  between(now) {
-    const { frames, newest } = this;
+  /** What to draw now: see `HermiteReader.at`. `into` is used again. */
+  at(now, into) {
+    const { frames } = this.reader;
     const passed = Math.min(now - this.drawnAt, 1000), target = now - this.earliest - this.lag;
     this.drawnAt = now;
     const error = target - this.shown - passed;
     // A small error is worked off unseen.
     this.shown = Math.abs(error) < 300 ? this.shown + passed + error * Math.min(1, passed / 300) : target;
-    let k = frames.length - 1;
-    while (k > 0 && frames[k - 1].due > this.shown) k--;
-    const b = frames[k], a = frames[Math.max(0, k - 1)], gap = b.due - a.due;
-    if (this.shown >= newest.due || gap <= 0 || gap > LONGEST_GAP) return { a: newest, b: newest, part: 1 };
-    return { a, b, part: Math.min(1, Math.max(0, (this.shown - a.due) / gap)) };
+    const after = frames.findIndex((frame) => frame.due > this.shown);
+    const tooFar = after > 0 && frames[after].due - frames[after - 1].due > LONGEST_GAP;
+    return this.reader.at(tooFar ? frames[after].due : this.shown, into);
   }
 }
 

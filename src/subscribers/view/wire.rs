@@ -1,11 +1,11 @@
 //! What a browser receives: frames as bytes, and JSON for what changes seldom. Called by the server only.
 //!
-//! Everything is little-endian. A frame is a header of 72 bytes and 16 bytes for each handle, head first:
+//! Everything is little-endian. A frame is a header of 72 bytes and 20 bytes for each handle, head first:
 //!
 //! | byte | type | what |
 //! |---|---|---|
-//! | 0 | u8 | version of this layout: 2 |
-//! | 1 | u8 | state: 0 moving, 1 approaching, 2 contact, 3 stall, 4 lock, 5 path end |
+//! | 0 | u8 | version of this layout: 3 |
+//! | 1 | u8 | state: its place in the list `states` of the message `stage`, from 0 |
 //! | 2 | u8 | playback: 0 playing, 1 paused, 2 held, 3 ended |
 //! | 3 | u8 | 0 |
 //! | 4 | u32 | number of handles |
@@ -19,18 +19,19 @@
 //! | 60 | u32 | epoch: grows by one at every jump of simulated time |
 //! | 64 | u32 | the latest cue passed, from 1; 0 where none has been |
 //! | 68 | u32 | 0 |
-//! | 72 + 16 k | 4 x f32 | handle k: x, y (m), heading (rad), speed without sign (m per simulated second; NaN where not computed) |
+//! | 72 + 20 k | 5 x f32 | handle k: x, y (m), heading (rad), vx, vy (m per simulated second; NaN where not computed, 0 where the show stands still) |
 
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use crate::show::state::{FrameState, Level, Severity};
 use crate::wire::json::{AlertObject, Exact};
-use crate::wire::sentence::{Figures, alert_sentence};
+use crate::wire::sentence::{Figures, alert_sentence, state_sentence};
 use crate::wire::{CollisionAlert, FrameHeader, HandlePose, Stage, StageSegment};
 
-const VERSION: u8 = 2;
+const VERSION: u8 = 3;
 const HEADER_BYTES: usize = 72;
-const HANDLE_BYTES: usize = 16;
+const HANDLE_BYTES: usize = 20;
 
 pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER_BYTES + HANDLE_BYTES * handles.len());
@@ -46,7 +47,7 @@ pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
         bytes.extend(number.to_le_bytes());
     }
     for pose in handles {
-        for number in [pose.x, pose.y, pose.heading, pose.vx.hypot(pose.vy)] {
+        for number in [pose.x, pose.y, pose.heading, pose.vx, pose.vy] {
             bytes.extend((number as f32).to_le_bytes());
         }
     }
@@ -57,7 +58,8 @@ pub(super) fn stage(stage: &Stage) -> String {
     let Stage { run_id, pitch, start_turn, hole_inset, head_length, body_length, width, benches, .. } = *stage;
     json!({"type": "stage", "run_id": Exact(run_id), "pitch": pitch, "start_turn": start_turn,
         "hole_inset": hole_inset, "head_length": head_length, "body_length": body_length, "width": width,
-        "benches": benches, "path": stage.path_in_use().iter().map(segment).collect::<Vec<_>>()})
+        "benches": benches, "path": stage.path_in_use().iter().map(segment).collect::<Vec<_>>(),
+        "states": FrameState::ALL.map(state)})
     .to_string()
 }
 
@@ -67,15 +69,29 @@ fn segment(segment: &StageSegment) -> Value {
         "theta_first": theta_first, "theta_last": theta_last})
 }
 
-/// An alert and its sentence, in a team of so many benches; the page shows its figures beside it.
+/// All that a page need know of a state, so that it can show one that it has never heard of.
+fn state(state: FrameState) -> Value {
+    json!({"name": state.name(), "severity": state.severity().name(), "happened": state.event().is_some(),
+        "sentence": state_sentence(state)})
+}
+
+/// An alert, its severity and its sentence, in a team of so many benches; the page shows its figures beside it.
 pub(super) fn alert(alert: &CollisionAlert, benches: u32) -> String {
     #[derive(Serialize)]
     struct AlertMessage {
         #[serde(flatten)]
         alert: AlertObject,
+        severity: &'static str,
+        happened: bool,
         sentence: String,
     }
-    let message = AlertMessage { alert: alert.into(), sentence: alert_sentence(alert, benches, Figures::Omitted) };
+    let level = alert.alert_level();
+    let message = AlertMessage {
+        alert: alert.into(),
+        severity: level.map_or(Severity::Ok, Level::severity).name(),
+        happened: level.is_some_and(Level::has_happened),
+        sentence: alert_sentence(alert, benches, Figures::Omitted),
+    };
     json!(message).to_string()
 }
 
@@ -113,8 +129,8 @@ mod tests {
         let pose = HandlePose { x: 8.75, y: -1.5, heading: 0.5, vx: 3.0, vy: -4.0 };
         let still = HandlePose { vx: f64::NAN, ..pose };
         let bytes = frame(&header, &[pose, still]);
-        assert_eq!(bytes.len(), 104);
-        assert_eq!(bytes[..8], [2, 2, 3, 0, 2, 0, 0, 0]);
+        assert_eq!(bytes.len(), 112);
+        assert_eq!(bytes[..8], [3, 2, 3, 0, 2, 0, 0, 0]);
         assert_eq!(bytes[8..16], 405.5_f64.to_le_bytes());
         assert_eq!(bytes[16..24], 2.0_f64.to_le_bytes());
         assert_eq!(bytes[24..32], 7_u64.to_le_bytes());
@@ -123,8 +139,21 @@ mod tests {
         assert_eq!(bytes[48..56], 9_u64.to_le_bytes());
         assert_eq!(bytes[56..72], [0, 0, 0x80, 0x3e, 4, 0, 0, 0, 5, 0, 0, 0, 0, 0, 0, 0]);
         let numbers: Vec<_> = bytes[72..].chunks(4).map(|four| f32::from_le_bytes(four.try_into().unwrap())).collect();
-        assert_eq!(numbers[..7], [8.75, -1.5, 0.5, 5.0, 8.75, -1.5, 0.5]);
-        assert!(numbers[7].is_nan());
+        assert_eq!(numbers[..8], [8.75, -1.5, 0.5, 3.0, -4.0, 8.75, -1.5, 0.5]);
+        assert!(numbers[8].is_nan() && numbers[9] == -4.0);
+    }
+
+    #[test]
+    fn the_states_stand_in_the_order_of_their_numbers() {
+        let json: Value = serde_json::from_str(&stage(&Stage::default())).unwrap();
+        let states = json["states"].as_array().unwrap();
+        assert_eq!(states.len(), FrameState::ALL.len());
+        for (state, number) in FrameState::ALL.into_iter().zip(0..) {
+            assert_eq!((state as usize, &states[number]["name"]), (number, &state.name().into()));
+        }
+        let contact = json!({"name": "contact", "severity": "error", "happened": true, "sentence": null});
+        assert_eq!(states[2], contact);
+        assert_eq!(states[5]["sentence"], "the head has reached the end of the path");
     }
 
     #[test]
@@ -132,6 +161,7 @@ mod tests {
         let alert_of = CollisionAlert { level: 1, event: 2, event_bench_a: 0, event_bench_b: 8, ..Default::default() };
         let json: Value = serde_json::from_str(&alert(&alert_of, 9)).unwrap();
         assert_eq!((&json["type"], &json["event"]), (&"alert".into(), &"contact".into()));
+        assert_eq!((&json["severity"], &json["happened"]), (&"warning".into(), &false.into()));
         assert_eq!(json["sentence"], "contact: bench 1 (the head) and bench 9 (the tail) (counting from 1)");
     }
 }

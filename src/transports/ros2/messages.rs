@@ -8,7 +8,7 @@ use serde::Serialize;
 use crate::model::Point;
 use crate::model::board::Board;
 use crate::motion::event::EventKind;
-use crate::show::state::Level;
+use crate::show::state::{Level, Severity};
 use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 
 /// The frame of all coordinates: metres, x to the right, y up, origin at the centre.
@@ -318,7 +318,7 @@ impl MarkerArray {
         }
         let mut contact = Marker::new("contact", 0, SPHERE);
         contact.scale = Xyz { x: stage.width, y: stage.width, z: stage.width };
-        contact.color = colour(Level::Contact);
+        contact.color = colour(Severity::Error);
         markers.push(contact);
         Self { markers }
     }
@@ -333,11 +333,12 @@ impl MarkerArray {
     ) {
         let stamp = Time::of(frame.stamp_ns);
         let level = level_of(alert);
-        let marked = alert.map_or(Vec::new(), |alert| match level {
-            Level::Clear => Vec::new(),
-            Level::Approaching => alert.nearest_benches().collect(),
-            Level::Contact | Level::Stall | Level::Lock => alert.event_benches().collect(),
-        });
+        // Those that it has happened to, or else those nearest to each other.
+        let marked: Vec<_> = match alert.filter(|_| level.severity() > Severity::Ok) {
+            None => Vec::new(),
+            Some(alert) if level.has_happened() => alert.event_benches().collect(),
+            Some(alert) => alert.nearest_benches().collect(),
+        };
         let benches = self.markers.len() - 1;
         for (bench, (marker, pair)) in self.markers[..benches].iter_mut().zip(handles.windows(2)).enumerate() {
             let points = [Point::new(pair[0].x, pair[0].y), Point::new(pair[1].x, pair[1].y)];
@@ -345,7 +346,7 @@ impl MarkerArray {
             marker.header.stamp = stamp;
             marker.pose = Pose::flat(centre.x, centre.y, pair[0].heading);
             marker.color = match (marked.contains(&(bench as u32)), bench) {
-                (true, _) => colour(level),
+                (true, _) => colour(level.severity()),
                 (false, 0) => Color { r: 0.85, g: 0.65, b: 0.13, a: 1.0 },
                 _ => Color { r: 0.55, g: 0.35, b: 0.2, a: 1.0 },
             };
@@ -365,12 +366,12 @@ fn level_of(alert: Option<&CollisionAlert>) -> Level {
     alert.and_then(CollisionAlert::alert_level).unwrap_or(Level::Clear)
 }
 
-/// The colour of a level.
-fn colour(level: Level) -> Color {
-    match level {
-        Level::Clear => Color { r: 0.2, g: 0.6, b: 0.3, a: 1.0 },
-        Level::Approaching => Color { r: 1.0, g: 0.75, b: 0.0, a: 1.0 },
-        Level::Contact | Level::Stall | Level::Lock => Color { r: 0.9, g: 0.1, b: 0.1, a: 1.0 },
+/// The colour of a severity.
+fn colour(severity: Severity) -> Color {
+    match severity {
+        Severity::Ok => Color { r: 0.2, g: 0.6, b: 0.3, a: 1.0 },
+        Severity::Warning => Color { r: 1.0, g: 0.75, b: 0.0, a: 1.0 },
+        Severity::Error => Color { r: 0.9, g: 0.1, b: 0.1, a: 1.0 },
     }
 }
 
@@ -452,10 +453,10 @@ impl DiagnosticArray {
             values.push(value("event benches (from 0)", listed(alert.event_benches())));
         }
         let dragon = DiagnosticStatus {
-            level: match level {
-                Level::Clear => OK,
-                Level::Approaching => WARN,
-                Level::Contact | Level::Stall | Level::Lock => ERROR,
+            level: match level.severity() {
+                Severity::Ok => OK,
+                Severity::Warning => WARN,
+                Severity::Error => ERROR,
             },
             name: format!("{name}: dragon"),
             message: level.name().to_owned(),

@@ -1,0 +1,112 @@
+//! The table, exact and in every format, against the safe solver.
+
+use super::*;
+use crate::model::Point;
+use crate::model::curve::Side;
+
+const TEAM: Team = Team { benches: 60, head_length: 3.41, body_length: 2.2, width: 0.3, hole_inset: 0.275 };
+
+fn paths() -> [Path; 3] {
+    let route = Path::route(Point::new(-30.0, -10.0), 0.0).line(40.0).arc(Side::Left, 6.0, 0.25).line(12.0);
+    let route = route.arc(Side::Right, 5.0, 0.5).line(10.0).arc(Side::Left, 5.0, 0.5).line(120.0);
+    let turnaround = Path::turnaround(1.7, 4.5, 2.0, 100.0, 100.0).unwrap();
+    [Path::spiral(0.55, 16.0), turnaround, route.build().unwrap()]
+}
+
+/// The largest differences of place, metres, of heading and of speed, relative to the head's or its own.
+fn differences(one: &Chain, other: &Chain) -> [f64; 3] {
+    let mut most = [0.0; 3];
+    for i in 0..one.handles() {
+        let turn = (one.heading[i] - other.heading[i]).abs();
+        let rates = (one.vx[i] - other.vx[i]).hypot(one.vy[i] - other.vy[i]).max((one.speed[i] - other.speed[i]).abs());
+        let place = (one.x[i] - other.x[i]).hypot(one.y[i] - other.y[i]);
+        let turn = turn.min((turn - std::f64::consts::TAU).abs());
+        for (most, now) in most.iter_mut().zip([place, turn, rates / other.speed[i].abs().max(1.0)]) {
+            *most = now.max(*most);
+        }
+    }
+    most
+}
+
+#[test]
+fn the_table_agrees_with_the_safe_solver_on_every_code_path_and_across_junctions() {
+    for path in paths() {
+        let newton = Newton::new(path.clone(), TEAM, 1.0, Velocities::Computed);
+        let table = FollowerTable::new(&path, TEAM, 1.0, Velocities::Computed).unwrap();
+        let end = table.valid_until();
+        assert!(end > 200.0, "{end}");
+        let around = |junction: f64| [-1e-3, -1e-9, 0.0, 1e-9, 1e-3].map(|by| junction + by);
+        let regular = (0..=200).map(|k| end * f64::from(k) / 200.0);
+        let times: Vec<f64> = path.junctions().flat_map(around).chain(regular).collect();
+        for instructions in Instructions::available() {
+            let mut table = table.clone().with_instructions(instructions).unwrap();
+            let (mut found, mut wanted) = (Chain::new(TEAM.handles()), Chain::new(TEAM.handles()));
+            for time in times.iter().copied().filter(|time| (0.0..=end).contains(time)) {
+                table.solve(time, &mut found).unwrap();
+                newton.solve_at(time, &mut wanted).unwrap();
+                let [place, heading, speed] = differences(&found, &wanted);
+                // Both solvers may be off by what the travel's rounding does to the chain.
+                let allowed = 2.0 * 1e-13f64.max(8.0 * f64::EPSILON * time);
+                let name = instructions.name();
+                assert!(
+                    place < allowed && heading < 1e-12 && speed < 2e-12,
+                    "{name} {time}: {place:e} {heading:e} {speed:e}"
+                );
+            }
+            assert_eq!(table.fallbacks(), 0);
+        }
+    }
+}
+
+#[test]
+fn a_frame_does_not_depend_on_the_ones_before_and_past_the_table_the_safe_solver_works() {
+    let path = &paths()[0];
+    let mut table = FollowerTable::new(path, TEAM, 1.0, Velocities::Omitted).unwrap();
+    let [mut first, mut again] = [Chain::new(TEAM.handles()), Chain::new(TEAM.handles())];
+    table.solve(123.4, &mut first).unwrap();
+    assert_eq!(table.solve(440.0, &mut again), Err(NoFollower));
+    assert_eq!(table.fallbacks(), 1);
+    table.solve(123.4, &mut again).unwrap();
+    assert_eq!((first.x, first.y, first.heading), (again.x, again.y, again.heading));
+}
+
+#[test]
+fn a_coarser_table_and_its_packed_formats_are_as_exact_as_they_say() {
+    let accuracy = 1e-4;
+    let tolerance = Tolerance { place: 1e-6, relative: f64::INFINITY, speed: 1e-5 };
+    let allowed = Allowed { place: accuracy, heading: accuracy, speed: 10.0 * accuracy };
+    for path in paths() {
+        let newton = Newton::new(path.clone(), TEAM, 1.0, Velocities::Computed);
+        let table = FollowerTable::with_tolerance(&path, TEAM, 1.0, Velocities::Computed, tolerance).unwrap();
+        assert_eq!(table.relative_cost(), 1.0);
+        let packed = FollowerTable::formats().into_iter().map(|format| table.packed(format, allowed).unwrap());
+        let mut cost = 0.0;
+        for packed in packed.chain([table.clone()]) {
+            assert!(packed.bytes_per_handle() > cost, "the cheapest first");
+            cost = packed.bytes_per_handle();
+            for instructions in Instructions::available() {
+                let mut solver = packed.for_frames().with_instructions(instructions).unwrap();
+                let (mut found, mut wanted) = (Chain::new(TEAM.handles()), Chain::new(TEAM.handles()));
+                for k in 0..=200 {
+                    let time = f64::from(k);
+                    solver.solve(time, &mut found).unwrap();
+                    newton.solve_at(time, &mut wanted).unwrap();
+                    let [place, heading, speed] = differences(&found, &wanted);
+                    let most = accuracy + 4.0 * tolerance.place;
+                    assert!(
+                        place < most && heading < most && speed < 11.0 * accuracy,
+                        "{} {time}: {place:e} {heading:e} {speed:e}",
+                        solver.format()
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_packed_is_refused() {
+    let table = FollowerTable::new(&paths()[0], TEAM, 1.0, Velocities::Computed).unwrap();
+    let allowed = Allowed { place: 1e-9, heading: 1e-9, speed: 1e-7 };
+    assert!(FollowerTable::formats().into_iter().all(|format| table.packed(format, allowed).is_none()));
+}

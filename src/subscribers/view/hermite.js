@@ -1,0 +1,131 @@
+// Where every handle is at the moment of display: cubic Hermite interpolation between the frames of a stream.
+//
+// The rules are those of the Rust `HermiteReader` (src/subscribers/hermite.rs) and of examples/python/hermite.py. The
+// module imports nothing and knows no page: any page may take it over as it is.
+
+/** Numbers of a handle: x, y (m), heading (rad), vx, vy (m per simulated second). */
+export const STRIDE = 5;
+
+/**
+ * A frame that is pushed.
+ *
+ * @typedef {object} Frame
+ * @property {number} due - when the frame was true, ms of wall time on any clock that runs evenly
+ * @property {number} time - its simulated time, s
+ * @property {number} scale - simulated seconds per second of wall time, from this frame on
+ * @property {boolean} playing - false where the show stands still, whose velocities are zero for that reason alone
+ * @property {string|number} run - which run of a publisher it belongs to
+ * @property {number} epoch - grows by one at every jump of simulated time
+ * @property {Float32Array|Float64Array} handles - STRIDE numbers a handle, head first
+ */
+
+/** The speed of a handle without its sign, m per simulated second; NaN where it is not sent. */
+export function speedOf(handles, handle) {
+  const vx = handles[STRIDE * handle + 3], vy = handles[STRIDE * handle + 4];
+  return Math.sqrt(vx * vx + vy * vy);
+}
+
+/** The latest frames of a stream, and what lies between them. */
+export class HermiteReader {
+  /** Keeps the latest `keep` frames: a display that runs d seconds behind r frames a second needs d r + 2. */
+  constructor(keep = 64) {
+    this.keep = Math.max(2, keep);
+    /** @type {Frame[]} */
+    this.frames = [];
+  }
+
+  /** Takes in the next frame of a stream. Frames of another run are forgotten. */
+  push(frame) {
+    if (this.newest && this.newest.run !== frame.run) this.clear();
+    this.frames.push(frame);
+    if (this.frames.length > this.keep) this.frames.shift();
+  }
+
+  clear() {
+    this.frames = [];
+  }
+
+  /** The newest frame; null where none has come. */
+  get newest() {
+    return this.frames.at(-1) ?? null;
+  }
+
+  /**
+   * What was true at a moment on the clock of `due`: the simulated time, the handles, and the two frames they lie
+   * between, the same one twice where they are exactly a frame's. Before the oldest frame that is kept, after the
+   * newest, and where simulated time jumps, the frame before is shown as it is. Null where no frame has come.
+   *
+   * Headings follow from the positions, as those of the frames do. Without velocities in the stream the path between
+   * two frames is a straight line.
+   *
+   * @param {number} moment - ms
+   * @param {Float64Array} [into] - is filled and used again where it has the right length
+   */
+  at(moment, into) {
+    const { frames } = this;
+    if (!frames.length) return null;
+    let after = frames.length;
+    while (after > 0 && frames[after - 1].due > moment) after--;
+    const from = frames[Math.max(0, after - 1)], next = frames[after];
+    const handles = into?.length === from.handles.length ? into : new Float64Array(from.handles.length);
+    if (!next || moment <= from.due || !continues(from, next)) {
+      handles.set(from.handles);
+      return { time: from.time, handles, from, to: from };
+    }
+    const time = timeBetween(from, next, moment), length = next.time - from.time;
+    interpolate(from, next, length, (time - from.time) / length, handles);
+    return { time, handles, from, to: next };
+  }
+}
+
+/** Whether simulated time runs without a jump from a frame to a later one. */
+function continues(from, to) {
+  return from.run === to.run && from.epoch === to.epoch && from.handles.length === to.handles.length && to.time > from.time;
+}
+
+/** The simulated time at a moment between two frames. */
+function timeBetween(from, to, moment) {
+  // The rate in force holds until the next frame; the end of the show may come earlier.
+  if (from.playing) return Math.min(to.time, from.time + (from.scale * (moment - from.due)) / 1000);
+  // A show that was resumed between the two, whose first frame afterwards was skipped on its way here.
+  return Math.max(from.time, to.time - (to.scale * (to.due - moment)) / 1000);
+}
+
+/** Fills `handles` at the share `u` of the way, `length` simulated seconds, from one frame to the next. */
+function interpolate(from, to, length, u, handles) {
+  const count = handles.length;
+  for (let k = 0; k < count; k += STRIDE) {
+    coordinate(from, to, k, length, u, handles);
+    coordinate(from, to, k + 1, length, u, handles);
+  }
+  for (let k = STRIDE; k < count; k += STRIDE) {
+    handles[k - STRIDE + 2] = Math.atan2(handles[k - STRIDE + 1] - handles[k + 1], handles[k - STRIDE] - handles[k]);
+  }
+  // The last handle heads where the last bench does.
+  handles[count - STRIDE + 2] = handles[count - 2 * STRIDE + 2];
+}
+
+/**
+ * The coordinate at the index `k` and its rate, of the polynomial of least degree through both positions and the
+ * velocities of those frames that play: cubic, quadratic, or a straight line.
+ */
+function coordinate(from, to, k, length, u, handles) {
+  const start = from.handles[k], end = to.handles[k], step = end - start, w = 1 - u;
+  const first = from.handles[k + 3] * length, last = to.handles[k + 3] * length;
+  let value = start + step * u, slope = step;
+  if (!Number.isNaN(first) && !Number.isNaN(last)) {
+    if (from.playing && to.playing) {
+      const fromFirst = first - step, fromLast = last - step;
+      value += u * w * (w * fromFirst - u * fromLast);
+      slope += w * (w - 2 * u) * fromFirst + u * (u - 2 * w) * fromLast;
+    } else if (from.playing) {
+      value = start + u * (first + u * (step - first));
+      slope = first + 2 * u * (step - first);
+    } else if (to.playing) {
+      value = end - w * (last + w * (step - last));
+      slope = last + 2 * w * (step - last);
+    }
+  }
+  handles[k] = value;
+  handles[k + 3] = slope / length;
+}

@@ -1,0 +1,176 @@
+"""The motion of the stage picture between two frames, in the same browser and with the same arguments as
+stage_picture.py:
+
+    stage_motion.py SCENARIO PROGRAM NAME
+"""
+
+import json
+import math
+import subprocess
+import time
+
+import numpy
+
+from stage_picture import CONTACT, PROGRAM, browser, drawn, play, publisher, server, until
+
+# How many places the head was drawn at in four seconds, and how many frames came.
+PLACES = """() => new Promise((told) => {
+    const seen = new Set(), start = performance.now(), before = picture.received;
+    const look = () => {
+        seen.add(picture.head.join());
+        performance.now() < start + 4000 ? requestAnimationFrame(look) : told([seen.size, picture.received - before]);
+    };
+    look();
+})"""
+
+
+def motion_is_smooth_at_any_rate():
+    counts = "[picture.received, picture.drawn, picture.sequence]"
+    with server() as url, browser(viewport={"width": 640, "height": 480}) as (page, complaints):
+        page.goto(url)
+        with publisher("--start", "100", "--rate", "2"):
+            drawn(page)
+            places, received = page.evaluate(PLACES)
+            assert places > 2 * received > 0, f"{places} places from {received} frames: nothing between them"
+        until(page, "document.body.dataset.level === 'waiting'", "the publisher's end")
+        with publisher("--start", "100", "--rate", "1000"):
+            drawn(page)
+            first = page.evaluate(counts)
+            time.sleep(3)
+            received, pictures, published = (now - then for now, then in zip(page.evaluate(counts), first))
+            assert 0 < received < published / 4, f"{received} of {published} frames: a page needs fewer"
+            assert pictures > 0
+        assert not complaints, complaints
+
+
+def solved_at(times):
+    """x, y, heading of every handle at each of some times, by the exact solver."""
+    asked = ",".join(repr(time) for time in times)
+    lines = subprocess.run([PROGRAM, "solve", "--at", asked, "--json"], capture_output=True, text=True, check=True).stdout
+    solved = [json.loads(line) for line in lines.splitlines()]
+    assert [line["t"] for line in solved] == times, "the solver has other times"
+    return [numpy.array(line["handles"])[:, :3] for line in solved]
+
+
+def between_frames_is_where_the_solver_says():
+    """At 10 Hz: single precision is 6.7e-7 m at 9 m from the centre, straight lines would be 3 mm off."""
+    random = numpy.random.default_rng()
+    with server() as url, publisher("--start", "404", "--rate", "10"), browser() as (page, complaints):
+        page.goto(url)
+        drawn(page)
+        time.sleep(1)
+        samples = []
+        while len(samples) < 40:
+            time.sleep(random.uniform(0.02, 0.15))
+            samples.append(page.evaluate("[picture.shown.time, [...picture.shown.handles]]"))
+        assert not complaints, complaints
+    # As shares of a frame's distance: most moments are those of no frame.
+    shares = [10 * moment % 1 for moment, _ in samples]
+    assert sum(0.15 < share < 0.85 for share in shares) >= 10, f"only frames were drawn: {shares}"
+    worst, turned = 0.0, 0.0
+    for (_, shown), exact in zip(samples, solved_at([moment for moment, _ in samples])):
+        handles = numpy.array(shown).reshape(-1, 5)
+        worst = max(worst, numpy.hypot(*(handles[:, :2] - exact[:, :2]).T).max())
+        angles = handles[:, 2] - exact[:, 2]
+        turned = max(turned, numpy.abs((angles + math.pi) % (2 * math.pi) - math.pi).max())
+    print(f"from {samples[0][0]:.3f} to {samples[-1][0]:.3f} s: {worst:.2e} m, {turned:.2e} rad")
+    assert worst < 1e-6, f"a handle is drawn {worst:e} m from where it was"
+    assert turned < 2e-6, f"a heading is {turned:e} rad from what it was"
+
+
+# The simulated time and the handles of every picture drawn in four seconds.
+PICTURES = """() => new Promise((told) => {
+    const seen = [], start = performance.now();
+    const look = () => {
+        seen.push([picture.shown.time, [...picture.shown.handles]]);
+        performance.now() < start + 4000 ? requestAnimationFrame(look) : told(seen);
+    };
+    look();
+})"""
+
+
+def loops_are_not_joined():
+    """Whatever is drawn while the show loops lies on the spiral; between an end and a beginning it would not."""
+    options = ["--start", "411", "--rate", "10", "--loop"]
+    with server() as url, publisher(*options), browser(viewport={"width": 640, "height": 480}) as (page, complaints):
+        page.goto(url)
+        drawn(page)
+        pictures = page.evaluate(PICTURES)
+        assert not complaints, complaints
+    times = numpy.array([moment for moment, _ in pictures])
+    jumps = numpy.nonzero(numpy.diff(times) < 0)[0]
+    assert len(jumps) >= 2, f"no loop in {len(times)} pictures"
+    for jump in jumps:
+        # A busy machine skips pictures; no picture has a time between these two.
+        assert times[jump] > CONTACT - 0.5 and times[jump + 1] < 411.5, f"from {times[jump]} s to {times[jump + 1]} s"
+    handles = numpy.array([shown for _, shown in pictures]).reshape(len(pictures), -1, 5)
+    growth = 0.55 / (2 * math.pi)
+    turns = numpy.hypot(handles[:, :, 0], handles[:, :, 1]) / growth - numpy.arctan2(handles[:, :, 1], handles[:, :, 0])
+    beside = growth * numpy.abs((turns + math.pi) % (2 * math.pi) - math.pi)
+    assert beside.max() < 1e-3, f"a handle is drawn {beside.max()} m beside the path at {times[beside.max(axis=1).argmax()]} s"
+
+
+# A reader of three handles at (cubic in t, parabola in t), frames a second apart; what it gives at moments in ms.
+READ = """async ([frames, moments]) => {
+    const { HermiteReader } = await import("/hermite.js"), reader = new HermiteReader(8);
+    const empty = reader.at(0);
+    for (const frame of frames) reader.push({ ...frame, handles: Float64Array.from(frame.handles.map((n) => n ?? NaN)) });
+    return [empty, moments.map((moment) => { const { time, handles } = reader.at(moment); return [time, [...handles]]; })];
+}"""
+
+
+def interpolation_keeps_its_rules():
+    """Of the module that any page can take, apart from the page."""
+    curves = [(lambda t, k=k: (1 + k + t * (2 - t * (3 - t)), 5 - k + t * (1 + 2 * t))) for k in range(3)]
+    rates = lambda t: (2 - 6 * t + 3 * t * t, 1 + 4 * t)
+
+    def frame(t, velocities=rates, **changes):
+        handles = [[*curve(t), 9, *velocities(t)] for curve in curves]
+        usual = {"due": 1000 * t, "time": t, "scale": 1, "playing": True, "run": "1", "epoch": 0}
+        return {**usual, "handles": sum(handles, []), **changes}
+
+    with server() as url, browser() as (page, complaints):
+        page.goto(url)
+
+        def at(frames, *moments):
+            empty, read = page.evaluate(READ, [frames, moments])
+            assert empty is None, "something is shown before the first frame"
+            return [(moment, numpy.array(handles, float).reshape(3, 5)) for moment, handles in read]
+
+        place = lambda t: numpy.array([curve(t) for curve in curves])
+        line = lambda t, a=0, b=1: place(a) + (place(b) - place(a)) * (t - a) / (b - a)
+        for t, (moment, handles) in zip((0.25, 0.7), at([frame(0), frame(1)], 250, 700)):
+            assert math.isclose(moment, t) and numpy.allclose(handles[:, :2], place(t), atol=1e-12), "no cubic"
+            assert numpy.allclose(handles[:, 3:], rates(t), atol=1e-12), "the rates are not those of the cubic"
+            heading = math.atan2(*(place(t)[0] - place(t)[1])[::-1])
+            assert numpy.allclose(handles[:, 2], heading), "headings do not follow from the positions"
+        for moment, handles in at([frame(0), frame(1)], 0, 1000, -50, 1050):
+            assert moment in (0, 1) and numpy.array_equal(handles[:, :2], place(moment)), "a frame is not shown as it is"
+            assert (handles[:, 2] == 9).all(), "a frame's headings are not shown as they are"
+        still = lambda t: (0, 0)
+        for frames in ([frame(0), frame(1, still, playing=False)], [frame(0, still, playing=False), frame(1)]):
+            ((_, handles),) = at(frames, 400)
+            assert numpy.allclose(handles[:, 1], place(0.4)[:, 1], atol=1e-12), "the velocity of a still frame was used"
+        none = lambda t: (None, None)
+        for frames in ([frame(0, none), frame(1, none)], [frame(0, still, playing=False), frame(1, still, playing=False, scale=1)]):
+            ((_, handles),) = at(frames, 400)
+            assert numpy.allclose(handles[:, :2], line(0.4)), "no straight line without velocities"
+        # The show ends 0.3 s after a frame, and the next frame comes after 1 s.
+        ((moment, _), (end, handles)) = at([frame(0), frame(0.3, still, playing=False, due=1000)], 200, 700)
+        assert math.isclose(moment, 0.2) and end == 0.3 and numpy.allclose(handles[:, :2], place(0.3)), (moment, end)
+        for later in (frame(1, epoch=1), frame(1, epoch=1, time=0.5)):
+            for moment, handles in at([frame(0), later], 400, 999):
+                assert moment == 0 and numpy.array_equal(handles[:, :2], place(0)), "something lies between two epochs"
+        # Another run's frames are forgotten.
+        ((moment, _),) = at([frame(0), frame(1, run="2")], 400)
+        assert moment == 1, "a frame of another run is shown"
+        assert not complaints, complaints
+
+
+if __name__ == "__main__":
+    play(
+        motion_is_smooth_at_any_rate,
+        between_frames_is_where_the_solver_says,
+        loops_are_not_joined,
+        interpolation_keeps_its_rules,
+    )
