@@ -340,7 +340,8 @@ impl Show {
         if jumped {
             level.restart();
         }
-        level.update(frame.tick, frame.sim_time, &self.timeline, closest, &mut frame.alerts);
+        let moves = frame.playback == PlaybackState::Playing;
+        level.update(frame.tick, frame.sim_time, moves, &self.timeline, closest, &mut frame.alerts);
         if passed.is_none() {
             frame.state = level.current().into();
         }

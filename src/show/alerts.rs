@@ -92,10 +92,12 @@ impl LevelTracker {
     ///
     /// Every event since the last frame is announced, however many a step has passed, so that what a subscriber
     /// receives of them does not depend on the rate. The first frame of a show announces the latest event passed alone.
+    /// Nothing is counted down while the show stands still (`moves` is false).
     pub fn update(
         &mut self,
         tick: u64,
         sim_time: f64,
+        moves: bool,
         timeline: &Timeline,
         nearest: Option<PairClearance>,
         alerts: &mut Vec<Alert>,
@@ -116,7 +118,7 @@ impl LevelTracker {
             let next = timeline.next_alertable(sim_time);
             let level = self.level_before_events(sim_time, nearest, next);
             let changed = self.announce_if_changed(level, tick);
-            if changed || (level == Level::Approaching && self.second_is_over(tick)) {
+            if changed || (level == Level::Approaching && self.second_is_over(tick) && moves) {
                 alerts.push(Alert { level, event: next.copied(), nearest });
             }
         }

@@ -78,6 +78,18 @@ fn a_looping_show_stands_at_its_end_before_it_begins_again() {
     assert_eq!((again.sim_time, again.epoch, again.shows_played), (412.4, 1, 1));
 }
 
+#[test]
+fn nothing_is_counted_down_while_the_show_stands_still() {
+    let mut show = show("", |playback| playback.start = 405.0);
+    let mut alerts = |ticks: std::ops::Range<u64>, command| {
+        show.command(ticks.start, command);
+        ticks.map(|tick| show.frame(tick).alerts.len()).sum::<usize>()
+    };
+    assert_eq!(alerts(0..101, Command::State), 3, "the level, and two seconds counted down");
+    assert_eq!(alerts(101..401, Command::Pause), 0);
+    assert_eq!(alerts(401..452, Command::Resume), 1);
+}
+
 const CUES: &str = "[[cues]]\nname = \"last\"\nbefore = \"contact\"\nseconds = 5.0\n\
                     [[cues]]\nname = \"wait\"\nat = 3.0\nthen = \"pause\"\n\
                     [[cues]]\nname = \"first\"\ntravelled = 1.0\n\

@@ -43,7 +43,7 @@ impl Run {
 
     fn frame(&mut self, tick: u64, sim_time: f64, clearance: f64) -> &[Alert] {
         self.alerts.clear();
-        self.tracker.update(tick, sim_time, &self.timeline, pair(clearance), &mut self.alerts);
+        self.tracker.update(tick, sim_time, true, &self.timeline, pair(clearance), &mut self.alerts);
         assert!(self.alerts.len() <= MOST_PER_FRAME && self.alerts.capacity() == MOST_PER_FRAME, "it allocates");
         &self.alerts
     }
@@ -209,7 +209,7 @@ fn without_pairs_only_events_raise_the_level() {
     let timeline = timeline(&[(EventKind::Stall, 20.0)]);
     let mut alerts = Vec::new();
     [0.0, 9.0, 10.0].into_iter().enumerate().for_each(|(tick, time)| {
-        tracker.update(tick as u64, time, &timeline, None, &mut alerts);
+        tracker.update(tick as u64, time, true, &timeline, None, &mut alerts);
     });
     assert_eq!(alerts.iter().map(|alert| alert.level).collect::<Vec<_>>(), [Level::Clear, Level::Approaching]);
 }
