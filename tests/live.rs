@@ -282,39 +282,3 @@ fn another_layout_is_refused_with_a_sentence() {
     });
     assert_eq!(refused, Some(Some(PublishSubscribeOpenError::IncompatibleTypes)));
 }
-
-#[test]
-fn python_sees_the_same_layouts() {
-    use bench_dragon::wire::{CollisionAlert, Stage};
-    use std::mem::offset_of;
-    let code = "import sys; sys.path.insert(0, 'examples/python')\n\
-                from bench_dragon_messages import *\n\
-                for m in MESSAGES:\n\
-                \x20   print(m.__name__, m.type_name(), ctypes.sizeof(m), *(f'{n}={getattr(m, n).offset}' for n, *_ in m._fields_))\n\
-                print(HANDLE_POSE.itemsize)";
-    let output = Process::start(python().args(["-c", code])).output_within(60);
-    let message = text(&output.stdout);
-    macro_rules! layout {
-        ($type:ident $version:literal: $($field:ident)*) => {{
-            let offsets = [$(format!("{}={}", stringify!($field), offset_of!($type, $field))),*];
-            let name = stringify!($type);
-            format!("{name} bench_dragon/{name}/{} {} {}", $version, size_of::<$type>(), offsets.join(" "))
-        }};
-    }
-    let expected = [
-        layout!(HandlePose 1: x y heading vx vy),
-        layout!(FrameHeader 2: run_id sequence tick stamp_ns sent_ns deadline_ns sim_time time_scale min_clearance handles state
-            playback cue epoch reserved),
-        layout!(CollisionAlert 2: run_id tick stamp_ns sim_time event_time time_to_event clearance x y event_x event_y level
-            bench_a bench_b event event_bench_a event_bench_b),
-        layout!(LoopStatus 2: run_id tick sequence stamp_ns sim_time rate measured_rate overruns skipped shows_played
-            unforeseen_contacts unsolved_frames
-            lateness_p50_second lateness_p99_second lateness_max_second lateness_p50_total lateness_p99_total
-            lateness_p999_total lateness_max_total step_p50_second step_p99_second step_max_second step_p50_total
-            step_p99_total step_p999_total step_max_total resident_bytes subscribers file_descriptors scene),
-        layout!(Stage 3: run_id stamp_ns pitch start_turn hole_inset head_length body_length width benches segments path),
-        "40".to_owned(),
-    ];
-    assert_eq!(message.lines().collect::<Vec<_>>(), expected, "{}", text(&output.stderr));
-    assert_eq!([size_of::<HandlePose>(), size_of::<FrameHeader>(), size_of::<CollisionAlert>()], [40, 96, 112]);
-}
