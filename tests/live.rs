@@ -285,7 +285,7 @@ fn another_layout_is_refused_with_a_sentence() {
 
 #[test]
 fn python_sees_the_same_layouts() {
-    use bench_dragon::wire::{CollisionAlert, Stage};
+    use bench_dragon::wire::{CollisionAlert, HandlePose32, Stage};
     use std::mem::offset_of;
     let code = "import sys; sys.path.insert(0, 'examples/python')\n\
                 from bench_dragon_messages import *\n\
@@ -303,6 +303,7 @@ fn python_sees_the_same_layouts() {
     }
     let expected = [
         layout!(HandlePose 1: x y heading vx vy),
+        layout!(HandlePose32 1: x y heading vx vy),
         layout!(FrameHeader 2: run_id sequence tick stamp_ns sent_ns deadline_ns sim_time time_scale min_clearance handles state
             playback cue epoch reserved),
         layout!(CollisionAlert 2: run_id tick stamp_ns sim_time event_time time_to_event clearance x y event_x event_y level
