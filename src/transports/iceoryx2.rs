@@ -24,7 +24,7 @@ use super::{Transport, TransportConfig, TransportError};
 use crate::live::{Deliveries, PublishError, Publisher, StatusPublisher};
 use crate::scene::SinglePrecision;
 use crate::show::Frame;
-use crate::wire::convert::{Decimation, collision_alert, handle_pose, handle_pose_32};
+use crate::wire::convert::{Decimation, collision_alert, handle_pose, handle_pose_32, handle_poses};
 use crate::wire::{CollisionAlert, FrameHeader, HandlePose, HandlePose32, LoopStatus, Stage};
 
 pub use error::OpenError;
@@ -201,9 +201,17 @@ impl SharedMemoryPublisher {
     }
 
     fn send_frame(&self, header: &FrameHeader, frame: &Frame) -> Result<(), String> {
-        self.poses.send(header, |handle| handle_pose(&frame.chain, handle))?;
-        let Some((port, decimation)) = &self.poses_32 else { return Ok(()) };
-        port.send(header, |index| handle_pose_32(handle_pose(&frame.chain, decimation.handle(index))))
+        self.poses.send(header, handle_poses(&frame.chain))?;
+        match &self.poses_32 {
+            None => Ok(()),
+            Some((port, Decimation { every: 1, .. })) => {
+                port.send(header, handle_poses(&frame.chain).map(handle_pose_32))
+            }
+            Some((port, decimation)) => {
+                let pose = |index| handle_pose_32(handle_pose(&frame.chain, decimation.handle(index)));
+                port.send(header, (0..decimation.poses()).map(pose))
+            }
+        }
     }
 
     fn send_alerts(&self, header: &FrameHeader, frame: &Frame) -> Result<(), String> {

@@ -1,6 +1,6 @@
 //! A service of frames, and the publisher's port to it: a header, and a slice of poses of one kind.
 //!
-//! In: a header, and the pose at each index. Out: a sample, written where subscribers read it. Called by
+//! In: a header and poses. Out: a sample, written where subscribers read it. Called by
 //! [`SharedMemoryPublisher`](super::SharedMemoryPublisher), on the loop's thread.
 
 use std::fmt::Debug;
@@ -33,10 +33,9 @@ pub(super) struct FrameService {
 pub(super) struct FrameSender<Pose: ZeroCopySend + Debug + 'static> {
     port: Sender<[Pose], FrameHeader>,
     service: Service<[Pose], FrameHeader>,
-    poses: usize,
 }
 
-impl<Pose: ZeroCopySend + Debug + 'static> FrameSender<Pose> {
+impl<Pose: ZeroCopySend + Debug + Default + 'static> FrameSender<Pose> {
     /// Opens the service, and the port on this thread.
     pub(super) fn open(
         node: &Node<ipc::Service>,
@@ -52,14 +51,20 @@ impl<Pose: ZeroCopySend + Debug + 'static> FrameSender<Pose> {
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|error| port_error(&config.name, suffix, error))?;
-        Ok(Self { port, service, poses })
+        Ok(Self { port, service })
     }
 
-    /// Sends a frame: `header` completed, and the poses by index.
-    pub(super) fn send(&self, header: &FrameHeader, pose: impl FnMut(usize) -> Pose) -> Result<(), String> {
-        let sample = self.port.loan_slice_uninit(self.poses).map_err(|error| error.to_string())?;
-        let mut sample = sample.write_from_fn(pose);
-        let handles = self.poses as u32;
+    /// Sends a frame: `header` completed, and the poses.
+    pub(super) fn send(
+        &self,
+        header: &FrameHeader,
+        mut poses: impl ExactSizeIterator<Item = Pose>,
+    ) -> Result<(), String> {
+        let handles = poses.len();
+        let sample = self.port.loan_slice_uninit(handles).map_err(|error| error.to_string())?;
+        // There are as many as it says: the default is never used.
+        let mut sample = sample.write_from_fn(|_| poses.next().unwrap_or_default());
+        let handles = handles as u32;
         *sample.user_header_mut() = FrameHeader { handles, sent_ns: monotonic_ns(), ..*header };
         sample.send().map(|_| ()).map_err(|error| error.to_string())
     }
