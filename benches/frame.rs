@@ -231,6 +231,7 @@ fn publish_over_iceoryx2(bencher: Bencher) {
     let config = PublisherConfig {
         name: format!("bench_{}_frame", std::process::id()),
         handles: scene.team().handles(),
+        single_precision: None,
         queue: 64,
         subscribers: 8,
         alerts: true,

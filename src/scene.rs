@@ -6,6 +6,7 @@
 pub mod accepted;
 pub mod cue;
 pub mod path;
+pub mod precision;
 pub mod ros2;
 
 use std::path::Path as FilePath;
@@ -16,6 +17,8 @@ use toml::Spanned;
 pub use self::accepted::Accepted;
 use self::cue::{Cue, RawCue};
 use self::path::RawPath;
+use self::precision::Precision;
+pub use self::precision::SinglePrecision;
 use self::ros2::{RawRos2, Ros2Settings};
 use crate::model::team::Team;
 use crate::motion::{Method, Motion, MotionError};
@@ -96,6 +99,8 @@ pub struct Scene {
     pub rate: f64,
     /// Whether velocities are computed.
     pub velocities: Velocities,
+    /// The service of poses in single precision beside that of whole frames; `None` where the scene asks for none.
+    pub single_precision: Option<SinglePrecision>,
     /// Frames a subscriber may fall behind, where the scene says so.
     pub queue: Option<usize>,
     /// Subscribers that each iceoryx2 service admits at once.
@@ -243,6 +248,9 @@ struct RawAlerts {
 struct RawPublish {
     rate: Option<Spanned<f64>>,
     velocities: Option<bool>,
+    #[serde(default)]
+    precision: Precision,
+    every: Option<Spanned<i64>>,
     queue: Option<Spanned<i64>>,
     subscribers: Option<Spanned<i64>>,
     ros2: Option<RawRos2>,
@@ -292,6 +300,7 @@ impl RawScene {
             alerts: self.alerts.as_ref().map(|alerts| alerts.validated(source)).transpose()?,
             rate,
             velocities: if velocities { Velocities::Computed } else { Velocities::Omitted },
+            single_precision: self.publish.precision.single(self.publish.every.as_ref(), source)?,
             queue: queue.transpose()?,
             subscribers,
             ros2: self.publish.ros2.as_ref().map(|ros2| ros2.validated(source)).transpose()?,

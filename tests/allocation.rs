@@ -12,7 +12,7 @@ use bench_dragon::live::clock::SystemClock;
 use bench_dragon::live::control::{Doors, door};
 use bench_dragon::live::statistics::queues;
 use bench_dragon::live::{Frames, LoopOptions, run_loop};
-use bench_dragon::scene::{AtEnd, Scene};
+use bench_dragon::scene::{AtEnd, Scene, SinglePrecision};
 use bench_dragon::show::control::Command;
 use bench_dragon::show::state::FrameState;
 use bench_dragon::show::{Frame, Outcome, Playback, Show};
@@ -59,7 +59,7 @@ struct Watched<'a> {
     stop: &'a AtomicBool,
     frames: u64,
     before: Option<u64>,
-    /// Samples loaned from iceoryx2 since then: a frame each, and its alerts.
+    /// Samples loaned from iceoryx2 since then: a frame each in double and in single precision, and its alerts.
     loans: u64,
     states: [u64; 6],
     shows_played: u64,
@@ -74,7 +74,7 @@ impl Frames for Watched<'_> {
         }
         let frame = self.show.frame(tick);
         if tick > 0 {
-            self.loans += 1 + frame.alerts.len() as u64;
+            self.loans += 2 + frame.alerts.len() as u64;
         }
         self.states[frame.state as usize] += 1;
         self.shows_played = frame.shows_played;
@@ -92,7 +92,7 @@ impl Frames for Watched<'_> {
 
 #[test]
 fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
-    let scene = Scene::paper();
+    let scene = Scene { single_precision: Some(SinglePrecision { every: 7 }), ..Scene::paper() };
     let playback = Playback {
         start: 400.0,
         rate: 500.0,

@@ -1,8 +1,9 @@
 """Prints the head's place once a second: `pip install iceoryx2==0.10.0 numpy`, start a publisher, run this.
 
-    python3 examples/python/subscribe.py [--name bench_dragon] [--seconds 10] [--json]
+    python3 examples/python/subscribe.py [--name bench_dragon] [--seconds 10] [--json] [--light]
 
-The frames are read where the publisher wrote them: nothing is copied. With --json every frame is a line.
+The frames are read where the publisher wrote them: nothing is copied. With --json every frame is a line. With --light
+they are those in single precision, which a scene offers with `precision = "f32"` in `[publish]`.
 """
 
 import argparse
@@ -11,7 +12,17 @@ import time
 
 import iceoryx2 as iox2
 import numpy as np
-from bench_dragon_messages import EVENTS, NO_BENCH, PLAYBACK, STATES, CollisionAlert, FrameHeader, HandlePose, handles_of
+from bench_dragon_messages import (
+    EVENTS,
+    NO_BENCH,
+    PLAYBACK,
+    STATES,
+    CollisionAlert,
+    FrameHeader,
+    HandlePose,
+    HandlePose32,
+    handles_of,
+)
 
 iox2.set_log_level(iox2.LogLevel.Fatal)
 
@@ -37,6 +48,7 @@ def main():
     parser.add_argument("--name", default="bench_dragon")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--json", action="store_true", help="a line for every frame and alert")
+    parser.add_argument("--light", action="store_true", help="the frames in single precision")
     arguments = parser.parse_args()
 
     # The node and its ports stay inside this function: as globals they would leave files behind.
@@ -45,9 +57,8 @@ def main():
     def service(suffix):
         return node.service_builder(iox2.ServiceName.new(f"{arguments.name}/{suffix}"))
 
-    poses = wait_for(
-        lambda: service("poses").publish_subscribe(iox2.Slice[HandlePose]).user_header(FrameHeader).open()
-    )
+    suffix, pose = ("poses32", HandlePose32) if arguments.light else ("poses", HandlePose)
+    poses = wait_for(lambda: service(suffix).publish_subscribe(iox2.Slice[pose]).user_header(FrameHeader).open())
     subscriber = poses.subscriber_builder().create()
     tick = wait_for(lambda: service("tick").event().open()).listener_builder().create()
     try:
@@ -69,8 +80,6 @@ def main():
             sequence = header.sequence
             received += 1
             if arguments.json:
-                # How far the second link is from 1.65 m tells whether the content is whole.
-                link = float(np.hypot(handles["x"][2] - handles["x"][1], handles["y"][2] - handles["y"][1]))
                 line = {
                     "type": "frame",
                     "sequence": header.sequence,
@@ -81,8 +90,10 @@ def main():
                     "epoch": header.epoch,
                     "handles": len(handles),
                     "head": [float(handles["x"][0]), float(handles["y"][0])],
-                    "link": link,
                 }
+                if not arguments.light:
+                    # How far the second link is from 1.65 m tells whether the content is whole.
+                    line["link"] = float(np.hypot(handles["x"][2] - handles["x"][1], handles["y"][2] - handles["y"][1]))
                 print(json.dumps(line), flush=False)
             elif time.monotonic() >= printed + 1.0:
                 printed = time.monotonic()

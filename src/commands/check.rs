@@ -54,7 +54,8 @@ pub fn check(common: &Common) -> Result<(), CommandError> {
             AtEnd::Loop => "begins again",
         }
     ))?;
-    output.line(&format!("  Publishing: {} frames per second to shared memory.", number(scene.rate)))?;
+    let single = scene.single_precision.map_or(String::new(), |single| format!("; poses32 has {single}"));
+    output.line(&format!("  Publishing: {} frames per second to shared memory{single}.", number(scene.rate)))?;
     output.line(&match &scene.ros2 {
         Some(settings) => format!(
             "  ROS 2: {} at {} frames per second.",

@@ -48,6 +48,8 @@ impl Accepted {
     pub const BENCHES: Self = Self { least: 1.0, greatest: 1e6, unit: "benches" };
     /// Frames a subscriber may fall behind.
     pub const QUEUE: Self = Self { least: 1.0, greatest: 1e6, unit: "frames" };
+    /// One handle in how many is published.
+    pub const EVERY: Self = Self { least: 1.0, greatest: 1e6, unit: "handles" };
     /// Subscribers at once.
     pub const SUBSCRIBERS: Self = Self { least: 1.0, greatest: 256.0, unit: "subscribers" };
     /// Messages that a ROS 2 topic keeps.

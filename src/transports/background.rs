@@ -15,7 +15,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use crate::live::clock::{monotonic_ns, sleep_until};
 use crate::live::{Deliveries, PublishError, Publisher, StatusPublisher};
 use crate::show::Frame;
-use crate::wire::convert::{collision_alert, handle_pose};
+use crate::wire::convert::{collision_alert, handle_poses};
 use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus};
 
 /// Seconds of frames that the thread may fall behind before it continues with the newest.
@@ -245,8 +245,8 @@ impl Publisher for BackgroundPublisher {
             return Ok(());
         };
         snapshot.header = FrameHeader { sent_ns: monotonic_ns(), ..*header };
-        for (handle, pose) in snapshot.handles.iter_mut().enumerate() {
-            *pose = handle_pose(&frame.chain, handle);
+        for (slot, pose) in snapshot.handles.iter_mut().zip(handle_poses(&frame.chain)) {
+            *slot = pose;
         }
         let _ = self.filled.push(snapshot);
         Ok(())

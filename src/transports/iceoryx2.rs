@@ -2,10 +2,11 @@
 //!
 //! [`SharedMemoryPublisher`] lives on the loop's thread, [`StatusSender`] on the statistics thread; both are made there,
 //! since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/alerts`, `/status`,
-//! `/stage` and the event service `<name>/tick`.
+//! `/stage`, the event service `<name>/tick` and, where a scene asks for it, `<name>/poses32`.
 
 mod control;
 mod error;
+mod frames;
 mod memory;
 pub mod stale_files;
 
@@ -18,21 +19,21 @@ use ::iceoryx2::port::publisher::Publisher as Port;
 use ::iceoryx2::port::update_connections::UpdateConnections;
 use ::iceoryx2::prelude::*;
 use ::iceoryx2::service::builder::event::{EventOpenError, EventOpenOrCreateError};
-use ::iceoryx2::service::builder::publish_subscribe::{PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError};
 use ::iceoryx2::service::port_factory::{event, publish_subscribe};
 
 use super::{Transport, TransportConfig, TransportError};
-use crate::live::clock::monotonic_ns;
 use crate::live::control::Door;
 use crate::live::{Deliveries, PublishError, Publisher, StatusPublisher};
+use crate::scene::SinglePrecision;
 use crate::show::Frame;
-use crate::wire::convert::{collision_alert, cue, handle_pose};
-use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+use crate::wire::convert::{Decimation, collision_alert, cue, handle_pose, handle_pose_32, handle_poses};
+use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, HandlePose32, LoopStatus, Stage};
 
 pub use error::OpenError;
 use error::{failed, incomplete, port_error, service_error};
-use memory::check_room;
-pub use memory::{check_room_to_subscribe, default_queue, reserve_pages};
+use frames::{FrameSender, FrameService};
+use memory::{check_room, default_queue};
+pub use memory::{check_room_to_subscribe, reserve_pages};
 
 /// Nodes that may have a service open at once beyond one a subscriber: the publisher's, and those that died and have
 /// not been cleaned up after yet.
@@ -47,7 +48,7 @@ const PATIENCE: Duration = Duration::from_secs(6);
 /// # Errors
 /// [`OpenError::Name`] where iceoryx2 takes no such name.
 pub fn service_name(name: &str, service: &str) -> Result<ServiceName, OpenError> {
-    let refused = || OpenError::Name { name: name.to_owned(), most: ServiceName::max_len() - "/status".len() };
+    let refused = || OpenError::Name { name: name.to_owned(), most: ServiceName::max_len() - "/poses32".len() };
     if name.is_empty() {
         return Err(refused());
     }
@@ -78,6 +79,8 @@ pub struct PublisherConfig {
     pub name: String,
     /// Handles in a frame.
     pub handles: usize,
+    /// The service of poses in single precision, where there is one.
+    pub single_precision: Option<SinglePrecision>,
     /// Frames a subscriber may fall behind.
     pub queue: usize,
     /// Subscribers that each service admits at once.
@@ -88,6 +91,13 @@ pub struct PublisherConfig {
     pub cues: bool,
     /// The stage, sent once and kept for late subscribers.
     pub stage: Stage,
+}
+
+impl PublisherConfig {
+    /// Which handles the frames in single precision have, where there are any.
+    fn decimation(&self) -> Option<Decimation> {
+        self.single_precision.map(|SinglePrecision { every }| Decimation { handles: self.handles, every })
+    }
 }
 
 /// The services of a run.
@@ -105,27 +115,29 @@ pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, Tran
     let TransportConfig { name, scene, stage, .. } = *config;
     service_name(name, "poses")?;
     stale_files::spawn_reaper();
-    let (handles, subscribers) = (scene.team().handles(), scene.subscribers);
-    let config = PublisherConfig {
+    let mut config = PublisherConfig {
         name: name.to_owned(),
-        handles,
-        queue: scene.queue.unwrap_or_else(|| default_queue(handles, subscribers)),
-        subscribers,
+        handles: scene.team().handles(),
+        single_precision: scene.single_precision,
+        queue: 0,
+        subscribers: scene.subscribers,
         alerts: scene.alerts.is_some(),
         cues: !scene.cues.is_empty(),
         stage,
     };
+    config.queue = scene.queue.unwrap_or_else(|| default_queue(&config));
     Ok(Some(Box::new(Iceoryx2 { config, control: None })))
 }
 
 impl Transport for Iceoryx2 {
     fn describe(&self) -> String {
-        let PublisherConfig { name, queue, subscribers, alerts, cues, .. } = &self.config;
+        let PublisherConfig { name, single_precision, queue, subscribers, alerts, cues, .. } = &self.config;
+        let single = single_precision.map_or(String::new(), |single| format!(", /poses32 ({single})"));
         let alerts = if *alerts { ", /alerts" } else { "" };
         let cues = if *cues { ", /cues" } else { "" };
         format!(
-            "iceoryx2 services: {name}/poses{alerts}{cues}, /status, /stage, /tick, /control (queues of {queue} frames for \
-             {subscribers} subscribers)."
+            "iceoryx2 services: {name}/poses{single}{alerts}{cues}, /status, /stage, /tick, /control (queues of {queue} \
+             frames for {subscribers} subscribers)."
         )
     }
 
@@ -152,8 +164,8 @@ type Sender<Payload, Header> = Port<ipc::Service, Payload, Header>;
 
 /// Publishes frames, alerts and the stage.
 pub struct SharedMemoryPublisher {
-    poses: Sender<[HandlePose], FrameHeader>,
-    poses_service: Service<[HandlePose], FrameHeader>,
+    poses: FrameSender<HandlePose>,
+    poses_32: Option<(FrameSender<HandlePose32>, Decimation)>,
     alerts: Option<Sender<CollisionAlert, ()>>,
     cues: Option<Sender<Cue, ()>>,
     stage: Sender<Stage, ()>,
@@ -177,14 +189,14 @@ impl SharedMemoryPublisher {
         service_name(name, "poses")?;
         check_room(config)?;
         let node = node()?;
-        let frame_service = frames(&node, config)?;
-        let poses = frame_service
-            .publisher_builder()
-            .initial_max_slice_len(config.handles)
-            .allocation_strategy(AllocationStrategy::Static)
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .create()
-            .map_err(|error| port_error(name, "poses", error))?;
+        let whole = FrameService { service: "poses", poses: config.handles, every: None };
+        let poses = FrameSender::open(&node, config, &whole)?;
+        let open_32 = |decimation: Decimation| {
+            let every = Some(decimation.every);
+            let described = FrameService { service: "poses32", poses: decimation.poses(), every };
+            Ok((FrameSender::open(&node, config, &described)?, decimation))
+        };
+        let poses_32 = config.decimation().map(open_32).transpose()?;
         let alerts = if config.alerts { Some(sender(&node, name, "alerts", config.subscribers)?) } else { None };
         let cues = if config.cues { Some(sender(&node, name, "cues", config.subscribers)?) } else { None };
         let stage = sender(&node, name, "stage", config.subscribers)?;
@@ -201,14 +213,21 @@ impl SharedMemoryPublisher {
             })?;
         let tick = tick_service.notifier_builder().create().map_err(|error| failed(name, "tick", error))?;
         reserve_pages()?;
-        Ok(Self { poses, poses_service: frame_service, alerts, cues, stage, tick, tick_service, _node: node })
+        Ok(Self { poses, poses_32, alerts, cues, stage, tick, tick_service, _node: node })
     }
 
     fn send_frame(&self, header: &FrameHeader, frame: &Frame) -> Result<(), String> {
-        let sample = self.poses.loan_slice_uninit(frame.chain.handles()).map_err(|error| error.to_string())?;
-        let mut sample = sample.write_from_fn(|handle| handle_pose(&frame.chain, handle));
-        *sample.user_header_mut() = FrameHeader { sent_ns: monotonic_ns(), ..*header };
-        sample.send().map(|_| ()).map_err(|error| error.to_string())
+        self.poses.send(header, handle_poses(&frame.chain))?;
+        match &self.poses_32 {
+            None => Ok(()),
+            Some((port, Decimation { every: 1, .. })) => {
+                port.send(header, handle_poses(&frame.chain).map(handle_pose_32))
+            }
+            Some((port, decimation)) => {
+                let pose = |index| handle_pose_32(handle_pose(&frame.chain, decimation.handle(index)));
+                port.send(header, (0..decimation.poses()).map(pose))
+            }
+        }
     }
 
     fn send_cues(&self, header: &FrameHeader, frame: &Frame) -> Result<(), String> {
@@ -250,11 +269,14 @@ impl Publisher for SharedMemoryPublisher {
             let _ = cues.update_connections();
         }
         let _ = self.stage.update_connections();
-        let _ = self.poses.update_connections();
+        self.poses.update_connections();
+        if let Some((port, _)) = &self.poses_32 {
+            port.update_connections();
+        }
     }
 
     fn subscribers(&self) -> u32 {
-        self.poses_service.dynamic_config().number_of_subscribers() as u32
+        self.poses.subscribers() + self.poses_32.as_ref().map_or(0, |(port, _)| port.subscribers())
     }
 }
 
@@ -284,39 +306,6 @@ impl StatusPublisher for StatusSender {
         if let Err(error) = self.status.send_copy(*status) {
             log::warn!("the status could not be sent: {error}");
         }
-    }
-}
-
-/// The service of frames. One left by a watcher can have shorter queues than this publisher would make: it is used as
-/// it is.
-fn frames(
-    node: &Node<ipc::Service>,
-    config: &PublisherConfig,
-) -> Result<Service<[HandlePose], FrameHeader>, OpenError> {
-    let full_name = service_name(&config.name, "poses")?;
-    let builder = || {
-        node.service_builder(&full_name)
-            .publish_subscribe::<[HandlePose]>()
-            .user_header::<FrameHeader>()
-            .max_publishers(1)
-            .enable_safe_overflow(true)
-    };
-    let made = builder()
-        .max_subscribers(config.subscribers)
-        .max_nodes(config.subscribers + SPARE_NODES)
-        .subscriber_max_buffer_size(config.queue)
-        .open_or_create();
-    match made {
-        Err(PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
-            PublishSubscribeOpenError::DoesNotSupportRequestedMinBufferSize,
-        )) => {
-            log::warn!(
-                "a subscriber keeps \"{full_name}\" open with shorter queues than {} frames: those are used",
-                config.queue
-            );
-            builder().open().map_err(|error| service_error(&full_name, PublishSubscribeOpenOrCreateError::from(error)))
-        }
-        other => other.map_err(|error| service_error(&full_name, error)),
     }
 }
 

@@ -27,8 +27,8 @@ use std::sync::LazyLock;
 use bench_dragon::show::state::{FrameState, Level, PlaybackState};
 use bench_dragon::transports::ros2::messages::{HandlePoses, Header, Stamped, type_name};
 use bench_dragon::wire::{
-    CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus, NO_BENCH, SEGMENT_ARC,
-    SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, Stage, StageSegment,
+    CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32, LoopStatus, NO_BENCH,
+    SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, Stage, StageSegment,
 };
 use iceoryx2::prelude::ZeroCopySend;
 use serde::Serialize;
@@ -163,6 +163,7 @@ fn fields(registry: &Registry, name: &str) -> Vec<(String, String)> {
 fn ros(format: &Format) -> String {
     match format {
         Format::F64 => "float64".to_owned(),
+        Format::F32 => "float32".to_owned(),
         Format::U64 => "uint64".to_owned(),
         Format::U32 => "uint32".to_owned(),
         Format::Str => "string".to_owned(),
@@ -286,7 +287,7 @@ import ctypes, json, sys
 sys.path.insert(0, "examples/python")
 import bench_dragon_messages as m
 
-WORDS = {ctypes.c_double: "float64", ctypes.c_uint64: "uint64", ctypes.c_uint32: "uint32"}
+WORDS = {ctypes.c_double: "float64", ctypes.c_float: "float32", ctypes.c_uint64: "uint64", ctypes.c_uint32: "uint32"}
 
 def word(of):
     if issubclass(of, ctypes.Array):
@@ -302,7 +303,7 @@ print(json.dumps({
     "segment": layout(m.StageSegment),
     "names": [m.STATES, m.LEVELS, m.PLAYBACK, m.SEGMENTS, m.EVENTS],
     "no_bench": m.NO_BENCH,
-    "handle_pose": m.HANDLE_POSE.itemsize,
+    "handle_poses": [m.HANDLE_POSE.itemsize, m.HANDLE_POSE_32.itemsize],
 }))
 "#;
 
@@ -315,6 +316,7 @@ fn python_sees_the_layouts_and_the_names_of_rust() {
     let said: Value = serde_json::from_slice(&output.stdout).unwrap();
     let messages = [
         layout::<HandlePose>(),
+        layout::<HandlePose32>(),
         layout::<FrameHeader>(),
         layout::<CollisionAlert>(),
         layout::<LoopStatus>(),
@@ -332,7 +334,8 @@ fn python_sees_the_layouts_and_the_names_of_rust() {
     let mut events: BTreeMap<_, _> = events.iter().map(|(number, name)| (number.to_string(), Some(*name))).collect();
     events.insert("0".to_owned(), None);
     assert_eq!(said["names"], json!([states, levels, playback, segments, events]));
-    assert_eq!((&said["no_bench"], &said["handle_pose"]), (&json!(NO_BENCH), &json!(size_of::<HandlePose>())));
+    assert_eq!(said["no_bench"], json!(NO_BENCH));
+    assert_eq!(said["handle_poses"], json!([size_of::<HandlePose>(), size_of::<HandlePose32>()]));
 }
 
 #[test]

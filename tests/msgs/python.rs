@@ -9,7 +9,8 @@ pub const BY_HAND: &str = "# From here on written by hand.\n";
 const HEAD: &str = r#""""The memory layouts of bench-dragon's messages, once, for every Python subscriber.
 
 Each class is what iceoryx2 compares with the publisher's type: its name ends in the layout's version, so that a
-publisher with another layout is refused. `HANDLE_POSE` is the numpy view of a frame's handles.
+publisher with another layout is refused. `HANDLE_POSE` and `HANDLE_POSE_32` are the numpy views
+of a frame's handles.
 """
 
 import ctypes

@@ -5,7 +5,7 @@ use std::fs::OpenOptions;
 
 use super::PublisherConfig;
 use super::error::OpenError;
-use crate::wire::{FrameHeader, HandlePose};
+use crate::wire::{FrameHeader, HandlePose, HandlePose32};
 
 /// Where Linux keeps shared memory.
 pub(super) const SHARED_MEMORY: &str = "/dev/shm";
@@ -15,12 +15,15 @@ const QUEUE_BYTES: usize = 64_000_000;
 const SUBSCRIBER_BYTES: u64 = 500_000;
 
 /// Frames a subscriber may fall behind, where the scene does not say: at most 64 MB for all subscribers together.
-pub fn default_queue(handles: usize, subscribers: usize) -> usize {
-    (QUEUE_BYTES / frame_bytes(handles) / subscribers).clamp(2, 64)
+pub(super) fn default_queue(config: &PublisherConfig) -> usize {
+    (QUEUE_BYTES / frame_bytes(config) / config.subscribers).clamp(2, 64)
 }
 
-fn frame_bytes(handles: usize) -> usize {
-    size_of::<FrameHeader>() + handles * size_of::<HandlePose>()
+/// The bytes of a frame in all services of frames together.
+fn frame_bytes(config: &PublisherConfig) -> usize {
+    let whole = size_of::<FrameHeader>() + config.handles * size_of::<HandlePose>();
+    let single = config.decimation().map(|it| size_of::<FrameHeader>() + it.poses() * size_of::<HandlePose32>());
+    whole + single.unwrap_or(0)
 }
 
 /// Refuses queues that the shared memory has no room for.
@@ -28,7 +31,7 @@ pub(super) fn check_room(config: &PublisherConfig) -> Result<(), OpenError> {
     let PublisherConfig { queue, subscribers, .. } = *config;
     // Two frames that a subscriber may hold, two loans, the history, and a little for bookkeeping.
     let frames = subscribers * (queue + 2) + 4;
-    let needed = (frames * frame_bytes(config.handles)) as u64 + 2_000_000;
+    let needed = (frames * frame_bytes(config)) as u64 + 2_000_000;
     match free_bytes() {
         Some(free) if free < needed => Err(OpenError::NoRoom { queue, subscribers, needed, free }),
         _ => Ok(()),

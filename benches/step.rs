@@ -1,0 +1,180 @@
+//! What a step of the loop costs, by the size of the team: the solver, the clearance, the way into shared memory, and all
+//! of it, beside copying as many bytes into the same memory. The parts are measured in turn, frame by frame, in one run,
+//! with one subscriber that takes every frame; the figures are medians.
+//!
+//! `cargo bench --bench step`, or with some numbers of benches: `cargo bench --bench step -- 223 100000`
+
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+use bench_dragon::live::Publisher;
+use bench_dragon::scene::Scene;
+use bench_dragon::show::{Playback, Show};
+use bench_dragon::subscribers::connection::{Connection, Subscription, Wake};
+use bench_dragon::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher, node, service_name};
+use bench_dragon::wire::convert::{Stamps, frame_header, handle_pose, stage};
+use bench_dragon::wire::{FrameHeader, HandlePose};
+
+const SIZES: [usize; 4] = [223, 5_000, 100_000, 1_000_000];
+/// Where the show begins, simulated seconds; it plays at 60 Hz from there.
+const START: f64 = 200.0;
+/// Frames of a part before the next part has its turn: so few that all parts see the same machine, so many that a part
+/// finds its own memory in the caches as the loop would.
+const BATCH: usize = 4;
+/// Rounds before the first that counts: every page has been written by then.
+const WARM_UP: usize = 1;
+/// Rounds that end before the scene's contact.
+const MOST_ROUNDS: usize = 3_000;
+/// Wall time of the measurement of one size.
+const TIME: Duration = Duration::from_secs(5);
+/// Frames in the queue of the subscriber.
+const QUEUE: usize = 2;
+/// Copies that are held at once, so that copying meets memory as little used as publishing does.
+const COPIES: usize = QUEUE + 2;
+
+fn main() {
+    let given: Vec<usize> = std::env::args().filter_map(|argument| argument.parse().ok()).collect();
+    println!(
+        "| benches | bytes | solver | clearance | publish | step | step without alerts | memcpy | (step without alerts - \
+         solver) / memcpy | rate | rate without alerts |\n|---|---|---|---|---|---|---|---|---|---|---|"
+    );
+    for benches in if given.is_empty() { SIZES.to_vec() } else { given } {
+        measure(benches);
+    }
+}
+
+/// The paper's scene with another number of benches.
+fn scene(benches: usize) -> Scene {
+    let text = include_str!("../config/paper.toml").replace("benches = 223 ", &format!("benches = {benches} "));
+    Scene::parse(&text, "paper.toml", "paper").expect("the paper's scene, with more benches")
+}
+
+/// Microseconds of each part, by frame.
+#[derive(Default)]
+struct Times {
+    solver: Vec<f64>,
+    clearance: Vec<f64>,
+    publish: Vec<f64>,
+    step: Vec<f64>,
+    /// Without alerts.
+    bare_step: Vec<f64>,
+    memcpy: Vec<f64>,
+}
+
+fn measure(benches: usize) {
+    let scene = scene(benches);
+    let handles = scene.team().handles();
+    let timeline = scene.motion.timeline(&mut |_| ());
+    let playback = Playback { start: START, ..Playback::of(&scene) };
+    let show_of = |scene: &Scene| Show::new(scene, timeline.clone(), playback).expect("200 s is before the contact");
+    let (mut show, mut bare_show) = (show_of(&scene), show_of(&Scene { alerts: None, ..scene.clone() }));
+    let mut choice = scene.motion.solver(scene.velocities);
+    let mut monitor = scene.motion.clearance_monitor(&choice);
+    let name = format!("bench_{}_{benches}", std::process::id());
+    let config = PublisherConfig {
+        name: name.clone(),
+        handles,
+        single_precision: None,
+        queue: QUEUE,
+        subscribers: 1,
+        alerts: true,
+        cues: false,
+        stage: stage(1, 0, &scene.motion),
+    };
+    let mut publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");
+    let subscription = Subscription::new(&name, Wake::Never).expect("the publisher has taken this name");
+    let connection = subscription.connect().expect("the publisher is there").expect("the publisher is there");
+    let mut frame = show.frame(0).clone();
+
+    // As many bytes, into samples of a service of the same kind.
+    let node = node().expect("the publisher has made one too");
+    let service = node
+        .service_builder(&service_name(&name, "copies").expect("the publisher's name, almost"))
+        .publish_subscribe::<[HandlePose]>()
+        .user_header::<FrameHeader>()
+        .create()
+        .expect("nobody else uses this name");
+    let port = service.publisher_builder().initial_max_slice_len(handles).max_loaned_samples(COPIES);
+    let port = port.create().expect("the memory for it is there");
+    let poses: Vec<HandlePose> = (0..handles).map(|handle| handle_pose(&frame.chain, handle)).collect();
+    let loan = || port.loan_slice_uninit(handles).expect("as many as are admitted").write_from_slice(&poses);
+    let mut copies: [_; COPIES] = std::array::from_fn(|_| loan());
+
+    let mut times = Times::default();
+    let mut began = Instant::now();
+    for round in 0.. {
+        if round == WARM_UP {
+            times = Times::default();
+            began = Instant::now();
+        }
+        if round > WARM_UP && (began.elapsed() > TIME || round == MOST_ROUNDS) {
+            break;
+        }
+        let ticks = (1 + round * BATCH) as u64..(1 + (round + 1) * BATCH) as u64;
+        for (show, times) in [(&mut show, &mut times.step), (&mut bare_show, &mut times.bare_step)] {
+            for tick in ticks.clone() {
+                timed(times, || {
+                    let frame = show.frame(tick);
+                    let header = frame_header(frame, stamps(tick));
+                    publisher.publish(&header, frame).expect("nobody else uses this service");
+                });
+                drain(&connection);
+            }
+        }
+        for tick in ticks.clone() {
+            let time = START + tick as f64 / 60.0;
+            let chain = &mut frame.chain;
+            timed(&mut times.solver, || choice.solver.solve(time, chain).expect("200 s is before the lock"));
+            let header = frame_header(&frame, stamps(tick));
+            timed(&mut times.publish, || publisher.publish(&header, &frame).expect("nobody else uses this service"));
+            drain(&connection);
+        }
+        for tick in ticks.clone() {
+            let time = START + tick as f64 / 60.0;
+            choice.solver.solve(time, &mut frame.chain).expect("200 s is before the lock");
+            let travelled = scene.motion.travelled_at(time);
+            timed(&mut times.clearance, || monitor.least_clearance(&frame.chain, travelled));
+        }
+        for copy in &mut copies {
+            timed(&mut times.memcpy, || copy.payload_mut().copy_from_slice(black_box(&poses)));
+        }
+    }
+    row(benches, handles, times);
+}
+
+fn stamps(sequence: u64) -> Stamps {
+    Stamps { run_id: 1, sequence, stamp_ns: 0, deadline_ns: 0 }
+}
+
+/// Takes what has come, as a subscriber does that is in time.
+fn drain(connection: &Connection) {
+    connection.frames(|header, handles| {
+        black_box((header.sequence, handles[0].x));
+    });
+}
+
+/// Runs something and notes how long it takes.
+fn timed<T>(times: &mut Vec<f64>, run: impl FnOnce() -> T) -> T {
+    let began = Instant::now();
+    let result = black_box(run());
+    times.push(began.elapsed().as_secs_f64() * 1e6);
+    result
+}
+
+fn median(mut times: Vec<f64>) -> f64 {
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
+}
+
+fn row(benches: usize, handles: usize, times: Times) {
+    let bytes = size_of::<FrameHeader>() + handles * size_of::<HandlePose>();
+    let Times { solver, clearance, publish, step, bare_step, memcpy } = times;
+    let [solver, clearance, publish, step, bare_step, memcpy] =
+        [solver, clearance, publish, step, bare_step, memcpy].map(median);
+    let ratio = (bare_step - solver) / memcpy;
+    let [rate, bare_rate] = [step, bare_step].map(|step| 1e6 / step);
+    println!(
+        "| {benches} | {bytes} | {solver:.2} us | {clearance:.2} us | {publish:.2} us | {step:.2} us | {bare_step:.2} us | \
+         {memcpy:.2} us | {ratio:.1} | {rate:.0} Hz | {bare_rate:.0} Hz |"
+    );
+}

@@ -1,0 +1,75 @@
+"""Compares the frames of `<name>/poses32` with those of `<name>/poses`, number by number, until the publisher leaves.
+
+    light_peer.py --name NAME
+
+Prints a JSON line with what it has compared, and ends with an error where a frame is not its counterpart rounded.
+"""
+
+import argparse
+import json
+import pathlib
+import sys
+import time
+
+import iceoryx2 as iox2
+import numpy as np
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
+from bench_dragon_messages import FrameHeader, HandlePose, HandlePose32, handles_of, indices_of  # noqa: E402
+
+# Each message has its own time of sending and its own count.
+OF_THE_FRAME = [name for name, _ in FrameHeader._fields_ if name not in ("sent_ns", "handles")]
+
+
+def open_service(node, name, pose):
+    builder = lambda: node.service_builder(iox2.ServiceName.new(name)).publish_subscribe(iox2.Slice[pose])
+    while True:
+        try:
+            return builder().user_header(FrameHeader).open()
+        except iox2.PublishSubscribeOpenError:
+            time.sleep(0.05)
+
+
+def take(port, into):
+    """Copies what has come: the header and the poses of each frame, by sequence."""
+    while (sample := port.receive()) is not None:
+        header = sample.user_header().contents
+        poses = handles_of(sample).copy()
+        assert header.handles == len(poses), f"the header says {header.handles}, there are {len(poses)}"
+        into[header.sequence] = [repr(getattr(header, field)) for field in OF_THE_FRAME], poses
+        sample.delete()
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--name", required=True)
+    name = parser.parse_args().name
+    iox2.set_log_level(iox2.LogLevel.Fatal)
+    node = iox2.NodeBuilder.new().signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
+    services = [open_service(node, f"{name}/poses", HandlePose), open_service(node, f"{name}/poses32", HandlePose32)]
+    ports = [service.subscriber_builder().create() for service in services]
+    frames = [{}, {}]
+    while services[0].dynamic_config.number_of_publishers > 0:
+        list(map(take, ports, frames))
+        time.sleep(0.01)
+    list(map(take, ports, frames))
+
+    whole, light = frames
+    # One of the two ports was there first.
+    first = max(min(whole), min(light))
+    assert sorted(light) == list(range(min(light), max(whole) + 1)), "frames are missing"
+    compared = [sequence for sequence in whole if sequence >= first]
+    handles = set()
+    for sequence in compared:
+        (header, poses), (header_32, poses_32) = whole[sequence], light[sequence]
+        assert header == header_32, f"{header} and {header_32}"
+        handles = indices_of(services[1], len(poses))
+        for field in poses.dtype.names:
+            rounded = poses[field][handles].astype(np.float32)
+            same = rounded.view(np.uint32) == poses_32[field].view(np.uint32)
+            assert same.all(), f"frame {sequence}: {field} of handles {handles[~same]}"
+    print(json.dumps({"compared": len(compared), "last": max(light), "handles": [int(handle) for handle in handles]}))
+
+
+if __name__ == "__main__":
+    main()
