@@ -78,7 +78,7 @@ fn check_alerts(alerts: &[&Value], seconds: u64) {
 
 fn suite(transport: &str) {
     let name = format!("suite_{transport}");
-    let mut early = Process::start(&mut peer(transport, &name, 14));
+    let mut early = Process::start(&mut peer(transport, &name, 18));
     let ready = early.lines();
     ready.until("ready", 20);
     let first = publisher(&name, 5);
@@ -87,7 +87,7 @@ fn suite(transport: &str) {
     wait(1.5);
     let late = Process::start(&mut peer(transport, &name, 2)).output_within(30);
     let summary_of_first = summary(&first.output_within(60));
-    let summary_of_second = summary(&publisher(&name, 3).output_within(60));
+    let summary_of_second = summary(&publisher(&name, 5).output_within(60));
     let lines: Vec<Value> = ready.rest(60).iter().map(|line| serde_json::from_str(line).unwrap()).collect();
 
     // One that was there before the publisher, through two of them.
