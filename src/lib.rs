@@ -12,8 +12,8 @@
 //! - [`plan`]: the least pitch and the greatest speed, for a choreographer.
 //! - [`live`]: the fixed-rate loop, its clock, its statistics.
 //! - [`transports`]: iceoryx2 shared memory and ROS 2 topics, as publishers of the loop.
-//! - [`trade`]: accuracy against cost, measured for every solver on a scene and this machine.
 //! - [`subscribers`]: the terminal monitor and the stage picture; they know the wire only.
+//! - [`trade`]: accuracy against cost, measured for every solver on a scene and this machine.
 
 #![deny(missing_docs)]
 

@@ -1,9 +1,11 @@
 //! Accuracy against cost, measured: every solver on one scene and this machine, against the high-precision reference.
 //!
-//! In: a scene and its timeline. Out: one [`Measurement`] per solver. The `trade` command prints and draws them.
+//! In: a scene and its timeline. Out: one [`Measurement`] per solver. The `trade` command prints and draws them, and what
+//! [`display`] measures: the error at the moment of display against bytes per second.
 
 mod candidates;
 mod collision;
+pub mod display;
 
 use std::time::Instant;
 
@@ -209,7 +211,7 @@ fn measured(scene: &Scene, mut candidate: Candidate, moments: &[Moment], noise: 
     let errors = errors(scene, &mut candidate, moments);
     let mut times = frame_times(scene, candidate.solver.as_mut(), end);
     times.sort_unstable();
-    let quantile = |share: f64| times.get((share * times.len() as f64) as usize).map_or(f64::NAN, |ns| *ns as f64);
+    let quantile = |share| quantile(&times, share);
     Measurement {
         solver: candidate.name,
         accuracy: candidate.accuracy,
@@ -228,6 +230,20 @@ fn measured(scene: &Scene, mut candidate: Candidate, moments: &[Moment], noise: 
         collision: Vec::new(),
         on_front: false,
     }
+}
+
+/// The time below which a share of sorted times lies, nanoseconds; not a number where there are none.
+fn quantile(times: &[u64], share: f64) -> f64 {
+    times.get((share * times.len() as f64) as usize).map_or(f64::NAN, |ns| *ns as f64)
+}
+
+/// Nanoseconds that the solver chosen for `scene` takes for a frame, the median over the show, as
+/// [`Measurement::frame_ns`].
+pub fn publisher_frame_ns(scene: &Scene, timeline: &Timeline) -> f64 {
+    let mut solver = scene.motion.solver(scene.velocities).solver;
+    let mut times = frame_times(scene, solver.as_mut(), timeline.end().time);
+    times.sort_unstable();
+    quantile(&times, 0.5)
 }
 
 #[derive(Default)]
@@ -311,10 +327,16 @@ fn clock_ns() -> u64 {
 fn mark_pareto_front(measurements: &mut [Measurement]) {
     let points: Vec<(f64, f64)> =
         measurements.iter().map(|m| (m.frame_ns, m.max_position_error.max(m.noise))).collect();
-    for (measurement, (cost, error)) in measurements.iter_mut().zip(&points) {
-        let beaten = |(c, e): &(f64, f64)| c <= cost && e <= error && (c < cost || e < error);
-        measurement.on_front = !points.iter().any(beaten);
+    for (measurement, on_front) in measurements.iter_mut().zip(pareto_front(&points)) {
+        measurement.on_front = on_front;
     }
+}
+
+/// Which points of cost and error no other is below in one and not above in the other.
+fn pareto_front(points: &[(f64, f64)]) -> Vec<bool> {
+    let is_beaten =
+        |(cost, error): &(f64, f64)| points.iter().any(|(c, e)| c <= cost && e <= error && (c < cost || e < error));
+    points.iter().map(|point| !is_beaten(point)).collect()
 }
 
 #[cfg(test)]

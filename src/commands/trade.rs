@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use bench_dragon::trade::{LAST_SECOND_MOMENTS, Measurement, SPREAD_MOMENTS, measure};
+use bench_dragon::scene::Scene;
+use bench_dragon::trade::display::{self, Display, DisplayMeasurement, Precision, Reader};
+use bench_dragon::trade::{LAST_SECOND_MOMENTS, Measurement, SPREAD_MOMENTS, measure, publisher_frame_ns};
+use plotters::coord::combinators::LogCoord;
 use plotters::prelude::*;
 
 use super::{CommandError, Common, Output, progress_bar, search_timeline};
@@ -13,26 +16,72 @@ pub struct TradeArguments {
     /// Draw error against cost as an SVG
     #[arg(long, value_name = "FILE")]
     pub plot: Option<PathBuf>,
+    /// With --json, print the errors at the moment of display too; every option below implies it
+    #[arg(long, help_heading = "The display")]
+    pub display: bool,
+    /// Draw the error at the moment of display against bytes per second as an SVG
+    #[arg(long, value_name = "FILE", help_heading = "The display")]
+    pub display_plot: Option<PathBuf>,
+    /// Pictures per second of the display [default: 60]
+    #[arg(long, value_name = "HZ", value_parser = display_rate, help_heading = "The display")]
+    pub display_rate: Option<f64>,
+    /// How far the display runs behind the stream [default: 0 for `hold`, else one publishing period]
+    #[arg(long, value_name = "SECONDS", value_parser = delay, help_heading = "The display")]
+    pub delay: Option<f64>,
 }
 
-/// Measures every solver and prints a table or JSON lines.
+impl TradeArguments {
+    /// Whether JSON lines of the display are wanted: by default the lines are those of the solvers alone.
+    fn wants_display(&self) -> bool {
+        self.display || self.display_plot.is_some() || self.display_rate.is_some() || self.delay.is_some()
+    }
+}
+
+fn display_rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().unwrap_or(f64::NAN);
+    if rate > 0.0 && rate < f64::INFINITY { Ok(rate) } else { Err("expected a rate above 0, in hertz".to_owned()) }
+}
+
+fn delay(text: &str) -> Result<f64, String> {
+    let delay = text.parse().unwrap_or(f64::NAN);
+    if (0.0..f64::INFINITY).contains(&delay) { Ok(delay) } else { Err("expected at least 0, in seconds".to_owned()) }
+}
+
+/// Measures every solver, and readers at every rate, and prints tables or JSON lines.
 pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandError> {
+    /// Of a progress bar of 1000, what measuring the solvers takes.
+    const SOLVERS: f64 = 850.0;
     let scene = common.load_scene()?;
     let timeline = search_timeline(&scene, common);
     let bar = progress_bar(1000, common).with_message("measuring");
-    let measured = measure(&scene, &timeline, &mut |share| bar.set_position((1000.0 * share) as u64));
+    let measured = measure(&scene, &timeline, &mut |share| bar.set_position((SOLVERS * share) as u64));
+    let displayed = if common.json && !arguments.wants_display() {
+        Ok(Vec::new())
+    } else {
+        let frame_ns = publisher_frame_ns(&scene, &timeline);
+        let display = Display { rate: arguments.display_rate.unwrap_or(60.0), delay: arguments.delay, frame_ns };
+        let mut progress = |share| bar.set_position((SOLVERS + (1000.0 - SOLVERS) * share) as u64);
+        display::measure(&scene, &timeline, display, &mut progress)
+    };
     bar.finish_and_clear();
-    let measurements = measured.map_err(CommandError::Failed)?;
+    let (measurements, displayed) = (measured.map_err(CommandError::Failed)?, displayed.map_err(CommandError::Failed)?);
     if let Some(file) = &arguments.plot {
-        draw(file, &scene.name, &measurements)?;
+        draw(file, |svg| plot(svg, &scene.name, &measurements))?;
+    }
+    if let Some(file) = &arguments.display_plot {
+        draw(file, |svg| display_plot(svg, &scene.name, &displayed))?;
     }
     let mut output = Output::standard();
     if common.json {
         for measurement in &measurements {
             output.json(measurement)?;
         }
+        for measurement in &displayed {
+            output.json(measurement)?;
+        }
     } else {
         print(&mut output, &measurements)?;
+        print_display(&mut output, &scene, &displayed)?;
     }
     output.finish()
 }
@@ -87,53 +136,163 @@ fn print(output: &mut Output, measurements: &[Measurement]) -> Result<(), Comman
     ))
 }
 
+/// One row for both precisions, which stand one after the other.
+fn print_display(output: &mut Output, scene: &Scene, displayed: &[DisplayMeasurement]) -> Result<(), CommandError> {
+    output.line("")?;
+    output.line(&format!(
+        "  {:8} {:>7} {:>9}   {:>10} {:>11}   {:>10} {:>11}   {:>9}",
+        "reader", "rate Hz", "delay s", "position m", "bytes/s", "single m", "bytes/s", "of a core"
+    ))?;
+    let star = |m: &DisplayMeasurement| if m.on_front { "*" } else { " " };
+    for pair in displayed.chunks_exact(Precision::ALL.len()) {
+        let (double, single) = (&pair[0], &pair[1]);
+        output.line(&format!(
+            "  {:8} {:>7} {:>9.4} {} {:>10.1e} {:>11.0} {} {:>10.1e} {:>11.0}   {:>8.4}%",
+            double.reader.name(),
+            double.rate_hz,
+            double.delay_s,
+            star(double),
+            double.max_position_error,
+            double.bytes_per_second,
+            star(single),
+            single.max_position_error,
+            single.bytes_per_second,
+            100.0 * double.cpu_share
+        ))?;
+    }
+    let display_rate = displayed.first().map_or(f64::NAN, |first| first.display_rate_hz);
+    output.line(&format!(
+        "* no other has both fewer bytes and a smaller error. Errors: the largest over all {} handles at the moments of a \
+         display at {display_rate} Hz that runs behind the stream by the delay, in the last {} s before the show freezes \
+         and at {} moments spread over it, against newton at the simulated time meant to be on display. Single: poses \
+         rounded to 32 bits, which are not published. Of a core: computing the frames by the solver of the scene, \
+         without transport.",
+        scene.team().handles(),
+        display::WINDOW,
+        display::SPREAD_MOMENTS
+    ))
+}
+
 /// The least error that is drawn: below it all is rounding.
 const LEAST_ERROR: f64 = 1e-15;
 
-fn draw(file: &Path, scene: &str, measurements: &[Measurement]) -> Result<(), CommandError> {
+/// What can go wrong in a drawing.
+type DrawingError = Box<dyn std::error::Error>;
+
+fn draw(file: &Path, plot: impl FnOnce(&mut String) -> Result<(), DrawingError>) -> Result<(), CommandError> {
     let mut svg = String::new();
-    plot(&mut svg, scene, measurements).map_err(|error| CommandError::Failed(format!("the plot: {error}")))?;
+    plot(&mut svg).map_err(|error| CommandError::Failed(format!("the plot: {error}")))?;
     let mut output = Output::file(file)?;
     output.line(&svg)?;
     output.finish()
 }
 
-fn plot(svg: &mut String, scene: &str, measurements: &[Measurement]) -> Result<(), Box<dyn std::error::Error>> {
-    let error = |m: &Measurement| m.max_position_error.max(LEAST_ERROR);
+fn plot(svg: &mut String, scene: &str, measurements: &[Measurement]) -> Result<(), DrawingError> {
+    let point = |m: &Measurement| Point {
+        at: (m.frame_ns / 1e3, m.max_position_error.max(LEAST_ERROR)),
+        text: m.solver.clone(),
+        colour: if m.solver.starts_with("paper") { RED } else { BLUE },
+        on_front: m.on_front,
+    };
+    let points: Vec<Point> = measurements.iter().map(point).collect();
+    let caption = format!("Error against cost, scene {scene}");
+    let axes = ["microseconds per frame (median)", "largest position error, metres"];
+    scatter(svg, &caption, axes, &[(front(&points), BLUE)], points)
+}
+
+fn display_plot(svg: &mut String, scene: &str, displayed: &[DisplayMeasurement]) -> Result<(), DrawingError> {
+    // Single precision is no different for readers whose error is far above its rounding.
+    let series = [
+        (Reader::Hold, Precision::Double, RED, "hold"),
+        (Reader::Linear, Precision::Double, RGBColor(150, 90, 0), "linear"),
+        (Reader::Hermite, Precision::Double, BLUE, "Hermite"),
+        (Reader::Hermite, Precision::Single, RGBColor(0, 130, 60), "Hermite, single precision"),
+    ];
+    let (mut lines, mut points) = (Vec::new(), Vec::new());
+    for (reader, precision, colour, name) in series {
+        let of_series: Vec<_> = displayed.iter().filter(|m| (m.reader, m.precision) == (reader, precision)).collect();
+        let line: Vec<Point> = of_series
+            .into_iter()
+            .enumerate()
+            .map(|(index, m)| Point {
+                at: (m.bytes_per_second / 1e3, m.max_position_error.max(LEAST_ERROR)),
+                text: if index == 0 { format!("{name}, {} Hz", m.rate_hz) } else { format!("{} Hz", m.rate_hz) },
+                colour,
+                on_front: m.on_front,
+            })
+            .collect();
+        lines.push((line.iter().map(|point| point.at).collect(), colour));
+        points.extend(line);
+    }
+    lines.push((front(&points), BLACK));
+    let caption = format!("Error at the moment of display, scene {scene} (filled and black line: Pareto front)");
+    scatter(svg, &caption, ["kilobytes per second", "largest position error, metres"], &lines, points)
+}
+
+/// A point of a plot, with its label.
+struct Point {
+    at: (f64, f64),
+    text: String,
+    colour: RGBColor,
+    on_front: bool,
+}
+
+/// The points of the front, by cost.
+fn front(points: &[Point]) -> Vec<(f64, f64)> {
+    let mut front: Vec<(f64, f64)> = points.iter().filter(|point| point.on_front).map(|point| point.at).collect();
+    front.sort_by(|a, b| a.0.total_cmp(&b.0));
+    front
+}
+
+/// Lines below labelled points, both axes logarithmic.
+fn scatter(
+    svg: &mut String,
+    caption: &str,
+    [x_desc, y_desc]: [&str; 2],
+    lines: &[(Vec<(f64, f64)>, RGBColor)],
+    points: Vec<Point>,
+) -> Result<(), DrawingError> {
     let area = SVGBackend::with_string(svg, (1020, 620)).into_drawing_area();
     area.fill(&WHITE)?;
-    let cost = |m: &Measurement| m.frame_ns / 1e3;
     let (mut least, mut most) = (f64::INFINITY, 0f64);
-    for measurement in measurements {
-        (least, most) = (least.min(cost(measurement)), most.max(cost(measurement)));
+    for Point { at: (cost, _), .. } in &points {
+        (least, most) = (least.min(*cost), most.max(*cost));
     }
     let mut chart = ChartBuilder::on(&area)
-        .caption(format!("Error against cost, scene {scene}"), ("sans-serif", 20))
+        .caption(caption, ("sans-serif", 20))
         .margin(14)
         .x_label_area_size(44)
         .y_label_area_size(70)
         .build_cartesian_2d((0.5 * least..8.0 * most).log_scale(), (LEAST_ERROR..10.0).log_scale())?;
     chart
         .configure_mesh()
-        .x_desc("microseconds per frame (median)")
-        .y_desc("largest position error, metres")
+        .x_desc(x_desc)
+        .y_desc(y_desc)
         .x_label_formatter(&|x| format!("{x}"))
         .y_label_formatter(&|y| format!("{y:.0e}"))
         .light_line_style(TRANSPARENT)
         .draw()?;
-    let mut front: Vec<(f64, f64)> = measurements.iter().filter(|m| m.on_front).map(|m| (cost(m), error(m))).collect();
-    front.sort_by(|a, b| a.0.total_cmp(&b.0));
-    chart.draw_series(LineSeries::new(front, &BLUE))?;
-    let places: Vec<(i32, i32)> = measurements.iter().map(|m| chart.backend_coord(&(cost(m), error(m)))).collect();
+    for (line, colour) in lines {
+        chart.draw_series(LineSeries::new(line.iter().copied(), colour))?;
+    }
+    draw_points(&mut chart, points)?;
+    area.present()?;
+    Ok(())
+}
+
+/// A plot of two logarithmic axes.
+type LogChart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<LogCoord<f64>, LogCoord<f64>>>;
+
+/// Draws points, the least exact first, with labels that hide neither points nor each other.
+fn draw_points(chart: &mut LogChart, points: Vec<Point>) -> Result<(), DrawingError> {
+    let places: Vec<(i32, i32)> = points.iter().map(|point| chart.backend_coord(&point.at)).collect();
     // No label lies on a point either.
     let mut taken: Vec<Label> =
         places.iter().map(|(x, y)| Label { left: x - 6, right: x + 6, top: y - Label::HEIGHT / 2 }).collect();
-    let mut labelled: Vec<(&Measurement, (i32, i32))> = measurements.iter().zip(places).collect();
-    labelled.sort_by(|a, b| error(b.0).total_cmp(&error(a.0)));
-    for (measurement, (x, y)) in labelled {
-        let colour = if measurement.solver.starts_with("paper") { RED } else { BLUE };
-        let at = (cost(measurement), error(measurement));
-        let label = Label::near(&taken, (x, y), &measurement.solver);
+    let mut labelled: Vec<(Point, (i32, i32))> = points.into_iter().zip(places).collect();
+    labelled.sort_by(|a, b| b.0.at.1.total_cmp(&a.0.at.1));
+    for (Point { at, text, colour, on_front }, (x, y)) in labelled {
+        let label = Label::near(&taken, (x, y), &text);
         let middle = label.top + Label::HEIGHT / 2;
         if (middle - y).abs() > Label::HEIGHT {
             // A line from a label that had to go elsewhere to its point.
@@ -141,13 +300,12 @@ fn plot(svg: &mut String, scene: &str, measurements: &[Measurement]) -> Result<(
             let line = PathElement::new(vec![(0, 0), (end - x, middle - y)], colour.mix(0.4));
             chart.draw_series([EmptyElement::at(at) + line])?;
         }
-        let style = if measurement.on_front { colour.filled() } else { colour.stroke_width(1) };
+        let style = if on_front { colour.filled() } else { colour.stroke_width(1) };
         chart.draw_series([Circle::new(at, 4, style)])?;
-        let text = Text::new(measurement.solver.clone(), (label.left - x, label.top - y), ("sans-serif", 12));
+        let text = Text::new(text, (label.left - x, label.top - y), ("sans-serif", 12));
         chart.draw_series([EmptyElement::at(at) + text])?;
         taken.push(label);
     }
-    area.present()?;
     Ok(())
 }
 
