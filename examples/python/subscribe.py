@@ -69,7 +69,7 @@ def main():
             sequence = header.sequence
             received += 1
             if arguments.json:
-                # How far the second link is from 1.65 m tells whether the content is whole.
+                # How far the second link is from 1.65 m shows whether the content is whole.
                 link = float(np.hypot(handles["x"][2] - handles["x"][1], handles["y"][2] - handles["y"][1]))
                 line = {
                     "type": "frame",
