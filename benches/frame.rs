@@ -52,7 +52,7 @@ fn newton_cold(bencher: Bencher, rate: f64) {
     play(bencher, &mut Newton::new(spiral(), team(223), 1.0, Velocities::Computed), 224, rate);
 }
 
-/// A spiral scene as the show plays it, whatever the path's kind costs to tell apart.
+/// A spiral scene as the show plays it, including what it costs to distinguish the path's kind.
 #[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
 fn scene_on_a_spiral(bencher: Bencher, rate: f64) {
     let scene = bench_dragon::scene::Scene::paper();
@@ -70,24 +70,24 @@ fn newton_on_a_turnaround(bencher: Bencher, rate: f64) {
 /// and cosine: what a careful person writes first.
 #[divan::bench(sample_count = 500, sample_size = 20)]
 fn newton_cold_without_care(bencher: Bencher) {
-    let (growth, team) = (0.55 / TAU, team(223));
+    let (radius_per_radian, team) = (0.55 / TAU, team(223));
     let mut chain = Chain::new(224);
     let mut tick = 0u32;
     bencher.counter(ItemsCount::new(224usize)).bench_local(|| {
         tick = (tick + 1) % 12_000;
-        let mut theta = (32.0 * TAU * 8.0 * TAU - 2.0 * f64::from(tick) / 60.0 / growth).sqrt();
+        let mut theta = (32.0 * TAU * 8.0 * TAU - 2.0 * f64::from(tick) / 60.0 / radius_per_radian).sqrt();
         let mut speed = 1.0;
         for bench in 0..223 {
             let link = team.link(bench);
-            let mut rear = theta + link / (growth * theta);
+            let mut rear = theta + link / (radius_per_radian * theta);
             let (sine, cosine) = theta.sin_cos();
-            let (x, y) = (growth * theta * cosine, growth * theta * sine);
+            let (x, y) = (radius_per_radian * theta * cosine, radius_per_radian * theta * sine);
             let mut across = (0.0, 0.0, 0.0, 0.0);
             for _ in 0..20 {
                 let (sine, cosine) = rear.sin_cos();
-                let (dx, dy) = (x - growth * rear * cosine, y - growth * rear * sine);
+                let (dx, dy) = (x - radius_per_radian * rear * cosine, y - radius_per_radian * rear * sine);
                 let excess = dx * dx + dy * dy - link * link;
-                let (tx, ty) = (growth * (cosine - rear * sine), growth * (sine + rear * cosine));
+                let (tx, ty) = (radius_per_radian * (cosine - rear * sine), radius_per_radian * (sine + rear * cosine));
                 across = (dx, dy, tx, ty);
                 let step = excess / (-2.0 * (dx * tx + dy * ty));
                 rear -= step;
@@ -96,7 +96,7 @@ fn newton_cold_without_care(bencher: Bencher) {
                 }
             }
             let (dx, dy, tx, ty) = across;
-            let (fx, fy) = (growth * (cosine - theta * sine), growth * (sine + theta * cosine));
+            let (fx, fy) = (radius_per_radian * (cosine - theta * sine), radius_per_radian * (sine + theta * cosine));
             chain.x[bench] = x;
             chain.y[bench] = y;
             chain.heading[bench] = dy.atan2(dx);
@@ -142,7 +142,7 @@ fn table_by_benches(bencher: Bencher, benches: usize) {
     play(bencher, &mut follower_table(benches, Velocities::Computed), benches + 1, 60.0);
 }
 
-/// Benches and the accuracy asked for, metres.
+/// Benches and the requested accuracy, metres.
 const SIZES: [(usize, f64); 15] = [
     (223, 1e-12),
     (223, 1e-9),
@@ -161,8 +161,8 @@ const SIZES: [(usize, f64); 15] = [
     (1_000_000, 1e-4),
 ];
 
-/// Frames of what a wish for accuracy selects; prints the bytes a frame reads for a handle, and how long it took to
-/// make.
+/// Frames of the table selected for an accuracy; prints the bytes a frame reads for a handle, and how long the table
+/// took to make.
 #[divan::bench(args = SIZES, sample_count = 100, sample_size = 4)]
 fn accuracy_by_benches(bencher: Bencher, (benches, accuracy): (usize, f64)) {
     let selected = selection::cheapest(&spiral(), team(benches), 1.0, Velocities::Computed, accuracy);

@@ -2,7 +2,7 @@
 """Wake-up lateness: the live loop beside cyclictest, on the same core, at the same interval and priority.
 
 In turn, for some rounds, so that the machine's moods fall on both; and either once with CPUs that may sleep and once with
-CPUs that are kept awake (cyclictest --latency, bench-dragon run --cpu-latency: cyclictest keeps them awake unless told
+CPUs that are kept awake (cyclictest --latency, bench-dragon run --cpu-latency: cyclictest keeps them awake unless set
 not to). cyclictest is Debian's package rt-tests; real-time priority and waking CPUs need root. --priority 0 compares
 without a priority. The live loop counts the periods that a late wake-up delayed as well (coordinated omission);
 cyclictest counts the wake-up only, which is to its advantage. Needs:

@@ -2,7 +2,7 @@
 
     cargo build --release && .venv/bin/python benches/ros2_growth.py [--minutes 10]
 
-At 60 Hz; a Cyclone DDS subscriber (`pip install cyclonedds==11.0.1`) lives for five seconds, every other one is killed.
+At 60 Hz; a Cyclone DDS subscriber (`pip install cyclonedds==11.0.1`) runs for five seconds, every other one is killed.
 """
 
 import argparse

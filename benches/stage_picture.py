@@ -7,7 +7,7 @@
     .venv/bin/python benches/stage_picture.py long      # pictures a second of a scene of 5,000 benches
 
 Needs Debian's Chromium and Playwright, which tests/run installs. Everything runs on this machine, in turn in one run:
-the ratios say more than the times.
+the ratios are more telling than the times.
 """
 
 import contextlib

@@ -23,7 +23,7 @@ fn main() {
     let mut samples = 0u32;
     let overlap = (41_000..).map(|hundredths| f64::from(hundredths) / 100.0).find(|time| {
         samples += 1;
-        // The motion goes on well past the contact.
+        // The motion continues well past the contact.
         solver.solve(*time, &mut chain).is_ok()
             && least_clearance_all_pairs(&chain, scene.team()).is_some_and(|least| least.value <= 0.0)
     });

@@ -56,7 +56,7 @@ pub struct Common {
 }
 
 impl Common {
-    /// The scene asked for.
+    /// The scene that the command line names.
     ///
     /// # Errors
     /// Bad input: the sentence names the file, the line and the field.
@@ -68,7 +68,7 @@ impl Common {
     }
 }
 
-/// Why a command did not do what it was asked.
+/// Why a command failed.
 #[derive(Debug)]
 pub enum CommandError {
     /// The user's input cannot be used; one sentence that names the place and what was expected. Exit code 2.
@@ -163,7 +163,7 @@ pub fn search_timeline(scene: &Scene, common: &Common) -> Timeline {
     timeline
 }
 
-/// Says how far the searches came, where one of them gave up.
+/// Reports how far the searches came, where one of them gave up.
 pub fn warn_of_gap(timeline: &Timeline) {
     if let Some(until) = timeline.searched_until() {
         log::warn!(
@@ -173,7 +173,7 @@ pub fn warn_of_gap(timeline: &Timeline) {
     }
 }
 
-/// Whether a stream is a terminal whose user has not asked for no colour (`NO_COLOR`, see no-color.org).
+/// Whether a stream is a terminal whose user has not switched colour off (`NO_COLOR`, see no-color.org).
 pub fn shows_colour(stream: &impl io::IsTerminal) -> bool {
     stream.is_terminal() && !anstyle_query::no_color()
 }
@@ -187,7 +187,7 @@ pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CommandError> {
     Ok(stop)
 }
 
-/// Ends this program with a sentence where a page of shared memory cannot be had, which Linux tells by SIGBUS: others
+/// Ends this program with a sentence where a page of shared memory cannot be had, which Linux signals by SIGBUS: others
 /// have filled /dev/shm since it was last looked at.
 pub fn end_when_shared_memory_is_full() -> Result<(), CommandError> {
     const SENTENCE: &[u8] = b"error: /dev/shm is full: remove what fills it, or make it larger\n";

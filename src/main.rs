@@ -9,7 +9,7 @@ use clap::{Parser, Subcommand};
 use commands::{CommandError, Common};
 
 /// Publishes a bench dragon live: handle poses and collision alerts at a fixed rate, over iceoryx2 shared memory and,
-/// when asked, as ROS 2 topics.
+/// on request, as ROS 2 topics.
 #[derive(Debug, Parser)]
 #[command(version, propagate_version = true, arg_required_else_help = true)]
 struct CommandLine {
@@ -44,7 +44,7 @@ enum Command {
     /// What soak starts
     #[command(hide = true)]
     SoakSubscriber(commands::soak::SoakSubscriberArguments),
-    /// Validate a scene and say what it would model
+    /// Validate a scene and print what it would model
     Check,
 }
 
@@ -95,7 +95,7 @@ fn set_up_logging(common: &Common) {
         // What iceoryx2 refuses is reported in this program's own words.
         _ => iceoryx2::prelude::LogLevel::Fatal,
     });
-    // What RustDDS and ros2-client complain of (every large message, every end) is no news to a user.
+    // What RustDDS and ros2-client complain of (every large message, every end) is of no use to a user.
     let of_dds = if common.verbose > 1 { log::LevelFilter::Warn } else { log::LevelFilter::Off };
     env_logger::Builder::new()
         .filter_level(level)

@@ -1,7 +1,8 @@
-//! The motion: a team on a path at a speed, followed by a method. The one place that knows what a show computes: which
-//! solver and why, which events, the live clearance, the time of a travelled distance, the outline to draw.
+//! The motion: a team on a path at a speed, followed by a method. It alone decides what a show computes: which solver and
+//! why, which events, the live clearance, the time of a travelled distance, the outline to draw.
 //!
-//! In: what a scene states. The show, the plans and the commands call it; nobody else asks what kind of path it is.
+//! In: what a scene states. The show, the plans and the commands call it; no other module distinguishes the kinds of
+//! path.
 
 pub mod clearance;
 pub mod contact;
@@ -88,19 +89,19 @@ const CONTACT_BUDGET: u64 = 100_000_000;
 const NO_TABLE: &str = "there is no table for this team and path";
 
 /// What was measured of a table, for people.
-fn measured(selection: &Selection, asked: f64) -> String {
+fn measured(selection: &Selection, requested: f64) -> String {
     let Selection { table, accuracy, error, moments, made_in, .. } = selection;
-    let wish = if !selection.meets() {
-        format!("the best there is for the {asked:e} m asked")
+    let target = if !selection.meets() {
+        format!("the best there is for the {requested:e} m requested")
     } else if selection.is_at_the_floor() {
-        format!("for the {asked:e} m asked, which doubles cannot hold everywhere here")
-    } else if *accuracy < asked {
-        format!("for the {asked:e} m asked, taken as {accuracy:.1e} m, a thousandth of a link")
+        format!("for the {requested:e} m requested, which doubles cannot hold everywhere here")
+    } else if *accuracy < requested {
+        format!("for the {requested:e} m requested, taken as {accuracy:.1e} m, a thousandth of a link")
     } else {
-        format!("for the {asked:e} m asked")
+        format!("for the {requested:e} m requested")
     };
     format!(
-        "{error:.1e} m measured against newton at {moments} moments, {wish}; {:.0} bytes a handle, {:.2} of the most \
+        "{error:.1e} m measured against newton at {moments} moments, {target}; {:.0} bytes a handle, {:.2} of the most \
          exact table's, {} kB, made in {:.0} ms",
         table.bytes_per_handle(),
         table.relative_cost(),

@@ -47,14 +47,14 @@ const TURNS_BEFORE: f64 = 3.0;
 /// How much the pitch grows at a time while the same two boards are in the way.
 const GROWTH: f64 = 1.005;
 
-/// What is added to a pitch at which boards just touch, metres: more than rounding, less than anyone asks for.
+/// What is added to a pitch at which boards just touch, metres: more than rounding, less than any plan needs.
 const FREE: f64 = 1e-13;
 
 /// How far about a touch, in links, the same two boards are followed as the pitch grows.
 const WINDOW: f64 = 0.3;
 
 /// The least pitch of an inward spiral at which the front handle of the head comes within `radius` metres of the centre
-/// and no two boards touch before. `progress` is told which share of the work is done, from 0 to 1.
+/// and no two boards touch before. `progress` is given the share of the work done, from 0 to 1.
 ///
 /// The pitch grows from one that cannot do. Each time the trial fails, the two boards that overlap most deeply are
 /// followed near that place, in steps of half a percent, until they come free, and the next trial is made there. So pitches

@@ -27,12 +27,12 @@ use crate::solve::paper::PaperRules;
 
 /// The paper's scene, as built into the program.
 const PAPER: &str = include_str!("../config/paper.toml");
-/// Subscribers that each iceoryx2 service admits at once where the scene does not say.
+/// Subscribers that each iceoryx2 service admits at once by default.
 const DEFAULT_SUBSCRIBERS: usize = 8;
-/// Seconds of wall time for which a looping show stands at its end where the scene does not say.
+/// Seconds of wall time for which a looping show stands at its end by default.
 const DEFAULT_END_HOLD: f64 = 5.0;
 
-/// Input that cannot be used, in one sentence that says where and what was expected.
+/// Input that cannot be used, in one sentence that names the place and what was expected.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct SceneError(String);
@@ -55,7 +55,7 @@ enum SolverName {
 pub enum OnContact {
     /// The show freezes at the contact.
     Stop,
-    /// The show goes on.
+    /// The show continues.
     Continue,
 }
 
@@ -93,7 +93,7 @@ pub struct Scene {
     pub end_hold: f64,
     /// The moments that have names, in the order of the file.
     pub cues: Vec<Cue>,
-    /// When to warn; `None` where the scene asks for no alerts.
+    /// When to warn; `None` where the scene requests no alerts.
     pub alerts: Option<AlertRules>,
     /// Frames per second.
     pub rate: f64,
@@ -101,11 +101,11 @@ pub struct Scene {
     pub velocities: Velocities,
     /// The service of poses in single precision beside that of whole frames; `None` where the scene asks for none.
     pub single_precision: Option<SinglePrecision>,
-    /// Frames a subscriber may fall behind, where the scene says so.
+    /// Frames a subscriber may fall behind, where the scene states it.
     pub queue: Option<usize>,
     /// Subscribers that each iceoryx2 service admits at once.
     pub subscribers: usize,
-    /// The ROS 2 topics; `None` where the scene asks for none.
+    /// The ROS 2 topics; `None` where the scene requests none.
     pub ros2: Option<Ros2Settings>,
 }
 

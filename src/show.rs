@@ -252,7 +252,7 @@ impl Show {
     pub fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
         let code = self.clock.apply(tick, command)?;
         if code == Code::Done && matches!(command, Command::Seek(_) | Command::Restart) {
-            // Where the show stands now is news, even where it is the level of before.
+            // The level after this is published anew, even where it is the same as before.
             self.level.iter_mut().for_each(LevelTracker::forget);
         }
         Some(self.outcome(tick, code))

@@ -61,7 +61,7 @@ pub enum Velocities {
 
 /// A way to find the chain. Implementations own their scratch memory, so that solving allocates nothing.
 pub trait Solver: Send {
-    /// The name by which a scene asks for this solver.
+    /// The name by which a scene selects this solver.
     fn name(&self) -> &'static str;
 
     /// Fills `chain` with the state at `time` simulated seconds after the scene's start.

@@ -1,6 +1,6 @@
 //! The ways out of this process: one trait, a list, a folder each.
 //!
-//! In: a scene, the loop's rate, the stage. Out: for each transport that the scene asks for, a [`Publisher`] for the
+//! In: a scene, the loop's rate, the stage. Out: for each transport that the scene requests, a [`Publisher`] for the
 //! loop's thread and a [`StatusPublisher`] for the statistics thread. Transports know frames and messages, no solver, and
 //! not each other. [`background`] is for those that would keep the loop waiting. Called by the `run` command.
 
@@ -14,12 +14,12 @@ use crate::live::{Deliveries, Publisher, StatusPublisher};
 use crate::scene::Scene;
 use crate::wire::Stage;
 
-/// What every transport is told of the run.
+/// What every transport is given about the run.
 #[derive(Debug, Clone, Copy)]
 pub struct TransportConfig<'a> {
     /// The name under which services and topics appear.
     pub name: &'a str,
-    /// The scene, which says what to publish.
+    /// The scene, which states what to publish.
     pub scene: &'a Scene,
     /// Frames per second of the loop.
     pub loop_rate: f64,
@@ -27,7 +27,7 @@ pub struct TransportConfig<'a> {
     pub stage: Stage,
 }
 
-/// Why a transport cannot be used: one sentence, which says what to change.
+/// Why a transport cannot be used: one sentence, which names what to change.
 #[derive(Debug, thiserror::Error)]
 pub enum TransportError {
     /// What the user asked for cannot be had.
@@ -78,13 +78,13 @@ pub trait Transport: Send {
     fn finish(self: Box<Self>) -> Option<(&'static str, Deliveries)>;
 }
 
-/// Makes a transport; `None` where the scene does not ask for it.
+/// Makes a transport; `None` where the scene does not request it.
 type Open = fn(&TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError>;
 
 /// Every transport there is.
 const TRANSPORTS: [Open; 2] = [iceoryx2::open, ros2_if_built];
 
-/// The transports that the scene asks for.
+/// The transports that the scene requests.
 ///
 /// # Errors
 /// The first [`TransportError`]
@@ -100,7 +100,7 @@ fn ros2_if_built(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>,
     match config.scene.ros2 {
         None => Ok(None),
         Some(_) => Err(TransportError::BadInput(
-            "ROS 2 is asked for and this program was built without it: build it with the feature \"jazzy\" or \
+            "ROS 2 is requested and this program was built without it: build it with the feature \"jazzy\" or \
              \"humble\""
                 .to_owned(),
         )),

@@ -11,11 +11,11 @@ fn run(arguments: &[&str]) -> Output {
 /// The sentence that an input is refused with.
 fn refusal(arguments: &[&str]) -> String {
     let output = run(arguments);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+    let printed = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {printed}");
     assert!(output.stdout.is_empty(), "{arguments:?} prints on standard output");
-    assert!(!said.contains("panicked"), "{arguments:?}: {said}");
-    said
+    assert!(!printed.contains("panicked"), "{arguments:?}: {printed}");
+    printed
 }
 
 /// The sentence that a scene is refused with: the paper's with one text replaced.
@@ -25,10 +25,10 @@ fn scene_refusal(from: &str, to: &str) -> String {
     let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
     file.write_all(scene.replacen(from, to, 1).as_bytes()).unwrap();
     let path = file.path().to_str().unwrap().to_owned();
-    let said = refusal(&["check", "--scene", &path]);
-    assert!(said.contains(&path), "the sentence does not name the file: {said}");
-    assert_eq!(said.lines().count(), 1, "more than one sentence: {said}");
-    said
+    let printed = refusal(&["check", "--scene", &path]);
+    assert!(printed.contains(&path), "the sentence does not name the file: {printed}");
+    assert_eq!(printed.lines().count(), 1, "more than one sentence: {printed}");
+    printed
 }
 
 #[test]
@@ -106,9 +106,9 @@ fn scenes_that_cannot_be_played() {
         ("velocities = true", "[publish.ros2.qos.poses]\nreliability = \"yes\"", &["line 29", "best_effort"]),
     ];
     for (from, to, named) in cases {
-        let said = scene_refusal(from, to);
+        let printed = scene_refusal(from, to);
         for word in *named {
-            assert!(said.contains(word), "{to:?} is refused without naming {word:?}: {said}");
+            assert!(printed.contains(word), "{to:?} is refused without naming {word:?}: {printed}");
         }
     }
 }
@@ -127,8 +127,8 @@ fn files_that_hold_no_scene() {
         (at("not.toml"), "line 1"),
         (at("binary.toml"), "UTF-8"),
     ] {
-        let said = refusal(&["check", "--scene", &file]);
-        assert!(said.contains(&file) && said.contains(word), "{said}");
+        let printed = refusal(&["check", "--scene", &file]);
+        assert!(printed.contains(&file) && printed.contains(word), "{printed}");
     }
 }
 
@@ -170,8 +170,8 @@ fn arguments_that_cannot_be_used() {
         (vec!["draw", "--radius", "0"], "--radius"),
         (vec!["dance"], "dance"),
     ] {
-        let said = refusal(&arguments);
-        assert!(said.contains(word), "{arguments:?} is refused without naming {word:?}: {said}");
+        let printed = refusal(&arguments);
+        assert!(printed.contains(word), "{arguments:?} is refused without naming {word:?}: {printed}");
     }
 }
 
@@ -187,8 +187,8 @@ fn a_million_benches_at_a_rate_nobody_can_meet_are_no_bad_input() {
     let name = format!("test_{}_million", std::process::id());
     let path = file.path().to_str().unwrap();
     let output = run(&["run", "--json", "--scene", path, "--name", &name, "--rate", "20000", "--duration", "2"]);
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{said}");
+    let printed = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{printed}");
     let summary: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     let [frames, skipped, overruns] = ["frames", "skipped", "overruns"].map(|key| summary[key].as_u64().unwrap());
     assert_eq!(frames + skipped, 40_000, "{summary}");

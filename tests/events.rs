@@ -11,7 +11,7 @@ fn scene(text: &str) -> Scene {
 }
 
 #[test]
-fn the_paper_scene_has_its_events_when_50_digits_say() {
+fn the_paper_scene_has_its_events_as_with_50_digits() {
     let started = std::time::Instant::now();
     let timeline = Scene::paper().motion.timeline(&mut |_| ());
     println!("found in {:?}", started.elapsed());

@@ -24,7 +24,7 @@ fn observer(place: &Place) -> (Process, Lines) {
     (process, lines)
 }
 
-/// What an observer has seen when it is told to end.
+/// What an observer has seen when it is stopped.
 fn observed((process, lines): &(Process, Lines)) -> Value {
     process.signal(SIGTERM);
     serde_json::from_str(lines.rest(20).last().unwrap()).unwrap()
@@ -54,10 +54,10 @@ fn assert_nothing_wrong(seen: &Value) {
 
 /// One clear sentence and exit code 1.
 fn refusal(output: &Output) -> String {
-    let said = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{:?} {said}", output.status.signal());
-    assert_eq!(said.lines().count(), 1, "{said}");
-    said
+    let printed = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{:?} {printed}", output.status.signal());
+    assert_eq!(printed.lines().count(), 1, "{printed}");
+    printed
 }
 
 #[test]
@@ -88,32 +88,32 @@ fn killed_subscribers_take_nothing_with_them() {
 fn subscribers_survive_killed_publishers() {
     let place = Place::new("widows");
     let mut monitors = [1, 2].map(|_| Process::start(place.program().arg("watch")));
-    let news = monitors.each_mut().map(Process::lines);
+    let outputs = monitors.each_mut().map(Process::lines);
     let steady = observer(&place);
     let start = || Process::start(place.program().args(["run", "--json", "--rate", "100"]));
-    let everybody_says = |what: &str| news.each_ref().map(|lines| lines.until(what, 20));
+    let all_print = |what: &str| outputs.each_ref().map(|lines| lines.until(what, 20));
     let rounds = if long() { 100 } else { 5 };
     let mut longest = Duration::ZERO;
     for _ in 0..rounds {
         let publisher = start();
-        everybody_says("is running");
-        everybody_says("missed 0");
+        all_print("is running");
+        all_print("missed 0");
         publisher.signal(SIGKILL);
         let killed = Instant::now();
-        everybody_says("has ended");
+        all_print("has ended");
         longest = longest.max(killed.elapsed());
     }
     println!("{rounds} deaths of a publisher, each noticed within {longest:?}");
     let last = start();
-    everybody_says("is running");
-    everybody_says("missed 0");
+    all_print("is running");
+    all_print("missed 0");
     last.signal(SIGINT);
     summary(&last.output_within(20));
-    everybody_says("has ended");
+    all_print("has ended");
     let seen = observed(&steady);
     assert_nothing_wrong(&seen);
     assert_eq!(number(&seen, "runs"), rounds + 1, "{seen}");
-    for (monitor, lines) in monitors.iter().zip(&news) {
+    for (monitor, lines) in monitors.iter().zip(&outputs) {
         monitor.signal(SIGTERM);
         lines.rest(20);
     }
@@ -208,8 +208,8 @@ fn of_publishers_that_race_for_a_name_one_wins() {
         assert_eq!(winners.len(), 1, "round {round}: {outputs:?}");
         assert_eq!(number(&summary(winners[0]), "frames") + number(&summary(winners[0]), "skipped"), 120);
         for loser in losers {
-            let said = refusal(loser);
-            assert!(said.contains("another publisher") && said.contains("--name"), "{said}");
+            let printed = refusal(loser);
+            assert!(printed.contains("another publisher") && printed.contains("--name"), "{printed}");
         }
     }
     place.assert_clean();
@@ -229,8 +229,11 @@ fn one_subscriber_too_many_is_told_the_limit_and_the_setting() {
             subscriber.1.until("\"status\":{", 20);
         }
         let watch = || Process::start(place.program().args(["watch", "--json", "--duration", "2"])).output_within(20);
-        let said = refusal(&watch());
-        assert!(said.contains(&format!("{limit} subscribers")) && said.contains("publish.subscribers"), "{said}");
+        let printed = refusal(&watch());
+        assert!(
+            printed.contains(&format!("{limit} subscribers")) && printed.contains("publish.subscribers"),
+            "{printed}"
+        );
         assert_nothing_wrong(&observed(&admitted.pop().unwrap()));
         let next = watch();
         assert!(number(json_lines(&next).last().unwrap(), "received") > 0, "{}", text(&next.stderr));
@@ -272,14 +275,14 @@ fn too_little_shared_memory_is_refused_with_figures() {
         return;
     }
     for size in ["100k", "1m", "6m"] {
-        let said = refusal(&with_shared_memory(size, "exec \"$PROGRAM\" run --json --duration 1"));
+        let printed = refusal(&with_shared_memory(size, "exec \"$PROGRAM\" run --json --duration 1"));
         for part in ["/dev/shm", "6817792 bytes", "publish.queue", "publish.subscribers"] {
-            assert!(said.contains(part), "{said}");
+            assert!(printed.contains(part), "{printed}");
         }
     }
     let script = "dd if=/dev/zero of=/dev/shm/filler bs=4k 2>/dev/null; exec \"$PROGRAM\" watch --duration 1";
-    let said = refusal(&with_shared_memory("1m", script));
-    assert!(said.contains("/dev/shm") && said.contains("too little"), "{said}");
+    let printed = refusal(&with_shared_memory("1m", script));
+    assert!(printed.contains("/dev/shm") && printed.contains("too little"), "{printed}");
 }
 
 #[test]
@@ -358,7 +361,7 @@ fn as_nobody(place: &Place, arguments: &[&str]) -> Output {
 
 /// Another user reads nothing, unless the program was built to let everybody in.
 #[test]
-fn another_user_is_kept_out_or_let_in_as_the_build_says() {
+fn another_user_is_kept_out_or_let_in_as_the_build_allows() {
     if !can_run(root("become another user")) {
         return;
     }
@@ -380,8 +383,8 @@ fn another_user_is_kept_out_or_let_in_as_the_build_says() {
         assert!(number(lines.last().unwrap(), "received") > 0, "{lines:?} {}", text(&output.stderr));
     } else {
         assert_eq!(modes, BTreeSet::from([0o600]));
-        let said = refusal(&output);
-        assert!(said.contains("another user"), "{said}");
+        let printed = refusal(&output);
+        assert!(printed.contains("another user"), "{printed}");
     }
     publisher.signal(SIGINT);
     summary(&publisher.output_within(20));

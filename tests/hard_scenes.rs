@@ -108,8 +108,8 @@ fn a_lock_with_a_jump_of_millimetres_is_a_lock() {
 #[test]
 fn bends_as_wide_as_a_link_are_searched() {
     for name in ["hang_uturn", "ut2", "ut3"] {
-        let (code, events, said) = answer(&["--scene", &format!("tests/scenes/{name}.toml"), "--json", "events"]);
-        assert_eq!(code, 0, "{name}: {said}");
+        let (code, events, printed) = answer(&["--scene", &format!("tests/scenes/{name}.toml"), "--json", "events"]);
+        assert_eq!(code, 0, "{name}: {printed}");
         assert!(events.contains("\"event\":\"lock\"") || events.contains("\"event\":\"path_end\""), "{name}: {events}");
     }
     let links = [1e-3, 5e-3, 0.02, 0.1, 0.5, 1.0, 1.65, 2.86, 5.0, 10.0];
@@ -129,7 +129,7 @@ fn bends_as_wide_as_a_link_are_searched() {
         let motion = Motion::new(description, team, 1.0, Method::Newton).unwrap();
         let timeline = motion.timeline(&mut |_| ());
         assert_eq!(timeline.searched_until(), None, "link {link}, offset {offset}");
-        // Wider than the link, the link always has a rear handle to go on with; narrower, it stalls and locks.
+        // Wider than the link, the link always has a next place for its rear handle; narrower, it stalls and locks.
         let kind = timeline.end().event.kind;
         if offset >= 1e-9 {
             assert_eq!(kind, PathEnd, "link {link}, offset {offset}");
@@ -147,8 +147,8 @@ fn a_plan_knows_that_a_scene_without_alerts_runs_into_its_lock() {
     let scene = scene("noalerts");
     let error = greatest_speed(&scene, &timeline(&scene), 2.0, &mut |_| ()).unwrap_err().to_string();
     assert!(error.contains("lock"), "{error}");
-    let (_, said, _) = answer(&["--scene", "tests/scenes/noalerts.toml", "check"]);
-    let least = said.lines().find(|line| line.contains("least clearance")).unwrap();
+    let (_, printed, _) = answer(&["--scene", "tests/scenes/noalerts.toml", "check"]);
+    let least = printed.lines().find(|line| line.contains("least clearance")).unwrap();
     assert!(least.contains("is -0.") || least.contains("is -1"), "the overlap by the lock: {least}");
 }
 
@@ -170,7 +170,7 @@ fn a_pitch_that_does_not_exist_is_refused() {
     }
 }
 
-/// N5, N7, N9, N10: what took minutes, or never ended, ends, or says how far it came.
+/// N5, N7, N9, N10: what took minutes, or never ended, ends, or reports how far it came.
 #[test]
 fn long_scenes_end_or_say_how_far_they_came() {
     let cases: [(&str, &[&str]); 8] = [
@@ -185,12 +185,12 @@ fn long_scenes_end_or_say_how_far_they_came() {
     ];
     for (name, arguments) in cases {
         let scene = format!("tests/scenes/{name}.toml");
-        let (code, stdout, said) = answer(&[&["--scene", scene.as_str()], arguments].concat());
-        println!("{name} {arguments:?}: {code}\n{stdout}{said}");
-        assert!(!said.contains("panicked"), "{name}: {said}");
-        let explained = said.contains("searched up to") || said.contains("too long to be searched");
-        assert!(code == 0 || (code == 2 && explained), "{name} {arguments:?}: {code} {said}");
-        assert!(!stdout.is_empty() || explained, "{name} {arguments:?} says nothing");
+        let (code, stdout, printed) = answer(&[&["--scene", scene.as_str()], arguments].concat());
+        println!("{name} {arguments:?}: {code}\n{stdout}{printed}");
+        assert!(!printed.contains("panicked"), "{name}: {printed}");
+        let explained = printed.contains("searched up to") || printed.contains("too long to be searched");
+        assert!(code == 0 || (code == 2 && explained), "{name} {arguments:?}: {code} {printed}");
+        assert!(!stdout.is_empty() || explained, "{name} {arguments:?} prints nothing");
     }
 }
 
@@ -214,7 +214,7 @@ fn short_links_near_the_centre_of_a_wide_spiral_hold() {
     }
 }
 
-/// N11: a lock at the very end of what doubles tell still has a place, and an event's printed time can be asked for.
+/// N11: a lock at the very end of what doubles resolve still has a place, and an event's printed time can be solved.
 #[test]
 fn a_lock_has_a_place_and_a_time_that_can_be_asked_for() {
     let scene = scene("x2");
@@ -222,8 +222,8 @@ fn a_lock_has_a_place_and_a_time_that_can_be_asked_for() {
     let place = timeline.find(Lock).expect("a lock").event.place.expect("a place");
     assert!(place.x.is_finite() && place.y.is_finite());
     let on_scene = |arguments: &[&str]| {
-        let (code, stdout, said) = answer(&[&["--scene", "tests/scenes/x2.toml"], arguments].concat());
-        assert_eq!(code, 0, "{arguments:?}: {said}");
+        let (code, stdout, printed) = answer(&[&["--scene", "tests/scenes/x2.toml"], arguments].concat());
+        assert_eq!(code, 0, "{arguments:?}: {printed}");
         stdout
     };
     let events = on_scene(&["--json", "events"]);

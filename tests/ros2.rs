@@ -67,7 +67,7 @@ fn both_kinds_of_subscriber_get_the_frames_of_the_shared_memory() {
 }
 
 #[test]
-fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_what_msgs_says() {
+fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs() {
     if !can_run(python_modules(&["cyclonedds"])) {
         return;
     }
@@ -102,7 +102,7 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_what_msgs_sa
     assert!(!lines.is_empty(), "{}", text(&output.stderr));
 
     let alerts = messages(&lines, topics[0]);
-    // RustDDS keeps a few alerts more than the one it is asked to keep; they come in order, and the last one holds.
+    // RustDDS keeps a few alerts more than the one that the depth allows; they come in order, and the last one holds.
     let times: Vec<f64> = alerts.iter().map(|alert| alert["sim_time"].as_f64().unwrap()).collect();
     assert!(times.len() <= 12 && times.is_sorted(), "{times:?}");
     let alert = alerts.last().unwrap();
@@ -204,10 +204,10 @@ fn what_ros_2_cannot_do_is_refused_in_a_sentence() {
     ] {
         let output = Process::start(program("refused").env(variable, value).args(["run", "--ros2", "--duration", "1"]))
             .output_within(20);
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(said.contains(variable) && said.contains(expected), "{said}");
-        assert_eq!(said.trim().lines().count(), 1, "{said}");
+        let printed = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{printed}");
+        assert!(printed.contains(variable) && printed.contains(expected), "{printed}");
+        assert_eq!(printed.trim().lines().count(), 1, "{printed}");
     }
     let mut run = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
     let output = Process::start(run.args(["run", "--ros2", "--name", "2nd dragon"])).output_within(20);
@@ -237,23 +237,23 @@ fn a_reliable_subscriber_that_stops_reading_holds_nobody_up() {
     stopped.signal(nix::sys::signal::Signal::SIGSTOP);
     let output = publisher.output_within(40);
     stopped.signal(nix::sys::signal::Signal::SIGKILL);
-    let said = text(&output.stderr);
+    let printed = text(&output.stderr);
     let summary = summary(&output);
     let number = |value: &Value| value.as_u64().unwrap();
     assert_eq!(number(&summary["frames"]) + number(&summary["skipped"]), 840, "{summary}");
     assert!(number(&summary["ros2"]["discarded"]) > 0, "{summary}");
-    assert_eq!(said.matches("discarded").count(), 1, "said once: {said}");
+    assert_eq!(printed.matches("discarded").count(), 1, "not printed once: {printed}");
 }
 
 #[test]
 fn without_being_asked_there_is_no_dds_thread_and_no_network_socket() {
     let plain = Process::start(program("plain").args(["run", "--duration", "6"]));
-    let asked = Process::start(program("asked").args(["run", "--ros2", "--duration", "6"]));
+    let requested = Process::start(program("requested").args(["run", "--ros2", "--duration", "6"]));
     wait(2.0);
     let (threads, sockets) = of_process(plain.id());
     assert_eq!((dds_threads(&threads), sockets), (0, 0), "{threads:?}");
     // That the same look finds them where they are.
-    let (threads, sockets) = of_process(asked.id());
+    let (threads, sockets) = of_process(requested.id());
     assert!(dds_threads(&threads) >= 2 && sockets >= 2, "{threads:?}, {sockets} sockets");
 }
 
@@ -378,8 +378,8 @@ fn the_example_that_needs_no_ros_prints_the_frames() {
     let publisher = Process::start(program("example").args(["run", "--ros2", "--json", "--duration", "7"]));
     let mut example = python();
     example.args(["examples/python/cyclone_listener.py", "--name", &unique("example"), "--seconds", "4.5"]);
-    let said = text(&Process::start(&mut example).output_within(40).stdout);
-    assert!(said.lines().count() >= 3, "{said}");
-    assert!(said.lines().last().is_some_and(|line| line.contains("224 handles, head (")), "{said}");
+    let printed = text(&Process::start(&mut example).output_within(40).stdout);
+    assert!(printed.lines().count() >= 3, "{printed}");
+    assert!(printed.lines().last().is_some_and(|line| line.contains("224 handles, head (")), "{printed}");
     summary(&publisher.output_within(30));
 }

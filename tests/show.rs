@@ -1,4 +1,4 @@
-//! The show: deterministic, without drift, frozen and looped as the scene says, and with levels that do not depend on
+//! The show: deterministic, without drift, frozen and looped as the scene states, and with levels that do not depend on
 //! how often it is looked at.
 
 use std::hash::{DefaultHasher, Hash, Hasher};

@@ -25,8 +25,8 @@ fn number(value: &Value, key: &str) -> u64 {
 }
 
 /// The checks of limits, by name: whether each passed, and its value.
-fn judgements(report: &Value) -> BTreeMap<&str, (bool, f64)> {
-    let all = report["judgements"].as_array().unwrap().iter();
+fn checks(report: &Value) -> BTreeMap<&str, (bool, f64)> {
+    let all = report["checks"].as_array().unwrap().iter();
     let value = |one: &Value| one["value"].as_f64().unwrap_or(f64::NAN);
     all.map(|one| (one["name"].as_str().unwrap(), (one["passed"] == true, value(one)))).collect()
 }
@@ -117,9 +117,9 @@ fn a_broken_limit_fails_even_when_interrupted() {
     assert!(text(&output.stderr).contains("wake-up lateness"), "{}", text(&output.stderr));
     let report = json_lines(&output).pop().unwrap();
     assert_eq!(report["verdict"], "FAIL");
-    let judgements = judgements(&report);
-    let failed: Vec<_> = judgements.iter().filter(|(_, (passed, _))| !passed).collect();
-    assert_eq!(failed.len(), 1, "{judgements:?}");
+    let checks = checks(&report);
+    let failed: Vec<_> = checks.iter().filter(|(_, (passed, _))| !passed).collect();
+    assert_eq!(failed.len(), 1, "{checks:?}");
     assert!(failed[0].0.contains("lateness") && failed[0].1.1 > 1.0, "{failed:?}");
     place.assert_clean();
 }
@@ -149,7 +149,7 @@ fn a_publisher_that_dies_fails_the_test_at_once() {
     assert_eq!(output.status.code(), Some(1));
     let report = json_lines(&output).pop().unwrap();
     assert_eq!((&report["verdict"], &report["publisher"]), (&Value::from("FAIL"), &Value::Null));
-    assert!(!judgements(&report)["processes that ended by themselves or hung"].0);
+    assert!(!checks(&report)["processes that ended by themselves or hung"].0);
 }
 
 #[test]
@@ -183,9 +183,9 @@ fn what_cannot_be_is_refused_before_it_starts() {
     ];
     for (arguments, named) in cases {
         let output = Process::start(program("refused").arg("soak").args(arguments)).output_within(20);
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
-        assert!(said.contains(named), "{said}");
+        let printed = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {printed}");
+        assert!(printed.contains(named), "{printed}");
     }
 }
 

@@ -28,7 +28,7 @@ const ACCURACY: f64 = 1e-9;
 /// A motion to be solved, and until when.
 struct Subject {
     motion: Motion,
-    /// Seconds up to which it is judged: the lock or path end, or an event that is named.
+    /// Seconds up to which it is tested: the lock or path end, or an event that is named.
     end: f64,
 }
 
@@ -272,7 +272,7 @@ fn every_scene_of_the_configuration_keeps_the_promise() {
 
 #[test]
 fn corners_of_the_ranges() {
-    // Benches, links of head and body, pitch, start turn, speed. Each line says what it is there for.
+    // Benches, links of head and body, pitch, start turn, speed. Each line states what it is there for.
     let corners = [
         // The closest start there is for a team that fits: all of it within two turns.
         spiral(1, 0.3, 0.3, 0.55, 1.0, 1.0),
@@ -326,7 +326,7 @@ fn short_links_far_from_the_centre() {
 
 #[test]
 fn a_hundred_thousand_benches_hold_their_links() {
-    // The reference would take minutes; the safe solver stands in for it, itself judged above.
+    // The reference would take minutes; the safe solver stands in for it, itself tested above.
     let team = Team { benches: 100_000, ..paper_team() };
     let subject = Subject::new(PathDescription::Spiral { pitch: 0.55, start_turn: 16.0 }, team, 1.0);
     let (mut chain, mut safe) = (Chain::new(100_001), Chain::new(100_001));
@@ -417,7 +417,7 @@ fn hash_of_frames(subject: &Subject, solver: &mut dyn Solver) -> u64 {
     hash
 }
 
-/// The bits of frames, as they were when these hashes were written down: a change that changes a bit says so here.
+/// The bits of frames, as they were when these hashes were written down: a change that changes a bit shows here.
 ///
 /// The hashes are for the C library's sine and cosine on x86-64 with FMA, which the making of a table uses.
 #[test]
@@ -522,7 +522,7 @@ fn random_subjects(subjects: impl Strategy<Value = Subject>, least_share_of_tabl
     let config = Config { cases: if long { 100_000 } else { 300 }, failure_persistence: None, ..Config::default() };
     let (cases, tables, compared) = (config.cases, Cell::new(0), Cell::new(0u64));
     let case = (subjects, 0.0..0.995f64);
-    // The same scenes in every run, unless the long one is asked for.
+    // The same scenes in every run, unless the long one is requested.
     let seed = if long {
         TestRng::from_seed(RngAlgorithm::ChaCha, &long_seed())
     } else {

@@ -81,15 +81,15 @@ fn a_program_reads_the_documented_layout() {
     let mut socket = connect(&address);
     let stage = loop {
         if let Message::Text(json) = socket.read().unwrap() {
-            let said: Value = serde_json::from_str(&json).unwrap();
-            if said["type"] == "stage" {
-                break said;
+            let printed: Value = serde_json::from_str(&json).unwrap();
+            if printed["type"] == "stage" {
+                break printed;
             }
         }
     };
     let numbers = ["pitch", "start_turn", "hole_inset", "head_length", "body_length", "width", "benches"];
-    let told: Vec<_> = numbers.iter().map(|key| stage[key].as_f64().unwrap()).collect();
-    assert_eq!(told, [0.55, 16.0, 0.275, 3.41, 2.2, 0.3, 223.0]);
+    let received: Vec<_> = numbers.iter().map(|key| stage[key].as_f64().unwrap()).collect();
+    assert_eq!(received, [0.55, 16.0, 0.275, 3.41, 2.2, 0.3, 223.0]);
     assert_eq!(stage["path"].as_array().unwrap().len(), 1);
     assert_eq!(stage["path"][0]["kind"], "inward_spiral");
     assert_eq!(stage["path"][0]["theta_first"], 32.0 * std::f64::consts::PI);
@@ -107,14 +107,21 @@ fn a_program_reads_the_documented_layout() {
     let truth = truth_at_300();
     assert_eq!(truth.len(), 224);
     for (handle, [x, y, speed]) in truth.iter().enumerate() {
-        let told = [0, 4, 8, 12, 16].map(|at| f32_at(&bytes, 72 + 20 * handle + at));
-        assert!((told[0] - x).hypot(told[1] - y) < 2e-6, "handle {handle} is at {told:?}, not {x}, {y}");
-        assert!((told[3].hypot(told[4]) - speed).abs() < 1e-6, "handle {handle}: {told:?}, not {speed} m/s");
+        let received = [0, 4, 8, 12, 16].map(|at| f32_at(&bytes, 72 + 20 * handle + at));
+        assert!((received[0] - x).hypot(received[1] - y) < 2e-6, "handle {handle} is at {received:?}, not {x}, {y}");
+        assert!(
+            (received[3].hypot(received[4]) - speed).abs() < 1e-6,
+            "handle {handle}: {received:?}, not {speed} m/s"
+        );
         let bench = handle.min(222);
         let [front, rear] = [truth[bench], truth[bench + 1]];
         let heading = (front[1] - rear[1]).atan2(front[0] - rear[0]);
-        let turned = (told[2] - heading).rem_euclid(std::f64::consts::TAU);
-        assert!(turned.min(std::f64::consts::TAU - turned) < 2e-6, "handle {handle} heads {}, not {heading}", told[2]);
+        let turned = (received[2] - heading).rem_euclid(std::f64::consts::TAU);
+        assert!(
+            turned.min(std::f64::consts::TAU - turned) < 2e-6,
+            "handle {handle} heads {}, not {heading}",
+            received[2]
+        );
     }
 }
 
@@ -128,12 +135,12 @@ fn the_python_example_reads_the_socket() {
     let url = format!("ws://{address}/frames");
     let arguments = ["examples/python/stage_socket.py", "--url", &url, "--seconds", "4"];
     let output = Process::start(python().args(arguments)).output_within(30);
-    let said = text(&output.stdout);
+    let printed = text(&output.stdout);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let [x, y, _] = truth_at_300()[0];
     let expected = format!("t =  300.000 s  moving      head ({x:.3}, {y:.3}) m  1.000 m/s");
-    assert!(said.lines().any(|line| line == expected), "no line is {expected}: {said}");
-    assert!(said.contains("'type': 'stage'") && said.contains("'level': 'clear'"), "{said}");
+    assert!(printed.lines().any(|line| line == expected), "no line is {expected}: {printed}");
+    assert!(printed.contains("'type': 'stage'") && printed.contains("'level': 'clear'"), "{printed}");
 }
 
 #[test]
@@ -203,8 +210,8 @@ fn listening_beyond_this_machine_is_said_aloud() {
     let mut open = Process::start(program("aloud").args(["view", "--port", "0", "--listen", "0.0.0.0"]));
     assert!(open.first_line_within(20).contains("of every address of this machine"));
     open.signal(Signal::SIGTERM);
-    let said = text(&open.output_within(20).stderr);
-    assert!(said.contains("WARNING") && said.contains("anyone"), "{said}");
+    let printed = text(&open.output_within(20).stderr);
+    assert!(printed.contains("WARNING") && printed.contains("anyone"), "{printed}");
     let mut closed = Process::start(program("quiet").args(["view", "--port", "0"]));
     assert!(closed.first_line_within(20).contains("http://127.0.0.1:"));
     closed.signal(Signal::SIGTERM);
@@ -216,14 +223,14 @@ fn an_address_that_cannot_be_used_is_one_sentence() {
     let (_server, address) = server("taken");
     let port = address.rsplit(':').next().unwrap();
     let taken = Process::start(program("taken").args(["view", "--port", port])).output_within(20);
-    let said = text(&taken.stderr);
-    assert_eq!(taken.status.code(), Some(1), "{said}");
-    assert!(said.contains("--port") && said.lines().count() == 1, "{said}");
+    let printed = text(&taken.stderr);
+    assert_eq!(taken.status.code(), Some(1), "{printed}");
+    assert!(printed.contains("--port") && printed.lines().count() == 1, "{printed}");
     // 192.0.2.0/24 is for documentation: no machine has it.
     let other = Process::start(program("other").args(["view", "--listen", "192.0.2.1"])).output_within(20);
-    let said = text(&other.stderr);
-    assert_eq!(other.status.code(), Some(2), "{said}");
-    assert!(said.contains("--listen") && said.lines().count() == 1, "{said}");
+    let printed = text(&other.stderr);
+    assert_eq!(other.status.code(), Some(2), "{printed}");
+    assert!(printed.contains("--listen") && printed.lines().count() == 1, "{printed}");
 }
 
 /// Chromium takes a core by itself.
@@ -249,8 +256,8 @@ fn run_scenario(script: &str, scenario: &str) {
 }
 
 #[test]
-fn boards_are_where_the_truth_says() {
-    in_a_browser("boards_are_where_the_truth_says");
+fn boards_are_where_the_truth_has_them() {
+    in_a_browser("boards_are_where_the_truth_has_them");
 }
 
 #[test]
@@ -279,8 +286,8 @@ fn motion_is_smooth_at_any_rate() {
 }
 
 #[test]
-fn between_frames_is_where_the_solver_says() {
-    in_motion("between_frames_is_where_the_solver_says");
+fn between_frames_is_where_the_solver_has_it() {
+    in_motion("between_frames_is_where_the_solver_has_it");
 }
 
 #[test]

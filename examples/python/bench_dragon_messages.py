@@ -41,7 +41,7 @@ LEVELS = (
     "contact",
     # A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
     "stall",
-    # A link is in a singular configuration: the motion cannot go on.
+    # A link is in a singular configuration: the motion cannot continue.
     "lock",
 )
 
@@ -53,7 +53,7 @@ EVENTS = {
     2: "contact",
     # A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
     3: "stall",
-    # A link is in a singular configuration: its rear handle would have to jump, and the motion cannot go on.
+    # A link is in a singular configuration: its rear handle would have to jump, and the motion cannot continue.
     4: "lock",
     # The head reaches the end of the path.
     5: "path_end",
@@ -107,9 +107,9 @@ class HandlePose(_Message):
         # Radians in (-pi, pi]: the direction of the bench this handle leads (from handle i+1 to handle i); the last
         # handle takes the last bench's.
         ("heading", ctypes.c_double),
-        # Velocity along x in simulation, metres per simulated second; NaN where the scene asks for no velocities.
+        # Velocity along x in simulation, metres per simulated second; NaN where the scene requests no velocities.
         ("vx", ctypes.c_double),
-        # Velocity along y in simulation, metres per simulated second; NaN where the scene asks for no velocities.
+        # Velocity along y in simulation, metres per simulated second; NaN where the scene requests no velocities.
         ("vy", ctypes.c_double),
     ]
 
@@ -173,7 +173,7 @@ class FrameHeader(_Message):
         ("handles", ctypes.c_uint32),
         # What the dragon is doing: one of `STATES`.
         ("state", ctypes.c_uint32),
-        # Whether simulated time goes on: one of `PLAYBACK`.
+        # Whether simulated time advances: one of `PLAYBACK`.
         ("playback", ctypes.c_uint32),
         # The latest cue passed, counted from 1; 0 where none has been.
         ("cue", ctypes.c_uint32),
@@ -260,7 +260,7 @@ class LoopStatus(_Message):
         ("stamp_ns", ctypes.c_uint64),
         # Simulated seconds of the latest frame.
         ("sim_time", ctypes.c_double),
-        # The rate asked for, frames per second.
+        # The requested rate, frames per second.
         ("rate", ctypes.c_double),
         # Frames published in the last second, divided by its true length.
         ("measured_rate", ctypes.c_double),
@@ -333,7 +333,7 @@ class Cue(_Message):
         ("cue_time", ctypes.c_double),
         # Its number, from 1 in the order of the cues' times.
         ("number", ctypes.c_uint32),
-        # 1 where the show waits there until it is told to go, else 0.
+        # 1 where the show waits there until the command `go`, else 0.
         ("pauses", ctypes.c_uint32),
         # Its name.
         ("name", ctypes.c_uint8 * 64),

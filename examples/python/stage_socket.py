@@ -58,7 +58,7 @@ def frame(message):
 
 
 def follow(socket, deadline):
-    told, states = 0.0, []
+    printed, states = 0.0, []
     for message in socket:
         if isinstance(message, str):
             message = json.loads(message)
@@ -67,8 +67,8 @@ def follow(socket, deadline):
             states = message["states"] if message["type"] == "stage" else states
         else:
             header, handles = frame(message)
-            if states and time.monotonic() - told >= 1:
-                told = time.monotonic()
+            if states and time.monotonic() - printed >= 1:
+                printed = time.monotonic()
                 x, y, _, vx, vy = handles[0]
                 name = states[header["state"]]["name"]
                 print(f"t = {header['sim_time']:8.3f} s  {name:11} head ({x:.3f}, {y:.3f}) m  {math.hypot(vx, vy):.3f} m/s", flush=True)

@@ -10,7 +10,7 @@ use bench_dragon::solve::Velocities;
 use super::events::{least_clearance, sentence};
 use super::{CommandError, Common, Output, number, search_timeline};
 
-/// Validates the scene and says what it would do.
+/// Validates the scene and prints what it would do.
 pub fn check(common: &Common) -> Result<(), CommandError> {
     let scene = common.load_scene()?;
     let timeline = search_timeline(&scene, common);
@@ -46,8 +46,8 @@ pub fn check(common: &Common) -> Result<(), CommandError> {
         "  At a contact the show {}; at its end it {}.",
         match (scene.alerts, scene.on_contact) {
             (Some(_), OnContact::Stop) => "freezes",
-            (Some(_), OnContact::Continue) => "goes on",
-            (None, _) => "goes on, unnoticed",
+            (Some(_), OnContact::Continue) => "continues",
+            (None, _) => "continues, unnoticed",
         },
         match scene.at_end {
             AtEnd::Hold => "holds the last frame",
@@ -62,7 +62,7 @@ pub fn check(common: &Common) -> Result<(), CommandError> {
             settings.topics.keys().map(|topic| topic.name()).collect::<Vec<_>>().join(", "),
             number(settings.rate_of(scene.rate))
         ),
-        None => "  ROS 2: nothing and no network socket, unless `run --ros2` asks for it.".to_owned(),
+        None => "  ROS 2: nothing and no network socket, unless `run --ros2` requests it.".to_owned(),
     })?;
     output.line("  Ahead, in simulated time:")?;
     for timed in timeline.events() {

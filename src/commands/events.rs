@@ -49,7 +49,7 @@ pub fn events(common: &Common) -> Result<(), CommandError> {
     output.finish()
 }
 
-/// An event for people; benches are counted from 1, and the sentence says so.
+/// An event for people; benches are counted from 1, and the sentence states it.
 pub fn sentence(scene: &Scene, timed: &TimedEvent) -> String {
     let TimedEvent { event, time } = *timed;
     let bench = |bench: Option<u32>| bench.map_or("no bench".to_owned(), |bench| bench_name(scene, bench));
@@ -59,7 +59,7 @@ pub fn sentence(scene: &Scene, timed: &TimedEvent) -> String {
         EventKind::Contact if time == 0.0 => format!("{first} and {second} overlap from the start, most deeply{place}"),
         EventKind::Contact => format!("{first} and {second} touch{place}"),
         EventKind::Stall => format!("{first} stalls: from the handle{place} on, the team is pushed backwards"),
-        EventKind::Lock => format!("{first} locks, its rear handle{place}: the motion cannot go on"),
+        EventKind::Lock => format!("{first} locks, its rear handle{place}: the motion cannot continue"),
         EventKind::PathEnd => "the head reaches the end of the path".to_owned(),
     };
     format!("{:>9}  t = {} s: {what} (counting from 1).", event.kind.name(), number(time))

@@ -7,7 +7,7 @@ use bench_dragon::live::realtime;
 
 use super::CommandError;
 
-/// What the operating system is asked for.
+/// What is requested from the operating system.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Real-time scheduling")]
 pub struct RealtimeScheduling {
@@ -24,7 +24,7 @@ pub struct RealtimeScheduling {
 }
 
 impl RealtimeScheduling {
-    /// Asks for it, on the loop's thread. The CPUs stay awake for as long as what is returned is kept.
+    /// Requests it, on the loop's thread. The CPUs stay awake for as long as what is returned is kept.
     ///
     /// # Errors
     /// Bad input: there is no such CPU. What the user has no right to is a warning.

@@ -52,13 +52,13 @@ pub struct RunArguments {
     /// Begin again whenever the show has ended
     #[arg(long = "loop", help_heading = "The show")]
     looping: bool,
-    /// Wait at the start until told to go (see the command `control`)
+    /// Wait at the start for the command `control go`
     #[arg(long, help_heading = "The show")]
     paused: bool,
     /// Wall time for which a looping show stands at its end, seconds; by default the scene's
     #[arg(long, value_name = "SECONDS", hide = true)]
     end_hold: Option<f64>,
-    /// Publish ROS 2 topics too, as the scene's [publish.ros2] says or the usual ones
+    /// Publish ROS 2 topics too, those of the scene's [publish.ros2] or the default ones
     #[arg(long)]
     ros2: bool,
     #[command(flatten)]
@@ -177,7 +177,8 @@ impl RunSession<'_> {
         Ok((transports, Doors::new(ports)))
     }
 
-    /// What the loop's thread does first: asks the system for what it was told to, opens its ends of the transports.
+    /// What the loop's thread does first: it requests its scheduling from the system and opens its ends of the
+    /// transports.
     fn prepare_loop(&self, mut transports: Vec<Box<dyn Transport>>) -> Result<LoopEnds, CommandError> {
         let awake = self.arguments.scheduling.prepare_thread()?;
         let publishers = transports.iter_mut().map(|transport| transport.publisher()).collect::<Result<_, _>>()?;
@@ -305,7 +306,7 @@ impl RunSession<'_> {
     }
 }
 
-/// A thread of this program panicked, which it says itself.
+/// A thread of this program panicked, which it has reported itself.
 fn lost(thread: &str) -> CommandError {
     CommandError::Failed(format!("the {thread} thread ended early"))
 }

@@ -103,7 +103,7 @@ pub fn soak(common: &Common, arguments: &SoakArguments) -> Result<(), CommandErr
     let verdict = Verdict::of(&fleet, &limits);
     let report = Report {
         verdict: verdict.word(),
-        judgements: verdict,
+        checks: verdict.checks,
         command: std::env::args().collect(),
         version: env!("CARGO_PKG_VERSION"),
         machine: Machine::this(),
@@ -140,8 +140,7 @@ fn conclude(report: &Report, common: &Common, files: Option<ReportFiles>) -> Res
     if report.verdict == "PASS" {
         return Ok(());
     }
-    let broken: Vec<_> =
-        report.judgements.checks.iter().filter(|check| !check.passed).map(|check| check.name).collect();
+    let broken: Vec<_> = report.checks.iter().filter(|check| !check.passed).map(|check| check.name).collect();
     Err(CommandError::Failed(format!("the soak test failed: {}", broken.join("; "))))
 }
 

@@ -40,7 +40,7 @@ struct TimeLine {
     handles: Vec<[f64; 6]>,
 }
 
-/// Solves the scene at the times asked for and prints the table.
+/// Solves the scene at the requested times and prints the table.
 pub fn solve(common: &Common, arguments: &SolveArguments) -> Result<(), CommandError> {
     let scene = common.load_scene()?;
     let wants_contact = arguments.at.iter().any(|time| time.trim() == EventKind::Contact.name());
@@ -82,7 +82,7 @@ fn numbers(chain: &Chain, handle: usize) -> [f64; 6] {
 }
 
 impl SolveArguments {
-    /// How many times are asked for, and one after the other, all of them within the motion.
+    /// How many times are requested, and one after the other, all of them within the motion.
     fn times(&self, timeline: &Timeline) -> Result<Times, CommandError> {
         match (self.every, self.until) {
             (Some(every), Some(until)) => self.regular_times(every, until, timeline),

@@ -22,7 +22,7 @@ pub fn set_timer_slack() {
 
 /// Gives this thread the real-time priority `priority` under SCHED_FIFO and locks the memory the process has so far.
 ///
-/// Without the right to either a warning says how to get it. What is mapped later, the queues in shared memory among
+/// Without the right to either, a warning states how to get it. What is mapped later, the queues in shared memory among
 /// it, is not locked here: that would fill all of it, used or not.
 pub fn become_realtime(priority: u8) {
     // Every priority of PRIORITIES is a valid value.
@@ -49,7 +49,7 @@ const CPU_LATENCY_DEVICE: &str = "/dev/cpu_dma_latency";
 /// Lets no CPU of this machine sleep so deeply that it takes more than `microseconds` to wake up, for as long as the
 /// returned file is open. With 0 idle CPUs do not sleep at all. cyclictest does the same by default.
 ///
-/// Without the right to it a warning says how to get it.
+/// Without the right to it, a warning states how to get it.
 pub fn limit_cpu_latency(microseconds: u32) -> Option<File> {
     // The device reads a signed 32-bit number; no CPU takes longer than what that holds.
     let limit = i32::try_from(microseconds).unwrap_or(i32::MAX);

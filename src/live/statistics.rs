@@ -64,7 +64,7 @@ pub struct RunSummary {
 pub struct Run<'a> {
     /// The run's number.
     pub run_id: u64,
-    /// Frames per second asked for.
+    /// Requested frames per second.
     pub rate: f64,
     /// The scene's name.
     pub scene: &'a str,

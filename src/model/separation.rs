@@ -197,7 +197,7 @@ fn clip(polygon: &mut [Vector; 8], count: usize, normal: Vector, offset: f64) ->
     let before = *polygon;
     let mut kept = 0;
     let mut push = |corner| {
-        // A convex polygon gains at most one corner per half-plane; rounding may say otherwise once it is a sliver.
+        // A convex polygon gains at most one corner per half-plane; rounding may give more once it is a sliver.
         if kept < polygon.len() {
             polygon[kept] = corner;
             kept += 1;

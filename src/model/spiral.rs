@@ -28,7 +28,7 @@ pub struct Spiral {
     direction: Direction,
 }
 
-/// No point behind is as far away as the link is long: going on would make the handle jump.
+/// No point behind is as far away as the link is long: any further motion would make the handle jump.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("no point behind on the path is one link away")]
 pub struct NoFollower;

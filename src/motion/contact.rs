@@ -7,7 +7,7 @@
 //!
 //! **How far handles move.** Handle 1 turns round only where the head is at a head turn, handle k + 1 only where handle
 //! k turns round or is at a body turn. So the two configurations at the ends of a step and the followers of the turns
-//! between tell what path each handle k passes over in it, forth and back (`displacement`); m_k is its length.
+//! between determine what path each handle k passes over in it, forth and back (`displacement`); m_k is its length.
 //!
 //! **How far boards move.** A point of a board is rear + s (front - rear) + w n, n the link's unit normal, s in
 //! [-e, 1 + e], e = inset / link, |w| <= width / 2. With handle velocities u and v, n turns at most at the rate
@@ -15,7 +15,7 @@
 //! |s| m_i + |1 - s| m_{i+1} + (width / (2 link)) (m_i + m_{i+1}), which for any s is at most
 //! C = max(m_i, m_{i+1}) + (e + width / (2 link)) (m_i + m_{i+1}).
 //!
-//! **Why nothing is skipped.** Say that at some moment of a step the clearance of a pair is x <= `limit`, limit >= 0.
+//! **Why nothing is skipped.** Let at some moment of a step the clearance of a pair is x <= `limit`, limit >= 0.
 //! Take the nearest points P and Q of the two boards at that moment, or one they share if they overlap: at most `limit`
 //! apart. The *same* two points of the boards are at the ends of the step at least as far apart as the clearances
 //! there, and their paths before and after the moment together are those of the step. So
@@ -31,8 +31,8 @@
 //! that turns about the centre with handle i and goes outward by a d theta_i, in one direction e of its own. With
 //! psi_k = theta_k - theta_i, the velocity of handle k in it is a d psi_k outward, r_k d psi_k around, and a d theta_i
 //! times the difference between the outward direction at handle k and e, at most the angle between them. While the
-//! handles from i to k go the same way, psi_k is monotone, so that the ends of the step tell these lengths: the angle
-//! of each link is, for (t . b) sqrt(a^2 + r^2) is larger at its outer handle than at its inner one, by
+//! handles from i to k go the same way, psi_k is monotone, so that the ends of the step determine these lengths: the
+//! angle of each link is, for (t . b) sqrt(a^2 + r^2) is larger at its outer handle than at its inner one, by
 //! 2 a (r + r') sin^2(d / 2) / link, so the outer one turns less.
 //!
 //! **Which pairs.** Every link behind the first has one length, so the place of handle i >= 1 decides where all behind
@@ -63,7 +63,7 @@ use configuration::Configuration;
 pub struct Found<T> {
     /// What was found.
     pub value: Option<T>,
-    /// Metres of travel of the head up to which that is proved: all that was asked for, unless the budget was spent.
+    /// Metres of travel of the head up to which that is proved: all that was requested, unless the budget was spent.
     pub searched_until: f64,
 }
 

@@ -10,7 +10,7 @@ pub enum EventKind {
     Contact,
     /// A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
     Stall,
-    /// A link is in a singular configuration: its rear handle would have to jump, and the motion cannot go on.
+    /// A link is in a singular configuration: its rear handle would have to jump, and the motion cannot continue.
     Lock,
     /// The head reaches the end of the path.
     PathEnd,
@@ -43,7 +43,7 @@ pub struct Event {
     pub place: Option<Point>,
 }
 
-/// How much a search may still do, and who is told how far it is. One unit of work is one link solved, or one pair of
+/// How much a search may still do, and who receives its progress. One unit of work is one link solved, or one pair of
 /// boards tested.
 pub struct Budget<'a> {
     left: u64,

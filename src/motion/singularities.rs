@@ -10,10 +10,10 @@
 //! reached by the foremost handle that did not start beyond it. The handles that start behind handle 1 are on the first
 //! segment: a straight line, where nothing happens, or an inward spiral, where nothing happens but near its centre
 //! (`inward`); only a start so near makes `Search::body_stall` consider more links. So there are two problems in one
-//! variable, a `LinkTrace` each: the head's link for all places of the head, and a body link for all places that handle 1
-//! has come to. They are solved in lockstep, and every step is proven to hold nothing unseen (`certificate`) or halved,
-//! down to what doubles can tell (`trace`). Between two turning points of handle 1 its place is monotone in the head's,
-//! so one is found from the other by bisection.
+//! variable, a `LinkTrace` each: the head's link for all places of the head, and a body link for all places that handle
+//! 1 has come to. They are solved in lockstep, and every step is proven to hold nothing unseen (`certificate`) or
+//! halved, down to the resolution of doubles (`trace`). Between two turning points of handle 1 its place is monotone in
+//! the head's, so one is found from the other by bisection.
 
 mod certificate;
 mod inward;

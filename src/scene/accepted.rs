@@ -1,4 +1,4 @@
-//! The ranges of numbers that a scene, or the command line, may ask for. Called by the scene and the commands.
+//! The ranges of numbers that a scene, or the command line, may request. Called by the scene and the commands.
 
 /// A closed range of accepted numbers and their unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,7 +34,7 @@ impl Accepted {
     pub const RATE: Self = Self { least: 0.1, greatest: 20_000.0, unit: "frames per second" };
     /// Simulated seconds per second of wall time.
     pub const TIME_SCALE: Self = Self { least: 1e-6, greatest: 1e6, unit: "simulated seconds per second" };
-    /// Position error asked for.
+    /// Requested position error.
     pub const ACCURACY: Self = Self { least: 1e-18, greatest: 1e3, unit: "metres" };
     /// Times and clearances at which a warning is given.
     pub const WARNING: Self = Self { least: 0.0, greatest: 1e9, unit: "seconds or metres" };

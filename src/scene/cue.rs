@@ -21,7 +21,7 @@ pub struct Cue {
     pub then: CueAction,
 }
 
-/// How a scene says when a cue is.
+/// How a scene states when a cue is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CueMoment {
     /// At simulated seconds since the start of the scene.
@@ -43,7 +43,7 @@ pub enum CueMoment {
 pub enum CueAction {
     /// It announces the cue.
     Mark,
-    /// It announces the cue and pauses until it is told to go.
+    /// It announces the cue and pauses until the command `go`.
     Pause,
 }
 

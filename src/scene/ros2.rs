@@ -1,4 +1,4 @@
-//! What a scene may say of its ROS 2 topics: `[publish.ros2]`.
+//! What a scene may state about its ROS 2 topics: `[publish.ros2]`.
 //!
 //! In: the table as written. Out: [`Ros2Settings`], checked. Called by the scene; read by the ROS 2 transport.
 
@@ -9,7 +9,7 @@ use toml::Spanned;
 
 use super::{Accepted, SceneError, Source};
 
-/// A topic that a scene can ask for.
+/// A topic that a scene can request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Topic {
@@ -30,7 +30,7 @@ pub enum Topic {
 }
 
 impl Topic {
-    /// What is published where the scene does not say.
+    /// What is published by default.
     pub const DEFAULT: [Self; 5] = [Self::Handles, Self::Poses, Self::Alerts, Self::Stage, Self::Diagnostics];
 
     /// The name in the scene, and the last part of the topic's.
@@ -55,7 +55,7 @@ impl Topic {
         }
     }
 
-    /// The quality of service where the scene does not say.
+    /// The default quality of service.
     ///
     /// Reliable throughout, since a default subscription is reliable and gets nothing from a best-effort publisher; a
     /// best-effort subscription gets what a reliable publisher sends. What is sent seldom is kept for late subscribers.
@@ -85,7 +85,7 @@ pub enum Reliability {
 pub enum Durability {
     /// They do not.
     Volatile,
-    /// They get the last messages, as many as the depth says.
+    /// They get the last messages, as many as the depth.
     TransientLocal,
 }
 
@@ -100,10 +100,10 @@ pub struct Qos {
     pub depth: u32,
 }
 
-/// What a scene says of its ROS 2 topics.
+/// What a scene states about its ROS 2 topics.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ros2Settings {
-    /// Frames per second on ROS 2; where the scene does not say, the smaller of 60 and the loop's rate.
+    /// Frames per second on ROS 2; by default the smaller of 60 and the loop's rate.
     pub rate: Option<f64>,
     /// The topics and how each is published.
     pub topics: BTreeMap<Topic, Qos>,

@@ -11,7 +11,7 @@ const MOST_STEPS: f64 = 9_007_199_254_740_992.0;
 /// A command, numbered on the wire in this order, from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Command {
-    /// Does nothing: the answer tells how the show stands.
+    /// Does nothing: the answer reports the state of the show.
     State,
     /// Simulated time stands still.
     Pause,
@@ -29,7 +29,7 @@ pub enum Command {
     Hold,
     /// From hold to paused.
     Release,
-    /// On from where the show waits: a cue that pauses, or a start that was asked to wait.
+    /// On from where the show waits: a cue that pauses, or a start that waits.
     Go,
 }
 

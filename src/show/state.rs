@@ -118,7 +118,7 @@ pub enum Level {
     Contact,
     /// A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
     Stall,
-    /// A link is in a singular configuration: the motion cannot go on.
+    /// A link is in a singular configuration: the motion cannot continue.
     Lock,
 }
 

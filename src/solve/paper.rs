@@ -61,8 +61,8 @@ impl Paper {
     }
 }
 
-/// The head's polar angle by Euler steps; remembers the last one asked for, so that a running show pays only for the
-/// steps since. The angle after n steps does not depend on what was asked before.
+/// The head's polar angle by Euler steps; remembers the last one computed, so that a running show pays only for the
+/// steps since. The angle after n steps does not depend on earlier calls.
 #[derive(Debug, Clone)]
 struct EulerHead {
     start: f64,

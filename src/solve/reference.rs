@@ -12,7 +12,7 @@ mod walk;
 #[cfg(test)]
 mod tests;
 
-use self::path::{Place, RealPath};
+use self::path::{RealParam, RealPath};
 use self::real::Real;
 use self::walk::Walk;
 use crate::linkage::NoFollower;
@@ -41,7 +41,7 @@ pub struct Reference {
 /// A handle in its place on the path.
 struct Seat {
     segment: usize,
-    place: Place,
+    place: RealParam,
     /// What the coordinate gains per second.
     rate: Real,
 }
@@ -93,7 +93,7 @@ impl Reference {
     ///
     /// The guess is the first one up to the rounding of doubles. That of Newton's method is taken to be the same where
     /// it is within a millionth of the link and the distance grows backward there.
-    fn follower(&mut self, segment: usize, front: &Place, link: f64) -> Result<(usize, Place), NoFollower> {
+    fn follower(&mut self, segment: usize, front: &RealParam, link: f64) -> Result<(usize, RealParam), NoFollower> {
         let (mut segment, guess) = self.guess(segment, front, link)?;
         let mut place = self.settled(segment, front, guess.clone(), link)?;
         // Near a junction the place may be on a neighbour of the segment on which the guess is.
@@ -107,7 +107,7 @@ impl Reference {
         if grows > 0.0 && moved.rounded().norm() <= 1e-6 * link { Ok((segment, place)) } else { Err(NoFollower) }
     }
 
-    fn guess(&mut self, segment: usize, front: &Place, link: f64) -> Result<(usize, Place), NoFollower> {
+    fn guess(&mut self, segment: usize, front: &RealParam, link: f64) -> Result<(usize, RealParam), NoFollower> {
         for index in (0..=segment).rev() {
             let on = self.path.segment(index);
             let from = if index == segment { front } else { &on.last };
@@ -120,9 +120,15 @@ impl Reference {
         Err(NoFollower)
     }
 
-    /// Newton's method on the square of the distance from `front`, from a place on a segment, which is taken to go on
-    /// beyond its ends.
-    fn settled(&mut self, segment: usize, front: &Place, from: Place, link: f64) -> Result<Place, NoFollower> {
+    /// Newton's method on the square of the distance from `front`, from a place on a segment, which is taken to
+    /// continue beyond its ends.
+    fn settled(
+        &mut self,
+        segment: usize,
+        front: &RealParam,
+        from: RealParam,
+        link: f64,
+    ) -> Result<RealParam, NoFollower> {
         let square = Real::from(link).square();
         let mut place = from;
         for _ in 0..60 {
@@ -140,7 +146,7 @@ impl Reference {
     }
 
     /// Where a place is beyond an end of its segment: the neighbour there and the place on it where the two join.
-    fn neighbour(&self, segment: usize, place: &Place) -> Option<(usize, Place)> {
+    fn neighbour(&self, segment: usize, place: &RealParam) -> Option<(usize, RealParam)> {
         let on = self.path.segment(segment);
         let ahead = on.curve.forward() * (&place.at - &on.last.at).rounded();
         let behind = on.curve.forward() * (&on.first.at - &place.at).rounded();

@@ -1,13 +1,13 @@
-//! Which table serves a wish for accuracy: the one that reads the fewest bytes a handle of those that were measured to
-//! meet it on this very path and team.
+//! Selects the table for a requested accuracy: of those measured to meet it on this very path and team, the one that
+//! reads the fewest bytes a handle.
 //!
-//! In: the motion and the wish. Out: a table with what was measured of it. The same wish gives the same table in every
-//! run: cost is counted in bytes, never timed. [`crate::motion`] and `trade` call it.
+//! In: the motion and the requested accuracy. Out: a table with what was measured of it. The same request gives the
+//! same table in every run: cost is counted in bytes, never timed. [`crate::motion`] and `trade` call it.
 //!
-//! Every candidate starts from one table of T whose own polynomials are off by a sixteenth of the wish. What a format
-//! loses of them is bounded over all phases while it is made; then frames are compared with the safe solver's at
-//! moments over the whole way, junctions and the last metres of the table included. Half the wish is left for what lies
-//! between these moments.
+//! Every candidate starts from one table of T whose own polynomials are off by a sixteenth of the requested accuracy.
+//! What a format loses of them is bounded over all phases while it is made; then frames are compared with the safe
+//! solver's at moments over the whole way, junctions and the last metres of the table included. Half the requested
+//! accuracy is left for what lies between these moments.
 
 use std::time::{Duration, Instant};
 
@@ -28,25 +28,25 @@ const MOST_HANDLES: usize = 500_000;
 /// Moments, at least.
 const FEWEST_MOMENTS: usize = 4;
 
-/// The greatest wish that is taken at its word, in links. Weaker ones would make the live clearance test dozens of
+/// The coarsest accuracy that is used as requested, in links. Coarser ones would make the live clearance test dozens of
 /// pairs a frame, which costs more than the frame itself can save.
 const COARSEST: f64 = 1e-3;
 
-/// Wishes up to this, metres, get links to 1e-12 of their length.
+/// Requested accuracies up to this, metres, get links to 1e-12 of their length.
 pub const EXACT_LINKS: f64 = 1e-9;
 
-/// Wishes up to this, metres, get the most exact table: rounding along the chain is as much.
+/// Requested accuracies up to this, metres, get the most exact table: rounding along the chain is as much.
 const FINEST: f64 = 2e-12;
 
 /// What speeds may be off, relative to themselves, where links are exact: both ends of a link agree to so much.
 const FINEST_SPEED: f64 = 1e-11;
 
-/// Parts of the wish: for the polynomials of T, for the format, and what may be measured of both.
+/// Parts of the requested accuracy: for the polynomials of T, for the format, and what may be measured of both.
 const SHARE_OF_ROWS: f64 = 1.0 / 16.0;
 const SHARE_OF_FORMAT: f64 = 3.0 / 8.0;
 const SHARE_MEASURED: f64 = 0.5;
 
-/// Metres by which links may be off, besides rounding, where this accuracy was asked for: both ends may be off by as much.
+/// Metres by which links may be off, besides rounding, at a requested accuracy: both ends may be off by as much.
 pub fn link_tolerance(team: &Team, accuracy: f64) -> f64 {
     if accuracy > EXACT_LINKS { 2.0 * accuracy.min(COARSEST * team.shortest_link()) } else { 0.0 }
 }
@@ -55,11 +55,12 @@ pub fn link_tolerance(team: &Team, accuracy: f64) -> f64 {
 pub struct Selection {
     /// The solver.
     pub table: FollowerTable,
-    /// Metres: the wish, or a thousandth of the shortest link if that is less.
+    /// Metres: the requested accuracy, or a thousandth of the shortest link if that is less.
     pub accuracy: f64,
     /// Metres: the largest distance of a handle from the safe solver's.
     pub error: f64,
-    /// Metres that the measured error may be: what the wish leaves, or what doubles allow where that is more.
+    /// Metres that the measured error may be: what the requested accuracy leaves, or what doubles allow where that is
+    /// more.
     pub allowed: f64,
     /// Moments at which it was measured.
     pub moments: usize,
@@ -68,12 +69,12 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// Whether the wish was measured to be met.
+    /// Whether the measured error meets the requested accuracy.
     pub fn meets(&self) -> bool {
         self.error <= self.allowed
     }
 
-    /// Whether rounding alone can be more than the wish where the error is the largest part of what is allowed.
+    /// Whether rounding alone can exceed the requested accuracy where the error is the largest part of what is allowed.
     pub fn is_at_the_floor(&self) -> bool {
         self.allowed > self.accuracy
     }
@@ -91,10 +92,10 @@ pub fn cheapest(path: &Path, team: Team, head_speed: f64, velocities: Velocities
     let make = |tolerance: Tolerance| FollowerTable::with_tolerance(path, team, head_speed, velocities, tolerance);
     let tolerance = tolerance(&team, accuracy);
     let rows = make(tolerance)?;
-    let judge = Judge::new(path, team, head_speed, &rows);
+    let measurement = ErrorMeasurement::new(path, team, head_speed, &rows);
     let select = |table: FollowerTable| {
-        let (error, allowed) = judge.error(&table, accuracy);
-        let (moments, made_in) = (judge.moments.len(), began.elapsed());
+        let (error, allowed) = measurement.error(&table, accuracy);
+        let (moments, made_in) = (measurement.moments.len(), began.elapsed());
         Selection { table: table.promising(accuracy), accuracy, error, allowed, moments, made_in }
     };
     if accuracy > EXACT_LINKS {
@@ -116,7 +117,7 @@ pub fn cheapest(path: &Path, team: Team, head_speed: f64, velocities: Velocities
     Some(select(make(Tolerance::EXACT)?))
 }
 
-/// How exact the rows of a table have to be for a wish.
+/// How exact the rows of a table have to be for a requested accuracy.
 fn tolerance(team: &Team, accuracy: f64) -> Tolerance {
     let exact = Tolerance::EXACT;
     if accuracy <= FINEST {
@@ -132,7 +133,7 @@ fn tolerance(team: &Team, accuracy: f64) -> Tolerance {
 }
 
 /// Where the safe solver has the handles at some moments.
-struct Judge {
+struct ErrorMeasurement {
     head_speed: f64,
     moments: Vec<Moment>,
 }
@@ -143,7 +144,7 @@ struct Moment {
     y: Vec<f64>,
 }
 
-impl Judge {
+impl ErrorMeasurement {
     fn new(path: &Path, team: Team, head_speed: f64, table: &FollowerTable) -> Self {
         let times = times(path, &team, head_speed, table.valid_until());
         let newton = Newton::new(path.clone(), team, head_speed, Velocities::Omitted);

@@ -95,7 +95,7 @@ impl Instructions {
 
 /// A table of the follower map.
 ///
-/// Within the table the same times give the same bits on the same [`Instructions`], whichever frames were asked for
+/// Within the table the same times give the same bits on the same [`Instructions`], whichever frames were solved
 /// before.
 #[derive(Debug, Clone)]
 pub struct FollowerTable {
@@ -127,7 +127,7 @@ impl FollowerTable {
         Self::with_tolerance(path, team, head_speed, velocities, Tolerance::EXACT)
     }
 
-    /// The same as exact as asked for.
+    /// The same at the requested accuracy.
     pub(crate) fn with_tolerance(
         path: &Path,
         team: Team,
@@ -246,7 +246,7 @@ impl FollowerTable {
     }
 
     /// The chain when the head has travelled so many metres, within the table.
-    fn read_off(&self, travelled: f64, chain: &mut Chain) {
+    fn interpolate(&self, travelled: f64, chain: &mut Chain) {
         match self.instructions {
             // SAFETY: a solver is only made with instructions that this processor was found to have.
             #[cfg(target_arch = "x86_64")]
@@ -307,7 +307,7 @@ impl Solver for FollowerTable {
     fn solve(&mut self, time: f64, chain: &mut Chain) -> Result<(), NoFollower> {
         let travelled = self.head_speed * time;
         if (0.0..=self.head.valid_until()).contains(&travelled) {
-            self.read_off(travelled, chain);
+            self.interpolate(travelled, chain);
             return Ok(());
         }
         self.fallbacks += 1;

@@ -221,7 +221,7 @@ fn serve(mut sink: impl Sink, period_ns: u64, mut inbox: Inbox) {
 }
 
 impl BackgroundPublisher {
-    /// Whether a frame of this tick is to be sent: as many per second as the rate says, spread evenly.
+    /// Whether a frame of this tick is to be sent: the rate's number per second, evenly spaced.
     fn due(&mut self, tick: u64) -> bool {
         // At most 20,000 ticks a second: beyond 2^53 they would have run for 14,000 years.
         let slot = (tick as f64 * self.share) as u64;

@@ -50,7 +50,7 @@ struct Ros2Config {
     handles: usize,
     /// Frames per second.
     rate: f64,
-    /// What the scene says.
+    /// The scene's settings.
     settings: Ros2Settings,
     /// Whether there are alerts.
     alerts: bool,
@@ -68,7 +68,7 @@ struct Ros2 {
     thread: background::BackgroundThread,
 }
 
-/// Opens the topics that the scene asks for, on the network that the environment names.
+/// Opens the topics that the scene requests, on the network that the environment names.
 ///
 /// # Errors
 /// [`TransportError`]

@@ -30,9 +30,9 @@ pub struct HandlePose {
     /// Radians in (-pi, pi]: the direction of the bench this handle leads (from handle i+1 to handle i); the last
     /// handle takes the last bench's.
     pub heading: f64,
-    /// Velocity along x in simulation, metres per simulated second; NaN where the scene asks for no velocities.
+    /// Velocity along x in simulation, metres per simulated second; NaN where the scene requests no velocities.
     pub vx: f64,
-    /// Velocity along y in simulation, metres per simulated second; NaN where the scene asks for no velocities.
+    /// Velocity along y in simulation, metres per simulated second; NaN where the scene requests no velocities.
     pub vy: f64,
 }
 
@@ -91,7 +91,7 @@ pub struct FrameHeader {
     pub handles: u32,
     /// What the dragon is doing: one of [`FrameState`](crate::show::state::FrameState).
     pub state: u32,
-    /// Whether simulated time goes on: one of [`PlaybackState`](crate::show::state::PlaybackState).
+    /// Whether simulated time advances: one of [`PlaybackState`](crate::show::state::PlaybackState).
     pub playback: u32,
     /// The latest cue passed, counted from 1; 0 where none has been.
     pub cue: u32,
@@ -236,7 +236,7 @@ pub struct LoopStatus {
     pub stamp_ns: u64,
     /// Simulated seconds of the latest frame.
     pub sim_time: f64,
-    /// The rate asked for, frames per second.
+    /// The requested rate, frames per second.
     pub rate: f64,
     /// Frames published in the last second, divided by its true length.
     pub measured_rate: f64,
@@ -307,7 +307,7 @@ pub struct Cue {
     pub cue_time: f64,
     /// Its number, from 1 in the order of the cues' times.
     pub number: u32,
-    /// 1 where the show waits there until it is told to go, else 0.
+    /// 1 where the show waits there until the command `go`, else 0.
     pub pauses: u32,
     /// Its name.
     pub name: SceneName,

@@ -1,7 +1,7 @@
-//! Alerts in words, for people: benches are counted from 1, and the sentence says so.
+//! Alerts in words, for people: benches are counted from 1, and the sentence states it.
 //!
 //! In: a [`CollisionAlert`] and the number of benches. Out: a sentence. Called by `run`, `watch` and the stage picture's
-//! server, so that all of them say the same.
+//! server, so that all of them print the same.
 
 use super::layouts::CollisionAlert;
 use crate::motion::event::EventKind;
@@ -29,10 +29,10 @@ pub fn bench_name(bench: u32, benches: u32) -> String {
     }
 }
 
-/// What an alert says, in a team of so many benches: what has happened, or what is coming and which two are nearest.
+/// An alert as a sentence, in a team of so many benches: what has happened, or what is coming and the nearest two.
 pub fn alert_sentence(alert: &CollisionAlert, benches: u32, figures: Figures) -> String {
     let happened = alert.alert_level().is_some_and(Level::has_happened);
-    let said = match (happened, alert.event_kind()) {
+    let sentence = match (happened, alert.event_kind()) {
         (true, Some(kind)) => happening(alert, kind, benches),
         (true, None) => "at an unknown place".to_owned(),
         (false, kind) => {
@@ -44,10 +44,10 @@ pub fn alert_sentence(alert: &CollisionAlert, benches: u32, figures: Figures) ->
             }
         }
     };
-    if said.contains("bench ") { format!("{said} (counting from 1)") } else { said }
+    if sentence.contains("bench ") { format!("{sentence} (counting from 1)") } else { sentence }
 }
 
-/// What a state says that no alert tells of; `None` where an alert does, or there is nothing to say.
+/// A state that no alert reports, as a sentence; `None` where an alert does, or where there is nothing to report.
 pub fn state_sentence(state: FrameState) -> Option<&'static str> {
     match state {
         FrameState::PathEnd => Some("the head has reached the end of the path"),
@@ -63,7 +63,9 @@ fn happening(alert: &CollisionAlert, kind: EventKind, benches: u32) -> String {
         EventKind::Stall => {
             format!("{who} stalls, t = {time:.6} s: from the handle at {place} on, the team is pushed backwards")
         }
-        EventKind::Lock => format!("{who} locks, its rear handle at {place}, t = {time:.6} s: the motion cannot go on"),
+        EventKind::Lock => {
+            format!("{who} locks, its rear handle at {place}, t = {time:.6} s: the motion cannot continue")
+        }
         EventKind::PathEnd => format!("the head reaches the end of the path, t = {time:.6} s"),
     }
 }
@@ -151,8 +153,8 @@ mod tests {
             "bench 1 (the head) and bench 9 (the tail) touch at (1.250, -0.500) m, t = 412.473838 s (counting from 1)"
         );
         let lock = CollisionAlert { event_bench_b: NO_BENCH, ..alert(Level::Lock, Some(EventKind::Lock)) };
-        let said = alert_sentence(&lock, 223, SHOWN);
-        assert!(said.starts_with("bench 1 (the head) locks, its rear handle at (1.250, -0.500) m"), "{said}");
+        let sentence = alert_sentence(&lock, 223, SHOWN);
+        assert!(sentence.starts_with("bench 1 (the head) locks, its rear handle at (1.250, -0.500) m"), "{sentence}");
     }
 
     #[test]

@@ -44,9 +44,9 @@ fn plan_pitch_has_its_keys_for_every_team_and_the_bits_of_the_library() {
             let known = least_pitch(scene.load().team(), REACH, &mut |_| ()).unwrap();
             let [value, .., radius] = numbers(&line)[..] else { panic!("{line}") };
             assert!(same_bits(value, known.value) && same_bits(radius, known.head_radius), "{line} {known:?}");
-            let said = scene.answer(&PLAN_PITCH);
-            assert!(said.contains("4.5 m") && said.contains(&format!("{value:.10} m per turn")), "{said}");
-            assert!(said.contains(&format!("bench {}", b + 1)) && said.contains("counting from 1"), "{said}");
+            let printed = scene.answer(&PLAN_PITCH);
+            assert!(printed.contains("4.5 m") && printed.contains(&format!("{value:.10} m per turn")), "{printed}");
+            assert!(printed.contains(&format!("bench {}", b + 1)) && printed.contains("counting from 1"), "{printed}");
         }
     }
 }
@@ -60,16 +60,16 @@ fn plan_speed_has_its_keys_or_names_what_forbids_it() {
             continue;
         }
         let output = scene.run(&[&["--json"], &PLAN_SPEED[..]].concat());
-        let said = text(&output.stderr);
+        let printed = text(&output.stderr);
         if output.status.code() == Some(2) {
             // Near a lock a handle is faster than any limit.
-            assert!(output.stdout.is_empty() && said.lines().count() == 1, "{}: {said}", scene.name);
+            assert!(output.stdout.is_empty() && printed.lines().count() == 1, "{}: {printed}", scene.name);
             let lock = time_of(&scene, EventKind::Lock).unwrap();
-            let runs_into_it = said.contains("lock") && said.contains(&lock.to_string());
-            assert!(runs_into_it || said.contains("too long to be searched"), "{}: {said}", scene.name);
+            let runs_into_it = printed.contains("lock") && printed.contains(&lock.to_string());
+            assert!(runs_into_it || printed.contains("too long to be searched"), "{}: {printed}", scene.name);
             continue;
         }
-        assert_eq!((output.status.code(), said.as_str()), (Some(0), ""), "{}", scene.name);
+        assert_eq!((output.status.code(), printed.as_str()), (Some(0), ""), "{}", scene.name);
         let line = text(&output.stdout);
         let plan: Value = serde_json::from_str(&line).unwrap();
         assert_keys(&plan, &["plan", "value", "time", "handle", "ratio"]);
@@ -85,9 +85,9 @@ fn plan_speed_has_its_keys_or_names_what_forbids_it() {
             for (printed, known) in [(value, known.value), (time, known.time), (ratio, known.ratio)] {
                 assert!(same_bits(printed, known), "{}: {plan}", scene.name);
             }
-            let said = scene.answer(&PLAN_SPEED);
-            assert!(said.contains(&format!("{value:.10} m/s")), "{said}");
-            assert!(said.contains(&format!("handle {} (counting from 1)", handle + 1.0)), "{said}");
+            let printed = scene.answer(&PLAN_SPEED);
+            assert!(printed.contains(&format!("{value:.10} m/s")), "{printed}");
+            assert!(printed.contains(&format!("handle {} (counting from 1)", handle + 1.0)), "{printed}");
         }
     }
     assert!(planned >= 4, "only {planned} scenes have a greatest speed");

@@ -51,11 +51,11 @@ fn every_command_refuses_a_bad_scene_in_the_same_sentence() {
     let also: [&[&str]; 3] = [&["trade"], &["run"], &["soak", "--duration", "1s"]];
     for command in COMMANDS.iter().chain(&also) {
         let output = Process::start(program().arg("--scene").arg(&bad).args(*command)).output_within(DEADLINE);
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{command:?}: {said}");
-        assert!(output.stdout.is_empty() && said.lines().count() == 1, "{command:?}: {said}");
+        let printed = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{command:?}: {printed}");
+        assert!(output.stdout.is_empty() && printed.lines().count() == 1, "{command:?}: {printed}");
         for part in [bad.to_str().unwrap(), &format!("line {line}"), "path.pitch", "-0.55", "expected"] {
-            assert!(said.contains(part), "{command:?} names no {part}: {said}");
+            assert!(printed.contains(part), "{command:?} names no {part}: {printed}");
         }
     }
 }
@@ -70,12 +70,12 @@ fn what_is_neither_done_nor_bad_input_is_exit_code_1_and_a_sentence() {
         full.stdin(Stdio::null()).stderr(Stdio::piped());
         full.stdout(OpenOptions::new().write(true).open("/dev/full").unwrap());
         let output = full.spawn().unwrap().wait_with_output().unwrap();
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{command:?}: {said}");
-        assert!(said.contains("No space left") && said.lines().count() == 1, "{command:?}: {said}");
+        let printed = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{command:?}: {printed}");
+        assert!(printed.contains("No space left") && printed.lines().count() == 1, "{command:?}: {printed}");
     }
-    let said = scene.run(&["solve", "--at", "0", "-o", "/dev/full"]);
-    assert_eq!(said.status.code(), Some(1), "{}", text(&said.stderr));
+    let printed = scene.run(&["solve", "--at", "0", "-o", "/dev/full"]);
+    assert_eq!(printed.status.code(), Some(1), "{}", text(&printed.stderr));
 }
 
 /// How a command ends whose readers go away before it prints anything.
@@ -90,7 +90,7 @@ fn end_unread(command: &mut Command, stdout: bool, stderr: bool) -> Output {
     process.output_within(DEADLINE)
 }
 
-/// `| head` and `2>&1 | head`: nobody is there to be told of anything.
+/// `| head` and `2>&1 | head`: nobody reads any more.
 #[test]
 fn a_closed_pipe_ends_quietly() {
     let scene = scene("school");
@@ -104,9 +104,9 @@ fn a_closed_pipe_ends_quietly() {
             let mut whole = place.program();
             whole.arg("--scene").arg(&scene.path).args(*command);
             let output = end_unread(&mut whole, stdout, stderr);
-            let said = text(&output.stderr);
-            assert_eq!(output.status.code(), Some(0), "{command:?}, {stdout} {stderr}: {said}");
-            assert!(!said.contains("panicked") && !said.contains("pipe"), "{command:?}: {said}");
+            let printed = text(&output.stderr);
+            assert_eq!(output.status.code(), Some(0), "{command:?}, {stdout} {stderr}: {printed}");
+            assert!(!printed.contains("panicked") && !printed.contains("pipe"), "{command:?}: {printed}");
         }
     }
 }

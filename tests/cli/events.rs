@@ -101,7 +101,7 @@ fn events_of_scenes_with_the_same_last_turns_differ_by_the_way_there() {
     }
 }
 
-/// Benches count from 1 in sentences, and the sentence says so.
+/// Benches count from 1 in sentences, and the sentence states it.
 fn assert_sentence(scene: &SceneFile, event: &Value, line: &str) {
     let kind = event["event"].as_str().unwrap();
     assert!(line.trim_start().starts_with(kind), "{}: {line}", scene.name);

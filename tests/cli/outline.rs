@@ -12,8 +12,8 @@ enum Segment {
     Line { start: Point, heading: f64, from: f64, to: f64 },
     /// Turns left where `turn` is 1 and right where it is -1.
     Arc { centre: Point, radius: f64, phase: f64, turn: f64, angle: f64 },
-    /// r = growth theta from a radius on, turned by half a turn where `sign` is -1.
-    Spiral { growth: f64, sign: f64, least_radius: f64 },
+    /// r = a theta from a radius on, turned by half a turn where `sign` is -1.
+    Spiral { radius_per_radian: f64, sign: f64, least_radius: f64 },
 }
 
 /// A path.
@@ -31,9 +31,9 @@ fn distance(a: Point, b: Point) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// Metres along r = growth theta from the centre.
-pub fn spiral_length(growth: f64, theta: f64) -> f64 {
-    0.5 * growth * (theta * 1f64.hypot(theta) + theta.asinh())
+/// Metres along r = a theta from the centre.
+pub fn spiral_length(radius_per_radian: f64, theta: f64) -> f64 {
+    0.5 * radius_per_radian * (theta * 1f64.hypot(theta) + theta.asinh())
 }
 
 impl Outline {
@@ -47,15 +47,15 @@ impl Outline {
     }
 
     fn spiral(scene: &SceneFile) -> Self {
-        let growth = scene.number("path", "pitch") / TAU;
+        let radius_per_radian = scene.number("path", "pitch") / TAU;
         let start = TAU * scene.number("path", "start_turn");
         let place = |k: u32| {
             let theta = start - f64::from(k);
-            let travelled = spiral_length(growth, start) - spiral_length(growth, theta);
-            (travelled, ahead([0.0, 0.0], theta, growth * theta))
+            let travelled = spiral_length(radius_per_radian, start) - spiral_length(radius_per_radian, theta);
+            (travelled, ahead([0.0, 0.0], theta, radius_per_radian * theta))
         };
         Self {
-            segments: vec![Segment::Spiral { growth, sign: 1.0, least_radius: 0.0 }],
+            segments: vec![Segment::Spiral { radius_per_radian, sign: 1.0, least_radius: 0.0 }],
             known: [0, 1, 10, 20].map(place).into(),
         }
     }
@@ -64,20 +64,20 @@ impl Outline {
     fn turnaround(scene: &SceneFile) -> Self {
         let [pitch, turn_radius, ratio, lead_in] =
             ["pitch", "turn_radius", "arc_ratio", "lead_in"].map(|key| scene.number("path", key));
-        let growth = pitch / TAU;
-        let theta = turn_radius / growth;
+        let radius_per_radian = pitch / TAU;
+        let theta = turn_radius / radius_per_radian;
         let a = ahead([0.0, 0.0], theta, turn_radius);
         let b = [-a[0], -a[1]];
         // Towards the centre the polar angle falls: the tangent lies atan(theta) clockwise of the way to the centre.
         let heading = theta + PI + theta.atan();
-        let whole = turn_radius.hypot(growth);
+        let whole = turn_radius.hypot(radius_per_radian);
         let [first, second] = [whole * ratio / (1.0 + ratio), whole / (1.0 + ratio)];
-        let angle = 2.0 * (turn_radius / growth).atan();
+        let angle = 2.0 * (turn_radius / radius_per_radian).atan();
         let arc = |from: Point, radius: f64, turn: f64, heading: f64| {
             let centre = ahead(from, heading + turn * FRAC_PI_2, radius);
             Segment::Arc { centre, radius, phase: heading - turn * FRAC_PI_2, turn, angle }
         };
-        let spiral = |sign: f64| Segment::Spiral { growth, sign, least_radius: turn_radius };
+        let spiral = |sign: f64| Segment::Spiral { radius_per_radian, sign, least_radius: turn_radius };
         let joint = arc_end(&arc(a, first, -1.0, heading), angle);
         Self {
             segments: vec![
@@ -147,12 +147,12 @@ impl Segment {
                         .fold(f64::INFINITY, f64::min)
                 }
             }
-            Self::Spiral { growth, sign, least_radius } => {
+            Self::Spiral { radius_per_radian, sign, least_radius } => {
                 let (x, y) = (sign * point[0], sign * point[1]);
                 let (radius, polar) = (x.hypot(y), y.atan2(x));
-                let turns = ((radius / growth - polar) / TAU).round();
+                let turns = ((radius / radius_per_radian - polar) / TAU).round();
                 let theta = polar + TAU * turns;
-                let nearest = growth * theta;
+                let nearest = radius_per_radian * theta;
                 // A junction belongs to both of its segments, and rounding may put a handle on either side of it.
                 if nearest < least_radius - 1e-9 { f64::INFINITY } else { (radius - nearest).abs() }
             }

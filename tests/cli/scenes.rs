@@ -90,8 +90,8 @@ impl SceneFile {
     /// What it prints, once it has ended with exit code 0 and nothing on standard error.
     pub fn answer(&self, arguments: &[&str]) -> String {
         let output = self.run(arguments);
-        let said = text(&output.stderr);
-        assert_eq!((output.status.code(), said.as_str()), (Some(0), ""), "{} {arguments:?}", self.name);
+        let printed = text(&output.stderr);
+        assert_eq!((output.status.code(), printed.as_str()), (Some(0), ""), "{} {arguments:?}", self.name);
         text(&output.stdout)
     }
 
@@ -104,11 +104,11 @@ impl SceneFile {
     /// The sentence on standard error with which it refuses, nothing being on standard output.
     pub fn refusal(&self, arguments: &[&str]) -> String {
         let output = self.run(arguments);
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{} {arguments:?}: {said}", self.name);
+        let printed = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{} {arguments:?}: {printed}", self.name);
         assert!(output.stdout.is_empty(), "{} {arguments:?} prints on standard output", self.name);
-        assert_eq!(said.lines().count(), 1, "{} {arguments:?}: {said}", self.name);
-        said
+        assert_eq!(printed.lines().count(), 1, "{} {arguments:?}: {printed}", self.name);
+        printed
     }
 }
 

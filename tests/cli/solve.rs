@@ -165,11 +165,12 @@ fn handles_stand_on_the_path_a_link_apart() {
 fn followers_on_a_spiral_are_the_first_points_at_their_distance() {
     let mut compared = 0;
     for scene in scenes().into_iter().filter(|scene| scene.content["path"]["kind"].as_str() == Some("spiral")) {
-        let growth = scene.number("path", "pitch") / std::f64::consts::TAU;
+        let radius_per_radian = scene.number("path", "pitch") / std::f64::consts::TAU;
         let end = scene.json(&["events"]).pop().unwrap()["time"].as_f64().unwrap();
         let times = format!("0,{},{}", 0.5 * end, 0.9 * end);
         for Moment { time, handles } in read_csv(&scene, &scene.answer(&["solve", "--at", &times])) {
-            let lengths = handles.iter().map(|[x, y, ..]| spiral_length(growth, x.hypot(*y) / growth));
+            let lengths =
+                handles.iter().map(|[x, y, ..]| spiral_length(radius_per_radian, x.hypot(*y) / radius_per_radian));
             let lengths: Vec<f64> = lengths.collect();
             for (bench, pair) in lengths.windows(2).enumerate() {
                 let (apart, link) = (pair[1] - pair[0], scene.link(bench));
@@ -220,16 +221,16 @@ fn a_time_past_the_end_is_refused_with_the_event_and_its_time() {
                 let past = if format[0] == "draw" { past.trim_start_matches("0,") } else { &past };
                 let output = ["-o", file.to_str().unwrap()];
                 for arguments in [[format, &["--at", past]].concat(), [format, &["--at", past], &output].concat()] {
-                    let said = scene.refusal(&arguments);
-                    assert!(said.contains(kind) && said.contains(&time.to_string()), "{}: {said}", scene.name);
+                    let printed = scene.refusal(&arguments);
+                    assert!(printed.contains(kind) && printed.contains(&time.to_string()), "{}: {printed}", scene.name);
                     assert!(!file.exists(), "{arguments:?} leaves a file");
                 }
             }
         }
         for kind in ["contact", "stall", "lock", "path_end"] {
             if !scene.json(&["events"]).iter().any(|event| event["event"] == kind) {
-                let said = scene.refusal(&["solve", "--at", kind]);
-                assert!(said.contains(kind), "{}: {said}", scene.name);
+                let printed = scene.refusal(&["solve", "--at", kind]);
+                assert!(printed.contains(kind), "{}: {printed}", scene.name);
             }
         }
     }
@@ -260,10 +261,10 @@ fn regular_times_past_the_end_stop_at_the_last_row_before_it_and_say_so() {
         let (every, until) = (every.to_string(), (2.0 * time).to_string());
         for format in [&["solve"][..], &["--json", "solve"]] {
             let output = scene.run(&[format, &["--every", &every, "--until", &until]].concat());
-            let said = text(&output.stderr);
-            assert_eq!(output.status.code(), Some(0), "{}: {said}", scene.name);
-            assert!(said.contains(kind) && said.contains(&time.to_string()), "{}: {said}", scene.name);
-            assert_eq!(said.lines().count(), 1, "{said}");
+            let printed = text(&output.stderr);
+            assert_eq!(output.status.code(), Some(0), "{}: {printed}", scene.name);
+            assert!(printed.contains(kind) && printed.contains(&time.to_string()), "{}: {printed}", scene.name);
+            assert_eq!(printed.lines().count(), 1, "{printed}");
             let stdout = text(&output.stdout);
             let printed = if format.len() == 1 { read_csv(&scene, &stdout) } else { read_json(&scene, &stdout) };
             let every: f64 = every.parse().unwrap();
@@ -285,8 +286,8 @@ fn every_way_to_ask_for_times_that_makes_no_sense_is_refused() {
         (&["--at", "1,,2"], "--at"),
     ] {
         let output = scene.run(&[&["solve"], arguments].concat());
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
-        assert!(output.stdout.is_empty() && said.contains(named), "{arguments:?}: {said}");
+        let printed = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {printed}");
+        assert!(output.stdout.is_empty() && printed.contains(named), "{arguments:?}: {printed}");
     }
 }

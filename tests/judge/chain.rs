@@ -2,11 +2,11 @@
 //!
 //! A handle's place is a function of the one ahead of it, so the stretch of path that it covers while the head goes from
 //! one place to another is the image of the stretch that the handle ahead covers: as long as the follower does not jump,
-//! what lies between its places at the ends and those where it turns round. No event between two looks is missed that
-//! way, however briefly it lasts.
+//! what lies between its places at the ends and those where it turns round. No event between two configurations is
+//! missed that way, however briefly it lasts.
 
-use super::geometry::{Path, Place, Vector};
-use super::links::{Link, Look};
+use super::geometry::{Param, Path, Vector};
+use super::links::{Configuration, Link};
 
 pub struct Team {
     pub benches: usize,
@@ -25,12 +25,12 @@ impl Team {
 /// A stretch of path that a handle covers.
 #[derive(Clone, Copy)]
 pub struct Span {
-    pub low: Place,
-    pub high: Place,
+    pub low: Param,
+    pub high: Param,
 }
 
 impl Span {
-    fn around(places: impl Iterator<Item = Place>) -> Self {
+    fn around(places: impl Iterator<Item = Param>) -> Self {
         let span = places.fold(None, |span: Option<Self>, place| match span {
             None => Some(Self { low: place, high: place }),
             Some(Self { low, high }) => Some(Self {
@@ -51,7 +51,7 @@ pub struct Pose {
 
 #[derive(Clone, Copy)]
 pub struct Handle {
-    pub place: Place,
+    pub place: Param,
     pub point: Vector,
     pub tangent: Vector,
     /// Metres per metre of the head, forward.
@@ -91,7 +91,7 @@ impl<'a> Chain<'a> {
         let mut speed = 1.0;
         let mut handles = Vec::with_capacity(self.team.benches + 1);
         for bench in 0..self.team.benches {
-            let Look { rear, front_cosine, rear_cosine, .. } = self.link(bench).look(place);
+            let Configuration { rear, front_cosine, rear_cosine, .. } = self.link(bench).configuration(place);
             let (point, tangent) = self.path.point_and_tangent(place);
             handles.push(Handle { place, point, tangent, speed, front_cosine, rear_cosine });
             place = rear;
@@ -113,7 +113,7 @@ impl<'a> Chain<'a> {
     fn image(&self, bench: usize, span: Span) -> Span {
         let link = self.link(bench);
         let ends = [span.low, span.high].into_iter().map(|place| self.path.follower(place, link.length));
-        Span::around(ends.chain(link.stalls_between(span.low.s, span.high.s).map(|look| look.rear)))
+        Span::around(ends.chain(link.stalls_between(span.low.s, span.high.s).map(|configuration| configuration.rear)))
     }
 
     /// What each handle covers while the head goes from one pose to another, no lock being between.
@@ -122,7 +122,7 @@ impl<'a> Chain<'a> {
         let mut turns = false;
         for (k, (one, other)) in from.handles.iter().zip(&to.handles).enumerate() {
             let mut span = Span::around([one.place, other.place].into_iter());
-            // Only behind a handle that turns round is there more than the ends tell.
+            // Only behind a handle that turns round is there more than the ends determine.
             if turns {
                 let image = self.image(k - 1, spans[k - 1]);
                 span = Span::around([span.low, span.high, image.low, image.high].into_iter());

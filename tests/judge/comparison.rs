@@ -1,4 +1,4 @@
-//! The judge's verdict on a scene, and the program's events beside it: each kind happens in both or in neither, at one
+//! The checker's verdict on a scene, with the program's events beside it: each kind happens in both or neither, at one
 //! place of the head and of one bench or pair; or it is ambiguous, being within rounding of not happening at all.
 
 use super::Event;
@@ -6,18 +6,18 @@ use super::chain::{Chain, Team, last_bits};
 use super::contact::{Boards, Touch};
 use super::geometry::{Path, Vector};
 
-/// What the judge says of a scene. Times are metres of the head.
+/// What the checker reports of a scene. Times are metres of the head.
 pub struct Verdict {
     pub contact: Result<Option<Touch>, String>,
     pub stall: Option<(f64, usize)>,
     pub lock: Option<(f64, usize)>,
     pub end: f64,
-    /// Why the judge is not sure.
+    /// Why the checker is not sure.
     pub doubts: Vec<String>,
 }
 
-/// The judge's own events of a team on a path.
-pub fn judge(chain: &Chain) -> Verdict {
+/// The checker's own events of a team on a path.
+pub fn verdict(chain: &Chain) -> Verdict {
     let mut doubts = Vec::new();
     if !chain.is_complete() {
         doubts.push("stalls and jumps: searched in part only".to_owned());
@@ -27,7 +27,7 @@ pub fn judge(chain: &Chain) -> Verdict {
     }
     let lock = chain.lock();
     if lock.is_some_and(|(_, _, doubtful)| doubtful) {
-        doubts.push(format!("a jump at {lock:?} too small to tell"));
+        doubts.push(format!("a jump at {lock:?} too small to resolve"));
     }
     let end = lock.map_or(chain.path.end, |(at, ..)| at);
     let before = if lock.is_some() { (end - last_bits(end)).max(0.0) } else { end };
@@ -37,11 +37,11 @@ pub fn judge(chain: &Chain) -> Verdict {
     Verdict { contact, stall, lock: lock.map(|(at, bench, _)| (at, bench)), end, doubts }
 }
 
-/// The judge's and the program's events side by side.
+/// The checker's and the program's events side by side.
 pub struct Comparison {
     /// Metres of the head by which times may differ.
     tolerance: f64,
-    /// Metres by which the judge's own figures are rounded.
+    /// Metres by which the checker's own figures are rounded.
     rounding: f64,
     pub compared: Vec<&'static str>,
     pub failures: Vec<String>,
@@ -57,7 +57,7 @@ impl Comparison {
 
     pub fn of(team: &Team, path: &Path, events: &[Event]) -> Self {
         let chain = Chain::new(path, team);
-        let verdict = judge(&chain);
+        let verdict = verdict(&chain);
         let start = chain.pose(0.0);
         // Of the scene, in metres.
         let size = path.extent(start.handles[team.benches].place);
@@ -86,19 +86,22 @@ impl Comparison {
             (Some((at, bench)), Some(event)) if self.near(at, event.time) => {
                 self.compared.push("lock");
                 if event.bench_a != Some(bench) {
-                    self.disagree(false, format!("lock of bench {bench}, the program says {:?}", event.bench_a));
+                    self.disagree(false, format!("lock of bench {bench}, the program reports {:?}", event.bench_a));
                 }
             }
             (Some((at, bench)), _) => {
                 // A start at the very lock, and a lock at the very end of the path.
                 let doubtful = at <= self.tolerance || chain.path.end - at <= self.tolerance;
-                self.disagree(doubtful, format!("lock at {at:.13} of bench {bench}, the program says {lock:?}"));
+                self.disagree(doubtful, format!("lock at {at:.13} of bench {bench}, the program reports {lock:?}"));
             }
-            (None, Some(event)) => self.disagree(false, format!("no lock, the program says {event:?}")),
+            (None, Some(event)) => self.disagree(false, format!("no lock, the program reports {event:?}")),
             (None, None) => {
                 self.compared.push("path_end");
                 if !path_end.is_some_and(|event| self.near(event.time, chain.path.end)) {
-                    self.disagree(false, format!("path end at {:.13}, the program says {path_end:?}", chain.path.end));
+                    self.disagree(
+                        false,
+                        format!("path end at {:.13}, the program reports {path_end:?}", chain.path.end),
+                    );
                 }
             }
         }
@@ -114,21 +117,21 @@ impl Comparison {
                 let handle = chain.pose(at).handles[bench + 1];
                 let place = event.x.zip(event.y).map(|(x, y)| Vector::new(x, y));
                 if event.bench_a != Some(bench) {
-                    self.disagree(false, format!("stall of bench {bench}, the program says {:?}", event.bench_a));
+                    self.disagree(false, format!("stall of bench {bench}, the program reports {:?}", event.bench_a));
                 } else if !place.is_some_and(|place| (place - handle.point).norm() <= 100.0 * self.tolerance) {
-                    self.disagree(false, format!("stall at place {:?}, the program says {place:?}", handle.point));
+                    self.disagree(false, format!("stall at place {:?}, the program reports {place:?}", handle.point));
                 }
             }
             (Some((at, bench)), _) => {
                 let over = chain.pose((at + self.tolerance).min(verdict.end));
                 let brief = over.handles[bench].front_cosine > 0.0 || verdict.end - at <= self.tolerance;
                 let other = event.is_some_and(|event| event.time < at && grazes(event.time));
-                let sentence = format!("stall at {at:.13} of bench {bench}, the program says {event:?}");
+                let sentence = format!("stall at {at:.13} of bench {bench}, the program reports {event:?}");
                 self.disagree(at <= self.tolerance || brief || other, sentence);
             }
             (None, Some(event)) => {
                 let doubtful = verdict.end - event.time <= self.tolerance || grazes(event.time);
-                self.disagree(doubtful, format!("no stall, the program says {event:?}"));
+                self.disagree(doubtful, format!("no stall, the program reports {event:?}"));
             }
             (None, None) => self.compared.push("no stall"),
         }
@@ -144,7 +147,7 @@ impl Comparison {
                 };
                 let least = boards.gap(touch.head, touch.benches);
                 if pair != touch.benches && (boards.gap(touch.head, pair) - least).abs() > self.tolerance {
-                    self.disagree(false, format!("{touch:?}, the program says {event:?}"));
+                    self.disagree(false, format!("{touch:?}, the program reports {event:?}"));
                 }
                 let place = event.x.zip(event.y).map(|(x, y)| Vector::new(x, y));
                 let slack = 100.0 * self.tolerance;
@@ -163,7 +166,7 @@ impl Comparison {
                     event.filter(|event| event.time <= verdict.end).map(|event| boards.least_gap(event.time));
                 let flat = at_theirs.flatten().is_some_and(|(gap, _)| gap.abs() <= self.rounding);
                 let doubtful = deepest >= -1e-11 - self.rounding || flat || verdict.end - touch.head <= self.tolerance;
-                let sentence = format!("{touch:?} (depth {deepest:e}), the program says {event:?}");
+                let sentence = format!("{touch:?} (depth {deepest:e}), the program reports {event:?}");
                 self.disagree(doubtful, sentence);
             }
             (None, Some(event)) => {
@@ -173,7 +176,7 @@ impl Comparison {
                 let slack = if last { 1e-3 } else { 1e-11 + self.rounding };
                 let gap = boards.least_gap(head);
                 let doubtful = gap.is_some_and(|(gap, _)| gap.abs() <= slack);
-                self.disagree(doubtful, format!("no contact, least gap there {gap:?}, the program says {event:?}"));
+                self.disagree(doubtful, format!("no contact, least gap there {gap:?}, the program reports {event:?}"));
             }
             (None, None) => self.compared.push("no contact"),
         }

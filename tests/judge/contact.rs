@@ -116,7 +116,7 @@ impl Boards<'_> {
             } else if let Some((_, benches)) = self.least_gap(head).filter(|(gap, _)| *gap <= 0.0) {
                 return Ok(Some(Touch { head, benches }));
             } else {
-                // As far as doubles tell, nothing happens in the last bit.
+                // As far as doubles resolve it, nothing happens in the last bit.
                 here = next;
                 step *= 2.0;
             }
@@ -137,7 +137,7 @@ impl Boards<'_> {
             .map(|(span, handle)| (span.high.s - handle.place.s).max(handle.place.s - span.low.s))
             .collect();
         let (before, after) = (self.boards(from), self.boards(to));
-        // Asked for only where two boards come near.
+        // Computed only where two boards come near.
         let mut strays: Option<Vec<f64>> = None;
         let by = |bench: usize, ways: &[f64]| self.overhang(bench) * ways[bench].max(ways[bench + 1]);
         for a in 0..before.len() {

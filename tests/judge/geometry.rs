@@ -1,4 +1,4 @@
-//! The judge's own paths: lines, arcs and spirals by metres of travel, and the follower on them.
+//! The checker's own paths: lines, arcs and spirals by metres of travel, and the follower on them.
 //!
 //! A path has no beginning: a route starts with a straight line without end behind its start, a spiral comes in from
 //! infinity. So every handle has a follower everywhere.
@@ -9,7 +9,7 @@ pub type Vector = nalgebra::Vector2<f64>;
 
 /// A place on a path.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct Param {
     /// Metres of travel: the head starts at 0, the team stands behind it.
     pub s: f64,
     piece: usize,
@@ -30,9 +30,9 @@ enum Curve {
         phase: f64,
         turn: f64,
     },
-    /// `outward` is -1 on r = growth theta inward, 1 on the same spiral turned by half a turn, outward.
+    /// `outward` is -1 on r = a theta inward, 1 on the same spiral turned by half a turn, outward.
     Spiral {
-        growth: f64,
+        radius_per_radian: f64,
         outward: f64,
     },
 }
@@ -51,18 +51,18 @@ struct Piece {
     anchor_turned: f64,
 }
 
-/// Length of r = growth theta from the centre.
-fn spiral_length(growth: f64, theta: f64) -> f64 {
-    0.5 * growth * (theta * 1f64.hypot(theta) + theta.asinh())
+/// Length of r = a theta from the centre.
+fn spiral_length(radius_per_radian: f64, theta: f64) -> f64 {
+    0.5 * radius_per_radian * (theta * 1f64.hypot(theta) + theta.asinh())
 }
 
-/// The polar angle so many metres from the centre. The length is convex and at least growth theta^2 / 2, so that
+/// The polar angle so many metres from the centre. The length is convex and at least a theta^2 / 2, so that
 /// Newton's steps come down from that guess and never pass the root.
-fn spiral_angle(growth: f64, length: f64) -> f64 {
+fn spiral_angle(radius_per_radian: f64, length: f64) -> f64 {
     let length = length.max(0.0);
-    let mut theta = (2.0 * length / growth).sqrt();
+    let mut theta = (2.0 * length / radius_per_radian).sqrt();
     for _ in 0..100 {
-        let step = (spiral_length(growth, theta) - length) / (growth * 1f64.hypot(theta));
+        let step = (spiral_length(radius_per_radian, theta) - length) / (radius_per_radian * 1f64.hypot(theta));
         theta -= step;
         if step.abs() <= 1e-16 * theta {
             break;
@@ -87,10 +87,10 @@ impl Curve {
                 let spoke = unit(phase + turn * q);
                 (centre + radius * spoke, turn * left_of(spoke))
             }
-            Self::Spiral { growth, outward } => {
+            Self::Spiral { radius_per_radian, outward } => {
                 let spoke = unit(q);
                 // Half a turn and the other way of travel cancel: both spirals have one tangent at one angle.
-                (-outward * growth * q * spoke, -(spoke + q * left_of(spoke)) / 1f64.hypot(q))
+                (-outward * radius_per_radian * q * spoke, -(spoke + q * left_of(spoke)) / 1f64.hypot(q))
             }
         }
     }
@@ -100,7 +100,9 @@ impl Curve {
         match *self {
             Self::Line { .. } => to - from,
             Self::Arc { radius, .. } => radius * (to - from),
-            Self::Spiral { growth, outward } => outward * (spiral_length(growth, to) - spiral_length(growth, from)),
+            Self::Spiral { radius_per_radian, outward } => {
+                outward * (spiral_length(radius_per_radian, to) - spiral_length(radius_per_radian, from))
+            }
         }
     }
 
@@ -108,7 +110,9 @@ impl Curve {
         match *self {
             Self::Line { .. } => from + metres,
             Self::Arc { radius, .. } => from + metres / radius,
-            Self::Spiral { growth, outward } => spiral_angle(growth, spiral_length(growth, from) + outward * metres),
+            Self::Spiral { radius_per_radian, outward } => {
+                spiral_angle(radius_per_radian, spiral_length(radius_per_radian, from) + outward * metres)
+            }
         }
     }
 
@@ -147,7 +151,9 @@ impl Curve {
                 let angle = -turn * spoke.perp(&here).atan2(spoke.dot(&here));
                 opening - angle
             }
-            Self::Spiral { growth, outward } => return leaves_spiral(self, growth, outward, q, first, centre, reach),
+            Self::Spiral { radius_per_radian, outward } => {
+                return leaves_spiral(self, radius_per_radian, outward, q, first, centre, reach);
+            }
         };
         let by = by.max(0.0);
         (by <= q - first).then_some(q - by)
@@ -158,7 +164,7 @@ impl Curve {
 /// 2 (rate) x + (1 + reach curvature) x^2, so the first place at `reach` is never passed.
 fn leaves_spiral(
     curve: &Curve,
-    growth: f64,
+    radius_per_radian: f64,
     outward: f64,
     q: f64,
     first: f64,
@@ -166,7 +172,7 @@ fn leaves_spiral(
     reach: f64,
 ) -> Option<f64> {
     let mut theta = q;
-    // Far more than any path asks for: near a fold steps shrink as the square root of what is missing.
+    // Far more than any path needs: near a fold steps shrink as the square root of what is missing.
     for _ in 0..1_000_000 {
         let (point, tangent) = curve.point_and_tangent(theta);
         let offset = point - centre;
@@ -179,12 +185,13 @@ fn leaves_spiral(
         // Curvature falls outward; on the way out the steps back go inward, by a quarter of a radian at most.
         let sharpest = if outward < 0.0 { theta } else { (theta - 0.25).max(first) };
         let square = sharpest * sharpest;
-        let bend = 1.0 + reach * (2.0 + square) / (growth * (1.0 + square).powf(1.5));
-        let root = (rate * rate + bend * lacking).sqrt();
-        let metres = if rate > 0.0 { lacking / (rate + root) } else { (root - rate) / bend };
-        let radians = metres / (growth * 1f64.hypot(theta));
+        let second_derivative_bound = 1.0 + reach * (2.0 + square) / (radius_per_radian * (1.0 + square).powf(1.5));
+        let root = (rate * rate + second_derivative_bound * lacking).sqrt();
+        let metres = if rate > 0.0 { lacking / (rate + root) } else { (root - rate) / second_derivative_bound };
+        let radians = metres / (radius_per_radian * 1f64.hypot(theta));
         // Metres per radian grow outward: with those at the step's outer end no step is too long.
-        let radians = if outward < 0.0 { metres / (growth * 1f64.hypot(theta + radians)) } else { radians.min(0.25) };
+        let radians =
+            if outward < 0.0 { metres / (radius_per_radian * 1f64.hypot(theta + radians)) } else { radians.min(0.25) };
         let next = theta - outward * radians;
         if outward > 0.0 && next <= first {
             let end = (curve.point_and_tangent(first).0 - centre).norm();
@@ -204,47 +211,47 @@ pub struct Path {
     pub end: f64,
 }
 
-/// One leg of a route.
+/// One segment of a route.
 #[derive(Clone, Copy, Debug)]
-pub enum Leg {
+pub enum RouteSegment {
     Line { length: f64 },
     Arc { radius: f64, turns: f64, left: bool },
 }
 
 impl Path {
     pub fn spiral(pitch: f64, start_turn: f64) -> Self {
-        let (growth, start) = (pitch / TAU, TAU * start_turn);
+        let (radius_per_radian, start) = (pitch / TAU, TAU * start_turn);
         let mut path = Self { pieces: Vec::new(), end: 0.0 };
-        path.begin_with(Curve::Spiral { growth, outward: -1.0 }, start, 0.0);
-        path.end = spiral_length(growth, start);
+        path.begin_with(Curve::Spiral { radius_per_radian, outward: -1.0 }, start, 0.0);
+        path.end = spiral_length(radius_per_radian, start);
         path
     }
 
     /// `lead_in` metres before the turn the head starts.
     pub fn turnaround(pitch: f64, turn_radius: f64, arc_ratio: f64, lead_in: f64, lead_out: f64) -> Self {
-        let growth = pitch / TAU;
-        let theta = turn_radius / growth;
-        let both = turn_radius.hypot(growth);
+        let radius_per_radian = pitch / TAU;
+        let theta = turn_radius / radius_per_radian;
+        let both = turn_radius.hypot(radius_per_radian);
         let angle = 2.0 * theta.atan();
         let mut path = Self { pieces: Vec::new(), end: 0.0 };
-        path.begin_with(Curve::Spiral { growth, outward: -1.0 }, theta, lead_in);
+        path.begin_with(Curve::Spiral { radius_per_radian, outward: -1.0 }, theta, lead_in);
         path.push_arc(both * arc_ratio / (1.0 + arc_ratio), angle, false);
         path.push_arc(both / (1.0 + arc_ratio), angle, true);
-        let out = Curve::Spiral { growth, outward: 1.0 };
-        path.push(out, theta, spiral_angle(growth, spiral_length(growth, theta) + lead_out));
+        let out = Curve::Spiral { radius_per_radian, outward: 1.0 };
+        path.push(out, theta, spiral_angle(radius_per_radian, spiral_length(radius_per_radian, theta) + lead_out));
         path
     }
 
-    pub fn route(start: Vector, heading_turns: f64, legs: &[Leg]) -> Self {
+    pub fn route(start: Vector, heading_turns: f64, segments: &[RouteSegment]) -> Self {
         let mut path = Self { pieces: Vec::new(), end: 0.0 };
         path.begin_with(Curve::Line { start, tangent: unit(TAU * heading_turns) }, 0.0, 0.0);
-        for leg in legs {
-            match *leg {
-                Leg::Line { length } => {
+        for segment in segments {
+            match *segment {
+                RouteSegment::Line { length } => {
                     let (start, tangent) = path.last_point_and_tangent();
                     path.push(Curve::Line { start, tangent }, 0.0, length);
                 }
-                Leg::Arc { radius, turns, left } => path.push_arc(radius, TAU * turns, left),
+                RouteSegment::Arc { radius, turns, left } => path.push_arc(radius, TAU * turns, left),
             }
         }
         path
@@ -279,23 +286,23 @@ impl Path {
         piece.curve.point_and_tangent(piece.last)
     }
 
-    pub fn place_at(&self, s: f64) -> Place {
+    pub fn place_at(&self, s: f64) -> Param {
         let index = self.pieces.partition_point(|piece| piece.begin <= s).max(1) - 1;
         let piece = &self.pieces[index];
-        Place { s, piece: index, q: piece.curve.after(piece.anchor, s - piece.anchor_s) }
+        Param { s, piece: index, q: piece.curve.after(piece.anchor, s - piece.anchor_s) }
     }
 
-    pub fn point_and_tangent(&self, place: Place) -> (Vector, Vector) {
+    pub fn point_and_tangent(&self, place: Param) -> (Vector, Vector) {
         self.pieces[place.piece].curve.point_and_tangent(place.q)
     }
 
-    pub fn point(&self, place: Place) -> Vector {
+    pub fn point(&self, place: Param) -> Vector {
         self.point_and_tangent(place).0
     }
 
     /// Radians by which the path turns, whichever way, from one place to another further on.
-    pub fn turned(&self, behind: Place, ahead: Place) -> f64 {
-        let at = |place: Place| {
+    pub fn turned(&self, behind: Param, ahead: Param) -> f64 {
+        let at = |place: Param| {
             let piece = &self.pieces[place.piece];
             piece.anchor_turned + piece.curve.turned(piece.anchor, place.q)
         };
@@ -303,14 +310,14 @@ impl Path {
     }
 
     /// The first place backward from `from` that is not nearer to it than `reach`: the follower, for a link's length.
-    pub fn follower(&self, from: Place, reach: f64) -> Place {
+    pub fn follower(&self, from: Param, reach: f64) -> Param {
         let centre = self.point(from);
         let (mut index, mut q) = (from.piece, from.q);
         loop {
             let piece = &self.pieces[index];
             if let Some(q) = piece.curve.leaves(q, piece.first, centre, reach) {
                 let s = piece.anchor_s + piece.curve.metres(piece.anchor, q);
-                return Place { s, piece: index, q };
+                return Param { s, piece: index, q };
             }
             // The first piece has no beginning, so it is always left.
             index -= 1;
@@ -319,13 +326,13 @@ impl Path {
     }
 
     /// Whether all four places are on one line or one circle, where a team moves as one rigid body.
-    pub fn is_even(&self, places: [Place; 4]) -> bool {
+    pub fn is_even(&self, places: [Param; 4]) -> bool {
         let piece = places[0].piece;
         places.iter().all(|place| place.piece == piece) && !matches!(self.pieces[piece].curve, Curve::Spiral { .. })
     }
 
     /// The largest coordinate of the path from a place on: of its pieces' ends, and a circle's whole width.
-    pub fn extent(&self, from: Place) -> f64 {
+    pub fn extent(&self, from: Param) -> f64 {
         let ends = self.pieces.iter().map(|piece| {
             let wide = if let Curve::Arc { radius, .. } = piece.curve { 2.0 * radius } else { 0.0 };
             piece.curve.point_and_tangent(piece.last).0.norm() + wide

@@ -3,23 +3,23 @@
 //! Both depend on the place of the front handle alone, so a path is searched once for each length of link, by halving
 //! until a stretch is certain to hold neither.
 
-use super::geometry::{Path, Place};
+use super::geometry::{Param, Path};
 
-/// Jumps below this share of the link cannot be told from a follower that is merely very fast: over the last bit of its
-/// place near a fold, 1e-13 m in 100, a follower moves by the root of that.
+/// Jumps below this share of the link cannot be distinguished from a follower that is merely very fast: over the last
+/// bit of its place near a fold, 1e-13 m in 100, a follower moves by the root of that.
 const DOUBTFUL_JUMP: f64 = 3e-6;
 /// Below this share of the link a jump is none.
 const LEAST_JUMP: f64 = 1e-9;
 /// What the rounding of two places can add to the way between them, in roundings of the largest number about.
 const ROUNDINGS: f64 = 32.0;
-/// Looks after which the search gives up, some seconds. Where an arc's diameter is within a share x of the link, it takes
-/// several hundred over the root of x.
-const MOST_LOOKS: usize = 20_000_000;
+/// Configurations after which the search gives up, some seconds. Where an arc's diameter is within a share x of the
+/// link, it takes several hundred over the root of x.
+const MOST_CONFIGURATIONS: usize = 20_000_000;
 
 #[derive(Clone, Copy)]
-pub struct Look {
-    pub front: Place,
-    pub rear: Place,
+pub struct Configuration {
+    pub front: Param,
+    pub rear: Param,
     /// Cosines between the bench and the path at its front and its rear handle.
     pub front_cosine: f64,
     pub rear_cosine: f64,
@@ -29,55 +29,55 @@ pub struct Link<'a> {
     path: &'a Path,
     pub length: f64,
     /// Places of the front handle where the front cosine changes its sign, and the followers there: they turn round.
-    pub stalls: Vec<Look>,
+    pub stalls: Vec<Configuration>,
     /// Metres of travel of the front handle where the follower jumps, and whether the jump is too small to be sure. Past
     /// the first that is sure no handle goes, and nothing is searched.
     pub jumps: Vec<(f64, bool)>,
     /// Whether the search came to its end.
     pub complete: bool,
     locked: bool,
-    looks: usize,
+    configurations: usize,
 }
 
 impl<'a> Link<'a> {
     pub fn new(path: &'a Path, length: f64) -> Self {
         let (stalls, jumps) = (Vec::new(), Vec::new());
-        let mut link = Self { path, length, stalls, jumps, complete: true, locked: false, looks: 0 };
+        let mut link = Self { path, length, stalls, jumps, complete: true, locked: false, configurations: 0 };
         // Out on the first piece, a line or a spiral that grows ever straighter, the calm has no end.
         let mut from = -length;
-        while !link.is_calm(path.place_at(from), path.place_at(from)) {
+        while !link.is_regular(path.place_at(from), path.place_at(from)) {
             from *= 2.0;
         }
         let cells = ((path.end - from) / (0.2 * length)).ceil() as usize;
         let at = |cell: usize| path.place_at(from + (path.end - from) * cell as f64 / cells as f64);
         for cell in 0..cells {
             let (one, other) = (at(cell), at(cell + 1));
-            if !link.is_calm(one, other) {
-                let (one, other) = (link.look(one), link.look(other));
+            if !link.is_regular(one, other) {
+                let (one, other) = (link.configuration(one), link.configuration(other));
                 link.search(one, other);
             }
         }
         link
     }
 
-    pub fn look(&self, front: Place) -> Look {
+    pub fn configuration(&self, front: Param) -> Configuration {
         let rear = self.path.follower(front, self.length);
         let ((point, tangent), (rear_point, rear_tangent)) =
             (self.path.point_and_tangent(front), self.path.point_and_tangent(rear));
         let bench = (point - rear_point) / self.length;
-        Look { front, rear, front_cosine: bench.dot(&tangent), rear_cosine: bench.dot(&rear_tangent) }
+        Configuration { front, rear, front_cosine: bench.dot(&tangent), rear_cosine: bench.dot(&rear_tangent) }
     }
 
     /// A path that turns by less than `MOST` in the 1.4 links behind every front handle: its chord is at least
     /// 1.4 cos(MOST / 2) > 1 link, and grows all the way. So there is neither stall nor jump.
-    fn is_calm(&self, from: Place, to: Place) -> bool {
+    fn is_regular(&self, from: Param, to: Param) -> bool {
         const MOST: f64 = 1.5;
         self.path.turned(self.path.place_at(from.s - 1.4 * self.length), to) < MOST
     }
 
-    fn search(&mut self, one: Look, other: Look) {
-        self.looks += 1;
-        self.complete &= self.looks <= MOST_LOOKS;
+    fn search(&mut self, one: Configuration, other: Configuration) {
+        self.configurations += 1;
+        self.complete &= self.configurations <= MOST_CONFIGURATIONS;
         if self.locked || !self.complete || self.path.is_even([one.front, one.rear, other.front, other.rear]) {
             return;
         }
@@ -87,7 +87,7 @@ impl<'a> Link<'a> {
         }
         let middle = self.path.place_at(0.5 * (one.front.s + other.front.s));
         if other.front.s - one.front.s > 4.0 * f64::EPSILON * (one.front.s.abs() + self.length) {
-            let middle = self.look(middle);
+            let middle = self.configuration(middle);
             self.search(one, middle);
             self.search(middle, other);
             return;
@@ -105,31 +105,32 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Whether the follower is certainly continuous between two looks; the metres in which it stays then.
+    /// Whether the follower is certainly continuous between two configurations; the metres in which it stays then.
     ///
-    /// With the front handle at most h from the first look's, what is nearer than link - h there stays nearer than the
+    /// With the front handle at most h from the first one's, what is nearer than link - h there stays nearer than the
     /// link. From that place back, over `range` metres, the angle between path and bench changes by at most `change`;
     /// where its cosine stays above half of what it is now, the distance grows all the way, from below the link to more.
-    fn continuous(&self, look: &Look, other: &Look) -> Option<f64> {
-        let size = look.front.s.abs() + self.path.point(look.front).norm() + self.length;
-        let h = (other.front.s - look.front.s).abs() + ROUNDINGS * f64::EPSILON * size;
+    fn continuous(&self, configuration: &Configuration, other: &Configuration) -> Option<f64> {
+        let size = configuration.front.s.abs() + self.path.point(configuration.front).norm() + self.length;
+        let h = (other.front.s - configuration.front.s).abs() + ROUNDINGS * f64::EPSILON * size;
         let rest = self.length - 2.0 * h;
-        if rest <= 0.0 || look.rear_cosine <= 0.0 {
+        if rest <= 0.0 || configuration.rear_cosine <= 0.0 {
             return None;
         }
-        let nearest = self.path.follower(look.front, self.length - h);
-        let furthest = self.path.place_at(look.rear.s - 2.0 * h / look.rear_cosine);
+        let nearest = self.path.follower(configuration.front, self.length - h);
+        let furthest = self.path.place_at(configuration.rear.s - 2.0 * h / configuration.rear_cosine);
         let range = nearest.s - furthest.s;
         let across = (range + h) / rest;
         // Up to 1/2 an arc sine is less than 1.1 times its sine.
         let change = self.path.turned(furthest, nearest) + 1.1 * across;
-        let kept = (look.rear_cosine.min(1.0).acos() + change).cos() >= 0.5 * look.rear_cosine;
-        let stays = (other.rear.s - look.rear.s).abs() <= range;
+        let kept = (configuration.rear_cosine.min(1.0).acos() + change).cos() >= 0.5 * configuration.rear_cosine;
+        let stays = (other.rear.s - configuration.rear.s).abs() <= range;
         (across < 0.5 && change < 1.5 && kept && stays).then_some(range)
     }
 
-    /// Whether the front cosine certainly has one sign between two looks, the follower staying in `range` metres.
-    fn keeps_sign(&self, one: &Look, other: &Look, range: f64) -> bool {
+    /// Whether the front cosine certainly has one sign between two configurations, the follower staying in `range`
+    /// metres.
+    fn keeps_sign(&self, one: &Configuration, other: &Configuration, range: f64) -> bool {
         let h = other.front.s - one.front.s;
         let change = self.path.turned(one.front, other.front) + 1.1 * (range + h) / (self.length - 2.0 * h);
         let margin = one.front_cosine.abs().min(1.0).asin();
@@ -137,8 +138,8 @@ impl<'a> Link<'a> {
     }
 
     /// All stalls of a front handle between two places.
-    pub fn stalls_between(&self, low: f64, high: f64) -> impl Iterator<Item = &Look> {
-        self.stalls.iter().filter(move |look| low <= look.front.s && look.front.s <= high)
+    pub fn stalls_between(&self, low: f64, high: f64) -> impl Iterator<Item = &Configuration> {
+        self.stalls.iter().filter(move |configuration| low <= configuration.front.s && configuration.front.s <= high)
     }
 
     /// The first jump in the list of a front handle between two places.

@@ -1,8 +1,8 @@
-//! An independent judge of a scene's events: its own paths, followers, boards and searches, and random scenes on which
+//! An independent check of a scene's events: its own paths, followers, boards and searches, and random scenes on which
 //! the program has to agree with it. It shares no code with the library; only [`program_events`] calls that.
 //!
-//! `BENCH_DRAGON_JUDGE_SEED` and `BENCH_DRAGON_JUDGE_SCENES` choose other scenes and how many, `BENCH_DRAGON_LONG` asks
-//! for 10,000, `BENCH_DRAGON_JUDGE_FILE` judges the scene in a file.
+//! `BENCH_DRAGON_JUDGE_SEED` and `BENCH_DRAGON_JUDGE_SCENES` choose other scenes and how many, `BENCH_DRAGON_LONG` runs
+//! 10,000, `BENCH_DRAGON_JUDGE_FILE` checks the scene in a file.
 
 mod chain;
 mod comparison;
@@ -17,10 +17,10 @@ use std::sync::{Mutex, mpsc};
 use std::time::{Duration, Instant};
 
 use chain::Chain;
-use comparison::{Comparison, Verdict, judge};
+use comparison::{Comparison, Verdict, verdict};
 use scenes::{FAMILIES, Random, random_scene, read};
 
-/// What the program says of one event.
+/// What the program reports of one event.
 #[derive(Clone, Debug)]
 struct Event {
     kind: &'static str,
@@ -168,7 +168,7 @@ fn the_program_agrees_with_brute_force() {
 
 fn verdict_of(text: &str) -> Verdict {
     let (team, path) = read(text);
-    judge(&Chain::new(&path, &team))
+    verdict(&Chain::new(&path, &team))
 }
 
 fn team(benches: usize, head: f64, body: f64, width: f64, inset: f64) -> String {
@@ -179,8 +179,9 @@ fn team(benches: usize, head: f64, body: f64, width: f64, inset: f64) -> String 
 }
 
 /// Legs written as `line(metres)` and `arc(radius, turns)`, negative turns to the right.
-fn route(legs: &[[f64; 2]]) -> String {
-    legs.iter()
+fn route(segments: &[[f64; 2]]) -> String {
+    segments
+        .iter()
         .map(
             |&[size, turns]| {
                 if turns == 0.0 { scenes::line(size) } else { scenes::arc(size, turns.abs(), turns > 0.0) }
@@ -213,7 +214,7 @@ fn the_judge_finds_what_another_judge_found() {
     let stall_of = |scene: String| verdict_of(&scene).stall.unwrap().0;
     let missed = team(20, 3.41, 2.2, 0.3, 0.275) + &route(&[[5.0, 0.0], [0.03, 0.5], [20.0, 0.0]]);
     assert_near(stall_of(missed), 5.047441916962, 1e-11);
-    let legs = [
+    let segments = [
         [20.73, 0.0],
         [0.021277099139995617, -0.2415370362213321],
         [0.02770720113482116, 0.11516399630650424],
@@ -225,16 +226,16 @@ fn the_judge_finds_what_another_judge_found() {
         [0.023210627810562143, 0.0],
         [0.3271720035995628, 0.0],
     ];
-    assert_near(stall_of(team(14, 2.63, 1.9, 0.4, 0.45) + &route(&legs)), 20.79056, 1e-5);
-    let legs = [
+    assert_near(stall_of(team(14, 2.63, 1.9, 0.4, 0.45) + &route(&segments)), 20.79056, 1e-5);
+    let segments = [
         [15.73, 0.0],
         [0.010077025143215441, -0.25955572291751955],
         [0.507347784935104, 0.4493062280894443],
         [0.038008853957396976, 0.0],
         [0.013335265373781048, 1.0],
     ];
-    assert_near(stall_of(team(9, 2.63, 1.9, 0.05, 0.45) + &route(&legs)), 15.74589, 1e-5);
-    let legs = [
+    assert_near(stall_of(team(9, 2.63, 1.9, 0.05, 0.45) + &route(&segments)), 15.74589, 1e-5);
+    let segments = [
         [19.994074807700006, 0.0],
         [3.0, -0.75],
         [2.1, 0.0],
@@ -243,7 +244,7 @@ fn the_judge_finds_what_another_judge_found() {
         [0.01, 1.0],
         [0.039788735772973836, 4.0],
     ];
-    let scene = team(12, 1.7, 3.7, 0.05, 0.6) + "start = [0.0, 0.0]\nheading_turns = 0.25\n" + &route(&legs);
+    let scene = team(12, 1.7, 3.7, 0.05, 0.6) + "start = [0.0, 0.0]\nheading_turns = 0.25\n" + &route(&segments);
     let contact = verdict_of(&scene).contact.unwrap().unwrap();
     assert_near(contact.head, 37.145313188924, 1e-11);
     assert_eq!(contact.benches, (1, 8));

@@ -1,11 +1,11 @@
-//! Random scenes as TOML text, by families, and the judge's own reading of such a text.
+//! Random scenes as TOML text, by families, and this checker's own reading of such a text.
 
 use std::fmt::Write;
 
 use toml::{Table, Value};
 
 use super::chain::Team;
-use super::geometry::{Leg, Path, Vector};
+use super::geometry::{Path, RouteSegment, Vector};
 
 pub const FAMILIES: [&str; 6] = ["spiral", "turnaround", "route", "tight bends", "U-turn", "S-bend"];
 
@@ -29,17 +29,17 @@ pub fn read(text: &str) -> (Team, Path) {
             Path::turnaround(pitch, radius, ratio, lead_in, number("lead_out").unwrap_or(stretched))
         }
         _ => {
-            let legs: Vec<Leg> = table["pieces"]
+            let segments: Vec<RouteSegment> = table["pieces"]
                 .as_array()
                 .unwrap()
                 .iter()
-                .map(|leg| {
-                    let number = |field: &str| float(leg, field).unwrap();
-                    match leg["kind"].as_str().unwrap() {
-                        "line" => Leg::Line { length: number("length") },
+                .map(|segment| {
+                    let number = |field: &str| float(segment, field).unwrap();
+                    match segment["kind"].as_str().unwrap() {
+                        "line" => RouteSegment::Line { length: number("length") },
                         _ => {
-                            let left = leg["side"].as_str() == Some("left");
-                            Leg::Arc { radius: number("radius"), turns: number("turns"), left }
+                            let left = segment["side"].as_str() == Some("left");
+                            RouteSegment::Arc { radius: number("radius"), turns: number("turns"), left }
                         }
                     }
                 })
@@ -47,7 +47,7 @@ pub fn read(text: &str) -> (Team, Path) {
             let start = table.get("start").map_or(Vector::zeros(), |start| {
                 Vector::new(start[0].as_float().unwrap(), start[1].as_float().unwrap())
             });
-            Path::route(start, number("heading_turns").unwrap_or(0.0), &legs)
+            Path::route(start, number("heading_turns").unwrap_or(0.0), &segments)
         }
     };
     (team, path)

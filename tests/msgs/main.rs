@@ -10,7 +10,7 @@
 //! line in the layout, the next version in the layout's `type_name`, and its value where the message is filled in. A
 //! new message also takes its line in `ros::MESSAGES`, in `msgs/CMakeLists.txt` and in the comparisons below.
 //!
-//! The generator reads the text of the sources and is not its own judge: all other tests compare the files with the
+//! The generator reads the text of the sources and does not check itself: all other tests compare the files with the
 //! compiled Rust types, by what serde writes of them and by where their fields lie in memory.
 #![cfg(feature = "ros2")]
 
@@ -46,7 +46,7 @@ fn read(file: &str) -> String {
     std::fs::read_to_string(path(file)).unwrap_or_default()
 }
 
-/// The generated files, written first where that is asked for, with a sentence on each that is not as it should be. All
+/// The generated files, written first where that is requested, with a sentence on each that is not as it should be. All
 /// tests that read the files start here.
 static DIFFERENCES: LazyLock<Vec<String>> = LazyLock::new(|| {
     let source = Source::read();
@@ -66,7 +66,7 @@ static DIFFERENCES: LazyLock<Vec<String>> = LazyLock::new(|| {
             std::fs::write(path(&file), wanted).unwrap();
         } else {
             differences.push(format!(
-                "{file} is not what src/wire/layouts.rs says: run BENCH_DRAGON_WRITE=1 cargo test --test msgs\n{}",
+                "{file} does not follow from src/wire/layouts.rs: run BENCH_DRAGON_WRITE=1 cargo test --test msgs\n{}",
                 difference(&found, &wanted)
             ));
         }
@@ -313,7 +313,7 @@ fn python_sees_the_layouts_and_the_names_of_rust() {
     let interpreter = std::env::var_os("BENCH_DRAGON_PYTHON").unwrap_or("python3".into());
     let output = Command::new(interpreter).current_dir(path("")).args(["-c", SCRIPT]).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let said: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let printed: Value = serde_json::from_slice(&output.stdout).unwrap();
     let messages = [
         layout::<HandlePose>(),
         layout::<HandlePose32>(),
@@ -325,17 +325,17 @@ fn python_sees_the_layouts_and_the_names_of_rust() {
         layout::<ControlResponse>(),
         layout::<Stage>(),
     ];
-    assert_eq!(said["messages"].as_array().unwrap().len(), messages.len(), "a message is not compared");
-    for (of_python, of_rust) in said["messages"].as_array().unwrap().iter().zip(messages) {
+    assert_eq!(printed["messages"].as_array().unwrap().len(), messages.len(), "a message is not compared");
+    for (of_python, of_rust) in printed["messages"].as_array().unwrap().iter().zip(messages) {
         assert_eq!(*of_python, of_rust);
     }
-    assert_eq!(said["segment"], layout::<StageSegment>());
+    assert_eq!(printed["segment"], layout::<StageSegment>());
     let Names { states, levels, playback, segments, events, .. } = names();
     let mut events: BTreeMap<_, _> = events.iter().map(|(number, name)| (number.to_string(), Some(*name))).collect();
     events.insert("0".to_owned(), None);
-    assert_eq!(said["names"], json!([states, levels, playback, segments, events]));
-    assert_eq!(said["no_bench"], json!(NO_BENCH));
-    assert_eq!(said["handle_poses"], json!([size_of::<HandlePose>(), size_of::<HandlePose32>()]));
+    assert_eq!(printed["names"], json!([states, levels, playback, segments, events]));
+    assert_eq!(printed["no_bench"], json!(NO_BENCH));
+    assert_eq!(printed["handle_poses"], json!([size_of::<HandlePose>(), size_of::<HandlePose32>()]));
 }
 
 #[test]

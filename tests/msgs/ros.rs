@@ -75,12 +75,14 @@ fn constants(source: &Source, layout: &Layout) -> Vec<Constant> {
                 }
                 // An alert is about no event that raises no level.
                 let levels = &source.enumeration("Level").unwrap().variants;
-                let is_told = |name: &str| !is_event || levels.iter().any(|level| level.name == name);
+                let is_reported = |name: &str| !is_event || levels.iter().any(|level| level.name == name);
                 let variants = &source.enumeration(names.rust).unwrap().variants;
-                constants.extend(variants.iter().filter(|variant| is_told(&variant.name)).map(|variant| Constant {
-                    name: format!("{}{}", names.ros, variant.name.to_uppercase()),
-                    value: variant.number,
-                    docs: variant.docs.clone(),
+                constants.extend(variants.iter().filter(|variant| is_reported(&variant.name)).map(|variant| {
+                    Constant {
+                        name: format!("{}{}", names.ros, variant.name.to_uppercase()),
+                        value: variant.number,
+                        docs: variant.docs.clone(),
+                    }
                 }));
             }
             Target::Group(prefix) => constants.extend(source.group(prefix).into_iter().map(|constant| Constant {
@@ -99,7 +101,7 @@ fn constants(source: &Source, layout: &Layout) -> Vec<Constant> {
     constants
 }
 
-/// How much of the constants' names the message's own name says already: `StageSegment` has no `SEGMENT_`.
+/// How many words of the constants' names the message's own name already has: `StageSegment` has no `SEGMENT_`.
 fn repeated(prefix: &str, layout: &Layout) -> usize {
     let word = prefix.trim_end_matches('_').to_lowercase();
     if layout.name.to_lowercase().ends_with(&word) { prefix.len() } else { 0 }

@@ -1,4 +1,4 @@
-//! What `src/wire/layouts.rs`, `src/show/state.rs` and `src/motion/event.rs` say, read from their text: layouts,
+//! The contents of `src/wire/layouts.rs`, `src/show/state.rs` and `src/motion/event.rs`, read from their text: layouts,
 //! constants, enums, and the doc comments on all of them.
 
 use std::collections::BTreeMap;

@@ -226,7 +226,7 @@ fn is_set(variable: &str) -> bool {
     std::env::var_os(variable).is_some_and(|value| value == "1")
 }
 
-/// Whether tests that take minutes are asked for.
+/// Whether tests that take minutes are requested.
 pub fn long() -> bool {
     is_set("BENCH_DRAGON_LONG")
 }

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use nix::libc::{CLOCK_MONOTONIC, CLOCK_REALTIME, SYS_clock_gettime, c_int, clockid_t, syscall, timespec};
 
-/// Seconds of CLOCK_MONOTONIC when the process first asked for the time.
+/// Seconds of CLOCK_MONOTONIC when the process first read the time.
 static BEGAN: OnceLock<i64> = OnceLock::new();
 
 fn true_time(clock: clockid_t, time: *mut timespec) -> c_int {

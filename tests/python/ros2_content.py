@@ -19,7 +19,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from ros2_peer import TOPICS, quality
 
-# CDR: 4 bytes that say little-endian, then sec, nanosec, and "stage" with its length.
+# CDR: 4 bytes that stand for little-endian, then sec, nanosec, and "stage" with its length.
 STAMP = struct.Struct("<4xiI")
 AFTER_HEADER = 4 + 24
 # run_id to deadline_ns, three numbers, handles to reserved.

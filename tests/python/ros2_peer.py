@@ -2,7 +2,7 @@
 
     ros2_peer.py --name NAME --seconds S [--topic handles:reliable:volatile] ...
 
-Prints a JSON line for every message of the topics asked for and one line at the end. The program's own types are
+Prints a JSON line for every message of the requested topics and one line at the end. The program's own types are
 read from the .msg files, so that a drift between those and the wire shows.
 """
 
@@ -187,7 +187,7 @@ def main():
         idle = True
         for wanted, kind, reader in readers:
             for sample in reader.take(N=100):
-                # The news that a publisher has gone comes as a sample that holds nothing.
+                # The notice that a publisher has gone comes as a sample that holds nothing.
                 if not isinstance(sample, TOPICS[kind]):
                     continue
                 idle = False

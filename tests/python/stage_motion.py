@@ -14,11 +14,11 @@ import numpy
 from stage_picture import CONTACT, PROGRAM, browser, drawn, play, publisher, server, until
 
 # How many places the head was drawn at in four seconds, and how many frames came.
-PLACES = """() => new Promise((told) => {
+PLACES = """() => new Promise((done) => {
     const seen = new Set(), start = performance.now(), before = picture.received;
     const look = () => {
         seen.add(picture.head.join());
-        performance.now() < start + 4000 ? requestAnimationFrame(look) : told([seen.size, picture.received - before]);
+        performance.now() < start + 4000 ? requestAnimationFrame(look) : done([seen.size, picture.received - before]);
     };
     look();
 })"""
@@ -45,14 +45,15 @@ def motion_is_smooth_at_any_rate():
 
 def solved_at(times):
     """x, y, heading of every handle at each of some times, by the exact solver."""
-    asked = ",".join(repr(time) for time in times)
-    lines = subprocess.run([PROGRAM, "solve", "--at", asked, "--json"], capture_output=True, text=True, check=True).stdout
+    moments = ",".join(repr(time) for time in times)
+    command = [PROGRAM, "solve", "--at", moments, "--json"]
+    lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     solved = [json.loads(line) for line in lines.splitlines()]
     assert [line["t"] for line in solved] == times, "the solver has other times"
     return [numpy.array(line["handles"])[:, :3] for line in solved]
 
 
-def between_frames_is_where_the_solver_says():
+def between_frames_is_where_the_solver_has_it():
     """At 10 Hz: single precision is 6.7e-7 m at 9 m from the centre, straight lines would be 3 mm off."""
     random = numpy.random.default_rng()
     with server() as url, publisher("--start", "404", "--rate", "10"), browser() as (page, complaints):
@@ -79,11 +80,11 @@ def between_frames_is_where_the_solver_says():
 
 
 # The simulated time and the handles of every picture drawn in four seconds.
-PICTURES = """() => new Promise((told) => {
+PICTURES = """() => new Promise((done) => {
     const seen = [], start = performance.now();
     const look = () => {
         seen.push([picture.shown.time, [...picture.shown.handles]]);
-        performance.now() < start + 4000 ? requestAnimationFrame(look) : told(seen);
+        performance.now() < start + 4000 ? requestAnimationFrame(look) : done(seen);
     };
     look();
 })"""
@@ -170,7 +171,7 @@ def interpolation_keeps_its_rules():
 if __name__ == "__main__":
     play(
         motion_is_smooth_at_any_rate,
-        between_frames_is_where_the_solver_says,
+        between_frames_is_where_the_solver_has_it,
         loops_are_not_joined,
         interpolation_keeps_its_rules,
     )

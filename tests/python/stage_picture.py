@@ -74,7 +74,7 @@ def until(page, script, what, seconds=30):
     """The value of a script as soon as it is true."""
     deadline = time.monotonic() + seconds
     while not (value := page.evaluate(script)):
-        assert time.monotonic() < deadline, f"{what}: not within {seconds} s; the page says {words(page)!r}"
+        assert time.monotonic() < deadline, f"{what}: not within {seconds} s; the page shows {words(page)!r}"
         time.sleep(0.05)
     return value
 
@@ -131,7 +131,7 @@ def outside_of_boards(places, handles):
     return numpy.min([outside_of_board(places, *board) for board in boards], axis=0)
 
 
-def boards_are_where_the_truth_says():
+def boards_are_where_the_truth_has_them():
     handles = truth_at(300.0)
     with server() as url, publisher(*STILL), browser() as (page, complaints):
         requests = []
@@ -156,25 +156,25 @@ def boards_are_where_the_truth_says():
         at = at[inside]
         wrong = is_board(pixels[at[:, 1], at[:, 0]])
         assert len(at) > 2000 and not wrong.any(), f"boards are drawn at {wrong.sum()} of {len(at)} places without one"
-        says_who_it_is(page, handles)
+        shows_who_it_is(page, handles)
         dark_and_light(page)
         assert page.get_by_role("alert").count() == 1 and page.get_by_role("meter").count() == 1
         assert all(request.startswith((url, "data:")) for request in requests), requests
         assert not complaints, complaints
 
 
-def says_who_it_is(page, handles):
-    """A click on the head's board tells its number, place and speed; so does a number typed."""
+def shows_who_it_is(page, handles):
+    """A click on the head's board shows its number, place and speed; so does a number typed."""
     x, y = page.evaluate("([x, y]) => picture.toPixel(x, y)", ((handles[0] + handles[1]) / 2).tolist())
     box = page.locator("#stage").bounding_box()
     page.mouse.click(box["x"] + x, box["y"] + y)
     until(page, "document.getElementById('bench').textContent.startsWith('Bench 1 of 223, the head')", "the head, clicked")
-    told = [float(number) for number in re.findall(r"-?\d+\.\d+", page.inner_text("#bench"))]
-    assert numpy.allclose(told[:3], [*handles[0], 1.0], atol=6e-4), f"{told} is not {handles[0]} and 1 m/s"
+    shown = [float(number) for number in re.findall(r"-?\d+\.\d+", page.inner_text("#bench"))]
+    assert numpy.allclose(shown[:3], [*handles[0], 1.0], atol=6e-4), f"{shown} is not {handles[0]} and 1 m/s"
     page.fill("#pick", "223")
     until(page, "document.getElementById('bench').textContent.startsWith('Bench 223 of 223, the tail')", "the tail, by number")
-    told = [float(number) for number in re.findall(r"-?\d+\.\d+", page.inner_text("#bench"))]
-    assert numpy.allclose(told[:2], handles[222], atol=6e-4), f"{told} is not {handles[222]}"
+    shown = [float(number) for number in re.findall(r"-?\d+\.\d+", page.inner_text("#bench"))]
+    assert numpy.allclose(shown[:2], handles[222], atol=6e-4), f"{shown} is not {handles[222]}"
 
 
 def dark_and_light(page):
@@ -271,7 +271,7 @@ def show_ends_in_contact():
             fits(page)
             assert "contact" in page.inner_text("#state").lower(), page.inner_text("#state")
             assert "and bench 9 touch" in page.get_by_role("alert").inner_text(), words(page)
-            assert page.inner_text("#left") == "", "the countdown goes on after the contact"
+            assert page.inner_text("#left") == "", "the countdown continues after the contact"
             heard = page.evaluate("heard")
             assert any("Approaching" in one for one in heard) and any("and bench 9 touch" in one for one in heard), heard
             assert any(re.fullmatch(r"[345] seconds", one) for one in heard), heard
@@ -280,13 +280,13 @@ def show_ends_in_contact():
 
 
 def listen(page):
-    """Keeps what a screen reader would say."""
+    """Keeps what a screen reader would announce."""
     page.evaluate(
         """() => {
             window.heard = [];
-            const said = (changes) => changes.forEach(({target}) => heard.push(target.textContent));
+            const announced = (changes) => changes.forEach(({target}) => heard.push(target.textContent));
             for (const region of document.querySelectorAll("[role=alert], [aria-live=polite]"))
-                new MutationObserver(said).observe(region, {childList: true, characterData: true});
+                new MutationObserver(announced).observe(region, {childList: true, characterData: true});
         }"""
     )
 
@@ -377,9 +377,9 @@ def foreign_pages_are_refused():
     threading.Thread(target=elsewhere.serve_forever, daemon=True).start()
     with server() as url, publisher(*STILL), browser() as (page, _):
         opens = lambda: page.evaluate(
-            """(url) => new Promise((told) => {
+            """(url) => new Promise((resolve) => {
                 const socket = new WebSocket(url);
-                [socket.onopen, socket.onerror] = [() => told(true), () => told(false)];
+                [socket.onopen, socket.onerror] = [() => resolve(true), () => resolve(false)];
             })""",
             url.replace("http", "ws", 1) + "frames",
         )
@@ -397,5 +397,5 @@ def play(*scenarios):
 
 
 if __name__ == "__main__":
-    scenarios = (boards_are_where_the_truth_says, hands_move_the_picture, show_ends_in_contact)
+    scenarios = (boards_are_where_the_truth_has_them, hands_move_the_picture, show_ends_in_contact)
     play(*scenarios, publishers_come_and_go, five_at_once, foreign_pages_are_refused)

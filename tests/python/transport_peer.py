@@ -86,7 +86,7 @@ class Ros2:
         for topic, reader in self.readers.items():
             for sample in reader.take(N=100):
                 if not isinstance(sample, self.peer.TOPICS[topic]):
-                    continue  # The news that a publisher has gone.
+                    continue  # The notice that a publisher has gone.
                 frame = topic == "handles"
                 handles = [(pose.x, pose.y) for pose in sample.poses[:2]] if frame else None
                 yield self.KINDS[topic], sample, handles, len(sample.poses) if frame else None

@@ -29,7 +29,7 @@ proptest! {
 
     /// Place and travel are each other's inverse, and a path is travelled by its arc length.
     #[test]
-    fn a_place_is_as_far_along_as_it_says(path in any_path(), share in -0.5..0.99f64, step in 1e-6..1e-3f64) {
+    fn place_and_travel_are_inverse(path in any_path(), share in -0.5..0.99f64, step in 1e-6..1e-3f64) {
         let travelled = share * path.length();
         let param = path.param_at(travelled);
         prop_assert!((path.travelled(param) - travelled).abs() < 1e-13 * (1.0 + travelled.abs()));
@@ -42,9 +42,11 @@ proptest! {
         prop_assert!(chord <= step + 1e-13 && chord >= step * (1.0 - (curvature * step).powi(2)) - 1e-13);
     }
 
-    /// No gap and no corner: everywhere, junctions included, the direction turns by no more than the curvature says.
+    /// No gap and no corner: everywhere, junctions included, the direction turns by no more than the curvature allows.
     #[test]
-    fn tangents_turn_as_the_curvature_says(path in any_path(), share in -0.5..0.99f64, junction in any::<prop::sample::Index>()) {
+    fn tangents_turn_by_the_curvature(
+        path in any_path(), share in -0.5..0.99f64, junction in any::<prop::sample::Index>(),
+    ) {
         let junctions: Vec<f64> = path.junctions().collect();
         let step = 1e-5;
         let at_junction = (!junctions.is_empty()).then(|| junctions[junction.index(junctions.len())] - 0.5 * step);

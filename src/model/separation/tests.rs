@@ -13,9 +13,9 @@ fn board(x: f64, y: f64, heading: f64, half_length: f64, half_width: f64) -> Boa
     Board { centre: Point::new(x, y), axis: Vector::new(heading.cos(), heading.sin()), half_length, half_width }
 }
 
-/// The distance by parry, 0 where the boards overlap. It is asked near the origin and in units of `size`: its
+/// The distance by parry, 0 where the boards overlap. It is computed near the origin and in units of `size`: its
 /// thresholds are absolute.
-fn judge(a: &Board, b: &Board, size: f64) -> f64 {
+fn parry_distance(a: &Board, b: &Board, size: f64) -> f64 {
     let shape = |board: &Board| Cuboid::new([board.half_length / size, board.half_width / size].into());
     let pose = |board: &Board, at: Vector| Pose::new([at.x, at.y].into(), board.axis.y.atan2(board.axis.x));
     let (pose_a, pose_b) = (pose(a, Vector::zeros()), pose(b, (b.centre - a.centre) / size));
@@ -29,23 +29,23 @@ fn check_depth(a: &Board, b: &Board, ours: f64, size: f64) {
     let out = (on_a - on_b).normalize();
     let moved = |by: Vector| Board { centre: b.centre + by, ..*b };
     let gap = 1e-6 * size;
-    let parted = judge(a, &moved(out * (gap - ours)), size);
+    let parted = parry_distance(a, &moved(out * (gap - ours)), size);
     assert!((parted - gap).abs() < 1e-9 * size, "{a:?} {b:?} {ours} {parted}");
     for k in 0..16 {
         let (sine, cosine) = (TAU * f64::from(k) / 16.0).sin_cos();
         let less = moved(Vector::new(cosine, sine) * (-ours - gap));
-        assert!(-ours < gap || judge(a, &less, size) < 1e-9 * size, "{a:?} {b:?} {ours} {k}");
+        assert!(-ours < gap || parry_distance(a, &less, size) < 1e-9 * size, "{a:?} {b:?} {ours} {k}");
     }
 }
 
-/// Asks both about one pair; `size` is the scale of everything in it. Returns whether the boards overlap.
+/// Computes one pair with both; `size` is the scale of everything in it. Returns whether the boards overlap.
 fn compare(a: &Board, b: &Board, size: f64) -> bool {
     let tolerance = 1e-12 * size;
     // What the stage's own coordinates have lost, far from the origin.
     let lost = tolerance + 8.0 * f64::EPSILON * (a.centre.coords.norm() + b.centre.coords.norm());
     let ours = signed_distance_board_board(a, b);
     let separation = separation_board_board(a, b);
-    let distance = judge(a, b, size);
+    let distance = parry_distance(a, b, size);
     let message = format!("{a:?} {b:?} ours {ours}, separation {separation}, parry {distance}");
     assert!((ours.max(0.0) - distance).abs() <= tolerance, "{message}");
     assert!(separation <= ours && (separation > 0.0) == (ours > 0.0), "{message}");

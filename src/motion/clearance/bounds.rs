@@ -229,7 +229,8 @@ impl<'a> ListBuilder<'a> {
         }
     }
 
-    /// Adds the list of a board against those from row `from` on, offsets counted from `row`, and says where it begins.
+    /// Adds the list of a board against those from row `from` on, offsets counted from `row`, and returns where it
+    /// begins.
     /// All boards behind must be known to go `most_travel` at most.
     fn list(&mut self, mover: &(MovingBoard, Board), row: usize, from: usize, neighbours: &mut Vec<Neighbour>) -> u32 {
         self.work += WORK_OF_CELL;

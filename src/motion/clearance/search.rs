@@ -52,7 +52,7 @@ impl CarriedBounds {
         }
     }
 
-    /// Goes on to the handles of a chain.
+    /// Continues to the handles of a chain.
     fn follow(&mut self, chain: &Chain, team: &Team, link_error: f64) {
         const LANES: usize = 8;
         let (mut most, mut sum) = ([0.0; LANES], [0.0; LANES]);

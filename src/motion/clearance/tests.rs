@@ -88,7 +88,7 @@ fn the_same_as_all_pairs_past_a_stall() {
     }
 }
 
-/// The closest points are on the boards' outlines and as far apart as the clearance says.
+/// The closest points are on the boards' outlines and as far apart as the clearance.
 #[test]
 fn the_closest_points_are_the_clearance_apart() {
     let team = team(223, 0.3);

@@ -91,9 +91,9 @@ struct Distances {
     /// The least square of the distance, m^2.
     square: f64,
     /// The least q = T . (P(s) - P(u)), metres: by how much half the square grows per metre backward.
-    growth: f64,
-    /// The greatest |q_u|.
-    bend: f64,
+    slope: f64,
+    /// The greatest |q_u|: half the second derivative of the square by u.
+    second_derivative_bound: f64,
 }
 
 impl Link<'_> {
@@ -131,7 +131,7 @@ impl Link<'_> {
         16.0 * f64::EPSILON * self.length * (self.length + at.front_point.coords.norm())
     }
 
-    /// Metres of travel of the front handle up to which its segment goes on.
+    /// Metres of travel of the front handle up to which its segment extends.
     pub fn segment_end(&self, at: &Configuration) -> f64 {
         self.path.end_of(at.front_param.segment)
     }
@@ -178,26 +178,27 @@ impl Link<'_> {
     fn least_rear_cosine(&self, before: &Configuration, after: &Configuration, curvature: f64) -> Option<f64> {
         let (link, step) = (self.length, after.front - before.front);
         let (rear_far, rear_near) = (before.rear.min(after.rear), before.rear.max(after.rear));
-        let growth = before.rear_cosine.min(after.rear_cosine) * link;
-        let bend = |reach: f64| 1.0 + link * self.path.max_curvature_between(rear_far - reach, rear_near + reach);
+        let slope = before.rear_cosine.min(after.rear_cosine) * link;
+        let second_derivative_bound =
+            |reach: f64| 1.0 + link * self.path.max_curvature_between(rear_far - reach, rear_near + reach);
         // Where the cosine is so small, rounding decides where the follower is.
-        if growth <= 0.0 || growth * growth <= 2.0 * bend(0.0) * self.rounding(before) {
+        if slope <= 0.0 || slope * slope <= 2.0 * second_derivative_bound(0.0) * self.rounding(before) {
             return None;
         }
-        // How far beyond the two followers: as little as the step asks for, as long as rounding allows.
-        let least_slack = 0.25 * growth / bend(0.25 * link);
-        let slack = (0.25 * growth / bend(0.0)).min((rear_near - rear_far + step).max(least_slack));
+        // How far beyond the two followers: as little as the step needs, as long as rounding allows.
+        let least_slack = 0.25 * slope / second_derivative_bound(0.25 * link);
+        let slack = (0.25 * slope / second_derivative_bound(0.0)).min((rear_near - rear_far + step).max(least_slack));
         let reach = link + step + (rear_near - rear_far) + 2.0 * slack;
         let least_change = 0.25 * (1.0 + curvature * reach) * step * step;
-        let (far, near) = (rear_far - slack - least_change / growth, rear_near + slack);
-        let reach = reach + least_change / growth;
+        let (far, near) = (rear_far - slack - least_change / slope, rear_near + slack);
+        let reach = reach + least_change / slope;
         let (at_far, at_near) = (self.distances(before, after, far), self.distances(before, after, near));
         if at_far.square - least_change <= link * link {
             return None;
         }
-        let bend = self.largest_bend([&at_far, &at_near], near - far, step, reach);
-        let growth = 0.5 * (at_far.growth + at_near.growth - bend * (near - far)) - 0.125 * curvature * step * step;
-        (growth > 0.0 && self.nearer_throughout(before, after, curvature, near)).then_some(growth / link)
+        let bound = self.largest_second_derivative([&at_far, &at_near], near - far, step, reach);
+        let slope = 0.5 * (at_far.slope + at_near.slope - bound * (near - far)) - 0.125 * curvature * step * step;
+        (slope > 0.0 && self.nearer_throughout(before, after, curvature, near)).then_some(slope / link)
     }
 
     fn distances(&self, before: &Configuration, after: &Configuration, travelled: f64) -> Distances {
@@ -210,20 +211,24 @@ impl Link<'_> {
             param,
             curvature,
             square: offsets[0].norm_squared().min(offsets[1].norm_squared()),
-            growth: offsets[0].dot(&tangent).min(offsets[1].dot(&tangent)),
-            bend: offsets.map(|offset| (turning * tangent.perp(&offset) - 1.0).abs()).into_iter().fold(0.0, f64::max),
+            slope: offsets[0].dot(&tangent).min(offsets[1].dot(&tangent)),
+            second_derivative_bound: offsets
+                .map(|offset| (turning * tangent.perp(&offset) - 1.0).abs())
+                .into_iter()
+                .fold(0.0, f64::max),
         }
     }
 
     /// The most that q changes per metre of the rear handle between two places, `apart` metres from each other, `reach`
     /// being the longest distance: |q_u| = |K n . (P(s) - P(u)) - 1|, on one segment from its values at the corners and
     /// its own rates of change, |K (K q + n . T(s))| at most.
-    fn largest_bend(&self, ends: [&Distances; 2], apart: f64, step: f64, reach: f64) -> f64 {
+    fn largest_second_derivative(&self, ends: [&Distances; 2], apart: f64, step: f64, reach: f64) -> f64 {
         let [far, near] = ends;
         let curvature = far.curvature.max(near.curvature);
         if far.param.segment == near.param.segment {
             let drift = curvature * (curvature * reach * apart + step) + (far.curvature - near.curvature).abs() * reach;
-            return (far.bend.max(near.bend) + drift).min(1.0 + reach * curvature);
+            return (far.second_derivative_bound.max(near.second_derivative_bound) + drift)
+                .min(1.0 + reach * curvature);
         }
         let place = |end: &Distances| self.path.travelled(end.param);
         1.0 + reach * self.path.max_curvature_between(place(far), place(near))

@@ -101,7 +101,7 @@ impl Inward<'_> {
         Some((configuration, configuration.rear_param.at.minus(front.at)))
     }
 
-    /// The last place at which there is a follower: the fold, as far as doubles tell.
+    /// The last place at which there is a follower: the fold, as far as doubles resolve it.
     fn last_solvable(&self, from: f64) -> Option<f64> {
         let locked = |travelled: f64| self.configuration(travelled).is_none();
         locked(self.end).then(|| bisect_predicate(locked, from, self.end).next_down().max(from))

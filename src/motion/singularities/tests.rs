@@ -117,7 +117,7 @@ fn assert_events(path: &Path, team: &Team, stall: Option<(f64, u32)>, end: (f64,
 }
 
 #[test]
-fn spirals_stall_and_lock_where_50_digits_say() {
+fn spirals_stall_and_lock_as_with_50_digits() {
     let paper = team(223, 3.41, 2.20);
     let events = [
         (Path::spiral(0.55, 16.0), 432.758134083656, 432.917924228383),
@@ -188,7 +188,7 @@ fn u_turns_as_wide_as_the_link_cost_no_more_than_others() {
                 let team = Team { benches: 9, head_length: link, body_length: link, width: 1e-4, hole_inset: 0.0 };
                 let found = Singularities::search(&path, &team, &mut budget);
                 let end = found.end.expect("the budget was spent");
-                // Nearer than some 1e-14 the jump, and then the stall, is below what doubles can tell.
+                // Nearer than some 1e-14 the jump, and then the stall, is below what doubles can resolve.
                 if power > -14 {
                     let expected = if excess < 0.0 { EventKind::Lock } else { EventKind::PathEnd };
                     assert_eq!(end.kind, expected, "{link} {excess}");

@@ -7,7 +7,7 @@
 //! certain; each further step in it may be as long as the stretch is already, since near a degenerate configuration what
 //! rounding hides is in proportion to the distance from it. Over the whole stretch a jump is looked for, and the signs of
 //! the front cosine at its ends are compared. A lock is a proven jump, found to the last digit; all else is a graze.
-//! Jumps of less than some 1e-8 links and pairs of turns within one such stretch are below what doubles can tell.
+//! Jumps of less than some 1e-8 links and pairs of turns within one such stretch are below what doubles can resolve.
 
 use crate::linkage::NoFollower;
 use crate::model::root::bisect_predicate;
@@ -30,7 +30,7 @@ pub(super) enum TraceEnd {
 /// What a bisection to the last digit costs, in links solved.
 const BISECTION_WORK: u64 = 64;
 
-/// The longest step, in links: what the certificates ask for.
+/// The longest step, in links: what the certificates allow.
 const LONGEST_STEP: f64 = 0.5;
 
 /// The longest step, in links, that is taken without a proof in a stretch that cannot be resolved.
@@ -48,7 +48,7 @@ pub(super) struct LinkTrace<'a> {
     unresolved: Option<Configuration>,
     turns: Vec<f64>,
     furthest_rear: f64,
-    /// Links solved since the budget was last told.
+    /// Links solved since the budget was last charged.
     work: u64,
     end: Option<TraceEnd>,
 }

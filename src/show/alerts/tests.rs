@@ -251,6 +251,6 @@ fn a_restart_decides_the_level_anew() {
     run.tracker.restart();
     assert_eq!(run.levels(4, 12.0, WIDE), [Level::Approaching]);
     run.tracker.restart();
-    // Open by less than the release asks for, and not for long: a level of the showing before is not held.
+    // Open by less than the release needs, and not for long: a level of the showing before is not held.
     assert_eq!(run.levels(5, 0.0, 0.06), [Level::Clear]);
 }

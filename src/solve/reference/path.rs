@@ -31,7 +31,7 @@ pub(super) enum Curve {
 
 /// A place on a curve.
 #[derive(Debug, Clone)]
-pub(super) struct Place {
+pub(super) struct RealParam {
     /// The curve's coordinate.
     pub at: Real,
     pub point: RealVector,
@@ -42,7 +42,7 @@ pub(super) struct Place {
 }
 
 impl Curve {
-    pub fn place(&self, at: Real, functions: &mut Functions) -> Place {
+    pub fn place(&self, at: Real, functions: &mut Functions) -> RealParam {
         let unit = match self {
             Self::Line { direction, .. } => direction.clone(),
             Self::Arc { heading, sense, .. } => functions.unit_vector(&(heading + sense * &at)),
@@ -52,7 +52,7 @@ impl Curve {
     }
 
     /// The place `by` further along the coordinate. Where that is little, no sine and no cosine is computed.
-    pub fn moved(&self, place: &Place, by: &Real, functions: &mut Functions) -> Place {
+    pub fn moved(&self, place: &RealParam, by: &Real, functions: &mut Functions) -> RealParam {
         let at = &place.at + by;
         if by.rounded().abs() >= 1e-8 {
             return self.place(at, functions);
@@ -65,7 +65,7 @@ impl Curve {
         self.place_with(at, unit)
     }
 
-    fn place_with(&self, at: Real, unit: RealVector) -> Place {
+    fn place_with(&self, at: Real, unit: RealVector) -> RealParam {
         let (point, slope) = match self {
             Self::Line { origin, direction } => (origin + &direction.scaled(&at), direction.clone()),
             Self::Arc { centre, radius, sense, .. } => {
@@ -82,7 +82,7 @@ impl Curve {
                 (point, slope)
             }
         };
-        Place { at, point, slope, unit }
+        RealParam { at, point, slope, unit }
     }
 
     /// 1 where the coordinate grows in the direction of travel, -1 where it shrinks.
@@ -147,11 +147,11 @@ fn spiral_angle(radius_per_radian: &Real, length: &Real, functions: &mut Functio
 pub(super) struct Segment {
     pub curve: Curve,
     /// Where it begins; on the first segment, which has no beginning, the place from which it is measured.
-    pub first: Place,
+    pub first: RealParam,
     /// Metres of travel at `first`.
     pub begin: Real,
     /// Where it ends.
-    pub last: Place,
+    pub last: RealParam,
     /// Metres of travel there.
     pub end: Real,
 }
@@ -279,7 +279,7 @@ impl RealPath {
     }
 
     /// The segment and the place so many metres of travel past the start; clamped to the path's end.
-    pub fn place_at(&mut self, travelled: &Real) -> (usize, Place) {
+    pub fn place_at(&mut self, travelled: &Real) -> (usize, RealParam) {
         let index = self.segments.partition_point(|segment| segment.begin <= *travelled).max(1) - 1;
         let Segment { curve, first, begin, end, .. } = &self.segments[index];
         let metres = if travelled > end { end - begin } else { travelled - begin };
@@ -288,7 +288,7 @@ impl RealPath {
     }
 
     /// The place `by` further along the coordinate of a segment.
-    pub fn moved(&mut self, segment: usize, place: &Place, by: &Real) -> Place {
+    pub fn moved(&mut self, segment: usize, place: &RealParam, by: &Real) -> RealParam {
         self.segments[segment].curve.moved(place, by, &mut self.functions)
     }
 }

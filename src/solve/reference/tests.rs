@@ -188,7 +188,7 @@ fn segments_join() {
         for index in 1..path.segments() {
             let (before, after) = (path.segment(index - 1), path.segment(index));
             let gap = length(&(&before.last.point - &after.first.point)).rounded();
-            let tangent = |curve: &Curve, place: &Place| {
+            let tangent = |curve: &Curve, place: &RealParam| {
                 place.slope.scaled(&(Real::from(curve.forward()) / curve.rate(&place.at)))
             };
             let corner = &tangent(&before.curve, &before.last) - &tangent(&after.curve, &after.first);

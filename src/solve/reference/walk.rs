@@ -5,7 +5,7 @@
 //! Visual Computer 12, 1996, for rays). The points are displacements from places that the reference knows exactly, so
 //! that they keep their digits far from the origin. Only the reference calls it.
 
-use super::path::{Curve, Place, Segment};
+use super::path::{Curve, RealParam, Segment};
 use crate::linkage::NoFollower;
 use crate::model::Vector;
 use crate::model::spiral::Direction;
@@ -39,7 +39,7 @@ pub(super) struct Walk<'a> {
 
 impl<'a> Walk<'a> {
     /// Back from `place` on `segment`, which is the path's first or not, for the handle at `front`.
-    pub fn new(segment: &'a Segment, is_first: bool, place: &Place, front: &Place) -> Self {
+    pub fn new(segment: &'a Segment, is_first: bool, place: &RealParam, front: &RealParam) -> Self {
         let radius = match &segment.curve {
             Curve::Line { .. } => f64::INFINITY,
             Curve::Arc { radius, sense, .. } => (sense * radius).rounded(),

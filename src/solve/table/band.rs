@@ -1,6 +1,6 @@
 //! How T is made: band after band from the team's rear to the front of the path.
 //!
-//! A *strand* is the run of all places of one phase through a band, each found from the one behind it. Five strands
+//! A [`NodeChain`] holds the places of one phase in all rows of a band, each found from the one behind it. Five of them
 //! make a piece: their slopes carry its polynomials, their places prove them; where they do not, the piece is cut in
 //! two. The next band starts from the frontmost row of this one. Called by [`super::FollowerTable::new`] only.
 
@@ -32,20 +32,21 @@ const LEAST_SHARE: f64 = 0.125;
 /// Rows of a band from which on two threads make it.
 const PARALLEL_ROWS: usize = 128;
 
-/// What part of its allowance a halved piece may still use up if halving is to go on: less gain is rounding, not shape.
+/// What part of its allowance a halved piece may still use up if halving is to continue: a smaller gain is rounding,
+/// not shape.
 const LEAST_GAIN: f64 = 0.75;
 
 /// A piece that uses up this many times its allowance is cut without looking at the rest of its rows.
 const HOPELESS: f64 = 100.0;
 
-/// Beta of the five strands of a piece.
+/// Beta of the five node chains of a piece.
 const NODES: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 
 /// Max |e|, where the slope's error is e = b (b^2 - 1/4) (b^2 - 1) times its first neglected coefficient.
 const LARGEST_NODAL: f64 = 0.12;
 
 /// The nodes of one phase through a band, from its last row forward, as far as the chain can stand there.
-type Strand = Arc<Vec<Node>>;
+type NodeChain = Arc<Vec<Node>>;
 
 /// A band being made.
 struct BandBuilder<'a> {
@@ -84,20 +85,20 @@ impl Made {
     }
 }
 
-/// Five strands, evenly spaced over a piece.
-type Quintet = [Strand; 5];
+/// Five node chains, evenly spaced over a piece.
+type Quintet = [NodeChain; 5];
 
 /// The largest errors of a piece over its rows, as parts of what is allowed.
 struct Errors {
     worst: f64,
     /// Alpha behind which the piece is exact.
     valid_from: f64,
-    /// Whether cutting the piece can help: some strand reaches each row that is wrong.
+    /// Whether cutting the piece can help: some node chain reaches each row that is wrong.
     curable: bool,
 }
 
 impl BandBuilder<'_> {
-    fn strand(&self, phase: f64) -> Strand {
+    fn node_chain(&self, phase: f64) -> NodeChain {
         let mut nodes = Vec::with_capacity(self.rows);
         let mut gap = self.link;
         let mut rear = self.behind.node(phase);
@@ -111,36 +112,36 @@ impl BandBuilder<'_> {
     }
 
     fn quintet(&self, piece: Piece) -> Quintet {
-        std::array::from_fn(|k| self.strand(piece.begin + 0.25 * k as f64 * (piece.end - piece.begin)))
+        std::array::from_fn(|k| self.node_chain(piece.begin + 0.25 * k as f64 * (piece.end - piece.begin)))
     }
 
     /// Cuts a piece until its parts are exact, and adds these to the band. `None` where the table grows too large.
-    fn refine(&self, made: &mut Made, piece: Piece, strands: Quintet, halvings: usize, parent: f64) -> Option<()> {
-        let errors = self.errors(piece, &strands, halvings);
+    fn refine(&self, made: &mut Made, piece: Piece, chains: Quintet, halvings: usize, parent: f64) -> Option<()> {
+        let errors = self.errors(piece, &chains, halvings);
         if errors.worst <= 1.0 || !errors.curable || halvings == 0 || errors.worst > LEAST_GAIN * parent {
             if errors.worst > 1.0 {
                 made.valid_from = made.valid_from.max(errors.valid_from);
             }
-            return self.keep(made, piece, &strands);
+            return self.keep(made, piece, &chains);
         }
         let middle = 0.5 * (piece.begin + piece.end);
-        let [a, b, c, d, e] = strands;
-        let refine = |made: &mut Made, part: Piece, [front, centre, rear]: [Strand; 3]| {
+        let [a, b, c, d, e] = chains;
+        let refine = |made: &mut Made, part: Piece, [front, centre, rear]: [NodeChain; 3]| {
             let quarter = 0.25 * (part.end - part.begin);
-            let (first, second) = (self.strand(part.begin + quarter), self.strand(part.end - quarter));
+            let (first, second) = (self.node_chain(part.begin + quarter), self.node_chain(part.end - quarter));
             self.refine(made, part, [front, first, centre, second, rear], halvings - 1, errors.worst)
         };
         let (first, second) = (Piece { end: middle, ..piece }, Piece { begin: middle, ..piece });
-        let (first_strands, second_strands) = ([a, b, c.clone()], [c, d, e]);
+        let (first_chains, second_chains) = ([a, b, c.clone()], [c, d, e]);
         if halvings < MOST_HALVINGS || self.rows < PARALLEL_ROWS {
-            refine(made, first, first_strands)?;
-            return refine(made, second, second_strands);
+            refine(made, first, first_chains)?;
+            return refine(made, second, second_chains);
         }
         // Two threads make the same as one.
         let mut later = self.nothing(0.0);
         let (first, second) = std::thread::scope(|scope| {
-            let second = scope.spawn(|| refine(&mut later, second, second_strands));
-            (refine(made, first, first_strands), second.join())
+            let second = scope.spawn(|| refine(&mut later, second, second_chains));
+            (refine(made, first, first_chains), second.join())
         });
         first?;
         second.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
@@ -160,26 +161,26 @@ impl BandBuilder<'_> {
         (bytes <= self.budget as f64 * phases.max(LEAST_SHARE)).then_some(())
     }
 
-    fn keep(&self, made: &mut Made, piece: Piece, strands: &Quintet) -> Option<()> {
-        self.tabulate(&mut made.band.coefficients, piece, strands);
+    fn keep(&self, made: &mut Made, piece: Piece, chains: &Quintet) -> Option<()> {
+        self.tabulate(&mut made.band.coefficients, piece, chains);
         if self.with_centres {
-            let middle = &strands[2];
+            let middle = &chains[2];
             let missing = std::iter::repeat_n(None, self.rows - middle.len());
             made.band.centres.extend(missing.chain(middle.iter().rev().map(|node| Some(node.at))));
         }
-        made.front_row.extend(quintet_at(strands, self.rows - 1).map(|nodes| (piece, nodes.map(|node| *node))));
+        made.front_row.extend(quintet_at(chains, self.rows - 1).map(|nodes| (piece, nodes.map(|node| *node))));
         made.band.pieces.push(piece);
         self.is_within_budget(made, piece.end)
     }
 
     /// Adds the polynomials of a piece.
-    fn tabulate(&self, coefficients: &mut Vec<Lanes>, piece: Piece, strands: &Quintet) {
+    fn tabulate(&self, coefficients: &mut Vec<Lanes>, piece: Piece, chains: &Quintet) {
         let Lengths { coordinate, heading } = self.lengths;
         let half = 0.5 * (piece.end - piece.begin);
         let (rows, per_row) = (self.rows, self.lengths.per_row());
         let begin = coefficients.len();
         coefficients.resize(begin + rows / LANES * per_row, Lanes([0.0; LANES]));
-        for (index, nodes) in (0..rows).map_while(|index| Some((index, quintet_at(strands, index)?))) {
+        for (index, nodes) in (0..rows).map_while(|index| Some((index, quintet_at(chains, index)?))) {
             let row = rows - 1 - index;
             let block = &mut coefficients[begin + row / LANES * per_row..][..per_row];
             let mut polynomials = polynomials(half, nodes);
@@ -199,16 +200,16 @@ impl BandBuilder<'_> {
     }
 
     /// How far the polynomials of a piece are off; infinitely where the piece is sure to be cut.
-    fn errors(&self, piece: Piece, strands: &Quintet, halvings: usize) -> Errors {
+    fn errors(&self, piece: Piece, chains: &Quintet, halvings: usize) -> Errors {
         let half = 0.5 * (piece.end - piece.begin);
         let mut errors = Errors { worst: 0.0, valid_from: 0.0, curable: false };
         for index in 0..self.end_row - self.needed.max(self.first_row).min(self.end_row) {
             let row = self.end_row - 1 - index;
-            let error = match quintet_at(strands, index) {
-                Some(nodes) => self.error(half, nodes, index, &strands[1]),
+            let error = match quintet_at(chains, index) {
+                Some(nodes) => self.error(half, nodes, index, &chains[1]),
                 None => f64::INFINITY,
             };
-            errors.curable |= strands.iter().any(|strand| strand.len() > index);
+            errors.curable |= chains.iter().any(|chain| chain.len() > index);
             if error > 1.0 {
                 errors.valid_from = errors.valid_from.max(row as f64 + piece.end);
             }
@@ -223,7 +224,7 @@ impl BandBuilder<'_> {
 
     /// The error of one row of a piece `2 half` long, as a part of what is allowed: the largest of those of place,
     /// heading and speed.
-    fn error(&self, half: f64, nodes: [&Node; 5], index: usize, strand: &Strand) -> f64 {
+    fn error(&self, half: f64, nodes: [&Node; 5], index: usize, chain: &NodeChain) -> f64 {
         let mut polynomials = polynomials(half, nodes);
         // The size of the slope's next power, had it fallen off as the last one did.
         let power = |power: usize| power as f64 * polynomials[0][power].hypot(polynomials[1][power]);
@@ -235,7 +236,7 @@ impl BandBuilder<'_> {
         });
         let [x, y, heading] = polynomials;
         let middle = nodes[2];
-        // Each step rounds; the strands of a band differ by what adds up.
+        // Each step rounds; the node chains of a band differ by what adds up.
         let walk = (index as f64 + 8.0).sqrt() * f64::EPSILON * self.link;
         let allowed = self.tolerance.metres(self.link) + 4.0 * walk;
         let allowed_heading = 10.0 * allowed / self.link + 2.0 * f64::EPSILON;
@@ -250,17 +251,17 @@ impl BandBuilder<'_> {
         let worst = ((miss + dropped_place) / allowed)
             .max((turn + dropped[2]) / allowed_heading)
             .max(truncated / (half * middle.spacing) / self.tolerance.speed);
-        if worst <= 1.0 && !self.is_first_follower(strand, index) { f64::INFINITY } else { worst }
+        if worst <= 1.0 && !self.is_first_follower(chain, index) { f64::INFINITY } else { worst }
     }
 
-    /// Whether the node before this one of a strand is where the linkage says the follower is.
-    fn is_first_follower(&self, strand: &Strand, index: usize) -> bool {
+    /// Whether the node before this one of a node chain is where the linkage has the follower.
+    fn is_first_follower(&self, chain: &NodeChain, index: usize) -> bool {
         let Some(before) = index.checked_sub(1) else { return true };
-        is_follower(self.track, strand[before].at, strand[index].at, self.link)
+        is_follower(self.track, chain[before].at, chain[index].at, self.link)
     }
 }
 
-/// Whether a place at a link's distance is where the linkage says the follower of `front` is.
+/// Whether a place at a link's distance is where the linkage has the follower of `front`.
 fn is_follower(track: &Track, place: Param, front: Param, link: f64) -> bool {
     let apart = place.at.minus(front.at).abs();
     // As long as the distance has grown all the way.
@@ -279,9 +280,9 @@ fn is_follower(track: &Track, place: Param, front: Param, link: f64) -> bool {
     track.displacement(found, place).norm() <= 1e-6 * link + 1e-13 * size
 }
 
-/// The nodes of a row's five strands, the row counted forward from the band's last; `None` where a strand ends before.
-fn quintet_at(strands: &Quintet, index: usize) -> Option<[&Node; 5]> {
-    let [a, b, c, d, e] = strands.each_ref().map(|strand| strand.get(index));
+/// One row's nodes in the five chains, the row counted forward from the band's last; `None` where a chain ends before.
+fn quintet_at(chains: &Quintet, index: usize) -> Option<[&Node; 5]> {
+    let [a, b, c, d, e] = chains.each_ref().map(|chain| chain.get(index));
     Some([a?, b?, c?, d?, e?])
 }
 
@@ -315,7 +316,7 @@ pub(super) fn rows(track: &Track, team: &Team, tolerance: Tolerance) -> Option<R
     let link = team.link(1);
     let foremost = foremost(track, team)?;
     let second = track.follower(track.path.param_at(0.0), team.link(0))?;
-    // One strand tells how many rows there are, with some to spare; where each takes half a turn there are the fewest.
+    // One chain of nodes determines the number of rows, with some to spare; it is least where each takes half a turn.
     let mut node = beginning.node(track, 0.0);
     let bytes_per_row = Lengths::NEAR.per_row() * size_of::<f64>();
     let fewest = (track.path.arc_length(node.at, foremost) / (FRAC_PI_2 * link)).max(0.0) as usize;
@@ -338,7 +339,7 @@ pub(super) fn rows(track: &Track, team: &Team, tolerance: Tolerance) -> Option<R
     let kinks = kinks(track, &beginning, link, end);
     let phases = kinks.iter().map(|kink| kink.fract()).collect();
     let mut table = Rows { tolerance, bands: Vec::new(), kinks: phases, valid_from: 0.0 };
-    // So far behind, one piece says it all, and says it more smoothly than the beginning could for each phase by
+    // So far behind, one piece is enough, and smoother than the beginning could for each phase by
     // itself.
     let whole = Piece { begin: 0.0, end: 1.0 };
     let nodes = [0.0, 0.25, 0.5, 0.75, 1.0].map(|alpha| beginning.node(track, alpha));

@@ -49,7 +49,7 @@ struct Piece {
     /// Metres of travel where beta is 0, and beta per metre.
     middle: f64,
     scale: f64,
-    /// Alpha is `row` and what the polynomial says.
+    /// Alpha is `row` plus the polynomial's value.
     row: usize,
     /// By power: x, y, heading, alpha.
     coefficients: [[f64; QUANTITIES]; COEFFICIENTS],

@@ -53,7 +53,7 @@ pub(super) trait Blocks: Copy {
     fn outputs<const FUSED: bool, const VELOCITIES: bool>(block: Self::Block, local: &Local) -> Outputs;
 }
 
-/// Writes all handles but the head from a table in double precision. `FUSED` says that the processor multiplies and
+/// Writes all handles but the head from a table in double precision. With `FUSED` the processor multiplies and
 /// adds in one instruction.
 ///
 /// The heading of the last handle is not its own.

@@ -1,4 +1,4 @@
-//! The last row behind a band of the table, from which the band's strands start.
+//! The last row behind a band of the table, from which the band's node chains start.
 //!
 //! In: that row's pieces. Out: a node at any phase. Called by the making of the table only.
 
@@ -7,7 +7,7 @@ use super::rows::Piece;
 use super::track::{Node, Track};
 use crate::model::path::Param;
 
-/// The last row behind a band, from which its strands start.
+/// The last row behind a band, from which its node chains start.
 pub(super) struct Row<'a> {
     track: &'a Track<'a>,
     pieces: Vec<RowPiece>,

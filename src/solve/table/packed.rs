@@ -5,8 +5,8 @@
 //! was lost, over all phases and all rows that a frame can read. Made for the frame alone; the clearance reads the
 //! rows.
 //!
-//! Every polynomial of a piece is written for a part of it, exactly, and shortened by Chebyshev polynomials, which says
-//! what that changes at most; to this comes the rounding of single precision. Where it is too much, the part is halved.
+//! Every polynomial of a piece is written for a part of it, exactly, and shortened by Chebyshev polynomials, which
+//! bounds the change; to this comes the rounding of single precision. Where it is too much, the part is halved.
 
 use super::polynomial::{economise, on_part};
 use super::rows::{Band, LANES, Lanes, Lengths, Piece, Rows, piece_at, piece_of_share};

@@ -71,7 +71,7 @@ fn a_frame_does_not_depend_on_the_ones_before_and_past_the_table_the_safe_solver
 }
 
 #[test]
-fn a_coarser_table_and_its_packed_formats_are_as_exact_as_they_say() {
+fn a_coarser_table_and_its_packed_formats_are_as_exact_as_requested() {
     let accuracy = 1e-4;
     let tolerance = Tolerance { place: 1e-6, relative: f64::INFINITY, speed: 1e-5 };
     let allowed = Allowed { place: accuracy, heading: accuracy, speed: 10.0 * accuracy };

@@ -77,7 +77,7 @@ impl<'a> Track<'a> {
 
     /// The place about `metres` further along, exact to first order: for a guess, or the last step of an iteration.
     ///
-    /// The last segment is taken to go on beyond its end. `None` at the centre of a spiral.
+    /// The last segment is taken to continue beyond its end. `None` at the centre of a spiral.
     pub(super) fn moved(&self, from: Param, metres: f64) -> Option<Param> {
         let mut place = from;
         let mut left = metres;
@@ -187,22 +187,22 @@ pub(super) fn signed_rate(segment: &Segment, at: Coordinate) -> f64 {
 }
 
 /// The angle from a place on a spiral to the one `link` metres away, about `gap` metres of travel ahead, by Newton's
-/// method for (g d)^2 + 4 r (r + g d) sin^2(d/2) = link^2 (law of cosines), r the radius and g its growth.
+/// method for (g d)^2 + 4 r (r + g d) sin^2(d/2) = link^2 (law of cosines), r the radius and g its change per radian.
 fn spiral_angle(spiral: &Spiral, from: Coordinate, gap: f64, link: f64) -> Option<f64> {
     let (r, a) = (spiral.radius(from), spiral.radius_per_radian());
-    let (growth, sign) = if spiral.direction() == Direction::Inward { (-a, -1.0) } else { (a, 1.0) };
+    let (radius_per_radian, sign) = if spiral.direction() == Direction::Inward { (-a, -1.0) } else { (a, 1.0) };
     // What rounds off here would add up along the rows.
     let (square, low) = (link * link, link.mul_add(link, -(link * link)));
     let mut d = gap / r.hypot(a);
     for _ in 0..20 {
         let (sine, cosine) = (0.5 * d).sin_cos();
-        let rise = growth * d;
+        let rise = radius_per_radian * d;
         let other = r + rise;
         let value = (2.0 * r * sine).mul_add(2.0 * other * sine, -square) + rise.mul_add(rise, -low);
-        let slope = 2.0 * growth * rise + 4.0 * r * sine * (growth * sine + other * cosine);
+        let slope = 2.0 * radius_per_radian * rise + 4.0 * r * sine * (radius_per_radian * sine + other * cosine);
         let step = value / slope;
         d -= step;
-        if !(d > 0.0 && d < PI && r + growth * d > 0.0) {
+        if !(d > 0.0 && d < PI && r + radius_per_radian * d > 0.0) {
             return None;
         }
         if step.abs() < LAST_STEP * d {

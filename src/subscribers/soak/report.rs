@@ -10,7 +10,7 @@ use super::history::History;
 use super::member::{Member, Role};
 use super::observation::{Latencies, Observation};
 use super::plots::{Line, Scale, escaped, plot};
-use super::verdict::Verdict;
+use super::verdict::LimitCheck;
 use crate::live::Deliveries;
 use crate::live::statistics::RunSummary;
 
@@ -20,7 +20,7 @@ pub struct Report {
     /// `PASS` or `FAIL`.
     pub verdict: &'static str,
     /// Each limit and its value.
-    pub judgements: Verdict,
+    pub checks: Vec<LimitCheck>,
     /// The command line.
     pub command: Vec<String>,
     /// The version of this program.
@@ -95,7 +95,7 @@ impl Report {
     /// Lines for people: the verdict, each limit, each subscriber.
     pub fn lines(&self) -> Vec<String> {
         let mut lines = vec![format!("{} after {:.1} s", self.verdict, self.seconds)];
-        lines.extend(self.judgements.checks.iter().map(|check| format!("  {}", check.line())));
+        lines.extend(self.checks.iter().map(|check| format!("  {}", check.line())));
         lines.extend(self.subscribers.iter().map(|subscriber| {
             let seen = &subscriber.seen;
             let latency = seen.total.map_or_else(String::new, |Latencies { since_sent, since_deadline }| {
@@ -156,7 +156,7 @@ impl Report {
     }
 
     fn table_of_limits(&self) -> String {
-        let rows = self.judgements.checks.iter().map(|check| {
+        let rows = self.checks.iter().map(|check| {
             let word = if check.passed { "PASS" } else { "FAIL" };
             let value = if check.value.is_nan() { "not known".to_owned() } else { check.unit.show(check.value) };
             let limit = check.unit.show(check.limit);

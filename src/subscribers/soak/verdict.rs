@@ -79,8 +79,7 @@ impl LimitCheck {
 }
 
 /// All limits together.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(transparent)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
     /// Each of them.
     pub checks: Vec<LimitCheck>,

@@ -27,7 +27,7 @@ pub enum Range {
 }
 
 impl Network {
-    /// The network that the environment asks for; `variable` gives the value of a variable that is set.
+    /// The network that the environment selects; `variable` gives the value of a variable that is set.
     ///
     /// # Errors
     /// [`Ros2Error::Environment`] for a value that ROS 2 does not know or that RustDDS cannot honour.
@@ -117,11 +117,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn another_distribution_is_told() {
+    fn another_distribution_gives_a_warning() {
         let built = ros2_client::COMPILED_ROS_DISTRO.as_str();
-        let told = |value: Option<&str>| other_distribution(|_| value.map(str::to_owned));
-        assert_eq!((told(None), told(Some("")), told(Some(built))), (None, None, None));
-        assert!(told(Some("foxy")).is_some_and(|warning| warning.contains("foxy") && warning.contains(built)));
+        let warning = |value: Option<&str>| other_distribution(|_| value.map(str::to_owned));
+        assert_eq!((warning(None), warning(Some("")), warning(Some(built))), (None, None, None));
+        assert!(warning(Some("foxy")).is_some_and(|text| text.contains("foxy") && text.contains(built)));
     }
 
     fn network(variables: &[(&str, &str)]) -> Result<Network, String> {

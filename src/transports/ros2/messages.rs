@@ -70,7 +70,7 @@ impl Header {
 pub struct Stamped<Layout> {
     /// The stamp of the layout.
     pub header: Header,
-    /// What is told.
+    /// The layout's fields.
     pub layout: Layout,
 }
 
@@ -432,7 +432,7 @@ impl DiagnosticArray {
             hardware_id: name.to_owned(),
             values: vec![
                 value("rate", format!("{:.3}", status.measured_rate)),
-                value("rate asked for", status.rate.to_string()),
+                value("requested rate", status.rate.to_string()),
                 value("overruns", status.overruns.to_string()),
                 value("skipped periods", status.skipped.to_string()),
                 value("wake-up lateness p99 (us)", format!("{:.1}", status.lateness_p99_second as f64 / 1e3)),

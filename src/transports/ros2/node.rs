@@ -1,6 +1,6 @@
 //! The ROS 2 node and its topics: the sink of the background thread.
 //!
-//! Everything of ros2-client lives and dies on that thread.
+//! Everything of ros2-client is created and dropped on that thread.
 
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
@@ -31,7 +31,7 @@ const SELDOM_BYTES: usize = HEADER_BYTES + size_of::<Stage>();
 /// How long a reliable subscriber is given for the last messages.
 const LINGER: Duration = Duration::from_millis(100);
 
-/// The publishers that the scene asks for, and the messages they send, whose memory is used again.
+/// The publishers that the scene requests, and the messages they send, whose memory is used again.
 pub(super) struct Topics {
     name: String,
     stage: Stage,
@@ -109,7 +109,7 @@ impl Maker<'_> {
         Ok(port.map(|port| Stream { port, message: Arc::new(message()) }))
     }
 
-    /// A publisher for `topic` if the scene asks for it. `bytes` is the message's size, for a bound of the memory.
+    /// A publisher for `topic` if the scene requests it. `bytes` is the message's size, for a bound of the memory.
     fn port<Message: Serialize>(
         &mut self,
         topic: Topic,

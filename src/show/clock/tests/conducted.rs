@@ -178,7 +178,7 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(2000) })]
 
     #[test]
-    fn commands_do_what_counting_tick_by_tick_says(
+    fn commands_agree_with_counting_tick_by_tick(
         (start, freeze, end_hold, paused) in shows(),
         cues in prop::collection::vec((0i64..40 * 8, any::<bool>()), 0..4),
         list in prop::collection::vec((0u64..150, commands()), 0..30),
@@ -215,7 +215,7 @@ proptest! {
         };
         counted.passed = counted.before(counted.start);
         counted.pass();
-        // One that is asked at every tick, and one at the commands alone.
+        // One that is read at every tick, and one at the commands alone.
         let (mut every, mut seldom) = (clock.clone(), clock);
         let mut tick = 0;
         for (gap, command) in list {

@@ -75,7 +75,7 @@ proptest! {
         }
     }
 
-    /// The last tick of a showing is the first that has ended; then time begins again and ticks go on.
+    /// The last tick of a showing is the first that has ended; then time begins again and ticks continue.
     #[test]
     fn a_loop_ends_each_showing_at_its_first_tick_past_the_freeze((time_scale, rate, start, freeze) in shows()) {
         let looping = clock(start, time_scale, rate, freeze, AtEnd::Loop);
