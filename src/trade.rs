@@ -26,7 +26,7 @@ use crate::solve::{Chain, Solver, Velocities};
 pub const SPREAD_MOMENTS: usize = 200;
 /// Further moments, spread evenly over its last second.
 pub const LAST_SECOND_MOMENTS: usize = 10;
-/// Frames of warming up before each moment: it is a running show that is judged.
+/// Frames of warming up before each moment: it is a running show that is measured.
 const WARM_UP_FRAMES: usize = 4;
 /// The most frames that are timed, so that slow solvers and long shows end too.
 const TIMED_FRAMES: usize = 26_000;
@@ -38,7 +38,7 @@ const TIMING_LIMIT: f64 = 0.7;
 pub struct Measurement {
     /// The solver and its settings.
     pub solver: String,
-    /// Metres that were asked for; `None` for a solver that is not chosen by its accuracy.
+    /// The requested accuracy, metres; `None` for a solver that is not chosen by its accuracy.
     pub accuracy: Option<f64>,
     /// Whether the wish is met wherever the motion itself does not multiply roundings by more; see
     /// [`Measurement::noise`].
@@ -89,7 +89,7 @@ pub struct CollisionMeasurement {
 /// A solver to be measured.
 struct Candidate {
     name: String,
-    /// Frames played before one that is judged.
+    /// Frames played before one that is measured.
     warm_up_frames: usize,
     solver: Box<dyn Solver>,
     contact_time_error: Option<f64>,
@@ -105,7 +105,7 @@ struct Moment {
     handles: Vec<ReferenceHandle>,
 }
 
-/// Measures every solver on `scene`. `progress` is told which share of the work is done, from 0 to 1.
+/// Measures every solver on `scene`. `progress` is called with the share of the work that is done, from 0 to 1.
 ///
 /// # Errors
 /// A sentence where the reference cannot be had.

@@ -95,7 +95,7 @@ pub struct Display {
 /// What a reader of a stream shows, and what the stream costs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DisplayMeasurement {
-    /// Always `display`; tells this line from those of the solvers.
+    /// Always `display`; distinguishes this line from those of the solvers.
     pub r#type: &'static str,
     /// The reader.
     pub reader: Reader,

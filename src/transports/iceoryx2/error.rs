@@ -1,4 +1,4 @@
-//! What can go wrong with iceoryx2's services, each in one sentence that says what to do.
+//! What can go wrong with iceoryx2's services, each in one sentence that names a remedy.
 
 use ::iceoryx2::port::publisher::PublisherCreateError;
 use ::iceoryx2::prelude::ServiceName;
@@ -83,7 +83,7 @@ pub enum OpenError {
     Failed {
         /// The service.
         service: String,
-        /// What iceoryx2 says.
+        /// What iceoryx2 reports.
         reason: String,
     },
 }

@@ -15,10 +15,10 @@ use super::{PublisherConfig, SPARE_NODES, Sender, Service, service_name};
 use crate::live::clock::monotonic_ns;
 use crate::wire::FrameHeader;
 
-/// The attribute of a decimated service that says one handle in how many it has.
+/// The attribute of a decimated service that states one handle in how many it has.
 const EVERY: &str = "every";
 
-/// What tells a service of frames from another.
+/// What distinguishes a service of frames from another.
 pub(super) struct FrameService {
     /// The last part of its name.
     pub(super) service: &'static str,
@@ -62,7 +62,7 @@ impl<Pose: ZeroCopySend + Debug + Default + 'static> FrameSender<Pose> {
     ) -> Result<(), String> {
         let handles = poses.len();
         let sample = self.port.loan_slice_uninit(handles).map_err(|error| error.to_string())?;
-        // There are as many as it says: the default is never used.
+        // There are as many as it states: the default is never used.
         let mut sample = sample.write_from_fn(|_| poses.next().unwrap_or_default());
         let handles = handles as u32;
         *sample.user_header_mut() = FrameHeader { handles, sent_ns: monotonic_ns(), ..*header };

@@ -14,7 +14,7 @@ const QUEUE_BYTES: usize = 64_000_000;
 /// What a subscriber needs of it for its own bookkeeping, and more.
 const SUBSCRIBER_BYTES: u64 = 500_000;
 
-/// Frames a subscriber may fall behind, where the scene does not say: at most 64 MB for all subscribers together.
+/// Frames a subscriber may fall behind, where the scene does not state it: at most 64 MB for all subscribers together.
 pub(super) fn default_queue(config: &PublisherConfig) -> usize {
     (QUEUE_BYTES / frame_bytes(config) / config.subscribers).clamp(2, 64)
 }
@@ -49,7 +49,7 @@ pub fn check_room_to_subscribe() -> Result<(), OpenError> {
     }
 }
 
-/// What is left of the shared memory; `None` where there is no such folder: iceoryx2 itself will say what is wrong.
+/// What is left of the shared memory; `None` where there is no such folder: iceoryx2 itself will report what is wrong.
 fn free_bytes() -> Option<u64> {
     let space = nix::sys::statvfs::statvfs(SHARED_MEMORY).ok()?;
     Some(space.blocks_available() * space.fragment_size())
