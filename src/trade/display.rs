@@ -20,7 +20,7 @@ use crate::wire::{FrameHeader, HandlePose};
 
 /// The publishing rates that are measured, hertz.
 pub const RATES: [f64; 9] = [1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 240.0, 1000.0];
-/// Seconds before the freeze whose display moments are measured.
+/// Seconds whose display moments are measured, up to the last whole second before the freeze.
 pub const WINDOW: f64 = 2.0;
 /// Further display moments, spread evenly over the show.
 pub const SPREAD_MOMENTS: usize = 20;
