@@ -44,6 +44,8 @@ pub(super) struct Topics {
     diagnostics: Option<Port<DiagnosticArray>>,
     latest_alert: Option<CollisionAlert>,
     skipped_periods: u64,
+    /// Whether the stage has been sent a second time.
+    stage_repeated: bool,
     /// Messages that a full queue of RustDDS did not take, because a reliable subscriber was slow or dead.
     discarded: u64,
     // Dropped after the publishers: they belong to it.
@@ -191,6 +193,7 @@ impl Topics {
             diagnostics: maker.port(Topic::Diagnostics, type_name::DIAGNOSTIC_ARRAY, SELDOM_BYTES, 1.0)?,
             latest_alert: None,
             skipped_periods: 0,
+            stage_repeated: false,
             discarded: 0,
             _node: maker.node,
         };
@@ -238,6 +241,11 @@ impl Sink for Topics {
     }
 
     fn status(&mut self, status: &LoopStatus) {
+        // Now and then RustDDS does not deliver what was sent while it was still discovering a subscriber, although it
+        // keeps it: a second later they have found each other.
+        if !std::mem::replace(&mut self.stage_repeated, true) {
+            self.publish_stage();
+        }
         if let Some(port) = &mut self.status {
             port.send(Arc::new(Stamped::status(*status)), &mut self.discarded);
         }
