@@ -8,11 +8,11 @@
 //! - [`motion`]: a team on a path: its solver, its events, its clearance.
 //! - [`scene`]: the file a user writes, checked and turned into the types above.
 //! - [`show`]: from a scene and a tick to one frame, deterministic.
-//! - [`wire`]: the memory layouts that go over the wire, and every conversion to them.
 //! - [`plan`]: the least pitch and the greatest speed, for a choreographer.
+//! - [`wire`]: the memory layouts that go over the wire, and every conversion to them.
 //! - [`live`]: the fixed-rate loop, its clock, its statistics.
 //! - [`transports`]: iceoryx2 shared memory and ROS 2 topics, as publishers of the loop.
-//! - [`subscribers`]: the terminal monitor and the stage picture; they know the wire only.
+//! - [`subscribers`]: the feed of a publisher's messages, the terminal monitor, the stage picture, the soak test; no solver.
 //! - [`trade`]: accuracy against cost, measured for every solver on a scene and this machine.
 
 #![deny(missing_docs)]

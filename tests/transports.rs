@@ -1,6 +1,7 @@
 //! What every transport promises, seen from another process: one suite, which each of them runs.
 //!
-//! A transport joins by a reader in tests/python/transport_peer.py and a line in the list below.
+//! A transport joins by a reader in tests/python/transport_peer.py, a test at the end that calls [`suite`], and, where a
+//! scene has to request it, its settings in [`publisher`].
 
 mod processes;
 
