@@ -92,7 +92,7 @@ PICTURES = """() => new Promise((done) => {
 
 def loops_are_not_joined():
     """Whatever is drawn while the show loops lies on the spiral; between an end and a beginning it would not."""
-    options = ["--start", "411", "--rate", "10", "--loop"]
+    options = ["--start", "411", "--rate", "10", "--loop", "--end-hold", "0"]
     with server() as url, publisher(*options), browser(viewport={"width": 640, "height": 480}) as (page, complaints):
         page.goto(url)
         drawn(page)
