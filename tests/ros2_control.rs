@@ -230,8 +230,12 @@ fn without_the_flag_there_is_no_service_and_with_it_those_of_the_standards() {
     let of_services =
         |topics: &serde_json::Map<String, Value>| topics.keys().filter(|topic| !topic.starts_with("rt/")).count();
     let [read, written] = endpoints(without);
-    assert!(written.keys().any(|topic| topic.ends_with("/poses")), "its topics are not there: {written:?}");
-    assert_eq!((of_services(&read), of_services(&written)), (0, 0), "{read:?}, {written:?}");
+    let topics = ["poses", "handles", "alerts", "stage", "path"].map(|topic| format!("rt/{}/{topic}", unique(without)));
+    let mut offered: Vec<&String> = written.keys().collect();
+    let mut topics: Vec<&String> = topics.iter().collect();
+    (offered.sort(), topics.sort());
+    assert_eq!(offered, topics, "no other topic is on by default; a scene without cues has none for them");
+    assert_eq!(of_services(&read), 0, "{read:?}");
     let [read, written] = endpoints(with);
     let expected = [
         (

@@ -5,8 +5,8 @@
 Before each request and response stand the client (uint64) and the number of the call (int64). Prints a JSON line for each
 response, or null where none came within some seconds. With --bare the 16 bytes are left out, as in the mapping of
 rmw_fastrtps_cpp. With --fresh, N clients, each a participant of its own, make their first call to the first service. With
---flood, one client calls the first service N times without waiting for a response. Without a call, prints which services
-there are below NAME, as topics and types.
+--flood, one client calls the first service N times without waiting for a response. Without a call, prints which topics
+there are below NAME with their types, those of services too, and /clock and /tf.
 """
 
 import argparse
@@ -171,7 +171,7 @@ def endpoints(participant, name, seconds):
         for what, reader in readers:
             for sample in reader.take(N=1000):
                 topic = getattr(sample, "topic_name", None)
-                if topic and topic.startswith((f"rq/{name}/", f"rr/{name}/", f"rt/{name}/")):
+                if topic and topic.startswith((f"rq/{name}/", f"rr/{name}/", f"rt/{name}/", "rt/clock", "rt/tf")):
                     found[what][topic] = sample.type_name
         time.sleep(0.01)
     return found

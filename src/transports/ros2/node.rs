@@ -20,6 +20,8 @@ use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stag
 
 /// More bytes than a point of the path has.
 const PATH_POSE_BYTES: usize = 88;
+/// More bytes than the transforms of head and tail have, whatever the name.
+const TRANSFORMS_BYTES: usize = 1000;
 /// How long a reliable subscriber is given for the last messages.
 const LINGER: Duration = Duration::from_millis(100);
 
@@ -86,7 +88,9 @@ impl Topics {
             diagnostics: maker.port(Topic::Diagnostics, type_name::DIAGNOSTIC_ARRAY, SELDOM_BYTES, 1.0)?,
             cues: if config.cues > 0 { maker.port(Topic::Cues, type_name::CUE, SELDOM_BYTES, 1.0)? } else { None },
             clock: maker.port(Topic::Clock, type_name::CLOCK, SELDOM_BYTES, config.rate)?,
-            transforms: maker.stream(Topic::Tf, type_name::TF_MESSAGE, 4, || TfMessage::of(&config.name))?,
+            transforms: maker
+                .port(Topic::Tf, type_name::TF_MESSAGE, TRANSFORMS_BYTES, config.rate)?
+                .map(|port| port.stream(TfMessage::of(&config.name))),
             path: maker.port(Topic::Path, type_name::PATH, path_bytes, 1.0)?.map(|port| (port, path)),
             latest_alert: None,
             alerts_sent: 0,
@@ -219,8 +223,14 @@ mod tests {
             bytes(&Stamped::status(status)),
             bytes(&Stamped::alert(alert)),
             bytes(&diagnostics),
+            bytes(&Stamped::cue(Cue { name: SceneName::new(&"n".repeat(100)), ..Cue::default() })),
+            bytes(&Clock { clock: Time::default() }),
         ];
         assert!(seldom.iter().all(|bytes| *bytes < SELDOM_BYTES), "{seldom:?} bytes of {SELDOM_BYTES}");
+        let points = vec![Pose::of(&HandlePose::default()); 1000];
+        assert!(bytes(&Path::of(0, &points)) < SELDOM_BYTES + 1000 * PATH_POSE_BYTES);
+        let transforms = bytes(&TfMessage::of(&"n".repeat(255)));
+        assert!(transforms < TRANSFORMS_BYTES, "{transforms}");
         let poses = vec![HandlePose::default(); 224];
         let frame = HandlePoses { header: Header::of(0), frame: FrameHeader::default(), poses };
         assert!(bytes(&frame) < HEADER_BYTES + 224 * size_of::<HandlePose>());

@@ -30,6 +30,11 @@ pub(super) struct Port<Message: Serialize> {
 }
 
 impl<Message: Serialize> Port<Message> {
+    /// A publisher of this message, which is changed before each time it is sent.
+    pub(super) fn stream(self, message: Message) -> Stream<Message> {
+        Stream { port: self, message: Arc::new(message) }
+    }
+
     /// Sends a message. What a full queue does not take is counted, and reported once.
     pub(super) fn send(&mut self, message: Arc<Message>, discarded: &mut u64) {
         if self.publisher.publish(message).is_ok() {
@@ -78,7 +83,7 @@ impl Maker<'_> {
     ) -> Result<Option<Stream<Message>>, Ros2Error> {
         let bytes = HEADER_BYTES + self.config.handles * each;
         let port = self.port(topic, type_name, bytes, self.config.rate)?;
-        Ok(port.map(|port| Stream { port, message: Arc::new(message()) }))
+        Ok(port.map(|port| port.stream(message())))
     }
 
     /// A publisher for `topic` if the scene requests it. `bytes` is the message's size, for a bound of the memory.

@@ -94,6 +94,7 @@ fn pose_at(segment: &SegmentOutline, share: f64) -> Pose {
 mod tests {
     use super::*;
     use crate::model::Point;
+    use crate::model::curve::Side;
     use crate::model::path::Path as ModelPath;
 
     /// Every pose lies on the path, and looks along it, by the path's own points and tangents.
@@ -127,5 +128,8 @@ mod tests {
     #[test]
     fn the_points_lie_on_the_path_and_look_along_it() {
         check(&ModelPath::spiral(0.55, 16.0));
+        check(&ModelPath::turnaround(1.7, 4.5, 2.0, 100.0, 60.0).unwrap());
+        let route = ModelPath::route(Point::new(-3.0, 2.0), 0.1).line(5.0).arc(Side::Left, 3.0, 0.5);
+        check(&route.line(2.0).arc(Side::Right, 1.5, 0.75).build().unwrap());
     }
 }
