@@ -61,6 +61,9 @@ pub struct RunArguments {
     /// Publish ROS 2 topics too, those of the scene's [publish.ros2] or the default ones
     #[arg(long)]
     ros2: bool,
+    /// Offer ROS 2 services that conduct the show, to everybody whom ROS 2 reaches; needs --ros2 or [publish.ros2]
+    #[arg(long)]
+    ros2_control: bool,
     #[command(flatten)]
     scheduling: RealtimeScheduling,
     /// End when the process that started this one ends
@@ -76,6 +79,14 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
     let mut scene = common.load_scene()?;
     if arguments.ros2 {
         scene.ros2.get_or_insert_default();
+    }
+    if arguments.ros2_control {
+        let Some(settings) = &mut scene.ros2 else {
+            let sentence =
+                "--ros2-control is given and ROS 2 is not requested, expected --ros2 or a scene with [publish.ros2]";
+            return Err(CommandError::BadInput(sentence.to_owned()));
+        };
+        settings.control = true;
     }
     let playback = arguments.playback(&scene)?;
     service_name(&common.name, "poses")?;

@@ -141,7 +141,7 @@ pub fn cue(header: &FrameHeader, reached: &ReachedCue) -> Cue {
 
 /// The response to a request with this id.
 pub fn control_response(id: u64, outcome: &Outcome) -> ControlResponse {
-    let Outcome { code, tick, sim_time, time_scale, playback, cue } = *outcome;
+    let Outcome { code, tick, sim_time, time_scale, playback, cue, .. } = *outcome;
     let (code, playback) = (code as u32, playback as u32);
     ControlResponse { id, tick, sim_time, time_scale, code, playback, cue, reserved: 0 }
 }

@@ -185,6 +185,7 @@ fn fields_types_and_order_are_those_that_serde_writes() {
         ("CollisionAlert", on_the_wire(&Stamped::alert(CollisionAlert::default()))),
         ("LoopStatus", on_the_wire(&Stamped::status(LoopStatus::default()))),
         ("Stage", on_the_wire(&Stamped::stage(Stage::default()))),
+        ("Cue", on_the_wire(&Stamped::cue(Cue::default()))),
         ("StageSegment", on_the_wire(&StageSegment::default())),
     ];
     assert_eq!(wire.len(), ros::MESSAGES.len(), "a message is not compared");
@@ -201,6 +202,7 @@ fn type_names_are_those_that_ros_2_gives_the_interface_files() {
         ("CollisionAlert", type_name::COLLISION_ALERT),
         ("LoopStatus", type_name::LOOP_STATUS),
         ("Stage", type_name::STAGE),
+        ("Cue", type_name::CUE),
     ] {
         assert_eq!(on_the_wire, format!("bench_dragon_msgs::msg::dds_::{name}_"));
     }
@@ -259,7 +261,7 @@ fn constants_are_the_states_levels_events_playback_and_segments() {
     alert.extend([("EVENT_NONE".to_owned(), 0), ("NO_BENCH".to_owned(), NO_BENCH)]);
     assert_eq!(interface("CollisionAlert").constants, alert);
     assert_eq!(interface("StageSegment").constants, in_order("", &names.segments));
-    for name in ["HandlePose", "LoopStatus", "Stage"] {
+    for name in ["HandlePose", "LoopStatus", "Stage", "Cue"] {
         assert_eq!(interface(name).constants, BTreeMap::new(), "{name}");
     }
 }
