@@ -207,7 +207,8 @@ impl Screen<'_> {
             return Ok(output.flush()?);
         }
         self.clear_previous(&mut output)?;
-        let columns = size().map_or(80, |(columns, _)| columns.into());
+        // Some terminals do not know their size.
+        let columns = size().ok().filter(|(columns, _)| *columns > 0).map_or(80, |(columns, _)| columns.into());
         writeln!(output, "{}", textwrap::fill(line, textwrap::Options::new(columns).subsequent_indent(INDENT)))?;
         self.draw(&mut output)?;
         Ok(output.flush()?)

@@ -13,10 +13,9 @@ use bench_dragon::show::control::Command;
 use bench_dragon::subscribers::control::conductor::{Action, Conducted, Conductor};
 use bench_dragon::subscribers::control::{refusal, standing};
 use bench_dragon::subscribers::feed::FeedEvent;
-use crossterm::event::{Event, KeyCode, KeyEventKind, KeyModifiers, poll, read};
-use signal_hook::consts::{SIGCONT, SIGHUP, SIGQUIT, SIGTSTP};
+use signal_hook::consts::{SIGCONT, SIGQUIT, SIGTSTP};
 
-use super::terminal::KeyMode;
+use super::terminal::{Key, KeyMode};
 use crate::commands::CommandError;
 
 /// What `?` prints.
@@ -58,7 +57,7 @@ pub struct Keyboard {
 }
 
 impl Keyboard {
-    /// Keys from standard input; `stop` is also set by the signals that would leave the terminal without an echo.
+    /// Keys from standard input; `stop` is also set by the signal that would leave the terminal without an echo.
     ///
     /// # Errors
     /// The system's, where it has no thread or signal handler left.
@@ -67,7 +66,7 @@ impl Keyboard {
         // Nobody waits for an answer any more where the keyboard has gone.
         let conductor = Conductor::start(name, move |(), conducted| drop(sender.send(conducted)))?;
         let [suspend, resumed] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
-        for (signal, flag) in [(SIGHUP, stop), (SIGQUIT, stop), (SIGTSTP, &suspend), (SIGCONT, &resumed)] {
+        for (signal, flag) in [(SIGQUIT, stop), (SIGTSTP, &suspend), (SIGCONT, &resumed)] {
             signal_hook::flag::register(signal, Arc::clone(flag))?;
         }
         let (waiting, unanswered, end) = (VecDeque::new(), 0, f64::INFINITY);
@@ -91,16 +90,10 @@ impl Keyboard {
     pub fn poll(&mut self) -> Vec<KeyOutcome> {
         let mut outcomes = Vec::new();
         self.follow_job_control();
-        while self.mode.is_some() {
-            match poll(Duration::ZERO).and_then(|any| if any { read().map(Some) } else { Ok(None) }) {
-                Ok(Some(Event::Key(key))) if key.kind != KeyEventKind::Release => {
-                    outcomes.extend(self.press(key.code, key.modifiers));
-                }
-                Ok(Some(_)) => (),
-                Ok(None) => break,
-                // The terminal has gone, or never sends a key.
-                Err(_) => self.mode = None,
-            }
+        match self.mode.as_mut().map(KeyMode::keys) {
+            Some(Ok(keys)) => keys.into_iter().for_each(|key| outcomes.extend(self.press(key))),
+            Some(Err(_)) => self.mode = None,
+            None => (),
         }
         while let Ok(conducted) = self.answers.try_recv() {
             outcomes.push(self.answered(conducted));
@@ -121,22 +114,19 @@ impl Keyboard {
         }
     }
 
-    fn press(&mut self, key: KeyCode, modifiers: KeyModifiers) -> Option<KeyOutcome> {
-        if modifiers.intersects(KeyModifiers::CONTROL | KeyModifiers::ALT) && !matches!(key, KeyCode::Char('[' | ']')) {
-            return None;
-        }
+    fn press(&mut self, key: Key) -> Option<KeyOutcome> {
         let seek = |seconds| Action::SeekBy { seconds, end: self.end };
         let action = match key {
-            KeyCode::Char(' ') => Action::Toggle,
-            KeyCode::Left => seek(-SEEK),
-            KeyCode::Right => seek(SEEK),
-            KeyCode::Char('[') => return self.change_rate(0.5),
-            KeyCode::Char(']') => return self.change_rate(2.0),
-            KeyCode::Char('.') => Action::Send(Command::Step(1)),
-            KeyCode::Char('h') => Action::Send(Command::Hold),
-            KeyCode::Char('r') => Action::Send(Command::Release),
-            KeyCode::Char('?') => return Some(KeyOutcome::Line(HELP.to_owned())),
-            KeyCode::Char('q') => return Some(KeyOutcome::Quit),
+            Key::Char(' ') => Action::Toggle,
+            Key::Left => seek(-SEEK),
+            Key::Right => seek(SEEK),
+            Key::Char('[') => return self.change_rate(0.5),
+            Key::Char(']') => return self.change_rate(2.0),
+            Key::Char('.') => Action::Send(Command::Step(1)),
+            Key::Char('h') => Action::Send(Command::Hold),
+            Key::Char('r') => Action::Send(Command::Release),
+            Key::Char('?') => return Some(KeyOutcome::Line(HELP.to_owned())),
+            Key::Char('q') => return Some(KeyOutcome::Quit),
             _ => return None,
         };
         self.request(action)
