@@ -14,10 +14,12 @@ use crate::subscribers::feed::{Feed, FeedEvent};
 const POLL_INTERVAL: Duration = Duration::from_millis(4);
 /// How long to wait where the services cannot be used, before the next attempt.
 const RETRY_INTERVAL: Duration = Duration::from_millis(200);
+/// Cues that a browser which takes long to be written to may fall behind.
+const KEPT_CUES: usize = 16;
 
 /// Keeps the picture up to date until `stop` is set, through any number of publishers.
 pub(super) fn read(mut feed: Feed, sender: &watch::Sender<Picture>, stop: &AtomicBool) {
-    let mut reader = Reader { picture: Picture::waiting(None), benches: 0 };
+    let mut reader = Reader { picture: Picture::waiting(None), benches: 0, cues: 0 };
     let mut reason: Option<String> = None;
     sender.send_replace(reader.picture.clone());
     while !stop.load(Ordering::Relaxed) {
@@ -47,6 +49,8 @@ struct Reader {
     picture: Picture,
     /// The size of the team, which an alert's sentence needs.
     benches: u32,
+    /// Cues that have come so far.
+    cues: u64,
 }
 
 impl Reader {
@@ -58,6 +62,11 @@ impl Reader {
                 self.benches = stage.benches;
             }
             FeedEvent::Alert(alert) => self.picture.alert = wire::alert(alert, self.benches).into(),
+            FeedEvent::Cue(cue) => {
+                self.cues += 1;
+                let kept = self.picture.cues.iter().rev().take(KEPT_CUES - 1).rev().cloned();
+                self.picture.cues = kept.chain([(self.cues, wire::cue(cue).into())]).collect();
+            }
             FeedEvent::Frame { header, handles, .. } => self.picture.frame = wire::frame(header, handles).into(),
             FeedEvent::Gone => {
                 self.picture = Picture::waiting(None);

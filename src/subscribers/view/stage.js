@@ -1,5 +1,7 @@
 // The page: puts the stream into the drawing and into words, and takes the user's hand.
 
+// First, since it takes the token out of the address.
+import { conduct } from "./conduct.js";
 import { STRIDE, speedOf } from "./hermite.js";
 import { Stream } from "./stream.js";
 import { Camera, Ground, benchAt, draw, paletteOf, pathOf } from "./drawing.js";
@@ -289,4 +291,5 @@ matchMedia("(prefers-color-scheme: dark)").onchange = () => (palette = paletteOf
 // The address may set how the picture begins, for a screen without a keyboard: #dark, #light,follow and so on.
 const begin = { dark: () => setTheme("dark"), light: () => setTheme("light"), follow };
 location.hash.slice(1).split(",").forEach((word) => begin[word]?.());
+conduct(stream);
 pass();
