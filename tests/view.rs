@@ -1,6 +1,7 @@
 //! The stage picture as its users meet it: browsers, programs that read its WebSocket, and strangers.
 //!
-//! The browser is Debian's Chromium; what is done in it stands in `tests/python/stage_picture.py` and `stage_motion.py`.
+//! The browser is Debian's Chromium; what is done in it stands in `tests/python/stage_picture.py`, `stage_motion.py` and
+//! `stage_show.py`.
 //! Nothing asserts a speed.
 
 mod processes;
@@ -11,7 +12,7 @@ use std::time::Duration;
 
 use bench_dragon::live::clock::monotonic_ns;
 use nix::sys::signal::Signal;
-use processes::{Process, can_run, chromium, program, python, python_modules, text, unique, wait};
+use processes::{Process, can_run, chromium, long, program, python, python_modules, text, unique, wait};
 use serde_json::Value;
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{ClientRequestBuilder, Message, WebSocket};
@@ -244,13 +245,19 @@ fn in_motion(scenario: &str) {
     run_scenario("tests/python/stage_motion.py", scenario);
 }
 
+fn on_stage(scenario: &str) {
+    run_scenario("tests/python/stage_show.py", scenario);
+}
+
 fn run_scenario(script: &str, scenario: &str) {
     if !can_run(chromium().and_then(|()| python_modules(&["playwright", "numpy"]))) {
         return;
     }
     let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let arguments = [script, scenario, env!("CARGO_BIN_EXE_bench-dragon"), &unique(&scenario[..6])];
-    let output = Process::start(python().args(arguments)).output_within(180);
+    // The scenario that is ten minutes long where long tests are requested ends itself.
+    let limit = if long() { 900 } else { 180 };
+    let output = Process::start(python().args(arguments)).output_within(limit);
     println!("{}", text(&output.stdout));
     assert!(output.status.success(), "{}", text(&output.stderr));
 }
@@ -303,4 +310,29 @@ fn interpolation_keeps_its_rules() {
 #[test]
 fn foreign_pages_are_refused() {
     in_a_browser("foreign_pages_are_refused");
+}
+
+#[test]
+fn show_paints_nothing_but_the_picture() {
+    on_stage("show_paints_nothing_but_the_picture");
+}
+
+#[test]
+fn what_is_coming_is_named_and_seen() {
+    on_stage("what_is_coming_is_named_and_seen");
+}
+
+#[test]
+fn the_last_picture_stays() {
+    on_stage("the_last_picture_stays");
+}
+
+#[test]
+fn colours_mean_the_same_all_along() {
+    on_stage("colours_mean_the_same_all_along");
+}
+
+#[test]
+fn nothing_is_complained_about() {
+    on_stage("nothing_is_complained_about");
 }

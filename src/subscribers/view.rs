@@ -149,7 +149,7 @@ pub fn serve<Refused: From<ViewError>>(
     let reader = std::thread::spawn({
         let (name, stop) = (name.to_owned(), Arc::clone(stop));
         move || {
-            let read = Feed::new(&name, FEED).map(|feed| reader::read(feed, &sender, &stop));
+            let read = Feed::new(&name, FEED).map(|feed| reader::read(feed, &name, &sender, &stop));
             stop.store(true, Ordering::Relaxed);
             read
         }
@@ -179,10 +179,21 @@ fn router(server: Server, pages: Option<&Path>) -> Router {
     }
     router
         .route("/", file("text/html; charset=utf-8", include_str!("view/index.html")))
-        .route("/stage.js", file("text/javascript; charset=utf-8", include_str!("view/stage.js")))
+        .route("/address.js", file("text/javascript; charset=utf-8", include_str!("view/address.js")))
+        .route("/boards.js", file("text/javascript; charset=utf-8", include_str!("view/boards.js")))
+        .route("/camera.js", file("text/javascript; charset=utf-8", include_str!("view/camera.js")))
         .route("/drawing.js", file("text/javascript; charset=utf-8", include_str!("view/drawing.js")))
+        .route("/hands.js", file("text/javascript; charset=utf-8", include_str!("view/hands.js")))
         .route("/hermite.js", file("text/javascript; charset=utf-8", include_str!("view/hermite.js")))
+        .route("/marks.js", file("text/javascript; charset=utf-8", include_str!("view/marks.js")))
+        .route("/palette.js", file("text/javascript; charset=utf-8", include_str!("view/palette.js")))
+        .route("/panel.js", file("text/javascript; charset=utf-8", include_str!("view/panel.js")))
+        .route("/show.js", file("text/javascript; charset=utf-8", include_str!("view/show.js")))
+        .route("/signs.js", file("text/javascript; charset=utf-8", include_str!("view/signs.js")))
+        .route("/sound.js", file("text/javascript; charset=utf-8", include_str!("view/sound.js")))
+        .route("/stage.js", file("text/javascript; charset=utf-8", include_str!("view/stage.js")))
         .route("/stream.js", file("text/javascript; charset=utf-8", include_str!("view/stream.js")))
+        .route("/words.js", file("text/javascript; charset=utf-8", include_str!("view/words.js")))
         .route("/style.css", file("text/css; charset=utf-8", include_str!("view/style.css")))
         .route("/conduct.js", file("text/javascript; charset=utf-8", include_str!("view/conduct.js")))
         .route("/conduct.css", file("text/css; charset=utf-8", include_str!("view/conduct.css")))

@@ -35,7 +35,8 @@ pub fn bench_name(bench: u32, benches: u32) -> String {
     }
 }
 
-/// An alert as a sentence, in a team of so many benches: what has happened, or what is coming and the nearest two.
+/// An alert as a sentence, in a team of so many benches: what happened, in the past tense, since the show may go on; or
+/// what is coming and where, and apart from it the two that are nearest now.
 pub fn alert_sentence(alert: &CollisionAlert, benches: u32, figures: Figures) -> String {
     let happened = alert.alert_level().is_some_and(Level::has_happened);
     let sentence = match (happened, alert.event_kind()) {
@@ -63,17 +64,21 @@ pub fn state_sentence(state: FrameState) -> Option<&'static str> {
 
 fn happening(alert: &CollisionAlert, kind: EventKind, benches: u32) -> String {
     let who = names(alert.event_benches(), benches);
-    let (time, place) = (alert.event_time, format!("({:.3}, {:.3}) m", alert.event_x, alert.event_y));
+    let (time, place) = (alert.event_time, place(alert));
     match kind {
-        EventKind::Contact => format!("{who} touch at {place}, t = {time:.6} s"),
+        EventKind::Contact => format!("{who} touched at {place}, t = {time:.6} s"),
         EventKind::Stall => {
-            format!("{who} stalls, t = {time:.6} s: from the handle at {place} on, the team is pushed backwards")
+            format!("{who} stalled, t = {time:.6} s: from the handle at {place} on, the team was pushed backwards")
         }
         EventKind::Lock => {
-            format!("{who} locks, its rear handle at {place}, t = {time:.6} s: the motion cannot continue")
+            format!("{who} locked, its rear handle at {place}, t = {time:.6} s: the motion cannot continue")
         }
-        EventKind::PathEnd => format!("the head reaches the end of the path, t = {time:.6} s"),
+        EventKind::PathEnd => format!("the head reached the end of the path, t = {time:.6} s"),
     }
+}
+
+fn place(alert: &CollisionAlert) -> String {
+    format!("({:.3}, {:.3}) m", alert.event_x, alert.event_y)
 }
 
 fn coming(alert: &CollisionAlert, kind: EventKind, benches: u32, figures: Figures) -> String {
@@ -82,7 +87,7 @@ fn coming(alert: &CollisionAlert, kind: EventKind, benches: u32, figures: Figure
         Figures::Shown { time_scale } => format!(" {}", time_until(alert.time_to_event, time_scale)),
         Figures::Omitted => String::new(),
     };
-    format!("{}: {who}{when}", kind.name())
+    format!("{}: {who} at {}{when}", kind.name(), place(alert))
 }
 
 /// Wall time until so many simulated seconds have passed, at a rate in force; a show that stands still comes nowhere.
@@ -137,8 +142,12 @@ mod tests {
         let coming = alert(Level::Approaching, Some(EventKind::Contact));
         let nearest = "nearest now are bench 1 (the head) and bench 10, 0.0031 m apart (counting from 1)";
         let sentence = |figures| alert_sentence(&coming, 223, figures);
-        assert_eq!(sentence(SHOWN), format!("contact: bench 1 (the head) and bench 9 in 6.5 s; {nearest}"));
-        let words = "contact: bench 1 (the head) and bench 9; nearest now are bench 1 (the head) and bench 10 (counting from 1)";
+        assert_eq!(
+            sentence(SHOWN),
+            format!("contact: bench 1 (the head) and bench 9 at (1.250, -0.500) m in 6.5 s; {nearest}")
+        );
+        let words = "contact: bench 1 (the head) and bench 9 at (1.250, -0.500) m; \
+                     nearest now are bench 1 (the head) and bench 10 (counting from 1)";
         assert_eq!(sentence(Figures::Omitted), words);
         let stall = CollisionAlert {
             event_bench_b: NO_BENCH,
@@ -146,7 +155,10 @@ mod tests {
             bench_b: NO_BENCH,
             ..alert(Level::Clear, Some(EventKind::Stall))
         };
-        assert_eq!(alert_sentence(&stall, 2, SHOWN), "stall: bench 1 (the head) in 6.5 s (counting from 1)");
+        assert_eq!(
+            alert_sentence(&stall, 2, SHOWN),
+            "stall: bench 1 (the head) at (1.250, -0.500) m in 6.5 s (counting from 1)"
+        );
         let nothing = alert(Level::Approaching, None);
         assert_eq!(alert_sentence(&nothing, 223, SHOWN), format!("no contact, stall or lock ahead; {nearest}"));
     }
@@ -156,11 +168,11 @@ mod tests {
         let contact = alert(Level::Contact, Some(EventKind::Contact));
         assert_eq!(
             alert_sentence(&contact, 9, SHOWN),
-            "bench 1 (the head) and bench 9 (the tail) touch at (1.250, -0.500) m, t = 412.473838 s (counting from 1)"
+            "bench 1 (the head) and bench 9 (the tail) touched at (1.250, -0.500) m, t = 412.473838 s (counting from 1)"
         );
         let lock = CollisionAlert { event_bench_b: NO_BENCH, ..alert(Level::Lock, Some(EventKind::Lock)) };
         let sentence = alert_sentence(&lock, 223, SHOWN);
-        assert!(sentence.starts_with("bench 1 (the head) locks, its rear handle at (1.250, -0.500) m"), "{sentence}");
+        assert!(sentence.starts_with("bench 1 (the head) locked, its rear handle at (1.250, -0.500) m"), "{sentence}");
     }
 
     #[test]
@@ -168,7 +180,9 @@ mod tests {
         let contact = alert(Level::Approaching, Some(EventKind::Contact));
         let sentence = alert_sentence(&contact, 9, Figures::Shown { time_scale: 0.0 });
         assert!(
-            sentence.starts_with("contact: bench 1 (the head) and bench 9 (the tail) not while paused"),
+            sentence.starts_with(
+                "contact: bench 1 (the head) and bench 9 (the tail) at (1.250, -0.500) m not while paused"
+            ),
             "{sentence}"
         );
     }

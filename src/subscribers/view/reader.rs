@@ -8,6 +8,7 @@ use tokio::sync::watch;
 
 use super::{Picture, wire};
 use crate::subscribers::feed::{Feed, FeedEvent};
+use crate::wire::{LoopStatus, Stage};
 
 /// How often frames are polled: some browsers draw 240 times a second, none needs more. To be woken by each frame
 /// instead would cost the publisher more than the frame itself.
@@ -17,9 +18,10 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(200);
 /// Cues that a browser which takes long to be written to may fall behind.
 const KEPT_CUES: usize = 16;
 
-/// Keeps the picture up to date until `stop` is set, through any number of publishers.
-pub(super) fn read(mut feed: Feed, sender: &watch::Sender<Picture>, stop: &AtomicBool) {
-    let mut reader = Reader { picture: Picture::waiting(None), benches: 0, cues: 0 };
+/// Keeps the picture up to date until `stop` is set, through any number of publishers of a name.
+pub(super) fn read(mut feed: Feed, name: &str, sender: &watch::Sender<Picture>, stop: &AtomicBool) {
+    let mut reader =
+        Reader { picture: Picture::waiting(None), publisher: name.to_owned(), stage: None, status: None, cues: 0 };
     let mut reason: Option<String> = None;
     sender.send_replace(reader.picture.clone());
     while !stop.load(Ordering::Relaxed) {
@@ -47,8 +49,11 @@ pub(super) fn read(mut feed: Feed, sender: &watch::Sender<Picture>, stop: &Atomi
 /// The newest of everything, as far as it has come.
 struct Reader {
     picture: Picture,
-    /// The size of the team, which an alert's sentence needs.
-    benches: u32,
+    /// The publisher's name.
+    publisher: String,
+    stage: Option<Stage>,
+    /// Of the run whose status came last: it alone holds the scene's name.
+    status: Option<LoopStatus>,
     /// Cues that have come so far.
     cues: u64,
 }
@@ -58,10 +63,13 @@ impl Reader {
     fn handle(&mut self, event: FeedEvent<'_>) -> bool {
         match event {
             FeedEvent::Stage(stage) => {
-                self.picture.stage = wire::stage(stage).into();
-                self.benches = stage.benches;
+                self.stage = Some(*stage);
+                self.describe();
             }
-            FeedEvent::Alert(alert) => self.picture.alert = wire::alert(alert, self.benches).into(),
+            FeedEvent::Alert(alert) => {
+                let benches = self.stage.map_or(0, |stage| stage.benches);
+                self.picture.alert = wire::alert(alert, benches).into();
+            }
             FeedEvent::Cue(cue) => {
                 self.cues += 1;
                 let kept = self.picture.cues.iter().rev().take(KEPT_CUES - 1).rev().cloned();
@@ -73,9 +81,23 @@ impl Reader {
                 return true;
             }
             // The page counts the time since the latest frame by itself.
-            FeedEvent::Silent | FeedEvent::Started { .. } | FeedEvent::Status(_) => return false,
+            FeedEvent::Status(status) => {
+                if self.status.replace(*status).is_some_and(|known| known.run_id == status.run_id) {
+                    return false;
+                }
+                self.describe();
+                return true;
+            }
+            FeedEvent::Silent | FeedEvent::Started { .. } => return false,
         }
         self.picture.waiting = Default::default();
         true
+    }
+
+    /// Says what the stage is, with the scene's name once it is known.
+    fn describe(&mut self) {
+        let Some(stage) = &self.stage else { return };
+        let status = self.status.as_ref().filter(|status| status.run_id == stage.run_id);
+        self.picture.stage = wire::stage(stage, &self.publisher, status.map(|status| status.scene.as_str())).into();
     }
 }

@@ -2,37 +2,53 @@
 
 // First, since it takes the token out of the address.
 import { conduct } from "./conduct.js";
+import { wordsOf } from "./address.js";
+import { benchAt } from "./boards.js";
+import { Camera } from "./camera.js";
+import { Ground, draw, pathOf } from "./drawing.js";
+import { attach } from "./hands.js";
 import { STRIDE, speedOf } from "./hermite.js";
+import { Overlap, marksOf } from "./marks.js";
+import { SpeedScale, paletteOf } from "./palette.js";
+import { element, put, showBench, showFigures, showNames, showSituation } from "./panel.js";
+import { Show } from "./show.js";
+import { Sound } from "./sound.js";
 import { Stream } from "./stream.js";
-import { Camera, Ground, benchAt, draw, paletteOf, pathOf } from "./drawing.js";
+import { benchesOf, nameOf, remaining, say, setLanguage, translate } from "./words.js";
 
-/** By severity; the list of the states, with the severity of each, comes with the stage. */
-const SIGNS = { ok: "○", warning: "△", error: "✖" };
-/** While there is nothing to show; a state that the server does not list is shown as one without danger. */
+/** While there is nothing to show. */
 const WAITING = { name: "waiting", severity: "ok", happened: false, sentence: null };
-const element = (id) => document.getElementById(id);
-const canvas = element("stage"), context = canvas.getContext("2d", { alpha: false });
-const stream = new Stream(), camera = new Camera(), ground = new Ground();
-let palette = paletteOf(canvas), places = null, path = null, pathRun = null, chosen = -1, range = null, still = false, last = null;
+/** A state that the server does not list is shown as one without danger. */
+const UNKNOWN = { ...WAITING, name: "unknown" };
+/** Frames that do not come for so long (ms) are missed. */
+const SILENCE = 2000;
+
+const words = wordsOf(location.hash), root = document.documentElement, stillness = matchMedia("(prefers-reduced-motion: reduce)");
+setLanguage(words.lang);
+translate(document);
+for (const word of ["show", "transparent"]) root.toggleAttribute(`data-${word}`, word in words);
+if (words.dark || words.light || words.show) root.dataset.theme = words.light ? "light" : "dark";
+
+const canvas = element("stage"), context = canvas.getContext("2d", { alpha: "transparent" in words });
+const stream = new Stream(), camera = new Camera(), ground = new Ground("transparent" in words), overlap = new Overlap(), sound = new Sound();
+const colours = new SpeedScale(), show = words.show ? new Show(stillness.matches) : null;
+let palette = paletteOf(canvas), places = null, path = null, run = null, team = null, epoch = null, chosen = -1, last = null, passedAt = 0, state = WAITING;
 
 /**
  * For tests and measurements: what the page has received and drawn. `shown` is the simulated time and the handles of the
- * latest picture; `latency` and `ways` in ms since the frame was sent.
+ * latest picture, `range` speeds on the colour scale, `marks` and `labels` what is marked and written on
+ * it; `latency` and `ways` in ms since the frame was sent.
  */
-const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, shown: null, latency: [], ways: stream.ways, toPixel: (x, y) => camera.toPixel(x, y) };
+const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, shown: null, range: null, marks: [], labels: [], latency: [], ways: stream.ways, played: sound.played, toPixel: (x, y) => camera.toPixel(x, y) };
 window.picture = picture;
-
-function put(id, text) {
-  if (element(id).textContent !== text) element(id).textContent = text;
-}
-
-// The drawing.
 
 function fitCanvas() {
   const { width, height } = canvas.getBoundingClientRect(), ratio = devicePixelRatio;
   Object.assign(camera, { width, height, ratio });
   const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
-  if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
+  if (canvas.width === wide && canvas.height === high) return;
+  [canvas.width, canvas.height] = [wide, high];
+  last = null;
 }
 
 /** How far from the centre the outermost bench is. */
@@ -42,185 +58,158 @@ function reachOf(stage, handles) {
   return most + stage.width + stage.hole_inset || 1;
 }
 
-/** The colours' scale holds all speeds and changes gently; none while nothing moves or no speeds are sent. */
-function widen(handles) {
-  let [low, high] = [Infinity, -Infinity];
-  for (let handle = 0; handle < handles.length / STRIDE; handle++) {
-    const speed = speedOf(handles, handle);
-    if (speed > 0) [low, high] = [Math.min(low, speed), Math.max(high, speed)];
+/** When the head reaches the end of the path, where nothing else comes before that. */
+function pathEnd(stage, alert) {
+  const metres = stage.path.reduce((sum, { length }) => sum + length, 0), speed = colours.handles ? speedOf(colours.handles, 0) : NaN;
+  return alert?.event === null ? metres / speed : NaN;
+}
+
+/** What is so now: the state, what is ahead and in how many seconds of wall time. */
+function situation(now) {
+  const { playback, stage, alert, trouble } = stream, { newest } = playback;
+  const silence = newest ? now - newest.at : 0;
+  const silent = !trouble && newest && silence > Math.max(SILENCE, 3 * playback.interval) ? Math.floor(silence / 1000) : null;
+  const lost = trouble ?? (newest && stage ? null : "noStage");
+  const current = lost ? WAITING : stage.states[newest.state] ?? UNKNOWN;
+  let [seconds, ahead] = [NaN, null];
+  if (!lost && silent === null && newest.playing && !current.happened) {
+    ahead = alert?.event ?? "path_end";
+    seconds = ((alert?.event_time ?? pathEnd(stage, alert)) - playback.time(now)) / newest.scale;
   }
-  if (!(high > 0)) return null;
-  // A hair's breadth is not worth a colour.
-  const wider = Math.max(0, 0.01 * high - (high - low) / 2);
-  [low, high] = [low - wider, high + wider];
-  const slowly = (old, now) => (range ? old + 0.05 * (now - old) : now);
-  return { low: Math.min(low, slowly(range?.low, low)), high: Math.max(high, slowly(range?.high, high)) };
+  return { state: current, alert, trouble: lost, silent, seconds, ahead, benches: stage?.benches, now: "" };
+}
+
+/** Another run: another path and other speeds; and where the team is another one, nothing chosen for the last. */
+function begin(stage, newest) {
+  const look = JSON.stringify({ ...stage, run_id: null, scene: null });
+  if (team !== null && team !== look) camera.forget();
+  [team, run] = [look, newest.run];
+  colours.clear();
+}
+
+/** Words for the marks, in the page's language. */
+function named(marks, { seconds }, deepest) {
+  const time = seconds > -1 ? remaining(Math.max(0, seconds)).join(" ") : null;
+  for (const mark of marks) {
+    mark.names = show ? [] : mark.pair.map(nameOf);
+    const benches = mark.pair.length ? benchesOf(mark.pair) : "", { alert } = stream;
+    if (mark.kind === "coming") mark.text = say(time === null ? "comingStill" : "coming", { kind: say(alert.event), benches, time });
+    if (mark.kind === "overlap") mark.text = overlapWords(deepest);
+  }
+  return marks;
+}
+
+function overlapWords({ pair, depth }) {
+  return depth < 0.0005 ? say("touchNow", { benches: benchesOf(pair) }) : say("overlapNow", { benches: benchesOf(pair), metres: depth.toFixed(3) });
 }
 
 function pass() {
   requestAnimationFrame(pass);
   picture.passes++;
   fitCanvas();
-  const now = performance.now(), { playback, stage, alert } = stream, { newest } = playback;
+  const now = performance.now(), passed = now - passedAt, sight = situation(now), { playback, stage, alert } = stream, { newest } = playback;
+  passedAt = now;
   picture.received = stream.received;
-  updateText(now);
-  if (!newest || !stage) return drawNothing();
+  const before = state;
+  state = sight.state;
+  if (!newest || !stage) {
+    showText(sight, now);
+    return drawNothing();
+  }
   const shown = playback.at(now, places), { from, to } = shown;
   places = shown.handles;
+  if (run !== newest.run) begin(stage, newest);
+  colours.take(newest);
+  camera.update(stage, places, passed);
   const reach = reachOf(stage, newest.handles);
   // Positions are rounded to 32 bits, which alone moves the outermost bench a little.
-  if (pathRun !== newest.run || reach > 1.001 * camera.reach) {
+  if (!path || path.run !== run || reach > 1.001 * path.reach) {
     // A team that moves outward is given room ahead.
-    camera.reach = pathRun === newest.run ? 1.1 * reach : reach;
-    path = pathOf(stage, camera.reach);
-    if (pathRun !== newest.run) range = null;
-    pathRun = newest.run;
+    const far = path?.run === run ? 1.1 * reach : reach;
+    path = { run, reach: far, lines: pathOf(stage, far) };
+    camera.reach = far;
   }
-  if (camera.follow) [camera.x, camera.y] = places;
-  const widened = widen(newest.handles);
-  range = widened ?? range;
-  still = !widened;
+  const known = stage.states[newest.state] ?? UNKNOWN;
+  const deepest = known.happened && known.severity !== "ok" ? overlap.look(stage, places, newest, reach, now) : null;
+  const all = marksOf({ state: known, alert, stage, places, overlap: deepest });
+  // An audience is shown where it will happen, not what the crew watches.
+  const marks = named(show ? all.filter(({ kind }) => kind !== "now") : all, sight, deepest);
+  sight.now = deepest && !sight.trouble ? overlapWords(deepest) : "";
+  showText(sight, now);
+  sound.count(state.severity === "ok" && !(sight.seconds < 10) ? NaN : sight.seconds);
+  const struck = state.happened && state.severity === "error";
+  if (struck && before !== WAITING && before.name !== state.name) sound.strike();
+  if (show) show.update(now, places, epoch !== from.epoch, struck ? { x: alert?.event_x ?? places[0], y: alert?.event_y ?? places[1] } : null);
+  epoch = from.epoch;
   // Nothing is drawn twice: a show that stands still costs nothing.
-  const all = [newest.run, newest.state, still, shown.time, from.epoch, camera.x, camera.y, camera.zoom, camera.reach, camera.width, camera.height, camera.ratio, range?.low, range?.high, alert?.level, alert?.event_x, alert?.bench_a, alert?.bench_b, chosen, palette.ground].join();
-  if (all !== last) {
-    draw(context, camera, palette, { stage, places, newest: newest.handles, range, ground, path, alert, chosen });
-    last = all;
+  const texts = marks.map(({ kind, pair, text }) => [kind, pair, text]);
+  const look = [newest.run, newest.state, colours.resting, shown.time, from.epoch, camera.x, camera.y, camera.scale, camera.c, camera.s, path.reach, colours.step, colours.head, alert?.level, texts, chosen, palette.ground, stage.scene, show?.phase].join();
+  if (look !== last) {
+    const written = draw(context, camera, palette, { stage, places, colours, ground, path: path.lines, marks, chosen, words: !words.nolabels, show, chosenName: nameOf(chosen), endNames: [say("head"), say("tail")] });
+    last = look;
     picture.drawn++;
+    Object.assign(picture, { marks, labels: written });
     if (stream.clock !== null && from !== to) {
       const part = (shown.time - from.time) / (to.time - from.time);
       picture.latency.push(performance.now() + stream.clock - (from.sent + (to.sent - from.sent) * part));
       if (picture.latency.length > 600) picture.latency.shift();
     }
   }
+  if (sight.trouble) return forget();
   const head = camera.toPixel(places[0], places[1]);
-  Object.assign(picture, { state: newest.state, run: newest.run, sequence: newest.sequence, time: newest.time, head, shown });
+  Object.assign(picture, { state: newest.state, run: newest.run, sequence: newest.sequence, time: newest.time, head, shown, range: colours.ticks.map(({ speed }) => speed) });
 }
 
-function drawNothing() {
-  const blank = [palette.ground, canvas.width, canvas.height].join();
-  if (blank === last) return;
-  last = blank;
-  context.setTransform(1, 0, 0, 1, 0, 0);
-  context.fillStyle = palette.ground;
-  context.fillRect(0, 0, canvas.width, canvas.height);
+/** The picture stays; what tests read of a publisher that is gone does not. */
+function forget() {
   Object.assign(picture, { state: null, run: null, sequence: null, head: null, shown: null });
 }
 
-// The words.
-
-/** Seconds as a person reads them off from afar. */
-function remaining(seconds) {
-  if (seconds < 100) return [seconds.toFixed(1), "s"];
-  const whole = Math.floor(seconds), pad = (number) => String(number).padStart(2, "0");
-  const hours = Math.floor(whole / 3600), minutes = Math.floor(whole / 60) % 60;
-  return hours ? [`${hours}:${pad(minutes)}:${pad(whole % 60)}`, "h"] : [`${minutes}:${pad(whole % 60)}`, "min"];
+/** What has been drawn stays until there is something else to draw. */
+function drawNothing() {
+  forget();
+  const blank = [palette.ground, canvas.width, canvas.height].join();
+  if (last !== null) return;
+  last = blank;
+  context.setTransform(1, 0, 0, 1, 0, 0);
+  context.clearRect(0, 0, canvas.width, canvas.height);
+  context.fillStyle = palette.ground;
+  if (!("transparent" in words)) context.fillRect(0, 0, canvas.width, canvas.height);
 }
 
-/** The server puts alerts and states into words; those of an alert's level that the frames have not reached, or have left, do not count. */
-function sentence(state, alert) {
-  const capital = (words) => words[0].toUpperCase() + words.slice(1);
-  if (state.sentence) return `${capital(state.sentence)}.`;
-  if (state.severity === "ok" || alert?.level !== state.name) return "";
-  const words = `${capital(alert.sentence)}.`;
-  return state.happened ? words : `${capital(state.name)}. ${words}`;
-}
-
-let spokenAt = Infinity;
-function speak(seconds) {
-  const mark = [10, 5, 3].findLast((mark) => seconds <= mark) ?? Infinity;
-  if (mark < spokenAt) put("spoken", `${Math.ceil(seconds)} seconds`);
-  spokenAt = mark;
-}
-
-function countdown(state, alert, now) {
-  const { playback } = stream, { newest } = playback;
-  const seconds = alert?.event_time != null ? (alert.event_time - playback.time(now)) / newest.scale : NaN;
-  const ahead = !state.happened && seconds > -1, near = state.severity !== "ok";
-  const [number, unit] = ahead ? remaining(Math.max(0, seconds)) : ["", ""];
-  element("countdown").hidden = !ahead;
-  put("until", ahead ? `${near ? "" : "next "}${alert.event} in` : "");
-  if (element("left").dataset.text !== number + unit) {
-    element("left").dataset.text = number + unit;
-    // The number is made as large as the panel is wide.
-    element("left").style.setProperty("--letters", number.length + 0.5 * unit.length);
-    element("left").textContent = number;
-    element("left").append(Object.assign(document.createElement("small"), { textContent: unit }));
-  }
-  speak(near && ahead ? seconds : Infinity);
-}
-
-function meter(stage, clearance) {
-  const known = Number.isFinite(clearance), most = Math.max(stage.pitch - stage.width, 2 * stage.width);
-  put("metres", !known ? "not computed" : clearance < -0.0005 ? `${(-clearance).toFixed(3)} m overlap` : `${Math.max(0, clearance).toFixed(3)} m`);
-  const bar = element("meter"), share = known ? Math.min(1, Math.max(0, clearance / most)) : 0;
-  bar.firstElementChild.style.width = `${(100 * share).toFixed(1)}%`;
-  bar.setAttribute("aria-valuemax", most.toFixed(3));
-  bar.setAttribute("aria-valuenow", (share * most).toFixed(3));
-  bar.setAttribute("aria-valuetext", element("metres").textContent);
-}
-
-function detail(stage, handles) {
-  const count = handles.length / STRIDE - 1;
-  element("pick").max = count;
-  const there = chosen >= 0 && chosen < count, k = STRIDE * chosen;
-  element("bench").classList.toggle("chosen", there);
-  if (!there) return put("bench", "Click a bench, or type its number.");
-  const name = chosen === 0 ? ", the head" : chosen === count - 1 ? ", the tail" : "", speed = speedOf(handles, chosen);
-  const degrees = ((handles[k + 2] * 180) / Math.PI).toFixed(1);
-  put("bench", `Bench ${chosen + 1} of ${count}${name}: front handle at (${handles[k].toFixed(3)}, ${handles[k + 1].toFixed(3)}) m, ${Number.isNaN(speed) ? "speed not sent" : `${speed.toFixed(3)} m/s`}, heading ${degrees}°`);
-}
-
-let figuresAt = 0, counted = { at: 0, received: 0 }, perSecond = 0;
-function updateText(now) {
-  const { playback, stage, alert } = stream, { newest } = playback;
-  const state = newest && stage ? stage.states[newest.state] ?? { ...WAITING, name: "unknown" } : WAITING;
-  const { dataset } = document.body, before = dataset.level, calm = state.severity === "ok" && !state.happened;
-  if (before !== state.name) Object.assign(dataset, { level: state.name, severity: state.severity, happened: state.happened });
-  if (state === WAITING) {
-    put("state", `○ ${stream.trouble ?? "waiting for the stage"}`);
-    put("spoken", stream.trouble ?? "");
-    for (const id of ["alert", "until", "left", "metres", "speeds", "time", "rate"]) put(id, "");
-    element("left").dataset.text = "";
-    element("countdown").hidden = true;
-    put("bench", "");
-    element("meter").firstElementChild.style.width = 0;
-    return;
-  }
-  countdown(state, alert, now);
-  const words = state.name.replaceAll("_", " "), silent = now - newest.at > Math.max(2000, 3 * playback.interval);
-  put("state", silent ? `… no frames for ${Math.floor((now - newest.at) / 1000)} s` : `${SIGNS[state.severity]} ${words}`);
-  put("alert", sentence(state, alert));
-  if (calm && before !== state.name) put("spoken", before === WAITING.name ? "The dragon moves." : "Clear again.");
+let figuresAt = 0, counted = { at: 0, received: 0 };
+function showText(sight, now) {
+  const { playback, stage } = stream, { newest } = playback;
+  showSituation(sight);
+  const stopped = sight.trouble ?? (sight.silent === null ? null : "silent"), kept = newest && stage && stopped;
+  const notice = { server: "lostServer", silent: "silent" }[stopped] ?? "lostPublisher";
+  element("notice").hidden = !kept || "nolabels" in words;
+  put("notice", kept ? say(notice, { seconds: sight.silent, time: newest.time.toFixed(1) }) : "");
   // The rest changes too often to be read at every pass.
-  if (now - figuresAt < 100) return;
+  if (!newest || !stage || now - figuresAt < 100) return;
   figuresAt = now;
-  meter(stage, newest.clearance);
-  put("speeds", Number.isNaN(newest.handles[3]) ? "not sent" : still ? "at rest" : range ? `${range.low.toFixed(2)}–${range.high.toFixed(2)}` : "");
-  put("time", `t = ${playback.time(now).toFixed(1)} s${newest.scale === 1 ? "" : ` (× ${+newest.scale.toPrecision(3)})`}`);
-  detail(stage, newest.handles);
-  if (now - counted.at > 1000) {
-    perSecond = ((stream.received - counted.received) * 1000) / (now - counted.at);
-    counted = { at: now, received: stream.received };
-    const late = picture.latency.slice(-60).sort((a, b) => a - b), behind = late.length ? `, ${late[late.length >> 1].toFixed(0)} ms behind the publisher` : "";
-    put("rate", `${perSecond.toFixed(perSecond < 10 ? 1 : 0)} frames/s${behind}`);
-  }
+  showNames(stage);
+  showFigures({ clearance: newest.clearance, colours, time: playback.time(now), scale: newest.scale });
+  showBench(chosen, newest.handles);
+  if (now - counted.at < 1000) return;
+  const rate = ((stream.received - counted.received) * 1000) / (now - counted.at), late = picture.latency.slice(-60).sort((a, b) => a - b);
+  counted = { at: now, received: stream.received };
+  const behind = late.length ? say("behind", { ms: late[late.length >> 1].toFixed(0) }) : "";
+  put("rate", stopped ? "" : say("frames", { rate: rate.toFixed(rate < 10 ? 1 : 0), behind }));
 }
 
 // The user's hand.
 
 function showFollow() {
-  element("follow").setAttribute("aria-pressed", camera.follow);
+  element("follow").setAttribute("aria-pressed", camera.mode === "bench");
+  put("follow", chosen > 0 ? say("followBench", { bench: chosen + 1 }) : say("follow"));
 }
 function follow() {
-  camera.follow = !camera.follow;
-  // Near enough to distinguish the benches, however large the stage is.
-  const near = Math.max(2.5, camera.reach / (5 * (stream.stage?.head_length ?? camera.reach)));
-  if (camera.follow && camera.zoom < near) camera.zoom = near;
+  camera.mode === "bench" ? camera.release() : camera.follow(Math.max(0, chosen));
   showFollow();
 }
 function whole() {
   camera.whole();
-  if (stream.stage) camera.reach = reachOf(stream.stage, stream.playback.newest.handles);
   showFollow();
 }
 function pan(x, y) {
@@ -230,66 +219,56 @@ function pan(x, y) {
 function choose(bench) {
   chosen = bench;
   element("pick").value = bench >= 0 ? bench + 1 : "";
+  showFollow();
 }
-function setTheme(theme) {
-  document.documentElement.dataset.theme = theme;
+function dressed() {
   palette = paletteOf(canvas);
+  last = null;
 }
 function toggleTheme() {
-  const theme = document.documentElement.dataset.theme ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
-  setTheme(theme === "dark" ? "light" : "dark");
+  const theme = root.dataset.theme ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+  root.dataset.theme = theme === "dark" ? "light" : "dark";
+  dressed();
 }
 async function fill() {
   if (document.fullscreenElement) return document.exitFullscreen();
-  await document.documentElement.requestFullscreen();
+  await root.requestFullscreen();
   // A projector must not go to sleep; a browser that cannot promise that still shows the picture.
   await navigator.wakeLock?.request("screen").catch(() => null);
 }
+function toggleSound() {
+  sound.turn(!sound.on);
+  element("sound").setAttribute("aria-pressed", sound.on);
+}
+const help = () => element("keys").showModal();
 
-const fingers = new Map();
-let moved = 0;
-canvas.onpointerdown = (event) => {
-  canvas.setPointerCapture(event.pointerId);
-  if (!fingers.size) moved = 0;
-  fingers.set(event.pointerId, { x: event.offsetX, y: event.offsetY });
-};
-canvas.onpointermove = (event) => {
-  const old = fingers.get(event.pointerId);
-  if (!old) return;
-  const now = { x: event.offsetX, y: event.offsetY }, x = now.x - old.x, y = now.y - old.y;
-  moved += Math.hypot(x, y);
-  const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
-  if (other) {
-    const apart = (one) => Math.hypot(one.x - other.x, one.y - other.y) || 1;
-    camera.zoomAt(apart(now) / apart(old), (now.x + other.x) / 2, (now.y + other.y) / 2);
-    if (!camera.follow) pan(x / 2, y / 2);
-  } else if (moved > 6) pan(x, y);
-  fingers.set(event.pointerId, now);
-};
-canvas.onpointercancel = (event) => fingers.delete(event.pointerId);
-canvas.onpointerup = (event) => {
-  fingers.delete(event.pointerId);
-  if (moved > 6 || fingers.size || !stream.stage || !places) return;
-  choose(benchAt(stream.stage, places, ...camera.toStage(event.offsetX, event.offsetY), 16 / camera.scale));
-};
-canvas.addEventListener("wheel", (event) => {
-  event.preventDefault();
-  camera.zoomAt(Math.exp(-event.deltaY / (event.deltaMode ? 20 : 500)), event.offsetX, event.offsetY);
-}, { passive: false });
+const zoom = (by) => () => camera.zoomAt(by);
 const keys = {
-  "+": () => camera.zoomAt(1.25), "=": () => camera.zoomAt(1.25), "-": () => camera.zoomAt(0.8), 0: whole, Home: whole,
-  f: follow, t: toggleTheme, p: fill, Escape: () => choose(-1),
+  "+": zoom(1.25), "=": zoom(1.25), "-": zoom(0.8), 0: whole, Home: whole,
+  f: follow, t: toggleTheme, p: fill, s: toggleSound, "?": help, Escape: () => choose(-1),
   ArrowLeft: () => pan(60, 0), ArrowRight: () => pan(-60, 0), ArrowUp: () => pan(0, 60), ArrowDown: () => pan(0, -60),
 };
-onkeydown = (event) => {
-  if (event.ctrlKey || event.metaKey || event.altKey || event.target === element("pick")) return;
-  keys[event.key.length === 1 ? event.key.toLowerCase() : event.key]?.();
+const tap = (x, y) => stream.stage && places && choose(benchAt(stream.stage, places, ...camera.toStage(x, y), 16 / camera.scale));
+attach(canvas, { pan, tap, keys, zoomAt: (...to) => (camera.zoomAt(...to), showFollow()), isFree: () => camera.mode !== "bench" });
+element("pick").oninput = ({ target }) => {
+  chosen = target.value === "" ? -1 : Math.floor(target.value) - 1;
+  showFollow();
 };
-element("pick").oninput = ({ target }) => (chosen = target.value === "" ? -1 : Math.floor(target.value) - 1);
-Object.entries({ follow, whole, theme: toggleTheme, full: fill, nearer: keys["+"], farther: keys["-"] }).forEach(([id, act]) => (element(id).onclick = act));
-matchMedia("(prefers-color-scheme: dark)").onchange = () => (palette = paletteOf(canvas));
-// The address may set how the picture begins, for a screen without a keyboard: #dark, #light,follow and so on.
-const begin = { dark: () => setTheme("dark"), light: () => setTheme("light"), follow };
-location.hash.slice(1).split(",").forEach((word) => begin[word]?.());
+Object.entries({ follow, whole, theme: toggleTheme, full: fill, sound: toggleSound, help, nearer: keys["+"], farther: keys["-"] }).forEach(([id, act]) => (element(id).onclick = act));
+matchMedia("(prefers-color-scheme: dark)").onchange = dressed;
+if (show) stillness.onchange = () => (show.still = stillness.matches);
+// Sound that the address asks for begins with the first key or click, where the browser wants one.
+if (words.sound) toggleSound();
+addEventListener("pointerdown", () => sound.on && sound.turn(true));
+addEventListener("hashchange", () => location.reload());
+
+// The address may set how the picture begins, for a screen without a keyboard.
+if (words.rotate) camera.turn(words.rotate[0]);
+if (words.view) camera.view(...words.view);
+if (words.bench) choose(words.bench[0] - 1);
+if (words.follow) camera.follow(words.follow === true ? 0 : words.follow[0] - 1);
+if (words.unknown.length) put("address", say("address", { words: words.unknown.join(", ") }));
+element("address").hidden = !words.unknown.length;
+showFollow();
 conduct(stream);
 pass();

@@ -107,9 +107,9 @@ class Playback {
 export class Stream {
   constructor() {
     this.playback = new Playback();
-    this.stages = null;
-    this.alerts = null;
-    this.trouble = "waiting for the server";
+    this.messages = { stage: {}, alert: {} };
+    /** Why no frames come: a key of the page's words, or the server's own reason; null while they come. */
+    this.trouble = "server";
     this.received = 0;
     /** How long the last frames were on their way, ms. */
     this.ways = [];
@@ -130,7 +130,7 @@ export class Stream {
       clearInterval(requests);
       socket.onopen = socket.onmessage = socket.onclose = null;
       socket.close();
-      this.forget("waiting for the server");
+      this.lose("server");
       setTimeout(() => this.open(), this.retry);
       this.retry = Math.min(4000, 2 * this.retry);
     };
@@ -144,7 +144,7 @@ export class Stream {
     socket.onclose = again;
     socket.onopen = () => {
       this.retry = 250;
-      this.trouble = "waiting for a publisher";
+      this.trouble = "publisher";
       requestClock();
     };
     socket.onmessage = ({ data }) => {
@@ -162,10 +162,9 @@ export class Stream {
     };
   }
 
-  forget(trouble) {
+  /** What was shown last is kept until there is something newer to show. */
+  lose(trouble) {
     this.trouble = trouble;
-    this.playback.clear();
-    this.stages = this.alerts = null;
   }
 
   /** Sends a message; whether there is a server to send it to. */
@@ -177,27 +176,34 @@ export class Stream {
 
   handle(message) {
     this.onmessage?.(message);
-    if (message.type === "waiting") this.forget(message.reason ?? "waiting for a publisher");
-    if (message.type === "stage") this.stages = message;
-    if (message.type === "alert") this.alerts = message;
+    if (message.type === "waiting") this.lose(message.reason ?? "publisher");
+    if (this.messages[message.type]) this.messages[message.type].newest = message;
   }
 
   receive(data) {
     const frame = frameOf(data, performance.now());
-    if (!frame) return this.forget("this page is for another version of the server: load it again");
+    if (!frame) return this.lose("version");
+    if (this.trouble !== null) this.playback.clear();
     this.trouble = null;
     this.received++;
     if (this.clock !== null && this.ways.push(frame.at + this.clock - frame.sent) > 600) this.ways.shift();
     this.playback.push(frame);
   }
 
-  /** The stage of the run whose frames come, if it is known. */
+  /** The stage of the run whose frames came last, if it is known. */
   get stage() {
-    return this.stages?.run_id === this.playback.newest?.run ? this.stages : null;
+    return this.ofRun("stage");
   }
 
   /** The latest alert of that run, or null. */
   get alert() {
-    return this.alerts?.run_id === this.playback.newest?.run ? this.alerts : null;
+    return this.ofRun("alert");
+  }
+
+  /** Messages of the next run may come before its first frame: until then those of the last one are kept. */
+  ofRun(type) {
+    const run = this.playback.newest?.run, { newest, kept } = this.messages[type];
+    if (newest && newest.run_id === run) return (this.messages[type].kept = newest);
+    return kept && kept.run_id === run ? kept : null;
   }
 }

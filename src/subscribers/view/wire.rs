@@ -55,9 +55,10 @@ pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
     bytes
 }
 
-pub(super) fn stage(stage: &Stage) -> String {
+/// The stage, the name of its publisher and, once it is known, that of its scene.
+pub(super) fn stage(stage: &Stage, publisher: &str, scene: Option<&str>) -> String {
     let Stage { run_id, pitch, start_turn, hole_inset, head_length, body_length, width, benches, .. } = *stage;
-    json!({"type": "stage", "run_id": Exact(run_id), "pitch": pitch, "start_turn": start_turn,
+    json!({"type": "stage", "run_id": Exact(run_id), "publisher": publisher, "scene": scene, "pitch": pitch, "start_turn": start_turn,
         "hole_inset": hole_inset, "head_length": head_length, "body_length": body_length, "width": width,
         "benches": benches, "path": stage.path_in_use().iter().map(segment).collect::<Vec<_>>(),
         "freeze_time": stage.freeze_time, "events": stage.events_in_use().iter().map(event).collect::<Vec<_>>(),
@@ -160,7 +161,8 @@ mod tests {
 
     #[test]
     fn the_states_stand_in_the_order_of_their_numbers() {
-        let json: Value = serde_json::from_str(&stage(&Stage::default())).unwrap();
+        let json: Value = serde_json::from_str(&stage(&Stage::default(), "dragon", Some("paper"))).unwrap();
+        assert_eq!((&json["publisher"], &json["scene"]), (&"dragon".into(), &"paper".into()));
         let states = json["states"].as_array().unwrap();
         assert_eq!(states.len(), FrameState::ALL.len());
         for (state, number) in FrameState::ALL.into_iter().zip(0..) {
@@ -173,10 +175,21 @@ mod tests {
 
     #[test]
     fn an_alert_carries_the_sentence_of_its_numbers() {
-        let alert_of = CollisionAlert { level: 1, event: 2, event_bench_a: 0, event_bench_b: 8, ..Default::default() };
+        let alert_of = CollisionAlert {
+            level: 1,
+            event: 2,
+            event_bench_a: 0,
+            event_bench_b: 8,
+            event_x: 1.0,
+            event_y: 2.0,
+            ..Default::default()
+        };
         let json: Value = serde_json::from_str(&alert(&alert_of, 9)).unwrap();
         assert_eq!((&json["type"], &json["event"]), (&"alert".into(), &"contact".into()));
         assert_eq!((&json["severity"], &json["happened"]), (&"warning".into(), &false.into()));
-        assert_eq!(json["sentence"], "contact: bench 1 (the head) and bench 9 (the tail) (counting from 1)");
+        assert_eq!(
+            json["sentence"],
+            "contact: bench 1 (the head) and bench 9 (the tail) at (1.000, 2.000) m (counting from 1)"
+        );
     }
 }

@@ -1,0 +1,86 @@
+// The boards as rectangles: which is where, which two are nearest. Metres of the stage; knows no canvas and no page.
+
+import { STRIDE } from "./hermite.js";
+
+/** A bench's rectangle: its middle, its direction, half its length and half its width. */
+export function rectangle(stage, places, bench) {
+  const k = STRIDE * bench, rear = k + STRIDE;
+  const x = places[k] - places[rear], y = places[k + 1] - places[rear + 1], link = Math.hypot(x, y) || 1;
+  return {
+    x: (places[k] + places[rear]) / 2,
+    y: (places[k + 1] + places[rear + 1]) / 2,
+    c: x / link,
+    s: y / link,
+    l: (bench === 0 ? stage.head_length : stage.body_length) / 2,
+    w: stage.width / 2,
+  };
+}
+
+/** The bench at a place of the stage, no further from it than `most` metres; -1 for none. */
+export function benchAt(stage, places, x, y, most) {
+  let best = most, found = -1;
+  for (let bench = 0; bench < places.length / STRIDE - 1; bench++) {
+    const r = rectangle(stage, places, bench), along = (x - r.x) * r.c + (y - r.y) * r.s, across = (y - r.y) * r.c - (x - r.x) * r.s;
+    const away = Math.hypot(Math.max(0, Math.abs(along) - r.l), Math.max(0, Math.abs(across) - r.w));
+    if (away < best || (away === 0 && best === 0)) [best, found] = [away, bench];
+  }
+  return found;
+}
+
+/** The middle between the nearest points of two boards, one of which is always a corner; where they overlap, of that. */
+export function nearest(stage, places, ...pair) {
+  const [a, b] = pair.map((bench) => rectangle(stage, places, bench));
+  let best = Infinity, place = null;
+  for (const [one, other] of [[a, b], [b, a]]) {
+    for (const [along, across] of [[1, 1], [1, -1], [-1, 1], [-1, -1]]) {
+      const x = one.x + along * one.l * one.c - across * one.w * one.s, y = one.y + along * one.l * one.s + across * one.w * one.c;
+      const dx = x - other.x, dy = y - other.y, u = dx * other.c + dy * other.s, v = dy * other.c - dx * other.s;
+      const nu = Math.max(-other.l, Math.min(other.l, u)), nv = Math.max(-other.w, Math.min(other.w, v)), away = Math.hypot(u - nu, v - nv);
+      if (away >= best) continue;
+      best = away;
+      place = { x: (x + other.x + nu * other.c - nv * other.s) / 2, y: (y + other.y + nu * other.s + nv * other.c) / 2 };
+    }
+  }
+  return place;
+}
+
+/**
+ * The greatest gap between two rectangles along the normals of their sides (separating axis theorem): negative where they
+ * overlap, and then the least way that parts them.
+ */
+function gap(a, b) {
+  const dx = b.x - a.x, dy = b.y - a.y, cos = Math.abs(a.c * b.c + a.s * b.s), sin = Math.abs(a.c * b.s - a.s * b.c);
+  return Math.max(
+    Math.abs(dx * a.c + dy * a.s) - a.l - b.l * cos - b.w * sin,
+    Math.abs(dy * a.c - dx * a.s) - a.w - b.l * sin - b.w * cos,
+    Math.abs(dx * b.c + dy * b.s) - b.l - a.l * cos - a.w * sin,
+    Math.abs(dy * b.c - dx * b.s) - b.w - a.l * sin - a.w * cos,
+  );
+}
+
+/**
+ * The two boards that share no handle and overlap most, and by how many metres; null where none come nearer to each
+ * other than `tolerance` metres, the rounding of their places. Boards are compared with those of the same and the next
+ * squares of a grid.
+ */
+export function overlapping(stage, places, tolerance) {
+  const count = places.length / STRIDE - 1, side = Math.hypot(Math.max(stage.head_length, stage.body_length), stage.width) + tolerance;
+  const squares = new Map(), boards = [];
+  let deepest = null;
+  for (let bench = 0; bench < count; bench++) {
+    const board = rectangle(stage, places, bench), column = Math.floor(board.x / side), row = Math.floor(board.y / side);
+    for (let right = -1; right <= 1; right++) {
+      for (let up = -1; up <= 1; up++) {
+        for (const other of squares.get(`${column + right},${row + up}`) ?? []) {
+          if (bench - other < 2) continue;
+          const apart = gap(boards[other], board);
+          if (apart <= (deepest ? -deepest.depth : tolerance)) deepest = { pair: [other, bench], depth: -apart };
+        }
+      }
+    }
+    boards.push(board);
+    const key = `${column},${row}`, here = squares.get(key);
+    here ? here.push(bench) : squares.set(key, [bench]);
+  }
+  return deepest && { ...deepest, place: nearest(stage, places, ...deepest.pair) };
+}

@@ -1,0 +1,147 @@
+// The camera: from metres to pixels and back. Shows all that is there, one bench, or a fixed view; may be turned.
+
+import { STRIDE } from "./hermite.js";
+
+/** What is left free on each side of all that is there, as a share of its size. */
+const MARGIN = 0.05;
+/** Boards of the longest kind that fit the shorter side of the picture while one bench is followed. */
+const BOARDS_FOLLOWED = 2.5;
+/** All that is there is framed anew where it fills less of the frame than this, or leaves it. */
+const LEAST_FILLED = 0.75;
+/** How long the camera takes to move most of the way to a new frame, ms. */
+const EASING = 700;
+
+export class Camera {
+  constructor() {
+    this.width = this.height = this.ratio = 1;
+    /** The middle of what is framed and its half sizes, along the screen's axes; and where that is to go. */
+    this.frame = this.goal = null;
+    /** How far from the centre the outermost bench has been, m. */
+    this.reach = 1;
+    this.followed = 0;
+    this.turn(0);
+    this.whole();
+  }
+
+  /** Turns the picture by degrees, counter-clockwise. */
+  turn(degrees) {
+    [this.c, this.s] = degrees % 90 ? [Math.cos((degrees * Math.PI) / 180), Math.sin((degrees * Math.PI) / 180)] : [[1, 0], [0, 1], [-1, 0], [0, -1]][((degrees / 90) % 4 + 4) % 4];
+  }
+
+  whole() {
+    this.mode = "whole";
+    this.zoom = 1;
+    this.stale = true;
+    if (this.frame) this.aim(this.frame);
+  }
+
+  /** Keeps a bench (from 0) in the middle. */
+  follow(bench) {
+    Object.assign(this, { mode: "bench", followed: bench, zoom: 1 });
+  }
+
+  /** Shows a place and so many metres around it along the shorter side. */
+  view(x, y, metres) {
+    Object.assign(this, { mode: "free", x, y, zoom: 1, metres });
+  }
+
+  /** Another team: what was chosen for the one before does not fit. */
+  forget() {
+    this.frame = this.goal = null;
+    if (this.mode === "free" && !this.metres) this.mode = "whole";
+    this.zoom = 1;
+  }
+
+  /** Looks at where everything is. */
+  update(stage, places, passed) {
+    this.longest = Math.max(stage.head_length, stage.body_length);
+    const box = this.box(stage, places);
+    if (!this.goal || this.stale || outgrown(this.goal, box)) this.goal = grown(box);
+    if (!this.frame || this.stale) this.frame = this.goal;
+    this.stale = false;
+    const part = 1 - Math.exp(-passed / EASING), close = Math.max(...this.frame.map((one, k) => Math.abs(one - this.goal[k]))) < 1e-4 * this.goal[2];
+    this.frame = close ? this.goal : this.frame.map((one, k) => one + part * (this.goal[k] - one));
+    if (this.mode === "whole") this.aim(this.frame);
+    const k = STRIDE * Math.min(this.followed, places.length / STRIDE - 1);
+    if (this.mode === "bench") [this.x, this.y] = places.slice(k, k + 2);
+  }
+
+  aim([right, up]) {
+    [this.x, this.y] = [right * this.c + up * this.s, up * this.c - right * this.s];
+  }
+
+  /** What is there, along the screen's axes: the middle and half the sizes. */
+  box(stage, places) {
+    let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
+    for (let k = 0; k < places.length; k += STRIDE) {
+      const x = places[k] * this.c - places[k + 1] * this.s, y = places[k] * this.s + places[k + 1] * this.c;
+      if (x < left) left = x;
+      if (x > right) right = x;
+      if (y < low) low = y;
+      if (y > high) high = y;
+    }
+    const edge = stage.width + stage.hole_inset;
+    return [(left + right) / 2, (low + high) / 2, (right - left) / 2 + edge, (high - low) / 2 + edge];
+  }
+
+  /** Pixels of the screen (not of the canvas) for a metre. */
+  get scale() {
+    const shorter = Math.min(this.width, this.height);
+    if (this.mode === "whole" && this.frame) return this.zoom * Math.min(this.width / this.frame[2], this.height / this.frame[3]) / 2;
+    if (this.mode === "bench") return (this.zoom * shorter) / (BOARDS_FOLLOWED * (this.longest ?? 1));
+    return (this.zoom * shorter) / (this.metres || 10);
+  }
+
+  /** Sizes of words and signs: they grow with the picture, so that they are read from as far away as it is. */
+  get unit() {
+    return Math.max(1, Math.min(this.width, this.height) / 800);
+  }
+
+  toPixel(x, y) {
+    const dx = x - this.x, dy = y - this.y, { scale, c, s } = this;
+    return [this.width / 2 + (dx * c - dy * s) * scale, this.height / 2 - (dx * s + dy * c) * scale];
+  }
+
+  toStage(x, y) {
+    const right = (x - this.width / 2) / this.scale, up = (this.height / 2 - y) / this.scale;
+    return [this.x + right * this.c + up * this.s, this.y + up * this.c - right * this.s];
+  }
+
+  /** From here on only hands move it. */
+  release() {
+    if (this.mode === "free") return;
+    const { scale } = this;
+    this.mode = "free";
+    this.metres = null;
+    this.zoom = (scale * 10) / Math.min(this.width, this.height);
+  }
+
+  /** Moves the picture by pixels. */
+  pan(x, y) {
+    this.release();
+    const right = -x / this.scale, up = y / this.scale;
+    this.x += right * this.c + up * this.s;
+    this.y += up * this.c - right * this.s;
+  }
+
+  /** Makes the picture `by` times as large and leaves in place what is at a pixel. */
+  zoomAt(by, x = this.width / 2, y = this.height / 2) {
+    if (this.mode === "whole") this.release();
+    const [before, above] = this.toStage(x, y), { scale } = this;
+    // From a millimetre across the screen to fifty times all that is there.
+    const most = Math.min(this.width, this.height) / 1e-3, least = Math.min(this.width, this.height) / (50 * this.reach);
+    this.zoom *= Math.min(most, Math.max(least, by * scale)) / scale;
+    if (this.mode === "bench") return;
+    const [after, below] = this.toStage(x, y);
+    this.x += before - after;
+    this.y += above - below;
+  }
+}
+
+const grown = ([x, y, wide, high]) => [x, y, wide * (1 + MARGIN), high * (1 + MARGIN)];
+
+/** Whether a box has left a frame, or become small in it. */
+function outgrown([x, y, wide, high], [bx, by, bw, bh]) {
+  const outside = Math.abs(bx - x) + bw > wide || Math.abs(by - y) + bh > high;
+  return outside || (bw < LEAST_FILLED * wide && bh < LEAST_FILLED * high);
+}

@@ -1,0 +1,51 @@
+// What is marked on the picture: what is coming and where, what is nearest now, and what overlaps once it has happened.
+
+import { nearest, overlapping } from "./boards.js";
+import { STRIDE } from "./hermite.js";
+
+/** Boards whose places are rounded to 32 bits overlap or part by up to so many metres for each metre from the centre. */
+const ROUNDING = 1e-6;
+/** How often overlapping boards are looked for in a team of more benches than `SMALL`, ms. */
+const SEARCH_INTERVAL = 200;
+const SMALL = 500;
+
+const benchesOf = (...benches) => benches.filter((bench) => bench !== null && bench !== undefined);
+
+/** The deepest overlap of a stream of pictures, looked for only where the publisher reports one. */
+export class Overlap {
+  constructor() {
+    this.found = null;
+    this.at = -Infinity;
+  }
+
+  look(stage, places, newest, reach, now) {
+    const tolerance = ROUNDING * Math.max(1, reach);
+    if (!(newest.clearance <= tolerance)) return (this.found = null);
+    if (stage.benches > SMALL && now - this.at < SEARCH_INTERVAL) return this.found;
+    this.at = now;
+    return (this.found = overlapping(stage, places, tolerance));
+  }
+}
+
+/**
+ * The marks of a state: each with the benches it concerns (`pair`), a place, a colour of the palette, whether the place
+ * is a ghost (it will be there), whether the outlines are dashed. `text` and `names` are left to who knows the language.
+ */
+export function marksOf({ state, alert, stage, places, overlap }) {
+  if (state.severity === "ok" || !alert) return [];
+  if (!state.happened) {
+    const event = benchesOf(alert.event_bench_a, alert.event_bench_b), now = benchesOf(alert.bench_a, alert.bench_b);
+    const marks = [];
+    if (now.length === 2 && Math.max(...now) < places.length / STRIDE - 1) marks.push({ kind: "now", pair: now, place: nearest(stage, places, ...now), ink: "warning", dashes: [7, 5] });
+    if (alert.event_x !== null) marks.push({ kind: "coming", pair: event, place: { x: alert.event_x, y: alert.event_y }, ink: "danger", ghost: true });
+    return marks.reverse();
+  }
+  const marks = [];
+  if (overlap) marks.push({ kind: "overlap", pair: overlap.pair, place: overlap.place, ink: "danger" });
+  if (state.name !== "contact" && alert.event_bench_a !== null) {
+    // A link that stalls or locks is marked at its rear handle, wherever that is by now.
+    const rear = STRIDE * (alert.event_bench_a + 1);
+    if (rear < places.length) marks.push({ kind: "link", pair: [alert.event_bench_a], place: { x: places[rear], y: places[rear + 1] }, ink: "danger" });
+  }
+  return marks;
+}

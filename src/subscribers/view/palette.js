@@ -1,0 +1,89 @@
+// The colours of the picture: those of the style sheet, the scale of speeds, and what the show look wears.
+
+import { STRIDE, speedOf } from "./hermite.js";
+
+/** Steps of the colour scale. */
+export const SHADES = 32;
+/** How far the scale reaches to either side of the head's speed, as shares of it: the first that holds every speed. */
+const WIDTHS = [1, 10, 100, 1000];
+/** Differences from the head's speed that are far smaller than this share of it have no colour of their own. */
+const FINEST = 0.001;
+/** How much of a colour is left while the dragon rests. */
+const AT_REST = 0.5;
+
+const colour = (style, name) => style.getPropertyValue(name).trim();
+const channels = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
+const mixed = (from, to, part) => `rgb(${from.map((one, k) => Math.round(one + (to[k] - one) * part)).join(" ")})`;
+
+/** The colours of the style sheet, looked up once for each change of theme. */
+export function paletteOf(element) {
+  const style = getComputedStyle(element), named = (name) => channels(colour(style, `--${name}`));
+  const [slow, middle, fast, ground] = ["slow", "middle", "fast", "ground"].map(named);
+  const shade = (part) => (part < 0.5 ? [slow, middle, 2 * part] : [middle, fast, 2 * part - 1]);
+  const shades = Array.from({ length: SHADES }, (_, k) => mixed(...shade(k / (SHADES - 1))));
+  const resting = shades.map((one) => mixed(ground, one.match(/\d+/g).map(Number), AT_REST));
+  const names = ["ground", "ink", "faint", "danger", "warning", "still", "near", "far", "wood", "rim", "gold", "lantern", "silk"];
+  return { shades, resting, night: colour(style, "--night") === "1", ...Object.fromEntries(names.map((name) => [name, colour(style, `--${name}`)])) };
+}
+
+/**
+ * The scale of the colours for a run: from rest to twice the head's speed, logarithmic in the difference from it, since
+ * most shows have differences of a thousandth for minutes and of a half for seconds; and only ever widened, so that a
+ * colour means the same from the first picture of a run to the last. It keeps the speeds of the last moving frame.
+ */
+export class SpeedScale {
+  constructor() {
+    this.clear();
+  }
+
+  clear() {
+    this.head = NaN;
+    this.step = 0;
+    /** Of the last moving frame. */
+    this.handles = null;
+    this.unsent = false;
+    this.resting = false;
+    this.frame = null;
+  }
+
+  /** Takes in the newest frame's speeds. */
+  take(frame) {
+    if (this.frame === frame) return;
+    this.frame = frame;
+    const { handles } = frame, head = speedOf(handles, 0);
+    this.unsent = Number.isNaN(head);
+    this.resting = !(head > 0);
+    if (this.resting) return;
+    this.handles = handles;
+    // It is rounded anew in each frame.
+    if (!(Math.abs(this.head - head) < 1e-4 * head)) this.head = head;
+    let most = 0;
+    for (let handle = 1; handle < handles.length / STRIDE; handle++) most = Math.max(most, Math.abs(speedOf(handles, handle) / head - 1));
+    while (this.step < WIDTHS.length - 1 && most > WIDTHS[this.step]) this.step++;
+  }
+
+  /** The widest difference from the head's speed that has a colour, as a share of it. */
+  get width() {
+    return WIDTHS[this.step];
+  }
+
+  /** Where on the scale, from 0 to 1, a difference from the head's speed stands, as a share of it. */
+  place(difference) {
+    const part = Math.log1p(Math.abs(difference) / FINEST) / Math.log1p(this.width / FINEST);
+    return 0.5 + 0.5 * Math.sign(difference) * Math.min(1, part);
+  }
+
+  /** Which of the shades a bench has; SHADES where its speed is not known. */
+  shade(bench) {
+    const speed = this.handles ? speedOf(this.handles, bench) : NaN;
+    if (Number.isNaN(speed)) return SHADES;
+    return Math.min(SHADES - 1, Math.floor(this.place(speed / this.head - 1) * SHADES));
+  }
+
+  /** Some speeds and where they stand on the scale. */
+  get ticks() {
+    if (Number.isNaN(this.head)) return [];
+    const shares = [-this.width, -0.1 * this.width, 0, 0.1 * this.width, this.width].filter((share) => share >= -1);
+    return shares.map((share) => ({ at: this.place(share), speed: this.head * (1 + share) }));
+  }
+}

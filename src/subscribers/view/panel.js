@@ -1,0 +1,115 @@
+// The panel beside the picture: the state, the countdown, the sentence, the figures. Reads what it is given; draws nothing.
+
+import { STRIDE, speedOf } from "./hermite.js";
+import { capital, remaining, say, sentenceOf } from "./words.js";
+
+/** By severity; the list of the states, with the severity of each, comes with the stage. */
+const SIGNS = { ok: "○", warning: "△", error: "✖" };
+/** The clearance bar is logarithmic from the least to the most metres, so that it has something to show near zero. */
+const LEAST_CLEARANCE = 0.001, MOST_CLEARANCE = 1;
+
+export const element = (id) => document.getElementById(id);
+
+export function put(id, text) {
+  if (element(id).textContent !== text) element(id).textContent = text;
+}
+
+let before = null, spokenAt = Infinity;
+
+/**
+ * The state, the sentence and the countdown of a situation: `state`, `alert`, `trouble` (why nothing comes, or null),
+ * `silent` (seconds without a frame, or null), `seconds` until what is `ahead` (NaN where nothing is counted down),
+ * `benches`, and `now` (what is so at this moment, in words).
+ */
+export function showSituation({ state, alert, trouble, silent, seconds, ahead, benches, now }) {
+  const { dataset } = document.body, calm = state.severity === "ok" && !state.happened;
+  const changed = dataset.level !== state.name;
+  if (changed) Object.assign(dataset, { level: state.name, severity: state.severity, happened: state.happened });
+  dataset.stale = String(Boolean(trouble) || silent !== null);
+  const words = trouble ? say(trouble) : silent === null ? say(state.name) : say("noFrames", { seconds: silent });
+  put("state", `${trouble ? "○" : silent === null ? SIGNS[state.severity] : "…"} ${trouble ? words : capital(words)}`);
+  put("alert", trouble ? "" : sentenceOf(state, alert, benches));
+  put("now", now);
+  element("now").hidden = !now;
+  countdown(state, seconds, ahead);
+  if (trouble) put("spoken", say(trouble));
+  else if (changed && calm) put("spoken", say(before === null ? "dragonMoves" : "clearAgain"));
+  else if (changed && !state.happened) put("spoken", `${capital(say(state.name))}.`);
+  before = trouble ? null : state.name;
+}
+
+function countdown(state, seconds, ahead) {
+  const counting = seconds > -1, near = counting && (state.severity !== "ok" || seconds < 10);
+  const [number, unit] = counting ? remaining(Math.max(0, seconds)) : ["", ""];
+  element("countdown").hidden = !counting;
+  document.body.dataset.near = String(near);
+  put("until", counting ? capital(say(near ? "in" : "next", { kind: say(ahead) })) : "");
+  if (element("left").dataset.text !== number + unit) {
+    element("left").dataset.text = number + unit;
+    // The number is made as large as the panel is wide.
+    element("left").style.setProperty("--letters", number.length + 0.5 * unit.length);
+    element("left").textContent = number;
+    element("left").append(Object.assign(document.createElement("small"), { textContent: unit }));
+  }
+  const mark = near ? ([10, 5, 3].findLast((mark) => seconds <= mark) ?? Infinity) : Infinity;
+  if (mark < spokenAt && state.severity !== "ok") put("spoken", say("seconds", { seconds: Math.ceil(seconds) }));
+  spokenAt = mark;
+}
+
+/** Clearance, speeds and time; empty where nothing comes. */
+export function showFigures({ clearance, colours, time, scale }) {
+  const known = Number.isFinite(clearance), metres = Math.max(0, clearance);
+  put("metres", !known ? say("notComputed") : clearance < -0.0005 ? say("overlap", { metres: (-clearance).toFixed(3) }) : `${metres.toFixed(3)} m`);
+  const within = Math.min(MOST_CLEARANCE, Math.max(LEAST_CLEARANCE, known ? metres : 0));
+  const share = Math.log(within / LEAST_CLEARANCE) / Math.log(MOST_CLEARANCE / LEAST_CLEARANCE), bar = element("meter");
+  bar.firstElementChild.style.width = `${(100 * share).toFixed(1)}%`;
+  bar.setAttribute("aria-valuemax", MOST_CLEARANCE);
+  bar.setAttribute("aria-valuenow", Math.min(MOST_CLEARANCE, known ? metres : 0).toFixed(3));
+  bar.setAttribute("aria-valuetext", element("metres").textContent);
+  put("speeds", colours.unsent ? say("notSent") : colours.resting ? say("rest") : "");
+  showScale(colours);
+  const rate = scale === 1 ? "" : say("rate", { rate: +scale.toPrecision(3) });
+  put("time", say("time", { time: time.toFixed(1), rate }));
+}
+
+let scaleShown = "";
+/** Speeds under the colours, where they stand. */
+function showScale({ ticks, width }) {
+  const digits = Math.max(2, Math.ceil(-Math.log10(width / 10)));
+  const shown = ticks.map(({ at, speed }) => ({ at: (100 * at).toFixed(1), text: String(+speed.toPrecision(digits + 1)) })), key = JSON.stringify(shown);
+  if (key === scaleShown) return;
+  scaleShown = key;
+  const spans = shown.map(({ at, text }) => {
+    const span = Object.assign(document.createElement("span"), { textContent: text });
+    span.style.left = `${at}%`;
+    return span;
+  });
+  element("scale").replaceChildren(...spans);
+}
+
+/** The number, place and speed of the bench that is chosen. */
+export function showBench(chosen, handles) {
+  const count = handles.length / STRIDE - 1;
+  element("pick").max = count;
+  const there = chosen >= 0 && chosen < count, k = STRIDE * chosen;
+  element("bench").classList.toggle("chosen", there);
+  if (!there) return put("bench", say("pick"));
+  const speed = speedOf(handles, chosen);
+  const values = {
+    number: chosen + 1,
+    count,
+    name: chosen === 0 ? say("theHead") : chosen === count - 1 ? say("theTail") : "",
+    x: handles[k].toFixed(3),
+    y: handles[k + 1].toFixed(3),
+    speed: Number.isNaN(speed) ? say("speedNotSent") : say("perSecond", { speed: speed.toFixed(3) }),
+    degrees: ((handles[k + 2] * 180) / Math.PI).toFixed(1),
+  };
+  put("bench", say("detail", values));
+}
+
+/** Which show this is, on the page and in the title. */
+export function showNames({ scene, publisher }) {
+  const title = scene ? say("title", { scene, publisher }) : say("stage");
+  if (document.title !== title) document.title = title;
+  put("name", [scene, publisher].filter(Boolean).join(" · "));
+}

@@ -1,0 +1,150 @@
+// Every word of the page, in English and in Chinese, and the sentences about alerts.
+//
+// English sentences come from the server, which has them from the same source as `run` and `watch`; the Chinese ones are
+// made here from the same numbers.
+
+const WORDS = {
+  title: ["{scene} ({publisher}): stage picture", "{scene}（{publisher}）：舞台画面"],
+  stage: ["Bench dragon: stage picture", "板凳龙：舞台画面"],
+  canvas: ["The stage from above. Arrow keys move the picture, plus and minus zoom, F follows the head, 0 shows all, question mark lists the keys.", "从上方看的舞台。方向键移动画面，加减号缩放，F 跟随龙头，0 显示全部，问号列出按键。"],
+  clearance: ["Clearance", "间距"],
+  speed: ["Speed, m/s", "速度（m/s）"],
+  bench: ["Bench", "板凳"],
+  pick: ["Click a bench, or type its number.", "点击一节板凳，或输入其编号。"],
+  follow: ["Follow head", "跟随龙头"],
+  followBench: ["Follow bench {bench}", "跟随第 {bench} 节"],
+  whole: ["Show all", "显示全部"],
+  nearer: ["Zoom in", "放大"],
+  farther: ["Zoom out", "缩小"],
+  theme: ["Light / dark", "浅色／深色"],
+  full: ["Full screen", "全屏"],
+  sound: ["Sound", "声音"],
+  keys: ["Keys", "按键"],
+  close: ["Close", "关闭"],
+  key_arrows: ["move the picture", "移动画面"],
+  key_zoom: ["zoom", "缩放"],
+  key_0: ["show all", "显示全部"],
+  key_f: ["follow the head, or the chosen bench", "跟随龙头或所选板凳"],
+  key_t: ["light or dark", "浅色或深色"],
+  key_p: ["full screen", "全屏"],
+  key_s: ["sound: a tick at 3, 2, 1, a gong at the event", "声音：倒数 3、2、1 时滴答，事件发生时锣响"],
+  key_escape: ["choose no bench", "取消选择"],
+  key_help: ["this list", "本列表"],
+
+  // States and kinds of events.
+  moving: ["moving", "行进中"],
+  approaching: ["approaching", "即将发生"],
+  contact: ["contact", "碰撞"],
+  stall: ["stall", "死点"],
+  lock: ["lock", "锁死"],
+  path_end: ["path end", "路径终点"],
+  unknown: ["unknown", "未知"],
+
+  // Benches.
+  one: ["bench {number}", "第 {number} 节板凳"],
+  head: ["HEAD", "龙头"],
+  tail: ["TAIL", "龙尾"],
+  headBench: ["HEAD (bench 1)", "龙头（第 1 节）"],
+  numbers: ["benches {a} and {b}", "第 {a} 与第 {b} 节板凳"],
+  number: ["bench {a}", "第 {a} 节板凳"],
+  detail: ["Bench {number} of {count}{name}: front handle at ({x}, {y}) m, {speed}, heading {degrees}°", "第 {number} 节板凳（共 {count} 节{name}）：前把手位于 ({x}, {y}) m，{speed}，航向 {degrees}°"],
+  theHead: [", the head", "，龙头"],
+  theTail: [", the tail", "，龙尾"],
+  perSecond: ["{speed} m/s", "{speed} m/s"],
+  speedNotSent: ["speed not sent", "未发送速度"],
+  notSent: ["not sent", "未发送"],
+  notComputed: ["not computed", "未计算"],
+  overlap: ["{metres} m overlap", "重叠 {metres} m"],
+  rest: ["at rest", "静止"],
+
+  // Time.
+  next: ["next: {kind} in", "下一事件：{kind}，还有"],
+  in: ["{kind} in", "距{kind}还有"],
+  s: ["s", "秒"],
+  min: ["min", "分"],
+  h: ["h", "时"],
+  time: ["t = {time} s{rate}", "t = {time} s{rate}"],
+  rate: [" (× {rate})", "（× {rate}）"],
+  frames: ["{rate} frames/s{behind}", "{rate} 帧/秒{behind}"],
+  behind: [", {ms} ms behind the publisher", "，比发布端晚 {ms} 毫秒"],
+  seconds: ["{seconds} seconds", "{seconds} 秒"],
+
+  // On the picture.
+  coming: ["{kind}: {benches}, here, in {time}", "{kind}：{benches}，在此处，还有 {time}"],
+  comingStill: ["{kind}: {benches}, here", "{kind}：{benches}，在此处"],
+  overlapNow: ["{benches} overlap by {metres} m", "{benches}重叠 {metres} m"],
+  touchNow: ["{benches} touch", "{benches}相触"],
+  lostPublisher: ["No publisher. The picture is from t = {time} s.", "没有发布端。画面停在 t = {time} s。"],
+  lostServer: ["No server. The picture is from t = {time} s.", "没有服务器。画面停在 t = {time} s。"],
+  silent: ["No frames for {seconds} s. The picture is from t = {time} s.", "已有 {seconds} 秒没有新帧。画面停在 t = {time} s。"],
+
+  // What the page is doing, and says once.
+  server: ["waiting for the server", "等待服务器"],
+  publisher: ["waiting for a publisher", "等待发布端"],
+  noStage: ["waiting for the stage", "等待舞台数据"],
+  version: ["this page is for another version of the server: load it again", "本页面与服务器版本不符：请重新载入"],
+  noFrames: ["no frames for {seconds} s", "已有 {seconds} 秒没有新帧"],
+  dragonMoves: ["The dragon moves.", "龙在行进。"],
+  clearAgain: ["Clear again.", "警报解除。"],
+  address: ["“{words}” after # is not understood.", "无法理解 # 之后的“{words}”。"],
+};
+
+let language = 0;
+
+export function setLanguage(name) {
+  language = name === "zh" ? 1 : 0;
+  document.documentElement.lang = name === "zh" ? "zh-Hans" : "en";
+}
+
+/** The words of a key in the page's language, with what stands in braces filled in. A key that is not known is its own words. */
+export function say(key, values = {}) {
+  const words = WORDS[key]?.[language] ?? key;
+  return words.replace(/\{(\w+)\}/g, (_, name) => values[name] ?? "");
+}
+
+/** Puts the words of the page's language where an element has `data-word`, `data-label` or `data-title`. */
+export function translate(root) {
+  for (const one of root.querySelectorAll("[data-word]")) one.textContent = say(one.dataset.word);
+  for (const one of root.querySelectorAll("[data-label]")) one.setAttribute("aria-label", say(one.dataset.label));
+}
+
+export const capital = (words) => words && words[0].toUpperCase() + words.slice(1);
+
+/** Seconds as a person reads them off from afar: a number and its unit. */
+export function remaining(seconds) {
+  if (seconds < 100) return [seconds.toFixed(1), say("s")];
+  const whole = Math.floor(seconds), pad = (number) => String(number).padStart(2, "0");
+  const hours = Math.floor(whole / 3600), minutes = Math.floor(whole / 60) % 60;
+  return hours ? [`${hours}:${pad(minutes)}:${pad(whole % 60)}`, say("h")] : [`${minutes}:${pad(whole % 60)}`, say("min")];
+}
+
+/** One or two benches (from 0) by their numbers from 1. */
+export function benchesOf(pair) {
+  const [a, b] = pair.map((bench) => bench + 1);
+  return b === undefined ? say("number", { a }) : say("numbers", { a, b });
+}
+
+/** A bench's name on the picture. */
+export const nameOf = (bench) => (bench === 0 ? say("headBench") : say("one", { number: bench + 1 }));
+
+/** What an alert or a state says; nothing of an alert that the frames have not reached, or have left. */
+export function sentenceOf(state, alert, count) {
+  if (language === 0 || !alert && !state.sentence) {
+    if (state.sentence) return `${capital(state.sentence)}.`;
+    return state.severity === "ok" || alert?.level !== state.name ? "" : `${capital(alert.sentence)}.`;
+  }
+  if (state.sentence) return "龙头已到达路径终点。";
+  if (state.severity === "ok" || alert.level !== state.name) return "";
+  const name = (bench) => `第 ${bench + 1} 节板凳${bench === 0 ? "（龙头）" : bench === count - 1 ? "（龙尾）" : ""}`;
+  const both = (...pair) => pair.filter((bench) => bench !== null).map(name).join("与");
+  const event = both(alert.event_bench_a, alert.event_bench_b), place = alert.event_x === null ? "" : `(${alert.event_x.toFixed(3)}, ${alert.event_y.toFixed(3)}) m`;
+  if (state.happened) {
+    const at = `t = ${alert.event_time?.toFixed(6)} s`;
+    if (alert.event === "contact") return `${event}于 ${place} 处相触，${at}（编号从 1 起）。`;
+    if (alert.event === "stall") return `${event}到达死点，${at}：自 ${place} 处的把手起，其后的队伍被向后推（编号从 1 起）。`;
+    return `${event}锁死，其后把手位于 ${place}，${at}：无法继续行进（编号从 1 起）。`;
+  }
+  const coming = alert.event ? `${say(alert.event)}：${event}，位于 ${place}` : "前方没有碰撞、死点或锁死";
+  const now = alert.bench_a === null ? "" : `；此刻最近的是${both(alert.bench_a, alert.bench_b)}`;
+  return `${coming}${now}（编号从 1 起）。`;
+}
