@@ -111,6 +111,9 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
 /// What the loop's thread prepares: its publishers; the transports, for the other threads; and what keeps CPUs awake.
 type LoopEnds = (Vec<Box<dyn Publisher>>, Vec<Box<dyn Transport>>, Option<File>);
 
+/// The log as a transport, and how it fares.
+type OpenedLog = (Box<dyn Transport>, LogOutcome);
+
 /// All that the threads of a run have in common.
 struct RunSession<'a> {
     common: &'a Common,
@@ -182,7 +185,7 @@ impl RunSession<'_> {
     }
 
     /// The log, where one is requested.
-    fn open_log(&self) -> Result<Option<(Box<dyn Transport>, LogOutcome)>, CommandError> {
+    fn open_log(&self) -> Result<Option<OpenedLog>, CommandError> {
         let Some(file) = &self.arguments.log else { return Ok(None) };
         let run = (self.run_id, realtime_ns());
         let show = ShowLine::new(self.text, &self.playback, Arithmetic::of(self.scene), &self.solver, run);
