@@ -19,6 +19,7 @@ pub mod run;
 pub mod soak;
 pub mod solve;
 pub mod trade;
+pub mod verify;
 pub mod view;
 pub mod watch;
 
@@ -30,7 +31,7 @@ use std::sync::atomic::AtomicBool;
 
 use anstyle::AnsiColor;
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::scene::{Scene, SceneError};
+use bench_dragon::scene::{Scene, SceneError, SceneText};
 use bench_dragon::show::state::Severity;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -61,9 +62,17 @@ impl Common {
     /// # Errors
     /// Bad input: the sentence names the file, the line and the field.
     pub fn load_scene(&self) -> Result<Scene, CommandError> {
+        Ok(self.scene_text()?.parse()?)
+    }
+
+    /// The text of that scene.
+    ///
+    /// # Errors
+    /// Bad input: the file cannot be read.
+    pub fn scene_text(&self) -> Result<SceneText, CommandError> {
         Ok(match &self.scene {
-            Some(path) => Scene::load(path)?,
-            None => Scene::paper(),
+            Some(path) => SceneText::load(path)?,
+            None => SceneText::paper(),
         })
     }
 }

@@ -12,6 +12,7 @@
 //! - [`wire`]: the memory layouts that go over the wire, and every conversion to them.
 //! - [`live`]: the fixed-rate loop, its clock, its statistics.
 //! - [`transports`]: iceoryx2 shared memory and ROS 2 topics, as publishers of the loop.
+//! - `recording` (feature `cli`): the log of a run, and the proof that it can be played again.
 //! - [`subscribers`]: the feed of a publisher's messages, the terminal monitor, the stage picture, the soak test; no solver.
 //! - [`trade`]: accuracy against cost, measured for every solver on a scene and this machine.
 
@@ -25,6 +26,8 @@ pub mod live;
 pub mod model;
 pub mod motion;
 pub mod plan;
+#[cfg(feature = "cli")]
+pub mod recording;
 pub mod scene;
 pub mod show;
 pub mod solve;

@@ -9,7 +9,7 @@ pub mod control;
 #[cfg(feature = "cli")]
 pub mod realtime;
 #[cfg(test)]
-mod simulated;
+pub(crate) mod simulated;
 pub mod statistics;
 #[cfg(test)]
 mod tests;

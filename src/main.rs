@@ -25,6 +25,8 @@ enum Command {
     Run(commands::run::RunArguments),
     /// Conduct a running publisher: pause, rate, seek, step, hold
     Control(commands::control::ControlArguments),
+    /// Play the show of a log again and compare every bit
+    Verify(commands::verify::VerifyArguments),
     /// Watch a running publisher from another process
     Watch(commands::watch::WatchArguments),
     /// Serve the live stage picture to a browser
@@ -54,6 +56,7 @@ fn main() -> ExitCode {
     let done = commands::end_when_shared_memory_is_full().and_then(|()| match &command {
         Command::Run(arguments) => commands::run::run(&common, arguments),
         Command::Control(arguments) => commands::control::control(&common, arguments),
+        Command::Verify(arguments) => commands::verify::verify(&common, arguments),
         Command::Watch(arguments) => commands::watch::watch(&common, arguments),
         Command::View(arguments) => commands::view::view(&common, arguments),
         Command::Solve(arguments) => commands::solve::solve(&common, arguments),

@@ -17,7 +17,7 @@ use crate::model::team::Team;
 use crate::solve::newton::Newton;
 use crate::solve::paper::{self, Paper, PaperRules};
 use crate::solve::selection::{self, Selection};
-use crate::solve::table::FollowerTable;
+use crate::solve::table::{FollowerTable, Instructions};
 use crate::solve::{Solver, Velocities};
 
 use clearance::ClearanceMonitor;
@@ -78,6 +78,7 @@ pub struct Motion {
     team: Team,
     head_speed: f64,
     method: Method,
+    instructions: Instructions,
 }
 
 /// Units of work after which the search for stall and lock gives up: some ten seconds.
@@ -120,7 +121,8 @@ impl Motion {
         if matches!(method, Method::Paper(_)) && path.as_spiral().is_none() {
             return Err(MotionError::PaperElsewhere);
         }
-        Ok(Self { description, path, team, head_speed, method })
+        let instructions = Instructions::fastest(team.handles());
+        Ok(Self { description, path, team, head_speed, method, instructions })
     }
 
     /// The numbers of which the path is made.
@@ -153,7 +155,18 @@ impl Motion {
     /// # Errors
     /// [`MotionError::PaperElsewhere`]
     pub fn with_method(&self, method: Method) -> Result<Self, MotionError> {
-        Self::new(self.description.clone(), self.team, self.head_speed, method)
+        let other = Self::new(self.description.clone(), self.team, self.head_speed, method)?;
+        Ok(Self { instructions: self.instructions, ..other })
+    }
+
+    /// The instructions that a table is read with: the fastest this processor has, unless others were requested.
+    pub fn instructions(&self) -> Instructions {
+        self.instructions
+    }
+
+    /// The same motion with other instructions, or `None` where this processor lacks them.
+    pub fn with_instructions(self, instructions: Instructions) -> Option<Self> {
+        instructions.is_available().then_some(Self { instructions, ..self })
     }
 
     /// Metres by which the links of this motion's frames may be off, besides rounding.
@@ -188,7 +201,8 @@ impl Motion {
         };
         match (self.method, self.path.as_spiral()) {
             (Method::Accuracy(accuracy), _) => {
-                match selection::cheapest(&self.path, self.team, self.head_speed, velocities, accuracy) {
+                let (team, head_speed, with) = (self.team, self.head_speed, self.instructions);
+                match selection::cheapest_with(&self.path, team, head_speed, velocities, accuracy, with) {
                     Some(selection) => {
                         let why = measured(&selection, accuracy);
                         self.chosen_table(selection.table, &why)
@@ -197,7 +211,8 @@ impl Motion {
                 }
             }
             (Method::FollowerTable, _) => {
-                match FollowerTable::new(&self.path, self.team, self.head_speed, velocities) {
+                let table = FollowerTable::new(&self.path, self.team, self.head_speed, velocities);
+                match table.and_then(|table| table.with_instructions(self.instructions)) {
                     Some(table) => self.chosen_table(table, "named by the scene"),
                     None => newton(format!("newton: the scene names follower_table, but {NO_TABLE}")),
                 }

@@ -8,6 +8,7 @@ pub mod cue;
 pub mod path;
 pub mod precision;
 pub mod ros2;
+mod text;
 
 use std::path::Path as FilePath;
 
@@ -20,6 +21,7 @@ use self::path::RawPath;
 use self::precision::Precision;
 pub use self::precision::SinglePrecision;
 use self::ros2::{RawRos2, Ros2Settings};
+pub use self::text::SceneText;
 use crate::model::team::Team;
 use crate::motion::{Method, Motion, MotionError};
 use crate::solve::Velocities;
@@ -113,7 +115,7 @@ impl Scene {
     /// The scene of the paper, which is built in.
     pub fn paper() -> Self {
         // A test parses the built-in text, and nothing can change it afterwards.
-        Self::parse(PAPER, "paper.toml (built in)", "paper").expect("the built-in scene is valid")
+        SceneText::paper().parse().expect("the built-in scene is valid")
     }
 
     /// Reads a scene from a file.
@@ -121,18 +123,7 @@ impl Scene {
     /// # Errors
     /// One sentence for a file that cannot be read or used.
     pub fn load(file: &FilePath) -> Result<Self, SceneError> {
-        let shown = file.display().to_string();
-        let text = std::fs::read_to_string(file).map_err(|error| {
-            let reason = match error.kind() {
-                std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
-                std::io::ErrorKind::IsADirectory => "it is a folder".to_owned(),
-                std::io::ErrorKind::InvalidData => "it is not UTF-8 text".to_owned(),
-                _ => error.to_string(),
-            };
-            SceneError(format!("{shown}: {reason}, expected a scene file in TOML"))
-        })?;
-        let stem = file.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
-        Self::parse(&text, &shown, &stem)
+        SceneText::load(file)?.parse()
     }
 
     /// Reads a scene from TOML text. `file` is how errors call it, `stem` its name where it gives none itself.

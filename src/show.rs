@@ -6,6 +6,7 @@
 pub mod alerts;
 pub mod clock;
 pub mod control;
+mod playback;
 pub mod state;
 #[cfg(test)]
 mod tests;
@@ -18,12 +19,13 @@ use crate::motion::event::{Event, EventKind};
 use crate::motion::timeline::{TimedEvent, Timeline};
 use crate::motion::{Choice, Method};
 use crate::scene::cue::CueAction;
-use crate::scene::{AtEnd, OnContact, Scene};
+use crate::scene::{OnContact, Scene};
 use crate::solve::{Chain, Solver, Velocities};
 
 use alerts::{Alert, LevelTracker};
 use clock::{CueTime, ShowClock, ShowTime};
-use control::{Code, Command};
+use control::{COMMANDS_PER_FRAME, Code, Command, CommandRecord};
+pub use playback::{Playback, StartError};
 use state::{FrameState, PlaybackState};
 
 /// One moment of the show.
@@ -51,6 +53,9 @@ pub struct Frame {
     pub cue: u32,
     /// The cues reached since the frame before, in order. Its memory is reserved once.
     pub cues: Vec<ReachedCue>,
+    /// What the show was commanded at the beginning of this period, and a step that was over, in order. Its memory is
+    /// reserved once.
+    pub commands: Vec<CommandRecord>,
     /// Times the show has been played to its end and begun again.
     pub shows_played: u64,
     /// Contacts so far that no search had found: boards that overlapped before any contact was due.
@@ -74,6 +79,7 @@ impl Frame {
             epoch: 0,
             cue: 0,
             cues: Vec::new(),
+            commands: Vec::with_capacity(COMMANDS_PER_FRAME),
             shows_played: 0,
             unforeseen_contacts: 0,
             unsolved_frames: 0,
@@ -113,48 +119,6 @@ pub struct Outcome {
     pub cue: u32,
 }
 
-/// How a scene is played: what the command line may override.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Playback {
-    /// Simulated seconds at which the show begins.
-    pub start: f64,
-    /// Simulated seconds per second of wall time.
-    pub time_scale: f64,
-    /// Frames per second.
-    pub rate: f64,
-    /// What happens at a contact.
-    pub on_contact: OnContact,
-    /// What happens once the show has frozen.
-    pub at_end: AtEnd,
-    /// Seconds of wall time for which a looping show stands at its end.
-    pub end_hold: f64,
-    /// Whether the show waits at its start for [`Command::Go`].
-    pub paused: bool,
-}
-
-impl Playback {
-    /// The playback that a scene states: from its start, in real time.
-    pub fn of(scene: &Scene) -> Self {
-        let Scene { rate, on_contact, at_end, end_hold, .. } = *scene;
-        Self { start: 0.0, time_scale: 1.0, rate, on_contact, at_end, end_hold, paused: false }
-    }
-}
-
-/// A start that is not before the motion's end.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error(
-    "{start} s is outside the motion, expected at least 0 and less than {end} s, at which it ends ({})",
-    kind.name()
-)]
-pub struct StartError {
-    /// Simulated seconds at which the show was to begin.
-    pub start: f64,
-    /// Simulated seconds at which the motion ends.
-    pub end: f64,
-    /// What ends it.
-    pub kind: EventKind,
-}
-
 /// A scene being played.
 pub struct Show {
     clock: ShowClock,
@@ -173,6 +137,10 @@ pub struct Show {
     /// In the order of their times.
     cues: Vec<ReachedCue>,
     missing_cues: Vec<String>,
+    /// What the next frame reports of commands.
+    commands: Vec<CommandRecord>,
+    /// Whether a step has begun whose end no frame has reported.
+    stepping: bool,
     frame: Frame,
 }
 
@@ -215,6 +183,8 @@ impl Show {
             solved: None,
             cues,
             missing_cues,
+            commands: Vec::with_capacity(COMMANDS_PER_FRAME),
+            stepping: false,
             frame,
         })
     }
@@ -252,7 +222,11 @@ impl Show {
     /// Obeys a command at the beginning of the period `tick`, before its frame. `None` for a step, which
     /// [`finished_step`](Self::finished_step) answers once it is over.
     pub fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
-        let code = self.clock.apply(tick, command)?;
+        let code = self.clock.apply(tick, command);
+        self.record_finished_step();
+        self.commands.push(CommandRecord::Given { command, code });
+        self.stepping |= code.is_none();
+        let code = code?;
         if code == Code::Done && matches!(command, Command::Seek(_) | Command::Restart) {
             // The level after this is published anew, even where it is the same as before.
             self.level.iter_mut().for_each(LevelTracker::forget);
@@ -264,6 +238,16 @@ impl Show {
     pub fn finished_step(&mut self, tick: u64) -> Option<Outcome> {
         let code = self.clock.take_step_outcome()?;
         Some(self.outcome(tick, code))
+    }
+
+    /// Notes for the next frame that a step is over, once.
+    fn record_finished_step(&mut self) {
+        if self.stepping
+            && let Some(code) = self.clock.step_outcome()
+        {
+            self.stepping = false;
+            self.commands.push(CommandRecord::StepFinished { code });
+        }
     }
 
     fn outcome(&mut self, tick: u64, code: Code) -> Outcome {
@@ -279,7 +263,10 @@ impl Show {
     pub fn frame(&mut self, tick: u64) -> &Frame {
         let ShowTime { sim_time, time_scale, playback, epoch, shows_played, cues_passed } = self.clock.advance(tick);
         let jumped = epoch != self.frame.epoch;
+        self.record_finished_step();
         let frame = &mut self.frame;
+        frame.commands.clear();
+        frame.commands.append(&mut self.commands);
         frame.cues.clear();
         frame.cues.extend(self.clock.reached().iter().map(|cue| self.cues[*cue].clone()));
         self.clock.clear_reached();

@@ -1,5 +1,5 @@
 //! The loop allocates nothing of its own after its first frame: counted over its whole body, with the real shared
-//! memory and the real ROS 2 publisher, across a contact and a loop of the show.
+//! memory, the real ROS 2 publisher and the log, across a contact and a loop of the show.
 //!
 //! iceoryx2 0.10.0 keeps the bookkeeping of each loaned sample in an `Rc`, made by `loan` and freed by `send`: one small
 //! allocation for every frame and every alert, which its interface leaves no way round. The test demands exactly those.
@@ -12,7 +12,10 @@ use bench_dragon::live::clock::SystemClock;
 use bench_dragon::live::control::{Doors, door};
 use bench_dragon::live::statistics::queues;
 use bench_dragon::live::{Frames, LoopOptions, run_loop};
-use bench_dragon::scene::{AtEnd, Scene, SinglePrecision};
+use bench_dragon::recording;
+use bench_dragon::recording::arithmetic::Arithmetic;
+use bench_dragon::recording::lines::ShowLine;
+use bench_dragon::scene::{AtEnd, Scene, SceneText, SinglePrecision};
 use bench_dragon::show::control::Command;
 use bench_dragon::show::state::FrameState;
 use bench_dragon::show::{Frame, Outcome, Playback, Show};
@@ -115,6 +118,9 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
         let network = Network { domain: 93, range: Range::Localhost };
         transports.push(open_on(network, &config, &settings).unwrap());
     }
+    let folder = tempfile::tempdir().unwrap();
+    let line = ShowLine::new(&SceneText::paper(), &playback, Arithmetic::of(&scene), "", (1, 2));
+    transports.push(recording::log::open(&folder.path().join("log"), line, scene.team().handles()).unwrap().0);
     let mut publishers: Vec<_> = transports.iter_mut().map(|transport| transport.publisher().unwrap()).collect();
     let subscription = Subscription::new(&name, Wake::OnFrame).unwrap();
     let connection = subscription.connect().unwrap().unwrap();

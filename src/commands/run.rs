@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::collections::hash_map::RandomState;
 use std::fs::File;
 use std::hash::BuildHasher;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
@@ -15,7 +16,10 @@ use bench_dragon::live::statistics::{self, Inbox, Run, RunSummary, Summary};
 use bench_dragon::live::{Announcement, Counts, Deliveries, End, LoopOptions, Publisher, run_loop};
 use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::scene::{Accepted, AtEnd, Scene};
+use bench_dragon::recording::arithmetic::Arithmetic;
+use bench_dragon::recording::lines::ShowLine;
+use bench_dragon::recording::log::{self as recording_log, LogOutcome};
+use bench_dragon::scene::{Accepted, AtEnd, Scene, SceneText};
 use bench_dragon::show::{Playback, ReachedCue, Show};
 use bench_dragon::transports::iceoryx2::{OpenError, service_name};
 use bench_dragon::transports::{self, Transport, TransportConfig, TransportError};
@@ -58,6 +62,9 @@ pub struct RunArguments {
     /// Wall time for which a looping show stands at its end, seconds; by default the scene's
     #[arg(long, value_name = "SECONDS", hide = true)]
     end_hold: Option<f64>,
+    /// Record commands and a hash of the frames each second, for `bench-dragon verify`
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
     /// Publish ROS 2 topics too, those of the scene's [publish.ros2] or the default ones
     #[arg(long)]
     ros2: bool,
@@ -76,7 +83,8 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
     if arguments.end_with_parent {
         super::soak::end_with_parent()?;
     }
-    let mut scene = common.load_scene()?;
+    let text = common.scene_text()?;
+    let mut scene = text.parse()?;
     if arguments.ros2 {
         scene.ros2.get_or_insert_default();
     }
@@ -106,17 +114,22 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
     }
     let (timeline, solver) = (show.timeline().clone(), show.solver_reason().to_owned());
     let cues = show.cues().to_vec();
-    let session = RunSession { common, arguments, scene: &scene, playback, run_id, timeline, cues, solver };
+    let session =
+        RunSession { common, arguments, text: &text, scene: &scene, playback, run_id, timeline, cues, solver };
     session.run(show, &stop)
 }
 
 /// What the loop's thread prepares: its publishers; the transports, for the other threads; and what keeps CPUs awake.
 type LoopEnds = (Vec<Box<dyn Publisher>>, Vec<Box<dyn Transport>>, Option<File>);
 
+/// The log as a transport, and how it fares.
+type OpenedLog = (Box<dyn Transport>, LogOutcome);
+
 /// All that the threads of a run have in common.
 struct RunSession<'a> {
     common: &'a Common,
     arguments: &'a RunArguments,
+    text: &'a SceneText,
     scene: &'a Scene,
     playback: Playback,
     run_id: u64,
@@ -129,7 +142,12 @@ struct RunSession<'a> {
 impl RunSession<'_> {
     /// Runs the loop on one thread and the statistics on another.
     fn run(&self, mut show: Show, stop: &Arc<AtomicBool>) -> Result<(), CommandError> {
-        let (transports, mut doors) = self.open_transports(&show)?;
+        let (mut transports, mut doors) = self.open_transports(&show)?;
+        // The last of them: what reaches the log has been published.
+        let log = self.open_log()?.map(|(transport, outcome)| {
+            transports.push(transport);
+            outcome
+        });
         let (reports, inbox) = statistics::queues();
         let done = AtomicBool::new(false);
         let (opened, opening) = mpsc::channel();
@@ -170,7 +188,19 @@ impl RunSession<'_> {
         let deliveries = transports.into_iter().filter_map(|transport| transport.finish());
         let deliveries = deliveries.map(|(name, of)| (name.to_owned(), of)).collect();
         self.print_summary(&counts, &summary, deliveries)?;
-        error.map_or(Ok(()), |error| Err(CommandError::Failed(error.to_string())))
+        let log_failure = log.and_then(|outcome| outcome.failure());
+        error
+            .map(|error| error.to_string())
+            .or(log_failure)
+            .map_or(Ok(()), |sentence| Err(CommandError::Failed(sentence)))
+    }
+
+    /// The log, where one is requested.
+    fn open_log(&self) -> Result<Option<OpenedLog>, CommandError> {
+        let Some(file) = &self.arguments.log else { return Ok(None) };
+        let run = (self.run_id, realtime_ns());
+        let show = ShowLine::new(self.text, &self.playback, Arithmetic::of(self.scene), &self.solver, run);
+        Ok(Some(recording_log::open(file, show, self.scene.team().handles())?))
     }
 
     /// The transports, and the loop's ends of those that have a door for commands.

@@ -7,14 +7,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::clock::Clock;
 
 /// CLOCK_REALTIME minus CLOCK_MONOTONIC of a simulated clock.
-pub(super) const REALTIME_OFFSET_NS: u64 = 1_700_000_000_000_000_000;
+pub(crate) const REALTIME_OFFSET_NS: u64 = 1_700_000_000_000_000_000;
 
 /// Sleeps after which a test has hung.
 const MOST_SLEEPS: u64 = 10_000_000;
 
 /// How a sleep ends.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Wake {
+pub(crate) enum Wake {
     /// So many nanoseconds after its deadline.
     Late(u64),
     /// Before its deadline, as by a signal, after so many thousandths of the time until then.
@@ -23,7 +23,7 @@ pub(super) enum Wake {
 
 /// Nanoseconds that only sleeping and [`SimulatedClock::advance`] move.
 #[derive(Debug)]
-pub(super) struct SimulatedClock {
+pub(crate) struct SimulatedClock {
     now_ns: Cell<u64>,
     /// How the next sleeps end; once it is empty, all end on time.
     wakes: RefCell<VecDeque<Wake>>,

@@ -127,6 +127,11 @@ impl ShowClock {
         self.reached.clear();
     }
 
+    /// How the last step ended, where [`take_step_outcome`](Self::take_step_outcome) has not reported it yet.
+    pub fn step_outcome(&self) -> Option<Code> {
+        self.step_outcome
+    }
+
     /// How the last step ended, once.
     pub fn take_step_outcome(&mut self) -> Option<Code> {
         self.step_outcome.take()
@@ -198,6 +203,7 @@ impl ShowClock {
             Command::Step(_) if self.advances() => Code::Refused,
             Command::Step(periods) => {
                 self.begin(tick, now);
+                self.step_outcome = None;
                 self.step_end = Some(tick.saturating_add(periods));
                 return None;
             }

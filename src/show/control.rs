@@ -111,3 +111,23 @@ impl Code {
         }
     }
 }
+
+/// Commands and ended steps that a frame has room for; the loop obeys one command a period, which can end a step.
+pub(super) const COMMANDS_PER_FRAME: usize = 4;
+
+/// A command that was given to the show, or the end of a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CommandRecord {
+    /// A command.
+    Given {
+        /// The command.
+        command: Command,
+        /// What became of it; `None` for a step that has begun, whose end is a record of its own.
+        code: Option<Code>,
+    },
+    /// A step was over, or was broken off.
+    StepFinished {
+        /// How it ended.
+        code: Code,
+    },
+}

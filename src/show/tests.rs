@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::motion::Method;
+use crate::scene::AtEnd;
 use crate::show::state::Level;
 
 const RATE: f64 = 50.0;

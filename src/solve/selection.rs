@@ -12,7 +12,7 @@
 use std::time::{Duration, Instant};
 
 use super::newton::Newton;
-use super::table::{Allowed, FollowerTable, Tolerance};
+use super::table::{Allowed, FollowerTable, Instructions, Tolerance};
 use super::{Chain, Solver, Velocities};
 use crate::model::path::Path;
 use crate::model::team::Team;
@@ -87,9 +87,24 @@ impl Selection {
 /// within 10 accuracy / link of a handle's speed, so that a tenth of a link's way further on they lead no farther
 /// astray.
 pub fn cheapest(path: &Path, team: Team, head_speed: f64, velocities: Velocities, accuracy: f64) -> Option<Selection> {
+    cheapest_with(path, team, head_speed, velocities, accuracy, Instructions::fastest(team.handles()))
+}
+
+/// [`cheapest`] with other instructions; `None` too where this processor lacks them.
+pub fn cheapest_with(
+    path: &Path,
+    team: Team,
+    head_speed: f64,
+    velocities: Velocities,
+    accuracy: f64,
+    instructions: Instructions,
+) -> Option<Selection> {
     let began = Instant::now();
     let accuracy = accuracy.min(COARSEST * team.shortest_link());
-    let make = |tolerance: Tolerance| FollowerTable::with_tolerance(path, team, head_speed, velocities, tolerance);
+    let make = |tolerance: Tolerance| {
+        let table = FollowerTable::with_tolerance(path, team, head_speed, velocities, tolerance)?;
+        table.with_instructions(instructions)
+    };
     let tolerance = tolerance(&team, accuracy);
     let rows = make(tolerance)?;
     let measurement = ErrorMeasurement::new(path, team, head_speed, &rows);

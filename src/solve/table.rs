@@ -57,13 +57,18 @@ impl Instructions {
 
     /// The fastest for frames of so many handles. Large ones wait for memory, and the wider stores then cost a tenth:
     /// each lies across two cache lines.
-    fn fastest(handles: usize) -> Self {
+    pub(crate) fn fastest(handles: usize) -> Self {
         const LARGE: usize = 10_000;
         let fastest = |instructions: &Self| *instructions != Self::Avx512 || handles < LARGE;
         Self::available().into_iter().find(fastest).unwrap_or(Self::Portable)
     }
 
-    /// The name for people.
+    /// The instructions of this [`name`](Self::name).
+    pub fn of_name(name: &str) -> Option<Self> {
+        [Self::Avx512, Self::Avx2, Self::Portable].into_iter().find(|instructions| instructions.name() == name)
+    }
+
+    /// The name for people and recordings.
     pub fn name(self) -> &'static str {
         match self {
             Self::Avx512 => "AVX-512",
@@ -72,8 +77,9 @@ impl Instructions {
         }
     }
 
+    /// Whether this processor has them.
     #[cfg(target_arch = "x86_64")]
-    fn is_available(self) -> bool {
+    pub fn is_available(self) -> bool {
         let avx2 = || is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
         match self {
             Self::Avx512 => {
@@ -87,8 +93,9 @@ impl Instructions {
         }
     }
 
+    /// Whether this processor has them.
     #[cfg(not(target_arch = "x86_64"))]
-    fn is_available(self) -> bool {
+    pub fn is_available(self) -> bool {
         self == Self::Portable
     }
 }

@@ -1,0 +1,50 @@
+//! The text of a scene, before it is understood: what a recording keeps, so that the same scene can be read again.
+
+use std::path::Path as FilePath;
+
+use super::{PAPER, Scene, SceneError};
+
+/// A scene as it was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SceneText {
+    /// TOML.
+    pub text: String,
+    /// How errors call the file.
+    pub file: String,
+    /// The scene's name where the text gives none.
+    pub stem: String,
+}
+
+impl SceneText {
+    /// The text of the scene that is built in.
+    pub fn paper() -> Self {
+        Self { text: PAPER.to_owned(), file: "paper.toml (built in)".to_owned(), stem: "paper".to_owned() }
+    }
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// One sentence for a file that cannot be read.
+    pub fn load(file: &FilePath) -> Result<Self, SceneError> {
+        let shown = file.display().to_string();
+        let text = std::fs::read_to_string(file).map_err(|error| {
+            let reason = match error.kind() {
+                std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
+                std::io::ErrorKind::IsADirectory => "it is a folder".to_owned(),
+                std::io::ErrorKind::InvalidData => "it is not UTF-8 text".to_owned(),
+                _ => error.to_string(),
+            };
+            SceneError(format!("{shown}: {reason}, expected a scene file in TOML"))
+        })?;
+        let stem = file.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy().into_owned());
+        Ok(Self { text, file: shown, stem })
+    }
+
+    /// The scene of this text.
+    ///
+    /// # Errors
+    /// As [`Scene::parse`].
+    pub fn parse(&self) -> Result<Scene, SceneError> {
+        Scene::parse(&self.text, &self.file, &self.stem)
+    }
+}
