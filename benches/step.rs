@@ -2,12 +2,16 @@
 //! of it, beside copying as many bytes into the same memory. The parts are measured in turn, frame by frame, in one run,
 //! with one subscriber that takes every frame; the figures are medians.
 //!
-//! `cargo bench --bench step`, or with some numbers of benches: `cargo bench --bench step -- 223 100000`
+//! Then the step of the paper's team once more, beside the same with one and with two doors at which no command waits.
+//!
+//! `cargo bench --bench step`, or with some numbers of benches: `cargo bench --bench step -- 223 100000`, or the doors
+//! alone: `cargo bench --bench step -- doors`
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use bench_dragon::live::Publisher;
+use bench_dragon::live::control::{Door, Doors, door};
+use bench_dragon::live::{Frames, Publisher};
 use bench_dragon::scene::Scene;
 use bench_dragon::show::{Playback, Show};
 use bench_dragon::subscribers::connection::{Connection, Subscription, Wake};
@@ -29,10 +33,15 @@ const MOST_ROUNDS: usize = 3_000;
 const TIME: Duration = Duration::from_secs(5);
 /// Frames in the queue of the subscriber.
 const QUEUE: usize = 2;
+/// Times that doors are looked at for one figure: once takes less than a clock resolves.
+const POLLS: usize = 1_000;
 /// Copies that are held at once, so that copying meets memory as little used as publishing does.
 const COPIES: usize = QUEUE + 2;
 
 fn main() {
+    if std::env::args().any(|argument| argument == "doors") {
+        return measure_doors();
+    }
     let given: Vec<usize> = std::env::args().filter_map(|argument| argument.parse().ok()).collect();
     println!(
         "| benches | bytes | solver | clearance | publish | step | step without alerts | memcpy | (step without alerts - \
@@ -41,6 +50,7 @@ fn main() {
     for benches in if given.is_empty() { SIZES.to_vec() } else { given } {
         measure(benches);
     }
+    measure_doors();
 }
 
 /// The paper's scene with another number of benches.
@@ -71,19 +81,7 @@ fn measure(benches: usize) {
     let mut choice = scene.motion.solver(scene.velocities);
     let mut monitor = scene.motion.clearance_monitor(&choice);
     let name = format!("bench_{}_{benches}", std::process::id());
-    let config = PublisherConfig {
-        name: name.clone(),
-        handles,
-        single_precision: None,
-        queue: QUEUE,
-        subscribers: 1,
-        alerts: true,
-        cues: false,
-        stage: stage(1, 0, &scene.motion),
-    };
-    let mut publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");
-    let subscription = Subscription::new(&name, Wake::Never).expect("the publisher has taken this name");
-    let connection = subscription.connect().expect("the publisher is there").expect("the publisher is there");
+    let (mut publisher, connection) = publisher_and_subscriber(&name, &scene);
     let mut frame = show.frame(0).clone();
 
     // As many bytes, into samples of a service of the same kind.
@@ -140,6 +138,78 @@ fn measure(benches: usize) {
         }
     }
     row(benches, handles, times);
+}
+
+fn publisher_and_subscriber(name: &str, scene: &Scene) -> (SharedMemoryPublisher, Connection) {
+    let config = PublisherConfig {
+        name: name.to_owned(),
+        handles: scene.team().handles(),
+        single_precision: None,
+        queue: QUEUE,
+        subscribers: 1,
+        alerts: true,
+        cues: false,
+        stage: stage(1, 0, &scene.motion),
+    };
+    let publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");
+    let subscription = Subscription::new(name, Wake::Never).expect("the publisher has taken this name");
+    let connection = subscription.connect().expect("the publisher is there").expect("the publisher is there");
+    (publisher, connection)
+}
+
+/// Steps with no door, one and two, in turn: the same show, so that what it computes costs all of them the same.
+fn measure_doors() {
+    let scene = scene(223);
+    let playback = Playback { start: START, ..Playback::of(&scene) };
+    let timeline = scene.motion.timeline(&mut |_| ());
+    let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
+    let (mut publisher, connection) = publisher_and_subscriber(&format!("bench_{}_doors", std::process::id()), &scene);
+    // The outer ends stay: a queue that nobody can fill any more is another one.
+    let (mut doors, outer): (Vec<Doors>, Vec<Vec<Door>>) = (0..3)
+        .map(|count| {
+            let (ports, outer): (Vec<_>, Vec<_>) = (0..count).map(|_| door()).unzip();
+            (Doors::new(ports), outer)
+        })
+        .unzip();
+    let mut times: [Vec<f64>; 3] = Default::default();
+    let mut takes: [Vec<f64>; 3] = Default::default();
+    let began = Instant::now();
+    let mut tick = 0;
+    for round in 0..MOST_ROUNDS / doors.len() {
+        for place in 0..doors.len() {
+            // Who comes first and who last changes.
+            let count = (place + round) % doors.len();
+            let doors = &mut doors[count];
+            for _ in 0..BATCH {
+                tick += 1;
+                timed(&mut times[count], || {
+                    doors.take_one(&mut show, tick);
+                    let frame = Frames::frame(&mut show, tick);
+                    let header = frame_header(frame, stamps(tick));
+                    publisher.publish(&header, frame).expect("nobody else uses this service");
+                    doors.finish_step(&mut show, tick);
+                });
+                drain(&connection);
+            }
+            timed(&mut takes[count], || {
+                for _ in 0..POLLS {
+                    black_box(&mut *doors).take_one(&mut show, tick);
+                    black_box(&mut *doors).finish_step(&mut show, tick);
+                }
+            });
+        }
+        if began.elapsed() > TIME {
+            break;
+        }
+    }
+    drop(outer);
+    let step = times.map(median);
+    let take = takes.map(median);
+    println!("\n| doors | step | beside a step without | the doors alone |\n|---|---|---|---|");
+    for count in 0..step.len() {
+        let alone = take[count] * 1e3 / POLLS as f64;
+        println!("| {count} | {:.3} us | {:.3} | {alone:.1} ns |", step[count], step[count] / step[0]);
+    }
 }
 
 fn stamps(sequence: u64) -> Stamps {

@@ -17,6 +17,7 @@ pub mod plan;
 mod realtime_scheduling;
 pub mod run;
 pub mod soak;
+pub mod soak_conductor;
 pub mod solve;
 pub mod trade;
 pub mod verify;

@@ -46,6 +46,12 @@ enum Command {
     /// What soak starts
     #[command(hide = true)]
     SoakSubscriber(commands::soak::SoakSubscriberArguments),
+    /// What soak --conduct starts
+    #[command(hide = true)]
+    SoakConductor(commands::soak_conductor::SoakConductorArguments),
+    /// What soak --conduct starts to kill it
+    #[command(hide = true)]
+    SoakClient,
     /// Validate a scene and print what it would model
     Check,
 }
@@ -66,6 +72,8 @@ fn main() -> ExitCode {
         Command::Plan(arguments) => commands::plan::plan(&common, arguments),
         Command::Soak(arguments) => commands::soak::soak(&common, arguments),
         Command::SoakSubscriber(arguments) => commands::soak::subscribe(&common, arguments),
+        Command::SoakConductor(arguments) => commands::soak_conductor::conduct(&common, arguments),
+        Command::SoakClient => commands::soak_conductor::client(&common),
         Command::Check => commands::check::check(&common),
     });
     match done {

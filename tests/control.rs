@@ -4,9 +4,15 @@
 mod processes;
 
 use std::process::Command;
+use std::time::{Duration, Instant};
 
+use bench_dragon::show::control::{Code, Command as Conduct};
+use bench_dragon::show::state::PlaybackState;
+use bench_dragon::subscribers::control::Controller;
+use bench_dragon::wire::ControlResponse;
 use processes::{
-    Process, can_run, json_lines, program, python, python_modules, scene_file, summary, text, unique, wait,
+    Place, Process, can_run, example, json_lines, program, python, python_modules, root, scene_file, summary, text,
+    unique, wait,
 };
 use serde_json::Value;
 
@@ -145,4 +151,201 @@ fn a_show_waits_for_go_at_its_start_and_at_its_cues() {
     done(name, &["go"]);
     let (code, line, sentence) = control(name, &["go"]);
     assert!(code == 1 && line["code"] == "refused" && sentence.contains("waits for nothing"), "{line} {sentence}");
+}
+
+/// A show as it stands when a command comes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Stand {
+    Playing,
+    Paused,
+    Stepping,
+    Waiting,
+    Held,
+    Ended,
+}
+
+const STANDS: [Stand; 6] = [Stand::Playing, Stand::Paused, Stand::Stepping, Stand::Waiting, Stand::Held, Stand::Ended];
+
+/// Two clients of a publisher: one awaits the end of a step, the other commands meanwhile.
+struct Conductor {
+    controller: Controller,
+    second: String,
+    step: Option<std::thread::JoinHandle<ControlResponse>>,
+}
+
+const PATIENCE: Duration = Duration::from_secs(60);
+
+impl Conductor {
+    fn new(name: &str) -> Self {
+        Self { controller: Controller::new(&unique(name)).unwrap(), second: unique(name), step: None }
+    }
+
+    fn send(&mut self, command: Conduct) -> (Code, PlaybackState) {
+        let answer = self.controller.send(command, PATIENCE).unwrap();
+        (answer.result().unwrap(), answer.playback_state().unwrap())
+    }
+
+    fn until(&mut self, wanted: PlaybackState) {
+        let deadline = Instant::now() + PATIENCE;
+        while self.send(Conduct::State).1 != wanted {
+            assert!(Instant::now() < deadline, "the show is never {}", wanted.name());
+        }
+    }
+
+    /// Brings the show to a stand; the scene's cue at 0.2 s pauses, and it ends after 412.4 s.
+    fn bring_to(&mut self, stand: Stand) {
+        self.send(Conduct::Release);
+        self.send(Conduct::Rate(1.0));
+        // A resume ends waiting, too.
+        self.send(Conduct::Resume);
+        self.send(Conduct::Pause);
+        assert_eq!(self.send(Conduct::Seek(1.0)), (Code::Done, PlaybackState::Paused));
+        match stand {
+            Stand::Playing => drop(self.send(Conduct::Resume)),
+            Stand::Paused => (),
+            Stand::Stepping => {
+                let name = self.second.clone();
+                self.step = Some(std::thread::spawn(move || {
+                    Controller::new(&name).unwrap().send(Conduct::Step(1_000_000), PATIENCE).unwrap()
+                }));
+                self.until(PlaybackState::Playing);
+            }
+            Stand::Waiting => {
+                self.send(Conduct::Seek(0.19));
+                self.send(Conduct::Resume);
+                self.until(PlaybackState::Paused);
+            }
+            Stand::Held => drop(self.send(Conduct::Hold)),
+            Stand::Ended => {
+                self.send(Conduct::Seek(412.46));
+                self.send(Conduct::Resume);
+                self.until(PlaybackState::Ended);
+            }
+        }
+    }
+
+    /// The answer to the step, if one was under way; it is broken off.
+    fn end_step(&mut self) -> Option<Code> {
+        let step = self.step.take()?;
+        if !step.is_finished() {
+            self.send(Conduct::Pause);
+        }
+        step.join().unwrap().result()
+    }
+}
+
+/// A publisher whose show waits at a cue, and ends at its contact.
+fn publisher_with_a_cue(name: &str) -> Process {
+    let scene = scene_file(name, &[("accuracy = 1e-9", "solver = \"newton\"")]);
+    let cue = "[[cues]]\nname = \"wait\"\nat = 0.2\nthen = \"pause\"\n";
+    std::fs::write(&scene, format!("{}\n{cue}", std::fs::read_to_string(&scene).unwrap())).unwrap();
+    publisher(name, &["--scene", scene.to_str().unwrap(), "--rate", "250", "--duration", "300"])
+}
+
+#[test]
+fn every_command_in_every_state() {
+    use Code::{Already, Done, Refused};
+    use PlaybackState::{Ended, Held, Paused, Playing};
+    let name = "whole_table";
+    let _publisher = publisher_with_a_cue(name);
+    let mut conductor = Conductor::new(name);
+    let held = (Refused, Held);
+    // Playing, paused, stepping, waiting, held, ended: the code, and whether the show plays then. A step has no answer
+    // before it is over.
+    let table: [(Conduct, [(Code, PlaybackState); 6]); 10] = [
+        (
+            Conduct::State,
+            [(Done, Playing), (Done, Paused), (Done, Playing), (Done, Paused), (Done, Held), (Done, Ended)],
+        ),
+        (Conduct::Pause, [(Done, Paused), (Already, Paused), (Done, Paused), (Already, Paused), held, (Done, Paused)]),
+        (
+            Conduct::Resume,
+            [(Already, Playing), (Done, Playing), (Done, Playing), (Done, Playing), held, (Already, Ended)],
+        ),
+        (Conduct::Rate(2.0), [(Done, Playing), (Done, Paused), (Done, Playing), (Done, Paused), held, (Done, Ended)]),
+        (Conduct::Seek(5.0), [(Done, Playing), (Done, Paused), (Done, Paused), (Done, Paused), held, (Done, Playing)]),
+        (
+            Conduct::Step(3),
+            [(Refused, Playing), (Done, Paused), (Refused, Playing), (Done, Paused), held, (Refused, Ended)],
+        ),
+        (Conduct::Restart, [(Done, Playing), (Done, Paused), (Done, Paused), (Done, Paused), held, (Done, Playing)]),
+        (Conduct::Hold, [(Done, Held), (Done, Held), (Done, Held), (Done, Held), (Already, Held), (Done, Held)]),
+        (
+            Conduct::Release,
+            [
+                (Refused, Playing),
+                (Refused, Paused),
+                (Refused, Playing),
+                (Refused, Paused),
+                (Done, Paused),
+                (Refused, Ended),
+            ],
+        ),
+        (
+            Conduct::Go,
+            [(Refused, Playing), (Refused, Paused), (Refused, Playing), (Done, Playing), held, (Refused, Ended)],
+        ),
+    ];
+    for (command, expected) in table {
+        for (stand, expected) in STANDS.into_iter().zip(expected) {
+            conductor.bring_to(stand);
+            assert_eq!(conductor.send(command), expected, "{command:?} while {stand:?}");
+            // What breaks a step off has it refused.
+            assert_eq!(conductor.end_step(), (stand == Stand::Stepping).then_some(Refused), "{command:?}");
+        }
+    }
+    let unusable =
+        [Conduct::Rate(0.0), Conduct::Rate(1e7), Conduct::Rate(f64::NAN), Conduct::Seek(-1.0), Conduct::Seek(1e9)];
+    for command in unusable {
+        for stand in STANDS {
+            conductor.bring_to(stand);
+            let expected = if stand == Stand::Held { Refused } else { Code::OutOfRange };
+            assert_eq!(conductor.send(command).0, expected, "{command:?} while {stand:?}");
+            conductor.end_step();
+        }
+    }
+    for (stand, expected) in [(Stand::Paused, Code::OutOfRange), (Stand::Held, Refused)] {
+        conductor.bring_to(stand);
+        assert_eq!(conductor.send(Conduct::Step(0)).0, expected, "no periods while {stand:?}");
+    }
+}
+
+/// The service's files are their owner's alone, unless the program was built to let everybody in.
+#[test]
+fn another_user_cannot_conduct() {
+    if !can_run(root("become another user")) {
+        return;
+    }
+    let place = Place::new("conductors");
+    let publisher = Process::start(place.program().args(["run", "--json", "--rate", "100"]));
+    let state = || json_lines(&place.program().args(["--json", "control", "state"]).output().unwrap()).pop();
+    let deadline = Instant::now() + PATIENCE;
+    while state().is_none() {
+        assert!(Instant::now() < deadline, "no publisher");
+        wait(0.1);
+    }
+    let output = place.as_nobody(&["control", "pause"]);
+    let printed = text(&output.stderr);
+    if cfg!(feature = "any_user") {
+        assert_eq!(output.status.code(), Some(0), "{printed}");
+    } else {
+        assert_eq!(output.status.code(), Some(1), "{printed}");
+        assert!(printed.contains("another user"), "{printed}");
+        assert_eq!(state().unwrap()["playback"], "playing");
+    }
+    publisher.signal(nix::sys::signal::Signal::SIGINT);
+    summary(&publisher.output_within(20));
+}
+
+#[test]
+fn the_example_pauses_seeks_and_resumes() {
+    let name = "example";
+    let _publisher = publisher(name, &["--rate", "50", "--start", "100", "--duration", "60"]);
+    let output = Process::start(example("conduct").arg(unique(name))).output_within(30);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let printed = text(&output.stdout);
+    let lines: Vec<_> = printed.lines().collect();
+    assert!(lines[0].starts_with("Pause: done, paused at 0 x"), "{printed}");
+    assert!(lines[1].starts_with("Seek(300.0): done, paused at 0 x, t = 300.000 s"), "{printed}");
+    assert!(lines[2].starts_with("Resume: done, playing at 1 x, t = 300.000 s"), "{printed}");
 }

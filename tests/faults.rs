@@ -6,9 +6,8 @@
 mod processes;
 
 use std::collections::BTreeSet;
-use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::os::unix::fs::MetadataExt;
 use std::os::unix::process::ExitStatusExt;
-use std::path::PathBuf;
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
@@ -342,23 +341,6 @@ fn without_ros2_there_is_no_network_socket() {
     assert!(sockets > 0, "both wake each other through local sockets, which is what was looked through");
 }
 
-/// The user who has nothing.
-const NOBODY: u32 = 65534;
-
-/// The program as another user, from a copy that this user may read.
-fn as_nobody(place: &Place, arguments: &[&str]) -> Output {
-    let copy: PathBuf = place.folder().join("bench-dragon");
-    if !copy.exists() {
-        std::fs::copy(env!("CARGO_BIN_EXE_bench-dragon"), &copy).unwrap();
-        std::fs::set_permissions(place.folder(), std::fs::Permissions::from_mode(0o755)).unwrap();
-    }
-    let nobody = NOBODY.to_string();
-    let mut command = Command::new("setpriv");
-    command.args([&format!("--reuid={nobody}"), &format!("--regid={nobody}"), "--clear-groups"]);
-    command.arg(copy).args(arguments).current_dir(place.folder());
-    Process::start(&mut command).output_within(20)
-}
-
 /// Another user reads nothing, unless the program was built to let everybody in.
 #[test]
 fn another_user_is_kept_out_or_let_in_as_the_build_allows() {
@@ -376,7 +358,7 @@ fn another_user_is_kept_out_or_let_in_as_the_build_allows() {
         })
         .map(|file| file.metadata().unwrap().mode() & 0o777)
         .collect();
-    let output = as_nobody(&place, &["watch", "--json", "--duration", "2"]);
+    let output = place.as_nobody(&["watch", "--json", "--duration", "2"]);
     if cfg!(feature = "any_user") {
         assert_eq!(modes, BTreeSet::from([0o666]));
         let lines = json_lines(&output);

@@ -15,7 +15,7 @@ use nix::sys::signal::kill;
 use nix::unistd::Pid;
 use serde_json::Value;
 
-use processes::{Place, Process, json_lines, program, scene_file, summary, text, unique, wait};
+use processes::{Place, Process, aloud, json_lines, long, program, scene_file, summary, text, unique, wait};
 
 /// Limits that any machine keeps.
 const ANY_SPEED: [&str; 6] = ["--max-skipped", "100%", "--max-lateness-p999", "3600s", "--max-rss-growth", "1MB"];
@@ -58,7 +58,8 @@ fn twenty_seconds_pass_with_nothing_missed() {
             "steady" => {
                 assert_eq!((number(seen, "missed"), number(seen, "runs")), (0, 1), "{subscriber}");
                 assert_eq!(number(seen, "last_sequence") + 1, frames, "{subscriber}");
-                assert_eq!(number(seen, "last_tick") + 1, frames + skipped, "{subscriber}");
+                // Periods may have passed between the last frame and the stop.
+                assert!((frames..=frames + skipped).contains(&(number(seen, "last_tick") + 1)), "{subscriber}");
                 assert!(number(seen, "received") > 4000, "{subscriber}");
             }
             // 1.5 s at 250 Hz are more than a queue of 64 holds.
@@ -103,6 +104,15 @@ fn a_scene_of_weak_accuracy_passes_with_the_links_it_promises() {
     assert!((1e-9..2e-5).contains(&worst), "{worst:e} m");
 }
 
+/// Waits until a publisher of this place answers: an unoptimised one makes its tables for seconds.
+fn until_publishing(place: &Place) {
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while !place.program().args(["control", "state"]).output().unwrap().status.success() {
+        assert!(Instant::now() < deadline, "nobody publishes");
+        wait(0.1);
+    }
+}
+
 #[test]
 fn a_broken_limit_fails_even_when_interrupted() {
     let place = Place::new("broken");
@@ -110,7 +120,8 @@ fn a_broken_limit_fails_even_when_interrupted() {
     soak.args(["soak", "--json", "--duration", "8h", "--rate", "100", "--subscribers", "1"]);
     soak.args(["--max-skipped", "100%", "--max-lateness-p999", "1ns"]);
     let soak = Process::start(&mut soak);
-    wait(4.0);
+    until_publishing(&place);
+    wait(3.0);
     soak.signal(SIGINT);
     let output = soak.output_within(60);
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
@@ -122,6 +133,93 @@ fn a_broken_limit_fails_even_when_interrupted() {
     assert_eq!(failed.len(), 1, "{checks:?}");
     assert!(failed[0].0.contains("lateness") && failed[0].1.1 > 1.0, "{failed:?}");
     place.assert_clean();
+}
+
+/// A scene of the paper whose subscribers may fall behind by so many frames.
+fn scene_with_queue(name: &str, queue: usize) -> std::path::PathBuf {
+    scene_file(name, &[("[publish]", &format!("[publish]\nqueue = {queue}"))])
+}
+
+/// Eight seconds, or ten minutes where long tests are requested.
+#[test]
+fn a_conducted_show_obeys_while_clients_are_killed() {
+    let place = Place::new("conducted");
+    let (duration, rate, commands) = if long() { ("10m", "1000", 5000) } else { ("8s", "200", 40) };
+    let scene = scene_with_queue("conducted", 1000);
+    let mut soak = place.program();
+    soak.args(["--scene", scene.to_str().unwrap(), "soak", "--json", "--duration", duration, "--rate", rate]);
+    soak.args(["--conduct", "7", "--flaky-clients", "2", "--subscribers", "2", "--report", "report"]);
+    // A subscriber that the machine does not run for a while leaves frames in its queue, whose memory the publisher then
+    // touches for the first time: 9 kB for each of 1000.
+    soak.args(&ANY_SPEED[..4]).args(["--max-rss-growth", "20MB"]);
+    let output = Process::start(&mut soak).output_within(if long() { 800 } else { 150 });
+    assert!(output.status.success(), "{} {}", text(&output.stderr), text(&output.stdout));
+    if long() {
+        aloud(&text(&output.stdout));
+    }
+    let report = json_lines(&output).pop().unwrap();
+    assert_eq!(report["verdict"], "PASS");
+    let conducted = &report["conducted"];
+    assert!(number(conducted, "sent") >= commands && number(conducted, "jumps") > 0, "{conducted}");
+    assert!(number(conducted, "refused_as_expected") > 0 && number(conducted, "compared") > 0, "{conducted}");
+    for fault in ["wrong", "lost", "contradicted"] {
+        assert_eq!(number(conducted, fault), 0, "{conducted}");
+    }
+    let answers = conducted["answers"].as_object().unwrap();
+    assert!(answers.len() >= 8, "{conducted}");
+    // Two clients, each of which was killed at least once.
+    assert!(number(&report, "clients_killed") >= 2, "{report}");
+    for subscriber in report["subscribers"].as_array().unwrap() {
+        let seen = &subscriber["seen"];
+        assert_eq!((number(seen, "missed"), number(seen, "disobedient")), (0, 0), "{seen}");
+        // From the first status on, a second after the beginning.
+        assert!(number(seen, "times_checked") > number(seen, "received") / 2, "{seen}");
+        assert!(number(seen, "epoch") >= number(conducted, "jumps"), "{seen}");
+    }
+    for name in ["frames that disobey the commands", "jumps of simulated time too many or too few"] {
+        assert_eq!(checks(&report)[name], (true, 0.0), "{name}");
+    }
+    let page = std::fs::read_to_string(place.folder().join("report.html")).unwrap();
+    assert!(page.contains("<th>command") && page.contains("<td>resume") && page.contains("conducted with seed 7"));
+    place.assert_clean();
+}
+
+/// Somebody else conducts too: what the conductor did not command is noticed.
+#[test]
+fn a_show_that_somebody_else_conducts_too_fails() {
+    let place = Place::new("meddled");
+    let scene = scene_with_queue("meddled", 1000);
+    let mut soak = place.program();
+    soak.args(["--scene", scene.to_str().unwrap(), "soak", "--json", "--duration", "8h", "--rate", "100"]);
+    let soak = Process::start(soak.args(["--conduct", "1", "--subscribers", "1"]).args(ANY_SPEED));
+    let control = |arguments: &[&str]| {
+        let output = Process::start(place.program().args(["--json", "control"]).args(arguments)).output_within(60);
+        json_lines(&output).pop().unwrap_or_default()
+    };
+    let until = |what: &str, arguments: &[&str], wanted: &dyn Fn(&Value) -> bool| {
+        let deadline = Instant::now() + Duration::from_secs(100);
+        while !wanted(&control(arguments)) {
+            assert!(Instant::now() < deadline, "{what} did not come about");
+            wait(0.05);
+        }
+    };
+    // The show waits at its start until it is conducted.
+    until("a first command", &["state"], &|state| state["sim_time"].as_f64().is_some_and(|time| time > 0.0));
+    // A jump that is not counted, and a hold that is not expected, each unless the show is held just then.
+    until("a seek", &["seek", "5"], &|answer| answer["code"] == "done");
+    until("a hold", &["hold"], &|answer| answer["code"] == "done");
+    until("a release", &["state"], &|state| state["playback"] != "held");
+    soak.signal(SIGINT);
+    let output = soak.output_within(90);
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stdout));
+    let report = json_lines(&output).pop().unwrap();
+    let checks = checks(&report);
+    assert_eq!(checks["jumps of simulated time too many or too few"], (false, 1.0));
+    assert!(checks["answers that the command table does not allow"].1 >= 1.0, "{checks:?}");
+    let fault = report["conducted"]["faults"][0].as_str().unwrap();
+    assert!(fault.contains("expected"), "{fault}");
+    // The stream itself is in order: each frame follows from the one before.
+    assert_eq!(checks["frames that disobey the commands"], (true, 0.0));
 }
 
 /// Processes that a process has started, and their command lines.
@@ -142,7 +240,8 @@ fn a_publisher_that_dies_fails_the_test_at_once() {
     let mut soak = place.program();
     soak.args(["soak", "--json", "--duration", "8h", "--rate", "100", "--subscribers", "2"]).args(ANY_SPEED);
     let soak = Process::start(&mut soak);
-    wait(4.0);
+    until_publishing(&place);
+    wait(3.0);
     let publisher = children(&soak).into_iter().find(|(_, command)| command.contains("\0run\0")).unwrap().0;
     kill(publisher, SIGKILL).unwrap();
     let output = soak.output_within(60);
@@ -173,13 +272,19 @@ fn nobody_outlives_a_killed_soak_test() {
 
 #[test]
 fn what_cannot_be_is_refused_before_it_starts() {
-    let cases: [(&[&str], &str); 6] = [
+    let cases: [(&[&str], &str); 12] = [
         (&["--subscribers", "0"], "--subscribers"),
         (&["--subscribers", "7", "--flaky", "2"], "publish.subscribers"),
         (&["--rate", "20001"], "--rate"),
         (&["--max-skipped", "2"], "0.01%"),
         (&["--max-lateness-p999", "200"], "200us"),
         (&["--report", "/nonexistent/report"], "--report"),
+        (&["--conduct", "x"], "a whole number from 0 to 18446744073709551615"),
+        (&["--conduct", "-1"], "a whole number"),
+        (&["--conduct", "1.5"], "a whole number"),
+        (&["--conduct", "1", "--subscribers", "8"], "less one for --conduct"),
+        (&["--conduct", "1", "--flaky-clients", "9"], "expected at most 8"),
+        (&["--flaky-clients", "1"], "--conduct"),
     ];
     for (arguments, named) in cases {
         let output = Process::start(program("refused").arg("soak").args(arguments)).output_within(20);
@@ -196,11 +301,13 @@ fn the_status_comes_once_a_second_and_adds_up() {
     let mut feed = Feed::new(&unique("status"), FeedOptions { wake: Wake::OnFrame, frames: Frames::All }).unwrap();
     let mut statuses: Vec<LoopStatus> = Vec::new();
     let mut frames = Vec::new();
-    let end = Instant::now() + Duration::from_secs(7);
-    while Instant::now() < end {
+    let end = Instant::now() + Duration::from_secs(60);
+    let mut gone = false;
+    while !gone && Instant::now() < end {
         let polled = feed.poll(Duration::from_millis(50), &mut |event| match event {
             FeedEvent::Frame { header, .. } => frames.push((header.sequence, header.tick, header.run_id)),
             FeedEvent::Status(status) => statuses.push(*status),
+            FeedEvent::Gone => gone = true,
             _ => (),
         });
         polled.unwrap();

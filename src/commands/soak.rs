@@ -16,7 +16,7 @@ use bench_dragon::subscribers::soak::fleet::{Fleet, FleetError};
 use bench_dragon::subscribers::soak::history::History;
 use bench_dragon::subscribers::soak::member::Role;
 use bench_dragon::subscribers::soak::observer::Observer;
-use bench_dragon::subscribers::soak::processes::Plan;
+use bench_dragon::subscribers::soak::processes::{ConductPlan, Plan};
 use bench_dragon::subscribers::soak::report::{Machine, Report, SubscriberReport};
 use bench_dragon::subscribers::soak::verdict::{Limits, Verdict};
 use bench_dragon::transports::iceoryx2;
@@ -27,6 +27,9 @@ use super::{CommandError, Common, Output, progress_bar, stop_on_signals, wall_se
 
 /// How long a slow subscriber sleeps: longer than a queue of 64 frames lasts at 60 Hz.
 const SLOW_PAUSE: Duration = Duration::from_millis(1500);
+
+/// Clients of the control service that find room beside the conductor's.
+const MOST_FLAKY_CLIENTS: usize = 8;
 
 /// Arguments of `soak`.
 #[derive(Debug, clap::Args)]
@@ -46,6 +49,13 @@ pub struct SoakArguments {
     /// Subscribers that are killed with SIGKILL every 5 s and started again; what they miss is reported and has no limit
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "The test")]
     flaky: usize,
+    /// Conduct the show: ten random commands a second from this seed, each answer and every frame checked
+    #[arg(long, value_name = "SEED", value_parser = seed, help_heading = "The test", allow_negative_numbers = true)]
+    conduct: Option<u64>,
+    /// With --conduct: further clients of the control service, killed with SIGKILL amid a request every 5 s and
+    /// started again
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "conduct", help_heading = "The test")]
+    flaky_clients: usize,
     /// Publish ROS 2 topics too
     #[arg(long, help_heading = "The test")]
     ros2: bool,
@@ -111,6 +121,8 @@ pub fn soak(common: &Common, arguments: &SoakArguments) -> Result<(), CommandErr
         seconds,
         publisher: fleet.summary().cloned(),
         subscribers: SubscriberReport::all(&fleet),
+        conducted: fleet.conducting().and_then(|conducting| conducting.conducted().cloned()),
+        clients_killed: fleet.conducting().map_or(0, |conducting| conducting.clients_killed()),
         history,
     };
     drop(fleet);
@@ -151,12 +163,24 @@ impl SoakArguments {
         if let Some(rate) = self.rate {
             Accepted::RATE.check("--rate", rate).map_err(CommandError::BadInput)?;
         }
-        let all = self.subscribers.saturating_add(self.slow).saturating_add(self.flaky);
+        if self.flaky_clients > MOST_FLAKY_CLIENTS {
+            return Err(CommandError::BadInput(format!(
+                "--flaky-clients is {}, expected at most {MOST_FLAKY_CLIENTS}",
+                self.flaky_clients
+            )));
+        }
+        // Who conducts reads the frames too.
+        let conductor = usize::from(self.conduct.is_some());
+        let all = self.subscribers.saturating_add(self.slow).saturating_add(self.flaky).saturating_add(conductor);
         if self.subscribers == 0 || all > admitted {
             return Err(CommandError::BadInput(format!(
                 "--subscribers, --slow and --flaky are {}, {} and {}, expected at least 1 and together at most \
-                 {admitted} subscribers, which is as many as the publisher admits (publish.subscribers in the scene)",
-                self.subscribers, self.slow, self.flaky
+                 {} subscribers, which is as many as the publisher admits (publish.subscribers in the scene){}",
+                self.subscribers,
+                self.slow,
+                self.flaky,
+                admitted.saturating_sub(conductor),
+                if conductor > 0 { ", less one for --conduct" } else { "" }
             )));
         }
         Ok(())
@@ -169,6 +193,7 @@ impl SoakArguments {
         }
         let mut publisher: Vec<OsString> =
             ["--loop", "--end-hold", "0", "--end-with-parent"].map(OsString::from).to_vec();
+        publisher.extend(self.conduct.map(|_| "--paused".into()));
         publisher.extend(self.ros2.then(|| "--ros2".into()));
         publisher.extend(self.rate.into_iter().flat_map(|rate| ["--rate".into(), rate.to_string().into()]));
         publisher.extend(self.scheduling.arguments());
@@ -176,7 +201,8 @@ impl SoakArguments {
         let roles = role(Role::Steady, self.subscribers)
             .chain(role(Role::Slow, self.slow))
             .chain(role(Role::Flaky, self.flaky));
-        Ok(Plan { program: std::env::current_exe()?, common: shared, publisher, roles: roles.collect() })
+        let conduct = self.conduct.map(|seed| ConductPlan { seed, rate: self.rate, flaky_clients: self.flaky_clients });
+        Ok(Plan { program: std::env::current_exe()?, common: shared, publisher, roles: roles.collect(), conduct })
     }
 
     fn limits(&self) -> Limits {
@@ -259,6 +285,11 @@ pub fn end_with_parent() -> Result<(), CommandError> {
         return Err(CommandError::Failed("the program that started this one has ended".to_owned()));
     }
     Ok(())
+}
+
+/// The seed of random commands.
+fn seed(text: &str) -> Result<u64, String> {
+    text.trim().parse().map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
 }
 
 /// A share as a person writes it: `0.01%`, `0.0001`.

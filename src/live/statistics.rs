@@ -28,7 +28,11 @@ const POLL_INTERVAL_NS: u64 = 20_000_000;
 
 /// The queues between the loop and this thread.
 pub fn queues() -> (super::Reports, Inbox) {
-    let (samples, sample_inbox) = rtrb::RingBuffer::new(QUEUED_SAMPLES);
+    let (mut samples, mut sample_inbox) = rtrb::RingBuffer::new(QUEUED_SAMPLES);
+    // Each page of this memory is written here once: otherwise the loop's thread would be the first to touch it, and for
+    // minutes a soak test would take that for growth.
+    while samples.push(Sample::NOTHING).is_ok() {}
+    while sample_inbox.pop().is_ok() {}
     let (announcements, announcement_inbox) = rtrb::RingBuffer::new(QUEUED_ANNOUNCEMENTS);
     let reports = super::Reports { samples, announcements };
     (reports, Inbox { samples: sample_inbox, announcements: announcement_inbox })

@@ -1,5 +1,7 @@
 //! The loop on a simulated clock: whatever is late, the counts, the deadlines and the order hold.
 
+mod doors;
+
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;

@@ -3,13 +3,16 @@
 #![allow(dead_code, reason = "not every test file uses all of it")]
 
 use std::io::{BufRead, BufReader, Read, Write};
-use std::os::unix::fs::MetadataExt;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+
+/// The user who has nothing.
+const NOBODY: u32 = 65534;
 
 /// A process that does not outlive its test.
 pub struct Process(Child);
@@ -142,6 +145,19 @@ impl Place {
         let mut command = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
         command.current_dir(self.folder());
         command
+    }
+
+    /// What the program prints here as the user who has nothing, from a copy that this user may read.
+    pub fn as_nobody(&self, arguments: &[&str]) -> Output {
+        let copy = self.folder().join("bench-dragon");
+        if !copy.exists() {
+            std::fs::copy(env!("CARGO_BIN_EXE_bench-dragon"), &copy).unwrap();
+            std::fs::set_permissions(self.folder(), std::fs::Permissions::from_mode(0o755)).unwrap();
+        }
+        let mut command = Command::new("setpriv");
+        command.args([&format!("--reuid={NOBODY}"), &format!("--regid={NOBODY}"), "--clear-groups"]);
+        command.arg(copy).args(arguments).current_dir(self.folder());
+        Process::start(&mut command).output_within(20)
     }
 
     /// Files that exist here.

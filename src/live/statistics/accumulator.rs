@@ -5,7 +5,7 @@
 use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
 
-use crate::live::Counts;
+use crate::live::{Counts, End};
 use crate::wire::{LoopStatus, SceneName};
 
 /// The longest lateness and step cost that a histogram distinguishes: an hour.
@@ -35,6 +35,21 @@ pub struct Sample {
     pub step_ns: u64,
     /// Subscribers connected.
     pub subscribers: u32,
+}
+
+impl Sample {
+    /// Before the first frame.
+    pub(super) const NOTHING: Self = Self {
+        tick: 0,
+        sim_time: 0.0,
+        shows_played: 0,
+        unforeseen_contacts: 0,
+        unsolved_frames: 0,
+        counts: Counts { frames: 0, overruns: 0, skipped: 0, end: End::Signal },
+        lateness_ns: 0,
+        step_ns: 0,
+        subscribers: 0,
+    };
 }
 
 /// Percentiles of a duration, nanoseconds.

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
 
+use super::conducting::Conducting;
 use super::member::{Member, ProcessState, Role};
 use super::observation::Status;
 use super::processes::{Plan, ProcessEvent, signal};
@@ -37,6 +38,9 @@ pub enum FleetError {
     /// A subscriber ended before it received a frame.
     #[error("the subscriber {0} ended at once: its error stands above")]
     SubscriberEnded(String),
+    /// Whoever conducts did not begin.
+    #[error("the conductor did not begin within {} s", START_TIMEOUT.as_secs())]
+    NoConductor,
     /// Frames did not come.
     #[error("not every subscriber received a frame within {} s", START_TIMEOUT.as_secs())]
     NoFrames,
@@ -50,6 +54,7 @@ pub struct Fleet {
     publisher_ended: Option<ExitStatus>,
     summary: Option<RunSummary>,
     members: Vec<Member>,
+    conducting: Option<Conducting>,
     events: Receiver<ProcessEvent>,
     sender: Sender<ProcessEvent>,
     /// Lines of the publisher's standard error that nobody has taken yet.
@@ -72,6 +77,7 @@ impl Fleet {
             publisher_ended: None,
             summary: None,
             members: Vec::new(),
+            conducting: None,
             events,
             sender,
             stderr: Vec::new(),
@@ -85,6 +91,10 @@ impl Fleet {
             fleet.members.push(member);
         }
         fleet.wait_for_frames(proceed)?;
+        if let Some(conduct) = &fleet.plan.conduct {
+            fleet.conducting = Some(Conducting::start(&fleet.plan, conduct, &fleet.sender)?);
+            fleet.wait_for_conductor(proceed)?;
+        }
         fleet.began = Instant::now();
         Ok(fleet)
     }
@@ -104,6 +114,18 @@ impl Fleet {
             }
             if Instant::now() > deadline {
                 return Err(FleetError::NoFrames);
+            }
+        }
+        Ok(())
+    }
+
+    /// It searches the scene for events before it reports for the first time.
+    fn wait_for_conductor(&mut self, proceed: &dyn Fn() -> bool) -> Result<(), FleetError> {
+        let deadline = Instant::now() + START_TIMEOUT;
+        while proceed() && self.conducting.as_ref().is_some_and(|conducting| conducting.conducted().is_none()) {
+            self.poll(Duration::from_millis(50))?;
+            if self.publisher_ended.is_some() || Instant::now() > deadline {
+                return Err(FleetError::NoConductor);
             }
         }
         Ok(())
@@ -132,6 +154,9 @@ impl Fleet {
                 member.replace(self.plan.spawn_subscriber(index, member.role, next, &self.sender)?);
             }
         }
+        if let Some(conducting) = &mut self.conducting {
+            conducting.poll(&self.plan)?;
+        }
         Ok(())
     }
 
@@ -151,6 +176,10 @@ impl Fleet {
                 self.members[member].observed(incarnation, *observation);
             }
             ProcessEvent::Ended { member, incarnation } => self.members[member].ended(incarnation),
+            ProcessEvent::Conducted(conducted) => {
+                self.conducting.iter_mut().for_each(|conducting| conducting.counted((*conducted).clone()));
+            }
+            ProcessEvent::ConductorEnded => self.conducting.iter_mut().for_each(Conducting::ended),
             ProcessEvent::Summary(summary) => self.summary = Some(*summary),
             ProcessEvent::Stderr(line) => self.stderr.push(line),
         }
@@ -159,6 +188,11 @@ impl Fleet {
     /// Whether the publisher has ended.
     pub fn publisher_has_ended(&self) -> bool {
         self.publisher_ended.is_some()
+    }
+
+    /// Who conducts, if anybody does.
+    pub fn conducting(&self) -> Option<&Conducting> {
+        self.conducting.as_ref()
     }
 
     /// The subscribers.
@@ -209,11 +243,16 @@ impl Fleet {
         self.summary.as_ref()
     }
 
-    /// Ends the publisher, lets subscribers receive what is left, and ends them.
+    /// Ends whoever conducts, then the publisher, lets subscribers receive what is left, and ends them.
     ///
     /// # Errors
     /// [`FleetError::Start`] where the state of a process is not known.
     pub fn finish(&mut self) -> Result<(), FleetError> {
+        self.conducting.iter_mut().for_each(Conducting::end);
+        let deadline = Instant::now() + END_TIMEOUT;
+        while self.conducting.as_mut().is_some_and(Conducting::is_ending) && Instant::now() < deadline {
+            self.receive(Duration::from_millis(20));
+        }
         signal(&self.publisher, Signal::SIGINT);
         let deadline = Instant::now() + END_TIMEOUT;
         while self.publisher_ended.is_none() && Instant::now() < deadline {
@@ -236,7 +275,9 @@ impl Fleet {
 
 impl Drop for Fleet {
     fn drop(&mut self) {
-        for child in self.members.iter_mut().map(|member| &mut member.child).chain([&mut self.publisher]) {
+        let conducting = self.conducting.iter_mut().flat_map(Conducting::children);
+        let members = self.members.iter_mut().map(|member| &mut member.child);
+        for child in members.chain(conducting).chain([&mut self.publisher]) {
             // It may have ended already, which is what is wanted.
             let _ = child.kill();
             let _ = child.wait();

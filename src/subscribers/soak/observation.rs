@@ -25,6 +25,14 @@ pub struct Observation {
     pub wrong_links: u64,
     /// The largest difference of a link from its length, metres.
     pub worst_link_error: f64,
+    /// Frames that do not follow from the one before by the rules of playing, pausing and jumping.
+    pub disobedient: u64,
+    /// What was wrong with the first of those.
+    pub disobedience: Option<String>,
+    /// Frames whose time was compared with that of the frames before.
+    pub times_checked: u64,
+    /// `epoch` of the latest frame.
+    pub epoch: u32,
     /// The largest distance of a deadline from first deadline + tick / rate, nanoseconds.
     pub phase_error_ns: f64,
     /// Runs of a publisher that frames came from.
@@ -55,6 +63,10 @@ impl Observation {
             links_checked: self.links_checked + later.links_checked,
             wrong_links: self.wrong_links + later.wrong_links,
             worst_link_error: self.worst_link_error.max(later.worst_link_error),
+            disobedient: self.disobedient + later.disobedient,
+            disobedience: self.disobedience.clone().or_else(|| later.disobedience.clone()),
+            times_checked: self.times_checked + later.times_checked,
+            epoch: self.epoch.max(later.epoch),
             phase_error_ns: self.phase_error_ns.max(later.phase_error_ns),
             runs: self.runs.max(later.runs),
             alerts: self.alerts + later.alerts,

@@ -5,6 +5,7 @@
 
 use hdrhistogram::Histogram;
 
+use super::obedience::Obedience;
 use super::observation::{Latencies, Observation};
 use crate::live::statistics::Percentiles;
 use crate::subscribers::feed::FeedEvent;
@@ -49,6 +50,7 @@ pub struct Observer {
     /// The first frame of the present run.
     first: FrameHeader,
     previous: Option<FrameHeader>,
+    obedience: Obedience,
     second: Histograms,
     total: Histograms,
 }
@@ -69,6 +71,7 @@ impl Observer {
             link_tolerance,
             first: FrameHeader::default(),
             previous: None,
+            obedience: Obedience::default(),
             second: Histograms::new(),
             total: Histograms::new(),
         }
@@ -82,6 +85,7 @@ impl Observer {
             FeedEvent::Frame { header, handles, missed } => {
                 self.seen.missed += missed;
                 self.frame(header, handles, received_ns);
+                self.check_obedience(header, handles);
             }
             FeedEvent::Alert(_) => self.seen.alerts += 1,
             FeedEvent::Status(status) => self.status(status),
@@ -152,6 +156,17 @@ impl Observer {
         let elapsed = header.deadline_ns.saturating_sub(self.first.deadline_ns);
         let error = (elapsed as f64 - periods as f64 * 1e9 / status.rate).abs();
         self.seen.phase_error_ns = self.seen.phase_error_ns.max(error);
+    }
+
+    fn check_obedience(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
+        self.seen.epoch = header.epoch;
+        // Without the rate no time can be checked.
+        let Some(status) = self.seen.status else { return };
+        self.seen.times_checked += 1;
+        if let Err(fault) = self.obedience.check(header, handles, status.rate) {
+            self.seen.disobedient += 1;
+            self.seen.disobedience.get_or_insert(fault);
+        }
     }
 
     fn check_links(&mut self, handles: &[HandlePose]) {

@@ -11,6 +11,7 @@ use std::sync::mpsc::Sender;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
+use super::conduct::Conducted;
 use super::member::Role;
 use super::observation::Observation;
 use crate::live::statistics::RunSummary;
@@ -26,6 +27,19 @@ pub struct Plan {
     pub publisher: Vec<OsString>,
     /// The subscribers.
     pub roles: Vec<Role>,
+    /// Who conducts the show, if anybody does.
+    pub conduct: Option<ConductPlan>,
+}
+
+/// Who conducts the show.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ConductPlan {
+    /// The seed of the commands.
+    pub seed: u64,
+    /// Frames per second, where they are not the scene's.
+    pub rate: Option<f64>,
+    /// Further clients of the control service, each killed amid a request and started again.
+    pub flaky_clients: usize,
 }
 
 /// What a process has printed, or that it has ended.
@@ -34,6 +48,10 @@ pub(super) enum ProcessEvent {
     Observed { member: usize, incarnation: u64, observation: Box<Observation> },
     /// A subscriber has closed its standard output.
     Ended { member: usize, incarnation: u64 },
+    /// The conductor has printed what it has counted.
+    Conducted(Box<Conducted>),
+    /// The conductor has closed its standard output.
+    ConductorEnded,
     /// The publisher has printed its summary.
     Summary(Box<RunSummary>),
     /// The publisher has printed a line on standard error.
@@ -91,6 +109,37 @@ impl Plan {
             let _ = sender.send(ProcessEvent::Ended { member, incarnation });
         });
         Ok(child)
+    }
+}
+
+impl Plan {
+    /// Starts the process that sends commands.
+    pub(super) fn spawn_conductor(
+        &self,
+        conduct: &ConductPlan,
+        sender: &Sender<ProcessEvent>,
+    ) -> std::io::Result<Child> {
+        let mut command = self.command();
+        command.args(["soak-conductor", "--seed", &conduct.seed.to_string()]);
+        if let Some(rate) = conduct.rate {
+            command.args(["--rate", &rate.to_string()]);
+        }
+        let mut child = command.spawn()?;
+        let stdout = child.stdout.take();
+        let sender = sender.clone();
+        std::thread::spawn(move || {
+            // Nobody receives any more where the test has ended.
+            for conducted in lines(stdout).filter_map(|line| serde_json::from_str(&line).ok()) {
+                let _ = sender.send(ProcessEvent::Conducted(Box::new(conducted)));
+            }
+            let _ = sender.send(ProcessEvent::ConductorEnded);
+        });
+        Ok(child)
+    }
+
+    /// Starts a client of the control service that always awaits an answer.
+    pub(super) fn spawn_client(&self) -> std::io::Result<Child> {
+        self.command().arg("soak-client").stdout(Stdio::null()).spawn()
     }
 }
 

@@ -1,9 +1,11 @@
 //! The report of a soak test: JSON for machines, one page of HTML with its plots inside for people.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use serde::Serialize;
 
+use super::conduct::Conducted;
 use super::figures::column_of;
 use super::fleet::Fleet;
 use super::history::History;
@@ -35,6 +37,10 @@ pub struct Report {
     pub publisher: Option<RunSummary>,
     /// What each subscriber saw.
     pub subscribers: Vec<SubscriberReport>,
+    /// What was commanded and answered; null where nobody conducted.
+    pub conducted: Option<Conducted>,
+    /// Further clients of the control service that were killed amid a request.
+    pub clients_killed: u64,
     /// Figures over time; of several seconds in a row the greatest.
     pub history: History,
 }
@@ -114,8 +120,20 @@ impl Report {
             };
             format!("  {}: {} received{incarnations}, {} missed{latency}", subscriber.label, seen.received, seen.missed)
         }));
-        lines.extend(self.deliveries().map(|sentence| format!("  {sentence}")));
+        lines.extend(self.deliveries().chain(self.conducting()).map(|sentence| format!("  {sentence}")));
         lines
+    }
+
+    /// Sentences about what was commanded, and the first disobedience of each subscriber.
+    fn conducting(&self) -> impl Iterator<Item = String> {
+        let conducted = self.conducted.iter().flat_map(Conducted::lines);
+        let killed = (self.clients_killed > 0)
+            .then(|| format!("{} clients of the control service were killed amid a request", self.clients_killed));
+        let disobedience =
+            self.subscribers.iter().filter(|_| self.conducted.is_some()).filter_map(|subscriber| {
+                Some(format!("{}: {}", subscriber.label, subscriber.seen.disobedience.as_ref()?))
+            });
+        conducted.chain(killed).chain(disobedience)
     }
 
     /// A sentence for each transport of the publisher that counts what it delivers.
@@ -136,7 +154,7 @@ impl Report {
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Soak test: {verdict}</title>\n\
              <style>{STYLE}</style></head><body>\n<h1>Soak test: <span class=\"{verdict}\">{verdict}</span></h1>\n\
              <p><code>{command}</code></p>\n<p>{seconds:.1} s on {processor}, {cores} logical processors, Linux {kernel}; \
-             bench-dragon {version}.</p>\n{limits}{subscribers}{deliveries}{plots}<p>Each point stands for {per_row} s and is the \
+             bench-dragon {version}.</p>\n{limits}{subscribers}{deliveries}{conducting}{plots}<p>Each point stands for {per_row} s and is the \
              greatest value of its seconds. All latencies are CLOCK_MONOTONIC; those since the deadline include the \
              periods that were skipped.</p>\n</body></html>\n",
             verdict = self.verdict,
@@ -149,6 +167,7 @@ impl Report {
             limits = self.table_of_limits(),
             subscribers = self.table_of_subscribers(),
             deliveries = self.deliveries().map(|sentence| format!("<p>{sentence}.</p>\n")).collect::<String>(),
+            conducting = self.section_on_conducting(),
             plots = self.plots(),
             per_row = self.history.seconds_per_row(),
         );
@@ -186,6 +205,23 @@ impl Report {
             "<table><tr><th>subscriber<th>incarnations<th>received<th>missed<th>out of order<th>worst link, m<th>latency p50, \
              us<th>p99<th>max<th>since deadline p99\n{}</table>\n",
             rows.collect::<String>()
+        )
+    }
+
+    /// What was commanded, a row for each command; nothing where nobody conducted.
+    fn section_on_conducting(&self) -> String {
+        let Some(conducted) = &self.conducted else { return String::new() };
+        let codes: BTreeSet<_> = conducted.answers.values().flat_map(|codes| codes.keys()).collect();
+        let header: String = codes.iter().map(|code| format!("<th>{code}")).collect();
+        let rows = conducted.answers.iter().map(|(name, answers)| {
+            let of_each = codes.iter().map(|code| format!("<td>{}", answers.get(*code).copied().unwrap_or(0)));
+            format!("<tr><td>{name}<td>{}{}\n", answers.values().sum::<u64>(), of_each.collect::<String>())
+        });
+        let sentences = self.conducting().map(|sentence| format!("<p>{}.</p>\n", escaped(&sentence)));
+        format!(
+            "<table><tr><th>command<th>sent{header}\n{}</table>\n{}",
+            rows.collect::<String>(),
+            sentences.collect::<String>()
         )
     }
 

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::conduct::Conducted;
+use super::conducting::Conducting;
 use super::fleet::Fleet;
 use super::member::{Member, Role};
 use super::observation::Observation;
@@ -123,6 +125,20 @@ impl Verdict {
             count("counts that publisher and subscribers disagree on", 0.0, disagreements(fleet, &steady)),
             count("processes that ended by themselves or hung", 0.0, lost(fleet)),
         ]);
+        if let Some(conducting) = fleet.conducting() {
+            let of_conductor = |value: fn(&Conducted) -> u64| {
+                // Who sent nothing has tested nothing.
+                let conducted = conducting.conducted().filter(|conducted| conducted.sent > 0);
+                conducted.map_or(f64::NAN, |conducted| value(conducted) as f64)
+            };
+            checks.extend([
+                count("frames that disobey the commands", 0.0, of_all(|seen| seen.disobedient)),
+                count("jumps of simulated time too many or too few", 0.0, wrong_jumps(&steady, conducting)),
+                count("answers that the command table does not allow", 0.0, of_conductor(|conducted| conducted.wrong)),
+                count("answers that their frames contradict", 0.0, of_conductor(|conducted| conducted.contradicted)),
+                count("commands that were not answered", 0.0, of_conductor(|conducted| conducted.lost)),
+            ]);
+        }
         Self { checks }
     }
 
@@ -153,14 +169,31 @@ fn disagreements(fleet: &Fleet, steady: &[&Member]) -> f64 {
     let Some(summary) = fleet.summary() else { return f64::NAN };
     let disagrees = |member: &&&Member| {
         let seen = member.seen();
-        let whole = seen.last_sequence + 1 < summary.frames || seen.last_tick + 1 == summary.frames + summary.skipped;
+        // Periods that passed between the last frame and the stop are in the summary, and in no frame.
+        let last_status = seen.status.filter(|status| status.frames == seen.last_sequence + 1);
+        let skipped = last_status.map_or(summary.skipped, |status| status.skipped);
+        let whole = seen.last_sequence + 1 < summary.frames
+            || skipped <= summary.skipped && seen.last_tick + 1 == summary.frames + skipped;
         let second = seen.status.map_or(0.0, |status| status.rate);
         !whole || seen.runs != 1 || (seen.received - seen.links_checked) as f64 > second
     };
     steady.iter().filter(disagrees).count() as f64
 }
 
+/// By how many the jumps that steady subscribers counted differ from those that were commanded and those by which the
+/// show began again; not known where the last status did not come.
+fn wrong_jumps(steady: &[&Member], conducting: &Conducting) -> f64 {
+    let Some(conducted) = conducting.conducted() else { return f64::NAN };
+    let of = |member: &&Member| {
+        let seen = member.seen();
+        let status = seen.status.filter(|status| status.frames == seen.last_sequence + 1);
+        status.map_or(f64::NAN, |status| u64::from(seen.epoch).abs_diff(status.shows_played + conducted.jumps) as f64)
+    };
+    steady.iter().map(of).sum()
+}
+
 fn lost(fleet: &Fleet) -> f64 {
+    let conducting = fleet.conducting().map_or(0, Conducting::failed);
     let subscribers = fleet.members().iter().filter(|member| member.failed()).count();
-    (subscribers + usize::from(fleet.summary().is_none())) as f64
+    (conducting + (subscribers + usize::from(fleet.summary().is_none())) as u64) as f64
 }

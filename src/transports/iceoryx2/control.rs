@@ -18,6 +18,7 @@ use super::error::{OpenError, failed};
 use super::{SPARE_NODES, node, retry_while_incomplete, service_name};
 use crate::live::control::{Answer, Door, MOST_WAITING};
 use crate::show::control::{Code, Command};
+use crate::show::state::PlaybackState;
 use crate::wire::convert::control_response;
 use crate::wire::{ControlRequest, ControlResponse};
 
@@ -124,7 +125,12 @@ fn serve(server: &Server<ipc::Service, ControlRequest, (), ControlResponse, ()>,
         while let Some(Answer { ticket, outcome }) = door.answer() {
             let Some(index) = pending.iter().position(|waiting| waiting.ticket == ticket) else { continue };
             let Pending { request, instead, .. } = pending.swap_remove(index);
-            let outcome = crate::show::Outcome { code: instead.unwrap_or(outcome.code), ..outcome };
+            let code = match instead {
+                // While held every command but three is refused, whatever its value.
+                Some(Code::OutOfRange) if outcome.playback == PlaybackState::Held => Code::Refused,
+                instead => instead.unwrap_or(outcome.code),
+            };
+            let outcome = crate::show::Outcome { code, ..outcome };
             // A client that has gone needs no answer.
             let _ = request.send_copy(control_response(request.payload().id, &outcome));
         }

@@ -169,6 +169,17 @@ fn commands() -> impl Strategy<Value = Command> {
     ]
 }
 
+/// A command of any size; a seek by the share of the show.
+fn any_command() -> impl Strategy<Value = Command> {
+    let magnitude = || (-8.0f64..8.0).prop_map(|exponent| 10f64.powf(exponent));
+    prop_oneof![
+        3 => commands(),
+        1 => magnitude().prop_map(Command::Rate),
+        1 => prop_oneof![-0.1f64..1.1, Just(1.0), Just(f64::NAN), Just(f64::INFINITY)].prop_map(Command::Seek),
+        1 => any::<u64>().prop_map(|periods| Command::Step(periods.max(1))),
+    ]
+}
+
 /// Start and end of a show in seconds, ticks at the end before it begins again, and whether it waits at the start.
 fn shows() -> impl Strategy<Value = (i64, i64, Option<i64>, bool)> {
     (0i64..4, 5i64..32, prop::option::of(0i64..40), any::<bool>())
@@ -245,6 +256,39 @@ proptest! {
             prop_assert_eq!(seldom.advance(tick), every.advance(tick));
             prop_assert_eq!(every.take_step_outcome(), counted.finished.take());
             seldom.take_step_outcome();
+        }
+    }
+
+    /// Whatever is commanded, of whatever size: time stays within the show, jumps are counted and nothing else is, and the
+    /// same list gives the same bits.
+    #[test]
+    fn time_stays_within_the_show_and_two_plays_are_alike(
+        (time_scale, rate, start, freeze) in super::shows(),
+        looping in any::<bool>(),
+        list in prop::collection::vec((1u64..100_000, any_command()), 1..60),
+    ) {
+        let at_end = if looping { AtEnd::Loop } else { AtEnd::Hold };
+        let [mut clock, mut again] = [(); 2].map(|()| super::clock(start, time_scale, rate, freeze, at_end));
+        let (mut tick, mut jumps, mut before) = (0, 0u64, clock.advance(0));
+        for (gap, command) in list {
+            tick += gap;
+            // A seek goes to a share of the show.
+            let command = if let Command::Seek(share) = command { Command::Seek(share * freeze) } else { command };
+            let code = clock.apply(tick, command);
+            prop_assert_eq!(again.apply(tick, command), code);
+            let is_jump = matches!(command, Command::Seek(_) | Command::Restart) && code == Some(Code::Done);
+            jumps += u64::from(is_jump);
+            let (time, other) = (clock.advance(tick), again.advance(tick));
+            prop_assert_eq!(time.sim_time.to_bits(), other.sim_time.to_bits());
+            prop_assert_eq!(time, other);
+            prop_assert!((0.0..=freeze).contains(&time.sim_time), "{} of {freeze}", time.sim_time);
+            prop_assert_eq!(u64::from(time.epoch), (jumps + time.shows_played) & 0xffff_ffff);
+            if time.epoch == before.epoch {
+                prop_assert!(time.sim_time >= before.sim_time);
+            }
+            let stands = matches!(time.playback, PlaybackState::Paused | PlaybackState::Held);
+            prop_assert_eq!(time.time_scale == 0.0, stands);
+            before = time;
         }
     }
 

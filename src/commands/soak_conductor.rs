@@ -1,0 +1,51 @@
+//! `soak-conductor` and `soak-client`: what `soak --conduct` starts to conduct its publisher.
+
+use std::io::Write;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use bench_dragon::show::control::Command;
+use bench_dragon::subscribers::soak::conduct::conductor;
+use bench_dragon::subscribers::soak::conduct::model::ShowFacts;
+
+use super::soak::end_with_parent;
+use super::{CommandError, Common, stop_on_signals};
+
+/// How long the publisher may take to answer.
+const TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Arguments of `soak-conductor`.
+#[derive(Debug, clap::Args)]
+pub struct SoakConductorArguments {
+    /// The seed of its commands
+    #[arg(long)]
+    seed: u64,
+    /// Frames per second of the publisher, where they are not the scene's
+    #[arg(long)]
+    rate: Option<f64>,
+}
+
+/// Conducts until a signal comes, what it has counted once a second on standard output.
+pub fn conduct(common: &Common, arguments: &SoakConductorArguments) -> Result<(), CommandError> {
+    end_with_parent()?;
+    let stop = stop_on_signals()?;
+    let scene = common.load_scene()?;
+    let facts = ShowFacts::of(&scene, arguments.rate.unwrap_or(scene.rate));
+    let mut output = std::io::stdout().lock();
+    conductor::conduct(&common.name, &facts, arguments.seed, &stop, &mut |conducted| -> Result<(), CommandError> {
+        serde_json::to_writer(&mut output, &conducted).map_err(std::io::Error::from)?;
+        writeln!(output)?;
+        Ok(output.flush()?)
+    })
+}
+
+/// Requests the state of the show again and again, so that it always awaits an answer, until it is killed.
+pub fn client(common: &Common) -> Result<(), CommandError> {
+    end_with_parent()?;
+    let stop = stop_on_signals()?;
+    let Some(mut controller) = conductor::connect(&common.name, &stop) else { return Ok(()) };
+    while !stop.load(Ordering::Relaxed) {
+        controller.send(Command::State, TIMEOUT)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,109 @@
+//! The processes that conduct a soak test: the conductor, and clients that are killed. Kept by the
+//! [`fleet`](super::fleet).
+
+use std::process::Child;
+use std::sync::mpsc::Sender;
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::Signal;
+
+use super::conduct::Conducted;
+use super::member::ProcessState;
+use super::processes::{ConductPlan, Plan, ProcessEvent, signal};
+
+/// How long a client runs before it is killed.
+const CLIENT_LIFETIME: Duration = Duration::from_secs(5);
+
+/// Who conducts, and what came of it.
+pub struct Conducting {
+    conductor: Child,
+    state: ProcessState,
+    conducted: Option<Conducted>,
+    clients: Vec<(Child, Instant)>,
+    clients_killed: u64,
+    clients_lost: u64,
+}
+
+impl Conducting {
+    /// Starts the conductor, and the clients.
+    pub(super) fn start(plan: &Plan, conduct: &ConductPlan, sender: &Sender<ProcessEvent>) -> std::io::Result<Self> {
+        let mut conducting = Self {
+            conductor: plan.spawn_conductor(conduct, sender)?,
+            state: ProcessState::Running,
+            conducted: None,
+            clients: Vec::new(),
+            clients_killed: 0,
+            clients_lost: 0,
+        };
+        for _ in 0..conduct.flaky_clients {
+            conducting.clients.push((plan.spawn_client()?, Instant::now()));
+        }
+        Ok(conducting)
+    }
+
+    /// Kills and replaces the clients whose time is over.
+    pub(super) fn poll(&mut self, plan: &Plan) -> std::io::Result<()> {
+        for (client, spawned) in &mut self.clients {
+            if spawned.elapsed() < CLIENT_LIFETIME {
+                continue;
+            }
+            self.clients_lost += u64::from(client.try_wait()?.is_some());
+            client.kill()?;
+            client.wait()?;
+            self.clients_killed += 1;
+            (*client, *spawned) = (plan.spawn_client()?, Instant::now());
+        }
+        Ok(())
+    }
+
+    /// Takes in what the conductor has counted.
+    pub(super) fn counted(&mut self, conducted: Conducted) {
+        self.conducted = Some(conducted);
+    }
+
+    /// Takes in that the conductor has ended.
+    pub(super) fn ended(&mut self) {
+        self.state = match self.state {
+            ProcessState::Ending => ProcessState::Ended,
+            _ => ProcessState::EndedByItself,
+        };
+    }
+
+    /// Has all of them end.
+    pub(super) fn end(&mut self) {
+        if self.state == ProcessState::Running {
+            self.state = ProcessState::Ending;
+            signal(&self.conductor, Signal::SIGTERM);
+        }
+        for (client, _) in &mut self.clients {
+            self.clients_lost += u64::from(matches!(client.try_wait(), Ok(Some(_))));
+            signal(client, Signal::SIGTERM);
+        }
+    }
+
+    /// Whether any of them has been told to end and has not ended.
+    pub(super) fn is_ending(&mut self) -> bool {
+        self.clients.retain_mut(|(client, _)| matches!(client.try_wait(), Ok(None)));
+        self.state == ProcessState::Ending || !self.clients.is_empty()
+    }
+
+    /// All processes that may still run.
+    pub(super) fn children(&mut self) -> impl Iterator<Item = &mut Child> {
+        self.clients.iter_mut().map(|(client, _)| client).chain([&mut self.conductor])
+    }
+
+    /// What the conductor has counted; `None` if it never reported.
+    pub fn conducted(&self) -> Option<&Conducted> {
+        self.conducted.as_ref()
+    }
+
+    /// Clients that were killed amid a request.
+    pub fn clients_killed(&self) -> u64 {
+        self.clients_killed
+    }
+
+    /// Processes that ended by themselves, or did not end. To be called once the fleet has finished.
+    pub fn failed(&self) -> u64 {
+        self.clients_lost + self.clients.len() as u64 + u64::from(self.state != ProcessState::Ended)
+    }
+}
