@@ -32,6 +32,7 @@ use anstyle::AnsiColor;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::{Scene, SceneError};
 use bench_dragon::show::state::Severity;
+use bench_dragon::wire::sentence::rounded;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -142,6 +143,16 @@ pub fn number(value: f64) -> String {
     let plain = format!("{value}");
     // Beyond this Rust writes out every zero.
     if plain.len() > 24 { format!("{value:e}") } else { plain }
+}
+
+/// A number in a sentence for people: to a billionth, zero where it is rounding, with an exponent where it is very large or
+/// very small.
+pub fn figure(value: f64) -> String {
+    match value.abs() {
+        size if size < 1e-12 => "0".to_owned(),
+        size if (1e-6..1e9).contains(&size) => rounded(value, 9),
+        _ => format!("{value:.3e}"),
+    }
 }
 
 /// A progress bar on standard error, hidden where that is no terminal.
