@@ -179,7 +179,7 @@ pub fn warn_of_gap(timeline: &Timeline) {
     if let Some(until) = timeline.searched_until() {
         log::warn!(
             "the search for events gave up: searched up to t = {} s, later events may be missing",
-            number(until)
+            figure(until)
         );
     }
 }

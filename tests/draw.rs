@@ -323,6 +323,14 @@ fn people_read_what_it_is_and_no_number_of_sixteen_digits() {
     let bell = folder.path().join("bell.toml");
     std::fs::write(&bell, odd.replacen("'a < b & \"c\" > d'", "\"ding\\u0007dong\"", 1)).unwrap();
     let [file, bell] = [&file, &bell].map(|file| file.to_str().unwrap().to_owned());
+    // Every scene has a picture.
+    let times = [("procession", "1"), ("tight", "stall"), ("wide", "lock"), ("ros2", "1"), ("long", "1")];
+    for (name, time) in times {
+        let svg = answer(&["--scene", &scene_file(name), "draw", "--at", time]);
+        let svg = Document::parse(&svg).unwrap();
+        assert!(texts(&svg)[..].iter().any(|words| words.starts_with(name)), "{:?}", texts(&svg));
+        assert!(drawn(&svg).len() >= 20 && with_id(&svg, "path").unwrap().attribute("d").unwrap().len() > 20, "{name}");
+    }
     for (scene, time, name) in [
         (scene_file("paper"), "contact", "paper at 412.474 s"),
         (scene_file("turnaround"), "path_end", "turnaround at 482.781 s"),

@@ -58,7 +58,7 @@ pub fn solve(common: &Common, arguments: &SolveArguments) -> Result<(), CommandE
     let bar = progress_bar(count, common);
     for time in times {
         if solve_at_or_just_before(solver.as_mut(), time, &mut chain).is_err() {
-            return Err(CommandError::Failed(format!("there is no solution at {} s", number(time))));
+            return Err(CommandError::Failed(format!("there is no solution at {} s", figure(time))));
         }
         if common.json {
             output.json(&TimeLine { t: time, handles: (0..chain.handles()).map(|i| numbers(&chain, i)).collect() })?;
@@ -121,7 +121,7 @@ impl SolveArguments {
         } else {
             eprintln!(
                 "The motion ends at {} s ({}): the table ends at its last row before that.",
-                number(end.time),
+                figure(end.time),
                 end.event.kind.name()
             );
             // The first row past the end: found by halving, since the rows may be a billion.
@@ -162,8 +162,8 @@ pub fn time_of(option: &str, text: &str, timeline: &Timeline) -> Result<f64, Com
     }
     // Minus zero is zero.
     let time = time + 0.0;
-    // The end's own time, printed with fewer digits and read again, is the end.
-    if time > end.time && time <= end.time * (1.0 + 4.0 * f64::EPSILON) {
+    // The end's own time, printed for people and read again, is the end.
+    if time > end.time && time <= (end.time + 1e-9).max(end.time * (1.0 + 4.0 * f64::EPSILON)) {
         return Ok(end.time);
     }
     if time > end.time {
