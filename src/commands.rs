@@ -34,6 +34,7 @@ use anstyle::AnsiColor;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::{Scene, SceneError, SceneText};
 use bench_dragon::show::state::Severity;
+use bench_dragon::wire::sentence::rounded;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -154,6 +155,16 @@ pub fn number(value: f64) -> String {
     if plain.len() > 24 { format!("{value:e}") } else { plain }
 }
 
+/// A number in a sentence for people: to a billionth, zero where it is rounding, with an exponent where it is very large or
+/// very small.
+pub fn figure(value: f64) -> String {
+    match value.abs() {
+        size if size < 1e-12 => "0".to_owned(),
+        size if (1e-6..1e9).contains(&size) => rounded(value, 9),
+        _ => format!("{value:.3e}"),
+    }
+}
+
 /// A progress bar on standard error, hidden where that is no terminal.
 pub fn progress_bar(length: u64, common: &Common) -> ProgressBar {
     if common.quiet {
@@ -178,7 +189,7 @@ pub fn warn_of_gap(timeline: &Timeline) {
     if let Some(until) = timeline.searched_until() {
         log::warn!(
             "the search for events gave up: searched up to t = {} s, later events may be missing",
-            number(until)
+            figure(until)
         );
     }
 }

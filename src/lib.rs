@@ -10,6 +10,7 @@
 //! - [`show`]: from a scene and a tick to one frame, deterministic.
 //! - [`plan`]: the least pitch and the greatest speed, for a choreographer.
 //! - [`wire`]: the memory layouts that go over the wire, and every conversion to them.
+//! - `drawing` (feature `cli`): a moment of a motion as an SVG, and the colours of all pictures.
 //! - [`live`]: the fixed-rate loop, its clock, its statistics.
 //! - [`transports`]: iceoryx2 shared memory and ROS 2 topics, as publishers of the loop.
 //! - `recording` (feature `cli`): the log of a run, and the proof that it can be played again.
@@ -21,6 +22,8 @@
 #[cfg(all(feature = "jazzy", feature = "humble"))]
 compile_error!("choose one ROS 2 distribution: `--no-default-features --features cli,humble` for Humble");
 
+#[cfg(feature = "cli")]
+pub mod drawing;
 pub mod linkage;
 pub mod live;
 pub mod model;

@@ -85,7 +85,7 @@ pub fn least_pitch(team: &Team, radius: f64, progress: &mut dyn FnMut(f64)) -> R
     }
     while let Some(obstacle) = Trial::new(team, pitch, radius).obstacle()? {
         if pitch > greatest {
-            return Err(PlanError(format!("the team reaches {radius} m with no pitch up to {greatest} m")));
+            return Err(PlanError(format!("the team reaches {radius} m with no pitch up to {greatest:.3} m")));
         }
         let free = |pitch: f64| !Trial::new(team, pitch, radius).is_blocked_by(&obstacle);
         while !free(pitch * GROWTH) && pitch <= greatest {
@@ -98,12 +98,12 @@ pub fn least_pitch(team: &Team, radius: f64, progress: &mut dyn FnMut(f64)) -> R
     }
     let Some(obstacle) = decided else {
         return Err(PlanError(format!(
-            "the team reaches {radius} m with every pitch from {lowest} m on: it is too short to meet itself"
+            "the team reaches {radius} m with every pitch from {lowest:.9} m on: it is too short to meet itself"
         )));
     };
     let Obstacle::Touch { pair: (bench_a, bench_b), .. } = obstacle else {
         return Err(PlanError(format!(
-            "no two boards touch before {radius} m, but with any pitch below {pitch} m a bench folds back on itself"
+            "no two boards touch before {radius} m, but with any pitch below {pitch:.9} m a bench folds back on itself"
         )));
     };
     let trial = Trial::new(team, pitch, radius);
@@ -191,7 +191,7 @@ impl Trial {
             return Ok(Some(Obstacle::Lock));
         }
         let pitch = TAU * self.radius_per_radian();
-        let given_up = || PlanError(format!("at a pitch of {pitch} m the search for overlapping boards gave up"));
+        let given_up = || PlanError(format!("at a pitch of {pitch:.9} m the search for overlapping boards gave up"));
         let least = self
             .advancement()
             .least_clearance(0.0, self.limit, &mut Budget::new(TRIAL_BUDGET, &mut |_| ()))
@@ -275,7 +275,7 @@ pub fn greatest_speed(
     let freeze = timeline.freeze(scene.stops_at_contact());
     if freeze.event.kind == EventKind::Lock {
         return Err(PlanError(format!(
-            "the show runs into a lock at {} s, and near it a handle goes faster than any limit",
+            "the show runs into a lock at {:.9} s, and near it a handle goes faster than any limit",
             freeze.time
         )));
     }
@@ -292,7 +292,7 @@ pub fn greatest_speed(
     let Peak { ratio, travelled, handle } = search.highest(to, progress).map_err(|reached| {
         let until = motion.time_at(reached.travelled);
         PlanError(format!(
-            "the show is too long to be searched for its fastest handle: up to {until} s of {} s it was {} times as fast \
+            "the show is too long to be searched for its fastest handle: up to {until:.3} s of {:.3} s it was {:.6} times as fast \
              as the head",
             freeze.time, reached.ratio
         ))

@@ -8,7 +8,7 @@ use bench_dragon::scene::{AtEnd, OnContact};
 use bench_dragon::solve::Velocities;
 
 use super::events::{least_clearance, sentence};
-use super::{CommandError, Common, Output, number, search_timeline};
+use super::{CommandError, Common, Output, figure, number, search_timeline};
 
 /// Validates the scene and prints what it would do.
 pub fn check(common: &Common) -> Result<(), CommandError> {
@@ -80,7 +80,7 @@ fn path(motion: &Motion) -> String {
     let outline = motion.outline();
     if let [SegmentOutline { kind: OutlineKind::Spiral { pitch, first, .. }, .. }] = outline.as_slice() {
         let turn = first / std::f64::consts::TAU;
-        return format!("inward spiral, {pitch} m per turn, the head starting on turn {turn}");
+        return format!("inward spiral, {pitch} m per turn, the head starting on turn {}", figure(turn));
     }
     let segments: Vec<String> = outline.iter().map(segment).collect();
     format!("{:.3} m: {}", motion.path().length(), segments.join(", "))

@@ -1,205 +1,301 @@
-//! `draw`: an SVG of the stage at a time: the path, every bench as its rectangle, the head, and where boards touch.
+//! `draw`: the stage as SVG, of one time, of many as numbered files, or as one picture that moves.
 
-use std::f64::consts::TAU;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use bench_dragon::model::board::Board;
-use bench_dragon::model::path::{OutlineKind, SegmentOutline};
-use bench_dragon::model::spiral::Direction;
-use bench_dragon::model::{Point, Vector};
-use bench_dragon::motion::event::EventKind;
-use bench_dragon::motion::timeline::{TimedEvent, Timeline};
+use bench_dragon::drawing::{Drawing, Extent, Framing, Length, Look, Surroundings, Theme};
+use bench_dragon::model::Point;
+use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::Scene;
 use bench_dragon::show::solve_at_or_just_before;
-use bench_dragon::solve::Chain;
-use plotters::coord::types::RangedCoordf64;
-use plotters::prelude::*;
+use bench_dragon::solve::{Chain, Solver, Velocities};
+use serde::Serialize;
 
-use super::solve::{time_at, title};
-use super::{CommandError, Common, Output, search_timeline};
+use super::solve::time_of;
+use super::{CommandError, Common, Output, figure, progress_bar, search_timeline};
 
 /// Arguments of `draw`.
 #[derive(Debug, clap::Args)]
 pub struct DrawArguments {
-    /// Simulated seconds, or contact, stall, lock
-    #[arg(long, value_name = "TIME", default_value = "0", allow_negative_numbers = true)]
+    /// Simulated seconds, or contact, stall, lock, path_end
+    #[arg(long, value_name = "TIME", default_value = "0", allow_negative_numbers = true, conflicts_with = "every")]
     at: String,
-    /// Write to a file instead of standard output
+    /// Write to a file instead of standard output; with --every a pattern such as frames/%05d.svg
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Metres from the centre to the edge of the picture; by default all of the team
-    #[arg(long, value_name = "METRES")]
-    radius: Option<f64>,
+    #[command(flatten)]
+    many: Many,
+    #[command(flatten)]
+    look: LookArguments,
 }
 
-type Stage<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+/// More than one time.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Many times")]
+struct Many {
+    /// Simulated seconds between two pictures, which share one camera and one colour scale; with --until
+    #[arg(long, value_name = "SECONDS", requires = "until", allow_negative_numbers = true)]
+    every: Option<f64>,
+    /// The first time: seconds, or an event
+    #[arg(long, value_name = "TIME", default_value = "0", requires = "every", allow_negative_numbers = true)]
+    from: String,
+    /// The last time, inclusive: seconds, or an event
+    #[arg(long, value_name = "TIME", requires = "every", allow_negative_numbers = true)]
+    until: Option<String>,
+    /// One SVG that moves, in place of many: in real time, about --every seconds from one moment to the next
+    #[arg(long, requires = "every")]
+    animated: bool,
+}
 
-const HEAD: RGBColor = RGBColor(192, 57, 43);
-const BODY: RGBColor = RGBColor(212, 160, 60);
-const TAIL: RGBColor = RGBColor(46, 110, 150);
-const TOUCH: RGBColor = RGBColor(142, 36, 170);
-const CURVE: RGBColor = RGBColor(170, 170, 170);
+/// How the picture looks.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "The picture")]
+struct LookArguments {
+    /// Metres from the centre of the stage to the edge of the picture; by default all that is there is shown
+    #[arg(long, value_name = "METRES", conflicts_with = "view", allow_negative_numbers = true)]
+    radius: Option<f64>,
+    /// The point in the middle of the picture and its width, metres, as in 1.5,2,4
+    #[arg(long, value_name = "X,Y,METRES", value_parser = view, allow_hyphen_values = true)]
+    view: Option<Framing>,
+    /// light, dark, or auto: light, and dark where a browser prefers that
+    #[arg(long, value_name = "THEME", default_value = "light", value_parser = theme)]
+    theme: Theme,
+    /// The width in print or on a screen, as in 210mm or 1920px; all that is drawn grows with it
+    #[arg(long, value_name = "LENGTH", default_value = "960px", value_parser = length)]
+    width: Length,
+    /// The height; by default that of what is shown
+    #[arg(long, value_name = "LENGTH", value_parser = length)]
+    height: Option<Length>,
+    /// The stage alone: no axes, title or legend
+    #[arg(long)]
+    no_axes: bool,
+}
+
+/// A line of `draw --json`.
+#[derive(Serialize)]
+struct PictureLine<'a> {
+    /// Simulated seconds; of a picture that moves, its last moment.
+    time: f64,
+    /// The file that was written.
+    file: Option<&'a Path>,
+    /// The picture, where no file was named.
+    svg: Option<&'a str>,
+}
+
+/// The most pictures of one command.
+const MOST: f64 = 1e6;
+
+/// The most moments of a picture that moves: more make a file that no browser shows well.
+const MOST_MOMENTS: f64 = 2000.0;
 
 /// Draws the stage.
 pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandError> {
     let scene = common.load_scene()?;
-    if let Some(radius) = arguments.radius
-        && !(radius.is_finite() && radius > 0.0)
-    {
-        return Err(CommandError::BadInput(format!("--radius is {radius}, expected a number of metres above 0")));
-    }
+    let look = arguments.look.look()?;
     let timeline = search_timeline(&scene, common);
-    let time = time_at(&arguments.at, &timeline)?;
-    let mut chain = Chain::new(scene.team().handles());
-    let mut solver = scene.motion.solver(scene.velocities).solver;
-    solve_at_or_just_before(solver.as_mut(), time, &mut chain)
-        .map_err(|none| CommandError::Failed(format!("at {time} s: {none}")))?;
-    let picture = picture(&scene, &timeline, time, &chain, arguments.radius)
-        .map_err(|error| CommandError::Failed(format!("the picture could not be drawn: {error}")))?;
-    let mut output = match &arguments.output {
-        Some(file) => Output::file(file)?,
-        None => Output::standard(),
-    };
-    output.line(&picture)?;
-    output.finish()
-}
-
-/// The SVG's text.
-fn picture(
-    scene: &Scene,
-    timeline: &Timeline,
-    time: f64,
-    chain: &Chain,
-    radius: Option<f64>,
-) -> Result<String, Box<dyn std::error::Error>> {
-    let team = chain.x.iter().zip(&chain.y).map(|(x, y)| x.hypot(*y));
-    // The head's way from its start on, of which an inward spiral only comes nearer.
-    let route = scene.motion.outline().into_iter().map(|segment| segment.start.coords.norm());
-    let reach = team.chain(route.skip(1)).fold(0.0, f64::max);
-    let radius = radius.unwrap_or(1.05 * reach + scene.team().head_length);
-    let mut text = String::new();
-    {
-        let area = SVGBackend::with_string(&mut text, (900, 918)).into_drawing_area();
-        area.fill(&WHITE)?;
-        let mut stage = ChartBuilder::on(&area)
-            .caption(title(scene, time), ("sans-serif", 22))
-            .margin(16)
-            .x_label_area_size(36)
-            .y_label_area_size(48)
-            .build_cartesian_2d(-radius..radius, -radius..radius)?;
-        stage.configure_mesh().x_desc("x, metres").y_desc("y, metres").light_line_style(WHITE).draw()?;
-        draw_path(&mut stage, scene, radius)?;
-        draw_benches(&mut stage, scene, timeline, time, chain, radius)?;
-        stage
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
-            .background_style(WHITE.mix(0.85))
-            .border_style(CURVE)
-            .draw()?;
-        area.present()?;
-    }
-    Ok(text)
-}
-
-fn draw_path(stage: &mut Stage, scene: &Scene, radius: f64) -> Result<(), Box<dyn std::error::Error>> {
-    let inside = |point: &(f64, f64)| point.0.abs() <= radius && point.1.abs() <= radius;
-    for segment in scene.motion.outline() {
-        let points: Vec<(f64, f64)> = outline(&segment, radius).into_iter().map(|point| (point.x, point.y)).collect();
-        // One line for each stretch inside the picture: what lies outside must not be bridged.
-        for stretch in points.split(|point| !inside(point)).filter(|stretch| stretch.len() > 1) {
-            stage.draw_series(LineSeries::new(stretch.to_vec(), CURVE.stroke_width(1)))?;
-        }
-    }
-    Ok(())
-}
-
-/// Points along a piece, near enough to each other for a picture of this radius. A spiral that comes in is drawn from
-/// as far out as the picture goes: the team stands there.
-fn outline(segment: &SegmentOutline, radius: f64) -> Vec<Point> {
-    let spiral = |pitch: f64, from: f64, to: f64, sign: f64| -> Vec<Point> {
-        let steps = ((to - from) * 12.0).ceil().clamp(1.0, 1e6);
-        let thetas = (0..=steps as usize).map(|step| from + (to - from) * step as f64 / steps);
-        let place = |theta: f64| Point::new(theta.cos(), theta.sin()) * (sign * pitch / TAU * theta);
-        thetas.map(place).collect()
-    };
-    match segment.kind {
-        OutlineKind::Spiral { direction: Direction::Inward, pitch, first, last } => {
-            spiral(pitch, last, first.max((1.42 * radius / pitch * TAU).min(1e5)), 1.0)
-        }
-        OutlineKind::Spiral { direction: Direction::Outward, pitch, first, last } => {
-            spiral(pitch, first, last.min(first.max(1e5)), -1.0)
-        }
-        OutlineKind::Line => {
-            let direction = Vector::new(segment.heading.cos(), segment.heading.sin());
-            // Short stretches, so that what leaves the picture is cut near its edge.
-            let steps = (segment.length / (0.002 * radius)).ceil().clamp(1.0, 1e6);
-            (0..=steps as usize)
-                .map(|step| segment.start + direction * (segment.length * step as f64 / steps))
-                .collect()
-        }
-        OutlineKind::Arc { curvature } => {
-            let left = Vector::new(-segment.heading.sin(), segment.heading.cos());
-            let centre = segment.start + left / curvature;
-            let angle = curvature * segment.length;
-            let steps = (angle.abs() * 24.0).ceil().clamp(1.0, 1e6);
-            let turned = |step: usize| nalgebra::Rotation2::new(angle * step as f64 / steps) * (segment.start - centre);
-            (0..=steps as usize).map(|step| centre + turned(step)).collect()
-        }
-    }
-}
-
-fn draw_benches(
-    stage: &mut Stage,
-    scene: &Scene,
-    timeline: &Timeline,
-    time: f64,
-    chain: &Chain,
-    radius: f64,
-) -> Result<(), Box<dyn std::error::Error>> {
-    let contact = timeline.find(EventKind::Contact).filter(|contact| contact.time <= time);
-    let touching = |bench: usize| contact.is_some_and(|contact| is_of(contact, bench));
-    let last = scene.team().benches - 1;
-    let (touch, others): (Vec<_>, Vec<_>) = (0..=last).partition(|bench| touching(*bench));
-    let (head, followers): (Vec<_>, Vec<_>) = others.into_iter().partition(|bench| *bench == 0);
-    let (tail, body): (Vec<_>, Vec<_>) = followers.into_iter().partition(|bench| *bench == last);
-    let kinds =
-        [("body", BODY, body), ("tail", TAIL, tail), ("head", HEAD, head), ("the two that touch", TOUCH, touch)];
-    for (name, colour, benches) in kinds.into_iter().filter(|(.., benches)| !benches.is_empty()) {
-        for bench in benches {
-            let corners = board(scene, chain, bench).corners().map(|corner| (corner.x, corner.y));
-            if corners.iter().any(|(x, y)| x.abs() > radius || y.abs() > radius) {
-                // The plot would bend what sticks out of it along its border.
-                continue;
+    let mut session = Session::new(&scene, &timeline, arguments.output.as_deref(), common.json);
+    let many = &arguments.many;
+    match (many.every, &many.until) {
+        (Some(every), Some(until)) => {
+            let until = time_of("--until", until, &timeline)?;
+            let from = time_of("--from", &many.from, &timeline)?;
+            let steps = steps(every, from, until)?;
+            if many.animated {
+                if look.theme == Theme::Auto {
+                    return Err(CommandError::BadInput(
+                        "--theme auto is for pictures that stand, expected light or dark with --animated".to_owned(),
+                    ));
+                }
+                session.draw_animated(look, (from, until), (until - from) / every)
+            } else {
+                let times: Vec<f64> = (0..=steps).map(|step| from + step as f64 * every).collect();
+                session.draw_many(look, &times, common)
             }
-            stage.draw_series([Polygon::new(corners.to_vec(), colour.mix(0.75))])?;
-            let outline = corners.into_iter().chain([corners[0]]).collect::<Vec<_>>();
-            stage.draw_series([PathElement::new(outline, colour.stroke_width(1))])?;
         }
-        stage
-            .draw_series(std::iter::empty::<Circle<(f64, f64), i32>>())?
-            .label(name)
-            .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 14, y + 5)], colour.mix(0.75).filled()));
+        _ => session.draw_one(look, time_of("--at", &arguments.at, &timeline)?),
     }
-    stage
-        .draw_series([Circle::new((chain.x[0], chain.y[0]), 4, HEAD.filled())])?
-        .label("front handle of the head")
-        .legend(|(x, y)| Circle::new((x + 7, y), 4, HEAD.filled()));
-    if let Some(place) = contact.and_then(|contact| contact.event.place) {
-        stage
-            .draw_series([Circle::new((place.x, place.y), 9, TOUCH.stroke_width(3))])?
-            .label("where they touch")
-            .legend(|(x, y)| Circle::new((x + 7, y), 6, TOUCH.stroke_width(2)));
-    }
-    Ok(())
 }
 
-fn is_of(contact: &TimedEvent, bench: usize) -> bool {
-    [contact.event.bench_a, contact.event.bench_b].contains(&Some(bench as u32))
+/// How many steps of --every lie between two times.
+fn steps(every: f64, from: f64, until: f64) -> Result<u64, CommandError> {
+    if !(every.is_finite() && every > 0.0) {
+        return Err(CommandError::BadInput(format!("--every is {every}, expected a number of seconds above 0")));
+    }
+    if until < from {
+        return Err(CommandError::BadInput(format!("--until is before --from, expected a time from {from} s on")));
+    }
+    // A last picture that rounding has pushed past --until by less than a part in 10^9 of a step still counts.
+    let steps = ((until - from) / every + 1e-9).floor();
+    if steps >= MOST {
+        return Err(CommandError::BadInput(format!(
+            "--every {every} gives {steps:e} pictures, expected at most {MOST:e}"
+        )));
+    }
+    Ok(steps as u64)
 }
 
-fn board(scene: &Scene, chain: &Chain, bench: usize) -> Board {
-    let (sine, cosine) = chain.heading[bench].sin_cos();
-    let front = Point::new(chain.x[bench], chain.y[bench]);
-    let team = scene.team();
-    Board::from_front(front, Vector::new(cosine, sine), team.link(bench), team.hole_inset, team.width)
+/// A scene being drawn, and where its pictures go.
+struct Session<'a> {
+    scene: &'a Scene,
+    timeline: &'a Timeline,
+    solver: Box<dyn Solver>,
+    chain: Chain,
+    file: Option<&'a Path>,
+    json: bool,
+}
+
+impl<'a> Session<'a> {
+    fn new(scene: &'a Scene, timeline: &'a Timeline, file: Option<&'a Path>, json: bool) -> Self {
+        // Boards are coloured by speed, whether the scene publishes speeds or not.
+        let solver = scene.motion.solver(Velocities::Computed).solver;
+        Self { scene, timeline, solver, chain: Chain::new(scene.team().handles()), file, json }
+    }
+
+    fn solve(&mut self, time: f64) -> Result<(), CommandError> {
+        solve_at_or_just_before(self.solver.as_mut(), time, &mut self.chain)
+            .map_err(|none| CommandError::Failed(format!("at {} s: {none}", figure(time))))
+    }
+
+    fn extent(&mut self, times: &[f64]) -> Result<Extent, CommandError> {
+        let mut extent = Extent::NONE;
+        for time in times {
+            self.solve(*time)?;
+            extent.include(&self.scene.motion, *time, &self.chain);
+        }
+        Ok(extent)
+    }
+
+    fn drawing(&self, extent: &Extent, look: Look) -> Drawing<'a> {
+        Drawing::new(&self.scene.name, &self.scene.motion, self.timeline, extent, look)
+    }
+
+    fn draw_one(&mut self, look: Look, time: f64) -> Result<(), CommandError> {
+        let extent = self.extent(&[time])?;
+        let svg = self.drawing(&extent, look).svg(time, &self.chain);
+        self.write(time, &svg, self.file)
+    }
+
+    fn draw_many(&mut self, look: Look, times: &[f64], common: &Common) -> Result<(), CommandError> {
+        let pattern = self.file.and_then(Pattern::of).ok_or_else(|| {
+            CommandError::BadInput(
+                "--every draws many files, expected -o with a pattern such as frames/%05d.svg".to_owned(),
+            )
+        })?;
+        let extent = self.extent(times)?;
+        let drawing = self.drawing(&extent, look);
+        let bar = progress_bar(times.len() as u64, common).with_message("drawing");
+        for (number, time) in times.iter().enumerate() {
+            self.solve(*time)?;
+            self.write(*time, &drawing.svg(*time, &self.chain), Some(&pattern.file(number)))?;
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        Ok(())
+    }
+
+    fn draw_animated(&mut self, look: Look, (from, until): (f64, f64), steps: f64) -> Result<(), CommandError> {
+        // The steps are stretched a little, so that the last moment is --until itself.
+        let steps = steps.round();
+        if !(1.0..MOST_MOMENTS).contains(&steps) {
+            return Err(CommandError::BadInput(format!(
+                "--animated from {} to {} s has {steps} moments after the first, expected 1 to {MOST_MOMENTS}: change --every",
+                figure(from),
+                figure(until)
+            )));
+        }
+        let times: Vec<f64> =
+            (0..=steps as u64).map(|step| until - (until - from) * (steps - step as f64) / steps).collect();
+        let extent = self.extent(&times)?;
+        let mut moments = Vec::with_capacity(times.len());
+        for time in times {
+            self.solve(time)?;
+            moments.push((time, self.chain.clone()));
+        }
+        let surroundings = match look.surroundings {
+            Surroundings::Words => Surroundings::Caption,
+            other => other,
+        };
+        let svg = self.drawing(&extent, Look { surroundings, ..look }).animated(&moments);
+        self.write(until, &svg, self.file)
+    }
+
+    /// Writes a picture where it is to go, and with --json a line about it.
+    fn write(&self, time: f64, svg: &str, file: Option<&Path>) -> Result<(), CommandError> {
+        if let Some(file) = file {
+            let mut output = Output::file(file)?;
+            output.line(svg)?;
+            output.finish()?;
+        }
+        let mut output = Output::standard();
+        match (self.json, file) {
+            (true, _) => output.json(&PictureLine { time, file, svg: file.is_none().then_some(svg) })?,
+            (false, None) => output.line(svg)?,
+            (false, Some(_)) => {}
+        }
+        output.finish()
+    }
+}
+
+/// A file's name with a place for a number, as ffmpeg reads it: `%d`, or `%05d` for five digits.
+struct Pattern {
+    before: String,
+    digits: usize,
+    after: String,
+}
+
+impl Pattern {
+    fn of(file: &Path) -> Option<Self> {
+        let (before, rest) = file.to_str()?.split_once('%')?;
+        let (digits, after) = rest.split_once('d')?;
+        let digits = if digits.is_empty() { 0 } else { digits.strip_prefix('0')?.parse().ok().filter(|n| *n < 20)? };
+        Some(Self { before: before.to_owned(), digits, after: after.to_owned() })
+    }
+
+    fn file(&self, number: usize) -> PathBuf {
+        format!("{}{number:0digits$}{}", self.before, self.after, digits = self.digits).into()
+    }
+}
+
+impl LookArguments {
+    fn look(&self) -> Result<Look, CommandError> {
+        let framing = match (self.radius, self.view) {
+            (Some(radius), _) if radius.is_finite() && radius > 0.0 => Framing::Radius(radius),
+            (Some(radius), _) => {
+                return Err(CommandError::BadInput(format!(
+                    "--radius is {radius}, expected a number of metres above 0"
+                )));
+            }
+            (None, Some(view)) => view,
+            (None, None) => Framing::Everything,
+        };
+        let surroundings = if self.no_axes { Surroundings::Nothing } else { Surroundings::Words };
+        Ok(Look { theme: self.theme, framing, surroundings, width: self.width, height: self.height })
+    }
+}
+
+fn theme(text: &str) -> Result<Theme, String> {
+    match text {
+        "light" => Ok(Theme::Light),
+        "dark" => Ok(Theme::Dark),
+        "auto" => Ok(Theme::Auto),
+        _ => Err("expected light, dark or auto".to_owned()),
+    }
+}
+
+fn view(text: &str) -> Result<Framing, String> {
+    let numbers: Vec<f64> = text.split(',').map(|number| number.trim().parse().unwrap_or(f64::NAN)).collect();
+    match numbers[..] {
+        [x, y, across] if x.is_finite() && y.is_finite() && across > 0.0 && across.is_finite() => {
+            Ok(Framing::View(Point::new(x, y), across))
+        }
+        _ => Err("expected a point and a width above 0 in metres, as in 1.5,2,4".to_owned()),
+    }
+}
+
+fn length(text: &str) -> Result<Length, String> {
+    let parse = |digits: &str| digits.trim().parse::<f64>().ok().filter(|length| (1.0..=1e5).contains(length));
+    let found = match text.strip_suffix("mm") {
+        Some(digits) => parse(digits).map(Length::Millimetres),
+        None => parse(text.strip_suffix("px").unwrap_or(text)).map(Length::Pixels),
+    };
+    found.ok_or_else(|| "expected a length from 1 to 100000 such as 210mm, 1920px or 1920".to_owned())
 }

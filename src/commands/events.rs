@@ -5,7 +5,7 @@ use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
 use bench_dragon::scene::Scene;
 use serde::Serialize;
 
-use super::{CommandError, Common, Output, number, progress_bar, search_timeline};
+use super::{CommandError, Common, Output, figure, progress_bar, search_timeline};
 
 /// One line of `events --json`.
 #[derive(Serialize)]
@@ -62,7 +62,7 @@ pub fn sentence(scene: &Scene, timed: &TimedEvent) -> String {
         EventKind::Lock => format!("{first} locks, its rear handle{place}: the motion cannot continue"),
         EventKind::PathEnd => "the head reaches the end of the path".to_owned(),
     };
-    format!("{:>9}  t = {} s: {what} (counting from 1).", event.kind.name(), number(time))
+    format!("{:>9}  t = {} s: {what} (counting from 1).", event.kind.name(), figure(time))
         .replace("path (counting from 1)", "path")
 }
 
@@ -77,9 +77,9 @@ pub fn least_clearance(scene: &Scene, timeline: &Timeline, common: &Common) -> S
         return "The least clearance of the show is not computed: there are no two benches that could meet, or the search gave up.".to_owned();
     };
     let (first, second) = (bench_name(scene, least.bench_a), bench_name(scene, least.bench_b));
-    let (value, time) = (number(least.value), number(time));
+    let (value, time) = (figure(least.value), figure(time));
     let of = searched_until
-        .map_or("of the show".to_owned(), |until| format!("up to t = {} s, where the search gave up,", number(until)));
+        .map_or("of the show".to_owned(), |until| format!("up to t = {} s, where the search gave up,", figure(until)));
     format!("The least clearance {of} is {value} m, at t = {time} s, between {first} and {second} (counting from 1).")
 }
 

@@ -4,12 +4,11 @@ use std::path::PathBuf;
 
 use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::scene::Scene;
 use bench_dragon::show::solve_at_or_just_before;
 use bench_dragon::solve::Chain;
 use serde::Serialize;
 
-use super::{CommandError, Common, Output, number, progress_bar, search_timeline};
+use super::{CommandError, Common, Output, figure, number, progress_bar, search_timeline};
 
 /// Arguments of `solve`.
 #[derive(Debug, clap::Args)]
@@ -59,7 +58,7 @@ pub fn solve(common: &Common, arguments: &SolveArguments) -> Result<(), CommandE
     let bar = progress_bar(count, common);
     for time in times {
         if solve_at_or_just_before(solver.as_mut(), time, &mut chain).is_err() {
-            return Err(CommandError::Failed(format!("there is no solution at {} s", number(time))));
+            return Err(CommandError::Failed(format!("there is no solution at {} s", figure(time))));
         }
         if common.json {
             output.json(&TimeLine { t: time, handles: (0..chain.handles()).map(|i| numbers(&chain, i)).collect() })?;
@@ -87,7 +86,8 @@ impl SolveArguments {
         match (self.every, self.until) {
             (Some(every), Some(until)) => self.regular_times(every, until, timeline),
             _ => {
-                let times: Vec<f64> = self.at.iter().map(|text| time_at(text, timeline)).collect::<Result<_, _>>()?;
+                let times: Vec<f64> =
+                    self.at.iter().map(|text| time_of("--at", text, timeline)).collect::<Result<_, _>>()?;
                 Ok((times.len() as u64, Box::new(times.into_iter())))
             }
         }
@@ -121,7 +121,7 @@ impl SolveArguments {
         } else {
             eprintln!(
                 "The motion ends at {} s ({}): the table ends at its last row before that.",
-                number(end.time),
+                figure(end.time),
                 end.event.kind.name()
             );
             // The first row past the end: found by halving, since the rows may be a billion.
@@ -139,44 +139,39 @@ impl SolveArguments {
 /// How many times, and one after the other.
 type Times = (u64, Box<dyn Iterator<Item = f64>>);
 
-/// A time as `--at` takes it: seconds, or the name of an event.
+/// A time as an option such as `--at` takes it: seconds, or the name of an event.
 ///
 /// # Errors
 /// Bad input: not a number, an event that does not happen, or a time after the motion's end.
-pub fn time_at(text: &str, timeline: &Timeline) -> Result<f64, CommandError> {
+pub fn time_of(option: &str, text: &str, timeline: &Timeline) -> Result<f64, CommandError> {
     let text = text.trim();
     let named = [EventKind::Contact, EventKind::Stall, EventKind::Lock, EventKind::PathEnd]
         .into_iter()
         .find(|kind| kind.name() == text);
     if let Some(kind) = named {
         return timeline.find(kind).map(|timed| timed.time).ok_or_else(|| {
-            CommandError::BadInput(format!("--at {text}: this scene has no {text}; `events` lists what it has"))
+            CommandError::BadInput(format!("{option} {text}: this scene has no {text}; `events` lists what it has"))
         });
     }
     let time: f64 = text.parse().map_err(|_| {
-        CommandError::BadInput(format!("--at {text}: expected seconds, or one of contact, stall, lock, path_end"))
+        CommandError::BadInput(format!("{option} {text}: expected seconds, or one of contact, stall, lock, path_end"))
     })?;
     let end = timeline.end();
     if !(time.is_finite() && time >= 0.0) {
-        return Err(CommandError::BadInput(format!("--at {text}: expected a number of seconds, at least 0")));
+        return Err(CommandError::BadInput(format!("{option} {text}: expected a number of seconds, at least 0")));
     }
     // Minus zero is zero.
     let time = time + 0.0;
-    // The end's own time, printed with fewer digits and read again, is the end.
-    if time > end.time && time <= end.time * (1.0 + 4.0 * f64::EPSILON) {
+    // The end's own time, printed for people and read again, is the end.
+    if time > end.time && time <= (end.time + 1e-9).max(end.time * (1.0 + 4.0 * f64::EPSILON)) {
         return Ok(end.time);
     }
     if time > end.time {
         return Err(CommandError::BadInput(format!(
-            "--at {text}: the motion ends at {} s ({}), expected a time up to that",
-            number(end.time),
+            "{option} {text}: the motion ends at {} s ({}), expected a time up to that",
+            figure(end.time),
             end.event.kind.name()
         )));
     }
     Ok(time)
-}
-
-/// The name of a scene and a time, for titles.
-pub fn title(scene: &Scene, time: f64) -> String {
-    format!("{} at {} s", scene.name, number(time))
 }

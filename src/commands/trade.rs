@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use bench_dragon::drawing::palette::{LIGHT, SERIES, channels, with_dark_rules};
 use bench_dragon::scene::Scene;
 use bench_dragon::trade::display::{self, Display, DisplayMeasurement, Precision, Reader};
 use bench_dragon::trade::{LAST_SECOND_MOMENTS, Measurement, SPREAD_MOMENTS, measure, publisher_frame_ns};
@@ -183,33 +184,48 @@ fn draw(file: &Path, plot: impl FnOnce(&mut String) -> Result<(), DrawingError>)
     let mut svg = String::new();
     plot(&mut svg).map_err(|error| CommandError::Failed(format!("the plot: {error}")))?;
     let mut output = Output::file(file)?;
-    output.line(&svg)?;
+    output.line(&with_dark_rules(&svg))?;
     output.finish()
+}
+
+/// A colour of the palette.
+fn colour(hex: &str) -> RGBColor {
+    let [red, green, blue] = channels(hex);
+    RGBColor(red, green, blue)
+}
+
+/// Words in the face of the page.
+fn words(size: u32, colour: RGBColor) -> TextStyle<'static> {
+    let style = TextStyle::from(("system-ui, sans-serif", size).into_font());
+    TextStyle { color: colour.to_backend_color(), ..style }
 }
 
 fn plot(svg: &mut String, scene: &str, measurements: &[Measurement]) -> Result<(), DrawingError> {
     let point = |m: &Measurement| Point {
         at: (m.frame_ns / 1e3, m.max_position_error.max(LEAST_ERROR)),
         text: m.solver.clone(),
-        colour: if m.solver.starts_with("paper") { RED } else { BLUE },
+        colour: colour(if m.solver.starts_with("paper") { LIGHT.danger } else { LIGHT.slow }),
         on_front: m.on_front,
     };
     let points: Vec<Point> = measurements.iter().map(point).collect();
     let caption = format!("Error against cost, scene {scene}");
+    let note =
+        "Blue: exact motion. Red: the paper's rules. Filled, on the line: no other is both faster and more exact.";
     let axes = ["microseconds per frame (median)", "largest position error, metres"];
-    scatter(svg, &caption, axes, &[(front(&points), BLUE)], points)
+    scatter(svg, [&caption, note], axes, &[(front(&points), colour(LIGHT.slow))], points)
 }
 
 fn display_plot(svg: &mut String, scene: &str, displayed: &[DisplayMeasurement]) -> Result<(), DrawingError> {
     // Single precision is no different for readers whose error is far above its rounding.
     let series = [
-        (Reader::Hold, Precision::Double, RED, "hold"),
-        (Reader::Linear, Precision::Double, RGBColor(150, 90, 0), "linear"),
-        (Reader::Hermite, Precision::Double, BLUE, "Hermite"),
-        (Reader::Hermite, Precision::Single, RGBColor(0, 130, 60), "Hermite, single precision"),
+        (Reader::Hold, Precision::Double, SERIES[2].0, "hold"),
+        (Reader::Linear, Precision::Double, SERIES[1].0, "linear"),
+        (Reader::Hermite, Precision::Double, SERIES[0].0, "Hermite"),
+        (Reader::Hermite, Precision::Single, SERIES[3].0, "Hermite, single precision"),
     ];
     let (mut lines, mut points) = (Vec::new(), Vec::new());
-    for (reader, precision, colour, name) in series {
+    for (reader, precision, hex, name) in series {
+        let colour = colour(hex);
         let of_series: Vec<_> = displayed.iter().filter(|m| (m.reader, m.precision) == (reader, precision)).collect();
         let line: Vec<Point> = of_series
             .into_iter()
@@ -224,9 +240,10 @@ fn display_plot(svg: &mut String, scene: &str, displayed: &[DisplayMeasurement])
         lines.push((line.iter().map(|point| point.at).collect(), colour));
         points.extend(line);
     }
-    lines.push((front(&points), BLACK));
-    let caption = format!("Error at the moment of display, scene {scene} (filled and black line: Pareto front)");
-    scatter(svg, &caption, ["kilobytes per second", "largest position error, metres"], &lines, points)
+    lines.push((front(&points), colour(LIGHT.ink)));
+    let caption = format!("Error at the moment of display, scene {scene}");
+    let note = "Filled, on the dark line: no other has both fewer bytes and a smaller error.";
+    scatter(svg, [&caption, note], ["kilobytes per second", "largest position error, metres"], &lines, points)
 }
 
 /// A point of a plot, with its label.
@@ -247,27 +264,32 @@ fn front(points: &[Point]) -> Vec<(f64, f64)> {
 /// Lines below labelled points, both axes logarithmic.
 fn scatter(
     svg: &mut String,
-    caption: &str,
+    [caption, note]: [&str; 2],
     [x_desc, y_desc]: [&str; 2],
     lines: &[(Vec<(f64, f64)>, RGBColor)],
     points: Vec<Point>,
 ) -> Result<(), DrawingError> {
-    let area = SVGBackend::with_string(svg, (1020, 620)).into_drawing_area();
-    area.fill(&WHITE)?;
+    let (ink, quiet) = (colour(LIGHT.ink), colour(LIGHT.quiet));
+    let sheet = SVGBackend::with_string(svg, (1080, 720)).into_drawing_area();
+    sheet.fill(&colour(LIGHT.ground))?;
+    let area = sheet.titled(caption, words(28, ink))?.titled(note, words(18, quiet))?;
     let (mut least, mut most) = (f64::INFINITY, 0f64);
     for Point { at: (cost, _), .. } in &points {
         (least, most) = (least.min(*cost), most.max(*cost));
     }
     let mut chart = ChartBuilder::on(&area)
-        .caption(caption, ("sans-serif", 20))
         .margin(14)
-        .x_label_area_size(44)
-        .y_label_area_size(70)
+        .x_label_area_size(50)
+        .y_label_area_size(80)
         .build_cartesian_2d((0.5 * least..8.0 * most).log_scale(), (LEAST_ERROR..10.0).log_scale())?;
     chart
         .configure_mesh()
         .x_desc(x_desc)
         .y_desc(y_desc)
+        .axis_desc_style(words(18, quiet))
+        .label_style(words(16, quiet))
+        .axis_style(quiet)
+        .bold_line_style(colour(LIGHT.line))
         .x_label_formatter(&|x| format!("{x}"))
         .y_label_formatter(&|y| format!("{y:.0e}"))
         .light_line_style(TRANSPARENT)
@@ -276,7 +298,7 @@ fn scatter(
         chart.draw_series(LineSeries::new(line.iter().copied(), colour))?;
     }
     draw_points(&mut chart, points)?;
-    area.present()?;
+    sheet.present()?;
     Ok(())
 }
 
@@ -294,15 +316,15 @@ fn draw_points(chart: &mut LogChart, points: Vec<Point>) -> Result<(), DrawingEr
     for (Point { at, text, colour, on_front }, (x, y)) in labelled {
         let label = Label::near(&taken, (x, y), &text);
         let middle = label.top + Label::HEIGHT / 2;
-        if (middle - y).abs() > Label::HEIGHT {
+        if (middle - y).abs() >= Label::HEIGHT {
             // A line from a label that had to go elsewhere to its point.
             let end = if label.left > x { label.left - 2 } else { label.right + 2 };
             let line = PathElement::new(vec![(0, 0), (end - x, middle - y)], colour.mix(0.4));
             chart.draw_series([EmptyElement::at(at) + line])?;
         }
-        let style = if on_front { colour.filled() } else { colour.stroke_width(1) };
-        chart.draw_series([Circle::new(at, 4, style)])?;
-        let text = Text::new(text, (label.left - x, label.top - y), ("sans-serif", 12));
+        let style = if on_front { colour.filled() } else { colour.stroke_width(2) };
+        chart.draw_series([Circle::new(at, 5, style)])?;
+        let text = Text::new(text, (label.left - x, label.top - y), words(16, self::colour(LIGHT.ink)));
         chart.draw_series([EmptyElement::at(at) + text])?;
         taken.push(label);
     }
@@ -317,14 +339,14 @@ struct Label {
 }
 
 impl Label {
-    const HEIGHT: i32 = 13;
+    const HEIGHT: i32 = 16;
     /// What a letter takes, rounded up.
-    const LETTER: i32 = 5;
+    const LETTER: i32 = 7;
     /// Where labels may stand.
-    const LEFTMOST: i32 = 86;
-    const RIGHTMOST: i32 = 1010;
-    const TOPMOST: i32 = 45;
-    const LOWEST: i32 = 540;
+    const LEFTMOST: i32 = 98;
+    const RIGHTMOST: i32 = 1066;
+    const TOPMOST: i32 = 72;
+    const LOWEST: i32 = 632;
 
     /// A label beside a point, or as near to that as it lies on none of `others` and on the plot.
     fn near(others: &[Self], (x, y): (i32, i32), text: &str) -> Self {

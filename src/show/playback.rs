@@ -33,7 +33,7 @@ impl Playback {
 /// A start that is not before the motion's end.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "{start} s is outside the motion, expected at least 0 and less than {end} s, at which it ends ({})",
+    "{start} s is outside the motion, expected at least 0 and less than {end:.9} s, at which it ends ({})",
     kind.name()
 )]
 pub struct StartError {

@@ -95,6 +95,13 @@ pub fn time_until(simulated_seconds: f64, time_scale: f64) -> String {
     if time_scale > 0.0 { format!("in {:.1} s", simulated_seconds / time_scale) } else { "not while paused".to_owned() }
 }
 
+/// A number with so many decimals at most: no zeros at its end, and no minus before zero.
+pub fn rounded(value: f64, decimals: usize) -> String {
+    let fixed = format!("{value:.decimals$}");
+    let short = if fixed.contains('.') { fixed.trim_end_matches('0').trim_end_matches('.') } else { &fixed };
+    if short == "-0" { "0".to_owned() } else { short.to_owned() }
+}
+
 /// Zero has no sign for people: a touch is solved to the last bits, on either side.
 fn nearest(alert: &CollisionAlert, benches: u32, figures: Figures) -> Option<String> {
     alert.nearest_benches().next()?;

@@ -2,18 +2,20 @@
 
 use plotters::prelude::*;
 
-/// Pixels across and down.
-const SIZE: (u32, u32) = (920, 270);
-/// Colours that are distinguished by people who do not see red and green, too (Okabe and Ito).
-const COLOURS: [RGBColor; 7] = [
-    RGBColor(0, 114, 178),
-    RGBColor(230, 159, 0),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(80, 80, 80),
-];
+use crate::drawing::palette::{LIGHT, SERIES, channels};
+
+/// Pixels across and down: on a phone, half as large, words can still be read.
+const SIZE: (u32, u32) = (760, 300);
+
+/// Words in the face of the page.
+fn words(size: u32, colour: RGBColor) -> TextStyle<'static> {
+    let style = TextStyle::from(("system-ui, sans-serif", size).into_font());
+    TextStyle { color: colour.to_backend_color(), ..style }
+}
+fn colour(hex: &str) -> RGBColor {
+    let [red, green, blue] = channels(hex);
+    RGBColor(red, green, blue)
+}
 
 /// A line of a plot.
 pub struct Line {
@@ -48,7 +50,7 @@ pub fn plot(unit: &str, scale: Scale, lines: &[Line]) -> Option<String> {
     {
         let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
         let mut chart = ChartBuilder::on(&area);
-        chart.margin(8).x_label_area_size(36).y_label_area_size(74);
+        chart.margin(8).x_label_area_size(46).y_label_area_size(84);
         match scale {
             // Zeros have no logarithm: they lie on the lower edge.
             Scale::Logarithmic => {
@@ -68,13 +70,14 @@ pub fn plot(unit: &str, scale: Scale, lines: &[Line]) -> Option<String> {
 
 /// What each colour means. Above the plot, where it hides no line.
 fn legend(lines: &[Line]) -> String {
-    let key = |(line, RGBColor(red, green, blue)): (&Line, &RGBColor)| {
+    // A picture of its own, so that the rules that make plots dark make it dark too.
+    let key = |(line, (colour, _)): (&Line, &(&str, &str))| {
         format!(
-            "<span><b style=\"color:#{red:02x}{green:02x}{blue:02x}\">&mdash;</b> {}</span>\n",
+            "<span><svg width=\"18\" height=\"10\"><rect y=\"3\" width=\"18\" height=\"4\" fill=\"{colour}\"/></svg> {}</span>\n",
             escaped(&line.label)
         )
     };
-    format!("<p class=\"legend\">\n{}</p>\n", lines.iter().zip(COLOURS.iter().cycle()).map(key).collect::<String>())
+    format!("<p class=\"legend\">\n{}</p>\n", lines.iter().zip(SERIES.iter().cycle()).map(key).collect::<String>())
 }
 
 /// Text as HTML takes it.
@@ -102,11 +105,14 @@ where
     Y: plotters::coord::ranged1d::Ranged<ValueType = f64> + plotters::coord::ranged1d::ValueFormatter<f64>,
 {
     let mut mesh = chart.configure_mesh();
+    let (quiet, line) = (colour(LIGHT.quiet), colour(LIGHT.line));
+    mesh.axis_desc_style(words(20, quiet)).label_style(words(18, quiet));
+    mesh.axis_style(quiet).bold_line_style(line).x_labels(6).y_labels(6);
     mesh.x_desc(time).y_desc(unit).light_line_style(TRANSPARENT).y_label_formatter(&|value| short(*value));
     mesh.draw().ok()?;
-    for (line, colour) in lines.iter().zip(COLOURS.iter().cycle()) {
+    for (line, (hex, _)) in lines.iter().zip(SERIES.iter().cycle()) {
         let points = line.points.iter().map(|(at, value)| (at / seconds, value.max(floor)));
-        chart.draw_series(LineSeries::new(points, colour.stroke_width(1))).ok()?;
+        chart.draw_series(LineSeries::new(points, colour(hex).stroke_width(2))).ok()?;
     }
     Some(())
 }

@@ -13,6 +13,7 @@ use super::member::{Member, Role};
 use super::observation::{Latencies, Observation};
 use super::plots::{Line, Scale, escaped, plot};
 use super::verdict::LimitCheck;
+use crate::drawing::palette::dark_rules;
 use crate::live::Deliveries;
 use crate::live::statistics::RunSummary;
 
@@ -148,11 +149,12 @@ impl Report {
     /// One page that needs nothing else.
     pub fn html(&self) -> String {
         let mut page = String::new();
+        let plots = self.plots();
         // Writing to a String cannot fail.
         let _ = write!(
             page,
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Soak test: {verdict}</title>\n\
-             <style>{STYLE}</style></head><body>\n<h1>Soak test: <span class=\"{verdict}\">{verdict}</span></h1>\n\
+             <meta name=\"viewport\" content=\"width=device-width\"><style>{STYLE}{dark}</style></head><body>\n<h1>Soak test: <span class=\"{verdict}\">{verdict}</span></h1>\n\
              <p><code>{command}</code></p>\n<p>{seconds:.1} s on {processor}, {cores} logical processors, Linux {kernel}; \
              bench-dragon {version}.</p>\n{limits}{subscribers}{deliveries}{conducting}{plots}<p>Each point stands for {per_row} s and is the \
              greatest value of its seconds. All latencies are CLOCK_MONOTONIC; those since the deadline include the \
@@ -168,7 +170,7 @@ impl Report {
             subscribers = self.table_of_subscribers(),
             deliveries = self.deliveries().map(|sentence| format!("<p>{sentence}.</p>\n")).collect::<String>(),
             conducting = self.section_on_conducting(),
-            plots = self.plots(),
+            dark = dark_rules(&plots),
             per_row = self.history.seconds_per_row(),
         );
         page
@@ -277,8 +279,12 @@ impl Report {
     }
 }
 
-const STYLE: &str = "body{font:15px system-ui,sans-serif;max-width:960px;margin:2em auto;padding:0 1em}\
-                     h2{font-size:1.05em;margin:1.6em 0 0}.legend{margin:.3em 0;font-size:.85em}.legend span{margin-right:1.2em}table{border-collapse:collapse;margin:1em 0}\
-                     td,th{padding:.2em .8em .2em 0;text-align:left;border-bottom:1px solid #ddd}\
+/// Light, and dark where the browser prefers that; what is wider than a phone scrolls by itself.
+const STYLE: &str = ":root{color-scheme:light dark;--ground:#fbfaf7;--ink:#16181d;--line:#d9d5cb;--good:#00734f;--bad:#c2001f}\
+                     @media(prefers-color-scheme:dark){:root{--ground:#0b0d11;--ink:#f2f0ea;--line:#2a2f39;--good:#1fb8a6;--bad:#ff4a5f}}\
+                     body{font:15px/1.45 system-ui,sans-serif;max-width:960px;margin:2em auto;padding:0 1em;background:var(--ground);color:var(--ink)}\
+                     code{overflow-wrap:anywhere}h2{font-size:1.05em;margin:1.6em 0 0}.legend{margin:.3em 0;font-size:.85em}.legend span{margin-right:1.2em;white-space:nowrap}\
+                     table{border-collapse:collapse;margin:1em 0;display:block;overflow-x:auto}\
+                     td,th{padding:.2em .8em .2em 0;text-align:left;border-bottom:1px solid var(--line)}\
                      td:not(:first-child){font-variant-numeric:tabular-nums}svg{max-width:100%;height:auto}\
-                     .PASS{color:#00734f}.FAIL{color:#b02a00;font-weight:bold}";
+                     .PASS{color:var(--good)}.FAIL{color:var(--bad);font-weight:bold}";
