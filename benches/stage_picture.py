@@ -4,9 +4,11 @@
     .venv/bin/python benches/stage_picture.py cost      # lateness and step of a 1 kHz publisher: five browsers against none;
                                                         # what follows is handed to `run`: cost --realtime 80
     .venv/bin/python benches/stage_picture.py latency   # from sent_ns to received and to drawn, at 20 Hz, 60 Hz and 1 kHz
-    .venv/bin/python benches/stage_picture.py long      # pictures a second of a scene of 5,000 benches
+    .venv/bin/python benches/stage_picture.py long      # pictures a second of a scene of 5,000 benches, and of it as a show
+    .venv/bin/python benches/stage_picture.py pictures  # makes the pictures of docs/driving-a-stage-picture.md
 
-Needs Debian's Chromium and Playwright, which tests/run installs. Everything runs on this machine, in turn in one run:
+Takes the release build, or the debug build where there is no other. Needs Debian's Chromium and Playwright, which
+tests/run installs. Everything runs on this machine, in turn in one run:
 the ratios are more telling than the times.
 """
 
@@ -22,7 +24,7 @@ import time
 from playwright.sync_api import sync_playwright
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-PROGRAM = ROOT / "target" / "release" / "bench-dragon"
+PROGRAM = next(path for kind in ("release", "debug") if (path := ROOT / "target" / kind / "bench-dragon").exists())
 NAME = "stage_picture_bench"
 
 
@@ -43,7 +45,7 @@ def server():
 
 
 @contextlib.contextmanager
-def pages(url, count, **viewport):
+def pages(url, count, address="", **viewport):
     """Pages, each in a Chromium of its own."""
     with contextlib.ExitStack() as stack:
         playwright = stack.enter_context(sync_playwright())
@@ -51,7 +53,7 @@ def pages(url, count, **viewport):
         for _ in range(count):
             chromium = stack.enter_context(playwright.chromium.launch(executable_path="/usr/bin/chromium"))
             opened.append(chromium.new_page(viewport=viewport))
-            opened[-1].goto(url)
+            opened[-1].goto(url + address)
         yield opened
 
 
@@ -132,8 +134,30 @@ def long():
         page.wait_for_timeout(1000)
         received, drawn, _, _ = rates(page, 5)
         print(f"following the head: {drawn:.1f} pictures/s")
+    with server() as (url, _), started("run", "--quiet", "--json", "--scene", str(scene)), pages(url, 1, "#show", width=1600, height=900) as [page]:
+        page.wait_for_timeout(3000)
+        print(f"#show: {rates(page, 10)[1]:.1f} pictures/s")
+
+
+def pictures():
+    wide, phone = {"width": 1120, "height": 630}, {"width": 390, "height": 844}
+    seconds_before = "picture.time !== null && picture.time >= 412.47 - {}"
+    wanted = [
+        ("dark", "405", "#dark", wide, seconds_before.format(4.2)),
+        ("light", "405", "#light", wide, "document.body.dataset.level === 'contact' && picture.shown.time >= 412.47"),
+        ("phone", "405", "#light", phone, seconds_before.format(4.2)),
+        ("show", "330", "#show", wide, "picture.time > 334"),
+        ("show-contact", "405", "#show", wide, seconds_before.format(1.6)),
+    ]
+    for name, start, address, viewport, when in wanted:
+        with server() as (url, _), started("run", "--quiet", "--json", "--start", start), pages(url, 1, address, **viewport) as [page]:
+            deadline = time.monotonic() + 120
+            while not page.evaluate(when):
+                assert time.monotonic() < deadline, f"{name}: not within two minutes"
+                page.wait_for_timeout(20)
+            page.screenshot(path=ROOT / "docs" / f"stage-picture-{name}.png")
 
 
 if __name__ == "__main__":
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
-    {"cost": cost, "latency": latency, "long": long}[sys.argv[1]]()
+    {"cost": cost, "latency": latency, "long": long, "pictures": pictures}[sys.argv[1]]()

@@ -152,6 +152,7 @@ export function draw(context, camera, palette, scene) {
   for (const { pair, ink, dashes } of marks.toReversed()) there(pair).forEach((bench) => mark(bench, palette[ink], 3.5, dashes));
   if (chosen >= 0 && chosen < count) mark(chosen, palette.ink, 3, [7, 4]);
   for (const { place, ink, ghost } of marks.toReversed()) if (place) target(context, place, palette, pixel, palette[ink], ghost);
+  show?.crown(context, camera, palette, scene);
   if (!words) return [];
   // The most important words take their places first.
   for (const { place, ink, text } of marks) if (place && text) labels.add(text, place.x, place.y, palette[ink], 34, 1.25);

@@ -29,7 +29,7 @@ export function showSituation({ state, alert, trouble, silent, seconds, ahead, b
   const words = trouble ? say(trouble) : silent === null ? say(state.name) : say("noFrames", { seconds: silent });
   put("state", `${trouble ? "○" : silent === null ? SIGNS[state.severity] : "…"} ${trouble ? words : capital(words)}`);
   put("alert", trouble ? "" : sentenceOf(state, alert, benches));
-  put("now", now);
+  put("now", capital(now));
   element("now").hidden = !now;
   countdown(state, seconds, ahead);
   if (trouble) put("spoken", say(trouble));

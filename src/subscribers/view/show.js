@@ -10,6 +10,8 @@ const TRAIL = 3500;
 const FLASH = 1600;
 /** Pixels of a glow's own picture. */
 const GLOW = 128;
+/** Lanterns that glow one by one: of more, every other one does, or every third, and so on. */
+const MOST_GLOWS = 1200;
 
 /** A spot of light, made once for each colour. */
 function glowOf(colour) {
@@ -53,16 +55,10 @@ export class Show {
     context.drawImage(this.glows.get(colour), x - radius, y - radius, 2 * radius, 2 * radius);
   }
 
-  /** In metres; leaves the context as it was. */
+  /** All but the crown. In metres; leaves the context as it was. */
   draw(context, camera, palette, { stage, places }, benches) {
     const pixel = camera.unit / camera.scale, count = places.length / STRIDE - 1, wide = stage.width * camera.scale;
-    const light = (draw) => {
-      context.globalCompositeOperation = palette.night ? "lighter" : "source-over";
-      draw();
-      context.globalCompositeOperation = "source-over";
-      context.globalAlpha = 1;
-    };
-    const flicker = (k) => (this.still ? 1 : 1 + 0.18 * Math.sin(this.now / 230 + 2.4 * k) * Math.sin(this.now / 570 + k));
+    const light = (draw) => this.light(context, palette, draw);
     light(() => this.embers(context, palette, pixel, stage));
     context.fillStyle = palette.wood;
     context.strokeStyle = palette.rim;
@@ -70,12 +66,30 @@ export class Show {
     fillBoards(context, stage, places, benches, wide > 4);
     light(() => {
       const radius = Math.max(2.1 * stage.width, 7 * pixel);
-      for (const k of benches) this.glow(context, palette.gold, places[STRIDE * k], places[STRIDE * k + 1], radius, 0.5 * flicker(k));
+      const each = Math.ceil(benches.length / MOST_GLOWS);
+      for (const k of benches) if (k % each === 0) this.glow(context, palette.gold, places[STRIDE * k], places[STRIDE * k + 1], radius, 0.5 * this.flicker(k));
     });
     this.lanterns(context, palette, pixel, stage, places, benches, wide);
     if (count > 1) this.tail(context, palette, pixel, rectangle(stage, places, count - 1));
-    this.head(context, palette, pixel, rectangle(stage, places, 0), flicker(0), light);
+  }
+
+  /** What lies over all marks: the head, and the flash. */
+  crown(context, camera, palette, { stage, places }) {
+    const light = (draw) => this.light(context, palette, draw);
+    this.head(context, palette, camera.unit / camera.scale, rectangle(stage, places, 0), this.flicker(0), light);
     if (this.flash) light(() => this.burst(context, palette, camera));
+  }
+
+  /** Lights add up at night; by day they tint. */
+  light(context, palette, draw) {
+    context.globalCompositeOperation = palette.night ? "lighter" : "source-over";
+    draw();
+    context.globalCompositeOperation = "source-over";
+    context.globalAlpha = 1;
+  }
+
+  flicker(k) {
+    return this.still ? 1 : 1 + 0.18 * Math.sin(this.now / 230 + 2.4 * k) * Math.sin(this.now / 570 + k);
   }
 
   /** What head and tail leave behind, fading. */
@@ -94,8 +108,10 @@ export class Show {
       for (let first = 0; first < benches.length; first += 100) {
         context.beginPath();
         for (const k of benches.slice(first, first + 100)) {
-          context.moveTo(places[STRIDE * k] + radius * part, places[STRIDE * k + 1]);
-          context.arc(places[STRIDE * k], places[STRIDE * k + 1], radius * part, 0, 7);
+          const x = places[STRIDE * k], y = places[STRIDE * k + 1], r = radius * part;
+          context.moveTo(x + r, y);
+          // Of a dot nobody sees the corners.
+          wide < 5 ? context.rect(x - r, y - r, 2 * r, 2 * r) : context.arc(x, y, r, 0, 7);
         }
         context.fill();
       }

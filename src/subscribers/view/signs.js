@@ -63,8 +63,12 @@ export class Labels {
     context.textAlign = "center";
     context.textBaseline = "middle";
     context.lineJoin = "round";
-    for (const { text, px, py, ink, away, large } of this.all) {
-      context.font = `600 ${15 * unit * large}px system-ui, sans-serif`;
+    for (const { text, px, py, ink, away, large: wanted } of this.all) {
+      const font = (size) => (context.font = `600 ${15 * unit * size}px system-ui, sans-serif`);
+      font(wanted);
+      // On a phone a long sentence is smaller.
+      const large = wanted * Math.min(1, (width - 24 * unit) / context.measureText(text).width);
+      font(large);
       const half = context.measureText(text).width / 2 + 6 * unit, tall = 12 * unit * large;
       const within = (at, least, most) => Math.min(Math.max(at, least), Math.max(least, most));
       const outward = Math.atan2(py - height / 2, px - width / 2);
