@@ -229,7 +229,8 @@ fn without_the_flag_there_is_no_service_and_with_it_those_of_the_standards() {
     let topics = ["poses", "handles", "alerts", "stage", "path"].map(|topic| format!("rt/{}/{topic}", unique(without)));
     let mut offered: Vec<&String> = written.keys().collect();
     let mut topics: Vec<&String> = topics.iter().collect();
-    (offered.sort(), topics.sort());
+    offered.sort();
+    topics.sort();
     assert_eq!(offered, topics, "no other topic is on by default; a scene without cues has none for them");
     assert_eq!(of_services(&read), 0, "{read:?}");
     let [read, written] = endpoints(with);
