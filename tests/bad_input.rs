@@ -101,6 +101,7 @@ fn scenes_that_cannot_be_played() {
         ("velocities = true", "[publish.ros2]\nrates = 1.0", &["line 29", "rates", "topics"]),
         ("velocities = true", "[publish.ros2]\ntopics = []", &["line 29", "publish.ros2.topics", "at least one"]),
         ("velocities = true", "[publish.ros2]\ntopics = [\"pose\"]", &["line 29", "pose", "poses"]),
+        ("velocities = true", "[publish.ros2]\ncontrol = 1", &["line 29", "publish.ros2.control", "boolean"]),
         ("velocities = true", "[publish.ros2.qos.poses]\ndepth = 0", &["line 29", "publish.ros2.qos.poses.depth"]),
         ("velocities = true", "[publish.ros2.qos.markers]\ndepth = 5", &["line 28", "markers", "topics"]),
         ("velocities = true", "[publish.ros2.qos.poses]\nreliability = \"yes\"", &["line 29", "best_effort"]),

@@ -59,7 +59,11 @@ pub fn check(common: &Common) -> Result<(), CommandError> {
     output.line(&match &scene.ros2 {
         Some(settings) => format!(
             "  ROS 2: {} at {} frames per second.",
-            settings.topics.keys().map(|topic| topic.name()).collect::<Vec<_>>().join(", "),
+            settings
+                .offered(scene.alerts.is_some(), !scene.cues.is_empty())
+                .map(|topic| topic.name())
+                .collect::<Vec<_>>()
+                .join(", "),
             number(settings.rate_of(scene.rate))
         ),
         None => "  ROS 2: nothing and no network socket, unless `run --ros2` requests it.".to_owned(),

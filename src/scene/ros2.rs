@@ -132,6 +132,16 @@ impl Default for Ros2Settings {
 }
 
 impl Ros2Settings {
+    /// The topics that a scene fills: one without `[alerts]` has no alerts, one without `[[cues]]` no cues.
+    pub fn offered(&self, alerts: bool, cues: bool) -> impl Iterator<Item = Topic> {
+        let filled = move |topic: &Topic| match topic {
+            Topic::Alerts => alerts,
+            Topic::Cues => cues,
+            _ => true,
+        };
+        self.topics.keys().copied().filter(filled)
+    }
+
     /// Frames per second on ROS 2 where the loop makes `loop_rate`.
     pub fn rate_of(&self, loop_rate: f64) -> f64 {
         self.rate.unwrap_or(60.0).min(loop_rate)

@@ -16,7 +16,7 @@ use rustdds::DomainParticipantBuilder;
 
 use crate::live::control::Door;
 use crate::live::{Deliveries, Publisher, StatusPublisher};
-use crate::scene::ros2::{Ros2Settings, Topic};
+use crate::scene::ros2::Ros2Settings;
 use crate::wire::Stage;
 use messages::Pose;
 
@@ -122,12 +122,7 @@ fn open_on(
     }
     let (alerts, rate, handles) = (scene.alerts.is_some(), settings.rate_of(loop_rate), scene.team().handles());
     let cues = scene.cues.len();
-    let topics = settings.topics.keys().filter(|topic| match topic {
-        Topic::Alerts => alerts,
-        Topic::Cues => cues > 0,
-        _ => true,
-    });
-    let topics: Vec<String> = topics.map(|topic| topic.path(name)).collect();
+    let topics: Vec<String> = settings.offered(alerts, cues > 0).map(|topic| topic.path(name)).collect();
     let services = mapping.map_or(String::new(), |mapping| {
         format!("\nROS 2 services that conduct the show: /{name}/..., for clients of {}.", mapping.rmw())
     });

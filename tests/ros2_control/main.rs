@@ -2,18 +2,14 @@
 //! `rmw_fastrtps_cpp` does, both from other processes than the publisher; what came of it is read over shared memory.
 #![cfg(feature = "ros2")]
 
+mod enhanced;
+#[path = "../processes/mod.rs"]
 mod processes;
 
 use std::process::Command;
-use std::time::Duration;
 
+use enhanced::{Empty, Features, Outcome, State, Time, Trigger, enhanced};
 use processes::{Process, can_run, json_lines, program, python, python_modules, summary, text, unique, wait};
-use ros2_client::{
-    Client, Context, ContextOptions, DEFAULT_PUBLISHER_QOS, Message, Name, NodeName, NodeOptions, ServiceMapping,
-    ServiceTypeName,
-};
-use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 /// A ROS 2 domain that other processes of this machine do not use meanwhile.
@@ -233,7 +229,8 @@ fn without_the_flag_there_is_no_service_and_with_it_those_of_the_standards() {
     let topics = ["poses", "handles", "alerts", "stage", "path"].map(|topic| format!("rt/{}/{topic}", unique(without)));
     let mut offered: Vec<&String> = written.keys().collect();
     let mut topics: Vec<&String> = topics.iter().collect();
-    (offered.sort(), topics.sort());
+    offered.sort();
+    topics.sort();
     assert_eq!(offered, topics, "no other topic is on by default; a scene without cues has none for them");
     assert_eq!(of_services(&read), 0, "{read:?}");
     let [read, written] = endpoints(with);
@@ -300,91 +297,6 @@ fn a_flood_of_calls_is_refused_and_others_are_answered() {
     let (summary, printed) = ended(publisher);
     assert_eq!(printed.matches("calls without an answer").count(), 1, "{printed}");
     assert_eq!(summary["end"], "signal");
-}
-
-/// An empty request or response: one byte.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-struct Empty(u8);
-
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-struct Time {
-    sec: i32,
-    nanosec: u32,
-}
-
-/// simulation_interfaces/Result.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Outcome {
-    result: u8,
-    error_message: String,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct State {
-    state: u8,
-    result: Outcome,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Features {
-    features: Vec<u16>,
-    spawn_formats: Vec<String>,
-    custom_info: String,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Trigger {
-    success: bool,
-    message: String,
-}
-
-/// What a request or a response holds.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-struct Fields<T>(T);
-impl<T: Serialize + DeserializeOwned> Message for Fields<T> {}
-
-/// Calls a service as a client that has never called before, a participant of its own. `None` where no answer comes.
-fn first_call<Request, Response>(
-    mapping: ServiceMapping,
-    name: &str,
-    service: &str,
-    kind: (&str, &str),
-    request: Request,
-) -> Option<Response>
-where
-    Request: Serialize + DeserializeOwned + Clone + 'static,
-    Response: Serialize + DeserializeOwned + 'static,
-{
-    let context = Context::with_options(ContextOptions::new().domain_id(domain())).unwrap();
-    let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
-    let mut node = context.new_node(NodeName::new("/", "caller").unwrap(), options).unwrap();
-    let qos = DEFAULT_PUBLISHER_QOS;
-    let service_name = Name::new(&format!("/{}", unique(name)), service).unwrap();
-    let client: Client<Fields<Request>, Fields<Response>> =
-        node.create_client(mapping, &service_name, &ServiceTypeName::new(kind.0, kind.1), qos.clone(), qos).unwrap();
-    let spinner = node.spinner().unwrap();
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
-    let answer = runtime.block_on(async {
-        let call = async {
-            client.wait_for_service(&node).await;
-            client.async_call_service(Fields(request)).await.unwrap().0
-        };
-        tokio::select! {
-            ended = spinner.spin() => panic!("the spinner ended: {ended:?}"),
-            answer = tokio::time::timeout(Duration::from_secs(20), call) => answer.ok(),
-        }
-    });
-    node.stop_spinner();
-    answer
-}
-
-/// As [`first_call`], in the mapping of `rmw_fastrtps_cpp`; there has to be an answer.
-fn enhanced<Request, Response>(name: &str, service: &str, kind: (&str, &str), request: Request) -> Response
-where
-    Request: Serialize + DeserializeOwned + Clone + 'static,
-    Response: Serialize + DeserializeOwned + 'static,
-{
-    first_call(ServiceMapping::Enhanced, name, service, kind, request).unwrap_or_else(|| panic!("{service}: no answer"))
 }
 
 #[test]
