@@ -79,7 +79,7 @@ fn measure(benches: usize) {
         subscribers: 1,
         alerts: true,
         cues: false,
-        stage: stage(1, 0, &scene.motion),
+        stage: stage(1, 0, &scene.motion, &show),
     };
     let mut publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");
     let subscription = Subscription::new(&name, Wake::Never).expect("the publisher has taken this name");
