@@ -81,7 +81,7 @@ fn measure(benches: usize) {
     let mut choice = scene.motion.solver(scene.velocities);
     let mut monitor = scene.motion.clearance_monitor(&choice);
     let name = format!("bench_{}_{benches}", std::process::id());
-    let (mut publisher, connection) = publisher_and_subscriber(&name, &scene);
+    let (mut publisher, connection) = publisher_and_subscriber(&name, &scene, &show);
     let mut frame = show.frame(0).clone();
 
     // As many bytes, into samples of a service of the same kind.
@@ -140,7 +140,7 @@ fn measure(benches: usize) {
     row(benches, handles, times);
 }
 
-fn publisher_and_subscriber(name: &str, scene: &Scene) -> (SharedMemoryPublisher, Connection) {
+fn publisher_and_subscriber(name: &str, scene: &Scene, show: &Show) -> (SharedMemoryPublisher, Connection) {
     let config = PublisherConfig {
         name: name.to_owned(),
         handles: scene.team().handles(),
@@ -149,7 +149,7 @@ fn publisher_and_subscriber(name: &str, scene: &Scene) -> (SharedMemoryPublisher
         subscribers: 1,
         alerts: true,
         cues: false,
-        stage: stage(1, 0, &scene.motion),
+        stage: stage(1, 0, &scene.motion, show),
     };
     let publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");
     let subscription = Subscription::new(name, Wake::Never).expect("the publisher has taken this name");
@@ -163,7 +163,7 @@ fn measure_doors() {
     let playback = Playback { start: START, ..Playback::of(&scene) };
     let timeline = scene.motion.timeline(&mut |_| ());
     let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
-    let (mut publisher, connection) = publisher_and_subscriber(&format!("bench_{}_doors", std::process::id()), &scene);
+    let (mut publisher, connection) = publisher_and_subscriber(&format!("bench_{}_doors", std::process::id()), &scene, &show);
     // The outer ends stay: a queue that nobody can fill any more is another one.
     let (mut doors, outer): (Vec<Doors>, Vec<Vec<Door>>) = (0..3)
         .map(|count| {

@@ -9,6 +9,7 @@ mod processes;
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use nix::sys::signal::Signal;
@@ -34,7 +35,7 @@ fn publisher(name: &str, arguments: &[&str]) -> Process {
     let mut command = program(name);
     command.args(["--scene", scene.to_str().unwrap(), "run", "--quiet", "--json", "--rate", "50"]);
     let publisher = Process::start(command.args(arguments));
-    for _ in 0..300 {
+    for _ in 0..600 {
         if state(name).is_some() {
             return publisher;
         }
@@ -307,15 +308,19 @@ fn pages_of_ones_own_are_served_and_nothing_beside_them() {
     assert!(text(&refused.stderr).contains("--pages /nowhere"), "{}", text(&refused.stderr));
 }
 
+/// Chromium takes a core by itself.
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+
 fn in_a_browser(scenario: &str) {
     if !can_run(chromium().and_then(|()| python_modules(&["playwright"]))) {
         return;
     }
+    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let scene = cued_scene(scenario);
     let program = env!("CARGO_BIN_EXE_bench-dragon");
     let arguments =
         ["tests/python/conduct_page.py", scenario, program, &unique(&scenario[..6]), scene.to_str().unwrap()];
-    let output = Process::start(python().args(arguments)).output_within(150);
+    let output = Process::start(python().args(arguments)).output_within(320);
     assert!(output.status.success(), "{}", text(&output.stderr));
 }
 

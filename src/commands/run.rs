@@ -297,7 +297,7 @@ impl RunSession<'_> {
                 eprintln!("{:>10.3} s  {style}{:<11}{style:#} {sentence}", alert.sim_time, level.name());
             }
             Announcement::Cue(cue) => {
-                eprintln!("{:>10.3} s  {}", cue.sim_time, cue_sentence(&cue));
+                eprintln!("{:>10.3} s  {}", cue.sim_time, cue_sentence(cue));
             }
         }
     }

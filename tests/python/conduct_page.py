@@ -19,7 +19,7 @@ import time
 from playwright.sync_api import sync_playwright
 
 # Nothing here may wait for ever; an alarm still lets everything that was started be ended.
-WATCHDOG = 120
+WATCHDOG = 300
 CONTACT = 412.473837682115
 
 _, SCENARIO, PROGRAM, NAME, SCENE = sys.argv
@@ -69,7 +69,7 @@ def opened(browser, url):
     return page
 
 
-def until(condition, what, seconds=30):
+def until(condition, what, seconds=60):
     """The value of a condition as soon as it is true."""
     deadline = time.monotonic() + seconds
     while not (value := condition()):

@@ -20,7 +20,7 @@ import threading
 import time
 
 # Nothing here may wait for ever; an alarm still lets everything that was started be ended.
-WATCHDOG = 90
+WATCHDOG = 200
 LEFT, RIGHT = "\x1b[D", "\x1b[C"
 
 _, SCENARIO, PROGRAM, NAME, SCENE = sys.argv
@@ -44,7 +44,7 @@ def state():
     return json.loads(asked.stdout) if asked.returncode == 0 else None
 
 
-def until(condition, what, seconds=30):
+def until(condition, what, seconds=60):
     deadline = time.monotonic() + seconds
     while not (value := condition()):
         assert time.monotonic() < deadline, f"{what}: not within {seconds} s; the show: {state()}"
