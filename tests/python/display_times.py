@@ -2,11 +2,14 @@
 
     display_times.py --transport iceoryx2|ros2 --name NAME --seconds S --delay D
 
-Prints a JSON line with the simulated time, the places and the headings for each moment.
+Prints a JSON line for each moment of the S seconds after the first frame: the simulated time, that between the frames on
+both sides of it, which is longer where the publisher skipped some, the places and the headings.
 """
 
 import argparse
+import bisect
 import json
+import math
 import pathlib
 import random
 import sys
@@ -16,6 +19,10 @@ sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "
 
 import hermite  # noqa: E402
 import ros2_display  # noqa: E402
+
+
+# Nothing here waits for ever.
+WATCHDOG = 100.0
 
 
 def ros2_frames(name, seconds):
@@ -42,15 +49,22 @@ def main():
     parser.add_argument("--delay", type=float, required=True)
     arguments = parser.parse_args()
     frames = {"iceoryx2": hermite.frames, "ros2": ros2_frames}[arguments.transport]
-    chance, reader, count = random.Random(7), hermite.HermiteReader(), 0
-    for frame in frames(arguments.name, arguments.seconds):
+    shown, chance, reader, count, end = [], random.Random(7), hermite.HermiteReader(), 0, math.inf
+    for frame in frames(arguments.name, WATCHDOG):
+        if time.monotonic() >= end:
+            break
         if frame is not None:
             reader.push(*frame)
+            shown.append(float(frame[0].sim_time))
             count += 1
+            if count == 1:
+                end = time.monotonic() + arguments.seconds
         elif count > 2:
             time.sleep(chance.uniform(0.001, 0.02))
             moment, handles = reader.at(time.monotonic_ns() - int(1e9 * arguments.delay))
-            line = {"time": float(moment)} | {field: handles[field].tolist() for field in ("x", "y", "heading")}
+            after = min(max(bisect.bisect(shown, moment), 1), count - 1)
+            line = {"time": float(moment), "interval": shown[after] - shown[after - 1]}
+            line |= {field: handles[field].tolist() for field in ("x", "y", "heading")}
             print(json.dumps(line))
         else:
             time.sleep(0.001)
