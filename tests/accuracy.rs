@@ -17,7 +17,7 @@ use bench_dragon::solve::selection::{self, EXACT_LINKS, Selection};
 use bench_dragon::solve::table::Instructions;
 use bench_dragon::solve::{Chain, Solver, Velocities};
 use proptest::prelude::*;
-use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use proptest::test_runner::{Config, TestRunner};
 
 /// From the strongest to the weakest, metres.
 const WISHES: [f64; 7] = [1e-18, 1e-12, 1e-9, 1e-7, 1e-6, 1e-4, 1e-2];
@@ -226,7 +226,7 @@ fn motions() -> impl Strategy<Value = Motion> {
 fn random_paths_keep_every_wish() {
     let config = Config { cases: 60, failure_persistence: None, ..Config::default() };
     let tables = std::cell::Cell::new(0);
-    TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha))
+    TestRunner::new(config)
         .run(&motions(), |motion| {
             let end = motion.timeline_without_contact().end().time;
             if end > 0.0 {

@@ -26,7 +26,7 @@ fn observer(place: &Place) -> (Process, Lines) {
 /// What an observer has seen when it is stopped.
 fn observed((process, lines): &(Process, Lines)) -> Value {
     process.signal(SIGTERM);
-    serde_json::from_str(lines.rest(20).last().unwrap()).unwrap()
+    serde_json::from_str(lines.rest(300).last().unwrap()).unwrap()
 }
 
 fn number(value: &Value, key: &str) -> u64 {
@@ -64,7 +64,7 @@ fn killed_subscribers_take_nothing_with_them() {
     let place = Place::new("kills");
     let publisher = Process::start(place.program().args(["run", "--json", "--rate", "200"]));
     let steady = observer(&place);
-    steady.1.until("\"status\":{", 20);
+    steady.1.until("\"status\":{", 300);
     let kills = if long() { 1000 } else { 20 };
     for kill in 0..kills {
         let victim = Process::start(place.program().args(["watch", "--json"]));
@@ -72,14 +72,14 @@ fn killed_subscribers_take_nothing_with_them() {
         wait(0.015 * f64::from(kill % 20));
         victim.signal(SIGKILL);
     }
-    let late = Process::start(place.program().args(["watch", "--json", "--duration", "2"])).output_within(20);
+    let late = Process::start(place.program().args(["watch", "--json", "--duration", "2"])).output_within(300);
     assert!(number(json_lines(&late).last().unwrap(), "received") > 0);
     publisher.signal(SIGINT);
-    let summary = summary(&publisher.output_within(20));
+    let summary = summary(&publisher.output_within(300));
     assert_nothing_lost(&observed(&steady), &summary);
     // What was killed half way stays untouched for two seconds: it could be alive and slow.
     wait(2.5);
-    Process::start(place.program().args(["watch", "--duration", "3"])).output_within(20);
+    Process::start(place.program().args(["watch", "--duration", "3"])).output_within(300);
     place.assert_clean();
 }
 
@@ -90,7 +90,7 @@ fn subscribers_survive_killed_publishers() {
     let outputs = monitors.each_mut().map(Process::lines);
     let steady = observer(&place);
     let start = || Process::start(place.program().args(["run", "--json", "--rate", "100"]));
-    let all_print = |what: &str| outputs.each_ref().map(|lines| lines.until(what, 20));
+    let all_print = |what: &str| outputs.each_ref().map(|lines| lines.until(what, 300));
     let rounds = if long() { 100 } else { 5 };
     let mut longest = Duration::ZERO;
     for _ in 0..rounds {
@@ -107,14 +107,14 @@ fn subscribers_survive_killed_publishers() {
     all_print("is running");
     all_print("missed 0");
     last.signal(SIGINT);
-    summary(&last.output_within(20));
+    summary(&last.output_within(300));
     all_print("has ended");
     let seen = observed(&steady);
     assert_nothing_wrong(&seen);
     assert_eq!(number(&seen, "runs"), rounds + 1, "{seen}");
     for (monitor, lines) in monitors.iter().zip(&outputs) {
         monitor.signal(SIGTERM);
-        lines.rest(20);
+        lines.rest(300);
     }
     place.assert_clean();
 }
@@ -123,9 +123,9 @@ fn subscribers_survive_killed_publishers() {
 fn files_of_dead_runs_are_gone_after_the_next() {
     let place = Place::new("dead");
     let mut first = Process::start(place.program().args(["run", "--rate", "100"]));
-    observer(&place).1.until("\"status\":{", 20);
+    observer(&place).1.until("\"status\":{", 300);
     first.signal(SIGKILL);
-    first.lines().rest(20);
+    first.lines().rest(300);
     assert!(place.left_behind().len() > 5, "a killed publisher leaves files");
     for start in 0..20 {
         let killed = Process::start(place.program().args(["run", "--rate", "100"]));
@@ -135,7 +135,7 @@ fn files_of_dead_runs_are_gone_after_the_next() {
     }
     // What was killed half way stays untouched for two seconds: it could be alive and slow.
     wait(2.5);
-    summary(&Process::start(place.program().args(["run", "--json", "--duration", "3"])).output_within(20));
+    summary(&Process::start(place.program().args(["run", "--json", "--duration", "3"])).output_within(300));
     place.assert_clean();
 }
 
@@ -150,12 +150,12 @@ fn a_stepped_wall_clock_moves_the_stamps_and_nothing_else() {
         stepped(&[&["run", "--json", "--rate", "100", "--duration", "6"][..], &alert_every_second].concat());
     let monitor = stepped(&["watch", "--json", "--duration", "5"]);
     let steady = observer(&place);
-    let summary = summary(&publisher.output_within(30));
+    let summary = summary(&publisher.output_within(300));
     // An hour that counted would be 360,000 periods one way, and a run that does not end the other.
     assert_eq!(number(&summary, "frames") + number(&summary, "skipped"), 600, "{summary}");
     assert!(number(&summary, "skipped") < 300, "{summary}");
     assert_nothing_lost(&observed(&steady), &summary);
-    let lines = json_lines(&monitor.output_within(20));
+    let lines = json_lines(&monitor.output_within(300));
     let latencies = lines.iter().filter_map(|line| line["latency_ns"]["max"].as_u64());
     assert!(latencies.max().is_some_and(|longest| longest < 3_000_000_000_000), "{lines:?}");
     // The steps did reach the publisher: its stamps, which are the wall clock's, are an hour ahead and behind.
@@ -172,15 +172,15 @@ fn a_stopped_publisher_skips_whole_periods_and_catches_nothing_up() {
     let place = Place::new("stopped");
     let publisher = Process::start(place.program().args(["run", "--json", "--rate", "100", "--duration", "8"]));
     let steady = observer(&place);
-    steady.1.until("\"status\":{", 20);
+    steady.1.until("\"status\":{", 300);
     publisher.signal(SIGSTOP);
     wait(5.0);
     publisher.signal(SIGCONT);
-    let summary = summary(&publisher.output_within(30));
+    let summary = summary(&publisher.output_within(300));
     assert_eq!(number(&summary, "frames") + number(&summary, "skipped"), 800, "{summary}");
-    // The machine itself may add a stall of a few periods.
-    assert!((498..560).contains(&number(&summary, "skipped")), "{summary}");
-    assert!((1..20).contains(&number(&summary, "overruns")), "{summary}");
+    // One incident of five seconds; the machine itself may add stalls, of a period each at the least.
+    let [skipped, overruns] = ["skipped", "overruns"].map(|key| number(&summary, key));
+    assert!(skipped >= 498 && overruns >= 1 && overruns - 1 <= skipped - 498, "{summary}");
     assert!(number(&summary["wakeup_ns"], "max") > 4_900_000_000, "{summary}");
     let seen = observed(&steady);
     assert_nothing_lost(&seen, &summary);
@@ -198,11 +198,11 @@ fn of_publishers_that_race_for_a_name_one_wins() {
         if round == 3 {
             // From here on they also find what a dead one left.
             let doomed = Process::start(place.program().args(["run", "--rate", "100"]));
-            observer(&place).1.until("\"status\":{", 20);
+            observer(&place).1.until("\"status\":{", 300);
             doomed.signal(SIGKILL);
         }
         let start = || Process::start(place.program().args(["run", "--json", "--duration", "2"]));
-        let outputs = [start(), start(), start()].map(|racer| racer.output_within(30));
+        let outputs = [start(), start(), start()].map(|racer| racer.output_within(300));
         let (winners, losers): (Vec<_>, Vec<_>) = outputs.iter().partition(|output| output.status.success());
         assert_eq!(winners.len(), 1, "round {round}: {outputs:?}");
         assert_eq!(number(&summary(winners[0]), "frames") + number(&summary(winners[0]), "skipped"), 120);
@@ -225,9 +225,9 @@ fn one_subscriber_too_many_is_told_the_limit_and_the_setting() {
         let publisher = Process::start(&mut run);
         let mut admitted: Vec<_> = (0..limit).map(|_| observer(&place)).collect();
         for subscriber in &admitted {
-            subscriber.1.until("\"status\":{", 20);
+            subscriber.1.until("\"status\":{", 300);
         }
-        let watch = || Process::start(place.program().args(["watch", "--json", "--duration", "2"])).output_within(20);
+        let watch = || Process::start(place.program().args(["watch", "--json", "--duration", "2"])).output_within(300);
         let printed = refusal(&watch());
         assert!(
             printed.contains(&format!("{limit} subscribers")) && printed.contains("publish.subscribers"),
@@ -237,7 +237,7 @@ fn one_subscriber_too_many_is_told_the_limit_and_the_setting() {
         let next = watch();
         assert!(number(json_lines(&next).last().unwrap(), "received") > 0, "{}", text(&next.stderr));
         publisher.signal(SIGINT);
-        let summary = summary(&publisher.output_within(20));
+        let summary = summary(&publisher.output_within(300));
         for subscriber in &admitted {
             assert_nothing_lost(&observed(subscriber), &summary);
         }
@@ -265,7 +265,7 @@ fn with_shared_memory(size: &str, script: &str) -> Output {
     let place = Place::new("small");
     let mut command = in_small_shared_memory(size, script);
     command.current_dir(place.folder()).env("PROGRAM", env!("CARGO_BIN_EXE_bench-dragon"));
-    Process::start(&mut command).output_within(60)
+    Process::start(&mut command).output_within(300)
 }
 
 #[test]
@@ -313,7 +313,7 @@ fn a_page_that_cannot_be_had_is_a_sentence() {
     wait(0.5);
     // What Linux sends where a page of a full /dev/shm is written.
     monitor.signal(SIGBUS);
-    assert!(refusal(&monitor.output_within(20)).contains("/dev/shm is full"));
+    assert!(refusal(&monitor.output_within(300)).contains("/dev/shm is full"));
 }
 
 #[test]
@@ -321,7 +321,7 @@ fn without_ros2_there_is_no_network_socket() {
     let place = Place::new("sockets");
     let publisher = Process::start(place.program().args(["run", "--json"]));
     let steady = observer(&place);
-    steady.1.until("\"status\":{", 20);
+    steady.1.until("\"status\":{", 300);
     let protocols = ["tcp", "tcp6", "udp", "udp6", "raw", "raw6", "udplite", "udplite6", "packet"];
     let tables = protocols.iter().filter_map(|protocol| std::fs::read_to_string(format!("/proc/net/{protocol}")).ok());
     let tables: Vec<String> = tables.collect();
@@ -349,7 +349,7 @@ fn another_user_is_kept_out_or_let_in_as_the_build_allows() {
     }
     let place = Place::new("users");
     let publisher = Process::start(place.program().args(["run", "--json", "--rate", "100"]));
-    observer(&place).1.until("\"status\":{", 20);
+    observer(&place).1.until("\"status\":{", 300);
     let shared = std::fs::read_dir("/dev/shm").unwrap().flatten();
     let modes: BTreeSet<_> = shared
         .filter(|file| {
@@ -369,5 +369,5 @@ fn another_user_is_kept_out_or_let_in_as_the_build_allows() {
         assert!(printed.contains("another user"), "{printed}");
     }
     publisher.signal(SIGINT);
-    summary(&publisher.output_within(20));
+    summary(&publisher.output_within(300));
 }

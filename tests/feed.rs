@@ -35,7 +35,7 @@ fn poll(feed: &mut Feed, seen: &mut Vec<Seen>) {
 }
 
 fn poll_until(feed: &mut Feed, seen: &mut Vec<Seen>, condition: impl Fn(&[Seen]) -> bool) {
-    let deadline = Instant::now() + Duration::from_secs(20);
+    let deadline = Instant::now() + Duration::from_secs(300);
     while !condition(seen) {
         assert!(Instant::now() < deadline, "{seen:?}");
         poll(feed, seen);
@@ -73,9 +73,12 @@ fn a_publisher_restarted_between_two_polls_is_a_new_run() {
         let mut seen = Vec::new();
         let first = publisher(&name, &["--rate", "100", "--duration", "2"]);
         poll_until(&mut feed, &mut seen, |seen| seen.len() > 10);
-        let published = summary(&first.output_within(20))["frames"].as_u64().unwrap();
+        let published = summary(&first.output_within(300))["frames"].as_u64().unwrap();
         let second = publisher(&name, &["--rate", "100"]);
-        wait(1.5);
+        // The feed is not polled until the second one publishes, which another process sees.
+        let mut monitor = Process::start(program(&name).args(["watch", "--json"]));
+        monitor.lines().until("\"state\":\"moving\"", 300);
+        drop(monitor);
         poll_until(&mut feed, &mut seen, |seen| runs(seen).len() > 1 && seen.len() > 20);
         second.signal(SIGKILL);
         poll_until(&mut feed, &mut seen, |seen| seen.contains(&Seen::Gone));

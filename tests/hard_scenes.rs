@@ -37,9 +37,9 @@ fn newton(scene: &Scene) -> Newton {
     Newton::new(scene.motion.path().clone(), *scene.team(), 1.0, Velocities::Computed)
 }
 
-/// What the program prints within a minute, which is a deadline for hanging and no measure of speed.
+/// What the program prints within ten minutes, which is a deadline for hanging and no measure of speed.
 fn answer(arguments: &[&str]) -> (i32, String, String) {
-    let output = Process::start(Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(arguments)).output_within(60);
+    let output = Process::start(Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(arguments)).output_within(600);
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
 }

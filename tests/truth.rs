@@ -1,31 +1,13 @@
-//! The reference against figures computed with 50 digits, and the paper's solver against its printed tables.
+//! The paper's solver against its printed tables, and against its own model's limit computed with 50 digits.
 
-use bench_dragon::model::description::PathDescription;
+#[path = "truth/tables.rs"]
+mod tables;
+
 use bench_dragon::model::path::Path;
 use bench_dragon::model::team::Team;
 use bench_dragon::solve::paper::{Paper, PaperRules};
-use bench_dragon::solve::reference::Reference;
 use bench_dragon::solve::{Chain, Solver, Velocities};
-
-/// One row of a 50-digit table.
-struct Row {
-    time: f64,
-    handle: usize,
-    x: f64,
-    y: f64,
-    speed: f64,
-}
-
-/// The table of a CSV file with the columns t_s, handle, theta_rad, x_m, y_m, speed_m_s.
-fn table(text: &str) -> Vec<Row> {
-    text.lines()
-        .skip(1)
-        .map(|line| {
-            let fields: Vec<f64> = line.split(',').map(|field| field.parse().unwrap()).collect();
-            Row { time: fields[0], handle: fields[1] as usize, x: fields[3], y: fields[4], speed: fields[5] }
-        })
-        .collect()
-}
+use tables::{Row, table};
 
 fn paper_team() -> Team {
     Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 }
@@ -136,24 +118,5 @@ fn paper_tends_to_the_limit_of_its_own_model() {
     let rows = table(include_str!("truth/paper_scene_as_printed_model.csv"));
     for (time, position, _) in errors(&mut paper_solver(), &rows) {
         assert!(position < 1.5e-5, "t = {time} s: {position:e} m");
-    }
-}
-
-#[test]
-fn the_reference_agrees_with_50_digits() {
-    let rows = table(include_str!("truth/paper_scene_exact.csv"));
-    let description = PathDescription::Spiral { pitch: 0.55, start_turn: 16.0 };
-    let mut reference = Reference::new(paper_team(), &description, 1.0).unwrap();
-    for rows in rows.chunk_by(|a, b| a.time == b.time) {
-        let handles = reference.handles(rows[0].time).unwrap();
-        for row in rows {
-            let handle = &handles[row.handle];
-            // The table was made from decimal lengths and times; the doubles nearest to them move a handle so far,
-            // the faster it goes the further.
-            let error = handle.x.error_of(row.x).hypot(handle.y.error_of(row.y));
-            assert!(error < 6e-14 * row.speed.abs().max(1.0), "t = {} s, handle {}: {error:e} m", row.time, row.handle);
-            let bound = if row.time < 430.0 { 1e-14 } else { 1e-11 };
-            assert!(((handle.speed - row.speed) / row.speed).abs() < bound, "{} {}", row.time, row.handle);
-        }
     }
 }

@@ -3,7 +3,8 @@
 use bench_dragon::motion::event::EventKind;
 use serde_json::Value;
 
-use crate::scenes::{SceneFile, assert_keys, numbers, same_bits, scene, scenes};
+use crate::processes::{Process, text};
+use crate::scenes::{DEADLINE, SceneFile, assert_keys, numbers, program, same_bits, scene, scenes};
 
 const KINDS: [&str; 4] = ["contact", "stall", "lock", "path_end"];
 
@@ -76,8 +77,8 @@ fn events_of_the_paper_scene_are_the_known_ones() {
         }
     }
     // Without --scene it is the paper's, which is built in.
-    let built_in = crate::processes::Process::start(crate::scenes::program().args(["events", "--json"]));
-    let built_in = crate::processes::text(&built_in.output_within(crate::scenes::DEADLINE).stdout);
+    let built_in = Process::start(program().args(["events", "--json"]));
+    let built_in = text(&built_in.output_within(DEADLINE).stdout);
     assert_eq!(built_in, scene("paper").answer(&["events", "--json"]));
 }
 
@@ -178,8 +179,28 @@ fn check_states_what_each_scene_models() {
         for event in scene.answer(&["events"]).lines().filter(|line| line.contains(" t = ") && line.contains(" s: ")) {
             assert!(text.lines().any(|line| line.trim_start() == event.trim_start()), "no {event} in {text}");
         }
-        assert!(line("The least clearance").contains(" m, at t = "), "{text}");
+        let least = line("The least clearance");
+        let figure = |mark: &str| -> f64 {
+            least.split(mark).next().and_then(|before| before.split_whitespace().last()).unwrap().parse().unwrap()
+        };
+        let (metres, time) = (figure(" m, at t ="), figure(" s, between"));
+        let contact = scene.json(&["events"]).into_iter().find(|event| event["event"] == "contact");
+        let stops =
+            scene.content.contains_key("alerts") && scene.content["motion"]["on_contact"].as_str() != Some("continue");
+        match contact.filter(|_| stops) {
+            // The show freezes where boards touch: nothing of it is nearer.
+            Some(contact) => {
+                let at = contact["time"].as_f64().unwrap();
+                assert!(metres.abs() < 1e-9 && (time - at).abs() < 1e-9, "{}: {least}", scene.name);
+            }
+            None => assert!(metres > 0.0, "{}: {least}", scene.name),
+        }
+        let at_contact = line("At a contact the show ");
+        assert!(at_contact.starts_with(if stops { "freezes" } else { "continues" }), "{at_contact}");
     }
+    let noalerts = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/noalerts.toml");
+    let text = text(&Process::start(program().args(["check", "--scene", noalerts])).output_within(DEADLINE).stdout);
+    assert!(text.contains("At a contact the show continues, unnoticed;"), "{text}");
 }
 
 /// The event of that kind, as the library has it.

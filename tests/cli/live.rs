@@ -123,7 +123,7 @@ fn two_seconds_of_every_scene_are_published_and_watched() {
         });
         for (scene, place, mut monitor, publisher) in started.collect::<Vec<_>>() {
             let lines = monitor.lines();
-            let summary = summary(&publisher.output_within(60));
+            let summary = summary(&publisher.output_within(300));
             let periods = (2.01 * scene.number("publish", "rate")).ceil() as u64;
             assert_summary(&summary, periods, "duration", speaks_ros2(scene));
             // The second in which the publisher ended is over when the next one is without it.
@@ -132,10 +132,10 @@ fn two_seconds_of_every_scene_are_published_and_watched() {
                 watched.iter().any(|line| line.contains("moving")) && watched.last().unwrap().contains("waiting")
             };
             while !ended(&watched) {
-                watched.push(lines.until("{", 20));
+                watched.push(lines.until("{", 300));
             }
             monitor.signal(SIGTERM);
-            watched.extend(lines.rest(20));
+            watched.extend(lines.rest(300));
             let watched: Vec<Value> = watched.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
             assert_watched(scene, &watched);
             place.assert_clean();
@@ -153,10 +153,41 @@ fn the_command_line_overrides_the_rate_of_the_file() {
         (&["--duration", "0.51", "--rate", "25"], 13),
         (&["--rate", "1000", "--duration", "0.5"], 500),
         (&["--rate", "0.5", "--duration", "0.01s"], 1),
+        (&["--rate", "100", "--duration", "0.01m"], 60),
+        (&["--rate", "100", "--duration", "0.0001h"], 36),
     ] {
-        let output = Process::start(publisher(&place, &scene).args(arguments)).output_within(60);
+        let output = Process::start(publisher(&place, &scene).args(arguments)).output_within(300);
         assert_summary(&summary(&output), periods, "duration", false);
     }
+}
+
+/// Two boards that overlap at the start, a cue whose event never happens, and a countdown in wall time.
+#[test]
+fn a_person_is_told_what_lies_ahead() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = Place::new("cli_told");
+    let printed = |scene: &SceneFile, arguments: &[&str]| {
+        let mut command = place.program();
+        command.arg("--scene").arg(&scene.path).args(["run", "--duration", "0.3"]).args(arguments);
+        let output = Process::start(&mut command).output_within(300);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        text(&output.stderr)
+    };
+    let crowded = printed(&scene("school").with(&folder, "path", "pitch", 0.28), &[]);
+    assert!(crowded.contains("boards overlap at the start"), "{crowded}");
+
+    let school = scene("school");
+    let cue = "name = \"never\"\nbefore = \"path_end\"".parse::<toml::Table>().unwrap();
+    let school = school.with(&folder, "", "cues", vec![toml::Value::from(cue)]);
+    let contact = school.json(&["events"])[0]["time"].as_f64().unwrap();
+    let start = (contact - 8.0).to_string();
+    let told = printed(&school, &["--start", &start, "--time-scale", "4"]);
+    assert!(told.contains("cue \"never\" has no time in this show"), "{told}");
+    assert!(!told.contains("overlap at the start") && told.contains("4 simulated seconds per second"), "{told}");
+    let line = told.lines().find(|line| line.contains("approaching")).unwrap_or_else(|| panic!("{told}"));
+    let before = |mark: &str| line.split(mark).next().unwrap().split_whitespace().last().unwrap().parse::<f64>();
+    let (simulated, wall) = (before(" s  approaching").unwrap(), before(" s; nearest").unwrap());
+    assert!((wall - (contact - simulated) / 4.0).abs() <= 0.051, "{line}: the contact is at {contact} s");
 }
 
 #[test]
@@ -166,15 +197,15 @@ fn signals_end_both_ends_with_exit_code_0_and_whole_lines() {
         let publisher = Process::start(publisher(&place, &scene).args(["--rate", "200"]));
         let mut monitor = Process::start(place.program().args(["--json", "watch"]));
         let lines = monitor.lines();
-        lines.until("\"moving\"", 20);
+        lines.until("\"moving\"", 300);
         publisher.signal(signal);
-        assert_summary(&summary(&publisher.output_within(20)), 0, "signal", false);
-        lines.until("\"waiting\"", 20);
+        assert_summary(&summary(&publisher.output_within(300)), 0, "signal", false);
+        lines.until("\"waiting\"", 300);
         monitor.signal(signal);
-        for line in lines.rest(20) {
+        for line in lines.rest(300) {
             serde_json::from_str::<Value>(&line).unwrap();
         }
-        let output = monitor.output_within(20);
+        let output = monitor.output_within(300);
         assert_eq!((output.status.code(), text(&output.stderr).as_str()), (Some(0), ""));
     }
 }
@@ -187,7 +218,7 @@ fn a_name_before_or_after_the_subcommand_is_the_services_name() {
     before.args(["--name", "lion", "--scene"]).arg(&scene.path).args(["run", "--json", "--duration", "20"]);
     let lion = Process::start(&mut before);
     let watch = |arguments: &[&str]| {
-        json_lines(&Process::start(place.program().args(["watch", "--json"]).args(arguments)).output_within(30))
+        json_lines(&Process::start(place.program().args(["watch", "--json"]).args(arguments)).output_within(300))
     };
     let heard = watch(&["--duration", "3", "--name", "lion"]);
     assert!(number(heard.last().unwrap(), "received") > 0, "{heard:?}");
@@ -196,11 +227,11 @@ fn a_name_before_or_after_the_subcommand_is_the_services_name() {
     // A second publisher of that name, named after the subcommand, is turned away.
     let mut after = place.program();
     after.args(["run", "--json", "--duration", "1", "--name", "lion", "--scene"]).arg(&scene.path);
-    let output = Process::start(&mut after).output_within(30);
+    let output = Process::start(&mut after).output_within(300);
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
     assert!(text(&output.stderr).contains("lion"), "{}", text(&output.stderr));
     lion.signal(SIGINT);
-    assert_eq!(summary(&lion.output_within(20))["end"], "signal");
+    assert_eq!(summary(&lion.output_within(300))["end"], "signal");
 }
 
 #[test]
@@ -213,7 +244,7 @@ fn watch_ends_quietly_when_nobody_reads_it() {
             if both {
                 monitor.close_stderr();
             }
-            let output = monitor.output_within(20);
+            let output = monitor.output_within(300);
             assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", text(&output.stderr));
         }
     }

@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::processes::{Process, text};
 
 /// A deadline for hanging, not for slowness, seconds.
-pub const DEADLINE: u64 = 120;
+pub const DEADLINE: u64 = 600;
 
 /// A scene file and its content.
 pub struct SceneFile {

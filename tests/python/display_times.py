@@ -1,11 +1,13 @@
 """Interpolates a publisher's frames at random moments of display, as the examples for Python do.
 
-    display_times.py --transport iceoryx2|ros2 --name NAME --seconds S --delay D
+    display_times.py --transport iceoryx2|ros2 --name NAME --moments N --delay D
 
-Prints a JSON line with the simulated time, the places and the headings for each moment.
+Prints a JSON line for each moment until N of them were between two frames: the simulated time, that between the frames on
+both sides of it, which is longer where the publisher skipped some, the places and the headings.
 """
 
 import argparse
+import bisect
 import json
 import pathlib
 import random
@@ -16,6 +18,10 @@ sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "
 
 import hermite  # noqa: E402
 import ros2_display  # noqa: E402
+
+
+# Nothing here waits for ever.
+WATCHDOG = 250.0
 
 
 def ros2_frames(name, seconds):
@@ -38,19 +44,25 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--transport", choices=["iceoryx2", "ros2"], required=True)
     parser.add_argument("--name", required=True)
-    parser.add_argument("--seconds", type=float, required=True)
+    parser.add_argument("--moments", type=int, required=True)
     parser.add_argument("--delay", type=float, required=True)
     arguments = parser.parse_args()
     frames = {"iceoryx2": hermite.frames, "ros2": ros2_frames}[arguments.transport]
-    chance, reader, count = random.Random(7), hermite.HermiteReader(), 0
-    for frame in frames(arguments.name, arguments.seconds):
+    shown, chance, reader, count, between = [], random.Random(7), hermite.HermiteReader(), 0, 0
+    for frame in frames(arguments.name, WATCHDOG):
+        if between >= arguments.moments:
+            break
         if frame is not None:
             reader.push(*frame)
+            shown.append(float(frame[0].sim_time))
             count += 1
         elif count > 2:
             time.sleep(chance.uniform(0.001, 0.02))
             moment, handles = reader.at(time.monotonic_ns() - int(1e9 * arguments.delay))
-            line = {"time": float(moment)} | {field: handles[field].tolist() for field in ("x", "y", "heading")}
+            between += moment not in shown
+            after = min(max(bisect.bisect(shown, moment), 1), count - 1)
+            line = {"time": float(moment), "interval": shown[after] - shown[after - 1]}
+            line |= {field: handles[field].tolist() for field in ("x", "y", "heading")}
             print(json.dumps(line))
         else:
             time.sleep(0.001)

@@ -3,13 +3,15 @@
     transport_peer.py --transport iceoryx2|ros2 --name NAME --seconds S
 
 Prints a JSON line for every frame, alert, stage and status, in the order in which it takes them, and one at the end.
-It may be started before the publisher, and stays while publishers come and go.
+It may be started before the publisher, and stays while publishers come and go; after SIGTERM, until the last of them has
+gone and all that it sent is taken.
 """
 
 import argparse
 import json
 import math
 import pathlib
+import signal
 import sys
 import time
 
@@ -109,10 +111,15 @@ def main():
     parser.add_argument("--name", required=True)
     parser.add_argument("--seconds", type=float, required=True)
     arguments = parser.parse_args()
+    told = []
+    signal.signal(signal.SIGTERM, lambda *_: told.append(True))
     peer = {"iceoryx2": Iceoryx2, "ros2": Ros2}[arguments.transport](arguments.name)
     print(json.dumps({"type": "ready"}), flush=True)
     end = time.monotonic() + arguments.seconds
-    while time.monotonic() < end:
+    over = False
+    while not over:
+        # Looked at before what is left is taken.
+        over = time.monotonic() >= end or (bool(told) and peer.publishers() == 0)
         for kind, message, handles, count in peer.take():
             line = {"type": kind} | {field: getattr(message, field) for field in FIELDS[kind]}
             if kind == "frame":

@@ -7,7 +7,7 @@ use parry2d_f64::math::Pose;
 use parry2d_f64::query;
 use parry2d_f64::shape::Cuboid;
 use proptest::prelude::*;
-use proptest::test_runner::{RngAlgorithm, TestRng};
+use proptest::test_runner::TestRunner;
 
 fn board(x: f64, y: f64, heading: f64, half_length: f64, half_width: f64) -> Board {
     Board { centre: Point::new(x, y), axis: Vector::new(heading.cos(), heading.sin()), half_length, half_width }
@@ -76,7 +76,7 @@ fn compare(a: &Board, b: &Board, size: f64) -> bool {
 fn parry_agrees_on_random_pairs() {
     // A million take seconds optimised.
     let pairs = if cfg!(debug_assertions) { 50_000 } else { 1_000_000 };
-    let mut random = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
+    let mut random = TestRunner::default().new_rng();
     let mut unit = || random.next_u64() as f64 / u64::MAX as f64;
     let (mut overlapping, mut apart) = (0, 0);
     for k in 0..pairs {

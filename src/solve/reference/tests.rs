@@ -1,6 +1,10 @@
 //! The reference against tables of 50 digits, against itself, and against the safe solver in doubles.
 
+#[path = "../../../tests/truth/tables.rs"]
+mod tables;
+
 use proptest::prelude::*;
+use tables::{Row, table};
 
 use super::path::Curve;
 use super::real::{Functions, RealVector};
@@ -40,25 +44,6 @@ fn length(vector: &RealVector) -> Real {
     vector.dot(vector).sqrt()
 }
 
-/// One row of a table of 50 digits.
-struct Row {
-    time: f64,
-    handle: usize,
-    x: f64,
-    y: f64,
-    speed: f64,
-}
-
-/// The rows of a table whose x, y and speed begin in a column.
-fn table(text: &str, column: usize) -> Vec<Row> {
-    let row = |line: &str| {
-        let fields: Vec<f64> = line.split(',').map(|field| field.parse().unwrap()).collect();
-        let [x, y, speed] = fields[column..column + 3] else { panic!("{line}") };
-        Row { time: fields[0], handle: fields[1] as usize, x, y, speed }
-    };
-    text.lines().skip(1).map(row).collect()
-}
-
 /// The largest error of position over the handle's speed, where that is above 1, and of speed, relative, at each time
 /// of a table whose clock begins `before` seconds after the motion.
 fn errors(reference: &mut Reference, rows: &[Row], before: f64) -> Vec<(f64, f64, f64)> {
@@ -76,7 +61,7 @@ fn errors(reference: &mut Reference, rows: &[Row], before: f64) -> Vec<(f64, f64
 
 #[test]
 fn it_agrees_with_50_digits_on_the_papers_scene() {
-    let rows = table(include_str!("../../../tests/truth/paper_scene_exact.csv"), 3);
+    let rows = table(include_str!("../../../tests/truth/paper_scene_exact.csv"));
     let mut reference = Reference::new(team(223), &PAPER, 1.0).unwrap();
     let errors = errors(&mut reference, &rows, 0.0);
     assert_eq!(errors.len(), 11);
@@ -93,7 +78,7 @@ fn it_agrees_with_50_digits_on_the_papers_scene() {
 
 #[test]
 fn it_agrees_with_50_digits_on_the_turnaround() {
-    let rows = table(include_str!("../../../tests/truth/turnaround_table.csv"), 2);
+    let rows = table(include_str!("../../../tests/truth/turnaround_table.csv"));
     let mut reference = Reference::new(team(223), &TURNAROUND, 1.0).unwrap();
     let errors = errors(&mut reference, &rows, 100.0);
     assert_eq!(errors.len(), 6);
