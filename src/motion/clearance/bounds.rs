@@ -146,8 +146,8 @@ impl BoundTable {
         }
         let mut is_fine = vec![false; blocks];
         fine.iter().for_each(|block| is_fine[*block] = true);
-        let is_near = |row: usize| is_fine[row / BLOCK];
-        // One row more has the rear handle of the last board.
+        // The rear handles, too. One row more has that of the last board.
+        let is_near = |row: usize| is_fine[row / BLOCK] || is_fine[row.saturating_sub(1) / BLOCK];
         let end = end_of_near(follower.rows(), is_near, team.link(1), builder.longest_distance()) + 1;
         for cell in 0..CELLS {
             let share = |cell: usize| cell as f64 / CELLS as f64;

@@ -84,7 +84,7 @@ impl<'a> ListBuilder<'a> {
 
     /// Metres between the front handles of two boards that can be in a list together, at most.
     pub(super) fn longest_distance(&self) -> f64 {
-        let from_handle = self.team.link(1) + self.team.hole_inset + self.team.width;
+        let from_handle = self.team.longest_link() + self.team.hole_inset + self.team.width;
         self.farthest + 2.0 * from_handle
     }
 
