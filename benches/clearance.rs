@@ -82,6 +82,13 @@ fn live(bencher: Bencher, (benches, percent): (usize, usize)) {
     run(bencher, monitor(&spiral(), team(benches)), &chains);
 }
 
+/// Large teams, half way to the contact.
+#[divan::bench(args = [20_000, 100_000])]
+fn live_large_team(bencher: Bencher, benches: usize) {
+    let chains = chains(&spiral(), team(benches), at(50), 60.0);
+    run(bencher, monitor(&spiral(), team(benches)), &chains);
+}
+
 /// Metres of travel: in along the spiral, in the turn, and between the lanes that still come in.
 #[divan::bench(args = [50.0, 110.0, 200.0, 300.0, 400.0])]
 fn live_on_the_turnaround(bencher: Bencher, travelled: f64) {
@@ -118,7 +125,7 @@ fn live_on_less_than_a_turn(bencher: Bencher) {
 }
 
 /// What the table of bounds costs once, before the show, with the follower table from which it is made.
-#[divan::bench(args = [223, 1_000, 5_000, 10_000], sample_count = 5, sample_size = 1)]
+#[divan::bench(args = [223, 1_000, 5_000, 10_000, 100_000], sample_count = 5, sample_size = 1)]
 fn make_monitor(benches: usize) -> ClearanceMonitor {
     monitor(&spiral(), team(benches))
 }

@@ -87,6 +87,9 @@ const SINGULARITIES_BUDGET: u64 = 50_000_000;
 /// Units of work after which the search for a contact, or for the least clearance, gives up: about half a minute.
 const CONTACT_BUDGET: u64 = 100_000_000;
 
+/// Metres by which a table of its own may be off where the clearance has to make a coarse one.
+const CLEARANCE_ACCURACY: f64 = 1e-4;
+
 const NO_TABLE: &str = "there is no table for this team and path";
 
 /// What was measured of a table, for people.
@@ -239,13 +242,29 @@ impl Motion {
     /// The live clearance of this motion's frames.
     /// `choice` is the solver of the same frames, whose table it shares.
     pub fn clearance_monitor(&self, choice: &Choice) -> ClearanceMonitor {
-        let made_here = match self.method {
-            Method::Newton => FollowerTable::new(&self.path, self.team, self.head_speed, Velocities::Omitted),
-            Method::Accuracy(_) | Method::FollowerTable | Method::Paper(_) => None,
+        let made_here = match (&choice.table, self.method) {
+            (Some(_), _) | (None, Method::Paper(_)) => None,
+            (None, _) => self.table_for_clearance(),
         };
         match choice.table.as_ref().or(made_here.as_ref()) {
             Some(table) => ClearanceMonitor::new(&self.path, self.team, table),
             None => ClearanceMonitor::without_table(self.team),
+        }
+    }
+
+    /// A table for the clearance of frames that come from another solver: the most exact one, or where that would be too
+    /// large, a coarse one.
+    fn table_for_clearance(&self) -> Option<FollowerTable> {
+        let exact = || FollowerTable::new(&self.path, self.team, self.head_speed, Velocities::Omitted);
+        let coarse = || {
+            let (path, team, speed) = (&self.path, self.team, self.head_speed);
+            selection::cheapest(path, team, speed, Velocities::Omitted, CLEARANCE_ACCURACY).filter(Selection::meets)
+        };
+        let coarse = || coarse().map(|selection| selection.table);
+        match self.method {
+            // There an exact one has been tried.
+            Method::Accuracy(_) | Method::FollowerTable => coarse(),
+            Method::Newton | Method::Paper(_) => exact().or_else(coarse),
         }
     }
 

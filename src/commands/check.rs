@@ -27,16 +27,21 @@ pub fn check(common: &Common) -> Result<(), CommandError> {
         team.hole_inset
     ))?;
     output.line(&format!("  Path: {}; the head moves at {} m/s.", path(&scene.motion), scene.motion.head_speed()))?;
-    output.line(&format!("  Solver: {}.", scene.motion.solver(scene.velocities).reason))?;
+    let choice = scene.motion.solver(scene.velocities);
+    output.line(&format!("  Solver: {}.", choice.reason))?;
     output.line(match scene.velocities {
         Velocities::Computed => "  Velocities: computed for every handle.",
         Velocities::Omitted => "  Velocities: not computed; vx and vy are NaN.",
     })?;
     match scene.alerts {
-        Some(rules) => output.line(&format!(
-            "  Alerts: the clearance of every frame, contact and stall; a warning {} s or {} m ahead.",
-            rules.approach_time, rules.approach_clearance
-        ))?,
+        Some(rules) => {
+            output.line(&format!(
+                "  Alerts: the clearance of every frame, contact and stall; a warning {} s or {} m ahead.",
+                rules.approach_time, rules.approach_clearance
+            ))?;
+            let monitor = scene.motion.clearance_monitor(&choice);
+            output.line(&format!("  Nearest boards of a frame: found {}.", monitor.description()))?;
+        }
         None => output.line(
             "  Alerts: none. `run` computes no rectangle, no clearance, no contact and no stall, and has no alerts \
              service: add an [alerts] table for those.",

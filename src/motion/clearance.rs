@@ -5,7 +5,9 @@
 //! the last bit.
 
 mod bounds;
+mod cells;
 mod grid;
+mod lists;
 mod moving;
 mod search;
 #[cfg(test)]
@@ -115,8 +117,8 @@ const EXACT_LINK_ERROR: f64 = 1e-9;
 
 impl ClearanceMonitor {
     /// A monitor for chains of `team` whose handles are where motion along `path` has them, as far as `table` promises.
-    /// From the table it makes one of its own, in some 15 ms for a way of 500 links and about half a second at most: if
-    /// that is not enough, the monitor does without.
+    /// From the table it makes one of its own, of 128 MB of lists and in some five seconds at most: if that is not enough,
+    /// the monitor does without.
     pub fn new(path: &Path, team: Team, table: &FollowerTable) -> Self {
         let link_error = EXACT_LINK_ERROR.max(2.0 * table.accuracy());
         Self { table: BoundTable::new(path, &team, table).map(Box::new), link_error, ..Self::without_table(team) }
@@ -132,6 +134,18 @@ impl ClearanceMonitor {
             carried: CarriedBounds::new(team.benches),
             link_error: EXACT_LINK_ERROR,
             counters: ClearanceCounters::default(),
+        }
+    }
+
+    /// How the nearest pair is found, for people.
+    pub fn description(&self) -> String {
+        match &self.table {
+            Some(table) => format!(
+                "by a table of bounds, {} kB, made in {:.0} ms",
+                table.memory_bytes().div_ceil(1000),
+                1e3 * table.made_in().as_secs_f64()
+            ),
+            None => "by a search among all boards in every frame, since a table of bounds cannot be had".to_owned(),
         }
     }
 

@@ -1,4 +1,4 @@
-//! The cheapest solver: a table of where a chain of equal links stands, made once, and read off every frame.
+//! The cheapest solver: a table of where a chain of equal links stands, made once, in which every frame is interpolated.
 //!
 //! In: the time. Out: the chain, as exact as the safe solver's, on any path that begins with a straight line or an
 //! inward spiral. A frame of the table does not depend on the ones before. The table is as good as it was found to be
@@ -217,6 +217,11 @@ impl FollowerTable {
         Self { rows, ..self.clone() }
     }
 
+    /// The same without any rows, for [`FollowerTable::second_handle`] alone.
+    pub(crate) fn without_rows(&self) -> Self {
+        Self { rows: Arc::new(Rows::empty()), packed: None, ..self.clone() }
+    }
+
     /// The instructions it uses.
     pub fn instructions(&self) -> Instructions {
         self.instructions
@@ -228,7 +233,7 @@ impl FollowerTable {
         size_of::<Self>() + table + self.head.memory_bytes()
     }
 
-    /// Simulated seconds up to which frames are read off the table.
+    /// Simulated seconds up to which frames are interpolated in the table.
     pub fn valid_until(&self) -> f64 {
         let time = self.head.valid_until() / self.head_speed;
         // The travel of that time may be rounded up past the table.
@@ -257,36 +262,36 @@ impl FollowerTable {
         match self.instructions {
             // SAFETY: a solver is only made with instructions that this processor was found to have.
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx512 => unsafe { self.read_off_with_avx512(travelled, chain) },
+            Instructions::Avx512 => unsafe { self.interpolate_with_avx512(travelled, chain) },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx2 => unsafe { self.read_off_with_avx2(travelled, chain) },
-            _ => self.read_off_with::<false>(travelled, chain),
+            Instructions::Avx2 => unsafe { self.interpolate_with_avx2(travelled, chain) },
+            _ => self.interpolate_with::<false>(travelled, chain),
         }
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
-    fn read_off_with_avx512(&self, travelled: f64, chain: &mut Chain) {
-        self.read_off_with::<true>(travelled, chain);
+    fn interpolate_with_avx512(&self, travelled: f64, chain: &mut Chain) {
+        self.interpolate_with::<true>(travelled, chain);
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,fma")]
-    fn read_off_with_avx2(&self, travelled: f64, chain: &mut Chain) {
-        self.read_off_with::<true>(travelled, chain);
+    fn interpolate_with_avx2(&self, travelled: f64, chain: &mut Chain) {
+        self.interpolate_with::<true>(travelled, chain);
     }
 
     #[inline(always)]
-    fn read_off_with<const FUSED: bool>(&self, travelled: f64, chain: &mut Chain) {
+    fn interpolate_with<const FUSED: bool>(&self, travelled: f64, chain: &mut Chain) {
         match self.velocities {
-            Velocities::Computed => self.read_off_wanted::<FUSED, true>(travelled, chain),
-            Velocities::Omitted => self.read_off_wanted::<FUSED, false>(travelled, chain),
+            Velocities::Computed => self.interpolate_wanted::<FUSED, true>(travelled, chain),
+            Velocities::Omitted => self.interpolate_wanted::<FUSED, false>(travelled, chain),
         }
     }
 
     #[inline(always)]
-    fn read_off_wanted<const FUSED: bool, const VELOCITIES: bool>(&self, travelled: f64, chain: &mut Chain) {
+    fn interpolate_wanted<const FUSED: bool, const VELOCITIES: bool>(&self, travelled: f64, chain: &mut Chain) {
         let sample = self.head.at(travelled);
         let moment = Moment { alpha: sample.alpha, alpha_per_second: sample.alpha_per_metre * self.head_speed };
         match &self.packed {

@@ -6,7 +6,11 @@
 //! handle alone. Every row of T is divided into [`CELLS`] equal cells, so that while one handle is in a cell, the next
 //! is in the same cell of the next row. Each (row, cell) has a list of the benches that can be near, with a proven
 //! lower bound of the signed distance to each (see [`super::moving`]), in ascending order; the last entry stands for
-//! all others. The lists' first bounds are kept once more cell by cell, where those of a whole chain lie side by side.
+//! all others. Far behind, where boards hardly move against each other while they all go on by a link, one list serves
+//! all cells of a row.
+//!
+//! The rows are grouped into blocks. The least bound of each block is kept once more, cell by cell, where those of a
+//! whole chain lie side by side: a frame looks into those blocks only of which that is within its limit.
 //!
 //! The head's link differs, but while the second handle is in a cell, the head too is near a known quadratic polynomial
 //! of the cell's time. Its list holds while it is so near as was taken for granted, which every frame confirms; past a
@@ -14,33 +18,37 @@
 //!
 //! In: a path and a team. Out: lists for every frame. Called by the clearance only.
 
-use super::grid::Grid;
+use std::time::{Duration, Instant};
+
+use super::cells::{HeadKnot, end_of_near, head_knots, head_track};
+use super::lists::{List, ListBuilder};
 use super::moving::{MovingBoard, Quadratic};
-use super::{circle_radius, corner_reach};
 use crate::model::Vector;
-use crate::model::board::Board;
 use crate::model::path::Path;
-use crate::model::separation::separation_board_board;
 use crate::model::team::Team;
 use crate::solve::table::FollowerTable;
-use crate::solve::table::rows::{Alpha, Band, Rows};
+use crate::solve::table::rows::Alpha;
 
 /// Cells to a row.
-const CELLS: usize = 8;
+pub(super) const CELLS: usize = 8;
 
-/// Rows, at most: some 30 MB.
-const MOST_ROWS: usize = 1 << 14;
+/// Rows of a block.
+pub(super) const BLOCK: usize = 64;
+
+/// Rows at the front that always have lists for every cell: the nearest pairs are most often there.
+const FINE_ROWS: usize = 1024;
+
+/// Rows for which the head has lists, at most: some 10 MB.
+const MOST_HEAD_ROWS: usize = 1 << 14;
+
+/// How far the bounds of a block may be below the distances, in links, where one list serves all cells of a row.
+const MOST_SLACK: f64 = 1e-3;
 
 /// The most work to make a table, in nanoseconds as a present processor does it.
-const MOST_WORK: usize = 500_000_000;
+const MOST_WORK: usize = 5_000_000_000;
 
-/// Nanoseconds for a cell of a row, for bounding a pair roughly, and for bounding it well.
-const WORK_OF_CELL: usize = 600;
-const WORK_OF_PAIR: usize = 30;
-const WORK_OF_BOUND: usize = 150;
-
-/// Entries of a list, at most.
-const MOST_ENTRIES: usize = 24;
+/// Bytes of all lists, at most.
+const MOST_BYTES: usize = 128 << 20;
 
 /// Benches that can be near another one.
 #[derive(Debug, Clone, Copy)]
@@ -53,13 +61,14 @@ pub(super) struct Neighbour {
 
 impl Neighbour {
     pub(super) const ALL: u32 = u32::MAX;
-    const UNKNOWN: Self = Self { bound: f32::NEG_INFINITY, behind: Self::ALL };
+    pub(super) const UNKNOWN: Self = Self { bound: f32::NEG_INFINITY, behind: Self::ALL };
 }
 
 /// Where the second handle of a frame is.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Located {
-    row: usize,
+    /// Its row, which is also that of the bench it leads.
+    pub row: usize,
     cell: usize,
     /// -1 to 1 over the cell.
     time: f64,
@@ -73,12 +82,13 @@ struct HeadCell {
     begin: u32,
 }
 
-/// The head at the end of a cell.
+/// Where a block has its lists.
 #[derive(Debug, Clone, Copy)]
-struct HeadKnot {
-    place: Vector,
-    /// Its derivative by the cell's time.
-    slope: Vector,
+struct Block {
+    /// The place of its first row in the table's `bounds` and `begins`, in its first cell.
+    begin: usize,
+    /// How many cells have lists of their own.
+    cells: usize,
 }
 
 /// The table.
@@ -86,62 +96,137 @@ struct HeadKnot {
 pub(super) struct BoundTable {
     follower: FollowerTable,
     rows: usize,
-    /// By cell, then by row: the first bound of each list, and where the list begins.
+    /// By cell, then by block: the least bound.
+    least: Vec<f32>,
+    blocks: Vec<Block>,
+    /// By block, then by cell, then by row: the first bound of each list, and where the list begins.
     bounds: Vec<f32>,
     begins: Vec<u32>,
     /// By row, then by cell, as far back as the second handle comes.
     heads: Vec<Option<HeadCell>>,
     neighbours: Vec<Neighbour>,
+    made_in: Duration,
 }
 
 impl BoundTable {
     /// The table for a team on a path with its follower table; `None` where it would be too large or too much work.
     pub(super) fn new(path: &Path, team: &Team, follower: &FollowerTable) -> Option<Self> {
-        if team.benches < 3 {
-            return None;
-        }
+        let began = Instant::now();
         let rows = follower.rows().rows();
-        if rows == 0 || rows > MOST_ROWS {
+        if team.benches < 3 || rows == 0 {
             return None;
         }
-        let knots = head_knots(path, follower, team.link(1))?;
+        let mut knots = head_knots(path, follower, team.link(1))?;
+        knots.truncate(CELLS * MOST_HEAD_ROWS);
+        let blocks = rows.div_ceil(BLOCK);
         let mut table = Self {
+            follower: follower.without_rows(),
             rows,
-            bounds: vec![f32::NEG_INFINITY; CELLS * rows],
-            begins: vec![0; CELLS * rows],
+            least: vec![f32::INFINITY; CELLS * blocks],
+            blocks: vec![Block { begin: 0, cells: CELLS }; blocks],
+            bounds: Vec::new(),
+            begins: Vec::new(),
             heads: vec![None; knots.len()],
-            neighbours: vec![Neighbour::UNKNOWN],
-            follower: follower.clone(),
+            neighbours: Vec::new(),
+            made_in: Duration::ZERO,
         };
-        let mut lists = ListBuilder::new(team, rows, follower.accuracy());
-        for cell in 0..CELLS {
-            table.fill(cell, team, &knots, &mut lists)?;
+        let mut builder = ListBuilder::new(team, rows, follower.accuracy());
+        let present = team.benches - 2;
+        let mut fine: Vec<usize> = (0..(FINE_ROWS.max(knots.len() / CELLS + 2)).div_ceil(BLOCK).min(blocks)).collect();
+        if fine.len() < blocks {
+            builder.enter(follower.rows(), (0.0, 1.0), rows);
+            for block in (fine.len()..blocks).rev() {
+                if !table.fill_with_one_cell(block, present, MOST_SLACK * team.link(1), &mut builder)? {
+                    fine.push(block);
+                }
+            }
         }
-        Some(table)
+        for block in &fine {
+            table.blocks[*block].begin = table.extend(CELLS);
+        }
+        let mut is_fine = vec![false; blocks];
+        fine.iter().for_each(|block| is_fine[*block] = true);
+        // The rear handles, too. One row more has that of the last board.
+        let is_near = |row: usize| is_fine[row / BLOCK] || is_fine[row.saturating_sub(1) / BLOCK];
+        let end = end_of_near(follower.rows(), is_near, team.link(1), builder.longest_distance()) + 1;
+        for cell in 0..CELLS {
+            let share = |cell: usize| cell as f64 / CELLS as f64;
+            builder.enter(follower.rows(), (share(cell), share(cell + 1)), end.min(rows));
+            for block in &fine {
+                table.fill(*block, cell, present, &mut builder);
+                table.fill_heads(*block, cell, team, &knots, &mut builder);
+                within_limits(&builder)?;
+            }
+        }
+        Some(Self { neighbours: builder.neighbours, made_in: began.elapsed(), ..table })
     }
 
-    /// Makes the lists of one cell of every row; `None` where that is too much work.
-    fn fill(&mut self, cell: usize, team: &Team, knots: &[Option<HeadKnot>], lists: &mut ListBuilder) -> Option<()> {
-        let (first, handles) = handles(self.follower.rows(), cell);
-        lists.enter(first, &handles);
-        // From the rear forward, so that it is known how far all the boards behind go.
-        for row in (first..self.rows - 1).rev() {
-            let mover = lists.board(row);
-            let begin = lists.list(&mover, row, row + 2, &mut self.neighbours);
-            self.begins[cell * self.rows + row] = begin;
-            self.bounds[cell * self.rows + row] = self.neighbours[begin as usize].bound;
-            lists.most_travel = lists.most_travel.max(mover.0.travel);
+    /// Makes room for so many cells of a block; returns where that is.
+    fn extend(&mut self, cells: usize) -> usize {
+        let begin = self.bounds.len();
+        // What no list fills is never read.
+        self.bounds.resize(begin + cells * BLOCK, f32::INFINITY);
+        self.begins.resize(begin + cells * BLOCK, 0);
+        begin
+    }
+
+    /// Makes lists for all cells of a block at once, if they are close enough; `None` where that is too much work.
+    fn fill_with_one_cell(
+        &mut self,
+        block: usize,
+        present: usize,
+        most_slack: f64,
+        builder: &mut ListBuilder,
+    ) -> Option<bool> {
+        let (neighbours, begin) = (builder.neighbours.len(), self.extend(1));
+        self.blocks[block] = Block { begin, cells: 1 };
+        let slack = self.fill(block, 0, present, builder);
+        within_limits(builder)?;
+        if slack <= most_slack {
+            let blocks = self.blocks.len();
+            (1..CELLS).for_each(|cell| self.least[cell * blocks + block] = self.least[block]);
+            return Some(true);
+        }
+        builder.neighbours.truncate(neighbours);
+        self.bounds.truncate(begin);
+        self.begins.truncate(begin);
+        self.blocks[block].cells = CELLS;
+        Some(false)
+    }
+
+    /// Makes the lists of a cell of a block; returns how far the first bound of one can be below the distance.
+    fn fill(&mut self, block: usize, cell: usize, present: usize, builder: &mut ListBuilder) -> f64 {
+        let (mut least, mut slack) = (f32::INFINITY, 0.0f64);
+        // The last row has no board.
+        for row in (block * BLOCK..((block + 1) * BLOCK).min(self.rows - 1)).rev() {
+            let list = builder.of_body(row, present);
+            let place = self.place(block, cell) + row % BLOCK;
+            (self.bounds[place], self.begins[place]) = (list.bound, list.begin);
+            (least, slack) = (least.min(list.bound), slack.max(list.slack));
+        }
+        let blocks = self.blocks.len();
+        self.least[cell * blocks + block] = least;
+        slack
+    }
+
+    /// Makes the lists of the head while the second handle is in a cell of a block.
+    fn fill_heads(
+        &mut self,
+        block: usize,
+        cell: usize,
+        team: &Team,
+        knots: &[Option<HeadKnot>],
+        builder: &mut ListBuilder,
+    ) {
+        for row in block * BLOCK..((block + 1) * BLOCK).min(self.rows - 1) {
             let flat = row * CELLS + cell;
-            if let Some(track) = knots.get(flat..flat + 2).and_then(|knots| head_track(knots, lists.handle_error)) {
-                let head = MovingBoard::new(&track, &handles[row - first], team, 0);
-                let begin = lists.list(&(head, head.middle()), row, row + 1, &mut self.neighbours);
+            let track = knots.get(flat..flat + 2).and_then(|knots| head_track(knots, self.follower.accuracy()));
+            if let (Some(track), Some(second)) = (track, builder.handle(row)) {
+                let head = MovingBoard::new(&track, second, team, 0);
+                let List { begin, .. } = builder.of_head(&head, row, row + team.benches - 2);
                 self.heads[flat] = Some(HeadCell { track, begin });
             }
-            if lists.work > MOST_WORK {
-                return None;
-            }
         }
-        Some(())
     }
 
     /// Where the second handle is when the head has travelled so many metres; `None` where the table does not know.
@@ -152,14 +237,19 @@ impl BoundTable {
         (row + benches <= self.rows).then_some(Located { row, cell, time: 2.0 * (cells - cell as f64) - 1.0 })
     }
 
-    /// The first bounds of the lists of so many benches from the second one on.
-    pub(super) fn bounds(&self, located: Located, benches: usize) -> &[f32] {
-        &self.bounds[located.cell * self.rows + located.row..][..benches]
+    /// The least bounds of the blocks that have any of these rows.
+    pub(super) fn least_bounds(&self, located: Located, rows: &std::ops::Range<usize>) -> &[f32] {
+        &self.least[located.cell * self.blocks.len()..][rows.start / BLOCK..rows.end.div_ceil(BLOCK)]
     }
 
-    /// The list of the bench so many behind the second one.
-    pub(super) fn of_body(&self, located: Located, behind: usize) -> &[Neighbour] {
-        &self.neighbours[self.begins[located.cell * self.rows + located.row + behind] as usize..]
+    /// The first bounds of the lists of a block, by row.
+    pub(super) fn bounds(&self, located: Located, block: usize) -> &[f32] {
+        &self.bounds[self.place(block, located.cell)..][..BLOCK]
+    }
+
+    /// The list of the bench that the handle of a row leads.
+    pub(super) fn of_body(&self, located: Located, row: usize) -> &[Neighbour] {
+        &self.neighbours[self.begins[self.place(row / BLOCK, located.cell) + row % BLOCK] as usize..]
     }
 
     /// The list of the head, counted from the second bench, if the head is at `place`.
@@ -171,212 +261,31 @@ impl BoundTable {
         });
         &self.neighbours[confirmed.map_or(0, |head| head.begin) as usize..]
     }
-}
 
-/// Makes lists for one cell of all rows after the other.
-struct ListBuilder<'a> {
-    team: &'a Team,
-    /// The boards of the cell, from row `first` on, with where they are in the middle of it.
-    boards: Vec<(MovingBoard, Board)>,
-    first: usize,
-    grid: Grid,
-    /// The side of the grid's squares, metres.
-    side: f64,
-    /// The most that a board behind the row goes, metres.
-    most_travel: f64,
-    /// How far, in metres, a handle of a frame can be from where it should be: twice what T and the frame are off.
-    handle_error: f64,
-    /// No bound is greater. Two benches with one between them are never farther apart than its link, so that in every
-    /// frame some pair is nearer.
-    farthest: f64,
-    candidates: Vec<(usize, f64)>,
-    work: usize,
-}
-
-impl<'a> ListBuilder<'a> {
-    fn new(team: &'a Team, rows: usize, handle_error: f64) -> Self {
-        Self {
-            team,
-            boards: Vec::with_capacity(rows),
-            first: 0,
-            grid: Grid::new(rows),
-            most_travel: 0.0,
-            side: 0.0,
-            handle_error,
-            farthest: team.link(1) + 2.0 * handle_error,
-            candidates: Vec::new(),
-            work: 0,
-        }
+    /// The place of the first row of a block in a cell.
+    #[inline]
+    fn place(&self, block: usize, cell: usize) -> usize {
+        let Block { begin, cells } = self.blocks[block];
+        begin + if cells == 1 { 0 } else { cell * BLOCK }
     }
 
-    fn board(&self, row: usize) -> (MovingBoard, Board) {
-        self.boards[row - self.first]
+    /// Bytes that it takes.
+    pub(super) fn memory_bytes(&self) -> usize {
+        size_of_val(self.least.as_slice())
+            + size_of_val(self.blocks.as_slice())
+            + size_of_val(self.bounds.as_slice())
+            + size_of_val(self.begins.as_slice())
+            + size_of_val(self.heads.as_slice())
+            + size_of_val(self.neighbours.as_slice())
     }
 
-    /// The next cell, with its handles from a row on.
-    fn enter(&mut self, first: usize, handles: &[Quadratic]) {
-        self.first = first;
-        self.boards.clear();
-        self.boards.extend(handles.windows(2).map(|pair| {
-            let moving = MovingBoard::new(&pair[0], &pair[1], self.team, 1);
-            (moving, moving.middle())
-        }));
-        self.most_travel = self.boards.last().map_or(0.0, |(moving, _)| moving.travel);
-        self.side = 2.0 * circle_radius(self.team, 1) + self.farthest + 4.0 * self.most_travel;
-        self.grid.clear(self.side);
-        for (index, (_, board)) in self.boards.iter().enumerate() {
-            self.grid.add(index, board.centre.x, board.centre.y);
-        }
-    }
-
-    /// Adds the list of a board against those from row `from` on, offsets counted from `row`, and returns where it
-    /// begins.
-    /// All boards behind must be known to go `most_travel` at most.
-    fn list(&mut self, mover: &(MovingBoard, Board), row: usize, from: usize, neighbours: &mut Vec<Neighbour>) -> u32 {
-        self.work += WORK_OF_CELL;
-        let (moving, board) = mover;
-        let reach =
-            board.circle_radius() + circle_radius(self.team, 1) + self.farthest + moving.travel + self.most_travel;
-        // Next to a singular place, nothing that is true is of use.
-        if reach.is_nan() || reach >= 3.0 * self.side {
-            return 0;
-        }
-        let near = self.candidates_within(mover, reach, from);
-        for (row, bound) in &mut self.candidates {
-            if *bound <= near {
-                let (other, other_board) = &self.boards[*row - self.first];
-                *bound = bound.max(moving.least_distance(board, other, other_board));
-                self.work += WORK_OF_BOUND;
-            }
-        }
-        self.candidates.sort_unstable_by(|a, b| a.1.total_cmp(&b.1));
-        let coordinates = board.centre.coords.norm() + reach;
-        let handle_error = self.handle_error + 64.0 * f64::EPSILON * coordinates;
-        let margin = 2.0 * handle_error * corner_reach(self.team, 0).max(corner_reach(self.team, 1));
-        let rounded = |bound: f64| ((bound - margin) as f32).next_down();
-        let begin = neighbours.len() as u32;
-        let kept = self.candidates.len().min(MOST_ENTRIES);
-        let entry = |(other, bound): &(usize, f64)| Neighbour { bound: rounded(*bound), behind: (other - row) as u32 };
-        neighbours.extend(self.candidates[..kept].iter().map(entry));
-        let others = self.candidates.get(kept).map_or(self.farthest, |(_, bound)| *bound);
-        neighbours.push(Neighbour { bound: rounded(others), behind: Neighbour::ALL });
-        begin
-    }
-
-    /// Finds the rows that can be within `farthest`, with a first bound of each; returns how near the nearest is
-    /// throughout the cell.
-    fn candidates_within(&mut self, mover: &(MovingBoard, Board), reach: f64, from: usize) -> f64 {
-        let Self { boards, grid, candidates, work, first, farthest, .. } = self;
-        candidates.clear();
-        let centre = mover.1.centre;
-        let mut near = f64::INFINITY;
-        grid.visit_near((centre.x, centre.y), reach, from - *first, |index| {
-            *work += WORK_OF_PAIR;
-            let (moving, board) = &boards[index];
-            let (separation, travel) = (separation_board_board(&mover.1, board), mover.0.travel + moving.travel);
-            if separation - travel <= *farthest {
-                candidates.push((*first + index, separation - travel));
-                near = near.min(separation + travel);
-            }
-        });
-        near
+    /// How long it took to make.
+    pub(super) fn made_in(&self) -> Duration {
+        self.made_in
     }
 }
 
-/// The handles of all rows while they are in a cell, and the first row for which T is known there.
-fn handles(rows: &Rows, cell: usize) -> (usize, Vec<Quadratic>) {
-    let share = |cell: usize| cell as f64 / CELLS as f64;
-    let (begin, end) = (share(cell), share(cell + 1));
-    let front = rows.bands.first().map_or(0, |band| band.first_row);
-    let first = ((rows.valid_from - begin).ceil() as usize).max(front);
-    let mut handles = Vec::with_capacity(rows.rows());
-    for band in &rows.bands {
-        let pieces = band.piece_at(begin)..=band.piece_at(end);
-        for row in first.max(band.first_row)..band.first_row + band.rows {
-            handles.push(handle(band, pieces.clone(), row, (begin, end)));
-        }
-    }
-    (first, handles)
-}
-
-/// A handle while its phase goes from `begin` to `end`, which are in these pieces.
-fn handle(band: &Band, pieces: std::ops::RangeInclusive<usize>, row: usize, (begin, end): (f64, f64)) -> Quadratic {
-    let middle = 0.5 * (begin + end);
-    let at = |piece: usize, phase: f64| {
-        let beta = band.pieces[piece].beta(phase);
-        let [x, y] = band.coordinates(piece, row);
-        let value = |c: [f64; 6]| c.iter().rev().fold(0.0, |value, c| value * beta + c);
-        Vector::new(value(x), value(y))
-    };
-    let mut quadratic =
-        Quadratic::through(at(*pieces.start(), begin), at(band.piece_at(middle), middle), at(*pieces.end(), end));
-    for piece in pieces {
-        let part = (band.pieces[piece].begin.max(begin), band.pieces[piece].end.min(end));
-        let time = |phase: f64| (2.0 * phase - begin - end) / (end - begin);
-        let local = |low: f64, high: f64| (0.5 * (low + high), 0.5 * (high - low));
-        let betas = local(band.pieces[piece].beta(part.0), band.pieces[piece].beta(part.1));
-        let times = local(time(part.0), time(part.1));
-        let miss: [f64; 2] = std::array::from_fn(|axis| {
-            let coefficients = band.coordinates(piece, row)[axis];
-            largest_difference(coefficients, betas, quadratic.terms.map(|term| term[axis]), times)
-        });
-        quadratic.error = quadratic.error.max(miss[0].hypot(miss[1]));
-    }
-    quadratic
-}
-
-/// A bound of the difference of two polynomials, each on its own interval, given by its middle and half its length.
-fn largest_difference(a: [f64; 6], (middle, half): (f64, f64), b: [f64; 3], (time, half_time): (f64, f64)) -> f64 {
-    let mut shifted = a;
-    for low in 0..5 {
-        for power in (low..5).rev() {
-            shifted[power] += middle * shifted[power + 1];
-        }
-    }
-    let mut scale = 1.0;
-    for coefficient in &mut shifted {
-        *coefficient *= scale;
-        scale *= half;
-    }
-    shifted[0] -= b[0] + time * (b[1] + time * b[2]);
-    shifted[1] -= half_time * (b[1] + 2.0 * time * b[2]);
-    shifted[2] -= half_time * half_time * b[2];
-    shifted.iter().map(|coefficient| coefficient.abs()).sum()
-}
-
-/// The head when alpha of the second handle is at the beginning of a cell, by the number of the cell, counted over all
-/// rows; of several places the first. These need not be exact.
-fn head_knots(path: &Path, follower: &FollowerTable, link: f64) -> Option<Vec<Option<HeadKnot>>> {
-    let cells = |travelled: f64| {
-        let (alpha, rate) = follower.second_handle(travelled)?;
-        Some(((alpha.row as f64 + alpha.phase) * CELLS as f64, rate * CELLS as f64))
-    };
-    let (start, _) = cells(0.0)?;
-    let mut knots = vec![None; start as usize + 1];
-    let longest = link / CELLS as f64;
-    let mut travelled = 0.0;
-    for wanted in (0..=start as usize).rev() {
-        while let Some((reached, rate)) = cells(travelled)
-            && reached > wanted as f64 + 1e-9
-        {
-            let step = (wanted as f64 - reached) / rate;
-            travelled += if rate < 0.0 { step.clamp(1e-6 * link, longest) } else { longest };
-        }
-        let Some((reached, rate)) = cells(travelled) else { break };
-        travelled += ((wanted as f64 - reached) / rate).clamp(-longest, longest);
-        let param = path.param_at(travelled);
-        knots[wanted] = Some(HeadKnot { place: path.point(param).coords, slope: path.tangent(param) * (0.5 / rate) });
-    }
-    Some(knots)
-}
-
-/// How the head goes from one knot to the next: the quadratic next to the cubic of their places and slopes; a frame's
-/// head may be `handle_error` metres from the path.
-fn head_track(knots: &[Option<HeadKnot>], handle_error: f64) -> Option<Quadratic> {
-    let [Some(begin), Some(end)] = knots else { return None };
-    let middle = 0.5 * (begin.place + end.place) + 0.25 * (begin.slope - end.slope);
-    let mut track = Quadratic::through(begin.place, middle, end.place);
-    let cubic = 0.25 * (begin.slope + end.slope - (end.place - begin.place));
-    track.error = cubic.norm() + 1e-6 + handle_error;
-    Some(track)
+/// `None` where the lists are too many or too much work.
+fn within_limits(builder: &ListBuilder) -> Option<()> {
+    (builder.work <= MOST_WORK && size_of_val(builder.neighbours.as_slice()) <= MOST_BYTES).then_some(())
 }

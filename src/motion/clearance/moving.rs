@@ -13,6 +13,8 @@
 //! known quadratics. Of every product the powers up to t^2 are kept, the others are bounded by their coefficients; if A
 //! and B are off by e and f, and B is a unit vector, A . B is off by at most e + |A| f. What remains is the least value
 //! of a quadratic between -1 and 1. Sliding along a costs such a bound nothing, whatever the speed.
+//!
+//! From above the distance is bounded by that of any two points, one fixed to each board.
 
 use super::corner_reach;
 use crate::model::board::Board;
@@ -43,6 +45,23 @@ impl Quadratic {
         self.terms[1].norm() + self.terms[2].norm() + self.error
     }
 
+    /// From this vector to another.
+    pub(super) fn to(&self, other: &Self) -> Self {
+        other.combine(self, |other, own| other - own, other.error + self.error)
+    }
+
+    /// Half way between two vectors.
+    pub(super) fn half_way(&self, other: &Self) -> Self {
+        self.combine(other, |own, other| 0.5 * (own + other), 0.5 * (self.error + other.error))
+    }
+
+    /// The greatest length throughout, at most: that of a control point of the quadratic Bezier curve.
+    fn greatest_norm(&self) -> f64 {
+        let [middle, slope, square] = self.terms;
+        let ends = (middle + square + slope).norm_squared().max((middle + square - slope).norm_squared());
+        ends.max((middle - square).norm_squared()).sqrt() + self.error
+    }
+
     fn combine(&self, other: &Self, each: impl Fn(Vector, Vector) -> Vector, error: f64) -> Self {
         Self { terms: std::array::from_fn(|power| each(self.terms[power], other.terms[power])), error }
     }
@@ -71,7 +90,7 @@ fn least([constant, slope, square]: [f64; 3]) -> f64 {
 /// A board on its way through a cell.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MovingBoard {
-    centre: Quadratic,
+    pub centre: Quadratic,
     axis: Quadratic,
     half_length: f64,
     half_width: f64,
@@ -85,7 +104,7 @@ impl MovingBoard {
         let link = team.link(bench);
         let error = front.error + rear.error;
         Self {
-            centre: front.combine(rear, |front, rear| 0.5 * (front + rear), 0.5 * error),
+            centre: front.half_way(rear),
             axis: front.combine(rear, |front, rear| (front - rear) / link, error / link),
             half_length: 0.5 * link + team.hole_inset,
             half_width: 0.5 * team.width,
@@ -102,7 +121,7 @@ impl MovingBoard {
     /// The least gap to `other` along the direction that is `along` and `across` in this board's frame.
     fn least_gap(&self, other: &Self, along: f64, across: f64) -> f64 {
         let direction = Quadratic { terms: self.axis.terms.map(|u| along * u + across * normal(u)), ..self.axis };
-        let offset = other.centre.combine(&self.centre, |b, a| b - a, other.centre.error + self.centre.error);
+        let offset = self.centre.to(&other.centre);
         let other_normal = Quadratic { terms: other.axis.terms.map(normal), ..other.axis };
         let (offset, offset_off) = offset.dot(&direction);
         let (length, length_off) = other.axis.dot(&direction);
@@ -116,24 +135,41 @@ impl MovingBoard {
         nearest - own - offset_off - other.half_length * length_off - other.half_width * width_off
     }
 
-    /// A lower bound of the signed distance to `other` throughout the cell: the least gap along the direction in which the
-    /// two are nearest in the middle of it, given where they are then.
-    pub(super) fn least_distance(&self, at: &Board, other: &Self, other_at: &Board) -> f64 {
-        let direction = direction(at, other_at);
+    /// How far a point of `other` goes from where it is at 0, as a point of this board sees it, at most, metres.
+    pub(super) fn relative_travel(&self, other: &Self) -> f64 {
+        let turn = |board: &Self| board.half_length.hypot(board.half_width) * board.axis.travel();
+        self.centre.to(&other.centre).travel() + turn(self) + turn(other)
+    }
+
+    /// A lower and an upper bound of the signed distance to `other` throughout the cell, given where the two are in the
+    /// middle of it: the least gap along the direction in which they are nearest then, and the greatest distance of the
+    /// points that are closest then.
+    pub(super) fn distance_bounds(&self, at: &Board, other: &Self, other_at: &Board) -> (f64, f64) {
+        let (on_own, on_other) = closest_points_board_board(at, other_at);
+        let direction = direction(at, other_at, on_other - on_own);
         let [own, others] = [at, other_at].map(|board| (direction.dot(&board.axis), direction.dot(&board.across())));
         // An edge's normal is best fixed to that edge's board.
-        if own.0.abs().min(own.1.abs()) <= others.0.abs().min(others.1.abs()) {
+        let least = if own.0.abs().min(own.1.abs()) <= others.0.abs().min(others.1.abs()) {
             self.least_gap(other, own.0, own.1)
         } else {
             other.least_gap(self, -others.0, -others.1)
-        }
+        };
+        (least, self.fixed(at, on_own).to(&other.fixed(other_at, on_other)).greatest_norm())
+    }
+
+    /// The point fixed to the board that is at `point` when the board is at `at`.
+    fn fixed(&self, at: &Board, point: Point) -> Quadratic {
+        let offset = point - at.centre;
+        let along = offset.dot(&at.axis).clamp(-self.half_length, self.half_length);
+        let across = offset.dot(&at.across()).clamp(-self.half_width, self.half_width);
+        let error = self.centre.error + along.hypot(across) * self.axis.error;
+        self.centre.combine(&self.axis, |centre, axis| centre + along * axis + across * normal(axis), error)
     }
 }
 
-/// The direction from `a` to `b` along which the gap between them is greatest.
-fn direction(a: &Board, b: &Board) -> Vector {
-    let (on_a, on_b) = closest_points_board_board(a, b);
-    let between = on_b - on_a;
+/// The direction from `a` to `b` along which the gap between them is greatest, given the way between their closest
+/// points.
+fn direction(a: &Board, b: &Board, between: Vector) -> Vector {
     let length = between.norm();
     if length == 0.0 {
         return a.across();

@@ -2,7 +2,9 @@
 //!
 //! Called by the clearance only.
 
-use super::bounds::{BoundTable, Located, Neighbour};
+use std::ops::Range;
+
+use super::bounds::{BLOCK, BoundTable, Located, Neighbour};
 use super::grid::Grid;
 use super::{Nearest, board, circle_radius, corner_reach};
 use crate::model::board::Board;
@@ -110,19 +112,42 @@ impl<'a> Search<'a> {
         let mut scans = 0;
         self.by_list(0, 1, table.of_head(located, (self.chain.x[0], self.chain.y[0])), &mut scans);
         // The last bench and the last but one have none behind that counts.
-        let bounds = table.bounds(located, self.team.benches - 3);
-        for (chunk, bounds) in bounds.chunks(BOUNDS_AT_ONCE).enumerate() {
-            if !any_within(bounds, (self.nearest.value as f32).next_up()) {
+        let rows = located.row..located.row + self.team.benches - 3;
+        let first_block = rows.start / BLOCK;
+        for (chunk, least) in table.least_bounds(located, &rows).chunks(BOUNDS_AT_ONCE).enumerate() {
+            if !any_within(least, (self.nearest.value as f32).next_up()) {
                 continue;
             }
-            for (k, bound) in bounds.iter().enumerate() {
-                if f64::from(*bound) <= self.nearest.value {
-                    let behind = chunk * BOUNDS_AT_ONCE + k;
-                    if scans == MOST_SCANS {
-                        return Some(1 + behind);
+            for (k, least) in least.iter().enumerate() {
+                if f64::from(*least) <= self.nearest.value {
+                    let block = first_block + chunk * BOUNDS_AT_ONCE + k;
+                    let rows = rows.start.max(block * BLOCK)..rows.end.min((block + 1) * BLOCK);
+                    if let Some(unsettled) = self.by_block(table, located, block, rows, &mut scans) {
+                        return Some(unsettled);
                     }
-                    self.by_list(1 + behind, 1 + behind, table.of_body(located, behind), &mut scans);
                 }
+            }
+        }
+        None
+    }
+
+    /// The same for rows of one block of the table.
+    fn by_block(
+        &mut self,
+        table: &BoundTable,
+        located: Located,
+        block: usize,
+        rows: Range<usize>,
+        scans: &mut usize,
+    ) -> Option<usize> {
+        let bounds = table.bounds(located, block);
+        for row in rows {
+            if f64::from(bounds[row % BLOCK]) <= self.nearest.value {
+                let a = 1 + row - located.row;
+                if *scans == MOST_SCANS {
+                    return Some(a);
+                }
+                self.by_list(a, a, table.of_body(located, row), scans);
             }
         }
         None

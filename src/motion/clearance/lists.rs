@@ -1,0 +1,212 @@
+//! The lists of the table: which boards can be near a board throughout a cell, and how near. Called by the making of the
+//! table only.
+
+use super::bounds::Neighbour;
+use super::cells::handles;
+use super::grid::Grid;
+use super::moving::{MovingBoard, Quadratic};
+use super::{circle_radius, corner_reach};
+use crate::model::separation::{separation_board_board, signed_distance_board_board};
+use crate::model::team::Team;
+use crate::solve::table::rows::Rows;
+
+/// Entries of a list, at most.
+const MOST_ENTRIES: usize = 24;
+
+/// What is beyond the nearest by more than this, in links, has no entry of its own.
+const ALLOWANCE: f64 = 0.02;
+
+/// Nanoseconds, as a present processor does it, for the handle of a row, for its list, for visiting another board, and
+/// for bounding the distance to it.
+const WORK_OF_HANDLE: usize = 400;
+const WORK_OF_LIST: usize = 300;
+const WORK_OF_VISIT: usize = 15;
+const WORK_OF_BOUND: usize = 250;
+
+/// A list that was made.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct List {
+    /// Where it begins.
+    pub begin: u32,
+    /// Its first bound, metres.
+    pub bound: f32,
+    /// How far that can be below the distance to the nearest board, metres.
+    pub slack: f64,
+}
+
+impl List {
+    /// That of which nothing is known.
+    pub(super) const UNKNOWN: Self = Self { begin: 0, bound: f32::NEG_INFINITY, slack: f64::INFINITY };
+}
+
+/// Makes lists for one cell of all rows after the other.
+pub(super) struct ListBuilder<'a> {
+    team: &'a Team,
+    /// The handles in the cell, from row `first` on.
+    handles: Vec<Quadratic>,
+    first: usize,
+    /// By row from `first` on: how far its board or one behind goes at most, metres.
+    travel_behind: Vec<f64>,
+    grid: Grid,
+    /// No list is made where boards may go farther, metres.
+    longest_reach: f64,
+    /// How far, in metres, a handle of a frame can be from where it should be: twice what T and the frame are off.
+    handle_error: f64,
+    /// No bound is greater. Two benches with one between them are never farther apart than its link, so that in every
+    /// frame some pair is nearer.
+    farthest: f64,
+    /// How many rows behind its own board the nearest one was, in the latest list.
+    likely: usize,
+    candidates: Vec<(usize, f64)>,
+    /// All lists.
+    pub neighbours: Vec<Neighbour>,
+    /// Nanoseconds of a present processor so far.
+    pub work: usize,
+}
+
+impl<'a> ListBuilder<'a> {
+    pub(super) fn new(team: &'a Team, rows: usize, handle_error: f64) -> Self {
+        Self {
+            team,
+            handles: Vec::new(),
+            first: 0,
+            travel_behind: Vec::new(),
+            grid: Grid::new(rows),
+            longest_reach: 0.0,
+            handle_error,
+            farthest: team.link(1) + 2.0 * handle_error,
+            likely: 0,
+            candidates: Vec::new(),
+            neighbours: vec![Neighbour::UNKNOWN],
+            work: 0,
+        }
+    }
+
+    /// Metres between the front handles of two boards that can be in a list together, at most.
+    pub(super) fn longest_distance(&self) -> f64 {
+        let from_handle = self.team.longest_link() + self.team.hole_inset + self.team.width;
+        self.farthest + 2.0 * from_handle
+    }
+
+    /// The next cell: phases from `begin` to `end`, rows up to `end_row`.
+    pub(super) fn enter(&mut self, rows: &Rows, phases: (f64, f64), end_row: usize) {
+        let (first, handles) = handles(rows, phases, end_row);
+        self.work += WORK_OF_HANDLE * handles.len();
+        self.first = first;
+        self.handles = handles;
+        let boards = self.handles.len().saturating_sub(1);
+        let mut travel: Vec<f64> = (0..boards).map(|index| self.board(index).travel).collect();
+        let last = travel.last().copied().unwrap_or(0.0);
+        for index in (1..boards).rev() {
+            // Not a number counts as infinitely far.
+            travel[index - 1] =
+                if travel[index - 1] <= travel[index] { travel[index] } else { travel[index - 1].max(travel[index]) };
+        }
+        self.travel_behind = travel;
+        let radii = 2.0 * circle_radius(self.team, 1);
+        self.longest_reach = 3.0 * (radii + self.farthest + 4.0 * last);
+        self.grid.clear(radii + 2.0 * last);
+        for (index, pair) in self.handles.windows(2).enumerate() {
+            let centre = 0.5 * (pair[0].terms[0] + pair[1].terms[0]);
+            self.grid.add(index, centre.x, centre.y);
+        }
+    }
+
+    /// The handle of a row, if it is known throughout the cell.
+    pub(super) fn handle(&self, row: usize) -> Option<&Quadratic> {
+        self.handles.get(row.checked_sub(self.first)?)
+    }
+
+    fn board(&self, index: usize) -> MovingBoard {
+        MovingBoard::new(&self.handles[index], &self.handles[index + 1], self.team, 1)
+    }
+
+    /// Makes the list of the board of a row; of the boards behind, all up to row `present` are there whenever it is.
+    pub(super) fn of_body(&mut self, row: usize, present: usize) -> List {
+        if row < self.first || row + 1 >= self.first + self.handles.len() {
+            return List::UNKNOWN;
+        }
+        let board = self.board(row - self.first);
+        let list = self.list(&board, row, row + 2, present, self.likely);
+        if list.begin > 0 {
+            self.likely = self.neighbours[list.begin as usize].behind as usize;
+        }
+        list
+    }
+
+    /// Makes the list of a head's board in front of the handle of a row; as [`ListBuilder::of_body`].
+    pub(super) fn of_head(&mut self, head: &MovingBoard, row: usize, present: usize) -> List {
+        self.list(head, row, row + 1, present, usize::MAX)
+    }
+
+    /// Makes the list of a board against those from row `from` on, offsets counted from `row`; the one `likely` rows
+    /// behind is probably near.
+    fn list(&mut self, moving: &MovingBoard, row: usize, from: usize, present: usize, likely: usize) -> List {
+        self.work += WORK_OF_LIST;
+        let at = moving.middle();
+        let radii = at.circle_radius() + circle_radius(self.team, 1);
+        let margin_per_error = 2.0 * corner_reach(self.team, 0).max(corner_reach(self.team, 1));
+        let allowance = ALLOWANCE * self.team.link(1) + 2.0 * margin_per_error * self.handle_error;
+        // Pairs that may be farther apart than another pair that is there, too, need no entries.
+        let mut limit = self.farthest;
+        let mut near = f64::INFINITY;
+        let likely = row.saturating_add(likely);
+        if (from..=present).contains(&likely) && likely - self.first < self.travel_behind.len() {
+            let board = self.board(likely - self.first);
+            limit = limit.min(moving.distance_bounds(&at, &board, &board.middle()).1 + allowance);
+        }
+        let most_travel = self.travel_behind.get(from - self.first).copied().unwrap_or(0.0);
+        let reach = radii + limit.max(0.0) + moving.travel + most_travel;
+        // Next to a singular place, nothing that is true is of use.
+        if reach.is_nan() || reach >= self.longest_reach {
+            return List::UNKNOWN;
+        }
+        let Self { team, handles, first, grid, candidates, work, .. } = self;
+        candidates.clear();
+        grid.visit_near((at.centre.x, at.centre.y), reach, from - *first, |index| {
+            *work += WORK_OF_VISIT;
+            let offset = moving.centre.to(&handles[index].half_way(&handles[index + 1]));
+            if offset.terms[0].norm() - offset.travel() - radii > limit {
+                return;
+            }
+            let board = MovingBoard::new(&handles[index], &handles[index + 1], team, 1);
+            let (board_at, travel) = (board.middle(), moving.relative_travel(&board));
+            let rough = separation_board_board(&at, &board_at) - travel;
+            if rough > limit {
+                return;
+            }
+            let (other, greatest) = (*first + index, signed_distance_board_board(&at, &board_at) + travel);
+            near = near.min(greatest);
+            if other <= present {
+                limit = limit.min(greatest + allowance);
+            }
+            candidates.push((other, rough));
+        });
+        let rough_near = near;
+        for (other, bound) in candidates.iter_mut().filter(|(_, rough)| *rough <= rough_near) {
+            *work += WORK_OF_BOUND;
+            let index = *other - *first;
+            let board = MovingBoard::new(&handles[index], &handles[index + 1], team, 1);
+            let (least, greatest) = moving.distance_bounds(&at, &board, &board.middle());
+            *bound = bound.max(least);
+            near = near.min(greatest);
+            if *other <= present {
+                limit = limit.min(greatest + allowance);
+            }
+        }
+        candidates.retain(|(_, bound)| *bound <= limit);
+        candidates.sort_unstable_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+        let coordinates = at.centre.coords.norm() + reach;
+        let margin = margin_per_error * (self.handle_error + 64.0 * f64::EPSILON * coordinates);
+        let rounded = |bound: f64| ((bound - margin) as f32).next_down();
+        let begin = self.neighbours.len() as u32;
+        let kept = self.candidates.len().min(MOST_ENTRIES);
+        let entry = |(other, bound): &(usize, f64)| Neighbour { bound: rounded(*bound), behind: (other - row) as u32 };
+        self.neighbours.extend(self.candidates[..kept].iter().map(entry));
+        let others = self.candidates.get(kept).map_or(limit, |(_, bound)| *bound);
+        self.neighbours.push(Neighbour { bound: rounded(others), behind: Neighbour::ALL });
+        let bound = self.neighbours[begin as usize].bound;
+        let slack = self.candidates.first().map_or(0.0, |(_, bound)| near - bound);
+        List { begin, bound, slack }
+    }
+}
