@@ -163,7 +163,8 @@ fn measure_doors() {
     let playback = Playback { start: START, ..Playback::of(&scene) };
     let timeline = scene.motion.timeline(&mut |_| ());
     let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
-    let (mut publisher, connection) = publisher_and_subscriber(&format!("bench_{}_doors", std::process::id()), &scene, &show);
+    let (mut publisher, connection) =
+        publisher_and_subscriber(&format!("bench_{}_doors", std::process::id()), &scene, &show);
     // The outer ends stay: a queue that nobody can fill any more is another one.
     let (mut doors, outer): (Vec<Doors>, Vec<Vec<Door>>) = (0..3)
         .map(|count| {

@@ -105,7 +105,7 @@ pub fn overlapping(boards: &[(usize, Board)], tolerance: f64) -> Vec<(usize, usi
             }
         }
     }
-    pairs.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)));
+    pairs.sort_by_key(|pair| (pair.0, pair.1));
     pairs
 }
 

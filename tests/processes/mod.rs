@@ -157,7 +157,7 @@ impl Place {
         let mut command = Command::new("setpriv");
         command.args([&format!("--reuid={NOBODY}"), &format!("--regid={NOBODY}"), "--clear-groups"]);
         command.arg(copy).args(arguments).current_dir(self.folder());
-        Process::start(&mut command).output_within(20)
+        Process::start(&mut command).output_within(300)
     }
 
     /// Files that exist here.

@@ -57,7 +57,7 @@ impl Frames for Arrivals {
         self.waiting.remove(waiting.iter().position(|waiting| waiting.door == door).unwrap());
         self.obeyed.push(Obeyed { door, frame: self.computed, tick, waiting });
         let playback = PlaybackState::Playing;
-        Some(Outcome { code: Code::Done, tick, sim_time: 0.0, time_scale: 1.0, playback, cue: 0 })
+        Some(Outcome { code: Code::Done, tick, sim_time: 0.0, time_scale: 1.0, playing_rate: 1.0, playback, cue: 0 })
     }
 
     fn finished_step(&mut self, _: u64) -> Option<Outcome> {

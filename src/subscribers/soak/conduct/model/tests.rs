@@ -68,6 +68,7 @@ impl Checked {
             tick,
             sim_time: time.sim_time,
             time_scale: time.time_scale,
+            playing_rate: 1.0,
             playback: time.playback,
             cue: time.cues_passed as u32,
         };
