@@ -192,12 +192,14 @@ pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CommandError> {
 pub fn end_when_shared_memory_is_full() -> Result<(), CommandError> {
     const SENTENCE: &[u8] = b"error: /dev/shm is full: remove what fills it, or make it larger\n";
     let end = || {
+        watch::terminal::restore();
         // Nothing is left to do for a standard error that takes no more.
         let _ = nix::unistd::write(io::stderr(), SENTENCE);
         // SAFETY: async-signal-safe, and ends the process without unwinding.
         unsafe { nix::libc::_exit(1) };
     };
-    // SAFETY: the action calls write and _exit only, both async-signal-safe; `io::stderr` is a unit with a descriptor.
+    // SAFETY: the action calls tcsetattr, write and _exit only, all async-signal-safe; `io::stdin` and `io::stderr`
+    // serve as descriptors.
     unsafe { signal_hook::low_level::register(signal_hook::consts::SIGBUS, end) }?;
     Ok(())
 }

@@ -105,6 +105,8 @@ pub struct Outcome {
     pub sim_time: f64,
     /// Simulated seconds per second, as in force.
     pub time_scale: f64,
+    /// Simulated seconds per second while the show plays; kept through a pause.
+    pub playing_rate: f64,
     /// Whether simulated time advances.
     pub playback: PlaybackState,
     /// The latest cue passed, from 1.
@@ -266,7 +268,8 @@ impl Show {
 
     fn outcome(&mut self, tick: u64, code: Code) -> Outcome {
         let ShowTime { sim_time, time_scale, playback, cues_passed, .. } = self.clock.advance(tick);
-        Outcome { code, tick, sim_time, time_scale, playback, cue: cues_passed as u32 }
+        let playing_rate = self.clock.playing_rate();
+        Outcome { code, tick, sim_time, time_scale, playing_rate, playback, cue: cues_passed as u32 }
     }
 
     /// The frame of a tick: time, chain, clearance, state, alerts, cues.

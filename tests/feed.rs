@@ -29,7 +29,7 @@ fn poll(feed: &mut Feed, seen: &mut Vec<Seen>) {
         }
         FeedEvent::Silent => seen.push(Seen::Silent),
         FeedEvent::Gone => seen.push(Seen::Gone),
-        FeedEvent::Stage(_) | FeedEvent::Alert(_) | FeedEvent::Status(_) => (),
+        FeedEvent::Stage(_) | FeedEvent::Alert(_) | FeedEvent::Cue(_) | FeedEvent::Status(_) => (),
     });
     polled.unwrap();
 }

@@ -164,6 +164,113 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs
 }
 
 #[test]
+fn cues_path_clock_and_transforms_are_those_of_the_show() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    // Two frames a second over ROS 2, and three cues within a sixth of a second.
+    let scene = scene_file("shown", &[]);
+    let of_scene = std::fs::read_to_string(&scene).unwrap();
+    let cues = [(50.35, "first"), (50.4, "second"), (50.45, "third")];
+    let cues = cues.map(|(at, name)| format!("[[cues]]\nname = \"{name}\"\nat = {at}\n")).concat();
+    let topics = "[publish.ros2]\nrate = 2.0\ntopics = [\"handles\", \"cues\", \"path\", \"clock\", \"tf\"]\n";
+    std::fs::write(&scene, format!("{of_scene}\n{topics}\n{cues}")).unwrap();
+    let mut run = program("shown");
+    run.args(["--scene", scene.to_str().unwrap(), "run", "--json", "--paused", "--start", "50.25"]);
+    // /clock and /tf are of the whole domain.
+    let publisher = Process::start(run.args(["--duration", "300"]).env("ROS_DOMAIN_ID", "9"));
+    let topics = ["handles", "clock", "tf", "path:reliable:transient_local", "cues:reliable:transient_local"];
+    let mut subscriber = Process::start(peer("shown", "300", &topics).args(["--domain", "9"]));
+    let printed = subscriber.lines();
+    let mut lines: Vec<Value> = Vec::new();
+    let until = |lines: &mut Vec<Value>, enough: &dyn Fn(&[Value]) -> bool| {
+        while !enough(lines) {
+            lines.push(serde_json::from_str(&printed.until("", 60)).unwrap());
+        }
+    };
+    until(&mut lines, &|lines| topics[..4].iter().all(|topic| !messages(lines, topic).is_empty()));
+    let go = program("shown").args(["control", "go"]).output().unwrap();
+    assert!(go.status.success(), "{}", text(&go.stderr));
+    let latest = |lines: &[Value]| messages(lines, topics[4]).last().is_some_and(|cue| cue["number"] == 3);
+    until(&mut lines, &latest);
+    let so_far = messages(&lines, "clock").len();
+    until(&mut lines, &|lines| messages(lines, "clock").len() > so_far + 2 && messages(lines, "tf").len() > so_far + 2);
+    // One that comes later gets the latest cue, and the path.
+    let late = Process::start(peer("shown", "2", &topics[3..]).args(["--domain", "9"])).output_within(60);
+    let late = json_lines(&late);
+    assert!(latest(&late) && !messages(&late, topics[3]).is_empty(), "{late:?}");
+    publisher.signal(nix::sys::signal::Signal::SIGINT);
+    let summary = summary(&publisher.output_within(60));
+    assert!(summary["ros2"]["frames"].as_u64().unwrap() * 10 < summary["frames"].as_u64().unwrap(), "{summary}");
+
+    let number = |value: &Value| value.as_f64().unwrap();
+    let cues = messages(&lines, topics[4]);
+    let names: Vec<_> = cues.iter().map(|cue| (cue["number"].clone(), cue["name"].clone())).collect();
+    assert_eq!(names, [(1, "first"), (2, "second"), (3, "third")].map(|(number, name)| (number.into(), name.into())));
+    for (cue, at) in cues.iter().zip([50.35, 50.4, 50.45]) {
+        let late = number(&cue["sim_time"]) - at;
+        assert!(number(&cue["cue_time"]) == at && late >= 0.0, "{cue}");
+        let stamp = &cue["header"]["stamp"];
+        let nanoseconds = stamp["sec"].as_u64().unwrap() * 1_000_000_000 + stamp["nanosec"].as_u64().unwrap();
+        assert_eq!((cue["stamp_ns"].as_u64(), &cue["pauses"]), (Some(nanoseconds), &0.into()), "{cue}");
+    }
+
+    // The whole spiral: r = pitch theta / 2 pi, from 16 turns to the centre, clockwise.
+    let path = messages(&lines, topics[3])[0];
+    assert_eq!(path["header"]["frame_id"], "stage");
+    let poses = path["poses"].as_array().unwrap();
+    let position = |pose: &Value| ["x", "y"].map(|axis| number(&pose["pose"]["position"][axis]));
+    let (mut theta, mut before) = (16.0 * std::f64::consts::TAU, position(&poses[0]));
+    let (centre, spiral) = poses.split_last().unwrap();
+    for pose in spiral {
+        let [x, y] = position(pose);
+        let turned = (before[0] * y - before[1] * x).atan2(before[0] * x + before[1] * y);
+        assert!(turned <= 0.0 && turned > -0.1, "{pose}");
+        (theta, before) = (theta + turned, [x, y]);
+        assert!((x.hypot(y) - 0.55 * theta / std::f64::consts::TAU).abs() < 1e-9, "{pose}");
+    }
+    assert!(theta > 0.0 && theta < 0.1 && position(centre).iter().all(|x| x.abs() < 1e-12), "{theta} before {centre}");
+    let [z, w] = ["z", "w"].map(|part| number(&poses[0]["pose"]["orientation"][part]));
+    let slope = -1.0 / (16.0 * std::f64::consts::TAU);
+    assert!((2.0 * z.atan2(w) - (slope - std::f64::consts::FRAC_PI_2)).abs() < 1e-4, "{}", poses[0]);
+
+    // Paused, then from tick to tick.
+    let clock = messages(&lines, "clock");
+    let times: Vec<f64> = clock
+        .iter()
+        .map(|message| number(&message["clock"]["sec"]) + number(&message["clock"]["nanosec"]) * 1e-9)
+        .collect();
+    assert!(times[0] == 50.25 && times.is_sorted() && times[times.len() - 1] > 51.0, "{times:?}");
+    for time in times {
+        let ticks = (time - 50.25) * 60.0;
+        assert!((ticks - ticks.round()).abs() < 1e-6, "{time} is between two frames");
+    }
+
+    // Head and tail as the frame of the same stamp has them.
+    let mut compared = 0;
+    for message in messages(&lines, "tf") {
+        let transforms = message["transforms"].as_array().unwrap();
+        let stamp = &transforms[0]["header"]["stamp"];
+        let Some(frame) = messages(&lines, "handles").into_iter().find(|frame| frame["header"]["stamp"] == *stamp)
+        else {
+            continue;
+        };
+        compared += 1;
+        let handles = frame["poses"].as_array().unwrap();
+        assert_eq!(transforms.len(), 2);
+        for (transform, (end, handle)) in transforms.iter().zip([("head", &handles[0]), ("tail", &handles[3])]) {
+            assert_eq!(transform["header"], frame["header"]);
+            assert_eq!(transform["child_frame_id"], format!("{}/{end}", unique("shown")));
+            let (place, turn) = (&transform["transform"]["translation"], &transform["transform"]["rotation"]);
+            assert_eq!((&place["x"], &place["y"], &place["z"]), (&handle["x"], &handle["y"], &0.0.into()));
+            let error = 2.0 * number(&turn["z"]).atan2(number(&turn["w"])) - number(&handle["heading"]);
+            assert!(error.sin().abs() < 1e-9 && error.cos() > 0.0, "{transform} and {handle}");
+        }
+    }
+    assert!(compared > 2, "{compared} transforms are of a frame that came");
+}
+
+#[test]
 fn a_clean_end_leaves_the_graph_at_once() {
     if !can_run(python_modules(&["cyclonedds"])) {
         return;

@@ -73,7 +73,9 @@ fn check_alerts(alerts: &[&Value], seconds: u64) {
         assert_eq!((number(alert, "event_bench_a"), number(alert, "event_bench_b")), (0, 8), "{alert}");
     }
     let ticks: Vec<u64> = alerts.iter().map(|alert| number(alert, "tick") / RATE).collect();
-    assert!(ticks.windows(2).all(|pair| pair[1] > pair[0]), "one alert a second: {ticks:?}");
+    // Over ROS 2 the first one is perhaps sent a second time.
+    let again = usize::from(alerts.len() > 1 && alerts[0] == alerts[1]);
+    assert!(ticks[again..].windows(2).all(|pair| pair[1] > pair[0]), "one alert a second: {ticks:?}");
     assert!(!ticks.is_empty() && ticks.len() as u64 <= seconds, "{ticks:?}");
 }
 

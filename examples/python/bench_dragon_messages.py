@@ -406,16 +406,47 @@ class StageSegment(_Message):
     ]
 
 
+class StageEvent(_Message):
+    """An event of the show in a `Stage`."""
+
+    LAYOUT = 4
+    _fields_ = [
+        # Simulated seconds at which it happens.
+        ("time", ctypes.c_double),
+        # What happens, as the state that it leads to: one of `STATES`.
+        ("state", ctypes.c_uint32),
+        # Always 0.
+        ("reserved", ctypes.c_uint32),
+    ]
+
+
+class StageCue(_Message):
+    """A cue of the show in a `Stage`."""
+
+    LAYOUT = 4
+    _fields_ = [
+        # Simulated seconds at which it is.
+        ("time", ctypes.c_double),
+        # Its number, from 1 in the order of the cues' times.
+        ("number", ctypes.c_uint32),
+        # 1 where the show waits there until the command `go`, else 0.
+        ("pauses", ctypes.c_uint32),
+        # Its name.
+        ("name", ctypes.c_uint8 * 64),
+    ]
+
+
 class Stage(_Message):
-    """What a subscriber needs to draw the stage. Sent at the start and kept for late joiners.
+    """What a subscriber needs to draw the stage and its time line. Sent at the start and kept for late joiners.
 
     The head's board has a length of its own; all that follow have one length. The team may stand further back than the
     first segment begins, on the same spiral or line.
 
-    Over iceoryx2 the payload of `<name>/stage`. Layout 2 added the segments of the path, layout 3 gave them their name.
+    Over iceoryx2 the payload of `<name>/stage`. Layout 2 added the segments of the path, layout 3 gave them their name,
+    layout 4 added the time line: the freeze time, the events and the cues.
     """
 
-    LAYOUT = 3
+    LAYOUT = 4
     _fields_ = [
         # The run, as `FrameHeader.run_id`.
         ("run_id", ctypes.c_uint64),
@@ -433,12 +464,22 @@ class Stage(_Message):
         ("body_length", ctypes.c_double),
         # Metres across every board.
         ("width", ctypes.c_double),
+        # Simulated seconds at which the show freezes: a seek reaches no later time.
+        ("freeze_time", ctypes.c_double),
         # The number of benches; one less than the number of handles.
         ("benches", ctypes.c_uint32),
         # The number of segments in use, at most 32.
         ("segments", ctypes.c_uint32),
+        # The number of events in use, at most 4; a scene without `[alerts]` has its last one only.
+        ("events", ctypes.c_uint32),
+        # The number of cues in the show; the first 32 of them are listed.
+        ("cues", ctypes.c_uint32),
         # The segments of the path in the order of travel; those not in use are zero.
         ("path", StageSegment * 32),
+        # The events in order of time; those not in use are zero. Those after the freeze time are not reached.
+        ("timeline", StageEvent * 4),
+        # The cues in order of time; those not in use are zero.
+        ("cue_list", StageCue * 32),
     ]
 
 

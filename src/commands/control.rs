@@ -4,11 +4,12 @@ use std::time::Duration;
 
 use bench_dragon::show::control::{Code, Command};
 use bench_dragon::show::state::PlaybackState;
-use bench_dragon::subscribers::control::{ControlError, Controller};
+use bench_dragon::subscribers::control::conductor::Action as Conducting;
+use bench_dragon::subscribers::control::{ControlError, Controller, refusal, standing};
 use bench_dragon::wire::ControlResponse;
 use serde::Serialize;
 
-use super::{CommandError, Common, Output, number};
+use super::{CommandError, Common, Output};
 
 /// How long a publisher is given to answer; a step answers when it is over.
 const TIMEOUT: Duration = Duration::from_secs(30);
@@ -84,8 +85,8 @@ pub fn control(common: &Common, arguments: &ControlArguments) -> Result<(), Comm
         Action::Pause => Command::Pause,
         Action::Resume => Command::Resume,
         Action::Toggle => {
-            let paused = controller.send(Command::State, timeout)?.playback_state() == Some(PlaybackState::Paused);
-            if paused { Command::Resume } else { Command::Pause }
+            let state = controller.send(Command::State, timeout)?;
+            Conducting::Toggle.command(&state)
         }
         Action::Rate { rate } => Command::Rate(rate),
         Action::Seek { time } => Command::Seek(time),
@@ -108,27 +109,9 @@ fn print(common: &Common, response: &ControlResponse) -> Result<(), CommandError
     if common.json {
         output.json(&ResponseLine { code, tick, sim_time, time_scale, playback, cue })?;
     } else if !common.quiet {
-        let rate = if time_scale > 0.0 { format!(" at {} x", number(time_scale)) } else { String::new() };
-        output.line(&format!("{playback}{rate}, t = {sim_time:.3} s, tick {tick}"))?;
+        output.line(&standing(response))?;
     }
     output.finish()
-}
-
-/// Why a command was not obeyed; `None` where it was.
-fn refusal(response: &ControlResponse, command: Command) -> Option<String> {
-    let (number_of_command, value) = command.number_and_value();
-    let name = Command::NAMES[number_of_command as usize];
-    let playback = response.playback_state().map_or("in an unknown state", PlaybackState::name);
-    match response.result() {
-        Some(Code::Done | Code::Already) => None,
-        Some(Code::Refused) if command == Command::Go => {
-            Some(format!("go is refused: the show waits for nothing ({playback})"))
-        }
-        Some(Code::Refused) => Some(format!("{name} is refused: the show is {playback}")),
-        Some(Code::OutOfRange) => Some(format!("{name} is refused: {} is out of range", number(value))),
-        Some(Code::TooMany) => Some(format!("{name} is refused: too many commands are waiting")),
-        Some(Code::NotUnderstood) | None => Some(format!("{name} is not understood by this publisher")),
-    }
 }
 
 impl From<ControlError> for CommandError {

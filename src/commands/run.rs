@@ -20,7 +20,7 @@ use bench_dragon::show::{Playback, ReachedCue, Show};
 use bench_dragon::transports::iceoryx2::{OpenError, service_name};
 use bench_dragon::transports::{self, Transport, TransportConfig, TransportError};
 use bench_dragon::wire::convert;
-use bench_dragon::wire::sentence::{Figures, alert_sentence};
+use bench_dragon::wire::sentence::{Figures, alert_sentence, cue_sentence};
 
 use super::events::sentence;
 use super::realtime_scheduling::RealtimeScheduling;
@@ -61,6 +61,9 @@ pub struct RunArguments {
     /// Publish ROS 2 topics too, those of the scene's [publish.ros2] or the default ones
     #[arg(long)]
     ros2: bool,
+    /// Offer ROS 2 services that conduct the show, to everybody whom ROS 2 reaches; needs --ros2 or [publish.ros2]
+    #[arg(long)]
+    ros2_control: bool,
     #[command(flatten)]
     scheduling: RealtimeScheduling,
     /// End when the process that started this one ends
@@ -76,6 +79,14 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
     let mut scene = common.load_scene()?;
     if arguments.ros2 {
         scene.ros2.get_or_insert_default();
+    }
+    if arguments.ros2_control {
+        let Some(settings) = &mut scene.ros2 else {
+            let sentence =
+                "--ros2-control is given and ROS 2 is not requested, expected --ros2 or a scene with [publish.ros2]";
+            return Err(CommandError::BadInput(sentence.to_owned()));
+        };
+        settings.control = true;
     }
     let playback = arguments.playback(&scene)?;
     service_name(&common.name, "poses")?;
@@ -118,7 +129,7 @@ struct RunSession<'a> {
 impl RunSession<'_> {
     /// Runs the loop on one thread and the statistics on another.
     fn run(&self, mut show: Show, stop: &Arc<AtomicBool>) -> Result<(), CommandError> {
-        let (transports, mut doors) = self.open_transports()?;
+        let (transports, mut doors) = self.open_transports(&show)?;
         let (reports, inbox) = statistics::queues();
         let done = AtomicBool::new(false);
         let (opened, opening) = mpsc::channel();
@@ -163,8 +174,8 @@ impl RunSession<'_> {
     }
 
     /// The transports, and the loop's ends of those that have a door for commands.
-    fn open_transports(&self) -> Result<(Vec<Box<dyn Transport>>, Doors), CommandError> {
-        let stage = convert::stage(self.run_id, realtime_ns(), &self.scene.motion);
+    fn open_transports(&self, show: &Show) -> Result<(Vec<Box<dyn Transport>>, Doors), CommandError> {
+        let stage = convert::stage(self.run_id, realtime_ns(), &self.scene.motion, show);
         let (name, scene, loop_rate) = (&self.common.name, self.scene, self.playback.rate);
         let mut transports = transports::open(&TransportConfig { name, scene, loop_rate, stage })?;
         let mut ports = Vec::new();
@@ -256,8 +267,7 @@ impl RunSession<'_> {
                 eprintln!("{:>10.3} s  {style}{:<11}{style:#} {sentence}", alert.sim_time, level.name());
             }
             Announcement::Cue(cue) => {
-                let waits = if cue.pauses == 1 { ": waiting for go" } else { "" };
-                eprintln!("{:>10.3} s  cue {} \"{}\"{waits}", cue.sim_time, cue.number, cue.name.as_str());
+                eprintln!("{:>10.3} s  {}", cue.sim_time, cue_sentence(&cue));
             }
         }
     }

@@ -2,14 +2,15 @@
 
 use std::io::ErrorKind;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
 
-use bench_dragon::subscribers::view::{ViewError, serve};
+use bench_dragon::subscribers::view::{AllowedOrigin, Ready, ViewError, ViewOptions, serve};
 use serde::Serialize;
 
 use super::{CommandError, Common, Output, stop_on_signals};
 
 /// Arguments of `view`.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Clone, clap::Args)]
 pub struct ViewArguments {
     /// The port of the page; 0 takes any free one
     #[arg(long, default_value_t = 8080)]
@@ -17,40 +18,87 @@ pub struct ViewArguments {
     /// The address to listen on; any but a loopback one lets others watch
     #[arg(long, value_name = "ADDR", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     listen: IpAddr,
+    /// Let browsers conduct the show: pause, seek, rate, hold
+    #[arg(long)]
+    control: bool,
+    /// Let a page of another place in, such as https://show.example or http://localhost:5173; may be repeated
+    #[arg(long, value_name = "ORIGIN")]
+    allow_origin: Vec<AllowedOrigin>,
+    /// Serve the files of this folder below /pages/, for a page of one's own
+    #[arg(long, value_name = "DIR")]
+    pages: Option<PathBuf>,
 }
 
 /// What `view --json` prints once browsers can connect.
 #[derive(Serialize)]
-struct Ready {
+struct ReadyLine {
     r#type: &'static str,
     url: String,
+    /// The addresses that others type, where the server listens on all of this machine's.
+    others: Vec<String>,
+    /// What whoever conducts has to give; null where nothing is needed.
+    token: Option<String>,
 }
 
 /// Serves the picture until a signal comes.
 pub fn view(common: &Common, arguments: &ViewArguments) -> Result<(), CommandError> {
     let stop = stop_on_signals()?;
-    let address = SocketAddr::new(arguments.listen, arguments.port);
-    serve(&common.name, address, &stop, |address| announce(common, address))
+    let ViewArguments { port, listen, control, allow_origin, pages } = arguments.clone();
+    let options = ViewOptions { address: SocketAddr::new(listen, port), control, origins: allow_origin, pages };
+    serve(&common.name, options, &stop, |ready| announce(common, arguments, ready))
 }
 
-fn announce(common: &Common, address: SocketAddr) -> Result<(), CommandError> {
-    let url = format!("http://{address}/");
+fn announce(common: &Common, arguments: &ViewArguments, ready: &Ready) -> Result<(), CommandError> {
+    let Ready { address, ref token } = *ready;
+    let port = address.port();
+    let fragment = token.as_ref().map_or(String::new(), |token| format!("#token={}", token.as_str()));
+    let others: Vec<_> = if address.ip().is_unspecified() { own_addresses(address.ip()) } else { Vec::new() };
+    let others = others.into_iter().map(|ip| format!("http://{}/", SocketAddr::new(ip, port))).collect::<Vec<_>>();
     let mut output = Output::standard();
     if common.json {
-        output.json(&Ready { r#type: "ready", url })?;
-    } else if address.ip().is_unspecified() {
-        let port = address.port();
+        let (url, token) = (format!("http://{address}/"), token.as_ref().map(|token| token.as_str().to_owned()));
+        output.json(&ReadyLine { r#type: "ready", url, others, token })?;
+        return output.finish();
+    }
+    let (name, of_all) = (&common.name, address.ip().is_unspecified());
+    if of_all {
         output.line(&format!(
-            "The stage picture of \"{}\" is at port {port} of every address of this machine; here, http://localhost:{port}/. Ctrl-C ends.",
-            common.name
+            "The stage picture of \"{name}\" is at port {port} of every address of this machine; here, \
+             http://localhost:{port}/{fragment}. Ctrl-C ends."
         ))?;
+        others.iter().try_for_each(|url| output.line(&format!("  from elsewhere: {url}{fragment}")))?;
     } else {
-        output.line(&format!("The stage picture of \"{}\" is at {url}. Ctrl-C ends.", common.name))?;
+        output.line(&format!("The stage picture of \"{name}\" is at http://{address}/{fragment}. Ctrl-C ends."))?;
+    }
+    if arguments.pages.is_some() {
+        let host = if of_all { format!("localhost:{port}") } else { address.to_string() };
+        output.line(&format!("Your own pages are at http://{host}/pages/."))?;
+    }
+    if token.is_some() {
+        output.line("Only who has this address with its token may conduct; without the token one may watch.")?;
     }
     if !address.ip().is_loopback() {
         eprintln!("WARNING: anyone who can reach {address} can watch this show; there is no password.");
     }
     output.finish()
+}
+
+/// The addresses of this machine that others can type, of the kinds that are listened on.
+fn own_addresses(listen: IpAddr) -> Vec<IpAddr> {
+    let interfaces = nix::ifaddrs::getifaddrs().into_iter().flatten();
+    let mut addresses: Vec<_> = interfaces
+        .filter_map(|interface| {
+            let address = interface.address?;
+            let v4 = address.as_sockaddr_in().map(|address| IpAddr::V4(address.ip()));
+            v4.or_else(|| address.as_sockaddr_in6().map(|address| IpAddr::V6(address.ip())))
+        })
+        .filter(|ip| !ip.is_loopback() && (ip.is_ipv4() || listen.is_ipv6()))
+        // One that is valid on its own link only cannot be typed without naming the link.
+        .filter(|ip| !matches!(ip, IpAddr::V6(ip) if ip.is_unicast_link_local()))
+        .collect();
+    addresses.sort();
+    addresses.dedup();
+    addresses
 }
 
 impl From<ViewError> for CommandError {
@@ -60,7 +108,8 @@ impl From<ViewError> for CommandError {
             ViewError::Listen { ref source, .. } if source.kind() == ErrorKind::AddrNotAvailable => {
                 Self::BadInput(error.to_string())
             }
-            ViewError::Listen { .. } => Self::Failed(error.to_string()),
+            ViewError::Pages { .. } => Self::BadInput(error.to_string()),
+            ViewError::Listen { .. } | ViewError::Token(_) => Self::Failed(error.to_string()),
         }
     }
 }

@@ -1,6 +1,9 @@
-//! `watch`: the terminal monitor.
+//! `watch`: the terminal monitor. In `keys`, what its keys command; in `terminal`, how they are read.
 
-use std::io::{IsTerminal, Write, stdout};
+mod keys;
+pub mod terminal;
+
+use std::io::{IsTerminal, Write, stdin, stdout};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -11,10 +14,12 @@ use bench_dragon::show::state::{FrameState, Level, PlaybackState, Severity};
 use bench_dragon::subscribers::connection::Wake;
 use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
 use bench_dragon::subscribers::monitor::{IntervalReport, Latency, Monitor, Presence};
-use bench_dragon::wire::json::AlertObject;
-use bench_dragon::wire::sentence::{Figures, alert_sentence, time_until};
+use bench_dragon::wire::json::{AlertObject, CueObject};
+use bench_dragon::wire::sentence::{Figures, alert_sentence, cue_sentence, time_until};
 use bench_dragon::wire::{CollisionAlert, LoopStatus};
-use crossterm::{cursor, execute, terminal};
+use crossterm::terminal::{Clear, ClearType, DisableLineWrap, EnableLineWrap, size};
+use crossterm::{cursor, execute};
+use keys::{KEY_INTERVAL, KeyOutcome, Keyboard};
 use serde::Serialize;
 
 use super::{CommandError, Common, severity_colour, shows_colour, stop_on_signals, wall_seconds};
@@ -27,7 +32,7 @@ pub struct WatchArguments {
     duration: Option<f64>,
 }
 
-/// The line of `watch --json` each second; the other kind of line is an [`AlertObject`].
+/// The line of `watch --json` each second; the other kinds of line are [`AlertObject`] and [`CueObject`].
 #[derive(Serialize)]
 #[serde(tag = "type", rename = "second")]
 struct IntervalLine {
@@ -68,9 +73,13 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
     let over = |at: Instant| arguments.duration.is_some_and(|seconds| (at - began).as_secs_f64() >= seconds);
     let interval = Duration::from_secs(1);
     let mut next = began + interval;
-    let mut screen = Screen { display, name: &common.name, time_scale: 1.0, benches: 0, drawn: Vec::new() };
+    let mut screen =
+        Screen { display, name: &common.name, time_scale: 1.0, benches: 0, drawn: Vec::new(), answer: None };
+    let has_keys = display == Display::Terminal && stdin().is_terminal();
+    let mut keyboard = if has_keys { Some(Keyboard::new(&common.name, &stop)?) } else { None };
     if display != Display::Json {
-        eprintln!("Watching \"{}\"; Ctrl-C ends.", common.name);
+        let keys = if has_keys { ", ? lists the keys" } else { "" };
+        eprintln!("Watching \"{}\"; Ctrl-C ends{keys}.", common.name);
     }
     while !stop.load(Ordering::Relaxed) {
         let now = Instant::now();
@@ -81,9 +90,18 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
         if over(now) {
             break;
         }
+        for outcome in keyboard.iter_mut().flat_map(Keyboard::poll) {
+            match outcome {
+                KeyOutcome::Line(words) => screen.print_line(&words)?,
+                KeyOutcome::Done(words) => screen.show_answer(words)?,
+                KeyOutcome::Quit => return Ok(()),
+            }
+        }
+        let patience = if has_keys { KEY_INTERVAL } else { interval };
         let mut printed = Ok(());
-        feed.poll(next.saturating_duration_since(now), &mut |event| {
+        feed.poll(next.saturating_duration_since(now).min(patience), &mut |event| {
             monitor.handle(&event, monotonic_ns());
+            keyboard.iter_mut().for_each(|keyboard| keyboard.handle(&event));
             if printed.is_ok() {
                 printed = screen.print_event(&event);
             }
@@ -100,6 +118,8 @@ struct Screen<'a> {
     benches: u32,
     /// The lines of the last report that stand on the terminal, which the next one replaces.
     drawn: Vec<String>,
+    /// How the show stood after the last key, which is the last line of the report.
+    answer: Option<String>,
 }
 
 impl Screen<'_> {
@@ -123,6 +143,7 @@ impl Screen<'_> {
             Display::Terminal => {
                 self.clear_previous(&mut output)?;
                 self.drawn = self.lines(report);
+                self.drawn.extend(self.answer.clone());
                 self.draw(&mut output)?;
             }
         }
@@ -132,9 +153,9 @@ impl Screen<'_> {
     /// Draws the last report below all events.
     fn draw(&self, output: &mut impl Write) -> std::io::Result<()> {
         // A wrapped line would take two rows, and the next report would clear one too few.
-        execute!(output, terminal::DisableLineWrap)?;
+        execute!(output, DisableLineWrap)?;
         self.drawn.iter().try_for_each(|line| writeln!(output, "{line}"))?;
-        execute!(output, terminal::EnableLineWrap)
+        execute!(output, EnableLineWrap)
     }
 
     /// Clears the last report from the terminal.
@@ -143,21 +164,22 @@ impl Screen<'_> {
             return Ok(());
         }
         let rows = self.drawn.len() as u16;
-        execute!(output, cursor::MoveToPreviousLine(rows), terminal::Clear(terminal::ClearType::FromCursorDown))
+        execute!(output, cursor::MoveToPreviousLine(rows), Clear(ClearType::FromCursorDown))
     }
 
-    /// Prints what a person wants to know at once; a machine gets the alerts.
+    /// Prints what a person wants to know at once; a machine gets the alerts and the cues.
     fn print_event(&mut self, event: &FeedEvent<'_>) -> Result<(), CommandError> {
         if let FeedEvent::Frame { header, .. } = event {
             (self.time_scale, self.benches) = (header.time_scale, header.handles.saturating_sub(1));
         }
         if self.display == Display::Json {
-            if let FeedEvent::Alert(alert) = event {
-                let mut output = stdout().lock();
-                write_json(&mut output, &AlertObject::from(*alert))?;
-                output.flush()?;
+            let mut output = stdout().lock();
+            match event {
+                FeedEvent::Alert(alert) => write_json(&mut output, &AlertObject::from(*alert))?,
+                FeedEvent::Cue(cue) => write_json(&mut output, &CueObject::from(*cue))?,
+                _ => return Ok(()),
             }
-            return Ok(());
+            return Ok(output.flush()?);
         }
         let name = self.name;
         let line = match event {
@@ -165,20 +187,42 @@ impl Screen<'_> {
             FeedEvent::Gone => format!("The publisher of \"{name}\" has ended; waiting for the next."),
             FeedEvent::Silent => format!("The publisher of \"{name}\" is there but sends nothing."),
             FeedEvent::Alert(alert) => self.alert_line(alert),
+            FeedEvent::Cue(cue) => format!("{:>10.3} s  {}", cue.sim_time, cue_sentence(cue)),
             FeedEvent::Frame { .. } | FeedEvent::Stage(_) | FeedEvent::Status(_) => return Ok(()),
         };
+        if self.display == Display::Terminal && matches!(event, FeedEvent::Started { .. } | FeedEvent::Gone) {
+            // The last report is of another publisher, or of none.
+            self.clear_previous(&mut stdout().lock())?;
+            self.drawn.clear();
+            self.answer = None;
+        }
+        self.print_line(&line)
+    }
+
+    /// Prints a line above the last report.
+    fn print_line(&self, line: &str) -> Result<(), CommandError> {
         let mut output = stdout().lock();
         if self.display == Display::Lines {
             writeln!(output, "{line}")?;
             return Ok(output.flush()?);
         }
         self.clear_previous(&mut output)?;
-        if matches!(event, FeedEvent::Started { .. } | FeedEvent::Gone) {
-            // The last report is of another publisher, or of none.
-            self.drawn.clear();
+        // Some terminals do not know their size.
+        let columns = size().ok().filter(|(columns, _)| *columns > 0).map_or(80, |(columns, _)| columns.into());
+        writeln!(output, "{}", textwrap::fill(line, textwrap::Options::new(columns).subsequent_indent(INDENT)))?;
+        self.draw(&mut output)?;
+        Ok(output.flush()?)
+    }
+
+    /// Shows how the show stands after a key at once, below the last report.
+    fn show_answer(&mut self, words: String) -> Result<(), CommandError> {
+        let mut output = stdout().lock();
+        self.clear_previous(&mut output)?;
+        if self.answer.is_some() {
+            self.drawn.pop();
         }
-        let columns = terminal::size().map_or(80, |(columns, _)| columns.into());
-        writeln!(output, "{}", textwrap::fill(&line, textwrap::Options::new(columns).subsequent_indent(INDENT)))?;
+        self.drawn.push(words.clone());
+        self.answer = Some(words);
         self.draw(&mut output)?;
         Ok(output.flush()?)
     }

@@ -1,4 +1,4 @@
-//! What a scene may state about its ROS 2 topics: `[publish.ros2]`.
+//! What a scene may state about its ROS 2 topics and services: `[publish.ros2]`.
 //!
 //! In: the table as written. Out: [`Ros2Settings`], checked. Called by the scene; read by the ROS 2 transport.
 
@@ -27,11 +27,20 @@ pub enum Topic {
     Markers,
     /// `/<name>/status`, bench_dragon_msgs/LoopStatus.
     Status,
+    /// `/<name>/path`, nav_msgs/Path.
+    Path,
+    /// `/<name>/cues`, bench_dragon_msgs/Cue.
+    Cues,
+    /// `/clock`, rosgraph_msgs/Clock.
+    Clock,
+    /// `/tf`, tf2_msgs/TFMessage.
+    Tf,
 }
 
 impl Topic {
     /// What is published by default.
-    pub const DEFAULT: [Self; 5] = [Self::Handles, Self::Poses, Self::Alerts, Self::Stage, Self::Diagnostics];
+    pub const DEFAULT: [Self; 7] =
+        [Self::Handles, Self::Poses, Self::Alerts, Self::Stage, Self::Diagnostics, Self::Path, Self::Cues];
 
     /// The name in the scene, and the last part of the topic's.
     pub fn name(self) -> &'static str {
@@ -43,14 +52,18 @@ impl Topic {
             Self::Diagnostics => "diagnostics",
             Self::Markers => "markers",
             Self::Status => "status",
+            Self::Path => "path",
+            Self::Cues => "cues",
+            Self::Clock => "clock",
+            Self::Tf => "tf",
         }
     }
 
     /// The topic's full name, where the publisher is called `publisher`.
     pub fn path(self, publisher: &str) -> String {
         match self {
-            // Where every diagnostics tool looks.
-            Self::Diagnostics => "/diagnostics".to_owned(),
+            // Where every tool looks.
+            Self::Diagnostics | Self::Clock | Self::Tf => format!("/{}", self.name()),
             _ => format!("/{publisher}/{}", self.name()),
         }
     }
@@ -61,7 +74,7 @@ impl Topic {
     /// best-effort subscription gets what a reliable publisher sends. What is sent seldom is kept for late subscribers.
     pub fn default_qos(self) -> Qos {
         match self {
-            Self::Alerts | Self::Stage => {
+            Self::Alerts | Self::Stage | Self::Path | Self::Cues => {
                 Qos { reliability: Reliability::Reliable, durability: Durability::TransientLocal, depth: 1 }
             }
             _ => Qos { reliability: Reliability::Reliable, durability: Durability::Volatile, depth: 10 },
@@ -107,11 +120,14 @@ pub struct Ros2Settings {
     pub rate: Option<f64>,
     /// The topics and how each is published.
     pub topics: BTreeMap<Topic, Qos>,
+    /// Whether there are services that conduct the show.
+    pub control: bool,
 }
 
 impl Default for Ros2Settings {
     fn default() -> Self {
-        Self { rate: None, topics: Topic::DEFAULT.into_iter().map(|topic| (topic, topic.default_qos())).collect() }
+        let topics = Topic::DEFAULT.into_iter().map(|topic| (topic, topic.default_qos())).collect();
+        Self { rate: None, topics, control: false }
     }
 }
 
@@ -128,6 +144,8 @@ impl Ros2Settings {
 pub(super) struct RawRos2 {
     rate: Option<Spanned<f64>>,
     topics: Option<Spanned<Vec<Topic>>>,
+    #[serde(default)]
+    control: bool,
     #[serde(default)]
     qos: BTreeMap<Topic, Spanned<RawQos>>,
 }
@@ -164,7 +182,7 @@ impl RawRos2 {
             };
             *qos = raw.get_ref().validated(*topic, source)?;
         }
-        Ok(Ros2Settings { rate, topics })
+        Ok(Ros2Settings { rate, topics, control: self.control })
     }
 }
 

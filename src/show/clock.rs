@@ -112,6 +112,11 @@ impl ShowClock {
         self.freeze_time
     }
 
+    /// Simulated seconds per second while the show plays.
+    pub fn playing_rate(&self) -> f64 {
+        self.time_scale
+    }
+
     /// Cues reached since the last [`clear_reached`](Self::clear_reached), by their place in the order of times.
     pub fn reached(&self) -> &[usize] {
         &self.reached

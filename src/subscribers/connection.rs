@@ -12,7 +12,7 @@ use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use crate::transports::iceoryx2::{OpenError, check_room_to_subscribe, node, reserve_pages, service_name, stale_files};
-use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
+use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
 
 type Receiver<Payload, Header> = Port<ipc::Service, Payload, Header>;
 
@@ -21,6 +21,9 @@ pub struct Connection {
     poses: Receiver<[HandlePose], FrameHeader>,
     poses_service: PortFactory<ipc::Service, [HandlePose], FrameHeader>,
     alerts: Option<Receiver<CollisionAlert, ()>>,
+    cues: Option<Receiver<Cue, ()>>,
+    /// Whether the show has cues: where it has none there is no such service to look for.
+    expects_cues: bool,
     status: Option<Receiver<LoopStatus, ()>>,
     stage: Option<Receiver<Stage, ()>>,
     tick: Option<Listener<ipc::Service>>,
@@ -76,6 +79,7 @@ impl Subscription {
         // Other subscribers keep a service when its publisher has gone. One more would keep it from being made anew.
         if poses_service.dynamic_config().number_of_publishers() == 0 {
             self.service::<CollisionAlert>("alerts")?;
+            self.service::<Cue>("cues")?;
             self.service::<LoopStatus>("status")?;
             self.service::<Stage>("stage")?;
             return Ok(None);
@@ -93,6 +97,8 @@ impl Subscription {
             poses,
             poses_service,
             alerts: self.receiver("alerts")?,
+            cues: self.receiver("cues")?,
+            expects_cues: false,
             status: self.receiver("status")?,
             stage: self.receiver("stage")?,
             tick: self.listener(),
@@ -111,6 +117,9 @@ impl Subscription {
         let missing = connection.missing();
         if connection.alerts.is_none() {
             connection.alerts = self.receiver("alerts")?;
+        }
+        if connection.cues.is_none() && connection.expects_cues {
+            connection.cues = self.receiver("cues")?;
         }
         if connection.status.is_none() {
             connection.status = self.receiver("status")?;
@@ -161,7 +170,8 @@ impl Subscription {
 impl Connection {
     /// Services that are not open.
     fn missing(&self) -> usize {
-        let open = [self.alerts.is_some(), self.status.is_some(), self.stage.is_some(), self.tick.is_some()];
+        let Self { alerts, cues, status, stage, tick, .. } = self;
+        let open = [alerts.is_some(), cues.is_some(), status.is_some(), stage.is_some(), tick.is_some()];
         open.into_iter().filter(|open| !open).count()
     }
 
@@ -198,6 +208,16 @@ impl Connection {
     /// The next alert, if one has come.
     pub fn alert(&self) -> Option<CollisionAlert> {
         next(self.alerts.as_ref())
+    }
+
+    /// Whether there is a service of cues to open.
+    pub fn expect_cues(&mut self, expected: bool) {
+        self.expects_cues = expected;
+    }
+
+    /// The next cue, if one has come.
+    pub fn cue(&self) -> Option<Cue> {
+        next(self.cues.as_ref())
     }
 
     /// The next status, if one has come.

@@ -1,14 +1,19 @@
-//! Conducting a publisher from another process: one request over `<name>/control`, and its response.
+//! Conducting a publisher from another process: requests over `<name>/control`, and their responses.
 //!
-//! Called by the `control` command; for controllers written in Rust.
+//! [`Controller`] is for the thread that waits, as the `control` command does; a [`conductor`] has a thread of its own,
+//! for whoever has something else to do meanwhile, as `watch` and the stage picture's server have.
+
+pub mod conductor;
 
 use std::time::{Duration, Instant};
 
+use iceoryx2::pending_response::PendingResponse;
 use iceoryx2::port::client::Client;
 use iceoryx2::prelude::*;
 use iceoryx2::service::builder::request_response::RequestResponseOpenError as Open;
 
-use crate::show::control::Command;
+use crate::show::control::{Code, Command};
+use crate::show::state::PlaybackState;
 use crate::transports::iceoryx2::{OpenError, check_room_to_subscribe, node, service_name};
 use crate::wire::{ControlRequest, ControlResponse};
 
@@ -53,20 +58,19 @@ impl Controller {
         check_room_to_subscribe()?;
         let node = node()?;
         let no_publisher = || ControlError::NoPublisher(name.to_owned());
-        let failed = |reason: String| OpenError::Failed { service: service.to_string(), reason };
         let opened = node.service_builder(&service).request_response::<ControlRequest, ControlResponse>().open();
         let opened = opened.map_err(|error| match error {
             Open::DoesNotExist | Open::HangsInCreation | Open::IsMarkedForDestruction => no_publisher(),
             Open::IncompatibleRequestOrResponseType | Open::VersionMismatch => {
                 OpenError::Incompatible(service.to_string()).into()
             }
-            error => failed(format!("{error:?}")).into(),
+            error => failed(name, format!("{error:?}")).into(),
         })?;
         if opened.dynamic_config().number_of_servers() == 0 {
             return Err(no_publisher());
         }
         let client = opened.client_builder().backpressure_strategy(BackpressureStrategy::DiscardData).create();
-        let client = client.map_err(|error| failed(format!("{error:?}")))?;
+        let client = client.map_err(|error| failed(name, format!("{error:?}")))?;
         Ok(Self { name: name.to_owned(), client, sent: 0, _node: node })
     }
 
@@ -75,21 +79,78 @@ impl Controller {
     /// # Errors
     /// [`ControlError::NoPublisher`] or [`ControlError::NoAnswer`].
     pub fn send(&mut self, command: Command, timeout: Duration) -> Result<ControlResponse, ControlError> {
-        self.sent += 1;
-        let (number, value) = command.number_and_value();
-        let request = ControlRequest { id: self.sent, value, command: number, reserved: 0 };
-        let failed = |reason: String| OpenError::Failed { service: format!("{}/control", self.name), reason };
-        let pending = self.client.send_copy(request).map_err(|error| failed(format!("{error:?}")))?;
+        let pending = self.request(command)?;
         let began = Instant::now();
         while began.elapsed() < timeout {
-            match pending.receive().map_err(|error| failed(format!("{error:?}")))? {
-                Some(response) => return Ok(*response),
-                None if pending.number_of_server_connections() == 0 => {
-                    return Err(ControlError::NoPublisher(self.name.clone()));
-                }
+            match pending.poll()? {
+                Some(response) => return Ok(response),
                 None => std::thread::sleep(POLL_INTERVAL),
             }
         }
         Err(ControlError::NoAnswer { name: self.name.clone(), timeout })
+    }
+
+    /// Sends a command. Dropping what is returned gives up the response, not the command.
+    ///
+    /// # Errors
+    /// [`ControlError::Open`] where the service fails.
+    pub fn request(&mut self, command: Command) -> Result<PendingCommand, ControlError> {
+        self.sent += 1;
+        let (number, value) = command.number_and_value();
+        let request = ControlRequest { id: self.sent, value, command: number, reserved: 0 };
+        let sent = self.client.send_copy(request);
+        let pending = sent.map_err(|error| failed(&self.name, format!("{error:?}")))?;
+        Ok(PendingCommand { name: self.name.clone(), pending })
+    }
+}
+
+/// A command whose response has not come.
+pub struct PendingCommand {
+    name: String,
+    pending: PendingResponse<ipc::Service, ControlRequest, (), ControlResponse, ()>,
+}
+
+impl PendingCommand {
+    /// The response, if it has come.
+    ///
+    /// # Errors
+    /// [`ControlError::NoPublisher`] where nobody is there any more who could answer.
+    pub fn poll(&self) -> Result<Option<ControlResponse>, ControlError> {
+        match self.pending.receive().map_err(|error| failed(&self.name, format!("{error:?}")))? {
+            Some(response) => Ok(Some(*response)),
+            None if self.pending.number_of_server_connections() == 0 => {
+                Err(ControlError::NoPublisher(self.name.clone()))
+            }
+            None => Ok(None),
+        }
+    }
+}
+
+fn failed(name: &str, reason: String) -> OpenError {
+    OpenError::Failed { service: format!("{name}/control"), reason }
+}
+
+/// How the show stands after a command, for people.
+pub fn standing(response: &ControlResponse) -> String {
+    let playback = response.playback_state().map_or("unknown", PlaybackState::name);
+    let ControlResponse { tick, sim_time, time_scale, .. } = *response;
+    let rate = if time_scale > 0.0 { format!(" at {time_scale} x") } else { String::new() };
+    format!("{playback}{rate}, t = {sim_time:.3} s, tick {tick}")
+}
+
+/// Why a command was not obeyed, in a sentence; `None` where it was.
+pub fn refusal(response: &ControlResponse, command: Command) -> Option<String> {
+    let (number_of_command, value) = command.number_and_value();
+    let name = Command::NAMES[number_of_command as usize];
+    let playback = response.playback_state().map_or("in an unknown state", PlaybackState::name);
+    match response.result() {
+        Some(Code::Done | Code::Already) => None,
+        Some(Code::Refused) if command == Command::Go => {
+            Some(format!("go is refused: the show waits for nothing ({playback})"))
+        }
+        Some(Code::Refused) => Some(format!("{name} is refused: the show is {playback}")),
+        Some(Code::OutOfRange) => Some(format!("{name} is refused: {value:?} is out of range")),
+        Some(Code::TooMany) => Some(format!("{name} is refused: too many commands are waiting")),
+        Some(Code::NotUnderstood) | None => Some(format!("{name} is not understood by this publisher")),
     }
 }

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use super::connection::{Connection, Subscription, Wake};
 use crate::transports::iceoryx2::OpenError;
-use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
+use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
 use liveness::{Change, Liveness};
 use sequence::SequenceTracker;
 
@@ -61,6 +61,8 @@ pub enum FeedEvent<'a> {
     Stage(&'a Stage),
     /// An alert.
     Alert(&'a CollisionAlert),
+    /// A cue that the show has reached. A feed that connects later gets the latest one.
+    Cue(&'a Cue),
     /// The status of the publisher's loop.
     Status(&'a LoopStatus),
     /// The publisher is alive and has stopped sending. The next frame ends that.
@@ -158,7 +160,7 @@ impl Feed {
 
 impl Connected {
     /// Hands over what is in the queues: the stage first, since it explains the frames, and frames before the alerts
-    /// that belong to them.
+    /// and cues that belong to them.
     fn receive(&mut self, frames: Frames, sequence: &mut SequenceTracker, handle: &mut dyn FnMut(FeedEvent<'_>)) {
         let Self { connection, liveness, received, .. } = self;
         let mut handle = |event: FeedEvent<'_>| {
@@ -166,6 +168,7 @@ impl Connected {
             handle(event);
         };
         while let Some(stage) = connection.stage() {
+            connection.expect_cues(stage.cues > 0);
             handle(FeedEvent::Stage(&stage));
         }
         let take_frame = |header: &FrameHeader, handles: &[HandlePose]| {
@@ -184,6 +187,9 @@ impl Connected {
         }
         while let Some(alert) = connection.alert() {
             handle(FeedEvent::Alert(&alert));
+        }
+        while let Some(cue) = connection.cue() {
+            handle(FeedEvent::Cue(&cue));
         }
         while let Some(status) = connection.status() {
             liveness.rate(status.rate);

@@ -119,7 +119,7 @@ impl Monitor {
                 self.status = None;
                 self.alert = None;
             }
-            FeedEvent::Started { .. } | FeedEvent::Stage(_) => (),
+            FeedEvent::Started { .. } | FeedEvent::Stage(_) | FeedEvent::Cue(_) => (),
         }
     }
 

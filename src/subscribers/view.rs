@@ -2,30 +2,39 @@
 //!
 //! Called by the `view` command. `reader` reads the shared memory on a thread of its own, since ports cannot leave the
 //! thread that made them, and hands the newest picture over; `browser` sends it to one browser at that one's pace;
-//! `wire` is its layout on the way.
+//! `wire` is its layout on the way. `origin` is who may connect, `gate` who may command, and how.
 
 mod browser;
+mod gate;
+mod origin;
 mod reader;
 mod wire;
 
-use std::net::{IpAddr, SocketAddr};
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use axum::Router;
 use axum::body::Bytes;
+use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::ws::{Utf8Bytes, WebSocketUpgrade};
-use axum::extract::{Query, State as Shared};
-use axum::http::{HeaderMap, StatusCode, header};
-use axum::response::{IntoResponse, Response};
+use axum::extract::{RawQuery, Request, State as Shared};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::{IntoResponse, Redirect, Response};
 use axum::routing::get;
-use serde::Deserialize;
 use tokio::sync::watch;
+use tower_http::services::ServeDir;
 
 use super::connection::Wake;
 use super::feed::{Feed, FeedOptions, Frames};
 use crate::transports::iceoryx2::{OpenError, service_name};
+use gate::Gate;
+pub use gate::Token;
+use origin::Admission;
+pub use origin::AllowedOrigin;
 
 /// Browsers send requests of a few letters.
 const MAX_REQUEST_BYTES: usize = 1024;
@@ -39,6 +48,8 @@ struct Picture {
     waiting: Utf8Bytes,
     stage: Utf8Bytes,
     alert: Utf8Bytes,
+    /// The latest cues, each with its number among all that have come to this server, so that none is left out.
+    cues: Arc<[(u64, Utf8Bytes)]>,
     frame: Bytes,
 }
 
@@ -52,7 +63,31 @@ impl Picture {
 #[derive(Clone)]
 struct Server {
     pictures: watch::Receiver<Picture>,
-    loopback: bool,
+    admission: Arc<Admission>,
+    /// `None` where nobody may command.
+    gate: Option<Arc<Gate>>,
+}
+
+/// How the stage picture is served.
+#[derive(Debug, Clone)]
+pub struct ViewOptions {
+    /// Where to listen; port 0 takes any free one.
+    pub address: SocketAddr,
+    /// Whether browsers may conduct the show.
+    pub control: bool,
+    /// Pages of other places that are let in.
+    pub origins: Vec<AllowedOrigin>,
+    /// A folder that is served below `/pages/`.
+    pub pages: Option<PathBuf>,
+}
+
+/// What browsers need to connect.
+#[derive(Debug, Clone)]
+pub struct Ready {
+    /// Where the server listens.
+    pub address: SocketAddr,
+    /// What whoever conducts has to give, where that is needed: as soon as more than this machine's own page is let in.
+    pub token: Option<Token>,
 }
 
 /// Why the stage picture could not be served.
@@ -72,26 +107,44 @@ pub enum ViewError {
         /// What the system reported.
         source: std::io::Error,
     },
+    /// The folder of pages is none.
+    #[error("--pages {}: {source}, expected a folder", folder.display())]
+    Pages {
+        /// The folder given.
+        folder: PathBuf,
+        /// What the system reported.
+        source: std::io::Error,
+    },
+    /// No token can be made.
+    #[error("the system has no random numbers for a token: {0}")]
+    Token(#[from] getrandom::Error),
 }
 
-/// Serves the picture of the publisher `name` at `address` until `stop` is set. `ready` is called with the address
-/// once browsers can connect.
+/// Serves the picture of the publisher `name` until `stop` is set. `ready` is called once browsers can connect.
 ///
 /// # Errors
-/// [`ViewError`] for a name or an address that cannot be used.
+/// [`ViewError`] for a name, an address or a folder that cannot be used.
 pub fn serve<Refused: From<ViewError>>(
     name: &str,
-    address: SocketAddr,
+    options: ViewOptions,
     stop: &Arc<AtomicBool>,
-    ready: impl FnOnce(SocketAddr) -> Result<(), Refused>,
+    ready: impl FnOnce(&Ready) -> Result<(), Refused>,
 ) -> Result<(), Refused> {
+    let ViewOptions { address, control, origins, pages } = options;
     service_name(name, "poses").map_err(ViewError::from)?;
+    if let Some(folder) = &pages {
+        std::fs::read_dir(folder).map_err(|source| ViewError::Pages { folder: folder.clone(), source })?;
+    }
     let listen = |source| ViewError::Listen { address, source };
     // One thread for all browsers: they must not take the cores a publisher on this machine needs.
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(listen)?;
     let listener = runtime.block_on(tokio::net::TcpListener::bind(address)).map_err(listen)?;
     let address = listener.local_addr().map_err(listen)?;
-    ready(address)?;
+    let loopback = address.ip().is_loopback();
+    let needs_token = control && (!loopback || !origins.is_empty());
+    let token = if needs_token { Some(Token::random().map_err(ViewError::from)?) } else { None };
+    let gate = if control { Some(Arc::new(Gate::new(name, token.clone()).map_err(listen)?)) } else { None };
+    ready(&Ready { address, token })?;
     let (sender, pictures) = watch::channel(Picture::default());
     let reader = std::thread::spawn({
         let (name, stop) = (name.to_owned(), Arc::clone(stop));
@@ -101,7 +154,8 @@ pub fn serve<Refused: From<ViewError>>(
             read
         }
     });
-    let router = router(Server { pictures, loopback: address.ip().is_loopback() });
+    let admission = Arc::new(Admission { loopback, origins });
+    let router = router(Server { pictures, admission, gate }, pages.as_deref());
     let served = runtime.block_on(async {
         tokio::select! {
             served = async { axum::serve(listener, router).await } => served,
@@ -115,9 +169,15 @@ pub fn serve<Refused: From<ViewError>>(
     Ok(read.map_err(ViewError::from)?)
 }
 
-fn router(server: Server) -> Router {
+fn router(server: Server, pages: Option<&Path>) -> Router {
     let file = |kind, text| get(move || async move { file(kind, text) });
-    Router::new()
+    let mut router = Router::new();
+    if let Some(folder) = pages {
+        let own = Router::new().fallback_service(ServeDir::new(folder));
+        let own = own.layer(from_fn_with_state(server.clone(), own_page));
+        router = router.nest("/pages/", own).route("/pages", get(|| async { Redirect::permanent("/pages/") }));
+    }
+    router
         .route("/", file("text/html; charset=utf-8", include_str!("view/index.html")))
         .route("/address.js", file("text/javascript; charset=utf-8", include_str!("view/address.js")))
         .route("/boards.js", file("text/javascript; charset=utf-8", include_str!("view/boards.js")))
@@ -135,6 +195,8 @@ fn router(server: Server) -> Router {
         .route("/stream.js", file("text/javascript; charset=utf-8", include_str!("view/stream.js")))
         .route("/words.js", file("text/javascript; charset=utf-8", include_str!("view/words.js")))
         .route("/style.css", file("text/css; charset=utf-8", include_str!("view/style.css")))
+        .route("/conduct.js", file("text/javascript; charset=utf-8", include_str!("view/conduct.js")))
+        .route("/conduct.css", file("text/css; charset=utf-8", include_str!("view/conduct.css")))
         .route("/frames", get(frames))
         .with_state(server)
 }
@@ -156,63 +218,50 @@ fn file(kind: &'static str, text: &'static str) -> Response {
     (headers, text).into_response()
 }
 
-/// The query of `/frames`.
-#[derive(Debug, Deserialize)]
-struct FrameQuery {
-    /// At most so many frames a second; without it, all that the server reads.
-    rate: Option<f64>,
+/// A file of the user's own. A foreign name that resolves to this machine gets none.
+async fn own_page(Shared(server): Shared<Server>, request: Request, next: Next) -> Response {
+    if !server.admission.allows_host(text_of(request.headers(), header::HOST)) {
+        return (StatusCode::FORBIDDEN, "this server has another name").into_response();
+    }
+    let mut response = next.run(request).await;
+    let headers = response.headers_mut();
+    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
+    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    response
+}
+
+fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
+    headers.get(name)?.to_str().ok()
 }
 
 async fn frames(
     Shared(server): Shared<Server>,
     headers: HeaderMap,
-    Query(query): Query<FrameQuery>,
-    upgrade: WebSocketUpgrade,
+    RawQuery(query): RawQuery,
+    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Response {
-    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
-    if !origin_allowed(text(header::ORIGIN), text(header::HOST), server.loopback) {
-        return (StatusCode::FORBIDDEN, "a page from elsewhere may not watch the stage picture").into_response();
+    if !server.admission.allows(text_of(&headers, header::ORIGIN), text_of(&headers, header::HOST)) {
+        let sentence = "a page from elsewhere may not watch the stage picture; view --allow-origin lets it in";
+        return (StatusCode::FORBIDDEN, sentence).into_response();
     }
-    let gap = match query.rate {
-        None => Duration::ZERO,
-        Some(rate) if (1.0..=1e6).contains(&rate) => Duration::from_secs_f64(rate.recip()),
-        Some(_) => return (StatusCode::BAD_REQUEST, "rate: expected 1 to 1000000 frames a second").into_response(),
+    let Some(gap) = gap(query.as_deref().unwrap_or_default()) else {
+        return (StatusCode::BAD_REQUEST, "rate: expected 1 to 1000000 frames a second").into_response();
     };
-    upgrade.max_message_size(MAX_REQUEST_BYTES).on_upgrade(move |socket| browser::serve(socket, server.pictures, gap))
+    match upgrade {
+        Ok(upgrade) => {
+            upgrade.max_message_size(MAX_REQUEST_BYTES).on_upgrade(move |socket| browser::serve(socket, server, gap))
+        }
+        Err(_) => (StatusCode::UPGRADE_REQUIRED, "frames come over a WebSocket: open ws://.../frames").into_response(),
+    }
 }
 
-/// Whether a WebSocket may be opened: by this server's own page or by a program, which sends no origin. On loopback
-/// the host must be a loopback name too, or a foreign name that resolves to this machine would pass as our own.
-fn origin_allowed(origin: Option<&str>, host: Option<&str>, loopback: bool) -> bool {
-    let Some(host) = host else { return false };
-    let own = origin.is_none_or(|origin| origin.strip_prefix("http://").is_some_and(|o| o.eq_ignore_ascii_case(host)));
-    own && (!loopback || is_loopback_name(host))
-}
-
-fn is_loopback_name(host: &str) -> bool {
-    let bare = match host.rsplit_once(':') {
-        Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,
-        _ => host,
-    };
-    let address = bare.trim_start_matches('[').trim_end_matches(']').parse::<IpAddr>();
-    bare.eq_ignore_ascii_case("localhost") || address.is_ok_and(|address| address.is_loopback())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::origin_allowed;
-
-    #[test]
-    fn only_our_own_page_and_programs_may_watch() {
-        assert!(origin_allowed(Some("http://127.0.0.1:8080"), Some("127.0.0.1:8080"), true));
-        assert!(origin_allowed(Some("http://[::1]:8080"), Some("[::1]:8080"), true));
-        assert!(origin_allowed(None, Some("localhost:8080"), true));
-        assert!(origin_allowed(Some("http://10.1.2.3:8080"), Some("10.1.2.3:8080"), false));
-        assert!(!origin_allowed(Some("http://evil.example"), Some("127.0.0.1:8080"), true));
-        assert!(!origin_allowed(Some("http://127.0.0.1:9"), Some("127.0.0.1:8080"), true));
-        assert!(!origin_allowed(Some("http://evil.example:8080"), Some("evil.example:8080"), true));
-        assert!(!origin_allowed(Some("http://evil.example"), Some("10.1.2.3:8080"), false));
-        assert!(!origin_allowed(Some("null"), Some("127.0.0.1:8080"), true));
-        assert!(!origin_allowed(None, None, true));
+/// The least time between two frames that the query of `/frames` asks for, none without a `rate`; `None` for a rate that
+/// cannot be.
+fn gap(query: &str) -> Option<Duration> {
+    let rate = query.split('&').find_map(|field| field.strip_prefix("rate="));
+    match rate.map(str::parse::<f64>) {
+        None => Some(Duration::ZERO),
+        Some(Ok(rate)) if (1.0..=1e6).contains(&rate) => Some(Duration::from_secs_f64(rate.recip())),
+        Some(_) => None,
     }
 }

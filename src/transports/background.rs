@@ -15,8 +15,8 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use crate::live::clock::{monotonic_ns, sleep_until};
 use crate::live::{Deliveries, PublishError, Publisher, StatusPublisher};
 use crate::show::Frame;
-use crate::wire::convert::{collision_alert, handle_poses};
-use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus};
+use crate::wire::convert::{collision_alert, cue, handle_poses};
+use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus};
 
 /// Seconds of frames that the thread may fall behind before it continues with the newest.
 const QUEUED_SECONDS: f64 = 0.25;
@@ -26,6 +26,8 @@ const QUEUED_FRAMES: (usize, usize) = (4, 256);
 const QUEUED_BYTES: usize = 64_000_000;
 /// Alerts in their queue; one a second is usual.
 const QUEUED_ALERTS: usize = 256;
+/// Times that all cues of the scene fit into their queue: one frame can reach every one of them twice.
+const QUEUED_SHOWS: usize = 8;
 /// Nanoseconds after a frame's deadline at which the queue is polled for it, and between two polls from then on.
 const FIRST_POLL_NS: u64 = 300_000;
 const POLL_INTERVAL_NS: u64 = 500_000;
@@ -39,6 +41,9 @@ pub trait Sink {
 
     /// Sends an alert.
     fn alert(&mut self, alert: CollisionAlert);
+
+    /// Sends a cue.
+    fn cue(&mut self, cue: Cue);
 
     /// Sends the loop's status.
     fn status(&mut self, status: &LoopStatus);
@@ -57,6 +62,8 @@ pub struct BackgroundConfig {
     pub name: &'static str,
     /// Handles in a frame.
     pub handles: usize,
+    /// Cues of the scene.
+    pub cues: usize,
     /// Frames per second of the loop.
     pub loop_rate: f64,
     /// Frames per second to send, at most those of the loop.
@@ -88,6 +95,7 @@ pub struct BackgroundPublisher {
     free: Consumer<Box<Snapshot>>,
     filled: Producer<Box<Snapshot>>,
     alerts: Producer<CollisionAlert>,
+    cues: Producer<Cue>,
     shared: Arc<Shared>,
 }
 
@@ -105,6 +113,7 @@ struct Inbox {
     free: Producer<Box<Snapshot>>,
     filled: Consumer<Box<Snapshot>>,
     alerts: Consumer<CollisionAlert>,
+    cues: Consumer<Cue>,
     status: mpsc::Receiver<LoopStatus>,
     shared: Arc<Shared>,
 }
@@ -139,12 +148,14 @@ pub fn start<S: Sink, E: Send + 'static>(
     }
     let (filled, filled_consumer) = RingBuffer::new(depth);
     let (alerts, alerts_consumer) = RingBuffer::new(QUEUED_ALERTS);
+    let (cues, cues_consumer) = RingBuffer::new(QUEUED_SHOWS * config.cues);
     let (status, status_receiver) = mpsc::channel();
     let shared = Arc::new(Shared::default());
     let inbox = Inbox {
         free: free_producer,
         filled: filled_consumer,
         alerts: alerts_consumer,
+        cues: cues_consumer,
         status: status_receiver,
         shared: Arc::clone(&shared),
     };
@@ -166,7 +177,7 @@ pub fn start<S: Sink, E: Send + 'static>(
         Err(_) => return Err(BackgroundError::Thread("it ended early".to_owned())),
     }
     let share = config.rate / config.loop_rate;
-    let publisher = BackgroundPublisher { share, latest_slot: None, free, filled, alerts, shared };
+    let publisher = BackgroundPublisher { share, latest_slot: None, free, filled, alerts, cues, shared };
     Ok((publisher, BackgroundStatus(status), thread))
 }
 
@@ -187,6 +198,9 @@ fn serve(mut sink: impl Sink, period_ns: u64, mut inbox: Inbox) {
         sleep_until(poll_at);
         while let Ok(alert) = inbox.alerts.pop() {
             sink.alert(alert);
+        }
+        while let Ok(cue) = inbox.cues.pop() {
+            sink.cue(cue);
         }
         let rejected_now = rejected.load(Ordering::Relaxed);
         let newest_only = rejected_now > rejected_before;
@@ -234,6 +248,9 @@ impl Publisher for BackgroundPublisher {
         for alert in &frame.alerts {
             // A thread that is 256 alerts behind has other troubles than this one.
             let _ = self.alerts.push(collision_alert(header, alert));
+        }
+        for reached in &frame.cues {
+            let _ = self.cues.push(cue(header, reached));
         }
         if !self.due(header.tick) {
             return Ok(());

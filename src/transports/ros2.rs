@@ -1,18 +1,29 @@
-//! ROS 2 topics, by ros2-client on RustDDS: on a thread of their own, at a rate of their own.
+//! ROS 2 topics, by ros2-client on RustDDS: on a thread of their own, at a rate of their own. Where a scene asks for it
+//! also services that conduct the show, on another thread.
 //!
 //! In: a scene with `[publish.ros2]` and the process's environment. Out: a [`Transport`]. Called by the list of transports.
 
+mod control;
 pub mod environment;
 pub mod messages;
 mod node;
+mod port;
 
+use std::net::{IpAddr, Ipv4Addr};
+
+use ros2_client::Context;
+use rustdds::DomainParticipantBuilder;
+
+use crate::live::control::Door;
 use crate::live::{Deliveries, Publisher, StatusPublisher};
 use crate::scene::ros2::{Ros2Settings, Topic};
 use crate::wire::Stage;
+use messages::Pose;
 
 use super::background::{self, BackgroundConfig, BackgroundError, BackgroundPublisher, BackgroundStatus};
 use super::{Transport, TransportConfig, TransportError};
-use environment::{Network, check_name, other_distribution};
+use control::{ControlThread, Mapping};
+use environment::{Network, Range, check_name, other_distribution};
 
 /// Why there are no ROS 2 topics.
 #[derive(Debug, thiserror::Error)]
@@ -54,15 +65,21 @@ struct Ros2Config {
     settings: Ros2Settings,
     /// Whether there are alerts.
     alerts: bool,
+    /// The cues of the scene.
+    cues: usize,
     /// The stage.
     stage: Stage,
-    /// Where to be found.
-    network: Network,
+    /// The path to draw.
+    path: Vec<Pose>,
 }
 
 /// The open topics.
 struct Ros2 {
+    name: String,
     description: String,
+    /// What the services are made of, until they are; `None` where the scene asks for none.
+    services: Option<(Context, Mapping)>,
+    control: Option<ControlThread>,
     publisher: Option<BackgroundPublisher>,
     status: Option<BackgroundStatus>,
     thread: background::BackgroundThread,
@@ -79,15 +96,22 @@ pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, Tran
     if let Some(warning) = other_distribution(variable) {
         log::warn!("{warning}");
     }
-    Ok(Some(open_on(network, config, settings)?))
+    let mapping = settings.control.then(|| Mapping::of(variable)).map(|(mapping, warning)| {
+        if let Some(warning) = warning {
+            log::warn!("{warning}");
+        }
+        mapping
+    });
+    Ok(Some(open_on(network, mapping, config, settings)?))
 }
 
-/// Opens the topics of `settings` on a network.
+/// Opens the topics of `settings` on a network; with a `mapping` also the services.
 ///
 /// # Errors
 /// [`Ros2Error`]
-pub fn open_on(
+fn open_on(
     network: Network,
+    mapping: Option<Mapping>,
     config: &TransportConfig,
     settings: &Ros2Settings,
 ) -> Result<Box<dyn Transport>, Ros2Error> {
@@ -97,19 +121,42 @@ pub fn open_on(
         log::warn!("publish.ros2.rate is {rate}, more than the loop's {loop_rate}: ROS 2 gets {loop_rate} a second");
     }
     let (alerts, rate, handles) = (scene.alerts.is_some(), settings.rate_of(loop_rate), scene.team().handles());
-    let topics = settings.topics.keys().filter(|topic| alerts || **topic != Topic::Alerts);
+    let cues = scene.cues.len();
+    let topics = settings.topics.keys().filter(|topic| match topic {
+        Topic::Alerts => alerts,
+        Topic::Cues => cues > 0,
+        _ => true,
+    });
     let topics: Vec<String> = topics.map(|topic| topic.path(name)).collect();
+    let services = mapping.map_or(String::new(), |mapping| {
+        format!("\nROS 2 services that conduct the show: /{name}/..., for clients of {}.", mapping.rmw())
+    });
     let description =
-        format!("ROS 2 topics ({}, at {rate} frames per second): {}.", network.sentence(), topics.join(", "));
-    let background = BackgroundConfig { name: "ros2", handles, loop_rate, rate };
-    let settings = settings.clone();
-    let config = Ros2Config { name: name.to_owned(), handles, rate, settings, alerts, stage, network };
-    let started = background::start(background, move || node::Topics::open(&config));
+        format!("ROS 2 topics ({}, at {rate} frames per second): {}.{services}", network.sentence(), topics.join(", "));
+    let background = BackgroundConfig { name: "ros2", handles, cues, loop_rate, rate };
+    let path = messages::path::poses(&scene.motion.outline());
+    let context = context(network)?;
+    let services = mapping.map(|mapping| (context.clone(), mapping));
+    let config =
+        Ros2Config { name: name.to_owned(), handles, rate, settings: settings.clone(), alerts, cues, stage, path };
+    let started = background::start(background, move || node::Topics::open(context, config));
     let (publisher, status, thread) = started.map_err(|error| match error {
         BackgroundError::Open(error) => error,
         BackgroundError::Thread(reason) => Ros2Error::Failed(reason),
     })?;
-    Ok(Box::new(Ros2 { description, publisher: Some(publisher), status: Some(status), thread }))
+    let (name, publisher, status) = (name.to_owned(), Some(publisher), Some(status));
+    Ok(Box::new(Ros2 { name, description, services, control: None, publisher, status, thread }))
+}
+
+/// A participant of the network.
+fn context(network: Network) -> Result<Context, Ros2Error> {
+    let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(error.to_string());
+    let mut builder = DomainParticipantBuilder::new(network.domain);
+    if network.range == Range::Localhost {
+        builder = builder.with_only_networks([IpAddr::V4(Ipv4Addr::LOCALHOST)]);
+    }
+    let participant = builder.build().map_err(|error| failed(&error))?;
+    Context::from_domain_participant(participant).map_err(|error| failed(&error))
 }
 
 impl Transport for Ros2 {
@@ -131,7 +178,15 @@ impl Transport for Ros2 {
         }
     }
 
-    fn finish(self: Box<Self>) -> Option<(&'static str, Deliveries)> {
+    fn control(&mut self, door: Door) -> Result<Option<Door>, TransportError> {
+        let Some((context, mapping)) = self.services.take() else { return Ok(Some(door)) };
+        self.control = Some(ControlThread::start(&self.name, context, mapping, door)?);
+        Ok(None)
+    }
+
+    fn finish(mut self: Box<Self>) -> Option<(&'static str, Deliveries)> {
+        // Whoever holds the participant last takes leave of the network.
+        drop((self.control.take(), self.services.take()));
         Some(("ros2", self.thread.finish()))
     }
 }

@@ -10,12 +10,13 @@ use crate::motion::event::EventKind;
 use crate::show::alerts::Alert;
 use crate::show::control::Code;
 use crate::show::state::{FrameState, Level, PlaybackState};
-use crate::show::{Frame, Outcome, ReachedCue};
+use crate::show::{Frame, Outcome, ReachedCue, Show};
 use crate::solve::Chain;
 
 use super::layouts::{
-    CollisionAlert, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32, MOST_SEGMENTS, NO_BENCH, SEGMENT_ARC,
-    SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, SceneName, Stage, StageSegment,
+    CollisionAlert, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32, MOST_CUES, MOST_EVENTS, MOST_SEGMENTS,
+    NO_BENCH, SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, SceneName, Stage, StageCue,
+    StageEvent, StageSegment,
 };
 
 /// A route of the most steps, and the line on which its team stands, fit into a stage.
@@ -141,13 +142,13 @@ pub fn cue(header: &FrameHeader, reached: &ReachedCue) -> Cue {
 
 /// The response to a request with this id.
 pub fn control_response(id: u64, outcome: &Outcome) -> ControlResponse {
-    let Outcome { code, tick, sim_time, time_scale, playback, cue } = *outcome;
+    let Outcome { code, tick, sim_time, time_scale, playback, cue, .. } = *outcome;
     let (code, playback) = (code as u32, playback as u32);
     ControlResponse { id, tick, sim_time, time_scale, code, playback, cue, reserved: 0 }
 }
 
-/// The stage of a motion.
-pub fn stage(run_id: u64, stamp_ns: u64, motion: &Motion) -> Stage {
+/// The stage of a motion, and the time line of the show that plays it.
+pub fn stage(run_id: u64, stamp_ns: u64, motion: &Motion, show: &Show) -> Stage {
     let team = motion.team();
     let mut path = [StageSegment::default(); MOST_SEGMENTS];
     let (mut segments, mut pitch, mut start_turn) = (0, f64::NAN, f64::NAN);
@@ -158,6 +159,16 @@ pub fn stage(run_id: u64, stamp_ns: u64, motion: &Motion) -> Stage {
         }
         segments += 1;
     }
+    let mut timeline = [StageEvent::default(); MOST_EVENTS];
+    let events = show.timeline().events();
+    for (slot, timed) in timeline.iter_mut().zip(events) {
+        *slot = StageEvent { time: timed.time, state: FrameState::from(timed.event.kind) as u32, reserved: 0 };
+    }
+    let mut cue_list = [StageCue::default(); MOST_CUES];
+    for (slot, cue) in cue_list.iter_mut().zip(show.cues()) {
+        let ReachedCue { number, time, pauses, ref name } = *cue;
+        *slot = StageCue { time, number, pauses: u32::from(pauses), name: SceneName::new(name) };
+    }
     Stage {
         run_id,
         stamp_ns,
@@ -167,9 +178,14 @@ pub fn stage(run_id: u64, stamp_ns: u64, motion: &Motion) -> Stage {
         head_length: team.head_length,
         body_length: team.body_length,
         width: team.width,
+        freeze_time: show.freeze_time(),
         benches: team.benches as u32,
         segments,
+        events: events.len().min(MOST_EVENTS) as u32,
+        cues: show.cues().len() as u32,
         path,
+        timeline,
+        cue_list,
     }
 }
 
@@ -209,6 +225,13 @@ impl ControlResponse {
     /// Whether the show plays, or `None` for a number that this layout does not know.
     pub fn playback_state(&self) -> Option<PlaybackState> {
         of_number(&PlaybackState::ALL, self.playback)
+    }
+}
+
+impl StageEvent {
+    /// What happens, or `None` for a number that this layout does not know.
+    pub fn kind(&self) -> Option<EventKind> {
+        of_number(&FrameState::ALL, self.state)?.event()
     }
 }
 

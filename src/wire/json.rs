@@ -4,7 +4,7 @@
 
 use serde::Serialize;
 
-use super::layouts::{CollisionAlert, NO_BENCH};
+use super::layouts::{CollisionAlert, Cue, NO_BENCH};
 use crate::motion::event::EventKind;
 use crate::show::state::Level;
 
@@ -63,6 +63,28 @@ impl From<&CollisionAlert> for AlertObject {
             event_bench_a: bench(alert.event_bench_a),
             event_bench_b: bench(alert.event_bench_b),
         }
+    }
+}
+
+/// A [`Cue`] with the fields of the layout in their order.
+#[derive(Debug, Clone, Serialize)]
+#[serde(tag = "type", rename = "cue")]
+pub struct CueObject {
+    run_id: Exact,
+    tick: u64,
+    stamp_ns: Exact,
+    sim_time: f64,
+    cue_time: f64,
+    number: u32,
+    pauses: bool,
+    name: String,
+}
+
+impl From<&Cue> for CueObject {
+    fn from(cue: &Cue) -> Self {
+        let Cue { run_id, tick, stamp_ns, sim_time, cue_time, number, pauses, ref name } = *cue;
+        let (run_id, stamp_ns, pauses, name) = (Exact(run_id), Exact(stamp_ns), pauses == 1, name.as_str().to_owned());
+        Self { run_id, tick, stamp_ns, sim_time, cue_time, number, pauses, name }
     }
 }
 

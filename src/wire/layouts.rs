@@ -401,14 +401,48 @@ impl StageSegment {
     }
 }
 
-/// What a subscriber needs to draw the stage. Sent at the start and kept for late joiners.
+/// The most events of a motion: one of each kind.
+pub const MOST_EVENTS: usize = 4;
+/// The most cues that a [`Stage`] has room for.
+pub const MOST_CUES: usize = 32;
+
+/// An event of the show in a [`Stage`].
+#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend, Serialize)]
+#[type_name("bench_dragon/StageEvent/4")]
+#[repr(C)]
+pub struct StageEvent {
+    /// Simulated seconds at which it happens.
+    pub time: f64,
+    /// What happens, as the state that it leads to: one of [`FrameState`](crate::show::state::FrameState).
+    pub state: u32,
+    /// Always 0.
+    pub reserved: u32,
+}
+
+/// A cue of the show in a [`Stage`].
+#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend, Serialize)]
+#[type_name("bench_dragon/StageCue/4")]
+#[repr(C)]
+pub struct StageCue {
+    /// Simulated seconds at which it is.
+    pub time: f64,
+    /// Its number, from 1 in the order of the cues' times.
+    pub number: u32,
+    /// 1 where the show waits there until the command `go`, else 0.
+    pub pauses: u32,
+    /// Its name.
+    pub name: SceneName,
+}
+
+/// What a subscriber needs to draw the stage and its time line. Sent at the start and kept for late joiners.
 ///
 /// The head's board has a length of its own; all that follow have one length. The team may stand further back than the
 /// first segment begins, on the same spiral or line.
 ///
-/// Over iceoryx2 the payload of `<name>/stage`. Layout 2 added the segments of the path, layout 3 gave them their name.
+/// Over iceoryx2 the payload of `<name>/stage`. Layout 2 added the segments of the path, layout 3 gave them their name,
+/// layout 4 added the time line: the freeze time, the events and the cues.
 #[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend, Serialize)]
-#[type_name("bench_dragon/Stage/3")]
+#[type_name("bench_dragon/Stage/4")]
 #[repr(C)]
 pub struct Stage {
     /// The run, as [`FrameHeader::run_id`].
@@ -427,17 +461,37 @@ pub struct Stage {
     pub body_length: f64,
     /// Metres across every board.
     pub width: f64,
+    /// Simulated seconds at which the show freezes: a seek reaches no later time.
+    pub freeze_time: f64,
     /// The number of benches; one less than the number of handles.
     pub benches: u32,
     /// The number of segments in use, at most [`MOST_SEGMENTS`].
     pub segments: u32,
+    /// The number of events in use, at most [`MOST_EVENTS`]; a scene without `[alerts]` has its last one only.
+    pub events: u32,
+    /// The number of cues in the show; the first [`MOST_CUES`] of them are listed.
+    pub cues: u32,
     /// The segments of the path in the order of travel; those not in use are zero.
     pub path: [StageSegment; MOST_SEGMENTS],
+    /// The events in order of time; those not in use are zero. Those after the freeze time are not reached.
+    pub timeline: [StageEvent; MOST_EVENTS],
+    /// The cues in order of time; those not in use are zero.
+    pub cue_list: [StageCue; MOST_CUES],
 }
 
 impl Stage {
     /// The segments of the path that are in use.
     pub fn path_in_use(&self) -> &[StageSegment] {
         &self.path[..(self.segments as usize).min(MOST_SEGMENTS)]
+    }
+
+    /// The events that are in use.
+    pub fn events_in_use(&self) -> &[StageEvent] {
+        &self.timeline[..(self.events as usize).min(MOST_EVENTS)]
+    }
+
+    /// The cues that are listed.
+    pub fn cues_in_use(&self) -> &[StageCue] {
+        &self.cue_list[..(self.cues as usize).min(MOST_CUES)]
     }
 }

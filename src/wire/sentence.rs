@@ -3,7 +3,7 @@
 //! In: a [`CollisionAlert`] and the number of benches. Out: a sentence. Called by `run`, `watch` and the stage picture's
 //! server, so that all of them print the same.
 
-use super::layouts::CollisionAlert;
+use super::layouts::{CollisionAlert, Cue};
 use crate::motion::event::EventKind;
 use crate::show::state::{FrameState, Level};
 
@@ -17,6 +17,12 @@ pub enum Figures {
     },
     /// It does not: they stand beside the sentence.
     Omitted,
+}
+
+/// A cue that the show has reached, as a sentence.
+pub fn cue_sentence(cue: &Cue) -> String {
+    let waits = if cue.pauses == 1 { ": waiting for go" } else { "" };
+    format!("cue {} \"{}\"{waits}", cue.number, cue.name.as_str())
 }
 
 /// A bench as people call it, counted from 1.

@@ -28,7 +28,8 @@ use bench_dragon::show::state::{FrameState, Level, PlaybackState};
 use bench_dragon::transports::ros2::messages::{HandlePoses, Header, Stamped, type_name};
 use bench_dragon::wire::{
     CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32, LoopStatus, NO_BENCH,
-    SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, Stage, StageSegment,
+    SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, Stage, StageCue, StageEvent,
+    StageSegment,
 };
 use iceoryx2::prelude::ZeroCopySend;
 use serde::Serialize;
@@ -185,7 +186,10 @@ fn fields_types_and_order_are_those_that_serde_writes() {
         ("CollisionAlert", on_the_wire(&Stamped::alert(CollisionAlert::default()))),
         ("LoopStatus", on_the_wire(&Stamped::status(LoopStatus::default()))),
         ("Stage", on_the_wire(&Stamped::stage(Stage::default()))),
+        ("Cue", on_the_wire(&Stamped::cue(Cue::default()))),
         ("StageSegment", on_the_wire(&StageSegment::default())),
+        ("StageEvent", on_the_wire(&StageEvent::default())),
+        ("StageCue", on_the_wire(&StageCue::default())),
     ];
     assert_eq!(wire.len(), ros::MESSAGES.len(), "a message is not compared");
     for (name, wire) in wire {
@@ -201,6 +205,7 @@ fn type_names_are_those_that_ros_2_gives_the_interface_files() {
         ("CollisionAlert", type_name::COLLISION_ALERT),
         ("LoopStatus", type_name::LOOP_STATUS),
         ("Stage", type_name::STAGE),
+        ("Cue", type_name::CUE),
     ] {
         assert_eq!(on_the_wire, format!("bench_dragon_msgs::msg::dds_::{name}_"));
     }
@@ -259,7 +264,8 @@ fn constants_are_the_states_levels_events_playback_and_segments() {
     alert.extend([("EVENT_NONE".to_owned(), 0), ("NO_BENCH".to_owned(), NO_BENCH)]);
     assert_eq!(interface("CollisionAlert").constants, alert);
     assert_eq!(interface("StageSegment").constants, in_order("", &names.segments));
-    for name in ["HandlePose", "LoopStatus", "Stage"] {
+    assert_eq!(interface("StageEvent").constants, in_order("STATE_", &names.states));
+    for name in ["HandlePose", "LoopStatus", "Stage", "Cue", "StageCue"] {
         assert_eq!(interface(name).constants, BTreeMap::new(), "{name}");
     }
 }
@@ -300,7 +306,7 @@ def layout(of):
 
 print(json.dumps({
     "messages": [layout(message) for message in m.MESSAGES],
-    "segment": layout(m.StageSegment),
+    "parts": [layout(part) for part in [m.StageSegment, m.StageEvent, m.StageCue]],
     "names": [m.STATES, m.LEVELS, m.PLAYBACK, m.SEGMENTS, m.EVENTS],
     "no_bench": m.NO_BENCH,
     "handle_poses": [m.HANDLE_POSE.itemsize, m.HANDLE_POSE_32.itemsize],
@@ -329,7 +335,8 @@ fn python_sees_the_layouts_and_the_names_of_rust() {
     for (of_python, of_rust) in printed["messages"].as_array().unwrap().iter().zip(messages) {
         assert_eq!(*of_python, of_rust);
     }
-    assert_eq!(printed["segment"], layout::<StageSegment>());
+    let parts = [layout::<StageSegment>(), layout::<StageEvent>(), layout::<StageCue>()];
+    assert_eq!(printed["parts"], json!(parts));
     let Names { states, levels, playback, segments, events, .. } = names();
     let mut events: BTreeMap<_, _> = events.iter().map(|(number, name)| (number.to_string(), Some(*name))).collect();
     events.insert("0".to_owned(), None);

@@ -11,13 +11,16 @@ pub struct Message {
     has_header: bool,
 }
 
-pub const MESSAGES: [Message; 6] = [
+pub const MESSAGES: [Message; 9] = [
     Message { name: "HandlePose", layout: "HandlePose", has_header: false },
     Message { name: "HandlePoses", layout: "FrameHeader", has_header: true },
     Message { name: "CollisionAlert", layout: "CollisionAlert", has_header: true },
     Message { name: "LoopStatus", layout: "LoopStatus", has_header: true },
     Message { name: "Stage", layout: "Stage", has_header: true },
+    Message { name: "Cue", layout: "Cue", has_header: true },
     Message { name: "StageSegment", layout: "StageSegment", has_header: false },
+    Message { name: "StageEvent", layout: "StageEvent", has_header: false },
+    Message { name: "StageCue", layout: "StageCue", has_header: false },
 ];
 
 /// What a frame is over ROS 2, where the handles and what is true of all of them are one message.

@@ -105,6 +105,18 @@ Marker = message(
 MarkerArray = message("visualization_msgs", "MarkerArray", [("markers", idl.sequence[Marker])])
 
 
+PoseStamped = message("geometry_msgs", "PoseStamped", [("header", Header), ("pose", Pose)])
+Path = message("nav_msgs", "Path", [("header", Header), ("poses", idl.sequence[PoseStamped])])
+Clock = message("rosgraph_msgs", "Clock", [("clock", Time)])
+Transform = message("geometry_msgs", "Transform", [("translation", Vector3), ("rotation", Quaternion)])
+TransformStamped = message(
+    "geometry_msgs",
+    "TransformStamped",
+    [("header", Header), ("child_frame_id", str), ("transform", Transform)],
+)
+TFMessage = message("tf2_msgs", "TFMessage", [("transforms", idl.sequence[TransformStamped])])
+
+
 def from_file(name, known):
     """The type that a .msg file of this repository defines."""
     fields = []
@@ -135,6 +147,10 @@ TOPICS = {
     "poses": PoseArray,
     "markers": MarkerArray,
     "diagnostics": DiagnosticArray,
+    "cues": from_file("Cue", KNOWN),
+    "path": Path,
+    "clock": Clock,
+    "tf": TFMessage,
 }
 
 
@@ -177,7 +193,7 @@ def main():
     readers = []
     for wanted in arguments.topic:
         kind, reliability, durability = (wanted.split(":") + ["reliable", "volatile"])[:3]
-        name = "rt/diagnostics" if kind == "diagnostics" else f"rt/{arguments.name}/{kind}"
+        name = f"rt/{kind}" if kind in ("diagnostics", "clock", "tf") else f"rt/{arguments.name}/{kind}"
         topic = Topic(participant, name, TOPICS[kind])
         readers.append((wanted, kind, DataReader(participant, topic, qos=quality(reliability, durability))))
     print(json.dumps({"type": "ready"}), flush=True)
@@ -192,7 +208,8 @@ def main():
                     continue
                 idle = False
                 counts[wanted] += 1
-                print(json.dumps({"type": "message", "topic": wanted, "message": shortened(kind, sample)}))
+                line = {"type": "message", "topic": wanted, "message": shortened(kind, sample)}
+                print(json.dumps(line), flush=True)
         if idle:
             time.sleep(0.002)
     publishers = {wanted: len(reader.get_matched_publications()) for wanted, _, reader in readers}

@@ -131,7 +131,7 @@ def is_publishing(rows):
 
 
 def figures_are_redrawn_in_place():
-    started = [rf'Watching "{NAME}"; Ctrl-C ends\.', rf'A publisher of "{NAME}" is running \(run [0-9a-f]{{16}}\)\.']
+    started = [rf'Watching "{NAME}"; Ctrl-C ends, \? lists the keys\.', rf'A publisher of "{NAME}" is running \(run [0-9a-f]{{16}}\)\.']
     with Terminal(80) as terminal, Terminal(50) as narrow:
         for each in [terminal, narrow]:
             each.read_until(lambda rows: rows and rows[-1].startswith("waiting for a publisher"))

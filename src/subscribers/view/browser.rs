@@ -8,10 +8,11 @@ use std::time::Duration;
 
 use axum::extract::ws::{Message, Utf8Bytes, WebSocket};
 use futures_util::{Sink, SinkExt, StreamExt};
-use tokio::sync::watch;
+use tokio::sync::{mpsc, watch};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout};
 
-use super::{Picture, wire};
+use super::gate::Visitor;
+use super::{Picture, Server, wire};
 use crate::live::clock::monotonic_ns;
 
 /// Frames that may be in flight to a browser: enough for 60 a second over a network that takes 50 ms.
@@ -22,13 +23,22 @@ const PING_INTERVAL: Duration = Duration::from_secs(10);
 const TIMEOUT: Duration = Duration::from_secs(30);
 
 /// Serves a browser until it goes. `gap` is the least time between two frames.
-pub(super) async fn serve(socket: WebSocket, mut pictures: watch::Receiver<Picture>, gap: Duration) {
+pub(super) async fn serve(socket: WebSocket, server: Server, gap: Duration) {
+    let Server { mut pictures, gate, .. } = server;
     let (mut sink, mut stream) = socket.split();
+    let (sender, mut answers) = mpsc::unbounded_channel();
+    let mut visitor = Visitor::new(gate.as_deref(), sender);
+    let permission = visitor.permission().map(text);
+    if !matches!(timeout(TIMEOUT, send(&mut sink, permission.into_iter().collect())).await, Ok(Ok(()))) {
+        return;
+    }
     let mut pings = interval(PING_INTERVAL);
     pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let (mut sent, mut answered) = (0, 0);
     let (mut due, mut last_received) = (Instant::now(), Instant::now());
-    let mut known = Picture::default();
+    // One who comes later gets the latest cue, as over shared memory.
+    let past_cues = pictures.borrow().cues.iter().rev().skip(1).cloned().collect();
+    let mut known = Picture { cues: past_cues, ..Picture::default() };
     pictures.mark_changed();
     loop {
         let has_credit = sent - answered < MAX_IN_FLIGHT;
@@ -45,8 +55,13 @@ pub(super) async fn serve(socket: WebSocket, mut pictures: watch::Receiver<Pictu
                         continue;
                     }
                     Message::Text(request) if request == "clock" => vec![text(wire::clock(monotonic_ns()))],
+                    Message::Text(request) => visitor.receive(&request).map(text).into_iter().collect(),
                     _ => continue,
                 }
+            }
+            Some(answer) = answers.recv() => {
+                visitor.unanswered -= 1;
+                vec![text(answer)]
             }
             changed = wait_for(&mut pictures, due), if has_credit => {
                 if changed.is_err() {
@@ -85,7 +100,9 @@ async fn wait_for(pictures: &mut watch::Receiver<Picture>, due: Instant) -> Resu
 fn changed_messages(picture: &Picture, known: &Picture) -> Vec<Message> {
     let parts = |of: &Picture| [of.waiting.clone(), of.stage.clone(), of.alert.clone()];
     let changed = parts(picture).into_iter().zip(parts(known)).filter(|(new, old)| new != old && !new.is_empty());
-    changed.map(|(new, _)| Message::Text(new)).collect()
+    let newest_cue = known.cues.iter().map(|(number, _)| *number).max().unwrap_or(0);
+    let cues = picture.cues.iter().filter(|(number, _)| *number > newest_cue);
+    changed.map(|(new, _)| new).chain(cues.map(|(_, cue)| cue.clone())).map(Message::Text).collect()
 }
 
 fn text(json: String) -> Message {

@@ -15,10 +15,13 @@ use crate::wire::{LoopStatus, Stage};
 const POLL_INTERVAL: Duration = Duration::from_millis(4);
 /// How long to wait where the services cannot be used, before the next attempt.
 const RETRY_INTERVAL: Duration = Duration::from_millis(200);
+/// Cues that a browser which takes long to be written to may fall behind.
+const KEPT_CUES: usize = 16;
 
 /// Keeps the picture up to date until `stop` is set, through any number of publishers of a name.
 pub(super) fn read(mut feed: Feed, name: &str, sender: &watch::Sender<Picture>, stop: &AtomicBool) {
-    let mut reader = Reader { picture: Picture::waiting(None), publisher: name.to_owned(), stage: None, status: None };
+    let (picture, publisher) = (Picture::waiting(None), name.to_owned());
+    let mut reader = Reader { picture, publisher, stage: None, status: None, cues: 0 };
     let mut reason: Option<String> = None;
     sender.send_replace(reader.picture.clone());
     while !stop.load(Ordering::Relaxed) {
@@ -51,6 +54,8 @@ struct Reader {
     stage: Option<Stage>,
     /// Of the run whose status came last: it alone holds the scene's name.
     status: Option<LoopStatus>,
+    /// Cues that have come so far.
+    cues: u64,
 }
 
 impl Reader {
@@ -64,6 +69,11 @@ impl Reader {
             FeedEvent::Alert(alert) => {
                 let benches = self.stage.map_or(0, |stage| stage.benches);
                 self.picture.alert = wire::alert(alert, benches).into();
+            }
+            FeedEvent::Cue(cue) => {
+                self.cues += 1;
+                let kept = self.picture.cues.iter().rev().take(KEPT_CUES - 1).rev().cloned();
+                self.picture.cues = kept.chain([(self.cues, wire::cue(cue).into())]).collect();
             }
             FeedEvent::Frame { header, handles, .. } => self.picture.frame = wire::frame(header, handles).into(),
             FeedEvent::Gone => {

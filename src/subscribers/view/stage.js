@@ -1,11 +1,13 @@
 // The page: puts the stream into the drawing and into words, and takes the user's hand.
 
+// First, since it takes the token out of the address.
+import { conduct } from "./conduct.js";
 import { wordsOf } from "./address.js";
 import { benchAt } from "./boards.js";
 import { Camera } from "./camera.js";
 import { Ground, draw, pathOf } from "./drawing.js";
 import { attach } from "./hands.js";
-import { STRIDE, speedOf } from "./hermite.js";
+import { STRIDE } from "./hermite.js";
 import { Overlap, marksOf } from "./marks.js";
 import { SpeedScale, paletteOf } from "./palette.js";
 import { element, put, showBench, showFigures, showNames, showSituation } from "./panel.js";
@@ -56,10 +58,10 @@ function reachOf(stage, handles) {
   return most + stage.width + stage.hole_inset || 1;
 }
 
-/** When the head reaches the end of the path, where nothing else comes before that. */
+/** When the head reaches the end of the path, where the show comes so far and nothing that is counted down is before. */
 function pathEnd(stage, alert) {
-  const metres = stage.path.reduce((sum, { length }) => sum + length, 0), speed = colours.handles ? speedOf(colours.handles, 0) : NaN;
-  return alert?.event === null ? metres / speed : NaN;
+  const end = stage.events.find(({ event, time }) => event === "path_end" && time <= stage.freeze_time);
+  return end && alert?.event == null ? end.time : NaN;
 }
 
 /** What is so now: the state, what is ahead and in how many seconds of wall time. */
@@ -268,4 +270,5 @@ if (words.follow) camera.follow(words.follow === true ? 0 : words.follow[0] - 1)
 if (words.unknown.length) put("address", say("address", { words: words.unknown.join(", ") }));
 element("address").hidden = !words.unknown.length;
 showFollow();
+conduct(stream);
 pass();

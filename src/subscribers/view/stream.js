@@ -26,6 +26,7 @@ function frameOf(data, at) {
     at,
     state: bytes.getUint8(1),
     playing: bytes.getUint8(2) === PLAYING,
+    playback: bytes.getUint8(2),
     time: bytes.getFloat64(8, true),
     scale: bytes.getFloat64(16, true),
     sequence: Number(bytes.getBigUint64(24, true)),
@@ -113,6 +114,8 @@ export class Stream {
     /** How long the last frames were on their way, ms. */
     this.ways = [];
     this.clock = null;
+    /** Called with each message that is no frame and no clock. */
+    this.onmessage = null;
     this.retry = 250;
     this.open();
   }
@@ -121,6 +124,7 @@ export class Stream {
     const scheme = location.protocol === "https:" ? "wss" : "ws";
     const socket = new WebSocket(`${scheme}://${location.host}/frames?rate=${MOST_FRAMES}`);
     socket.binaryType = "arraybuffer";
+    this.socket = socket;
     let requested = null, nearest = Infinity;
     const again = () => {
       clearInterval(requests);
@@ -163,7 +167,15 @@ export class Stream {
     this.trouble = trouble;
   }
 
+  /** Sends a message; whether there is a server to send it to. */
+  send(message) {
+    if (this.socket.readyState !== WebSocket.OPEN) return false;
+    this.socket.send(JSON.stringify(message));
+    return true;
+  }
+
   handle(message) {
+    this.onmessage?.(message);
     if (message.type === "waiting") this.lose(message.reason ?? "publisher");
     if (this.messages[message.type]) this.messages[message.type].newest = message;
   }

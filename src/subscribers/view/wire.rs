@@ -24,10 +24,11 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use crate::motion::event::EventKind;
 use crate::show::state::{FrameState, Level, Severity};
-use crate::wire::json::{AlertObject, Exact};
+use crate::wire::json::{AlertObject, CueObject, Exact};
 use crate::wire::sentence::{Figures, alert_sentence, state_sentence};
-use crate::wire::{CollisionAlert, FrameHeader, HandlePose, Stage, StageSegment};
+use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage, StageCue, StageEvent, StageSegment};
 
 const VERSION: u8 = 3;
 const HEADER_BYTES: usize = 72;
@@ -60,8 +61,22 @@ pub(super) fn stage(stage: &Stage, publisher: &str, scene: Option<&str>) -> Stri
     json!({"type": "stage", "run_id": Exact(run_id), "publisher": publisher, "scene": scene, "pitch": pitch, "start_turn": start_turn,
         "hole_inset": hole_inset, "head_length": head_length, "body_length": body_length, "width": width,
         "benches": benches, "path": stage.path_in_use().iter().map(segment).collect::<Vec<_>>(),
-        "states": FrameState::ALL.map(state)})
+        "freeze_time": stage.freeze_time, "events": stage.events_in_use().iter().map(event).collect::<Vec<_>>(),
+        "cues": stage.cues_in_use().iter().map(stage_cue).collect::<Vec<_>>(), "states": FrameState::ALL.map(state)})
     .to_string()
+}
+
+fn event(event: &StageEvent) -> Value {
+    json!({"event": event.kind().map_or("unknown", EventKind::name), "time": event.time})
+}
+
+fn stage_cue(cue: &StageCue) -> Value {
+    json!({"number": cue.number, "name": cue.name.as_str(), "time": cue.time, "pauses": cue.pauses == 1})
+}
+
+/// A cue that the show has reached.
+pub(super) fn cue(cue: &Cue) -> String {
+    json!(CueObject::from(cue)).to_string()
 }
 
 fn segment(segment: &StageSegment) -> Value {

@@ -6,6 +6,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use proptest::prelude::*;
 
 use super::*;
+use crate::show::ReachedCue;
 use crate::show::alerts::Alert;
 use crate::show::state::Level;
 
@@ -16,6 +17,7 @@ const HANDLES: usize = 3;
 enum Sent {
     Frame { tick: u64, x: Vec<f64> },
     Alert { tick: u64 },
+    Cue { tick: u64, number: u32 },
     Status { tick: u64 },
 }
 
@@ -41,6 +43,10 @@ impl Sink for Recorder {
         self.send(Sent::Alert { tick: alert.tick });
     }
 
+    fn cue(&mut self, cue: Cue) {
+        self.send(Sent::Cue { tick: cue.tick, number: cue.number });
+    }
+
     fn status(&mut self, status: &LoopStatus) {
         self.send(Sent::Status { tick: status.tick });
     }
@@ -60,7 +66,7 @@ fn recorder(loop_rate: f64, rate: f64) -> (Ends, Receiver<Sent>, Arc<Mutex<()>>)
     let (sent, receiver) = channel();
     let gate = Arc::new(Mutex::new(()));
     let sink = Recorder { sent, gate: Arc::clone(&gate) };
-    let config = BackgroundConfig { name: "test", handles: HANDLES, loop_rate, rate };
+    let config = BackgroundConfig { name: "test", handles: HANDLES, cues: 2, loop_rate, rate };
     (start(config, move || Ok::<_, std::io::Error>(sink)).unwrap(), receiver, gate)
 }
 
@@ -117,8 +123,28 @@ fn a_sink_that_is_held_up_costs_frames_and_never_the_loop() {
 }
 
 #[test]
+fn cues_of_frames_that_are_not_sent_are_sent() {
+    let ((mut publisher, _status, thread), sent, _) = recorder(1000.0, 1.0);
+    for tick in 0..4 {
+        let cues = [2 * tick + 1, 2 * tick + 2].map(|number| ReachedCue {
+            number: number as u32,
+            time: 0.0,
+            pauses: false,
+            name: "".into(),
+        });
+        let frame = Frame { cues: cues.to_vec(), ..frame(tick, 0) };
+        publisher.publish(&FrameHeader { tick, ..FrameHeader::default() }, &frame).unwrap();
+    }
+    drop(publisher);
+    assert_eq!(thread.finish().frames, 1, "the rate is a frame a second");
+    let cues: Vec<_> = sent.iter().filter(|sent| matches!(sent, Sent::Cue { .. })).collect();
+    let expected: Vec<_> = (0..8).map(|cue| Sent::Cue { tick: cue / 2, number: cue as u32 + 1 }).collect();
+    assert_eq!(cues, expected);
+}
+
+#[test]
 fn a_sink_that_cannot_be_made_is_an_error() {
-    let config = BackgroundConfig { name: "test", handles: HANDLES, loop_rate: 60.0, rate: 60.0 };
+    let config = BackgroundConfig { name: "test", handles: HANDLES, cues: 2, loop_rate: 60.0, rate: 60.0 };
     let refused = start(config, || Err::<Recorder, _>(std::io::Error::other("no such network")));
     assert!(matches!(refused, Err(BackgroundError::Open(error)) if error.to_string() == "no such network"));
 }
@@ -128,10 +154,10 @@ proptest! {
     fn the_rate_is_kept_and_spread_evenly(loop_rate in 0.1f64..20_000.0, share in 0.0001f64..=1.0) {
         let rate = share * loop_rate;
         let (_, free) = RingBuffer::new(0);
-        let ((filled, _), (alerts, _)) = (RingBuffer::new(0), RingBuffer::new(0));
+        let ((filled, _), (alerts, _), (cues, _)) = (RingBuffer::new(0), RingBuffer::new(0), RingBuffer::new(0));
         let shared = Arc::default();
         let mut publisher =
-            BackgroundPublisher { share: rate / loop_rate, latest_slot: None, free, filled, alerts, shared };
+            BackgroundPublisher { share: rate / loop_rate, latest_slot: None, free, filled, alerts, cues, shared };
         let due: Vec<u64> = (0..20_000).filter(|tick| publisher.due(*tick)).collect();
         let expected = 20_000.0 * share;
         prop_assert!((due.len() as f64 - expected).abs() <= 1.0, "{} of {expected}", due.len());

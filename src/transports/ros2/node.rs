@@ -1,33 +1,27 @@
 //! The ROS 2 node and its topics: the sink of the background thread.
 //!
-//! Everything of ros2-client is created and dropped on that thread.
+//! Everything of ros2-client but the participant is created and dropped on that thread.
 
-use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
 use std::time::Duration;
 
-use ros2_client::{Context, Node, NodeName, NodeOptions, Publisher};
-use rustdds::policy::{self, ResourceLimits};
-use rustdds::{DomainParticipantBuilder, QosPolicies, QosPolicyBuilder, TopicKind};
-use serde::Serialize;
+use ros2_client::{Context, Node, NodeName, NodeOptions};
 
-use super::environment::Range;
-use super::messages::{DiagnosticArray, HandlePoses, Header, MarkerArray, Pose, PoseArray, Stamped, Time, type_name};
+use super::messages::diagnostics::DiagnosticArray;
+use super::messages::markers::MarkerArray;
+use super::messages::path::Path;
+use super::messages::transforms::TfMessage;
+use super::messages::{Clock, HandlePoses, Header, Pose, PoseArray, Stamped, Time, type_name};
+use super::port::{Maker, Port, SELDOM_BYTES, Stream};
 use super::{Ros2Config, Ros2Error};
-use crate::scene::ros2::{Durability, Qos, Reliability, Topic};
+use crate::scene::ros2::Topic;
 use crate::transports::background::Sink;
-use crate::wire::{CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
+use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
 
-/// How long a subscriber that has died counts as slow: its lease.
-const LEASE_SECONDS: f64 = 12.0;
-/// The memory that one topic may keep for slow subscribers.
-const UNACKNOWLEDGED_BYTES: f64 = 64_000_000.0;
-/// RustDDS's own limit.
-const UNACKNOWLEDGED_MESSAGES: f64 = 8192.0;
-/// More bytes than a message has besides its handles.
-const HEADER_BYTES: usize = 200;
-/// More bytes than any message has that is not of every frame; the largest of them is the stage.
-const SELDOM_BYTES: usize = HEADER_BYTES + size_of::<Stage>();
+/// More bytes than a point of the path has.
+const PATH_POSE_BYTES: usize = 88;
+/// More bytes than the transforms of head and tail have, whatever the name.
+const TRANSFORMS_BYTES: usize = 1000;
 /// How long a reliable subscriber is given for the last messages.
 const LINGER: Duration = Duration::from_millis(100);
 
@@ -42,134 +36,35 @@ pub(super) struct Topics {
     stages: Option<Port<Stamped<Stage>>>,
     status: Option<Port<Stamped<LoopStatus>>>,
     diagnostics: Option<Port<DiagnosticArray>>,
+    cues: Option<Port<Stamped<Cue>>>,
+    clock: Option<Port<Clock>>,
+    transforms: Option<Stream<TfMessage>>,
+    /// The path, and when it was published.
+    path: Option<(Port<Path>, Arc<Path>)>,
     latest_alert: Option<CollisionAlert>,
+    /// Alerts so far.
+    alerts_sent: u64,
     skipped_periods: u64,
-    /// Whether the stage has been sent a second time.
-    stage_repeated: bool,
+    /// Whether what is sent seldom has been sent a second time.
+    repeated: bool,
     /// Messages that a full queue of RustDDS did not take, because a reliable subscriber was slow or dead.
     discarded: u64,
     // Dropped after the publishers: they belong to it.
     _node: Node,
 }
 
-/// A publisher of one topic.
-struct Port<Message: Serialize> {
-    publisher: Publisher<Arc<Message>>,
-    topic: String,
-    reported: bool,
-}
-
-impl<Message: Serialize> Port<Message> {
-    /// Sends a message. What a full queue does not take is counted, and reported once.
-    fn send(&mut self, message: Arc<Message>, discarded: &mut u64) {
-        if self.publisher.publish(message).is_ok() {
-            return;
-        }
-        *discarded += 1;
-        if !self.reported {
-            self.reported = true;
-            log::warn!(
-                "ROS 2 topic {}: a reliable subscriber is so slow, or dead, that messages are discarded until it is \
-                 back or its lease ends (reported once)",
-                self.topic
-            );
-        }
-    }
-}
-
-/// A publisher whose message is changed from frame to frame, so that its memory is used again.
-struct Stream<Message: Serialize> {
-    port: Port<Message>,
-    message: Arc<Message>,
-}
-
-impl<Message: Serialize + Clone> Stream<Message> {
-    fn publish(&mut self, discarded: &mut u64, change: impl FnOnce(&mut Message)) {
-        change(Arc::make_mut(&mut self.message));
-        self.port.send(Arc::clone(&self.message), discarded);
-    }
-}
-
-/// Makes the publishers of one node.
-struct Maker<'a> {
-    context: Context,
-    node: Node,
-    config: &'a Ros2Config,
-}
-
-impl Maker<'_> {
-    /// As [`Maker::port`], for what is sent with every frame: `each` bytes a handle, `message` being filled later.
-    fn stream<Message: Serialize>(
-        &mut self,
-        topic: Topic,
-        type_name: &str,
-        each: usize,
-        message: impl FnOnce() -> Message,
-    ) -> Result<Option<Stream<Message>>, Ros2Error> {
-        let bytes = HEADER_BYTES + self.config.handles * each;
-        let port = self.port(topic, type_name, bytes, self.config.rate)?;
-        Ok(port.map(|port| Stream { port, message: Arc::new(message()) }))
-    }
-
-    /// A publisher for `topic` if the scene requests it. `bytes` is the message's size, for a bound of the memory.
-    fn port<Message: Serialize>(
-        &mut self,
-        topic: Topic,
-        type_name: &str,
-        bytes: usize,
-        rate: f64,
-    ) -> Result<Option<Port<Message>>, Ros2Error> {
-        let Some(qos) = self.config.settings.topics.get(&topic) else { return Ok(None) };
-        let name = topic.path(&self.config.name);
-        let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(format!("topic {name}: {error}"));
-        let participant = self.context.domain_participant();
-        // Made here and not through the node, whose quality of service knows no limit of memory.
-        let dds = participant
-            .create_topic(format!("rt{name}"), type_name.to_owned(), &policies(*qos, bytes, rate), TopicKind::NoKey)
-            .map_err(|error| failed(&error))?;
-        let publisher = self.node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
-        Ok(Some(Port { publisher, topic: name, reported: false }))
-    }
-}
-
-/// The quality of service on the wire. A full queue refuses at once instead of blocking; it holds what a dead subscriber
-/// leaves unacknowledged during its lease, as far as memory allows.
-fn policies(qos: Qos, bytes: usize, rate: f64) -> QosPolicies {
-    let reliability = match qos.reliability {
-        Reliability::Reliable => policy::Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO },
-        Reliability::BestEffort => policy::Reliability::BestEffort,
-    };
-    let durability = match qos.durability {
-        Durability::Volatile => policy::Durability::Volatile,
-        Durability::TransientLocal => policy::Durability::TransientLocal,
-    };
-    let depth = qos.depth as i32;
-    let affordable = (UNACKNOWLEDGED_BYTES / bytes as f64).min(UNACKNOWLEDGED_MESSAGES);
-    let max_samples = ((LEASE_SECONDS * rate).min(affordable) as i32).max(depth);
-    QosPolicyBuilder::new()
-        .reliability(reliability)
-        .durability(durability)
-        .history(policy::History::KeepLast { depth })
-        .resource_limits(ResourceLimits { max_samples, max_instances: 1, max_samples_per_instance: max_samples })
-        .build()
-}
-
 impl Topics {
-    pub(super) fn open(config: &Ros2Config) -> Result<Self, Ros2Error> {
-        let Ros2Config { network, stage, handles, .. } = *config;
+    pub(super) fn open(context: Context, config: Ros2Config) -> Result<Self, Ros2Error> {
+        let Ros2Config { stage, handles, .. } = config;
         let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(error.to_string());
-        let mut builder = DomainParticipantBuilder::new(network.domain);
-        if network.range == Range::Localhost {
-            builder = builder.with_only_networks([IpAddr::V4(Ipv4Addr::LOCALHOST)]);
-        }
-        let participant = builder.build().map_err(|error| failed(&error))?;
-        let context = Context::from_domain_participant(participant).map_err(|error| failed(&error))?;
         let node_name = NodeName::new(&format!("/{}", config.name), "publisher").map_err(|error| failed(&error))?;
         // Fewer endpoints, fewer complaints of subscribers that look for what RustDDS cannot send.
         let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
         let node = context.new_node(node_name, options).map_err(|error| failed(&error))?;
-        let mut maker = Maker { context, node, config };
+        let mut maker = Maker { context, node, config: &config };
         let header = || Header::of(0);
+        let path = Arc::new(Path::of(stage.stamp_ns, &config.path));
+        let path_bytes = SELDOM_BYTES + path.poses.len() * PATH_POSE_BYTES;
         let mut topics = Self {
             name: config.name.clone(),
             stage,
@@ -191,19 +86,46 @@ impl Topics {
             stages: maker.port(Topic::Stage, type_name::STAGE, SELDOM_BYTES, 1.0)?,
             status: maker.port(Topic::Status, type_name::LOOP_STATUS, SELDOM_BYTES, 1.0)?,
             diagnostics: maker.port(Topic::Diagnostics, type_name::DIAGNOSTIC_ARRAY, SELDOM_BYTES, 1.0)?,
+            cues: if config.cues > 0 { maker.port(Topic::Cues, type_name::CUE, SELDOM_BYTES, 1.0)? } else { None },
+            clock: maker.port(Topic::Clock, type_name::CLOCK, SELDOM_BYTES, config.rate)?,
+            transforms: maker
+                .port(Topic::Tf, type_name::TF_MESSAGE, TRANSFORMS_BYTES, config.rate)?
+                .map(|port| port.stream(TfMessage::of(&config.name))),
+            path: maker.port(Topic::Path, type_name::PATH, path_bytes, 1.0)?.map(|port| (port, path)),
             latest_alert: None,
+            alerts_sent: 0,
             skipped_periods: 0,
-            stage_repeated: false,
+            repeated: false,
             discarded: 0,
             _node: maker.node,
         };
-        topics.publish_stage();
+        topics.publish_surroundings();
         Ok(topics)
     }
 
-    fn publish_stage(&mut self) {
+    /// Sends what does not change: the stage and the path.
+    fn publish_surroundings(&mut self) {
         if let Some(port) = &mut self.stages {
             port.send(Arc::new(Stamped::stage(self.stage)), &mut self.discarded);
+        }
+        if let Some((port, path)) = &mut self.path {
+            port.send(Arc::clone(path), &mut self.discarded);
+        }
+    }
+
+    fn publish_alert(&mut self, alert: CollisionAlert) {
+        if let Some(port) = &mut self.alerts {
+            port.send(Arc::new(Stamped::alert(alert)), &mut self.discarded);
+        }
+    }
+
+    /// Sends once more what a transient-local topic holds. Now and then RustDDS does not deliver what was sent while it was
+    /// still discovering a subscriber, although it keeps it: a second later they have found each other. What has been
+    /// followed by something newer since is not sent again.
+    fn repeat(&mut self) {
+        self.publish_surroundings();
+        if let Some(alert) = self.latest_alert.filter(|_| self.alerts_sent == 1) {
+            self.publish_alert(alert);
         }
     }
 }
@@ -227,6 +149,12 @@ impl Sink for Topics {
                 }
             });
         }
+        if let Some(port) = &mut self.clock {
+            port.send(Arc::new(Clock { clock: Time::of_seconds(header.sim_time) }), discarded);
+        }
+        if let Some(stream) = &mut self.transforms {
+            stream.publish(discarded, |message| message.update(stamp, handles));
+        }
         if let Some(stream) = &mut self.markers {
             let (stage, alert) = (&self.stage, self.latest_alert.as_ref());
             stream.publish(discarded, |message| message.update(header, handles, stage, alert));
@@ -235,16 +163,19 @@ impl Sink for Topics {
 
     fn alert(&mut self, alert: CollisionAlert) {
         self.latest_alert = Some(alert);
-        if let Some(port) = &mut self.alerts {
-            port.send(Arc::new(Stamped::alert(alert)), &mut self.discarded);
+        self.alerts_sent += 1;
+        self.publish_alert(alert);
+    }
+
+    fn cue(&mut self, cue: Cue) {
+        if let Some(port) = &mut self.cues {
+            port.send(Arc::new(Stamped::cue(cue)), &mut self.discarded);
         }
     }
 
     fn status(&mut self, status: &LoopStatus) {
-        // Now and then RustDDS does not deliver what was sent while it was still discovering a subscriber, although it
-        // keeps it: a second later they have found each other.
-        if !std::mem::replace(&mut self.stage_repeated, true) {
-            self.publish_stage();
+        if !std::mem::replace(&mut self.repeated, true) {
+            self.repeat();
         }
         if let Some(port) = &mut self.status {
             port.send(Arc::new(Stamped::status(*status)), &mut self.discarded);
@@ -271,8 +202,10 @@ impl Sink for Topics {
 mod tests {
     use rustdds::CDRSerializerAdapter;
     use rustdds::no_key::SerializerAdapter;
+    use serde::Serialize;
 
     use super::*;
+    use crate::transports::ros2::port::HEADER_BYTES;
     use crate::wire::SceneName;
 
     fn bytes<Message: Serialize>(message: &Message) -> usize {
@@ -290,8 +223,14 @@ mod tests {
             bytes(&Stamped::status(status)),
             bytes(&Stamped::alert(alert)),
             bytes(&diagnostics),
+            bytes(&Stamped::cue(Cue { name: SceneName::new(&"n".repeat(100)), ..Cue::default() })),
+            bytes(&Clock { clock: Time::default() }),
         ];
         assert!(seldom.iter().all(|bytes| *bytes < SELDOM_BYTES), "{seldom:?} bytes of {SELDOM_BYTES}");
+        let points = vec![Pose::of(&HandlePose::default()); 1000];
+        assert!(bytes(&Path::of(0, &points)) < SELDOM_BYTES + 1000 * PATH_POSE_BYTES);
+        let transforms = bytes(&TfMessage::of(&"n".repeat(255)));
+        assert!(transforms < TRANSFORMS_BYTES, "{transforms}");
         let poses = vec![HandlePose::default(); 224];
         let frame = HandlePoses { header: Header::of(0), frame: FrameHeader::default(), poses };
         assert!(bytes(&frame) < HEADER_BYTES + 224 * size_of::<HandlePose>());

@@ -1,0 +1,193 @@
+//! The keys of `watch`: what a media player's keys do, done to the show.
+//!
+//! In: keys, and the answers of a [`Conductor`]. Out: lines for the screen. Nothing is sent without a key, and nothing
+//! here waits for an answer.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+use bench_dragon::show::control::Command;
+use bench_dragon::subscribers::control::conductor::{Action, Conducted, Conductor};
+use bench_dragon::subscribers::control::{refusal, standing};
+use bench_dragon::subscribers::feed::FeedEvent;
+use signal_hook::consts::{SIGCONT, SIGQUIT, SIGTSTP};
+
+use super::terminal::{Key, KeyMode};
+use crate::commands::CommandError;
+
+/// What `?` prints.
+const HELP: &str = "Keys: space pauses and resumes; left and right seek 5 s; [ and ] halve and double the rate; \
+                    . steps one period; h holds; r releases; ? lists the keys; q ends.";
+/// How often keys are looked for.
+pub const KEY_INTERVAL: Duration = Duration::from_millis(20);
+/// Simulated seconds of one seek.
+const SEEK: f64 = 5.0;
+/// Keys that may wait for the answers to those before them.
+const MOST_WAITING: usize = 16;
+
+/// What became of a key.
+#[derive(Debug, Clone, PartialEq)]
+pub enum KeyOutcome {
+    /// Words to keep.
+    Line(String),
+    /// How the show stands after a command.
+    Done(String),
+    /// The monitor is to end.
+    Quit,
+}
+
+/// A keyboard that conducts the publisher of one name.
+pub struct Keyboard {
+    mode: Option<KeyMode>,
+    conductor: Conductor<()>,
+    answers: Receiver<Conducted>,
+    waiting: VecDeque<Action>,
+    /// Commands sent, holds aside, whose answer has not come: at most one, so that each key acts on what the one before
+    /// it left.
+    unanswered: usize,
+    /// Simulated seconds per second while the show plays, once it is known.
+    rate: Option<f64>,
+    /// Simulated seconds at which the show freezes, once it is known.
+    end: f64,
+    suspend: Arc<AtomicBool>,
+    resumed: Arc<AtomicBool>,
+}
+
+impl Keyboard {
+    /// Keys from standard input; `stop` is also set by the signal that would leave the terminal without an echo.
+    ///
+    /// # Errors
+    /// The system's, where it has no thread or signal handler left.
+    pub fn new(name: &str, stop: &Arc<AtomicBool>) -> Result<Self, CommandError> {
+        let (sender, answers) = channel();
+        // Nobody waits for an answer any more where the keyboard has gone.
+        let conductor = Conductor::start(name, move |(), conducted| drop(sender.send(conducted)))?;
+        let [suspend, resumed] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
+        for (signal, flag) in [(SIGQUIT, stop), (SIGTSTP, &suspend), (SIGCONT, &resumed)] {
+            signal_hook::flag::register(signal, Arc::clone(flag))?;
+        }
+        let (waiting, unanswered, end) = (VecDeque::new(), 0, f64::INFINITY);
+        let mode = KeyMode::enter();
+        Ok(Self { mode, conductor, answers, waiting, unanswered, rate: None, end, suspend, resumed })
+    }
+
+    /// Takes in what the keys' commands depend on.
+    pub fn handle(&mut self, event: &FeedEvent<'_>) {
+        match event {
+            FeedEvent::Frame { header, .. } if header.time_scale > 0.0 && self.unanswered == 0 => {
+                self.rate = Some(header.time_scale);
+            }
+            FeedEvent::Stage(stage) => self.end = stage.freeze_time,
+            FeedEvent::Gone => (self.rate, self.end) = (None, f64::INFINITY),
+            _ => (),
+        }
+    }
+
+    /// What has become of keys since the last call. Reads those that have been pressed.
+    pub fn poll(&mut self) -> Vec<KeyOutcome> {
+        let mut outcomes = Vec::new();
+        self.follow_job_control();
+        match self.mode.as_mut().map(KeyMode::keys) {
+            Some(Ok(keys)) => keys.into_iter().for_each(|key| outcomes.extend(self.press(key))),
+            Some(Err(_)) => self.mode = None,
+            None => (),
+        }
+        while let Ok(conducted) = self.answers.try_recv() {
+            outcomes.push(self.answered(conducted));
+        }
+        outcomes
+    }
+
+    /// Gives the terminal back while this program is stopped (Ctrl-Z) or in the background.
+    fn follow_job_control(&mut self) {
+        if self.suspend.swap(false, Ordering::Relaxed) {
+            self.mode = None;
+            // Without it the key would do nothing.
+            let _ = signal_hook::low_level::emulate_default_handler(SIGTSTP);
+        }
+        if self.resumed.swap(false, Ordering::Relaxed) {
+            self.mode = None;
+            self.mode = KeyMode::enter();
+        }
+    }
+
+    fn press(&mut self, key: Key) -> Option<KeyOutcome> {
+        let seek = |seconds| Action::SeekBy { seconds, end: self.end };
+        let action = match key {
+            Key::Char(' ') => Action::Toggle,
+            Key::Left => seek(-SEEK),
+            Key::Right => seek(SEEK),
+            Key::Char('[') => return self.change_rate(0.5),
+            Key::Char(']') => return self.change_rate(2.0),
+            Key::Char('.') => Action::Send(Command::Step(1)),
+            Key::Char('h') => Action::Send(Command::Hold),
+            Key::Char('r') => Action::Send(Command::Release),
+            Key::Char('?') => return Some(KeyOutcome::Line(HELP.to_owned())),
+            Key::Char('q') => return Some(KeyOutcome::Quit),
+            _ => return None,
+        };
+        self.request(action)
+    }
+
+    fn change_rate(&mut self, factor: f64) -> Option<KeyOutcome> {
+        let Some(rate) = self.rate else {
+            return Some(KeyOutcome::Line("The rate is not known until the show plays.".to_owned()));
+        };
+        // Keys pressed one after the other add up, answered or not.
+        self.rate = Some(rate * factor);
+        self.request(Action::Send(Command::Rate(rate * factor)))
+    }
+
+    fn request(&mut self, action: Action) -> Option<KeyOutcome> {
+        let is_hold = action == Action::Send(Command::Hold);
+        if is_hold {
+            // What was asked before it is not to be done after it.
+            self.waiting.clear();
+        } else if self.waiting.len() >= MOST_WAITING {
+            return Some(KeyOutcome::Line("The publisher has not answered the keys before this one.".to_owned()));
+        }
+        if is_hold || self.unanswered == 0 {
+            self.send(action)
+        } else {
+            self.waiting.push_back(action);
+            None
+        }
+    }
+
+    fn send(&mut self, action: Action) -> Option<KeyOutcome> {
+        match self.conductor.request((), action) {
+            Ok(()) => {
+                self.unanswered += 1;
+                None
+            }
+            Err(error) => Some(KeyOutcome::Line(error.to_string())),
+        }
+    }
+
+    fn answered(&mut self, conducted: Conducted) -> KeyOutcome {
+        self.unanswered -= 1;
+        let outcome = match conducted {
+            Ok((command, response)) => match refusal(&response, command) {
+                None => KeyOutcome::Done(standing(&response)),
+                Some(sentence) => {
+                    if matches!(command, Command::Rate(_)) {
+                        // The rate that was asked for is not in force; the next frame has the one that is.
+                        self.rate = None;
+                    }
+                    KeyOutcome::Line(sentence)
+                }
+            },
+            Err(error) => KeyOutcome::Line(error.to_string()),
+        };
+        if self.unanswered == 0
+            && let Some(action) = self.waiting.pop_front()
+        {
+            // A conductor with nothing to answer has room.
+            let _ = self.send(action);
+        }
+        outcome
+    }
+}

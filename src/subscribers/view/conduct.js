@@ -1,0 +1,197 @@
+// The transport bar: conducts the show where the server says that this page may, and shows the cues everywhere. In: the
+// stream's messages and frames. Out: commands over the same WebSocket.
+
+/** The numbers of the states of playback. */
+const PLAYING = 0, HELD = 2;
+/** Simulated seconds of one seek by a key. */
+const SEEK = 5;
+/** While the time line is dragged, a seek is sent no more often than this (ms). */
+const SEEK_INTERVAL = 100;
+/** An answer that has not come by then (ms) is not waited for. */
+const PATIENCE = 2000;
+/** How long a sentence and a cue's name stay (ms). */
+const SENTENCE_TIME = 8000, CUE_TIME = 6000;
+const RATES = [0.1, 0.25, 0.5, 1, 2, 4, 10];
+
+const BAR = `
+  <button id="conduct-toggle" title="Space"></button>
+  <button id="conduct-step" title=". (while paused)">Step</button>
+  <button id="conduct-restart">Restart</button>
+  <label>Speed <select id="conduct-rate"></select></label>
+  <span id="conduct-time"></span>
+  <div id="conduct-line">
+    <input id="conduct-seek" type="range" min="0" max="1" step="any" value="0" aria-label="Time of the show" aria-describedby="conduct-events" title="← →">
+    <div id="conduct-marks" aria-hidden="true"></div>
+    <p id="conduct-events" class="unseen"></p>
+  </div>
+  <button id="conduct-hold" aria-pressed="false" title="H"></button>
+  <p id="conduct-answer" role="status"></p>`;
+
+const TOKEN = "bench-dragon token";
+
+/** The token, out of the address at once: a screen that others see shows the address. A reload finds it again. */
+function takeToken() {
+  const given = /(?:^#|[,&])token=([^,&]*)/.exec(location.hash)?.[1];
+  if (given !== undefined) {
+    const rest = location.hash.slice(1).replace(/(^|[,&])token=[^,&]*/, "").replace(/^[,&]/, "");
+    history.replaceState(null, "", rest ? `#${rest}` : location.pathname + location.search);
+  }
+  try {
+    if (given !== undefined) sessionStorage.setItem(TOKEN, given);
+    return sessionStorage.getItem(TOKEN);
+  } catch {
+    // A browser that keeps nothing.
+    return given ?? null;
+  }
+}
+const token = takeToken();
+
+export function conduct(stream) {
+  const bar = document.getElementById("conduct"), main = bar.parentElement;
+  bar.innerHTML = BAR;
+  const part = (name) => document.getElementById(`conduct-${name}`);
+  const line = part("seek"), rates = part("rate");
+  const cue = main.appendChild(Object.assign(document.createElement("p"), { id: "cue", hidden: true }));
+  cue.setAttribute("role", "status");
+  let greeted = null, numbered = 0, shownStage = null, rate = null, dragged = false, sentenceAt = 0, cueAt = 0;
+  /** Where a seek that has not been answered goes, and one that waits for that answer; the time of the last one sent. */
+  let sought = null, wanted = null, soughtAt = -Infinity;
+
+  const put = (element, text) => element.textContent !== text && (element.textContent = text);
+  const seconds = (time) => `${time.toFixed(1)} s`;
+  function report(sentence) {
+    put(part("answer"), sentence);
+    sentenceAt = performance.now();
+  }
+  function command(name, value) {
+    const id = ++numbered;
+    if (!stream.send({ command: name, value, id })) report("The server is not there: nothing was sent.");
+    return id;
+  }
+
+  // The time line. One seek is on its way at a time, so that a hand that moves fast leaves no queue behind.
+  function seek(time) {
+    wanted = Math.min(Math.max(0, time), Number(line.max));
+    sendSeek();
+  }
+  function sendSeek() {
+    const passed = performance.now() - soughtAt;
+    if (wanted === null || passed < SEEK_INTERVAL || (sought !== null && passed < PATIENCE)) return;
+    sought = { time: wanted, id: command("seek", wanted) };
+    [wanted, soughtAt] = [null, performance.now()];
+  }
+  const now = () => wanted ?? sought?.time ?? stream.playback.newest?.time ?? 0;
+
+  function showStage(stage) {
+    if (stage === shownStage) return;
+    shownStage = stage;
+    line.max = stage.freeze_time;
+    const marks = [
+      ...stage.events.filter(({ time }) => time <= stage.freeze_time).map(({ event, time }) => ({ kind: event, text: `${event.replaceAll("_", " ")}, ${time.toFixed(3)} s`, time })),
+      ...stage.cues.map(({ name, time, pauses }) => ({ kind: "cue", text: `cue "${name}", ${time.toFixed(3)} s${pauses ? ", waits there" : ""}`, time })),
+    ];
+    part("marks").replaceChildren(
+      ...marks.map(({ kind, text, time }) => {
+        const mark = Object.assign(document.createElement("i"), { className: kind === "cue" ? "cue" : "event", title: text });
+        Object.assign(mark.dataset, { kind, time });
+        mark.style.setProperty("--share", time / stage.freeze_time);
+        return mark;
+      }),
+    );
+    put(part("events"), marks.map(({ text }) => text).join("; "));
+  }
+  function showRate(scale) {
+    if (!(scale > 0) || scale === rate) return;
+    rate = scale;
+    const all = [...new Set([...RATES, scale])].sort((a, b) => a - b);
+    rates.replaceChildren(...all.map((one) => new Option(`${+one.toPrecision(3)} ×`, one, false, one === scale)));
+  }
+  function show() {
+    const { newest } = stream.playback, { stage } = stream, at = performance.now(), there = newest && stage && stream.trouble === null;
+    if (at - sentenceAt > SENTENCE_TIME) put(part("answer"), "");
+    if (at - cueAt > CUE_TIME) cue.hidden = true;
+    if (bar.hidden) return;
+    main.style.setProperty("--conduct-height", `${bar.offsetHeight}px`);
+    for (const control of bar.querySelectorAll("button, input, select")) control.disabled = !there;
+    if (!there) return;
+    sendSeek();
+    showStage(stage);
+    showRate(newest.scale);
+    const toggle = newest.playback === PLAYING ? "Pause" : "Play", held = newest.playback === HELD;
+    put(part("toggle"), toggle);
+    put(part("hold"), held ? "HELD: release" : "Hold");
+    part("hold").setAttribute("aria-pressed", held);
+    bar.dataset.held = held;
+    const time = dragged || sought !== null || wanted !== null ? now() : stream.playback.time(at);
+    if (!dragged) line.value = time;
+    line.setAttribute("aria-valuetext", seconds(time));
+    put(part("time"), `${time.toFixed(1)} / ${seconds(stage.freeze_time)}`);
+  }
+
+  stream.onmessage = (message) => {
+    if (message.type === "control") {
+      // The first message of a connection tells whether the token is asked for; the second whether it was right.
+      if (!message.allowed && token && greeted !== stream.socket) stream.send({ token });
+      greeted = stream.socket;
+      bar.hidden = !message.allowed;
+      [sought, wanted] = [null, null];
+      show();
+    }
+    if (message.type === "answer") {
+      if (message.id === sought?.id) sought = null;
+      if (message.sentence) report(`${message.sentence[0].toUpperCase()}${message.sentence.slice(1)}.`);
+      else if (message.code) put(part("answer"), "");
+      sendSeek();
+    }
+    // A cue that passed before this page came is no news.
+    const { newest } = stream.playback, age = message.type === "cue" && newest ? Math.abs(newest.time - message.sim_time) : Infinity;
+    if (age <= (CUE_TIME / 1000) * (newest?.scale || 1)) {
+      cue.textContent = `${message.number}. ${message.name}${message.pauses ? " (waiting for go)" : ""}`;
+      [cue.hidden, cueAt] = [false, performance.now()];
+    }
+  };
+
+  const hold = () => command(stream.playback.newest?.playback === HELD ? "release" : "hold");
+  part("toggle").onclick = () => command("toggle");
+  part("step").onclick = () => command("step", 1);
+  part("restart").onclick = () => command("restart");
+  part("hold").onclick = hold;
+  rates.onchange = () => {
+    // What is shown is what is in force, which a frame says.
+    command("rate", Number(rates.value));
+    rate = null;
+  };
+  line.oninput = () => {
+    dragged = true;
+    seek(Number(line.value));
+  };
+  line.onchange = () => {
+    dragged = false;
+    // The last place counts, however soon it follows the one before.
+    soughtAt = Math.min(soughtAt, performance.now() - SEEK_INTERVAL);
+    seek(Number(line.value));
+  };
+
+  const keys = {
+    " ": () => command("toggle"), ".": () => command("step", 1), h: hold,
+    "[": () => rate && command("rate", rate / 2), "]": () => rate && command("rate", rate * 2),
+    ArrowLeft: () => seek(now() - SEEK), ArrowRight: () => seek(now() + SEEK),
+  };
+  /** Keys that what has the focus uses itself: the picture moves by arrows, buttons are pressed by space, lists have theirs. */
+  const usedBy = (target, key) =>
+    target.closest("select, input:not([type=range]), dialog") || (key === " " && target.closest("button")) || (key.startsWith("Arrow") && target.closest("canvas"));
+  addEventListener("keydown", (event) => {
+    const { key, target } = event;
+    if (bar.hidden || event.ctrlKey || event.metaKey || (event.altKey && !"[]".includes(key))) return;
+    const within = bar.contains(target);
+    if (usedBy(target, key)) return within && event.stopPropagation();
+    const act = keys[key.length === 1 ? key.toLowerCase() : key];
+    if (!act && !(target === line && /^(Arrow|Home|End|Page)/.test(key))) return;
+    // The picture's own keys do not act as well.
+    event.stopPropagation();
+    if (!act) return;
+    event.preventDefault();
+    if (!event.repeat || key.startsWith("Arrow")) act();
+  }, { capture: true });
+  setInterval(show, 100);
+}

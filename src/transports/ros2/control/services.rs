@@ -1,0 +1,205 @@
+//! The services, request by request and response by response as their packages define them.
+//!
+//! `simulation_interfaces` (1.0.0 to 2.1.0 do not differ in what follows), `rosbag2_interfaces` (Humble to Kilted, and
+//! `Resume` of what came later) under the names that rosbag2's player gives them, `std_srvs/Trigger`. In: the bytes of a
+//! request. Out: a [`Call`]; back from a [`Response`]. Called by the control thread.
+
+use serde::Serialize;
+
+/// A service: what it is called below the publisher's name, its type, and what a request is.
+pub struct Service {
+    /// The last part of the name.
+    pub name: &'static str,
+    /// The package of its type.
+    pub package: &'static str,
+    /// The type in that package.
+    pub kind: &'static str,
+    /// The lengths in bytes that a request may have.
+    pub lengths: &'static [usize],
+    /// Reads a request of such a length.
+    pub read: fn(&[u8]) -> Call,
+}
+
+/// A request without a field is one byte on the wire.
+const EMPTY: &[usize] = &[1];
+const BYTE: &[usize] = &[1];
+const EIGHT_BYTES: &[usize] = &[8];
+
+/// Every service there is.
+pub const SERVICES: [Service; 16] = {
+    const fn simulation(
+        name: &'static str,
+        kind: &'static str,
+        lengths: &'static [usize],
+        read: fn(&[u8]) -> Call,
+    ) -> Service {
+        Service { name, package: "simulation_interfaces", kind, lengths, read }
+    }
+    const fn player(
+        name: &'static str,
+        kind: &'static str,
+        lengths: &'static [usize],
+        read: fn(&[u8]) -> Call,
+    ) -> Service {
+        Service { name, package: "rosbag2_interfaces", kind, lengths, read }
+    }
+    const fn trigger(name: &'static str, read: fn(&[u8]) -> Call) -> Service {
+        Service { name, package: "std_srvs", kind: "Trigger", lengths: EMPTY, read }
+    }
+    [
+        simulation("get_simulator_features", "GetSimulatorFeatures", EMPTY, |_| Call::GetFeatures),
+        simulation("get_simulation_state", "GetSimulationState", EMPTY, |_| Call::GetState),
+        simulation("set_simulation_state", "SetSimulationState", BYTE, |body| Call::SetState(body[0])),
+        simulation("step_simulation", "StepSimulation", EIGHT_BYTES, |body| {
+            Call::Step(u64::from_le_bytes(eight(body)))
+        }),
+        simulation("reset_simulation", "ResetSimulation", BYTE, |body| Call::Reset(body[0])),
+        player("pause", "Pause", EMPTY, |_| Call::Pause),
+        // Since Lyrical a request has a time, which the player does not heed.
+        player("resume", "Resume", &[1, 8], |_| Call::Resume),
+        player("toggle_paused", "TogglePaused", EMPTY, |_| Call::TogglePaused),
+        player("is_paused", "IsPaused", EMPTY, |_| Call::IsPaused),
+        player("get_rate", "GetRate", EMPTY, |_| Call::GetRate),
+        player("set_rate", "SetRate", EIGHT_BYTES, |body| Call::SetRate(f64::from_le_bytes(eight(body)))),
+        player("seek", "Seek", EIGHT_BYTES, |body| Call::Seek(seconds(eight(body)))),
+        player("play_next", "PlayNext", EMPTY, |_| Call::PlayNext),
+        trigger("hold", |_| Call::Hold),
+        trigger("release", |_| Call::Release),
+        trigger("go", |_| Call::Go),
+    ]
+};
+
+/// The eight bytes that a request of that length has.
+fn eight(body: &[u8]) -> [u8; 8] {
+    std::array::from_fn(|byte| body.get(byte).copied().unwrap_or(0))
+}
+
+/// A builtin_interfaces/Time in seconds: i32 seconds, u32 nanoseconds.
+fn seconds(bytes: [u8; 8]) -> f64 {
+    let [a, b, c, d, e, f, g, h] = bytes;
+    f64::from(i32::from_le_bytes([a, b, c, d])) + f64::from(u32::from_le_bytes([e, f, g, h])) * 1e-9
+}
+
+/// What a client calls.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Call {
+    /// simulation_interfaces/GetSimulatorFeatures.
+    GetFeatures,
+    /// simulation_interfaces/GetSimulationState.
+    GetState,
+    /// simulation_interfaces/SetSimulationState: the state.
+    SetState(u8),
+    /// simulation_interfaces/StepSimulation: the number of steps.
+    Step(u64),
+    /// simulation_interfaces/ResetSimulation: the scope.
+    Reset(u8),
+    /// rosbag2_interfaces/Pause.
+    Pause,
+    /// rosbag2_interfaces/Resume.
+    Resume,
+    /// rosbag2_interfaces/TogglePaused.
+    TogglePaused,
+    /// rosbag2_interfaces/IsPaused.
+    IsPaused,
+    /// rosbag2_interfaces/GetRate.
+    GetRate,
+    /// rosbag2_interfaces/SetRate: simulated seconds per second.
+    SetRate(f64),
+    /// rosbag2_interfaces/Seek: simulated seconds.
+    Seek(f64),
+    /// rosbag2_interfaces/PlayNext.
+    PlayNext,
+    /// std_srvs/Trigger `hold`.
+    Hold,
+    /// std_srvs/Trigger `release`.
+    Release,
+    /// std_srvs/Trigger `go`.
+    Go,
+}
+
+/// What a call is answered with: the fields of the response in order.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Response {
+    /// Of a service whose response has no field: one byte, 0.
+    Empty(u8),
+    /// Whether it succeeded, or whether the show is paused.
+    Flag(bool),
+    /// Simulated seconds per second.
+    Rate(f64),
+    /// What became of a call that changes the simulation.
+    Result(CallResult),
+    /// simulation_interfaces/GetSimulationState.
+    State(u8, CallResult),
+    /// simulation_interfaces/GetSimulatorFeatures.
+    Features(Features),
+    /// std_srvs/Trigger: whether it succeeded, and a sentence.
+    Trigger(bool, String),
+}
+
+/// simulation_interfaces/Result.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct CallResult {
+    /// One of [`result`].
+    pub result: u8,
+    /// A sentence where it is not [`result::OK`].
+    pub error_message: String,
+}
+
+/// What simulation_interfaces/Result can be.
+pub mod result {
+    /// The simulator has no such feature.
+    pub const FEATURE_UNSUPPORTED: u8 = 0;
+    /// Done.
+    pub const OK: u8 = 1;
+    /// Not in this state.
+    pub const INCORRECT_STATE: u8 = 3;
+    /// Not done: the message has the reason.
+    pub const OPERATION_FAILED: u8 = 4;
+    /// Of SetSimulationState: it was in that state.
+    pub const ALREADY_IN_TARGET_STATE: u8 = 101;
+    /// Of SetSimulationState: it did not get into that state.
+    pub const STATE_TRANSITION_ERROR: u8 = 102;
+    /// Of SetSimulationState: not from the state it is in.
+    pub const INCORRECT_TRANSITION: u8 = 103;
+}
+
+/// simulation_interfaces/SimulationState.
+pub mod state {
+    /// Paused at the start.
+    pub const STOPPED: u8 = 0;
+    /// Simulated time advances.
+    pub const PLAYING: u8 = 1;
+    /// Simulated time stands still.
+    pub const PAUSED: u8 = 2;
+    /// The simulator ends.
+    pub const QUITTING: u8 = 3;
+    /// There is no world.
+    pub const NO_WORLD: u8 = 4;
+    /// A world is being loaded.
+    pub const LOADING_WORLD: u8 = 5;
+}
+
+/// The bits of ResetSimulation's scope, and the scope that means all of them.
+pub mod scope {
+    /// As [`ALL`].
+    pub const DEFAULT: u8 = 0;
+    /// Simulated time.
+    pub const TIME: u8 = 1;
+    /// Poses and velocities.
+    pub const STATE: u8 = 2;
+    /// Everything.
+    pub const ALL: u8 = 255;
+}
+
+/// simulation_interfaces/SimulatorFeatures.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Features {
+    /// SIMULATION_RESET (20), its scopes TIME (21) and STATE (22), SIMULATION_STATE_GETTING (24), _SETTING (25) and
+    /// _PAUSE (26), STEP_SIMULATION_SINGLE (31) and _MULTIPLE (32).
+    pub features: Vec<u16>,
+    /// None.
+    pub spawn_formats: Vec<String>,
+    /// What this program is.
+    pub custom_info: String,
+}

@@ -1,0 +1,135 @@
+//! nav_msgs/Path: the line that the head follows.
+
+use serde::Serialize;
+
+use super::{Header, Pose};
+use crate::model::path::{OutlineKind, SegmentOutline};
+use crate::model::spiral::Direction;
+
+/// The turn between two points, radians: a chord of it misses a circle of 9 m by 9 mm.
+const TURN: f64 = std::f64::consts::PI / 36.0;
+/// Points of a path at most; one that turns more often gets fewer for each turn.
+const MOST_POINTS: f64 = 10_000.0;
+
+/// geometry_msgs/PoseStamped.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PoseStamped {
+    /// As that of the path.
+    pub header: Header,
+    /// A point, and the direction of travel there.
+    pub pose: Pose,
+}
+
+/// nav_msgs/Path.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Path {
+    /// When it was published.
+    pub header: Header,
+    /// From the start to the end.
+    pub poses: Vec<PoseStamped>,
+}
+
+impl Path {
+    /// The message of a path that is published at `stamp_ns`.
+    pub fn of(stamp_ns: u64, poses: &[Pose]) -> Self {
+        let header = Header::of(stamp_ns);
+        let poses = poses.iter().map(|pose| PoseStamped { header: header.clone(), pose: *pose }).collect();
+        Self { header, poses }
+    }
+}
+
+/// Points along an outline, with the direction of travel: the ends of every segment, and between them one for each turn by
+/// five degrees.
+pub fn poses(outline: &[SegmentOutline]) -> Vec<Pose> {
+    let turned: f64 = outline.iter().map(turn_of).sum();
+    let turn = TURN.max(turned / MOST_POINTS);
+    let along = |segment: &SegmentOutline| {
+        let pieces = (turn_of(segment) / turn).ceil().max(1.0) as usize;
+        let segment = *segment;
+        (0..=pieces).map(move |piece| pose_at(&segment, piece as f64 / pieces as f64))
+    };
+    outline.iter().flat_map(along).collect()
+}
+
+/// Radians by which a segment turns.
+fn turn_of(segment: &SegmentOutline) -> f64 {
+    match segment.kind {
+        OutlineKind::Line => 0.0,
+        OutlineKind::Arc { curvature } => (curvature * segment.length).abs(),
+        OutlineKind::Spiral { first, last, .. } => (last - first).abs(),
+    }
+}
+
+/// The pose at a share, from 0 to 1, of a segment: of its length, or of a spiral's polar angle.
+fn pose_at(segment: &SegmentOutline, share: f64) -> Pose {
+    let SegmentOutline { kind, start, heading, length } = *segment;
+    match kind {
+        OutlineKind::Line => {
+            let (sine, cosine) = heading.sin_cos();
+            Pose::flat(start.x + share * length * cosine, start.y + share * length * sine, heading)
+        }
+        OutlineKind::Arc { curvature } => {
+            let here = heading + share * curvature * length;
+            let x = start.x + (here.sin() - heading.sin()) / curvature;
+            let y = start.y - (here.cos() - heading.cos()) / curvature;
+            Pose::flat(x, y, here)
+        }
+        OutlineKind::Spiral { direction, pitch, first, last } => {
+            let theta = first + share * (last - first);
+            let per_radian = pitch / std::f64::consts::TAU;
+            let (sine, cosine) = theta.sin_cos();
+            let radius = per_radian * theta;
+            // Against the derivative by theta: inward because theta decreases, outward because of the half turn.
+            let (x, y) = (radius * sine - per_radian * cosine, -radius * cosine - per_radian * sine);
+            let side = match direction {
+                Direction::Inward => 1.0,
+                Direction::Outward => -1.0,
+            };
+            Pose::flat(side * radius * cosine, side * radius * sine, y.atan2(x))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Point;
+    use crate::model::curve::Side;
+    use crate::model::path::Path as ModelPath;
+
+    /// Every pose lies on the path, and looks along it, by the path's own points and tangents.
+    fn check(path: &ModelPath) {
+        let poses = poses(&path.outline());
+        assert!(poses.len() > 50 && poses.len() < 2500, "{}", poses.len());
+        let mut travelled = 0.0;
+        let mut before: Option<Pose> = None;
+        for pose in poses {
+            let here = Point::new(pose.position.x, pose.position.y);
+            // The chord and a little more: the arc between is at most a thousandth longer.
+            let chord = before.map_or(0.0, |b| (here.x - b.position.x).hypot(here.y - b.position.y));
+            let range = [travelled + chord - 1e-9, travelled + 1.002 * chord + 1e-6];
+            let distance = |s: f64| nalgebra::distance(&path.point(path.param_at(s.clamp(0.0, path.length()))), &here);
+            let (mut low, mut high) = (range[0], range[1]);
+            for _ in 0..200 {
+                let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+                if distance(a) < distance(b) { high = b } else { low = a }
+            }
+            travelled = (0.5 * (low + high)).clamp(0.0, path.length());
+            assert!(distance(travelled) < 1e-6, "{} m off at {travelled} m", distance(travelled));
+            let tangent = path.tangent(path.param_at(travelled));
+            let (z, w) = (pose.orientation.z, pose.orientation.w);
+            let along = (w * w - z * z) * tangent.x + 2.0 * w * z * tangent.y;
+            assert!(along > 1.0 - 1e-6 || travelled > path.length() - 0.01, "{along} at {travelled} m");
+            before = Some(pose);
+        }
+        assert!((travelled - path.length()).abs() < 1e-4, "it ends at {travelled} of {} m", path.length());
+    }
+
+    #[test]
+    fn the_points_lie_on_the_path_and_look_along_it() {
+        check(&ModelPath::spiral(0.55, 16.0));
+        check(&ModelPath::turnaround(1.7, 4.5, 2.0, 100.0, 60.0).unwrap());
+        let route = ModelPath::route(Point::new(-3.0, 2.0), 0.1).line(5.0).arc(Side::Left, 3.0, 0.5);
+        check(&route.line(2.0).arc(Side::Right, 1.5, 0.75).build().unwrap());
+    }
+}

@@ -1,0 +1,130 @@
+//! A publisher of one topic: its quality of service, what it keeps for slow subscribers, and what it discards.
+
+use std::sync::Arc;
+
+use ros2_client::{Context, Node, Publisher};
+use rustdds::policy::{self, ResourceLimits};
+use rustdds::{QosPolicies, QosPolicyBuilder, TopicKind};
+use serde::Serialize;
+
+use crate::scene::ros2::{Durability, Qos, Reliability, Topic};
+use crate::transports::ros2::{Ros2Config, Ros2Error};
+use crate::wire::Stage;
+
+/// How long a subscriber that has died counts as slow: its lease.
+const LEASE_SECONDS: f64 = 12.0;
+/// The memory that one topic may keep for slow subscribers.
+const UNACKNOWLEDGED_BYTES: f64 = 64_000_000.0;
+/// RustDDS's own limit.
+const UNACKNOWLEDGED_MESSAGES: f64 = 8192.0;
+/// More bytes than a message has besides its handles.
+pub(super) const HEADER_BYTES: usize = 200;
+/// More bytes than any message has that is not of every frame; the largest of them is the stage.
+pub(super) const SELDOM_BYTES: usize = HEADER_BYTES + size_of::<Stage>();
+
+/// A publisher of one topic.
+pub(super) struct Port<Message: Serialize> {
+    publisher: Publisher<Arc<Message>>,
+    topic: String,
+    reported: bool,
+}
+
+impl<Message: Serialize> Port<Message> {
+    /// A publisher of this message, which is changed before each time it is sent.
+    pub(super) fn stream(self, message: Message) -> Stream<Message> {
+        Stream { port: self, message: Arc::new(message) }
+    }
+
+    /// Sends a message. What a full queue does not take is counted, and reported once.
+    pub(super) fn send(&mut self, message: Arc<Message>, discarded: &mut u64) {
+        if self.publisher.publish(message).is_ok() {
+            return;
+        }
+        *discarded += 1;
+        if !self.reported {
+            self.reported = true;
+            log::warn!(
+                "ROS 2 topic {}: a reliable subscriber is so slow, or dead, that messages are discarded until it is \
+                 back or its lease ends (reported once)",
+                self.topic
+            );
+        }
+    }
+}
+
+/// A publisher whose message is changed from frame to frame, so that its memory is used again.
+pub(super) struct Stream<Message: Serialize> {
+    port: Port<Message>,
+    message: Arc<Message>,
+}
+
+impl<Message: Serialize + Clone> Stream<Message> {
+    pub(super) fn publish(&mut self, discarded: &mut u64, change: impl FnOnce(&mut Message)) {
+        change(Arc::make_mut(&mut self.message));
+        self.port.send(Arc::clone(&self.message), discarded);
+    }
+}
+
+/// Makes the publishers of one node.
+pub(super) struct Maker<'a> {
+    pub(super) context: Context,
+    pub(super) node: Node,
+    pub(super) config: &'a Ros2Config,
+}
+
+impl Maker<'_> {
+    /// As [`Maker::port`], for what is sent with every frame: `each` bytes a handle, `message` being filled later.
+    pub(super) fn stream<Message: Serialize>(
+        &mut self,
+        topic: Topic,
+        type_name: &str,
+        each: usize,
+        message: impl FnOnce() -> Message,
+    ) -> Result<Option<Stream<Message>>, Ros2Error> {
+        let bytes = HEADER_BYTES + self.config.handles * each;
+        let port = self.port(topic, type_name, bytes, self.config.rate)?;
+        Ok(port.map(|port| port.stream(message())))
+    }
+
+    /// A publisher for `topic` if the scene requests it. `bytes` is the message's size, for a bound of the memory.
+    pub(super) fn port<Message: Serialize>(
+        &mut self,
+        topic: Topic,
+        type_name: &str,
+        bytes: usize,
+        rate: f64,
+    ) -> Result<Option<Port<Message>>, Ros2Error> {
+        let Some(qos) = self.config.settings.topics.get(&topic) else { return Ok(None) };
+        let name = topic.path(&self.config.name);
+        let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(format!("topic {name}: {error}"));
+        let participant = self.context.domain_participant();
+        // Made here and not through the node, whose quality of service knows no limit of memory.
+        let dds = participant
+            .create_topic(format!("rt{name}"), type_name.to_owned(), &policies(*qos, bytes, rate), TopicKind::NoKey)
+            .map_err(|error| failed(&error))?;
+        let publisher = self.node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
+        Ok(Some(Port { publisher, topic: name, reported: false }))
+    }
+}
+
+/// The quality of service on the wire. A full queue refuses at once instead of blocking; it holds what a dead subscriber
+/// leaves unacknowledged during its lease, as far as memory allows.
+fn policies(qos: Qos, bytes: usize, rate: f64) -> QosPolicies {
+    let reliability = match qos.reliability {
+        Reliability::Reliable => policy::Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO },
+        Reliability::BestEffort => policy::Reliability::BestEffort,
+    };
+    let durability = match qos.durability {
+        Durability::Volatile => policy::Durability::Volatile,
+        Durability::TransientLocal => policy::Durability::TransientLocal,
+    };
+    let depth = qos.depth as i32;
+    let affordable = (UNACKNOWLEDGED_BYTES / bytes as f64).min(UNACKNOWLEDGED_MESSAGES);
+    let max_samples = ((LEASE_SECONDS * rate).min(affordable) as i32).max(depth);
+    QosPolicyBuilder::new()
+        .reliability(reliability)
+        .durability(durability)
+        .history(policy::History::KeepLast { depth })
+        .resource_limits(ResourceLimits { max_samples, max_instances: 1, max_samples_per_instance: max_samples })
+        .build()
+}

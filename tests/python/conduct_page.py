@@ -1,0 +1,261 @@
+"""The page that conducts: the transport bar in Debian's Chromium, with a publisher that has to obey.
+
+    conduct_page.py SCENARIO PROGRAM NAME SCENE
+
+Starts its own server and a publisher of SCENE under the service name NAME. Whether the publisher obeys is asked of it by
+another process, `control state`. Ends with exit code 0, or with what it found instead.
+"""
+
+import contextlib
+import functools
+import http.server
+import json
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+from playwright.sync_api import sync_playwright
+
+# Nothing here may wait for ever; an alarm still lets everything that was started be ended.
+WATCHDOG = 120
+CONTACT = 412.473837682115
+
+_, SCENARIO, PROGRAM, NAME, SCENE = sys.argv
+
+
+@contextlib.contextmanager
+def started(*arguments):
+    child = subprocess.Popen([PROGRAM, "--name", NAME, "--scene", SCENE, *arguments], stdout=subprocess.PIPE, text=True)
+    try:
+        yield child
+    finally:
+        child.kill()
+        child.wait()
+
+
+@contextlib.contextmanager
+def publisher(*arguments):
+    with started("run", "--quiet", "--json", "--rate", "50", *arguments) as child:
+        until(state, "a publisher")
+        yield child
+
+
+@contextlib.contextmanager
+def server(*arguments):
+    with started("view", "--json", "--port", "0", *arguments) as child:
+        yield json.loads(child.stdout.readline())
+
+
+def state():
+    """How the show stands, or None while nobody publishes."""
+    asked = subprocess.run([PROGRAM, "--name", NAME, "--json", "control", "state"], capture_output=True)
+    return json.loads(asked.stdout) if asked.returncode == 0 else None
+
+
+@contextlib.contextmanager
+def chromium():
+    with sync_playwright() as playwright, playwright.chromium.launch(executable_path="/usr/bin/chromium") as browser:
+        yield browser
+
+
+def opened(browser, url):
+    page = browser.new_context(viewport={"width": 1280, "height": 720}).new_page()
+    page.complaints = []
+    page.on("pageerror", lambda error: page.complaints.append(str(error)))
+    page.goto(url)
+    until(lambda: page.evaluate("picture.drawn > 0"), "a picture")
+    return page
+
+
+def until(condition, what, seconds=30):
+    """The value of a condition as soon as it is true."""
+    deadline = time.monotonic() + seconds
+    while not (value := condition()):
+        assert time.monotonic() < deadline, f"{what}: not within {seconds} s; the show: {state()}"
+        time.sleep(0.05)
+    return value
+
+
+def bar_is_shown(page):
+    return page.evaluate("!document.getElementById('conduct').hidden")
+
+
+def says(page, words):
+    until(lambda: words in page.inner_text("#conduct-answer"), f"the sentence {words!r}")
+
+
+def bar_conducts():
+    with publisher("--start", "100") as _, server() as closed, server("--control") as ready, chromium() as browser:
+        # Without --control: no bar, and a command is refused with a sentence.
+        page = opened(browser, closed["url"])
+        assert closed["token"] is None and not bar_is_shown(page), "the bar is there unasked"
+        answer = """() => new Promise((done) => {
+            const socket = new WebSocket(`ws://${location.host}/frames?rate=1`);
+            socket.onopen = () => socket.send('{"command":"pause","id":3}');
+            socket.onmessage = ({ data }) => typeof data === "string" && JSON.parse(data).type === "answer" && done(data);
+        })"""
+        refused = json.loads(page.evaluate(answer))
+        assert (refused["id"], refused["code"]) == (3, None) and "--control" in refused["sentence"], refused
+        page.keyboard.press("Space")
+        assert state()["playback"] == "playing"
+        page.close()
+        page = opened(browser, ready["url"])
+        until(lambda: bar_is_shown(page), "the bar")
+        buttons(page)
+        time_line(page)
+        keyboard(page)
+        held(page)
+        assert not page.complaints, page.complaints
+
+
+def buttons(page):
+    page.get_by_role("button", name="Pause").click()
+    paused = until(lambda: (now := state())["playback"] == "paused" and now, "Pause pauses")
+    until(lambda: page.inner_text("#conduct-toggle") == "Play", "the button becomes Play")
+    page.get_by_role("button", name="Step").click()
+    until(lambda: abs(state()["sim_time"] - paused["sim_time"] - 0.02) < 1e-9, "Step is one period")
+    page.get_by_label("Speed").select_option("4 ×")
+    page.get_by_role("button", name="Play").click()
+    until(lambda: state()["time_scale"] == 4.0, "the speed")
+    page.get_by_role("button", name="Restart").click()
+    until(lambda: 100 <= state()["sim_time"] < 105, "Restart")
+    page.get_by_role("button", name="Pause").click()
+    until(lambda: state()["playback"] == "paused", "Pause")
+
+
+def place_on_line(page, time):
+    """Where a moment of the show is on the time line."""
+    box, end = page.locator("#conduct-seek").bounding_box(), float(page.get_attribute("#conduct-seek", "max"))
+    thumb = page.evaluate("parseFloat(getComputedStyle(document.documentElement).fontSize)")
+    return box["x"] + thumb / 2 + (box["width"] - thumb) * time / end, box["y"] + box["height"] / 2
+
+
+def time_line(page):
+    end = float(page.get_attribute("#conduct-seek", "max"))
+    assert abs(end - CONTACT) < 1e-9, "the time line ends where the show does"
+    marks = page.evaluate("[...document.querySelectorAll('#conduct-marks i')].map((mark) => [mark.dataset.kind, Number(mark.dataset.time), mark.getBoundingClientRect().x + 2])")
+    assert [mark[0] for mark in marks] == ["contact", "cue", "cue"], marks
+    for (_, at, x), true in zip(marks, [CONTACT, 150.0, 300.0]):
+        assert abs(at - true) < 1e-9 and abs(x - place_on_line(page, true)[0]) < 1.5, marks
+    # A drag seeks on its way, some ten times a second at most, and to its end exactly.
+    page.evaluate("(() => { const { send } = WebSocket.prototype; window.sent = []; WebSocket.prototype.send = function (text) { sent.push(text); send.call(this, text); }; })()")
+    page.mouse.move(*place_on_line(page, state()["sim_time"]))
+    page.mouse.down()
+    began = time.monotonic()
+    for step in range(60):
+        page.mouse.move(*place_on_line(page, 100 + 3 * step))
+    until(lambda: 105 < state()["sim_time"] < 290, "seeks while the hand is on its way")
+    page.mouse.move(*place_on_line(page, 250))
+    took = time.monotonic() - began
+    page.mouse.up()
+    until(lambda: abs(state()["sim_time"] - 250) < 0.6, "the seek to where the hand let go")
+    seeks = [text for text in page.evaluate("sent") if '"seek"' in text]
+    assert 1 < len(seeks) <= 10 * took + 3, f"{len(seeks)} seeks in {took} s"
+    until(lambda: abs(float(page.input_value("#conduct-seek")) - state()["sim_time"]) < 0.1, "the thumb is where the show is")
+
+
+def keyboard(page):
+    page.mouse.click(640, 5)
+    page.evaluate("document.activeElement.blur()")
+    before = state()["sim_time"]
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowLeft")
+    until(lambda: abs(state()["sim_time"] - before - 5) < 1e-6, "two arrows to the right and one to the left are 5 s")
+    # In the picture, arrows move the picture; the other keys conduct there too. A period of 1/50 s at a rate of 4.
+    page.focus("#stage")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press(".")
+    until(lambda: abs(state()["sim_time"] - before - 5.08) < 1e-6, "a step, and no seek")
+    page.keyboard.press("Space")
+    until(lambda: state()["playback"] == "playing", "space resumes")
+    # A cue on the way: its name.
+    page.keyboard.press("Space")
+    until(lambda: state()["playback"] == "paused", "space pauses")
+    page.evaluate("document.activeElement.blur()")
+    page.get_by_label("Speed").select_option("1 ×")
+    seek(page, 149.8)
+    page.get_by_role("button", name="Play").click()
+    until(lambda: page.evaluate("!document.getElementById('cue').hidden") and page.inner_text("#cue"), "the cue's name")
+    assert page.inner_text("#cue") == "1. lamps"
+    seek(page, 299.9)
+    # The second cue pauses: Play goes on from there.
+    until(lambda: (now := state())["playback"] == "paused" and now["sim_time"] == 300.0, "the cue that pauses")
+    until(lambda: page.inner_text("#cue") == "2. coil (waiting for go)", "its name")
+    page.get_by_role("button", name="Play").click()
+    until(lambda: state()["playback"] == "playing", "on from the cue")
+
+
+def seek(page, moment):
+    page.evaluate("(time) => { const line = document.getElementById('conduct-seek'); line.value = time; line.onchange(); }", moment)
+
+
+def held(page):
+    page.keyboard.press("h")
+    until(lambda: state()["playback"] == "held", "h holds")
+    hold = page.locator("#conduct-hold")
+    until(lambda: hold.get_attribute("aria-pressed") == "true" and "HELD" in hold.inner_text(), "the button is latched")
+    page.get_by_role("button", name="Play").click()
+    says(page, "Resume is refused: the show is held.")
+    assert state()["playback"] == "held"
+    hold.click()
+    until(lambda: state()["playback"] == "paused", "release")
+    until(lambda: hold.inner_text() == "Hold", "the button is not latched any more")
+    names = page.evaluate("[...document.querySelectorAll('#conduct button, #conduct input, #conduct select')].map((one) => (one.labels?.[0] ?? one).textContent || one.ariaLabel)")
+    assert all(names), names
+
+
+def token_and_own_pages():
+    with publisher("--start", "100") as _, chromium() as browser, server("--control", "--listen", "0.0.0.0") as ready:
+        port = ready["url"].rstrip("/").rsplit(":", 1)[1]
+        here = f"http://127.0.0.1:{port}/"
+        # One who has no token, or a wrong one, may watch.
+        for fragment in ["", "#token=0123456789abcdef0123456789abcdef"]:
+            page = opened(browser, here + fragment)
+            time.sleep(0.5)
+            assert not bar_is_shown(page), fragment
+            page.keyboard.press("Space")
+            page.close()
+        assert state()["playback"] == "playing"
+        page = opened(browser, f"{here}#dark,token={ready['token']}")
+        until(lambda: bar_is_shown(page), "the bar, with the token")
+        assert page.url == f"{here}#dark", "the token does not stay in the address"
+        page.reload()
+        until(lambda: page.evaluate("picture.drawn > 0") and bar_is_shown(page), "the bar, loaded again")
+        page.keyboard.press("Space")
+        until(lambda: state()["playback"] == "paused", "space pauses")
+    own = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory="examples/page"))
+    threading.Thread(target=own.serve_forever, daemon=True).start()
+    elsewhere = f"http://127.0.0.1:{own.server_port}"
+    with publisher("--start", "100") as _, chromium() as browser:
+        with server("--pages", "examples/page") as ready:
+            page = browser.new_page()
+            page.goto(ready["url"] + "pages")
+            assert page.url == ready["url"] + "pages/"
+            until(lambda: page.evaluate("page.time") is not None, "frames on a page of one's own")
+            page.close()
+            assert not gets_frames(browser, elsewhere, ready), "a page from elsewhere is let in unasked"
+        with server("--allow-origin", elsewhere) as ready:
+            assert gets_frames(browser, elsewhere, ready), "a page that was let in gets nothing"
+
+
+class Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        pass
+
+
+def gets_frames(browser, elsewhere, ready):
+    """Whether the example page, served from elsewhere, gets frames; or is refused."""
+    page, closed = browser.new_page(), []
+    page.on("console", lambda message: "403" in message.text and closed.append(message.text))
+    page.goto(f"{elsewhere}/?{ready['url'].split('/')[2]}")
+    until(lambda: closed or page.evaluate("page.time") is not None, "frames, or a refusal")
+    page.close()
+    return not closed
+
+
+signal.signal(signal.SIGALRM, lambda *_: sys.exit(f"{SCENARIO} did not end within {WATCHDOG} s"))
+signal.alarm(WATCHDOG)
+{scenario.__name__: scenario for scenario in [bar_conducts, token_and_own_pages]}[SCENARIO]()

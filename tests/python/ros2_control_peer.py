@@ -1,0 +1,227 @@
+"""A client of the control services without ROS: Cyclone DDS calls them as rmw_cyclonedds_cpp does.
+
+    ros2_control_peer.py --name NAME [--domain D] [--bare] [--fresh N | --flood N] [SERVICE[=VALUE] ...]
+
+Before each request and response stand the client (uint64) and the number of the call (int64). Prints a JSON line for each
+response, or null where none came within some seconds. With --bare the 16 bytes are left out, as in the mapping of
+rmw_fastrtps_cpp. With --fresh, N clients, each a participant of its own, make their first call to the first service. With
+--flood, one client calls the first service N times without waiting for a response. Without a call, prints which topics
+there are below NAME with their types, those of services too, and /clock and /tf.
+"""
+
+import argparse
+import json
+import sys
+import threading
+import time
+import types
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription
+from cyclonedds.core import Policy, Qos
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import IdlStruct, annotations, types as idl
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+SERVICE = Qos(
+    Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.Volatile, Policy.History.KeepLast(10)
+)
+
+
+def struct(typename, fields):
+    def body(namespace):
+        namespace["__annotations__"] = dict(fields)
+        namespace["__module__"] = __name__
+
+    name = typename.split("::")[-1]
+    return dataclass(annotations.final(types.new_class(name, (IdlStruct,), {"typename": typename}, body)))
+
+
+def message(package, name, fields):
+    return struct(f"{package}::msg::dds_::{name}_", fields)
+
+
+Time = message("builtin_interfaces", "Time", [("sec", idl.int32), ("nanosec", idl.uint32)])
+Result = message("simulation_interfaces", "Result", [("result", idl.uint8), ("error_message", str)])
+State = message("simulation_interfaces", "SimulationState", [("state", idl.uint8)])
+Features = message(
+    "simulation_interfaces",
+    "SimulatorFeatures",
+    [("features", idl.sequence[idl.uint16]), ("spawn_formats", idl.sequence[str]), ("custom_info", str)],
+)
+EMPTY = [("structure_needs_at_least_one_member", idl.uint8)]
+RESULT = [("result", Result)]
+SUCCESS = [("success", bool)]
+TRIGGER = ("std_srvs", "Trigger", EMPTY, [("success", bool), ("message", str)])
+
+
+def simulation(name, request, response):
+    return ("simulation_interfaces", name, request, response)
+
+
+def player(name, request, response):
+    return ("rosbag2_interfaces", name, request, response)
+
+
+# Package, type, fields of the request, fields of the response: as the .srv files have them.
+SERVICES = {
+    "get_simulator_features": simulation("GetSimulatorFeatures", EMPTY, [("features", Features)]),
+    "get_simulation_state": simulation("GetSimulationState", EMPTY, [("state", State), ("result", Result)]),
+    "set_simulation_state": simulation("SetSimulationState", [("state", State)], RESULT),
+    "step_simulation": simulation("StepSimulation", [("steps", idl.uint64)], RESULT),
+    "reset_simulation": simulation("ResetSimulation", [("scope", idl.uint8)], RESULT),
+    "pause": player("Pause", EMPTY, EMPTY),
+    "resume": player("Resume", EMPTY, EMPTY),
+    "toggle_paused": player("TogglePaused", EMPTY, EMPTY),
+    "is_paused": player("IsPaused", EMPTY, [("paused", bool)]),
+    "get_rate": player("GetRate", EMPTY, [("rate", idl.float64)]),
+    "set_rate": player("SetRate", [("rate", idl.float64)], SUCCESS),
+    "seek": player("Seek", [("time", Time)], SUCCESS),
+    "play_next": player("PlayNext", EMPTY, SUCCESS),
+    "hold": TRIGGER,
+    "release": TRIGGER,
+    "go": TRIGGER,
+}
+HEADER = [("client", idl.uint64), ("sequence", idl.int64)]
+
+
+def ends(service, bare):
+    """The types of a service's request and response."""
+    package, name, request, response = SERVICES[service]
+    header = [] if bare else HEADER
+    of = lambda direction, fields: struct(f"{package}::srv::dds_::{name}_{direction}_", header + fields)
+    return of("Request", request), of("Response", response)
+
+
+def argument(service, text):
+    """The only field of a request."""
+    kind = SERVICES[service][2][0][1]
+    if kind is State:
+        return State(state=int(text))
+    if kind is Time:
+        return Time(sec=int(float(text) // 1), nanosec=round(float(text) % 1 * 1e9))
+    return float(text) if kind is idl.float64 else int(text or 0)
+
+
+def plain(value):
+    if hasattr(value, "__dataclass_fields__"):
+        return {name: plain(getattr(value, name)) for name in value.__dataclass_fields__}
+    return list(value) if isinstance(value, (list, tuple)) else value
+
+
+class Client:
+    """A client of one service."""
+
+    lock = threading.Lock()
+    numbers = 0
+
+    def __init__(self, participant, name, service, bare=False):
+        self.service, self.bare = service, bare
+        with Client.lock:
+            Client.numbers += 1
+            self.number = 1000 * Client.numbers + 7
+        request, response = ends(service, bare)
+        self.request = request
+        requests = Topic(participant, f"rq/{name}/{service}Request", request, qos=SERVICE)
+        responses = Topic(participant, f"rr/{name}/{service}Reply", response, qos=SERVICE)
+        self.reader = DataReader(participant, responses, qos=SERVICE)
+        self.writer = DataWriter(participant, requests, qos=SERVICE)
+        self.sequence = 0
+
+    def ready(self, seconds):
+        """Waits as rclpy's wait_for_service does: until this side has matched the other."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            if self.writer.get_matched_subscriptions() and self.reader.get_matched_publications():
+                return True
+            time.sleep(0.001)
+        return False
+
+    def send(self, text):
+        self.sequence += 1
+        header = [] if self.bare else [self.number, self.sequence]
+        self.writer.write(self.request(*header, argument(self.service, text)))
+
+    def call(self, text, seconds):
+        self.send(text)
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            for sample in self.reader.take(N=10):
+                fields = getattr(sample, "__dataclass_fields__", None)
+                # The notice that a publisher has gone comes as a sample that holds nothing.
+                if fields is None:
+                    continue
+                if self.bare or (sample.client, sample.sequence) == (self.number, self.sequence):
+                    return {name: plain(getattr(sample, name)) for name in fields if name not in dict(HEADER)}
+            time.sleep(0.001)
+        return None
+
+
+def endpoints(participant, name, seconds):
+    """The topics of services below a name with their types, by who reads and who writes."""
+    found = {"read": {}, "written": {}}
+    kinds = [("read", BuiltinTopicDcpsSubscription), ("written", BuiltinTopicDcpsPublication)]
+    readers = [(what, BuiltinDataReader(participant, kind)) for what, kind in kinds]
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        for what, reader in readers:
+            for sample in reader.take(N=1000):
+                topic = getattr(sample, "topic_name", None)
+                if topic and topic.startswith((f"rq/{name}/", f"rr/{name}/", f"rt/{name}/", "rt/clock", "rt/tf")):
+                    found[what][topic] = sample.type_name
+        time.sleep(0.01)
+    return found
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--name", required=True)
+    parser.add_argument("--domain", type=int, default=0)
+    parser.add_argument("--seconds", type=float, default=20.0, help="that a response may take")
+    parser.add_argument("--bare", action="store_true")
+    parser.add_argument("--fresh", type=int, default=0)
+    parser.add_argument("--flood", type=int, default=0)
+    parser.add_argument("calls", nargs="*")
+    arguments = parser.parse_args()
+
+    if arguments.fresh:
+
+        def first_call(_):
+            participant = DomainParticipant(arguments.domain)
+            client = Client(participant, arguments.name, arguments.calls[0])
+            return client.call("", arguments.seconds) if client.ready(60) else "no service"
+
+        with ThreadPoolExecutor(10) as pool:
+            for answer in pool.map(first_call, range(arguments.fresh)):
+                print(json.dumps(answer), flush=True)
+        return
+
+    participant = DomainParticipant(arguments.domain)
+    if not arguments.calls:
+        print(json.dumps(endpoints(participant, arguments.name, arguments.seconds)))
+        return
+    if arguments.flood:
+        client = Client(participant, arguments.name, arguments.calls[0])
+        client.ready(60)
+        for _ in range(arguments.flood):
+            client.send("")
+        print(json.dumps(client.sequence), flush=True)
+        # Until it is killed: its process does not take what it is sent.
+        time.sleep(arguments.seconds)
+        return
+    clients = {}
+    for call in arguments.calls:
+        service, _, text = call.partition("=")
+        if service not in clients:
+            clients[service] = Client(participant, arguments.name, service, arguments.bare)
+            if not clients[service].ready(60):
+                sys.exit(f"nobody serves {service}")
+        print(json.dumps({"call": call, "response": clients[service].call(text, arguments.seconds)}), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,187 @@
+"""The keys of `watch`: in a pseudo-terminal, with a publisher that has to obey.
+
+    watch_keys.py SCENARIO PROGRAM NAME SCENE
+
+Starts its own publisher of SCENE under the service name NAME, and asks it how it stands with `control state`. Ends with
+exit code 0, or with what it found instead.
+"""
+
+import contextlib
+import fcntl
+import json
+import os
+import pty
+import signal
+import struct
+import subprocess
+import sys
+import termios
+import threading
+import time
+
+# Nothing here may wait for ever; an alarm still lets everything that was started be ended.
+WATCHDOG = 90
+LEFT, RIGHT = "\x1b[D", "\x1b[C"
+
+_, SCENARIO, PROGRAM, NAME, SCENE = sys.argv
+
+
+@contextlib.contextmanager
+def publisher(*arguments):
+    command = [PROGRAM, "--name", NAME, "--scene", SCENE, "run", "--quiet", "--json", "--rate", "50", *arguments]
+    child = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    try:
+        until(lambda: state(), "a publisher")
+        yield child
+    finally:
+        child.kill()
+        child.wait()
+
+
+def state():
+    """How the show stands, or None while nobody publishes."""
+    asked = subprocess.run([PROGRAM, "--name", NAME, "--json", "control", "state"], capture_output=True)
+    return json.loads(asked.stdout) if asked.returncode == 0 else None
+
+
+def until(condition, what, seconds=30):
+    deadline = time.monotonic() + seconds
+    while not (value := condition()):
+        assert time.monotonic() < deadline, f"{what}: not within {seconds} s; the show: {state()}"
+        time.sleep(0.02)
+    return value
+
+
+class Watch:
+    """The monitor in a terminal of its own, of which it is the foreground."""
+
+    def __init__(self):
+        self.output = b""
+        self.child, self.master = pty.fork()
+        if self.child == 0:
+            os.execv(PROGRAM, [PROGRAM, "--name", NAME, "watch"])
+        fcntl.ioctl(self.master, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+        # A terminal whose output nobody reads stops who writes to it.
+        self.reader = threading.Thread(target=self.read, daemon=True)
+        self.reader.start()
+        self.shows("? lists the keys")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.child is not None:
+            os.kill(self.child, signal.SIGKILL)
+            os.waitpid(self.child, 0)
+        self.reader.join()
+        os.close(self.master)
+
+    def read(self):
+        # At its end a terminal has no output but an error.
+        with contextlib.suppress(OSError):
+            while printed := os.read(self.master, 65536):
+                self.output += printed
+
+    def shows(self, words):
+        # A sentence may be broken into rows.
+        shown = lambda: words in " ".join(self.output.decode(errors="replace").split())
+        until(shown, words)
+
+    def press(self, keys):
+        os.write(self.master, keys.encode())
+
+    def local_flags(self):
+        return termios.tcgetattr(self.master)[3]
+
+    def reads_keys(self):
+        return not self.local_flags() & (termios.ICANON | termios.ECHO)
+
+    def exit_code(self):
+        _, status = os.waitpid(self.child, 0)
+        self.child = None
+        return os.waitstatus_to_exitcode(status)
+
+
+def keys_conduct():
+    with publisher("--start", "100", "--paused") as _, Watch() as watch:
+        watch.shows("(paused)")
+        assert state()["playback"] == "paused", "nothing is sent without a key"
+        watch.press("?")
+        watch.shows("Keys: space pauses and resumes")
+        # The start waits: space goes on from there too.
+        watch.press(" ")
+        until(lambda: state()["playback"] == "playing", "space resumes")
+        # The rate is that of the frames.
+        until(lambda: state()["sim_time"] > 101, "the show plays")
+        watch.press("]]")
+        until(lambda: state()["time_scale"] == 4.0, "] twice makes 4 of 1")
+        watch.press("[[[")
+        until(lambda: state()["time_scale"] == 0.5, "[ three times makes 0.5 of 4")
+        watch.press(" ")
+        before = until(lambda: state() if state()["playback"] == "paused" else None, "space pauses")
+        watch.press(RIGHT * 3 + LEFT)
+        until(lambda: abs(state()["sim_time"] - before["sim_time"] - 10) < 1e-9, "right three times and left once are 10 s")
+        watch.press("..")
+        # Two periods of 1/50 s at a rate of 0.5.
+        until(lambda: abs(state()["sim_time"] - before["sim_time"] - 10.02) < 1e-9, "two steps")
+        assert state()["playback"] == "paused"
+        watch.press("h")
+        until(lambda: state()["playback"] == "held", "h holds")
+        watch.press(" ")
+        watch.shows("resume is refused: the show is held")
+        watch.press("r")
+        until(lambda: state()["playback"] == "paused", "r releases")
+        # Seeks stay within the show.
+        watch.press(LEFT * 16)
+        until(lambda: state()["sim_time"] < 40, "seeks to the left")
+        watch.press(LEFT * 12)
+        until(lambda: state()["sim_time"] == 0, "no seek before the start")
+        assert watch.reads_keys()
+        watch.press("q")
+        assert watch.exit_code() == 0
+        assert not watch.reads_keys(), "the terminal is as before"
+
+
+def terminal_is_restored():
+    # Nobody publishes: a command is one sentence, and every way out gives the terminal back.
+    with Watch() as watch:
+        until(watch.reads_keys, "keys are read")
+        watch.press("h")
+        watch.shows("nobody publishes under the name")
+        watch.press("\x03")
+        assert watch.exit_code() == 0, "Ctrl-C ends it"
+        assert not watch.reads_keys()
+    for sent in [signal.SIGTERM, signal.SIGQUIT, signal.SIGBUS]:
+        with Watch() as watch:
+            until(watch.reads_keys, "keys are read")
+            os.kill(watch.child, sent)
+            assert watch.exit_code() == (1 if sent == signal.SIGBUS else 0), sent
+            assert not watch.reads_keys(), f"{sent} leaves the terminal without an echo"
+    with Watch() as watch:
+        until(watch.reads_keys, "keys are read")
+        watch.press("\x1a")
+        # Its session has no shell: the stop is seen by its parent, as a shell would.
+        done, status = os.waitpid(watch.child, os.WUNTRACED)
+        assert done and os.WIFSTOPPED(status), "Ctrl-Z stops it"
+        assert not watch.reads_keys(), "a stopped program leaves the terminal as it was"
+        os.kill(watch.child, signal.SIGCONT)
+        until(watch.reads_keys, "keys are read again")
+        watch.press("q")
+        assert watch.exit_code() == 0
+    for arguments in [["--json", "watch"], ["watch"]]:
+        # In a pipe: the terminal stays as it is, and its keys are not read.
+        master, slave = os.openpty()
+        before = termios.tcgetattr(slave)
+        piped = subprocess.Popen([PROGRAM, "--name", NAME, *arguments], stdin=slave, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        os.write(master, b"q")
+        assert piped.stdout.readline(), "a report"
+        assert piped.poll() is None and termios.tcgetattr(slave) == before, arguments
+        piped.kill()
+        piped.wait()
+        os.close(master)
+        os.close(slave)
+
+
+signal.signal(signal.SIGALRM, lambda *_: sys.exit(f"{SCENARIO} did not end within {WATCHDOG} s"))
+signal.alarm(WATCHDOG)
+{scenario.__name__: scenario for scenario in [keys_conduct, terminal_is_restored]}[SCENARIO]()
