@@ -107,13 +107,13 @@ export function conduct(stream) {
     rates.replaceChildren(...all.map((one) => new Option(`${+one.toPrecision(3)} ×`, one, false, one === scale)));
   }
   function show() {
-    const { newest } = stream.playback, { stage } = stream, at = performance.now();
+    const { newest } = stream.playback, { stage } = stream, at = performance.now(), there = newest && stage && stream.trouble === null;
     if (at - sentenceAt > SENTENCE_TIME) put(part("answer"), "");
     if (at - cueAt > CUE_TIME) cue.hidden = true;
     if (bar.hidden) return;
     main.style.setProperty("--conduct-height", `${bar.offsetHeight}px`);
-    for (const control of bar.querySelectorAll("button, input, select")) control.disabled = !newest || !stage;
-    if (!newest || !stage) return;
+    for (const control of bar.querySelectorAll("button, input, select")) control.disabled = !there;
+    if (!there) return;
     sendSeek();
     showStage(stage);
     showRate(newest.scale);

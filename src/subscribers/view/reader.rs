@@ -20,8 +20,8 @@ const KEPT_CUES: usize = 16;
 
 /// Keeps the picture up to date until `stop` is set, through any number of publishers of a name.
 pub(super) fn read(mut feed: Feed, name: &str, sender: &watch::Sender<Picture>, stop: &AtomicBool) {
-    let mut reader =
-        Reader { picture: Picture::waiting(None), publisher: name.to_owned(), stage: None, status: None, cues: 0 };
+    let (picture, publisher) = (Picture::waiting(None), name.to_owned());
+    let mut reader = Reader { picture, publisher, stage: None, status: None, cues: 0 };
     let mut reason: Option<String> = None;
     sender.send_replace(reader.picture.clone());
     while !stop.load(Ordering::Relaxed) {

@@ -58,10 +58,10 @@ function reachOf(stage, handles) {
   return most + stage.width + stage.hole_inset || 1;
 }
 
-/** When the head reaches the end of the path, where nothing else comes before that. */
+/** When the head reaches the end of the path, where the show comes so far and nothing that is counted down is before. */
 function pathEnd(stage, alert) {
-  const metres = stage.path.reduce((sum, { length }) => sum + length, 0), speed = colours.handles ? speedOf(colours.handles, 0) : NaN;
-  return alert?.event === null ? metres / speed : NaN;
+  const end = stage.events.find(({ event, time }) => event === "path_end" && time <= stage.freeze_time);
+  return end && alert?.event == null ? end.time : NaN;
 }
 
 /** What is so now: the state, what is ahead and in how many seconds of wall time. */
