@@ -161,8 +161,9 @@ class Client:
         return None
 
 
-def endpoints(participant, name, seconds):
-    """The topics of services below a name with their types, by who reads and who writes."""
+def endpoints(participant, name, topics, seconds):
+    """The topics below a name with their types, by who reads and who writes: once there are so many of them, and half a
+    second later."""
     found = {"read": {}, "written": {}}
     kinds = [("read", BuiltinTopicDcpsSubscription), ("written", BuiltinTopicDcpsPublication)]
     readers = [(what, BuiltinDataReader(participant, kind)) for what, kind in kinds]
@@ -173,6 +174,9 @@ def endpoints(participant, name, seconds):
                 topic = getattr(sample, "topic_name", None)
                 if topic and topic.startswith((f"rq/{name}/", f"rr/{name}/", f"rt/{name}/", "rt/clock", "rt/tf")):
                     found[what][topic] = sample.type_name
+        if len(found["read"]) + len(found["written"]) >= topics:
+            end = min(end, time.monotonic() + 0.5)
+            topics = float("inf")
         time.sleep(0.01)
     return found
 
@@ -185,6 +189,7 @@ def main():
     parser.add_argument("--bare", action="store_true")
     parser.add_argument("--fresh", type=int, default=0)
     parser.add_argument("--flood", type=int, default=0)
+    parser.add_argument("--topics", type=int, default=1, help="to wait for, where there is no call")
     parser.add_argument("calls", nargs="*")
     arguments = parser.parse_args()
 
@@ -202,7 +207,7 @@ def main():
 
     participant = DomainParticipant(arguments.domain)
     if not arguments.calls:
-        print(json.dumps(endpoints(participant, arguments.name, arguments.seconds)))
+        print(json.dumps(endpoints(participant, arguments.name, arguments.topics, arguments.seconds)))
         return
     if arguments.flood:
         client = Client(participant, arguments.name, arguments.calls[0])

@@ -76,12 +76,13 @@ where
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let answer = runtime.block_on(async {
         let call = async {
-            client.wait_for_service(&node).await;
-            client.async_call_service(Fields(request)).await.unwrap().0
+            let found = tokio::time::timeout(Duration::from_secs(90), client.wait_for_service(&node)).await;
+            assert!(found.is_ok(), "{service} was not discovered");
+            tokio::time::timeout(Duration::from_secs(20), client.async_call_service(Fields(request))).await
         };
         tokio::select! {
             ended = spinner.spin() => panic!("the spinner ended: {ended:?}"),
-            answer = tokio::time::timeout(Duration::from_secs(20), call) => answer.ok(),
+            answer = call => answer.ok().map(|answer| answer.unwrap().0),
         }
     });
     node.stop_spinner();

@@ -218,14 +218,14 @@ fn without_the_flag_there_is_no_service_and_with_it_those_of_the_standards() {
         publisher(without, CYCLONE, &["--duration", "300"]),
         publisher(with, CYCLONE, &["--ros2-control", "--duration", "300"]),
     ];
-    let endpoints = |name: &str| {
-        let output = Process::start(&mut peer(name, &["--seconds", "2"])).output_within(60);
+    let endpoints = |name: &str, topics: &str| {
+        let output = Process::start(&mut peer(name, &["--seconds", "30", "--topics", topics])).output_within(90);
         let found = json_lines(&output).pop().unwrap_or_else(|| panic!("{}", text(&output.stderr)));
         ["read", "written"].map(|what| found[what].as_object().unwrap().clone())
     };
     let of_services =
         |topics: &serde_json::Map<String, Value>| topics.keys().filter(|topic| !topic.starts_with("rt/")).count();
-    let [read, written] = endpoints(without);
+    let [read, written] = endpoints(without, "5");
     let topics = ["poses", "handles", "alerts", "stage", "path"].map(|topic| format!("rt/{}/{topic}", unique(without)));
     let mut offered: Vec<&String> = written.keys().collect();
     let mut topics: Vec<&String> = topics.iter().collect();
@@ -233,7 +233,7 @@ fn without_the_flag_there_is_no_service_and_with_it_those_of_the_standards() {
     topics.sort();
     assert_eq!(offered, topics, "no other topic is on by default; a scene without cues has none for them");
     assert_eq!(of_services(&read), 0, "{read:?}");
-    let [read, written] = endpoints(with);
+    let [read, written] = endpoints(with, "37");
     let expected = [
         (
             "simulation_interfaces",
