@@ -10,7 +10,7 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
 use processes::{
@@ -78,7 +78,10 @@ fn connect(address: &str, origin: Option<&str>) -> Result<Socket, u16> {
 
 /// The next message of a type.
 fn message(socket: &mut Socket, of: &str) -> Value {
+    // Frames keep coming where the message does not.
+    let deadline = Instant::now() + Duration::from_secs(60);
     loop {
+        assert!(Instant::now() < deadline, "no message {of} within 60 s");
         if let Message::Text(json) = socket.read().unwrap() {
             let message: Value = serde_json::from_str(&json).unwrap();
             if message["type"] == of {
