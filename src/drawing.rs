@@ -9,6 +9,7 @@
 pub mod animation;
 mod benches;
 pub mod camera;
+mod look;
 mod marks;
 pub mod palette;
 mod route;
@@ -26,6 +27,7 @@ use crate::solve::Chain;
 use crate::wire::sentence::rounded;
 use benches::{ColourScale, Speeds};
 use camera::{Camera, Frame, StageBox};
+pub use look::{Framing, Length, Look, Surroundings, Theme};
 use marks::{Happened, Tense};
 use palette::Palette;
 
@@ -34,89 +36,6 @@ const WIDTH: f64 = 960.0;
 
 /// The face of all words, that of the page.
 const FACE: &str = "system-ui, sans-serif";
-
-/// The colours of a picture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Theme {
-    /// On a light ground.
-    Light,
-    /// On a dark ground.
-    Dark,
-    /// Light, and dark where the viewer prefers that and knows style rules, as browsers do.
-    Auto,
-}
-
-impl Theme {
-    fn palette(self) -> &'static Palette {
-        match self {
-            Self::Light | Self::Auto => &palette::LIGHT,
-            Self::Dark => &palette::DARK,
-        }
-    }
-}
-
-/// Which part of the stage is shown.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Framing {
-    /// The box of every board at every time of the picture.
-    Everything,
-    /// The square about the origin that reaches so many metres to each side.
-    Radius(f64),
-    /// So many metres across about a point.
-    View(Point, f64),
-}
-
-/// What stands about the stage.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Surroundings {
-    /// Title, axes and legend.
-    Words,
-    /// The stage fills the sheet, with words over it: the countdown of a picture that moves.
-    Caption,
-    /// Nothing: the stage fills the sheet.
-    Nothing,
-}
-
-/// A length on paper or on a screen.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Length {
-    /// Millimetres.
-    Millimetres(f64),
-    /// Pixels of a screen, 96 to the inch.
-    Pixels(f64),
-}
-
-impl Length {
-    fn pixels(self) -> f64 {
-        match self {
-            Self::Millimetres(length) => length * 96.0 / 25.4,
-            Self::Pixels(length) => length,
-        }
-    }
-
-    /// A part of this length as an attribute's value.
-    fn attribute(self, part: f64) -> String {
-        match self {
-            Self::Millimetres(length) => rounded(part * length, 4) + "mm",
-            Self::Pixels(length) => rounded(part * length, 4),
-        }
-    }
-}
-
-/// How a picture looks.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Look {
-    /// Its colours.
-    pub theme: Theme,
-    /// Which part of the stage it shows.
-    pub framing: Framing,
-    /// What stands about the stage.
-    pub surroundings: Surroundings,
-    /// How wide it is.
-    pub width: Length,
-    /// How high it is; as high as what it shows where nothing is given.
-    pub height: Option<Length>,
-}
 
 /// What is there at the moments of a picture or of a sequence of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -174,12 +93,12 @@ impl<'a> Drawing<'a> {
         let (frame, height) = match look.surroundings {
             Surroundings::Words => {
                 let (above, below) = sheet::margins(rows);
-                let height = sheet_height(&look).unwrap_or(above + below + shape * sheet::frame_width());
+                let height = look.sheet_height().unwrap_or(above + below + shape * sheet::frame_width());
                 let height = height.max(above + below + 50.0);
                 (sheet::frame(height, rows), height)
             }
             Surroundings::Caption | Surroundings::Nothing => {
-                let height = sheet_height(&look).unwrap_or(shape * WIDTH);
+                let height = look.sheet_height().unwrap_or(shape * WIDTH);
                 (Frame { left: 0.0, top: 0.0, width: WIDTH, height }, height)
             }
         };
@@ -372,11 +291,6 @@ impl<'a> Drawing<'a> {
         }
         words + " Lengths are metres; benches count from 1 in words and from 0 in the names of elements."
     }
-}
-
-/// Units of the sheet's height where the look gives one.
-fn sheet_height(look: &Look) -> Option<f64> {
-    look.height.map(|height| WIDTH * height.pixels() / look.width.pixels())
 }
 
 /// The benches to outline and what they do: those that touch at this very time, or those that overlap.

@@ -272,7 +272,7 @@ fn scatter(
     let (ink, quiet) = (colour(LIGHT.ink), colour(LIGHT.quiet));
     let sheet = SVGBackend::with_string(svg, (1080, 720)).into_drawing_area();
     sheet.fill(&colour(LIGHT.ground))?;
-    let area = sheet.titled(caption, words(28, ink))?.titled(note, words(18, quiet))?;
+    let area = sheet.margin(12, 0, 0, 0).titled(caption, words(28, ink))?.titled(note, words(18, quiet))?;
     let (mut least, mut most) = (f64::INFINITY, 0f64);
     for Point { at: (cost, _), .. } in &points {
         (least, most) = (least.min(*cost), most.max(*cost));
@@ -345,7 +345,7 @@ impl Label {
     /// Where labels may stand.
     const LEFTMOST: i32 = 98;
     const RIGHTMOST: i32 = 1066;
-    const TOPMOST: i32 = 72;
+    const TOPMOST: i32 = 84;
     const LOWEST: i32 = 632;
 
     /// A label beside a point, or as near to that as it lies on none of `others` and on the plot.

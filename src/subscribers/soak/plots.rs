@@ -50,7 +50,7 @@ pub fn plot(unit: &str, scale: Scale, lines: &[Line]) -> Option<String> {
     {
         let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
         let mut chart = ChartBuilder::on(&area);
-        chart.margin(8).x_label_area_size(46).y_label_area_size(84);
+        chart.margin(8).margin_right(28).x_label_area_size(46).y_label_area_size(84);
         match scale {
             // Zeros have no logarithm: they lie on the lower edge.
             Scale::Logarithmic => {
