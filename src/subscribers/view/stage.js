@@ -7,7 +7,7 @@ import { benchAt } from "./boards.js";
 import { Camera } from "./camera.js";
 import { Ground, draw, pathOf } from "./drawing.js";
 import { attach } from "./hands.js";
-import { STRIDE, speedOf } from "./hermite.js";
+import { STRIDE } from "./hermite.js";
 import { Overlap, marksOf } from "./marks.js";
 import { SpeedScale, paletteOf } from "./palette.js";
 import { element, put, showBench, showFigures, showNames, showSituation } from "./panel.js";
