@@ -85,7 +85,10 @@ fn cues_are_at_the_times_that_the_scene_states() {
 }
 
 fn stage_of(path: &str) -> Stage {
-    stage(1, 2, &scene(path, 1.0, "").motion)
+    let scene = scene(path, 1.0, "");
+    let scene = Scene { motion: scene.motion.with_method(Method::Newton).unwrap(), ..scene };
+    let show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    stage(1, 2, &scene.motion, &show)
 }
 
 /// Metres from the centre at which a spiral ends, by the numbers of its message alone.

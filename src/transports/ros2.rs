@@ -22,7 +22,8 @@ use messages::Pose;
 
 use super::background::{self, BackgroundConfig, BackgroundError, BackgroundPublisher, BackgroundStatus};
 use super::{Transport, TransportConfig, TransportError};
-use control::{ControlThread, Mapping};
+use control::ControlThread;
+pub use control::Mapping;
 use environment::{Network, Range, check_name, other_distribution};
 
 /// Why there are no ROS 2 topics.
@@ -109,7 +110,7 @@ pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, Tran
 ///
 /// # Errors
 /// [`Ros2Error`]
-fn open_on(
+pub fn open_on(
     network: Network,
     mapping: Option<Mapping>,
     config: &TransportConfig,

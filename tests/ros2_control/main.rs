@@ -149,7 +149,7 @@ fn a_cyclone_client_conducts_by_every_service() {
     for (service, playback) in
         [("resume", "playing"), ("pause", "paused"), ("toggle_paused", "playing"), ("toggle_paused", "paused")]
     {
-        assert_eq!(call(name, &[service]), [empty.clone()], "{service}");
+        assert_eq!(call(name, &[service]), std::slice::from_ref(&empty), "{service}");
         assert_eq!(here()["playback"], playback, "{service}");
     }
     // The pause was no waiting for go.
