@@ -185,8 +185,8 @@ fn check_states_what_each_scene_models() {
         };
         let (metres, time) = (figure(" m, at t ="), figure(" s, between"));
         let contact = scene.json(&["events"]).into_iter().find(|event| event["event"] == "contact");
-        let stops =
-            scene.content.contains_key("alerts") && scene.content["motion"]["on_contact"].as_str() != Some("continue");
+        let on_contact = scene.content["motion"].get("on_contact").and_then(|value| value.as_str());
+        let stops = scene.content.contains_key("alerts") && on_contact != Some("continue");
         match contact.filter(|_| stops) {
             // The show freezes where boards touch: nothing of it is nearer.
             Some(contact) => {

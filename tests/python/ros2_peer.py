@@ -138,7 +138,8 @@ def from_file(name, known):
 
 KNOWN = {"std_msgs/Header": Header}
 KNOWN["HandlePose"] = from_file("HandlePose", KNOWN)
-KNOWN["StageSegment"] = from_file("StageSegment", KNOWN)
+for part in ("StageSegment", "StageEvent", "StageCue"):
+    KNOWN[part] = from_file(part, KNOWN)
 TOPICS = {
     "handles": from_file("HandlePoses", KNOWN),
     "alerts": from_file("CollisionAlert", KNOWN),
