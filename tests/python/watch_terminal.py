@@ -34,7 +34,7 @@ FIGURES = [
     rf"lateness p99 {NUMBER} us  step p99 {NUMBER} us  memory {NUMBER} MB",
 ]
 ALERT = (
-    rf" {{0,9}}{NUMBER} s  approaching contact: bench 1 \(the head\) and bench 9 in {NUMBER} s; "
+    rf" {{0,9}}{NUMBER} s  approaching contact: bench 1 \(the head\) and bench 9 at \(1\.474, 2\.111\) m in {NUMBER} s; "
     rf"nearest now are bench \d+( \(the head\))? and bench \d+, {NUMBER} m apart \(counting from 1\)"
 )
 # The words of an alert begin behind its time, on each of its rows.

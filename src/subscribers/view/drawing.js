@@ -155,6 +155,7 @@ export function draw(context, camera, palette, scene) {
   show?.crown(context, camera, palette, scene);
   if (!words) return [];
   // The most important words take their places first.
+  for (const { place } of marks) if (place) labels.ring(place.x, place.y);
   for (const { place, ink, text } of marks) if (place && text) labels.add(text, place.x, place.y, palette[ink], 34, 1.25);
   const named = new Set();
   for (const { pair, ink, names } of marks) {

@@ -43,6 +43,7 @@ export class Labels {
     this.camera = camera;
     this.all = [];
     this.boxes = [];
+    this.signs = [];
   }
 
   /** Words at a place of the stage, so many pixels away from it, `large` times the usual size. */
@@ -55,6 +56,12 @@ export class Labels {
   /** A box that words may not cover. */
   keep(box) {
     this.boxes.push(box);
+  }
+
+  /** A ring around a place of the stage, which words leave free where they can. */
+  ring(x, y) {
+    const [px, py] = this.camera.toPixel(x, y), reach = 29 * this.camera.unit;
+    this.signs.push({ x: px, y: py, half: reach, tall: reach });
   }
 
   write(context, palette) {
@@ -78,9 +85,11 @@ export class Labels {
         const x = within(px + dx * (away * unit * far + half * Math.abs(dx)), half, width - half);
         return { x, y: within(py + dy * away * unit * far, tall, height - tall), half, tall, text };
       }));
-      const free = (box) => !this.boxes.some((other) => Math.abs(other.x - box.x) < other.half + box.half && Math.abs(other.y - box.y) < other.tall + box.tall);
+      const off = (box, all) => !all.some((other) => Math.abs(other.x - box.x) < other.half + box.half && Math.abs(other.y - box.y) < other.tall + box.tall);
+      const free = (box) => off(box, this.boxes);
       const clear = (box) => Math.abs(px - box.x) > half || Math.abs(py - box.y) > tall + 10 * unit;
-      const box = boxes.find((box) => free(box) && clear(box)) ?? boxes.find(free);
+      const apart = boxes.filter((box) => free(box) && clear(box));
+      const box = apart.find((box) => off(box, this.signs)) ?? apart[0] ?? boxes.find(free);
       if (!box) continue;
       this.boxes.push(box);
       context.lineWidth = 5 * unit * large;
