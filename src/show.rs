@@ -222,6 +222,9 @@ impl Show {
     /// Obeys a command at the beginning of the period `tick`, before its frame. `None` for a step, which
     /// [`finished_step`](Self::finished_step) answers once it is over.
     pub fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
+        // A step that is over by now came before the command.
+        self.clock.advance(tick);
+        self.record_finished_step();
         let code = self.clock.apply(tick, command);
         self.record_finished_step();
         self.commands.push(CommandRecord::Given { command, code });
@@ -234,8 +237,11 @@ impl Show {
         Some(self.outcome(tick, code))
     }
 
-    /// The answer to the step that was over, or was broken off, at `tick`. To be called after its frame.
+    /// The answer to the step that was over, or was broken off, at `tick`. To be called after its frame, and before a
+    /// command, which may be the next step.
     pub fn finished_step(&mut self, tick: u64) -> Option<Outcome> {
+        self.clock.advance(tick);
+        self.record_finished_step();
         let code = self.clock.take_step_outcome()?;
         Some(self.outcome(tick, code))
     }

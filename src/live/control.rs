@@ -102,6 +102,8 @@ impl Doors {
             let door = (self.next + turn) % self.ports.len();
             let Ok(Request { ticket, command }) = self.ports[door].requests.pop() else { continue };
             self.next = door + 1;
+            // Where the command is a step too, the one before it is over by now, and has its answer first.
+            self.finish_step(frames, tick);
             match frames.command(tick, command) {
                 Some(outcome) => {
                     // What a command breaks off is answered before it.

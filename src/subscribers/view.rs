@@ -248,9 +248,10 @@ async fn frames(
         return (StatusCode::BAD_REQUEST, "rate: expected 1 to 1000000 frames a second").into_response();
     };
     match upgrade {
-        Ok(upgrade) => {
-            upgrade.max_message_size(MAX_REQUEST_BYTES).on_upgrade(move |socket| browser::serve(socket, server, gap))
-        }
+        Ok(upgrade) => upgrade
+            .max_frame_size(MAX_REQUEST_BYTES)
+            .max_message_size(MAX_REQUEST_BYTES)
+            .on_upgrade(move |socket| browser::serve(socket, server, gap)),
         Err(_) => (StatusCode::UPGRADE_REQUIRED, "frames come over a WebSocket: open ws://.../frames").into_response(),
     }
 }

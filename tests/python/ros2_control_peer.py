@@ -195,9 +195,12 @@ def main():
 
     if arguments.fresh:
 
+        # None is taken down while others are made.
+        clients = []
+
         def first_call(_):
-            participant = DomainParticipant(arguments.domain)
-            client = Client(participant, arguments.name, arguments.calls[0])
+            client = Client(DomainParticipant(arguments.domain), arguments.name, arguments.calls[0])
+            clients.append(client)
             return client.call("", arguments.seconds) if client.ready(60) else "no service"
 
         with ThreadPoolExecutor(10) as pool:

@@ -369,7 +369,7 @@ fn a_hundred_new_clients_each_get_the_answer_to_their_first_call() {
         }
     });
     let output = callers.output_within(120);
-    assert_eq!(json_lines(&output), vec![json!({"rate": 1.0}); 100], "{}", text(&output.stderr));
+    assert_eq!(json_lines(&output), vec![json!({"rate": 1.0}); 100], "{}: {}", output.status, text(&output.stderr));
     publishers.into_iter().for_each(|publisher| drop(ended(publisher)));
 }
 

@@ -3,6 +3,8 @@
 
 use super::*;
 use crate::live::control::{Answer, Door, door};
+use crate::scene::Scene;
+use crate::show::Playback;
 use crate::show::control::Code;
 use crate::show::state::PlaybackState;
 
@@ -119,4 +121,30 @@ proptest! {
             prop_assert_eq!(ticks, obeyed.map(|obeyed| obeyed.tick).collect::<Vec<_>>());
         }
     }
+}
+
+/// A step that is over in the period in which the next one begins has its answer too, and its door its place again.
+#[test]
+fn steps_on_each_others_heels_are_all_answered() {
+    let team = "[team]\nbenches = 12\nhead_length = 3.41\nbody_length = 2.2\nwidth = 0.3\nhole_inset = 0.275\n";
+    let path = "[path]\nkind = \"spiral\"\npitch = 0.55\nstart_turn = 16\n";
+    let text = format!("{team}{path}[motion]\nhead_speed = 1.0\nsolver = \"newton\"\n");
+    let scene = Scene::parse(&text, "small.toml", "small").unwrap();
+    let playback = Playback { paused: true, ..Playback::of(&scene) };
+    let mut show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), playback).unwrap();
+    let (port, mut door) = door();
+    let mut doors = Doors::new(vec![port]);
+    for periods in [1, 1, 2, 1] {
+        door.send(Command::Step(periods)).unwrap();
+    }
+    for tick in 0..9 {
+        doors.take_one(&mut show, tick);
+        Frames::frame(&mut show, tick);
+        doors.finish_step(&mut show, tick);
+    }
+    let answers: Vec<_> = std::iter::from_fn(|| door.answer()).map(|answer| answer.outcome).collect();
+    // The third is not over when the fourth comes, which is refused.
+    let expected = [(1, Code::Done), (2, Code::Done), (3, Code::Refused), (4, Code::Done)];
+    assert_eq!(answers.iter().map(|answer| (answer.tick, answer.code)).collect::<Vec<_>>(), expected);
+    assert_eq!(door.waiting(), 0);
 }

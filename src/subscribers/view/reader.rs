@@ -78,6 +78,7 @@ impl Reader {
             FeedEvent::Frame { header, handles, .. } => self.picture.frame = wire::frame(header, handles).into(),
             FeedEvent::Gone => {
                 self.picture = Picture::waiting(None);
+                (self.stage, self.status) = (None, None);
                 return true;
             }
             // The page counts the time since the latest frame by itself.
