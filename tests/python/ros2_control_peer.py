@@ -11,6 +11,7 @@ there are below NAME with their types, those of services too, and /clock and /tf
 
 import argparse
 import json
+import resource
 import sys
 import threading
 import time
@@ -193,6 +194,8 @@ def main():
     parser.add_argument("calls", nargs="*")
     arguments = parser.parse_args()
 
+    # A peer that runs wild is not to take the machine with it.
+    resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
     if arguments.fresh:
 
         # None is taken down while others are made.
