@@ -10,6 +10,7 @@
 //! - [`show`]: from a scene and a tick to one frame, deterministic.
 //! - [`plan`]: the least pitch and the greatest speed, for a choreographer.
 //! - [`wire`]: the memory layouts that go over the wire, and every conversion to them.
+//! - `ros2_messages` (features `cli`, `jazzy`, `humble`): the messages of ROS 2, on its network and in recordings.
 //! - `drawing` (feature `cli`): a moment of a motion as an SVG, and the colours of all pictures.
 //! - [`live`]: the fixed-rate loop, its clock, its statistics.
 //! - [`transports`]: iceoryx2 shared memory and ROS 2 topics, as publishers of the loop.
@@ -31,6 +32,8 @@ pub mod motion;
 pub mod plan;
 #[cfg(feature = "cli")]
 pub mod recording;
+#[cfg(any(feature = "cli", feature = "ros2"))]
+pub mod ros2_messages;
 pub mod scene;
 pub mod show;
 pub mod solve;

@@ -5,7 +5,6 @@
 
 mod control;
 pub mod environment;
-pub mod messages;
 mod node;
 mod port;
 
@@ -16,9 +15,9 @@ use rustdds::DomainParticipantBuilder;
 
 use crate::live::control::Door;
 use crate::live::{Deliveries, Publisher, StatusPublisher};
+use crate::ros2_messages::{self, Pose};
 use crate::scene::ros2::Ros2Settings;
 use crate::wire::Stage;
-use messages::Pose;
 
 use super::background::{self, BackgroundConfig, BackgroundError, BackgroundPublisher, BackgroundStatus};
 use super::{Transport, TransportConfig, TransportError};
@@ -130,7 +129,7 @@ pub fn open_on(
     let description =
         format!("ROS 2 topics ({}, at {rate} frames per second): {}.{services}", network.sentence(), topics.join(", "));
     let background = BackgroundConfig { name: "ros2", handles, cues, loop_rate, rate };
-    let path = messages::path::poses(&scene.motion.outline());
+    let path = ros2_messages::path::poses(&scene.motion.outline());
     let context = context(network)?;
     let services = mapping.map(|mapping| (context.clone(), mapping));
     let config =

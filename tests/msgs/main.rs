@@ -24,8 +24,8 @@ use std::collections::BTreeMap;
 use std::process::Command;
 use std::sync::LazyLock;
 
+use bench_dragon::ros2_messages::{HandlePoses, Header, Stamped, type_name};
 use bench_dragon::show::state::{FrameState, Level, PlaybackState};
-use bench_dragon::transports::ros2::messages::{HandlePoses, Header, Stamped, type_name};
 use bench_dragon::wire::{
     CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32, LoopStatus, NO_BENCH,
     SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, Stage, StageCue, StageEvent,

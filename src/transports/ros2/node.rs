@@ -7,13 +7,13 @@ use std::time::Duration;
 
 use ros2_client::{Context, Node, NodeName, NodeOptions};
 
-use super::messages::diagnostics::DiagnosticArray;
-use super::messages::markers::MarkerArray;
-use super::messages::path::Path;
-use super::messages::transforms::TfMessage;
-use super::messages::{Clock, HandlePoses, Header, Pose, PoseArray, Stamped, Time, type_name};
 use super::port::{Maker, Port, SELDOM_BYTES, Stream};
 use super::{Ros2Config, Ros2Error};
+use crate::ros2_messages::diagnostics::DiagnosticArray;
+use crate::ros2_messages::markers::MarkerArray;
+use crate::ros2_messages::path::Path;
+use crate::ros2_messages::transforms::TfMessage;
+use crate::ros2_messages::{Clock, HandlePoses, Header, Pose, PoseArray, Stamped, Time, type_name};
 use crate::scene::ros2::Topic;
 use crate::transports::background::Sink;
 use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};

@@ -1,7 +1,8 @@
 //! The ROS 2 messages as they go on the wire: field for field what `msgs/` and the standard packages define.
 //!
 //! A message that is a header followed by one of the program's own layouts nests that layout: on the wire a nested
-//! struct is its fields in order. Called by the ROS 2 transport only.
+//! struct is its fields in order. Called by the ROS 2 transport and by the recorder, so that a recording holds what a ROS 2
+//! subscriber would have received.
 
 pub mod diagnostics;
 pub mod markers;
