@@ -106,14 +106,14 @@ fn live_on_the_procession(bencher: Bencher, travelled: f64) {
 #[divan::bench(args = CASES)]
 fn live_without_table(bencher: Bencher, (benches, percent): (usize, usize)) {
     let chains = chains(&spiral(), team(benches), at(percent), 60.0);
-    run(bencher, ClearanceMonitor::without_table(team(benches)), &chains);
+    run(bencher, ClearanceMonitor::without_table(team(benches), 0.0), &chains);
 }
 
 /// The same with 223 benches, by frames a second: what a frame has to find out anew goes with the way between two.
 #[divan::bench(args = [60.0, 1_000.0, 20_000.0])]
 fn live_without_table_by_rate(bencher: Bencher, rate: f64) {
     let chains = chains(&spiral(), team(223), at(50), rate);
-    run(bencher, ClearanceMonitor::without_table(team(223)), &chains);
+    run(bencher, ClearanceMonitor::without_table(team(223), 0.0), &chains);
 }
 
 /// A team too short to meet itself on the next turn: every bench is as near as any to the next but one.

@@ -248,7 +248,19 @@ impl Motion {
         };
         match choice.table.as_ref().or(made_here.as_ref()) {
             Some(table) => ClearanceMonitor::new(&self.path, self.team, table),
-            None => ClearanceMonitor::without_table(self.team),
+            None => ClearanceMonitor::without_table(self.team, self.link_error()),
+        }
+    }
+
+    /// Metres by which a link can be off its length, beyond rounding: the paper's bisection stops at an angle, and along an
+    /// arc of radius r a chord changes by at most r for each radian.
+    pub(crate) fn link_error(&self) -> f64 {
+        match (self.method, self.path.as_spiral()) {
+            (Method::Paper(rules), Some((spiral, start))) => {
+                let outermost = spiral.radius_per_radian() * start.high + self.team.length();
+                rules.bisection_tolerance * (outermost + spiral.radius_per_radian())
+            }
+            _ => 0.0,
         }
     }
 

@@ -132,8 +132,10 @@ pub struct Show {
     level: Option<LevelTracker>,
     /// Metres of overlap that no search has let pass; `None` where the solver does not follow the searched motion.
     overlap_tolerance: Option<f64>,
-    /// The time that the chain was solved for, and whether it moves then.
+    /// The time that the chain was asked for, and whether it moves then.
     solved: Option<(f64, bool)>,
+    /// The time at which it stands: not a number before the first solution.
+    solved_at: f64,
     /// In the order of their times.
     cues: Vec<ReachedCue>,
     missing_cues: Vec<String>,
@@ -181,6 +183,7 @@ impl Show {
             level,
             overlap_tolerance: exact.then_some(rounding),
             solved: None,
+            solved_at: f64::NAN,
             cues,
             missing_cues,
             commands: Vec::with_capacity(COMMANDS_PER_FRAME),
@@ -292,9 +295,11 @@ impl Show {
             return;
         }
         self.solved = Some((sim_time, moves));
-        if solve_at_or_just_before(self.solver.as_mut(), sim_time, &mut self.frame.chain).is_err() {
+        let at = solve_at_or_just_before(self.solver.as_mut(), sim_time, &mut self.frame.chain);
+        self.solved_at = at.unwrap_or_else(|_| {
             self.frame.unsolved_frames += 1;
-        }
+            f64::NAN
+        });
         if !moves && self.velocities == Velocities::Computed {
             let Chain { speed, vx, vy, .. } = &mut self.frame.chain;
             [speed, vx, vy].into_iter().for_each(|numbers| numbers.fill(0.0));
@@ -302,7 +307,7 @@ impl Show {
     }
 
     fn measure_clearance(&mut self) -> Option<PairClearance> {
-        let travelled = self.metres_per_second * self.frame.sim_time;
+        let travelled = self.metres_per_second * self.solved_at;
         let least = self.clearance.as_mut()?.least_clearance(&self.frame.chain, travelled);
         self.frame.min_clearance = least.map_or(f64::NAN, |least| least.value);
         least
@@ -361,14 +366,14 @@ fn cues(scene: &Scene, timeline: &Timeline) -> (Vec<ReachedCue>, Vec<String>) {
     (cues, missing)
 }
 
-/// Solves at `time`, or at the latest moment before it at which there is a solution.
+/// Solves at `time`, or at the latest moment before it at which there is a solution, and returns that moment.
 ///
 /// The time of a lock, multiplied by the speed again, can lie past the lock by the last digit; the paper's solver is
 /// one of its own time steps ahead. Nothing else steps back, and nothing does so by more than 1e-4 of the time.
 ///
 /// # Errors
 /// [`NoFollower`] where there is none as near; `chain` is then unspecified.
-pub fn solve_at_or_just_before(solver: &mut dyn Solver, time: f64, chain: &mut Chain) -> Result<(), NoFollower> {
+pub fn solve_at_or_just_before(solver: &mut dyn Solver, time: f64, chain: &mut Chain) -> Result<f64, NoFollower> {
     let mut back = f64::EPSILON * time;
     let mut at = time;
     while let Err(none) = solver.solve(at, chain) {
@@ -379,5 +384,5 @@ pub fn solve_at_or_just_before(solver: &mut dyn Solver, time: f64, chain: &mut C
             return Err(none);
         }
     }
-    Ok(())
+    Ok(at)
 }

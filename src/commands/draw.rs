@@ -152,6 +152,7 @@ impl<'a> Session<'a> {
 
     fn solve(&mut self, time: f64) -> Result<(), CommandError> {
         solve_at_or_just_before(self.solver.as_mut(), time, &mut self.chain)
+            .map(|_| ())
             .map_err(|none| CommandError::Failed(format!("at {} s: {none}", figure(time))))
     }
 

@@ -120,19 +120,20 @@ impl ClearanceMonitor {
     /// From the table it makes one of its own, of 128 MB of lists and in some five seconds at most: if that is not enough,
     /// the monitor does without.
     pub fn new(path: &Path, team: Team, table: &FollowerTable) -> Self {
-        let link_error = EXACT_LINK_ERROR.max(2.0 * table.accuracy());
-        Self { table: BoundTable::new(path, &team, table).map(Box::new), link_error, ..Self::without_table(team) }
+        let table_of_bounds = BoundTable::new(path, &team, table).map(Box::new);
+        Self { table: table_of_bounds, ..Self::without_table(team, 2.0 * table.accuracy()) }
     }
 
-    /// A monitor for chains of `team` wherever the handles are.
-    pub fn without_table(team: Team) -> Self {
+    /// A monitor for chains of `team` wherever the handles are, if no link is off its length by more than `link_error`
+    /// metres or the rounding of exact motion.
+    pub fn without_table(team: Team, link_error: f64) -> Self {
         Self {
             team,
             latest: None,
             last_pair: None,
             table: None,
             carried: CarriedBounds::new(team.benches),
-            link_error: EXACT_LINK_ERROR,
+            link_error: EXACT_LINK_ERROR.max(link_error),
             counters: ClearanceCounters::default(),
         }
     }

@@ -206,7 +206,7 @@ fn truth(scene: &Scene, times: &[f64]) -> Result<Vec<Moment>, String> {
 }
 
 fn solve(solver: &mut dyn Solver, time: f64, chain: &mut Chain) -> Result<(), String> {
-    solve_at_or_just_before(solver, time, chain).map_err(|none| format!("the chain at {time} s: {none}"))
+    solve_at_or_just_before(solver, time, chain).map(|_| ()).map_err(|none| format!("the chain at {time} s: {none}"))
 }
 
 /// Metres below which errors are rounding, as [`super::Measurement::noise`].

@@ -95,12 +95,11 @@ impl<'a> ListBuilder<'a> {
         self.first = first;
         self.handles = handles;
         let boards = self.handles.len().saturating_sub(1);
-        let mut travel: Vec<f64> = (0..boards).map(|index| self.board(index).travel).collect();
+        let travel = |index: usize| Some(self.board(index).travel).filter(|travel| !travel.is_nan());
+        let mut travel: Vec<f64> = (0..boards).map(|index| travel(index).unwrap_or(f64::INFINITY)).collect();
         let last = travel.last().copied().unwrap_or(0.0);
         for index in (1..boards).rev() {
-            // Not a number counts as infinitely far.
-            travel[index - 1] =
-                if travel[index - 1] <= travel[index] { travel[index] } else { travel[index - 1].max(travel[index]) };
+            travel[index - 1] = travel[index - 1].max(travel[index]);
         }
         self.travel_behind = travel;
         let radii = 2.0 * circle_radius(self.team, 1);

@@ -112,10 +112,12 @@ impl MovingBoard {
         }
     }
 
-    /// The board in the middle of the cell, where no handle is off.
+    /// The board in the middle of the cell, if no handle is off. Its axis is a unit vector even where the handles' distance
+    /// is not quite the link: a direction w of the bound is one in its frame.
     pub(super) fn middle(&self) -> Board {
         let Self { half_length, half_width, .. } = *self;
-        Board { centre: Point::from(self.centre.terms[0]), axis: self.axis.terms[0], half_length, half_width }
+        let axis = self.axis.terms[0].normalize();
+        Board { centre: Point::from(self.centre.terms[0]), axis, half_length, half_width }
     }
 
     /// The least gap to `other` along the direction that is `along` and `across` in this board's frame.
