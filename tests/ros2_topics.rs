@@ -5,7 +5,9 @@ mod processes;
 
 use std::process::Command;
 
-use processes::{Process, can_run, json_lines, program, python, python_modules, scene_file, summary, text, unique};
+use processes::{
+    Process, can_run, json_lines, long, program, python, python_modules, scene_file, summary, text, unique,
+};
 use serde_json::Value;
 
 /// A Cyclone DDS process that prints what it gets of these topics.
@@ -128,4 +130,56 @@ fn cues_path_clock_and_transforms_are_those_of_the_show() {
         }
     }
     assert!(compared > 2, "{compared} transforms are of a frame that came");
+}
+
+/// The alerts of `joins` subscribers, one after the other, each with when it was made: its first, and all of them.
+fn joined(name: &str, joins: u32, further: &[&str]) -> Vec<(u64, Vec<u64>)> {
+    let mut command = python();
+    command.args(["tests/python/ros2_joins.py", "--name", &unique(name), "--joins", &joins.to_string()]);
+    let output = Process::start(command.args(further)).output_within(30 + 5 * u64::from(joins));
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let joined = json_lines(&output).into_iter().map(|join| {
+        let alerts = join["alerts"].as_array().unwrap().iter().map(|alert| alert["stamp_ns"].as_u64().unwrap());
+        (join["made_ns"].as_u64().unwrap(), alerts.collect())
+    });
+    joined.collect()
+}
+
+/// A countdown raises an alert each second. Whoever comes gets the one that holds and none before it, whether somebody
+/// had been there and left or nobody ever was; beside somebody who stays, the last of what he gets at once.
+#[test]
+fn a_late_subscriber_gets_the_current_alert_and_none_before_it() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let countdown = ("approach_time = 10.0", "approach_time = 1000.0");
+    let scene = scene_file("countdown", &[countdown, ("accuracy = 1e-9", "solver = \"newton\"")]);
+    let mut run = program("countdown");
+    run.args(["--scene", scene.to_str().unwrap(), "run", "--ros2", "--quiet", "--rate", "30"]);
+    let mut watch = Process::start(program("countdown").args(["watch", "--json"]));
+    let printed = watch.lines();
+    let _publisher = Process::start(&mut run);
+    let mut published: Vec<u64> = Vec::new();
+    let mut publish_until = |instant: u64| {
+        while published.last().is_none_or(|stamp| *stamp < instant) {
+            let alert: Value = serde_json::from_str(&printed.until("\"type\":\"alert\"", 60)).unwrap();
+            published.push(alert["stamp_ns"].as_str().unwrap().parse().unwrap());
+        }
+        published.clone()
+    };
+    // Alerts that nobody on ROS 2 gets.
+    let first = publish_until(0)[0];
+    publish_until(first + 3_000_000_000);
+    let joins = if long() { 50 } else { 12 };
+    for (made, alerts) in joined("countdown", joins, &[]) {
+        let published = publish_until(made.max(alerts[0]));
+        // What was stamped just before was on its way.
+        let current = published.iter().rfind(|stamp| **stamp + 200_000_000 < made).unwrap();
+        assert!(alerts[0] >= *current, "{} ms old", (current - alerts[0]) / 1_000_000);
+    }
+    for (made, alerts) in joined("countdown", joins / 4, &["--beside"]) {
+        let published = publish_until(made.max(alerts[alerts.len() - 1]));
+        let current = published.iter().rfind(|stamp| **stamp + 200_000_000 < made).unwrap();
+        assert!(alerts.is_sorted() && alerts.last() >= Some(current), "{alerts:?}");
+    }
 }

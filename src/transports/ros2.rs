@@ -5,6 +5,7 @@
 
 mod control;
 pub mod environment;
+mod matching;
 mod node;
 mod port;
 
@@ -24,6 +25,7 @@ use super::{Transport, TransportConfig, TransportError};
 use control::ControlThread;
 pub use control::Mapping;
 use environment::{Network, Range, check_name, other_distribution};
+use matching::Matches;
 
 /// Why there are no ROS 2 topics.
 #[derive(Debug, thiserror::Error)]
@@ -78,7 +80,7 @@ struct Ros2 {
     name: String,
     description: String,
     /// What the services are made of, until they are; `None` where the scene asks for none.
-    services: Option<(Context, Mapping)>,
+    services: Option<(Context, Matches, Mapping)>,
     control: Option<ControlThread>,
     publisher: Option<BackgroundPublisher>,
     status: Option<BackgroundStatus>,
@@ -131,10 +133,11 @@ pub fn open_on(
     let background = BackgroundConfig { name: "ros2", handles, cues, loop_rate, rate };
     let path = ros2_messages::path::poses(&scene.motion.outline());
     let context = context(network)?;
-    let services = mapping.map(|mapping| (context.clone(), mapping));
+    let matches = Matches::new(&context);
+    let services = mapping.map(|mapping| (context.clone(), matches.clone(), mapping));
     let config =
         Ros2Config { name: name.to_owned(), handles, rate, settings: settings.clone(), alerts, cues, stage, path };
-    let started = background::start(background, move || node::Topics::open(context, config));
+    let started = background::start(background, move || node::Topics::open(context, matches, config));
     let (publisher, status, thread) = started.map_err(|error| match error {
         BackgroundError::Open(error) => error,
         BackgroundError::Thread(reason) => Ros2Error::Failed(reason),
@@ -174,8 +177,8 @@ impl Transport for Ros2 {
     }
 
     fn control(&mut self, door: Door) -> Result<Option<Door>, TransportError> {
-        let Some((context, mapping)) = self.services.take() else { return Ok(Some(door)) };
-        self.control = Some(ControlThread::start(&self.name, context, mapping, door)?);
+        let Some((context, matches, mapping)) = self.services.take() else { return Ok(Some(door)) };
+        self.control = Some(ControlThread::start(&self.name, context, matches, mapping, door)?);
         Ok(None)
     }
 

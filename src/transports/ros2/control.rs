@@ -3,13 +3,12 @@
 //! Made of ros2-client's subscriptions (for the requests, so that the node shows its services) and RustDDS's writers (for
 //! the responses), not of ros2-client's `Server`: that one hides the bytes of a request, which tell the mapping
 //! ([`mapping`]), and answers at once. A client whose reply reader RustDDS has not matched yet would never get that
-//! answer, so an answer waits here until it is ([`matching`]). A client that is dead or floods the door costs the loop
+//! answer, so an answer waits here until it is ([`Matches`]). A client that is dead or floods the door costs the loop
 //! nothing: the thread takes requests, the loop takes one command a period from a queue of bounded length.
 
 mod calls;
 mod endpoints;
 mod mapping;
-mod matching;
 mod services;
 
 use std::sync::Arc;
@@ -22,13 +21,13 @@ use ros2_client::Context;
 use rustdds::{GUID, SampleIdentity, SequenceNumber};
 
 use super::Ros2Error;
+use super::matching::Matches;
 use crate::live::control::{Answer, Door, MOST_WAITING};
 use crate::show::control::{Code, Command};
 use calls::{Conductor, Next, refusal, sentence};
 use endpoints::{Client, Endpoints};
 pub use mapping::Mapping;
 use mapping::Request;
-use matching::Matches;
 use services::{Call, Response};
 
 /// Calls of one process that may have no answer yet, so that one which floods the door leaves room for the others.
@@ -55,7 +54,13 @@ impl ControlThread {
     ///
     /// # Errors
     /// [`Ros2Error`]
-    pub(super) fn start(name: &str, context: Context, mapping: Mapping, door: Door) -> Result<Self, Ros2Error> {
+    pub(super) fn start(
+        name: &str,
+        context: Context,
+        matches: Matches,
+        mapping: Mapping,
+        door: Door,
+    ) -> Result<Self, Ros2Error> {
         let stop = Arc::new(AtomicBool::new(false));
         let (opened, opening) = mpsc::channel();
         let thread = {
@@ -63,7 +68,7 @@ impl ControlThread {
             move || match Endpoints::open(&name, &context) {
                 Ok(endpoints) => {
                     let _ = opened.send(Ok(()));
-                    Server::new(endpoints, Matches::new(&context), mapping, door).serve(&stop);
+                    Server::new(endpoints, matches, mapping, door).serve(&stop);
                 }
                 Err(error) => drop(opened.send(Err(error))),
             }
@@ -128,7 +133,6 @@ impl Server {
 
     fn serve(mut self, stop: &AtomicBool) {
         while !stop.load(Ordering::Acquire) {
-            self.matches.update();
             for port in 0..self.endpoints.ports.len() {
                 self.take_requests(port);
             }

@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use ros2_client::{Context, Node, NodeName, NodeOptions};
 
-use super::port::{Maker, Port, SELDOM_BYTES, Stream};
+use super::matching::Matches;
+use super::port::{Attend, Maker, Port, SELDOM_BYTES, Stream};
 use super::{Ros2Config, Ros2Error};
 use crate::ros2_messages::diagnostics::DiagnosticArray;
 use crate::ros2_messages::markers::MarkerArray;
@@ -39,22 +40,18 @@ pub(super) struct Topics {
     cues: Option<Port<Stamped<Cue>>>,
     clock: Option<Port<Clock>>,
     transforms: Option<Stream<TfMessage>>,
-    /// The path, and when it was published.
-    path: Option<(Port<Path>, Arc<Path>)>,
+    path: Option<Port<Path>>,
     latest_alert: Option<CollisionAlert>,
-    /// Alerts so far.
-    alerts_sent: u64,
     skipped_periods: u64,
-    /// Whether what is sent seldom has been sent a second time.
-    repeated: bool,
     /// Messages that a full queue of RustDDS did not take, because a reliable subscriber was slow or dead.
     discarded: u64,
+    matches: Matches,
     // Dropped after the publishers: they belong to it.
-    _node: Node,
+    node: Node,
 }
 
 impl Topics {
-    pub(super) fn open(context: Context, config: Ros2Config) -> Result<Self, Ros2Error> {
+    pub(super) fn open(context: Context, matches: Matches, config: Ros2Config) -> Result<Self, Ros2Error> {
         let Ros2Config { stage, handles, .. } = config;
         let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(error.to_string());
         let node_name = NodeName::new(&format!("/{}", config.name), "publisher").map_err(|error| failed(&error))?;
@@ -91,47 +88,40 @@ impl Topics {
             transforms: maker
                 .port(Topic::Tf, type_name::TF_MESSAGE, TRANSFORMS_BYTES, config.rate)?
                 .map(|port| port.stream(TfMessage::of(&config.name))),
-            path: maker.port(Topic::Path, type_name::PATH, path_bytes, 1.0)?.map(|port| (port, path)),
+            path: maker.port(Topic::Path, type_name::PATH, path_bytes, 1.0)?,
             latest_alert: None,
-            alerts_sent: 0,
             skipped_periods: 0,
-            repeated: false,
             discarded: 0,
-            _node: maker.node,
+            matches,
+            node: maker.node,
         };
-        topics.publish_surroundings();
+        // What does not change.
+        if let Some(port) = &mut topics.stages {
+            port.send(Arc::new(Stamped::stage(stage)), &mut topics.discarded);
+        }
+        if let Some(port) = &mut topics.path {
+            port.send(path, &mut topics.discarded);
+        }
         Ok(topics)
     }
 
-    /// Sends what does not change: the stage and the path.
-    fn publish_surroundings(&mut self) {
-        if let Some(port) = &mut self.stages {
-            port.send(Arc::new(Stamped::stage(self.stage)), &mut self.discarded);
+    /// Looks after what late subscribers are to get.
+    fn attend(&mut self) {
+        fn end<T: Attend>(end: &mut Option<T>) -> Option<&mut dyn Attend> {
+            end.as_mut().map(|end| end as &mut dyn Attend)
         }
-        if let Some((port, path)) = &mut self.path {
-            port.send(Arc::clone(path), &mut self.discarded);
-        }
-    }
-
-    fn publish_alert(&mut self, alert: CollisionAlert) {
-        if let Some(port) = &mut self.alerts {
-            port.send(Arc::new(Stamped::alert(alert)), &mut self.discarded);
-        }
-    }
-
-    /// Sends once more what a transient-local topic holds. Now and then RustDDS does not deliver what was sent while it was
-    /// still discovering a subscriber, although it keeps it: a second later they have found each other. What has been
-    /// followed by something newer since is not sent again.
-    fn repeat(&mut self) {
-        self.publish_surroundings();
-        if let Some(alert) = self.latest_alert.filter(|_| self.alerts_sent == 1) {
-            self.publish_alert(alert);
+        let streams = [end(&mut self.handles), end(&mut self.poses), end(&mut self.markers), end(&mut self.transforms)];
+        let seldom = [end(&mut self.alerts), end(&mut self.cues), end(&mut self.stages), end(&mut self.path)];
+        let others = [end(&mut self.status), end(&mut self.diagnostics), end(&mut self.clock)];
+        for end in streams.into_iter().chain(seldom).chain(others).flatten() {
+            end.attend(&self.matches, &mut self.node, &mut self.discarded);
         }
     }
 }
 
 impl Sink for Topics {
     fn frame(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
+        self.attend();
         let stamp = Time::of(header.stamp_ns);
         let discarded = &mut self.discarded;
         if let Some(stream) = &mut self.handles {
@@ -162,21 +152,22 @@ impl Sink for Topics {
     }
 
     fn alert(&mut self, alert: CollisionAlert) {
+        self.attend();
         self.latest_alert = Some(alert);
-        self.alerts_sent += 1;
-        self.publish_alert(alert);
+        if let Some(port) = &mut self.alerts {
+            port.send(Arc::new(Stamped::alert(alert)), &mut self.discarded);
+        }
     }
 
     fn cue(&mut self, cue: Cue) {
+        self.attend();
         if let Some(port) = &mut self.cues {
             port.send(Arc::new(Stamped::cue(cue)), &mut self.discarded);
         }
     }
 
     fn status(&mut self, status: &LoopStatus) {
-        if !std::mem::replace(&mut self.repeated, true) {
-            self.repeat();
-        }
+        self.attend();
         if let Some(port) = &mut self.status {
             port.send(Arc::new(Stamped::status(*status)), &mut self.discarded);
         }

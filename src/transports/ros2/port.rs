@@ -1,4 +1,10 @@
-//! A publisher of one topic: its quality of service, what it keeps for slow subscribers, and what it discards.
+//! A publisher of one topic: its quality of service, what it keeps for late and slow subscribers, and what it discards.
+//!
+//! RustDDS keeps of a transient-local topic more than its depth: whatever nobody has acknowledged, and the rest until it tidies
+//! up every six seconds; a late subscriber would get all of that first. So what nobody subscribes to is not written before
+//! somebody does, and when the last subscriber has left, a new publisher takes the place of the one that still keeps what was
+//! written for it. Whoever comes while others are there gets the older messages of the last six seconds, too; the current
+//! one is the last.
 
 use std::sync::Arc;
 
@@ -7,8 +13,9 @@ use rustdds::policy::{self, ResourceLimits};
 use rustdds::{QosPolicies, QosPolicyBuilder, TopicKind};
 use serde::Serialize;
 
+use super::matching::Matches;
+use super::{Ros2Config, Ros2Error};
 use crate::scene::ros2::{Durability, Qos, Reliability, Topic};
-use crate::transports::ros2::{Ros2Config, Ros2Error};
 use crate::wire::Stage;
 
 /// How long a subscriber that has died counts as slow: its lease.
@@ -25,8 +32,18 @@ pub(super) const SELDOM_BYTES: usize = HEADER_BYTES + size_of::<Stage>();
 /// A publisher of one topic.
 pub(super) struct Port<Message: Serialize> {
     publisher: Publisher<Arc<Message>>,
+    dds: rustdds::Topic,
     topic: String,
     reported: bool,
+    /// Only where late subscribers get what was sent before.
+    latched: Option<Latched<Message>>,
+}
+
+/// What a transient-local topic holds.
+struct Latched<Message> {
+    latest: Option<Arc<Message>>,
+    /// Whether somebody was there at the last look.
+    has_reader: bool,
 }
 
 impl<Message: Serialize> Port<Message> {
@@ -35,8 +52,18 @@ impl<Message: Serialize> Port<Message> {
         Stream { port: self, message: Arc::new(message) }
     }
 
-    /// Sends a message. What a full queue does not take is counted, and reported once.
+    /// Sends a message, or holds it until somebody subscribes. What a full queue does not take is counted, and reported once.
     pub(super) fn send(&mut self, message: Arc<Message>, discarded: &mut u64) {
+        if let Some(latched) = &mut self.latched {
+            latched.latest = Some(Arc::clone(&message));
+            if !latched.has_reader {
+                return;
+            }
+        }
+        self.write(message, discarded);
+    }
+
+    fn write(&mut self, message: Arc<Message>, discarded: &mut u64) {
         if self.publisher.publish(message).is_ok() {
             return;
         }
@@ -49,6 +76,38 @@ impl<Message: Serialize> Port<Message> {
                 self.topic
             );
         }
+    }
+}
+
+/// A publisher that knows what late subscribers are to get.
+pub(super) trait Attend {
+    /// Sends what is held for the first subscriber, and forgets what was sent when the last one has left. To be called often.
+    fn attend(&mut self, matches: &Matches, node: &mut Node, discarded: &mut u64);
+}
+
+impl<Message: Serialize> Attend for Port<Message> {
+    fn attend(&mut self, matches: &Matches, node: &mut Node, discarded: &mut u64) {
+        let Some(latched) = &mut self.latched else { return };
+        let has_reader = matches.has_reader(self.publisher.guid());
+        let had_reader = std::mem::replace(&mut latched.has_reader, has_reader);
+        if has_reader && !had_reader {
+            if let Some(latest) = latched.latest.clone() {
+                self.write(latest, discarded);
+            }
+        } else if had_reader && !has_reader {
+            match node.create_publisher(&self.dds, None) {
+                Ok(publisher) => self.publisher = publisher,
+                Err(error) => {
+                    log::warn!("topic {}: a late subscriber will get old messages first: {error}", self.topic)
+                }
+            }
+        }
+    }
+}
+
+impl<Message: Serialize> Attend for Stream<Message> {
+    fn attend(&mut self, matches: &Matches, node: &mut Node, discarded: &mut u64) {
+        self.port.attend(matches, node, discarded);
     }
 }
 
@@ -103,7 +162,9 @@ impl Maker<'_> {
             .create_topic(format!("rt{name}"), type_name.to_owned(), &policies(*qos, bytes, rate), TopicKind::NoKey)
             .map_err(|error| failed(&error))?;
         let publisher = self.node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
-        Ok(Some(Port { publisher, topic: name, reported: false }))
+        let latched =
+            (qos.durability == Durability::TransientLocal).then_some(Latched { latest: None, has_reader: false });
+        Ok(Some(Port { publisher, dds, topic: name, reported: false, latched }))
     }
 }
 
