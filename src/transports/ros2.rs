@@ -15,7 +15,6 @@ use rustdds::DomainParticipantBuilder;
 
 use crate::live::control::Door;
 use crate::live::{Deliveries, Publisher, StatusPublisher};
-use crate::ros2_messages::{self, Pose};
 use crate::scene::ros2::Ros2Settings;
 use crate::wire::Stage;
 
@@ -69,8 +68,6 @@ struct Ros2Config {
     cues: usize,
     /// The stage.
     stage: Stage,
-    /// The path to draw.
-    path: Vec<Pose>,
 }
 
 /// The open topics.
@@ -129,11 +126,9 @@ pub fn open_on(
     let description =
         format!("ROS 2 topics ({}, at {rate} frames per second): {}.{services}", network.sentence(), topics.join(", "));
     let background = BackgroundConfig { name: "ros2", handles, cues, loop_rate, rate };
-    let path = ros2_messages::path::poses(&scene.motion.outline());
     let context = context(network)?;
     let services = mapping.map(|mapping| (context.clone(), mapping));
-    let config =
-        Ros2Config { name: name.to_owned(), handles, rate, settings: settings.clone(), alerts, cues, stage, path };
+    let config = Ros2Config { name: name.to_owned(), handles, rate, settings: settings.clone(), alerts, cues, stage };
     let started = background::start(background, move || node::Topics::open(context, config));
     let (publisher, status, thread) = started.map_err(|error| match error {
         BackgroundError::Open(error) => error,
