@@ -15,6 +15,7 @@ pub mod draw;
 pub mod events;
 pub mod plan;
 mod realtime_scheduling;
+pub mod record;
 pub mod run;
 pub mod soak;
 pub mod soak_conductor;

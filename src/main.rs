@@ -25,6 +25,8 @@ enum Command {
     Run(commands::run::RunArguments),
     /// Conduct a running publisher: pause, rate, seek, step, hold
     Control(commands::control::ControlArguments),
+    /// Record a running publisher as MCAP, or mend a recording that was cut
+    Record(commands::record::RecordArguments),
     /// Play the show of a log again and compare every bit
     Verify(commands::verify::VerifyArguments),
     /// Watch a running publisher from another process
@@ -62,6 +64,7 @@ fn main() -> ExitCode {
     let done = commands::end_when_shared_memory_is_full().and_then(|()| match &command {
         Command::Run(arguments) => commands::run::run(&common, arguments),
         Command::Control(arguments) => commands::control::control(&common, arguments),
+        Command::Record(arguments) => commands::record::record(&common, arguments),
         Command::Verify(arguments) => commands::verify::verify(&common, arguments),
         Command::Watch(arguments) => commands::watch::watch(&common, arguments),
         Command::View(arguments) => commands::view::view(&common, arguments),

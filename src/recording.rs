@@ -9,6 +9,7 @@ pub mod arithmetic;
 pub mod hash;
 pub mod lines;
 pub mod log;
+pub mod mcap;
 pub mod verify;
 mod writer;
 

@@ -8,40 +8,16 @@ pub mod diagnostics;
 pub mod markers;
 pub mod path;
 pub mod transforms;
+mod types;
 
 use serde::Serialize;
 
 use crate::show::state::Level;
 use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+pub use types::MessageType;
 
 /// The frame of all coordinates: metres, x to the right, y up, origin at the centre.
 pub const FRAME_ID: &str = "stage";
-
-/// Type names on the wire.
-pub mod type_name {
-    /// bench_dragon_msgs/HandlePoses.
-    pub const HANDLE_POSES: &str = "bench_dragon_msgs::msg::dds_::HandlePoses_";
-    /// bench_dragon_msgs/CollisionAlert.
-    pub const COLLISION_ALERT: &str = "bench_dragon_msgs::msg::dds_::CollisionAlert_";
-    /// bench_dragon_msgs/LoopStatus.
-    pub const LOOP_STATUS: &str = "bench_dragon_msgs::msg::dds_::LoopStatus_";
-    /// bench_dragon_msgs/Stage.
-    pub const STAGE: &str = "bench_dragon_msgs::msg::dds_::Stage_";
-    /// geometry_msgs/PoseArray.
-    pub const POSE_ARRAY: &str = "geometry_msgs::msg::dds_::PoseArray_";
-    /// visualization_msgs/MarkerArray.
-    pub const MARKER_ARRAY: &str = "visualization_msgs::msg::dds_::MarkerArray_";
-    /// bench_dragon_msgs/Cue.
-    pub const CUE: &str = "bench_dragon_msgs::msg::dds_::Cue_";
-    /// nav_msgs/Path.
-    pub const PATH: &str = "nav_msgs::msg::dds_::Path_";
-    /// rosgraph_msgs/Clock.
-    pub const CLOCK: &str = "rosgraph_msgs::msg::dds_::Clock_";
-    /// tf2_msgs/TFMessage.
-    pub const TF_MESSAGE: &str = "tf2_msgs::msg::dds_::TFMessage_";
-    /// diagnostic_msgs/DiagnosticArray.
-    pub const DIAGNOSTIC_ARRAY: &str = "diagnostic_msgs::msg::dds_::DiagnosticArray_";
-}
 
 /// builtin_interfaces/Time.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -127,6 +103,13 @@ pub struct Clock {
     pub clock: Time,
 }
 
+impl Clock {
+    /// The simulated time of a frame.
+    pub fn of(frame: &FrameHeader) -> Self {
+        Self { clock: Time::of_seconds(frame.sim_time) }
+    }
+}
+
 /// bench_dragon_msgs/HandlePoses.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HandlePoses {
@@ -136,6 +119,21 @@ pub struct HandlePoses {
     pub frame: FrameHeader,
     /// The handles, head first.
     pub poses: Vec<HandlePose>,
+}
+
+impl HandlePoses {
+    /// The message of so many handles, not yet of any frame.
+    pub fn of(handles: usize) -> Self {
+        Self { header: Header::of(0), frame: FrameHeader::default(), poses: vec![HandlePose::default(); handles] }
+    }
+
+    /// Makes it the message of a frame.
+    pub fn update(&mut self, frame: &FrameHeader, handles: &[HandlePose]) {
+        self.header.stamp = Time::of(frame.stamp_ns);
+        self.frame = *frame;
+        self.poses.clear();
+        self.poses.extend_from_slice(handles);
+    }
 }
 
 /// geometry_msgs/Point and Vector3.
@@ -197,6 +195,20 @@ pub struct PoseArray {
     pub header: Header,
     /// The handles, head first.
     pub poses: Vec<Pose>,
+}
+
+impl PoseArray {
+    /// The message of so many handles, not yet of any frame.
+    pub fn of(handles: usize) -> Self {
+        Self { header: Header::of(0), poses: vec![Pose::flat(0.0, 0.0, 0.0); handles] }
+    }
+
+    /// Makes it the message of a frame.
+    pub fn update(&mut self, frame: &FrameHeader, handles: &[HandlePose]) {
+        self.header.stamp = Time::of(frame.stamp_ns);
+        self.poses.clear();
+        self.poses.extend(handles.iter().map(Pose::of));
+    }
 }
 
 /// The level of the latest alert; clear before the first.

@@ -3,8 +3,7 @@
 use serde::Serialize;
 
 use super::{Header, Pose};
-use crate::model::path::{OutlineKind, SegmentOutline};
-use crate::model::spiral::Direction;
+use crate::wire::{SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_OUTWARD_SPIRAL, Stage, StageSegment};
 
 /// The turn between two points, radians: a chord of it misses a circle of 9 m by 9 mm.
 const TURN: f64 = std::f64::consts::PI / 36.0;
@@ -30,62 +29,59 @@ pub struct Path {
 }
 
 impl Path {
-    /// The message of a path that is published at `stamp_ns`.
-    pub fn of(stamp_ns: u64, poses: &[Pose]) -> Self {
-        let header = Header::of(stamp_ns);
-        let poses = poses.iter().map(|pose| PoseStamped { header: header.clone(), pose: *pose }).collect();
+    /// The path of a stage, published when that was.
+    pub fn of(stage: &Stage) -> Self {
+        let header = Header::of(stage.stamp_ns);
+        let poses = poses(stage.path_in_use(), stage.pitch);
+        let poses = poses.into_iter().map(|pose| PoseStamped { header: header.clone(), pose }).collect();
         Self { header, poses }
     }
 }
 
-/// Points along an outline, with the direction of travel: the ends of every segment, and between them one for each turn by
-/// five degrees.
-pub fn poses(outline: &[SegmentOutline]) -> Vec<Pose> {
-    let turned: f64 = outline.iter().map(turn_of).sum();
+/// Points along segments, with the direction of travel: the ends of every segment, and between them one for each turn by
+/// five degrees. `pitch` is that of the spirals, metres per turn.
+fn poses(segments: &[StageSegment], pitch: f64) -> Vec<Pose> {
+    let turned: f64 = segments.iter().map(turn_of).sum();
     let turn = TURN.max(turned / MOST_POINTS);
-    let along = |segment: &SegmentOutline| {
+    let along = |segment: &StageSegment| {
         let pieces = (turn_of(segment) / turn).ceil().max(1.0) as usize;
         let segment = *segment;
-        (0..=pieces).map(move |piece| pose_at(&segment, piece as f64 / pieces as f64))
+        (0..=pieces).map(move |piece| pose_at(&segment, pitch, piece as f64 / pieces as f64))
     };
-    outline.iter().flat_map(along).collect()
+    segments.iter().flat_map(along).collect()
 }
 
 /// Radians by which a segment turns.
-fn turn_of(segment: &SegmentOutline) -> f64 {
+fn turn_of(segment: &StageSegment) -> f64 {
     match segment.kind {
-        OutlineKind::Line => 0.0,
-        OutlineKind::Arc { curvature } => (curvature * segment.length).abs(),
-        OutlineKind::Spiral { first, last, .. } => (last - first).abs(),
+        SEGMENT_ARC => (segment.curvature * segment.length).abs(),
+        SEGMENT_INWARD_SPIRAL | SEGMENT_OUTWARD_SPIRAL => (segment.theta_last - segment.theta_first).abs(),
+        _ => 0.0,
     }
 }
 
 /// The pose at a share, from 0 to 1, of a segment: of its length, or of a spiral's polar angle.
-fn pose_at(segment: &SegmentOutline, share: f64) -> Pose {
-    let SegmentOutline { kind, start, heading, length } = *segment;
+fn pose_at(segment: &StageSegment, pitch: f64, share: f64) -> Pose {
+    let StageSegment { x, y, heading, length, curvature, theta_first, theta_last, kind, .. } = *segment;
     match kind {
-        OutlineKind::Line => {
-            let (sine, cosine) = heading.sin_cos();
-            Pose::flat(start.x + share * length * cosine, start.y + share * length * sine, heading)
-        }
-        OutlineKind::Arc { curvature } => {
+        SEGMENT_ARC => {
             let here = heading + share * curvature * length;
-            let x = start.x + (here.sin() - heading.sin()) / curvature;
-            let y = start.y - (here.cos() - heading.cos()) / curvature;
-            Pose::flat(x, y, here)
+            let right = x + (here.sin() - heading.sin()) / curvature;
+            Pose::flat(right, y - (here.cos() - heading.cos()) / curvature, here)
         }
-        OutlineKind::Spiral { direction, pitch, first, last } => {
-            let theta = first + share * (last - first);
+        SEGMENT_INWARD_SPIRAL | SEGMENT_OUTWARD_SPIRAL => {
+            let theta = theta_first + share * (theta_last - theta_first);
             let per_radian = pitch / std::f64::consts::TAU;
             let (sine, cosine) = theta.sin_cos();
             let radius = per_radian * theta;
             // Against the derivative by theta: inward because theta decreases, outward because of the half turn.
-            let (x, y) = (radius * sine - per_radian * cosine, -radius * cosine - per_radian * sine);
-            let side = match direction {
-                Direction::Inward => 1.0,
-                Direction::Outward => -1.0,
-            };
-            Pose::flat(side * radius * cosine, side * radius * sine, y.atan2(x))
+            let (along_x, along_y) = (radius * sine - per_radian * cosine, -radius * cosine - per_radian * sine);
+            let side = if kind == SEGMENT_INWARD_SPIRAL { 1.0 } else { -1.0 };
+            Pose::flat(side * radius * cosine, side * radius * sine, along_y.atan2(along_x))
+        }
+        _ => {
+            let (sine, cosine) = heading.sin_cos();
+            Pose::flat(x + share * length * cosine, y + share * length * sine, heading)
         }
     }
 }
@@ -96,10 +92,12 @@ mod tests {
     use crate::model::Point;
     use crate::model::curve::Side;
     use crate::model::path::Path as ModelPath;
+    use crate::wire::convert::stage_segment;
 
     /// Every pose lies on the path, and looks along it, by the path's own points and tangents.
-    fn check(path: &ModelPath) {
-        let poses = poses(&path.outline());
+    fn check(path: &ModelPath, pitch: f64) {
+        let segments: Vec<_> = path.outline().iter().map(stage_segment).collect();
+        let poses = poses(&segments, pitch);
         assert!(poses.len() > 50 && poses.len() < 2500, "{}", poses.len());
         let mut travelled = 0.0;
         let mut before: Option<Pose> = None;
@@ -127,9 +125,9 @@ mod tests {
 
     #[test]
     fn the_points_lie_on_the_path_and_look_along_it() {
-        check(&ModelPath::spiral(0.55, 16.0));
-        check(&ModelPath::turnaround(1.7, 4.5, 2.0, 100.0, 60.0).unwrap());
+        check(&ModelPath::spiral(0.55, 16.0), 0.55);
+        check(&ModelPath::turnaround(1.7, 4.5, 2.0, 100.0, 60.0).unwrap(), 1.7);
         let route = ModelPath::route(Point::new(-3.0, 2.0), 0.1).line(5.0).arc(Side::Left, 3.0, 0.5);
-        check(&route.line(2.0).arc(Side::Right, 1.5, 0.75).build().unwrap());
+        check(&route.line(2.0).arc(Side::Right, 1.5, 0.75).build().unwrap(), f64::NAN);
     }
 }

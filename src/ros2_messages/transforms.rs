@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{Header, Pose, Quaternion, Time, Xyz};
-use crate::wire::HandlePose;
+use crate::wire::{FrameHeader, HandlePose};
 
 /// geometry_msgs/TransformStamped.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -37,8 +37,9 @@ impl TfMessage {
         Self { transforms: vec![transform("head"), transform("tail")] }
     }
 
-    /// Puts head and tail where the first and the last of these handles are.
-    pub fn update(&mut self, stamp: Time, handles: &[HandlePose]) {
+    /// Puts head and tail where the first and the last handle of a frame are.
+    pub fn update(&mut self, frame: &FrameHeader, handles: &[HandlePose]) {
+        let stamp = Time::of(frame.stamp_ns);
         let ends = [handles.first(), handles.last()];
         for (transform, handle) in self.transforms.iter_mut().zip(ends) {
             let Some(Pose { position, orientation }) = handle.map(Pose::of) else { continue };

@@ -42,6 +42,21 @@ impl Topic {
     pub const DEFAULT: [Self; 7] =
         [Self::Handles, Self::Poses, Self::Alerts, Self::Stage, Self::Diagnostics, Self::Path, Self::Cues];
 
+    /// Every one.
+    pub const ALL: [Self; 11] = [
+        Self::Handles,
+        Self::Poses,
+        Self::Alerts,
+        Self::Stage,
+        Self::Diagnostics,
+        Self::Markers,
+        Self::Status,
+        Self::Path,
+        Self::Cues,
+        Self::Clock,
+        Self::Tf,
+    ];
+
     /// The name in the scene, and the last part of the topic's.
     pub fn name(self) -> &'static str {
         match self {

@@ -16,7 +16,6 @@ use rustdds::DomainParticipantBuilder;
 
 use crate::live::control::Door;
 use crate::live::{Deliveries, Publisher, StatusPublisher};
-use crate::ros2_messages::{self, Pose};
 use crate::scene::ros2::Ros2Settings;
 use crate::wire::Stage;
 
@@ -71,8 +70,6 @@ struct Ros2Config {
     cues: usize,
     /// The stage.
     stage: Stage,
-    /// The path to draw.
-    path: Vec<Pose>,
 }
 
 /// The open topics.
@@ -131,12 +128,10 @@ pub fn open_on(
     let description =
         format!("ROS 2 topics ({}, at {rate} frames per second): {}.{services}", network.sentence(), topics.join(", "));
     let background = BackgroundConfig { name: "ros2", handles, cues, loop_rate, rate };
-    let path = ros2_messages::path::poses(&scene.motion.outline());
     let context = context(network)?;
     let matches = Matches::new(&context);
     let services = mapping.map(|mapping| (context.clone(), matches.clone(), mapping));
-    let config =
-        Ros2Config { name: name.to_owned(), handles, rate, settings: settings.clone(), alerts, cues, stage, path };
+    let config = Ros2Config { name: name.to_owned(), handles, rate, settings: settings.clone(), alerts, cues, stage };
     let started = background::start(background, move || node::Topics::open(context, matches, config));
     let (publisher, status, thread) = started.map_err(|error| match error {
         BackgroundError::Open(error) => error,

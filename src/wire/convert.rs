@@ -189,7 +189,8 @@ pub fn stage(run_id: u64, stamp_ns: u64, motion: &Motion, show: &Show) -> Stage 
     }
 }
 
-fn stage_segment(outline: &SegmentOutline) -> StageSegment {
+/// The segment of a stage.
+pub fn stage_segment(outline: &SegmentOutline) -> StageSegment {
     let (kind, curvature, theta_first, theta_last) = match outline.kind {
         OutlineKind::Line => (SEGMENT_LINE, 0.0, f64::NAN, f64::NAN),
         OutlineKind::Arc { curvature } => (SEGMENT_ARC, curvature, f64::NAN, f64::NAN),

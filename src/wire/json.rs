@@ -1,10 +1,11 @@
 //! Messages as JSON: the names of numbers, null where there is nothing, and text where a double is too small.
 //!
-//! In: a layout. Out: what serde writes. Called by `watch --json` and the stage picture's server.
+//! In: a layout. Out: what serde writes. Called by `watch --json`, the stage picture's server and the
+//! recorder.
 
 use serde::Serialize;
 
-use super::layouts::{CollisionAlert, Cue, NO_BENCH};
+use super::layouts::{CollisionAlert, Cue, NO_BENCH, Stage, StageCue, StageEvent, StageSegment};
 use crate::motion::event::EventKind;
 use crate::show::state::Level;
 
@@ -85,6 +86,86 @@ impl From<&Cue> for CueObject {
         let Cue { run_id, tick, stamp_ns, sim_time, cue_time, number, pauses, ref name } = *cue;
         let (run_id, stamp_ns, pauses, name) = (Exact(run_id), Exact(stamp_ns), pauses == 1, name.as_str().to_owned());
         Self { run_id, tick, stamp_ns, sim_time, cue_time, number, pauses, name }
+    }
+}
+
+/// A [`Stage`] with what of it is in use.
+#[derive(Debug, Clone, Serialize)]
+pub struct StageObject {
+    run_id: Exact,
+    pitch: f64,
+    start_turn: f64,
+    hole_inset: f64,
+    head_length: f64,
+    body_length: f64,
+    width: f64,
+    benches: u32,
+    path: Vec<SegmentObject>,
+    freeze_time: f64,
+    events: Vec<EventObject>,
+    cues: Vec<StageCueObject>,
+}
+
+/// A segment of the path.
+#[derive(Debug, Clone, Serialize)]
+struct SegmentObject {
+    kind: &'static str,
+    x: f64,
+    y: f64,
+    heading: f64,
+    length: f64,
+    curvature: f64,
+    theta_first: f64,
+    theta_last: f64,
+}
+
+/// An event of the show.
+#[derive(Debug, Clone, Serialize)]
+struct EventObject {
+    event: &'static str,
+    time: f64,
+}
+
+/// A cue of the show.
+#[derive(Debug, Clone, Serialize)]
+struct StageCueObject {
+    number: u32,
+    name: String,
+    time: f64,
+    pauses: bool,
+}
+
+impl From<&Stage> for StageObject {
+    fn from(stage: &Stage) -> Self {
+        let Stage { run_id, pitch, start_turn, hole_inset, head_length, body_length, width, .. } = *stage;
+        let Stage { freeze_time, benches, .. } = *stage;
+        let segment = |segment: &StageSegment| {
+            let StageSegment { x, y, heading, length, curvature, theta_first, theta_last, .. } = *segment;
+            let kind = segment.kind_name();
+            SegmentObject { kind, x, y, heading, length, curvature, theta_first, theta_last }
+        };
+        let event = |event: &StageEvent| EventObject {
+            event: event.kind().map_or("unknown", EventKind::name),
+            time: event.time,
+        };
+        let cue = |cue: &StageCue| {
+            let StageCue { time, number, pauses, ref name } = *cue;
+            StageCueObject { number, name: name.as_str().to_owned(), time, pauses: pauses == 1 }
+        };
+        Self {
+            run_id: Exact(run_id),
+            pitch,
+            start_turn,
+            hole_inset,
+            head_length,
+            body_length,
+            width,
+            benches,
+            path: stage.path_in_use().iter().map(segment).collect(),
+            freeze_time,
+            events: stage.events_in_use().iter().map(event).collect(),
+            cues: stage.cues_in_use().iter().map(cue).collect(),
+        }
     }
 }
 

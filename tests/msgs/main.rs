@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 use std::process::Command;
 use std::sync::LazyLock;
 
-use bench_dragon::ros2_messages::{HandlePoses, Header, Stamped, type_name};
+use bench_dragon::ros2_messages::{HandlePoses, Header, MessageType, Stamped};
 use bench_dragon::show::state::{FrameState, Level, PlaybackState};
 use bench_dragon::wire::{
     CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32, LoopStatus, NO_BENCH,
@@ -200,14 +200,14 @@ fn fields_types_and_order_are_those_that_serde_writes() {
 #[test]
 fn type_names_are_those_that_ros_2_gives_the_interface_files() {
     assert!(read("msgs/package.xml").contains("<name>bench_dragon_msgs</name>"));
-    for (name, on_the_wire) in [
-        ("HandlePoses", type_name::HANDLE_POSES),
-        ("CollisionAlert", type_name::COLLISION_ALERT),
-        ("LoopStatus", type_name::LOOP_STATUS),
-        ("Stage", type_name::STAGE),
-        ("Cue", type_name::CUE),
+    for (name, topic) in [
+        ("HandlePoses", Topic::Handles),
+        ("CollisionAlert", Topic::Alerts),
+        ("LoopStatus", Topic::Status),
+        ("Stage", Topic::Stage),
+        ("Cue", Topic::Cues),
     ] {
-        assert_eq!(on_the_wire, format!("bench_dragon_msgs::msg::dds_::{name}_"));
+        assert_eq!(MessageType::of(topic).dds_name(), format!("bench_dragon_msgs::msg::dds_::{name}_"));
     }
     let list = read("msgs/CMakeLists.txt");
     for ros::Message { name, .. } in &ros::MESSAGES {

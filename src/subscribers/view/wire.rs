@@ -24,11 +24,10 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::motion::event::EventKind;
 use crate::show::state::{FrameState, Level, Severity};
-use crate::wire::json::{AlertObject, CueObject, Exact};
+use crate::wire::json::{AlertObject, CueObject, Exact, StageObject};
 use crate::wire::sentence::{Figures, alert_sentence, state_sentence};
-use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage, StageCue, StageEvent, StageSegment};
+use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage};
 
 const VERSION: u8 = 3;
 const HEADER_BYTES: usize = 72;
@@ -57,32 +56,22 @@ pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
 
 /// The stage, the name of its publisher and, once it is known, that of its scene.
 pub(super) fn stage(stage: &Stage, publisher: &str, scene: Option<&str>) -> String {
-    let Stage { run_id, pitch, start_turn, hole_inset, head_length, body_length, width, benches, .. } = *stage;
-    json!({"type": "stage", "run_id": Exact(run_id), "publisher": publisher, "scene": scene, "pitch": pitch, "start_turn": start_turn,
-        "hole_inset": hole_inset, "head_length": head_length, "body_length": body_length, "width": width,
-        "benches": benches, "path": stage.path_in_use().iter().map(segment).collect::<Vec<_>>(),
-        "freeze_time": stage.freeze_time, "events": stage.events_in_use().iter().map(event).collect::<Vec<_>>(),
-        "cues": stage.cues_in_use().iter().map(stage_cue).collect::<Vec<_>>(), "states": FrameState::ALL.map(state)})
-    .to_string()
-}
-
-fn event(event: &StageEvent) -> Value {
-    json!({"event": event.kind().map_or("unknown", EventKind::name), "time": event.time})
-}
-
-fn stage_cue(cue: &StageCue) -> Value {
-    json!({"number": cue.number, "name": cue.name.as_str(), "time": cue.time, "pauses": cue.pauses == 1})
+    #[derive(Serialize)]
+    struct StageMessage<'a> {
+        r#type: &'static str,
+        publisher: &'a str,
+        scene: Option<&'a str>,
+        #[serde(flatten)]
+        stage: StageObject,
+        states: [Value; FrameState::ALL.len()],
+    }
+    let (stage, states) = (StageObject::from(stage), FrameState::ALL.map(state));
+    json!(StageMessage { r#type: "stage", publisher, scene, stage, states }).to_string()
 }
 
 /// A cue that the show has reached.
 pub(super) fn cue(cue: &Cue) -> String {
     json!(CueObject::from(cue)).to_string()
-}
-
-fn segment(segment: &StageSegment) -> Value {
-    let StageSegment { x, y, heading, length, curvature, theta_first, theta_last, .. } = *segment;
-    json!({"kind": segment.kind_name(), "x": x, "y": y, "heading": heading, "length": length, "curvature": curvature,
-        "theta_first": theta_first, "theta_last": theta_last})
 }
 
 /// All that a page need know of a state, so that it can show one that it has never heard of.

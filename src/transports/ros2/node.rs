@@ -14,7 +14,7 @@ use crate::ros2_messages::diagnostics::DiagnosticArray;
 use crate::ros2_messages::markers::MarkerArray;
 use crate::ros2_messages::path::Path;
 use crate::ros2_messages::transforms::TfMessage;
-use crate::ros2_messages::{Clock, HandlePoses, Header, Pose, PoseArray, Stamped, Time, type_name};
+use crate::ros2_messages::{Clock, HandlePoses, PoseArray, Stamped};
 use crate::scene::ros2::Topic;
 use crate::transports::background::Sink;
 use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
@@ -59,36 +59,24 @@ impl Topics {
         let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
         let node = context.new_node(node_name, options).map_err(|error| failed(&error))?;
         let mut maker = Maker { context, node, config: &config };
-        let header = || Header::of(0);
-        let path = Arc::new(Path::of(stage.stamp_ns, &config.path));
+        let path = Arc::new(Path::of(&stage));
         let path_bytes = SELDOM_BYTES + path.poses.len() * PATH_POSE_BYTES;
         let mut topics = Self {
             name: config.name.clone(),
             stage,
-            handles: maker.stream(Topic::Handles, type_name::HANDLE_POSES, 40, || HandlePoses {
-                header: header(),
-                frame: FrameHeader::default(),
-                poses: vec![HandlePose::default(); handles],
-            })?,
-            poses: maker.stream(Topic::Poses, type_name::POSE_ARRAY, 56, || PoseArray {
-                header: header(),
-                poses: vec![Pose::of(&HandlePose::default()); handles],
-            })?,
-            markers: maker.stream(Topic::Markers, type_name::MARKER_ARRAY, 300, || MarkerArray::of(&stage))?,
-            alerts: if config.alerts {
-                maker.port(Topic::Alerts, type_name::COLLISION_ALERT, SELDOM_BYTES, 1.0)?
-            } else {
-                None
-            },
-            stages: maker.port(Topic::Stage, type_name::STAGE, SELDOM_BYTES, 1.0)?,
-            status: maker.port(Topic::Status, type_name::LOOP_STATUS, SELDOM_BYTES, 1.0)?,
-            diagnostics: maker.port(Topic::Diagnostics, type_name::DIAGNOSTIC_ARRAY, SELDOM_BYTES, 1.0)?,
-            cues: if config.cues > 0 { maker.port(Topic::Cues, type_name::CUE, SELDOM_BYTES, 1.0)? } else { None },
-            clock: maker.port(Topic::Clock, type_name::CLOCK, SELDOM_BYTES, config.rate)?,
+            handles: maker.stream(Topic::Handles, 40, || HandlePoses::of(handles))?,
+            poses: maker.stream(Topic::Poses, 56, || PoseArray::of(handles))?,
+            markers: maker.stream(Topic::Markers, 300, || MarkerArray::of(&stage))?,
+            alerts: if config.alerts { maker.port(Topic::Alerts, SELDOM_BYTES, 1.0)? } else { None },
+            stages: maker.port(Topic::Stage, SELDOM_BYTES, 1.0)?,
+            status: maker.port(Topic::Status, SELDOM_BYTES, 1.0)?,
+            diagnostics: maker.port(Topic::Diagnostics, SELDOM_BYTES, 1.0)?,
+            cues: if config.cues > 0 { maker.port(Topic::Cues, SELDOM_BYTES, 1.0)? } else { None },
+            clock: maker.port(Topic::Clock, SELDOM_BYTES, config.rate)?,
             transforms: maker
-                .port(Topic::Tf, type_name::TF_MESSAGE, TRANSFORMS_BYTES, config.rate)?
+                .port(Topic::Tf, TRANSFORMS_BYTES, config.rate)?
                 .map(|port| port.stream(TfMessage::of(&config.name))),
-            path: maker.port(Topic::Path, type_name::PATH, path_bytes, 1.0)?,
+            path: maker.port(Topic::Path, path_bytes, 1.0)?,
             latest_alert: None,
             skipped_periods: 0,
             discarded: 0,
@@ -122,28 +110,18 @@ impl Topics {
 impl Sink for Topics {
     fn frame(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
         self.attend();
-        let stamp = Time::of(header.stamp_ns);
         let discarded = &mut self.discarded;
         if let Some(stream) = &mut self.handles {
-            stream.publish(discarded, |message| {
-                message.header.stamp = stamp;
-                message.frame = *header;
-                message.poses.copy_from_slice(handles);
-            });
+            stream.publish(discarded, |message| message.update(header, handles));
         }
         if let Some(stream) = &mut self.poses {
-            stream.publish(discarded, |message| {
-                message.header.stamp = stamp;
-                for (pose, handle) in message.poses.iter_mut().zip(handles) {
-                    *pose = Pose::of(handle);
-                }
-            });
+            stream.publish(discarded, |message| message.update(header, handles));
         }
         if let Some(port) = &mut self.clock {
-            port.send(Arc::new(Clock { clock: Time::of_seconds(header.sim_time) }), discarded);
+            port.send(Arc::new(Clock::of(header)), discarded);
         }
         if let Some(stream) = &mut self.transforms {
-            stream.publish(discarded, |message| message.update(stamp, handles));
+            stream.publish(discarded, |message| message.update(header, handles));
         }
         if let Some(stream) = &mut self.markers {
             let (stage, alert) = (&self.stage, self.latest_alert.as_ref());
@@ -197,7 +175,7 @@ mod tests {
 
     use super::*;
     use crate::transports::ros2::port::HEADER_BYTES;
-    use crate::wire::SceneName;
+    use crate::wire::{SEGMENT_ARC, SceneName, StageSegment};
 
     fn bytes<Message: Serialize>(message: &Message) -> usize {
         CDRSerializerAdapter::<Message>::to_bytes(message).unwrap().len()
@@ -215,15 +193,15 @@ mod tests {
             bytes(&Stamped::alert(alert)),
             bytes(&diagnostics),
             bytes(&Stamped::cue(Cue { name: SceneName::new(&"n".repeat(100)), ..Cue::default() })),
-            bytes(&Clock { clock: Time::default() }),
+            bytes(&Clock::of(&FrameHeader::default())),
         ];
         assert!(seldom.iter().all(|bytes| *bytes < SELDOM_BYTES), "{seldom:?} bytes of {SELDOM_BYTES}");
-        let points = vec![Pose::of(&HandlePose::default()); 1000];
-        assert!(bytes(&Path::of(0, &points)) < SELDOM_BYTES + 1000 * PATH_POSE_BYTES);
+        let mut stage = Stage { segments: 1, ..Stage::default() };
+        stage.path[0] = StageSegment { length: 10.0, curvature: 10.0, kind: SEGMENT_ARC, ..StageSegment::default() };
+        let path = Path::of(&stage);
+        assert!(path.poses.len() > 1000 && bytes(&path) < SELDOM_BYTES + path.poses.len() * PATH_POSE_BYTES);
         let transforms = bytes(&TfMessage::of(&"n".repeat(255)));
         assert!(transforms < TRANSFORMS_BYTES, "{transforms}");
-        let poses = vec![HandlePose::default(); 224];
-        let frame = HandlePoses { header: Header::of(0), frame: FrameHeader::default(), poses };
-        assert!(bytes(&frame) < HEADER_BYTES + 224 * size_of::<HandlePose>());
+        assert!(bytes(&HandlePoses::of(224)) < HEADER_BYTES + 224 * size_of::<HandlePose>());
     }
 }

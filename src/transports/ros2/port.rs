@@ -15,6 +15,7 @@ use serde::Serialize;
 
 use super::matching::Matches;
 use super::{Ros2Config, Ros2Error};
+use crate::ros2_messages::MessageType;
 use crate::scene::ros2::{Durability, Qos, Reliability, Topic};
 use crate::wire::Stage;
 
@@ -136,12 +137,11 @@ impl Maker<'_> {
     pub(super) fn stream<Message: Serialize>(
         &mut self,
         topic: Topic,
-        type_name: &str,
         each: usize,
         message: impl FnOnce() -> Message,
     ) -> Result<Option<Stream<Message>>, Ros2Error> {
         let bytes = HEADER_BYTES + self.config.handles * each;
-        let port = self.port(topic, type_name, bytes, self.config.rate)?;
+        let port = self.port(topic, bytes, self.config.rate)?;
         Ok(port.map(|port| port.stream(message())))
     }
 
@@ -149,17 +149,16 @@ impl Maker<'_> {
     pub(super) fn port<Message: Serialize>(
         &mut self,
         topic: Topic,
-        type_name: &str,
         bytes: usize,
         rate: f64,
     ) -> Result<Option<Port<Message>>, Ros2Error> {
         let Some(qos) = self.config.settings.topics.get(&topic) else { return Ok(None) };
         let name = topic.path(&self.config.name);
         let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(format!("topic {name}: {error}"));
-        let participant = self.context.domain_participant();
+        let (participant, type_name) = (self.context.domain_participant(), MessageType::of(topic).dds_name());
         // Made here and not through the node, whose quality of service knows no limit of memory.
         let dds = participant
-            .create_topic(format!("rt{name}"), type_name.to_owned(), &policies(*qos, bytes, rate), TopicKind::NoKey)
+            .create_topic(format!("rt{name}"), type_name, &policies(*qos, bytes, rate), TopicKind::NoKey)
             .map_err(|error| failed(&error))?;
         let publisher = self.node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
         let latched =

@@ -1,0 +1,208 @@
+//! `record`: keeps a running show as MCAP.
+
+use std::io::{self, IsTerminal};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use bench_dragon::recording::mcap::recorder::{DEFAULT_TOPICS, Recorded, Recorder, RecorderConfig, Split};
+use bench_dragon::scene::ros2::Topic;
+use bench_dragon::subscribers::connection::Wake;
+use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
+use bench_dragon::subscribers::record::{self, RecordQueue, RecordThread};
+use bench_dragon::wire::sentence::rounded;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use super::{CommandError, Common, Output, stop_on_signals, wall_seconds};
+
+/// Frames that may wait in the shared memory before they are looked for, where its queue is the shortest.
+const UNREAD_FRAMES: f64 = 2.0;
+/// The shortest and the longest time between two looks.
+const POLL_INTERVAL: (Duration, Duration) = (Duration::from_millis(1), Duration::from_millis(20));
+/// How often the terminal shows how far it is.
+const PROGRESS_INTERVAL: Duration = Duration::from_millis(200);
+/// The smallest file that a recording is split into.
+const LEAST_SPLIT: u64 = 1_000_000;
+
+/// Arguments of `record`.
+#[derive(Debug, clap::Args)]
+pub struct RecordArguments {
+    /// The file to write; further ones are numbered after it
+    #[arg(short, long, value_name = "FILE", required_unless_present = "recover")]
+    output: Option<PathBuf>,
+    /// The topics to record, of handles, poses, alerts, stage, status, diagnostics, path, cues (all of which are recorded by
+    /// default), markers, clock, tf
+    #[arg(long, value_name = "TOPICS", value_delimiter = ',', value_parser = topic, conflicts_with = "recover")]
+    topics: Vec<Topic>,
+    /// Begin another file after so much (1GB, 500MB) or so long (1h, 90s); one begins with every run anyway
+    #[arg(long, value_name = "SIZE|TIME", value_parser = split, conflicts_with = "recover")]
+    split: Option<Split>,
+    /// Wall time after which to end: 60, 90s, 5m, 8h
+    #[arg(long, value_name = "TIME", value_parser = wall_seconds, conflicts_with = "recover")]
+    duration: Option<f64>,
+    /// Replace files that exist
+    #[arg(long)]
+    force: bool,
+    /// Mend a recording that was cut: keep every finished chunk, in FILE-recovered.mcap or the --output
+    #[arg(long, value_name = "FILE")]
+    recover: Option<PathBuf>,
+}
+
+/// The line of `record --json`.
+#[derive(Serialize)]
+struct Summary {
+    files: Vec<String>,
+    frames: u64,
+    missed: u64,
+    bytes: u64,
+    seconds: f64,
+}
+
+/// Records until the duration is over, a signal comes or the disk takes no more; or mends a recording.
+pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), CommandError> {
+    let Some(file) = &arguments.output else {
+        return Err(CommandError::BadInput("expected -o FILE".to_owned()));
+    };
+    let mut topics = if arguments.topics.is_empty() { DEFAULT_TOPICS.to_vec() } else { arguments.topics.clone() };
+    topics.sort_unstable();
+    topics.dedup();
+    let mut feed = Feed::new(&common.name, FeedOptions { wake: Wake::Never, frames: Frames::All })?;
+    let stop = stop_on_signals()?;
+    // A file that may not grow is then a failed write, and no signal that ends the process.
+    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
+    let config = RecorderConfig {
+        name: common.name.clone(),
+        file: file.clone(),
+        replace: arguments.force,
+        topics,
+        split: arguments.split,
+    };
+    let recorder = Recorder::new(config).map_err(|error| refused(file, &error))?;
+    let (queue, thread) = record::start(recorder)?;
+    if !common.quiet {
+        eprintln!("Recording \"{}\" to {}; Ctrl-C ends.", common.name, file.display());
+    }
+    let over = || stop.load(Ordering::Relaxed);
+    let fed = follow(&mut feed, &queue, &thread, arguments.duration, over, &progress(common));
+    let (recorded, failure) = thread.finish(queue);
+    print(common, &recorded)?;
+    fed?;
+    match failure {
+        Some(error) => Err(CommandError::Failed(error.to_string())),
+        None if recorded.frames == 0 => {
+            Err(CommandError::Failed(format!("nothing came from \"{}\": there is no recording", common.name)))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Passes on what comes until it is over or the thread has ended.
+fn follow(
+    feed: &mut Feed,
+    queue: &RecordQueue,
+    thread: &RecordThread,
+    duration: Option<f64>,
+    over: impl Fn() -> bool,
+    bar: &ProgressBar,
+) -> Result<(), CommandError> {
+    let began = Instant::now();
+    let (shortest, longest) = POLL_INTERVAL;
+    let (mut interval, mut shown) = (shortest, began);
+    while !over() && !thread.has_ended() && duration.is_none_or(|seconds| began.elapsed().as_secs_f64() < seconds) {
+        feed.poll(interval, &mut |event| {
+            if let FeedEvent::Status(status) = event {
+                let seconds = Duration::try_from_secs_f64(UNREAD_FRAMES / status.rate);
+                interval = seconds.unwrap_or(longest).clamp(shortest, longest);
+            }
+            queue.handle(&event);
+        })?;
+        if shown.elapsed() >= PROGRESS_INTERVAL {
+            shown = Instant::now();
+            bar.set_message(sentence(&thread.recorded()));
+            bar.tick();
+        }
+    }
+    bar.finish_and_clear();
+    Ok(())
+}
+
+/// A line on standard error that shows how far it is, hidden where that is no terminal.
+fn progress(common: &Common) -> ProgressBar {
+    if common.quiet || common.json || !io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    // The template is a constant that a test has parsed; the default bar would do as well.
+    let style = ProgressStyle::with_template("{spinner} {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
+    ProgressBar::new_spinner().with_style(style).with_message("waiting for a publisher")
+}
+
+/// How much has been recorded.
+fn sentence(recorded: &Recorded) -> String {
+    let Recorded { frames, missed, bytes, .. } = *recorded;
+    if frames == 0 {
+        return "waiting for a publisher".to_owned();
+    }
+    format!("{}, {}, {frames} frames, {missed} missed", time(recorded), size(bytes))
+}
+
+/// The time that was recorded, as 1:02:03.4.
+fn time(recorded: &Recorded) -> String {
+    let tenths = recorded.nanoseconds / 100_000_000;
+    let (seconds, minutes, hours) = (tenths / 10 % 60, tenths / 600 % 60, tenths / 36_000);
+    format!("{hours}:{minutes:02}:{seconds:02}.{}", tenths % 10)
+}
+
+fn size(bytes: u64) -> String {
+    format!("{} MB", rounded(bytes as f64 / 1e6, 1))
+}
+
+fn print(common: &Common, recorded: &Recorded) -> Result<(), CommandError> {
+    let mut output = Output::standard();
+    let files: Vec<String> = recorded.files.iter().map(|file| file.display().to_string()).collect();
+    let Recorded { frames, missed, bytes, nanoseconds, .. } = *recorded;
+    if common.json {
+        output.json(&Summary { files, frames, missed, bytes, seconds: nanoseconds as f64 / 1e9 })?;
+    } else if frames > 0 {
+        output.line(&format!("Recorded {}: {}", sentence(recorded), files.join(", ")))?;
+    }
+    output.finish()
+}
+
+/// The sentence for a file that cannot be made.
+fn refused(file: &std::path::Path, error: &io::Error) -> CommandError {
+    let shown = file.display();
+    CommandError::BadInput(if error.kind() == io::ErrorKind::AlreadyExists {
+        format!("{shown} exists, expected another file, or --force to replace it")
+    } else {
+        format!("{shown}: {error}, expected a file to write")
+    })
+}
+
+/// A topic by its name, for clap.
+fn topic(text: &str) -> Result<Topic, String> {
+    let names = || Topic::ALL.map(Topic::name).join(", ");
+    let found = Topic::ALL.into_iter().find(|topic| topic.name() == text.trim());
+    found.ok_or_else(|| format!("expected topics of {}", names()))
+}
+
+/// A size or a time after which a recording goes on in another file, for clap.
+fn split(text: &str) -> Result<Split, String> {
+    let text = text.trim();
+    let units = [("KB", 1e3), ("MB", 1e6), ("GB", 1e9), ("TB", 1e12)];
+    let upper = text.to_uppercase();
+    let size =
+        units.iter().find_map(|(unit, bytes)| Some(upper.strip_suffix(unit)?.trim().parse::<f64>().ok()? * bytes));
+    if let Some(bytes) = size.filter(|bytes| *bytes >= LEAST_SPLIT as f64 && *bytes <= 1e18) {
+        return Ok(Split::Bytes(bytes as u64));
+    }
+    let has_unit = text.ends_with(['s', 'm', 'h']);
+    match wall_seconds(text).ok().filter(|seconds| has_unit && *seconds >= 1.0) {
+        Some(seconds) => Ok(Split::Nanoseconds((seconds * 1e9) as u64)),
+        None => {
+            Err("expected a size of at least 1MB, such as 500MB or 1GB, or a time of at least 1s, such as 90s or 1h"
+                .to_owned())
+        }
+    }
+}

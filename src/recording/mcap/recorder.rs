@@ -1,0 +1,496 @@
+//! A show as files: which messages a topic gets, where a file ends and the next begins, and what is counted.
+//!
+//! In: what a subscriber receives, in the order in which it does. Out: files of one run each. Called by the subscriber that
+//! records, on its thread.
+
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use super::file::{Batch, McapFile};
+use crate::ros2_messages::diagnostics::DiagnosticArray;
+use crate::ros2_messages::markers::MarkerArray;
+use crate::ros2_messages::path::Path as PathMessage;
+use crate::ros2_messages::transforms::TfMessage;
+use crate::ros2_messages::{Clock, HandlePoses, PoseArray, Stamped};
+use crate::scene::ros2::Topic;
+use crate::wire::json::{Exact, StageObject};
+use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+
+/// What is recorded by default: all that a replay needs, and what tools show without this program's messages.
+pub const DEFAULT_TOPICS: [Topic; 8] = [
+    Topic::Handles,
+    Topic::Poses,
+    Topic::Alerts,
+    Topic::Stage,
+    Topic::Status,
+    Topic::Diagnostics,
+    Topic::Path,
+    Topic::Cues,
+];
+/// Messages of a run that are kept until its first frame.
+const MOST_EARLY: usize = 256;
+/// The name of the attachment.
+const ATTACHMENT: &str = "bench_dragon.json";
+
+/// When a recording goes on in another file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Split {
+    /// Before a file has more bytes than this, unless one frame has more.
+    Bytes(u64),
+    /// After so many nanoseconds of the publisher's monotonic clock.
+    Nanoseconds(u64),
+}
+
+/// What is recorded, and where.
+#[derive(Debug, Clone)]
+pub struct RecorderConfig {
+    /// The publisher's name, which is the namespace of the topics.
+    pub name: String,
+    /// The first file; the others are numbered after it.
+    pub file: PathBuf,
+    /// Whether files that exist are replaced.
+    pub replace: bool,
+    /// The topics.
+    pub topics: Vec<Topic>,
+    /// When a file ends, besides with its run.
+    pub split: Option<Split>,
+}
+
+/// What has been recorded so far.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Recorded {
+    /// The files, in the order of time.
+    pub files: Vec<PathBuf>,
+    /// Frames in them.
+    pub frames: u64,
+    /// Frames of the same runs that did not come, between those that did.
+    pub missed: u64,
+    /// Bytes of all files.
+    pub bytes: u64,
+    /// Nanoseconds from the first to the last frame of each run, added up.
+    pub nanoseconds: u64,
+}
+
+/// Why a recording ended early, in one sentence.
+#[derive(Debug, thiserror::Error)]
+#[error("{file}: {error}: the recording ends there, {state}")]
+pub struct RecordError {
+    file: String,
+    error: io::Error,
+    state: &'static str,
+}
+
+/// A message that came before the first frame of its run.
+#[derive(Debug, Clone, Copy)]
+enum Early {
+    Stage(Stage),
+    Alert(CollisionAlert),
+    Cue(Cue),
+    Status(LoopStatus),
+}
+
+impl Early {
+    fn run_id(&self) -> u64 {
+        match self {
+            Self::Stage(stage) => stage.run_id,
+            Self::Alert(alert) => alert.run_id,
+            Self::Cue(cue) => cue.run_id,
+            Self::Status(status) => status.run_id,
+        }
+    }
+}
+
+/// A run, and the file that its frames go to.
+struct Run {
+    run_id: u64,
+    file: McapFile,
+    /// Of the file's first frame and of the run's latest.
+    file_began_ns: u64,
+    latest_deadline_ns: u64,
+    attached: bool,
+    /// What a subscriber that joins now would get besides frames.
+    stage: Option<Stage>,
+    alert: Option<CollisionAlert>,
+    cue: Option<Cue>,
+    status: Option<LoopStatus>,
+    /// Periods skipped as of the latest status; `None` where it is not known how many were skipped before.
+    skipped: Option<u64>,
+    /// Messages so far of what is not sent with every frame.
+    seldom: u32,
+}
+
+/// Records.
+pub struct Recorder {
+    config: RecorderConfig,
+    /// The first file until the first frame; whether it is to be removed if there is none.
+    first: Option<(File, bool)>,
+    run: Option<Run>,
+    early: Vec<Early>,
+    recorded: Recorded,
+    /// Bytes of the files that are finished.
+    finished_bytes: u64,
+    number: u64,
+    batch: Batch,
+    handles: HandlePoses,
+    poses: PoseArray,
+    markers: Option<MarkerArray>,
+    transforms: TfMessage,
+}
+
+impl Recorder {
+    /// A recorder, whose first file is there and empty, unless it is to be replaced.
+    ///
+    /// # Errors
+    /// The file cannot be made, or is there and is not to be replaced.
+    pub fn new(config: RecorderConfig) -> io::Result<Self> {
+        let is_new = !config.file.exists();
+        let file = open(&config.file, config.replace)?;
+        let transforms = TfMessage::of(&config.name);
+        Ok(Self {
+            config,
+            first: Some((file, is_new)),
+            run: None,
+            early: Vec::new(),
+            recorded: Recorded::default(),
+            finished_bytes: 0,
+            number: 1,
+            batch: Batch::default(),
+            handles: HandlePoses::of(0),
+            poses: PoseArray::of(0),
+            markers: None,
+            transforms,
+        })
+    }
+
+    /// What has been recorded so far.
+    pub fn recorded(&self) -> &Recorded {
+        &self.recorded
+    }
+
+    /// A frame, before which `missed` of its run did not come.
+    ///
+    /// # Errors
+    /// [`RecordError`]; the files are finished then.
+    pub fn frame(&mut self, frame: &FrameHeader, handles: &[HandlePose], missed: u64) -> Result<(), RecordError> {
+        self.recorded.missed += missed;
+        match &self.run {
+            Some(run) if run.run_id == frame.run_id => {
+                let since = frame.deadline_ns.saturating_sub(run.file_began_ns);
+                if matches!(self.config.split, Some(Split::Nanoseconds(most)) if since >= most) {
+                    self.next_file(frame)?;
+                }
+            }
+            _ => self.begin(frame)?,
+        }
+        self.encode_frame(frame, handles);
+        if !self.has_room()? {
+            self.next_file(frame)?;
+            self.encode_frame(frame, handles);
+        }
+        self.append_batch()?;
+        self.recorded.frames += 1;
+        if let Some(run) = &mut self.run {
+            self.recorded.nanoseconds += frame.deadline_ns.saturating_sub(run.latest_deadline_ns);
+            run.latest_deadline_ns = frame.deadline_ns;
+        }
+        Ok(())
+    }
+
+    /// A stage.
+    ///
+    /// # Errors
+    /// As [`Recorder::frame`].
+    pub fn stage(&mut self, stage: &Stage) -> Result<(), RecordError> {
+        self.seldom(Early::Stage(*stage))
+    }
+
+    /// An alert.
+    ///
+    /// # Errors
+    /// As [`Recorder::frame`].
+    pub fn alert(&mut self, alert: &CollisionAlert) -> Result<(), RecordError> {
+        self.seldom(Early::Alert(*alert))
+    }
+
+    /// A cue.
+    ///
+    /// # Errors
+    /// As [`Recorder::frame`].
+    pub fn cue(&mut self, cue: &Cue) -> Result<(), RecordError> {
+        self.seldom(Early::Cue(*cue))
+    }
+
+    /// A status.
+    ///
+    /// # Errors
+    /// As [`Recorder::frame`].
+    pub fn status(&mut self, status: &LoopStatus) -> Result<(), RecordError> {
+        self.seldom(Early::Status(*status))
+    }
+
+    /// Does what is due. To be called several times a second.
+    ///
+    /// # Errors
+    /// As [`Recorder::frame`].
+    pub fn maintain(&mut self) -> Result<(), RecordError> {
+        let Some(run) = &mut self.run else { return Ok(()) };
+        let done = run.file.maintain();
+        self.recorded.bytes = self.finished_bytes + run.file.bytes();
+        done.or_else(|error| self.fail(error))
+    }
+
+    /// Finishes the file of the run, if there is one: its publisher has gone, or the recording ends.
+    ///
+    /// # Errors
+    /// As [`Recorder::frame`].
+    pub fn finish_run(&mut self) -> Result<(), RecordError> {
+        let Some(mut run) = self.run.take() else { return Ok(()) };
+        let attached = attach(&mut run, &self.config.name);
+        let finished = run.file.finish();
+        let bytes = *finished.as_ref().unwrap_or_else(|(bytes, _)| bytes);
+        self.finished_bytes += bytes;
+        self.recorded.bytes = self.finished_bytes;
+        match (attached, finished) {
+            (Err(error), _) | (_, Err((_, error))) => {
+                Err(self.error(error, "the file has no end: mend it with record --recover"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Ends the recording. A file that has got no frame is removed.
+    ///
+    /// # Errors
+    /// As [`Recorder::frame`].
+    pub fn finish(&mut self) -> Result<(), RecordError> {
+        if let Some((_, is_new)) = self.first.take()
+            && is_new
+        {
+            // Whoever has removed it before has done the same.
+            let _ = std::fs::remove_file(&self.config.file);
+        }
+        self.finish_run()
+    }
+
+    /// Begins the first file of a run with what came before its first frame.
+    fn begin(&mut self, frame: &FrameHeader) -> Result<(), RecordError> {
+        self.finish_run()?;
+        let file = self.make_file(frame)?;
+        self.run = Some(Run {
+            run_id: frame.run_id,
+            file,
+            file_began_ns: frame.deadline_ns,
+            latest_deadline_ns: frame.deadline_ns,
+            attached: false,
+            stage: None,
+            alert: None,
+            cue: None,
+            status: None,
+            skipped: (frame.sequence == 0).then_some(0),
+            seldom: 0,
+        });
+        for early in std::mem::take(&mut self.early) {
+            if early.run_id() == frame.run_id {
+                self.seldom(early)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes on in another file, which begins with what a subscriber that joins now would get.
+    fn next_file(&mut self, frame: &FrameHeader) -> Result<(), RecordError> {
+        let Some(run) = &self.run else { return Ok(()) };
+        let Run { run_id, stage, alert, cue, status, skipped, seldom, latest_deadline_ns, .. } = *run;
+        self.finish_run()?;
+        let file = self.make_file(frame)?;
+        self.run = Some(Run {
+            run_id,
+            file,
+            file_began_ns: frame.deadline_ns,
+            latest_deadline_ns,
+            attached: false,
+            stage,
+            alert,
+            cue,
+            status,
+            skipped,
+            seldom,
+        });
+        let held = [stage.map(Early::Stage), alert.map(Early::Alert), cue.map(Early::Cue)];
+        held.into_iter().flatten().try_for_each(|held| self.seldom(held))
+    }
+
+    /// The next file, for which this is the first frame.
+    fn make_file(&mut self, frame: &FrameHeader) -> Result<McapFile, RecordError> {
+        let (path, file) = match self.first.take() {
+            Some((file, _)) => (self.config.file.clone(), file.set_len(0).or_else(no_regular_file).map(|()| file)),
+            None => loop {
+                self.number += 1;
+                let path = numbered(&self.config.file, self.number);
+                let file = open(&path, self.config.replace);
+                // In the midst of a show no file is worth an end.
+                if !matches!(&file, Err(error) if error.kind() == io::ErrorKind::AlreadyExists) {
+                    break (path, file);
+                }
+            },
+        };
+        self.recorded.files.push(path);
+        let limit = match self.config.split {
+            Some(Split::Bytes(most)) => Some(most),
+            _ => None,
+        };
+        let RecorderConfig { name, topics, .. } = &self.config;
+        let made = file.and_then(|file| McapFile::new(file, name, topics, frame.stamp_ns, limit));
+        made.map_err(|error| self.error(error, "nothing is in it"))
+    }
+
+    /// Makes the batch that of a frame.
+    fn encode_frame(&mut self, frame: &FrameHeader, handles: &[HandlePose]) {
+        self.batch.clear();
+        let (stamp_ns, sequence) = (frame.stamp_ns, frame.sequence as u32);
+        let run = self.run.as_ref();
+        for topic in &self.config.topics {
+            let (topic, batch) = (*topic, &mut self.batch);
+            match topic {
+                Topic::Handles => {
+                    self.handles.update(frame, handles);
+                    batch.push(topic, stamp_ns, sequence, &self.handles);
+                }
+                Topic::Poses => {
+                    self.poses.update(frame, handles);
+                    batch.push(topic, stamp_ns, sequence, &self.poses);
+                }
+                Topic::Clock => batch.push(topic, stamp_ns, sequence, &Clock::of(frame)),
+                Topic::Tf => {
+                    self.transforms.update(frame, handles);
+                    batch.push(topic, stamp_ns, sequence, &self.transforms);
+                }
+                Topic::Markers => {
+                    let stage = run.and_then(|run| run.stage.as_ref());
+                    if let (Some(markers), Some(stage)) = (&mut self.markers, stage) {
+                        markers.update(frame, handles, stage, run.and_then(|run| run.alert.as_ref()));
+                        batch.push(topic, stamp_ns, sequence, markers);
+                    }
+                }
+                Topic::Alerts | Topic::Stage | Topic::Diagnostics | Topic::Status | Topic::Path | Topic::Cues => (),
+            }
+        }
+    }
+
+    /// A message that is not sent with every frame.
+    fn seldom(&mut self, message: Early) -> Result<(), RecordError> {
+        let Some(run) = self.run.as_mut().filter(|run| run.run_id == message.run_id()) else {
+            // Without frames there is nothing to keep it with.
+            if self.early.len() < MOST_EARLY {
+                self.early.push(message);
+            }
+            return Ok(());
+        };
+        let sequence = run.seldom;
+        run.seldom = sequence.wrapping_add(1);
+        self.batch.clear();
+        let batch = &mut self.batch;
+        let topics = &self.config.topics;
+        match message {
+            Early::Stage(stage) => {
+                run.stage = Some(stage);
+                if topics.contains(&Topic::Markers) {
+                    self.markers = Some(MarkerArray::of(&stage));
+                }
+                batch.push(Topic::Stage, stage.stamp_ns, sequence, &Stamped::stage(stage));
+                if topics.contains(&Topic::Path) {
+                    batch.push(Topic::Path, stage.stamp_ns, sequence, &PathMessage::of(&stage));
+                }
+            }
+            Early::Alert(alert) => {
+                run.alert = Some(alert);
+                batch.push(Topic::Alerts, alert.stamp_ns, sequence, &Stamped::alert(alert));
+            }
+            Early::Cue(cue) => {
+                run.cue = Some(cue);
+                batch.push(Topic::Cues, cue.stamp_ns, sequence, &Stamped::cue(cue));
+            }
+            Early::Status(status) => {
+                run.status = Some(status);
+                let skipped = run.skipped.replace(status.skipped).unwrap_or(status.skipped);
+                let skipped = status.skipped.saturating_sub(skipped);
+                batch.push(Topic::Status, status.stamp_ns, sequence, &Stamped::status(status));
+                let message = DiagnosticArray::of(&self.config.name, &status, run.alert.as_ref(), skipped, 0);
+                batch.push(Topic::Diagnostics, status.stamp_ns, sequence, &message);
+            }
+        }
+        let attached = if run.attached || run.stage.is_none() || run.status.is_none() {
+            Ok(())
+        } else {
+            attach(run, &self.config.name)
+        };
+        attached.or_else(|error| self.fail(error))?;
+        // Files are split before frames only.
+        self.append_batch()
+    }
+
+    /// Whether the batch fits into this file.
+    fn has_room(&mut self) -> Result<bool, RecordError> {
+        let room = self.run.as_mut().map_or(Ok(true), |run| run.file.has_room(&self.batch));
+        room.or_else(|error| self.fail(error))
+    }
+
+    fn append_batch(&mut self) -> Result<(), RecordError> {
+        let appended = self.run.as_mut().map_or(Ok(()), |run| run.file.append(&self.batch));
+        appended.or_else(|error| self.fail(error))
+    }
+
+    /// Finishes the file as far as the disk takes it, and returns the error.
+    fn fail<Done>(&mut self, error: io::Error) -> Result<Done, RecordError> {
+        let state = match self.finish_run() {
+            Ok(()) => "the file is whole up to there",
+            Err(_) => "the file has no end: mend it with record --recover",
+        };
+        Err(self.error(error, state))
+    }
+
+    fn error(&self, error: io::Error, state: &'static str) -> RecordError {
+        let file = self.recorded.files.last().unwrap_or(&self.config.file).display().to_string();
+        RecordError { file, error, state }
+    }
+}
+
+/// Attaches what is known of the run and is no message.
+fn attach(run: &mut Run, name: &str) -> io::Result<()> {
+    if std::mem::replace(&mut run.attached, true) {
+        return Ok(());
+    }
+    let scene = run.status.as_ref().map(|status| status.scene.as_str().to_owned());
+    let object = json!({
+        "run_id": Exact(run.run_id), "name": name, "scene": scene, "stage": run.stage.as_ref().map(StageObject::from),
+    });
+    let time_ns = run.stage.as_ref().map_or(0, |stage| stage.stamp_ns);
+    run.file.attach(ATTACHMENT, "application/json", time_ns, object.to_string().as_bytes())
+}
+
+/// An empty file to write, or with `replace` one that keeps its content until its first frame.
+fn open(path: &Path, replace: bool) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.write(true);
+    if replace {
+        options.create(true).truncate(false)
+    } else {
+        options.create_new(true)
+    };
+    options.open(path)
+}
+
+/// A device has no length to set.
+fn no_regular_file(error: io::Error) -> io::Result<()> {
+    if error.raw_os_error() == Some(nix::libc::EINVAL) { Ok(()) } else { Err(error) }
+}
+
+/// `show-2.mcap` for `show.mcap`.
+fn numbered(path: &Path, number: u64) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let extension = path.extension().map_or(String::new(), |extension| format!(".{}", extension.to_string_lossy()));
+    path.with_file_name(format!("{stem}-{number}{extension}"))
+}
