@@ -11,7 +11,7 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use bench_dragon::live::control::{Door, Doors, door};
-use bench_dragon::live::{Frames, Publisher};
+use bench_dragon::live::{Frames, Outgoing, Publisher};
 use bench_dragon::scene::Scene;
 use bench_dragon::show::{Playback, Show};
 use bench_dragon::subscribers::connection::{Connection, Subscription, Wake};
@@ -114,7 +114,7 @@ fn measure(benches: usize) {
                 timed(times, || {
                     let frame = show.frame(tick);
                     let header = frame_header(frame, stamps(tick));
-                    publisher.publish(&header, frame).expect("nobody else uses this service");
+                    publisher.publish(Outgoing::new(&header, frame)).expect("nobody else uses this service");
                 });
                 drain(&connection);
             }
@@ -124,7 +124,9 @@ fn measure(benches: usize) {
             let chain = &mut frame.chain;
             timed(&mut times.solver, || choice.solver.solve(time, chain).expect("200 s is before the lock"));
             let header = frame_header(&frame, stamps(tick));
-            timed(&mut times.publish, || publisher.publish(&header, &frame).expect("nobody else uses this service"));
+            timed(&mut times.publish, || {
+                publisher.publish(Outgoing::new(&header, &frame)).expect("nobody else uses this service")
+            });
             drain(&connection);
         }
         for tick in ticks.clone() {
@@ -187,7 +189,7 @@ fn measure_doors() {
                     doors.take_one(&mut show, tick);
                     let frame = Frames::frame(&mut show, tick);
                     let header = frame_header(frame, stamps(tick));
-                    publisher.publish(&header, frame).expect("nobody else uses this service");
+                    publisher.publish(Outgoing::new(&header, frame)).expect("nobody else uses this service");
                     doors.finish_step(&mut show, tick);
                 });
                 drain(&connection);

@@ -1,15 +1,16 @@
-//! Recordings: what a run leaves on disk, and the proof that it can be played again.
+//! Recordings: what a run leaves on disk, how it is played again, and the proof that it can be.
 //!
 //! In: frames, and the commands that led to them. Out: `run --log`'s file, and the verdict of `verify`. [`lines`] is the
 //! file's format, [`hash`] what is computed over frames; [`log`] is the loop's end and the thread that writes; [`verify`]
-//! plays the show of a file again. Called by the commands `run` and `verify`. docs/recordings.md describes the file for
-//! other programs.
+//! plays the show of a file again. [`mcap`] is the messages of a show as a file, and [`replay`] makes frames of them. Called
+//! by the commands `run`, `verify`, `record` and `replay`. docs/recordings.md describes the files for other programs.
 
 pub mod arithmetic;
 pub mod hash;
 pub mod lines;
 pub mod log;
 pub mod mcap;
+pub mod replay;
 pub mod verify;
 mod writer;
 

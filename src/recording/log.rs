@@ -17,12 +17,11 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use super::hash::{HEADER_SLOTS, Slot, header_slots, pose_slot};
 use super::lines::ShowLine;
 use super::writer::LogWriter;
-use crate::live::{Deliveries, PublishError, Publisher, StatusPublisher};
-use crate::show::Frame;
+use crate::live::{Deliveries, Outgoing, PublishError, Publisher, StatusPublisher};
 use crate::show::control::{Code, Command, CommandRecord};
 use crate::transports::{Transport, TransportError};
+use crate::wire::LoopStatus;
 use crate::wire::convert::handle_poses;
-use crate::wire::{FrameHeader, LoopStatus};
 
 /// Seconds of frames that the thread may fall behind before frames are lost, and the memory that these may take.
 const QUEUED_SECONDS: f64 = 5.0;
@@ -142,7 +141,8 @@ impl LogPublisher {
 }
 
 impl Publisher for LogPublisher {
-    fn publish(&mut self, header: &FrameHeader, frame: &Frame) -> Result<(), PublishError> {
+    fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
+        let Outgoing { header, frame, .. } = outgoing;
         let tick = header.tick;
         if self.shared.missing_from.load(Ordering::Relaxed) != NEVER {
             return Ok(());

@@ -11,8 +11,8 @@ use super::arithmetic::Arithmetic;
 use super::lines::{Line, Seal, ShowLine};
 use super::log::{empty, queue_of};
 use super::writer::LogWriter;
-use crate::live::Publisher;
 use crate::live::simulated::Wake;
+use crate::live::{Outgoing, Publisher};
 use crate::scene::AtEnd;
 use crate::show::control::{Code, Command, CommandRecord};
 use crate::show::{Playback, Show};
@@ -159,7 +159,7 @@ fn a_log_that_is_too_far_behind_says_where_it_ends() {
     let mut show = Show::new(&scene, scene.motion.timeline_without_contact(), playback).unwrap();
     for tick in 0..40 {
         let header = FrameHeader { tick, ..Default::default() };
-        publisher.publish(&header, show.frame(tick)).unwrap();
+        publisher.publish(Outgoing::new(&header, show.frame(tick))).unwrap();
     }
     let file = File::default();
     let line = ShowLine::new(&scene_text(NEWTON, false), &playback, Arithmetic::of(&scene), "", (1, 2));
@@ -169,7 +169,7 @@ fn a_log_that_is_too_far_behind_says_where_it_ends() {
     // Four frames of 15 slots, then the ticks of ten: the next one has no room.
     assert_eq!((counts.frames, counts.lost), (4, 10));
     // It takes nothing more, though it has room again: what is missing would not show.
-    publisher.publish(&FrameHeader { tick: 40, ..Default::default() }, show.frame(40)).unwrap();
+    publisher.publish(Outgoing::new(&FrameHeader { tick: 40, ..Default::default() }, show.frame(40))).unwrap();
     assert!(queue.is_empty());
 }
 

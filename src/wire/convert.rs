@@ -108,6 +108,33 @@ impl Decimation {
     }
 }
 
+/// Makes `frame` the one of a message, without alerts, cues and commands. What a message does not have is left as it is:
+/// signed speeds, and what is counted over a run.
+///
+/// # Errors
+/// The name of the field whose number this layout does not know; `frame` is not usable then.
+pub fn read_frame(header: &FrameHeader, poses: &[HandlePose], frame: &mut Frame) -> Result<(), &'static str> {
+    frame.state = header.frame_state().ok_or("state")?;
+    frame.playback = header.playback_state().ok_or("playback")?;
+    let FrameHeader { tick, sim_time, time_scale, min_clearance, epoch, cue, .. } = *header;
+    frame.tick = tick;
+    (frame.sim_time, frame.time_scale, frame.min_clearance) = (sim_time, time_scale, min_clearance);
+    (frame.epoch, frame.cue) = (epoch, cue);
+    let Chain { x, y, heading, vx, vy, .. } = &mut frame.chain;
+    let fields: [(&mut Vec<f64>, fn(&HandlePose) -> f64); 5] = [
+        (x, |pose| pose.x),
+        (y, |pose| pose.y),
+        (heading, |pose| pose.heading),
+        (vx, |pose| pose.vx),
+        (vy, |pose| pose.vy),
+    ];
+    for (numbers, of) in fields {
+        numbers.clear();
+        numbers.extend(poses.iter().map(of));
+    }
+    Ok(())
+}
+
 /// The message of an alert that goes with a frame.
 pub fn collision_alert(header: &FrameHeader, alert: &Alert) -> CollisionAlert {
     let FrameHeader { run_id, tick, stamp_ns, sim_time, .. } = *header;

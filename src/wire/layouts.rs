@@ -11,7 +11,7 @@
 //! link to a constant or to an enum of `show::state` gives the ROS 2 message those constants.
 
 use iceoryx2::prelude::ZeroCopySend;
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// The bench number that means "no bench".
 pub const NO_BENCH: u32 = u32::MAX;
@@ -19,7 +19,7 @@ pub const NO_BENCH: u32 = u32::MAX;
 /// Where one handle is and how it moves.
 ///
 /// Over iceoryx2 the payload of `<name>/poses` is a slice of these, the head first.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/HandlePose/1")]
 #[repr(C)]
 pub struct HandlePose {
@@ -62,7 +62,7 @@ pub struct HandlePose32 {
 /// What is true of a whole frame.
 ///
 /// Over iceoryx2 the user header of `<name>/poses` and `<name>/poses32`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/FrameHeader/2")]
 #[repr(C)]
 pub struct FrameHeader {
@@ -109,7 +109,7 @@ pub struct FrameHeader {
 /// or approaching, the one that has happened otherwise.
 ///
 /// Over iceoryx2 the payload of `<name>/alerts`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/CollisionAlert/2")]
 #[repr(C)]
 pub struct CollisionAlert {
@@ -216,13 +216,19 @@ impl Serialize for SceneName {
     }
 }
 
+impl<'de> Deserialize<'de> for SceneName {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Ok(Self::new(&String::deserialize(deserializer)?))
+    }
+}
+
 /// How the loop is doing, once a second.
 ///
 /// Figures that end in `_second` are of the last second alone, those that end in `_total` since the start of the run;
 /// all durations are in nanoseconds.
 ///
 /// Over iceoryx2 the payload of `<name>/status`. Layout 2 added the unforeseen contacts and the unsolved frames.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/LoopStatus/2")]
 #[repr(C)]
 pub struct LoopStatus {
@@ -291,7 +297,7 @@ pub struct LoopStatus {
 /// A cue that the show has reached. Payload of `<name>/cues`.
 ///
 /// Each is sent once, with the frame at or after it; a seek over cues sends none.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/Cue/1")]
 #[repr(C)]
 pub struct Cue {
@@ -364,7 +370,7 @@ pub const SEGMENT_INWARD_SPIRAL: u32 = 2;
 pub const SEGMENT_OUTWARD_SPIRAL: u32 = 3;
 
 /// One segment of the path in a [`Stage`].
-#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/StageSegment/3")]
 #[repr(C)]
 pub struct StageSegment {
@@ -407,7 +413,7 @@ pub const MOST_EVENTS: usize = 4;
 pub const MOST_CUES: usize = 32;
 
 /// An event of the show in a [`Stage`].
-#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/StageEvent/4")]
 #[repr(C)]
 pub struct StageEvent {
@@ -420,7 +426,7 @@ pub struct StageEvent {
 }
 
 /// A cue of the show in a [`Stage`].
-#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/StageCue/4")]
 #[repr(C)]
 pub struct StageCue {
@@ -441,7 +447,7 @@ pub struct StageCue {
 ///
 /// Over iceoryx2 the payload of `<name>/stage`. Layout 2 added the segments of the path, layout 3 gave them their name,
 /// layout 4 added the time line: the freeze time, the events and the cues.
-#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/Stage/4")]
 #[repr(C)]
 pub struct Stage {

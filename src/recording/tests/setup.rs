@@ -11,10 +11,10 @@ use super::super::verify::{Verdict, VerifyError, verify};
 use super::super::writer::LogWriter;
 use crate::live::control::{Door, Doors, door};
 use crate::live::simulated::{SimulatedClock, Wake};
-use crate::live::{Counts, Frames, LoopOptions, PublishError, Publisher, Reports, run_loop};
+use crate::live::{Counts, Frames, LoopOptions, Outgoing, Period, PublishError, Publisher, Reports, run_loop};
 use crate::scene::SceneText;
 use crate::show::control::Command;
-use crate::show::{Frame, Outcome, Playback, Show};
+use crate::show::{Outcome, Playback, Show};
 use crate::solve::table::Instructions;
 use crate::wire::FrameHeader;
 
@@ -58,9 +58,9 @@ impl Conducted {
 }
 
 impl Frames for Conducted {
-    fn frame(&mut self, tick: u64) -> &Frame {
+    fn frame(&mut self, tick: u64) -> Period<'_> {
         self.exchange();
-        self.show.frame(tick)
+        self.show.frame(tick).into()
     }
 
     fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
@@ -97,9 +97,9 @@ pub struct Inline {
 }
 
 impl Publisher for Inline {
-    fn publish(&mut self, header: &FrameHeader, frame: &Frame) -> Result<(), PublishError> {
-        self.publisher.publish(header, frame)?;
-        if !(self.held_up)(header.tick) {
+    fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
+        self.publisher.publish(outgoing)?;
+        if !(self.held_up)(outgoing.header.tick) {
             empty(&mut self.queue, &mut self.writer);
         }
         Ok(())
