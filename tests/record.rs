@@ -204,7 +204,7 @@ fn a_recorder_that_is_killed_loses_a_second_and_nobody_notices() {
         let file = folder.path().join(format!("killed{round}.mcap"));
         let recorder = recorder(name, &file, &[]);
         wait_for_bytes(&file, 1000);
-        wait(random.f64() * 2.0);
+        wait(1.0 + random.f64() * 2.0);
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_nanos() as u64;
         recorder.signal(Signal::SIGKILL);
         recorder.output_within(20);
@@ -227,8 +227,8 @@ fn a_recorder_that_is_killed_loses_a_second_and_nobody_notices() {
         losses[losses.len() / 2],
         losses[losses.len() - 1]
     ));
-    // A loaded machine stops a recorder for seconds; one that wrote each ten seconds would lose five in the middle.
-    assert!(losses[losses.len() / 2] < 1.5 && losses[losses.len() - 1] < 5.0, "{losses:?}");
+    // A loaded machine stops a recorder for seconds; one that wrote only at the end would lose two in the middle.
+    assert!(losses[losses.len() / 2] < 1.2 && losses[losses.len() - 1] < 5.0, "{losses:?}");
 }
 
 /// A recording on a disk that takes no more, which is whole up to there.
