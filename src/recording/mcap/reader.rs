@@ -6,17 +6,19 @@
 //! back. Called by the [`replay`](crate::recording::replay).
 
 use std::collections::HashMap;
+use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
+use std::sync::Arc;
 
 use byteorder::LittleEndian;
-use mcap::read::ChunkReader;
+use mcap::Channel;
 use mcap::records::{ChunkIndex, Record, op};
-use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
-use mcap::{Channel, MAGIC, McapError, Summary, parse_record};
 use serde::de::DeserializeOwned;
 
+use super::index::{Index, index, told};
+use super::recover::records_of_chunk;
 use crate::ros2_messages::{HandlePoses, Header, MessageType, Stamped, fields};
 use crate::scene::ros2::Topic;
 use crate::wire::{CollisionAlert, Cue, FrameHeader, LoopStatus, Stage};
@@ -149,12 +151,10 @@ impl Recording {
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let mut file = File::open(path)?;
         let length = file.seek(SeekFrom::End(0))?;
-        let summary = summary(&mut file, length)?;
-        let (channels, name) = channels(&summary)?;
-        let mut chunks = summary.chunk_indexes;
+        let Index { channels, mut chunks, counts } = index(&mut file, length)?;
+        let (channels, name) = played(&channels)?;
         chunks.sort_by_key(|chunk| chunk.chunk_start_offset);
         let handles = channels.iter().find(|(_, topic)| **topic == Topic::Handles).map(|(id, _)| *id);
-        let counts = summary.stats.map(|stats| stats.channel_message_counts);
         let frames = counts.and_then(|counts| counts.get(&handles?).copied());
         // Filled below.
         let contents = Contents {
@@ -188,7 +188,7 @@ impl Recording {
     pub fn read_chunk(&mut self, chunk: usize, handle: &mut dyn FnMut(Item)) -> Result<(), ReadError> {
         let Some(index) = self.chunks.get(chunk) else { return Ok(()) };
         let at = index.chunk_start_offset;
-        let damaged = |reason: &dyn std::fmt::Display| ReadError::Damaged { at, reason: reason.to_string() };
+        let damaged = |reason: &dyn Display| ReadError::Damaged { at, reason: reason.to_string() };
         let bytes = usize::try_from(index.chunk_length).ok().filter(|_| {
             let end = at.checked_add(index.chunk_length);
             end.is_some_and(|end| end <= self.length)
@@ -196,15 +196,11 @@ impl Recording {
         let mut record = vec![0; bytes.ok_or_else(|| damaged(&"a chunk beyond the file's end"))?];
         self.file.seek(SeekFrom::Start(at))?;
         self.file.read_exact(&mut record)?;
-        let chunk = match record.split_first_chunk() {
-            Some(([op::CHUNK, _, _, _, _, _, _, _, _], body)) => parse_record(op::CHUNK, body),
-            _ => return Err(damaged(&"no chunk is where the index has one")),
-        };
-        let Record::Chunk { header, data } = chunk.map_err(|error| damaged(&told(&error)))? else {
+        let Some(([op::CHUNK, _, _, _, _, _, _, _, _], body)) = record.split_first_chunk() else {
             return Err(damaged(&"no chunk is where the index has one"));
         };
-        for record in ChunkReader::new(header, &data).map_err(|error| damaged(&told(&error)))? {
-            let Record::Message { header, data } = record.map_err(|error| damaged(&told(&error)))? else { continue };
+        for record in records_of_chunk(body).map_err(|error| damaged(&told(&error)))? {
+            let Record::Message { header, data } = record else { continue };
             let Some(topic) = self.channels.get(&header.channel_id) else { continue };
             let item = match topic {
                 Topic::Handles => Some(Item::Frame(data.into_owned())),
@@ -319,54 +315,12 @@ fn decoded<Message: DeserializeOwned>(bytes: &[u8]) -> Option<Message> {
     cdr_encoding::from_bytes::<Message, LittleEndian>(body).ok().map(|(message, _)| message)
 }
 
-/// The index at the end of a file.
-fn summary(file: &mut File, length: u64) -> Result<Summary, ReadError> {
-    let mut magic = [0; MAGIC.len()];
-    file.seek(SeekFrom::Start(0))?;
-    match file.read_exact(&mut magic) {
-        Err(error) if error.kind() != io::ErrorKind::UnexpectedEof => return Err(error.into()),
-        _ if magic != *MAGIC => return Err(ReadError::NotMcap),
-        _ => (),
-    }
-    let mut reader = SummaryReader::new_with_options(SummaryReaderOptions::default().with_file_size(length));
-    while let Some(event) = reader.next_event() {
-        match event.map_err(|error| summary_error(&error, length))? {
-            SummaryReadEvent::ReadRequest(bytes) => {
-                let read = file.read(reader.insert(bytes))?;
-                reader.notify_read(read);
-            }
-            SummaryReadEvent::SeekRequest(to) => reader.notify_seeked(file.seek(to)?),
-        }
-    }
-    let summary = reader.finish().ok_or(ReadError::NoIndex)?;
-    let counted = summary.stats.as_ref().is_some_and(|stats| stats.message_count > 0);
-    if summary.chunk_indexes.is_empty() && counted { Err(ReadError::NoIndex) } else { Ok(summary) }
-}
-
-fn summary_error(error: &McapError, length: u64) -> ReadError {
-    match error {
-        McapError::BadMagic | McapError::BadFooter | McapError::UnexpectedEof => ReadError::NoEnd,
-        other => ReadError::Damaged { at: length, reason: told(other) },
-    }
-}
-
-/// What the reader has to say, without what it says of itself.
-fn told(error: &McapError) -> String {
-    match error {
-        McapError::UnsupportedCompression(name) => format!("its chunks are compressed by {name}, expected zstd"),
-        // binrw's sentences name its own types, over several lines.
-        McapError::Parse(_) => "a record cannot be read".to_owned(),
-        McapError::Io(error) => error.to_string(),
-        other => other.to_string(),
-    }
-}
-
 /// The channels that are played, and the name of the publisher whose they are.
-fn channels(summary: &Summary) -> Result<(HashMap<u16, Topic>, String), ReadError> {
+fn played(channels: &HashMap<u16, Arc<Channel<'_>>>) -> Result<(HashMap<u16, Topic>, String), ReadError> {
     let handles = format!("/{}", Topic::Handles.name());
     let own = MessageType::of(Topic::Handles).ros_name();
     let is_own = |channel: &Channel<'_>| channel.schema.as_ref().is_some_and(|schema| schema.name == own);
-    let all = summary.channels.values();
+    let all = channels.values();
     let mut names: Vec<&str> = all.clone().filter_map(|channel| channel.topic.strip_suffix(&handles)).collect();
     if names.len() > 1 {
         // Another's topic may end so too.
@@ -379,15 +333,15 @@ fn channels(summary: &Summary) -> Result<(HashMap<u16, Topic>, String), ReadErro
         [name] => name,
         _ => return Err(ReadError::Publishers(names.join(", "))),
     };
-    let mut channels = HashMap::new();
-    for (id, channel) in &summary.channels {
+    let mut played = HashMap::new();
+    for (id, channel) in channels {
         let last = channel.topic.strip_prefix(name).and_then(|rest| rest.strip_prefix('/'));
         if let Some(topic) = TOPICS.into_iter().find(|topic| Some(topic.name()) == last) {
             check_type(channel, topic)?;
-            channels.insert(*id, topic);
+            played.insert(*id, topic);
         }
     }
-    Ok((channels, name.trim_start_matches('/').to_owned()))
+    Ok((played, name.trim_start_matches('/').to_owned()))
 }
 
 /// Fails unless the messages of a channel are those of the topic in this version.

@@ -95,7 +95,7 @@ impl Pass {
     pub fn next(&mut self, recording: &mut Recording) -> Result<Option<Recorded>, ReadError> {
         while let Some(bytes) = self.next_frame(recording)? {
             let tick = header_of(&bytes)?.tick;
-            if tick < self.from_tick {
+            if self.first && tick < self.from_tick {
                 continue;
             }
             let frame = frame_of(&bytes)?;
