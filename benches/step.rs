@@ -11,7 +11,7 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use bench_dragon::live::control::{Door, Doors, door};
-use bench_dragon::live::{Frames, Outgoing, Publisher};
+use bench_dragon::live::{Outgoing, Publisher};
 use bench_dragon::scene::Scene;
 use bench_dragon::show::{Playback, Show};
 use bench_dragon::subscribers::connection::{Connection, Subscription, Wake};
@@ -187,7 +187,7 @@ fn measure_doors() {
                 tick += 1;
                 timed(&mut times[count], || {
                     doors.take_one(&mut show, tick);
-                    let frame = Frames::frame(&mut show, tick);
+                    let frame = show.frame(tick);
                     let header = frame_header(frame, stamps(tick));
                     publisher.publish(Outgoing::new(&header, frame)).expect("nobody else uses this service");
                     doors.finish_step(&mut show, tick);

@@ -6,6 +6,8 @@
 //! left out and none is sent in a burst. Called by the command `replay`.
 
 mod pass;
+#[cfg(test)]
+mod tests;
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

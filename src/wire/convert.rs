@@ -121,16 +121,15 @@ pub fn read_frame(header: &FrameHeader, poses: &[HandlePose], frame: &mut Frame)
     (frame.sim_time, frame.time_scale, frame.min_clearance) = (sim_time, time_scale, min_clearance);
     (frame.epoch, frame.cue) = (epoch, cue);
     let Chain { x, y, heading, vx, vy, .. } = &mut frame.chain;
-    let fields: [(&mut Vec<f64>, fn(&HandlePose) -> f64); 5] = [
-        (x, |pose| pose.x),
-        (y, |pose| pose.y),
-        (heading, |pose| pose.heading),
-        (vx, |pose| pose.vx),
-        (vy, |pose| pose.vy),
-    ];
-    for (numbers, of) in fields {
+    for numbers in [&mut *x, y, heading, vx, vy] {
         numbers.clear();
-        numbers.extend(poses.iter().map(of));
+    }
+    for pose in poses {
+        x.push(pose.x);
+        y.push(pose.y);
+        heading.push(pose.heading);
+        vx.push(pose.vx);
+        vy.push(pose.vy);
     }
     Ok(())
 }

@@ -256,9 +256,10 @@ impl Recording {
         for chunk in (0..self.chunks.len()).rev() {
             let mut last = None;
             if self.may_hold(chunk, Topic::Handles) {
-                self.read_chunk(chunk, &mut |item| match item {
-                    Item::Frame(bytes) => last = Some(bytes),
-                    _ => (),
+                self.read_chunk(chunk, &mut |item| {
+                    if let Item::Frame(bytes) = item {
+                        last = Some(bytes);
+                    }
                 })?;
             }
             if last.is_some() {

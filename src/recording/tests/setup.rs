@@ -16,7 +16,6 @@ use crate::scene::SceneText;
 use crate::show::control::Command;
 use crate::show::{Outcome, Playback, Show};
 use crate::solve::table::Instructions;
-use crate::wire::FrameHeader;
 
 pub const RATE: f64 = 50.0;
 

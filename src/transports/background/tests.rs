@@ -6,9 +6,9 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use proptest::prelude::*;
 
 use super::*;
-use crate::show::ReachedCue;
 use crate::show::alerts::Alert;
 use crate::show::state::Level;
+use crate::show::{Frame, ReachedCue};
 
 const HANDLES: usize = 3;
 
