@@ -14,7 +14,7 @@
 //! - `drawing` (feature `cli`): a moment of a motion as an SVG, and the colours of all pictures.
 //! - [`live`]: the fixed-rate loop, its clock, its statistics.
 //! - [`transports`]: iceoryx2 shared memory and ROS 2 topics, as publishers of the loop.
-//! - `recording` (feature `cli`): the log of a run, and the proof that it can be played again.
+//! - `recording` (feature `cli`): the log of a run, the proof that it can be played again, and every message as MCAP.
 //! - [`subscribers`]: the feed of a publisher's messages, the terminal monitor, the stage picture, the soak test; no solver.
 //! - [`trade`]: accuracy against cost, measured for every solver on a scene and this machine.
 

@@ -1,12 +1,14 @@
 //! `record`: keeps a running show as MCAP.
 
-use std::io::{self, IsTerminal};
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter, IsTerminal};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use bench_dragon::recording::mcap::recorder::{DEFAULT_TOPICS, Recorded, Recorder, RecorderConfig, Split};
+use bench_dragon::recording::mcap::recorder::{DEFAULT_TOPICS, Recorded, Recorder, RecorderConfig, Split, create};
+use bench_dragon::recording::mcap::recover::{RecoverError, Recovered, check_magic, recover};
 use bench_dragon::scene::ros2::Topic;
 use bench_dragon::subscribers::connection::Wake;
 use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
@@ -15,7 +17,7 @@ use bench_dragon::wire::sentence::rounded;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use super::{CommandError, Common, Output, stop_on_signals, wall_seconds};
+use super::{CommandError, Common, Output, progress_bar, stop_on_signals, wall_seconds};
 
 /// Frames that may wait in the shared memory before they are looked for, where its queue is the shortest.
 const UNREAD_FRAMES: f64 = 2.0;
@@ -62,6 +64,9 @@ struct Summary {
 
 /// Records until the duration is over, a signal comes or the disk takes no more; or mends a recording.
 pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), CommandError> {
+    if let Some(damaged) = &arguments.recover {
+        return mend(common, damaged, arguments);
+    }
     let Some(file) = &arguments.output else {
         return Err(CommandError::BadInput("expected -o FILE".to_owned()));
     };
@@ -170,8 +175,68 @@ fn print(common: &Common, recorded: &Recorded) -> Result<(), CommandError> {
     output.finish()
 }
 
+/// The line of `record --recover --json`.
+#[derive(Serialize)]
+struct MendedLine {
+    file: String,
+    output: String,
+    #[serde(flatten)]
+    recovered: Recovered,
+}
+
+/// Mends a recording that was cut: writes what is whole of it into another file.
+fn mend(common: &Common, file: &Path, arguments: &RecordArguments) -> Result<(), CommandError> {
+    let shown = file.display().to_string();
+    let bad = |error: RecoverError| CommandError::BadInput(format!("{shown}: {error}"));
+    let unread = |error: io::Error| bad(RecoverError::Read(error));
+    let input = File::open(file).map_err(unread)?;
+    let length = input.metadata().map_err(unread)?.len();
+    let path = arguments.output.clone().unwrap_or_else(|| {
+        let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+        file.with_file_name(format!("{stem}-recovered.mcap"))
+    });
+    if path.canonicalize().is_ok_and(|output| file.canonicalize().is_ok_and(|input| input == output)) {
+        return Err(CommandError::BadInput(format!("{shown} is to be mended, expected another --output")));
+    }
+    // What is no recording leaves no file.
+    let mut input = BufReader::new(input);
+    check_magic(&mut input).map_err(bad)?;
+    let output = create(&path, arguments.force).and_then(|file| file.set_len(0).map(|()| file));
+    let output = output.map_err(|error| refused(&path, &error))?;
+    let bar = progress_bar(length, common).with_message("mending");
+    let mended = recover(bar.wrap_read(input), length, BufWriter::new(&output));
+    bar.finish_and_clear();
+    let mended = mended.and_then(|recovered| output.sync_all().map(|()| recovered).map_err(RecoverError::Write));
+    let recovered = mended.map_err(|error| {
+        // Half of a mended recording is of no use.
+        let _ = std::fs::remove_file(&path);
+        match error {
+            RecoverError::Write(error) => CommandError::Failed(format!("{}: {error}", path.display())),
+            other => bad(other),
+        }
+    })?;
+    let mut lines = Output::standard();
+    let output = path.display().to_string();
+    if common.json {
+        lines.json(&MendedLine { file: shown, output, recovered })?;
+        return lines.finish();
+    }
+    let Recovered { chunks, messages, damaged, unknown, lost_bytes, whole, .. } = recovered;
+    lines.line(&format!("{output} has the {messages} messages of {chunks} finished chunks of {shown}."))?;
+    if damaged > 0 {
+        let unknown = if unknown > 0 { format!(", and {unknown} messages that needed them") } else { String::new() };
+        lines.line(&format!("Left out: {damaged} damaged records{unknown}."))?;
+    }
+    if whole {
+        lines.line("Nothing had been cut off.")?;
+    } else {
+        lines.line(&format!("Lost: the last {lost_bytes} bytes, which are no whole chunk."))?;
+    }
+    lines.finish()
+}
+
 /// The sentence for a file that cannot be made.
-fn refused(file: &std::path::Path, error: &io::Error) -> CommandError {
+fn refused(file: &Path, error: &io::Error) -> CommandError {
     let shown = file.display();
     CommandError::BadInput(if error.kind() == io::ErrorKind::AlreadyExists {
         format!("{shown} exists, expected another file, or --force to replace it")

@@ -1,9 +1,13 @@
 //! Recordings of a show in MCAP: what every ROS 2 tool reads, with the topics, types and bytes that `run --ros2` sends.
 //!
 //! In: the messages of a publisher, as subscribers get them. Out: files. [`recorder`] decides what goes into which file,
-//! [`file`] is one file with its channels and chunks, [`disk`] is where its bytes go.
-//! Nothing here knows a transport. Called by the subscriber that records.
+//! `run` is the run that it is in, `messages` fills the messages of each topic, `file` is one file with its channels and chunks, `disk` is where its bytes
+//! go, [`recover`](mod@recover) mends one that was cut. Nothing here knows a transport. Called by the subscriber that
+//! records, and by its command.
 
 mod disk;
-pub mod file;
+mod file;
+mod messages;
 pub mod recorder;
+pub mod recover;
+mod run;

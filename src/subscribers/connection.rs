@@ -25,6 +25,7 @@ pub struct Connection {
     /// Whether the show has cues: where it has none there is no such service to look for.
     expects_cues: bool,
     status: Option<Receiver<LoopStatus, ()>>,
+    status_service: Option<PortFactory<ipc::Service, LoopStatus, ()>>,
     stage: Option<Receiver<Stage, ()>>,
     tick: Option<Listener<ipc::Service>>,
 }
@@ -100,6 +101,7 @@ impl Subscription {
             cues: self.receiver("cues")?,
             expects_cues: false,
             status: self.receiver("status")?,
+            status_service: self.service("status")?,
             stage: self.receiver("stage")?,
             tick: self.listener(),
         };
@@ -123,6 +125,7 @@ impl Subscription {
         }
         if connection.status.is_none() {
             connection.status = self.receiver("status")?;
+            connection.status_service = self.service("status")?;
         }
         if connection.stage.is_none() {
             connection.stage = self.receiver("stage")?;
@@ -134,7 +137,10 @@ impl Subscription {
     /// Whether a publisher is there and alive. Cleans up after one that was killed.
     pub fn publisher_is_alive(&self, connection: &Connection) -> bool {
         let _ = self.node.try_cleanup_dead_nodes();
+        // One that ends sends its last status after its last frame.
+        let status = connection.status_service.as_ref();
         connection.poses_service.dynamic_config().number_of_publishers() > 0
+            || status.is_some_and(|status| status.dynamic_config().number_of_publishers() > 0)
     }
 
     /// A port of a service that may be absent: a scene can be without alerts.

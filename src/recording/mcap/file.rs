@@ -31,8 +31,8 @@ const MESSAGE_OVERHEAD: u64 = 80;
 const CHUNK_INDEX_BYTES: u64 = 512;
 /// More bytes than the end of a file has besides channels and indexes, and than an attachment has.
 const END_BYTES: u64 = 64 << 10;
-/// zstd's fastest ordinary level: the next ones take longer and save less than a hundredth of handles.
-const COMPRESSION_LEVEL: u32 = 1;
+/// zstd's own default: handles are nearly random to it, and higher levels take much longer and save nothing.
+const COMPRESSION_LEVEL: u32 = 3;
 /// CDR, little-endian.
 const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
 

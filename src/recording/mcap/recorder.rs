@@ -7,16 +7,10 @@ use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use serde_json::json;
-
-use super::file::{Batch, McapFile};
-use crate::ros2_messages::diagnostics::DiagnosticArray;
-use crate::ros2_messages::markers::MarkerArray;
-use crate::ros2_messages::path::Path as PathMessage;
-use crate::ros2_messages::transforms::TfMessage;
-use crate::ros2_messages::{Clock, HandlePoses, PoseArray, Stamped};
+use super::file::McapFile;
+use super::messages::Messages;
+use super::run::{Run, Seldom};
 use crate::scene::ros2::Topic;
-use crate::wire::json::{Exact, StageObject};
 use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
 
 /// What is recorded by default: all that a replay needs, and what tools show without this program's messages.
@@ -32,8 +26,6 @@ pub const DEFAULT_TOPICS: [Topic; 8] = [
 ];
 /// Messages of a run that are kept until its first frame.
 const MOST_EARLY: usize = 256;
-/// The name of the attachment.
-const ATTACHMENT: &str = "bench_dragon.json";
 
 /// When a recording goes on in another file.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,61 +75,18 @@ pub struct RecordError {
     state: &'static str,
 }
 
-/// A message that came before the first frame of its run.
-#[derive(Debug, Clone, Copy)]
-enum Early {
-    Stage(Stage),
-    Alert(CollisionAlert),
-    Cue(Cue),
-    Status(LoopStatus),
-}
-
-impl Early {
-    fn run_id(&self) -> u64 {
-        match self {
-            Self::Stage(stage) => stage.run_id,
-            Self::Alert(alert) => alert.run_id,
-            Self::Cue(cue) => cue.run_id,
-            Self::Status(status) => status.run_id,
-        }
-    }
-}
-
-/// A run, and the file that its frames go to.
-struct Run {
-    run_id: u64,
-    file: McapFile,
-    /// Of the file's first frame and of the run's latest.
-    file_began_ns: u64,
-    latest_deadline_ns: u64,
-    attached: bool,
-    /// What a subscriber that joins now would get besides frames.
-    stage: Option<Stage>,
-    alert: Option<CollisionAlert>,
-    cue: Option<Cue>,
-    status: Option<LoopStatus>,
-    /// Periods skipped as of the latest status; `None` where it is not known how many were skipped before.
-    skipped: Option<u64>,
-    /// Messages so far of what is not sent with every frame.
-    seldom: u32,
-}
-
 /// Records.
 pub struct Recorder {
     config: RecorderConfig,
     /// The first file until the first frame; whether it is to be removed if there is none.
     first: Option<(File, bool)>,
     run: Option<Run>,
-    early: Vec<Early>,
+    early: Vec<Seldom>,
     recorded: Recorded,
     /// Bytes of the files that are finished.
     finished_bytes: u64,
     number: u64,
-    batch: Batch,
-    handles: HandlePoses,
-    poses: PoseArray,
-    markers: Option<MarkerArray>,
-    transforms: TfMessage,
+    messages: Messages,
 }
 
 impl Recorder {
@@ -147,8 +96,8 @@ impl Recorder {
     /// The file cannot be made, or is there and is not to be replaced.
     pub fn new(config: RecorderConfig) -> io::Result<Self> {
         let is_new = !config.file.exists();
-        let file = open(&config.file, config.replace)?;
-        let transforms = TfMessage::of(&config.name);
+        let file = create(&config.file, config.replace)?;
+        let messages = Messages::new(&config.name, &config.topics);
         Ok(Self {
             config,
             first: Some((file, is_new)),
@@ -157,11 +106,7 @@ impl Recorder {
             recorded: Recorded::default(),
             finished_bytes: 0,
             number: 1,
-            batch: Batch::default(),
-            handles: HandlePoses::of(0),
-            poses: PoseArray::of(0),
-            markers: None,
-            transforms,
+            messages,
         })
     }
 
@@ -185,10 +130,10 @@ impl Recorder {
             }
             _ => self.begin(frame)?,
         }
-        self.encode_frame(frame, handles);
+        self.fill_frame(frame, handles);
         if !self.has_room()? {
             self.next_file(frame)?;
-            self.encode_frame(frame, handles);
+            self.fill_frame(frame, handles);
         }
         self.append_batch()?;
         self.recorded.frames += 1;
@@ -204,7 +149,7 @@ impl Recorder {
     /// # Errors
     /// As [`Recorder::frame`].
     pub fn stage(&mut self, stage: &Stage) -> Result<(), RecordError> {
-        self.seldom(Early::Stage(*stage))
+        self.seldom(Seldom::Stage(*stage))
     }
 
     /// An alert.
@@ -212,7 +157,7 @@ impl Recorder {
     /// # Errors
     /// As [`Recorder::frame`].
     pub fn alert(&mut self, alert: &CollisionAlert) -> Result<(), RecordError> {
-        self.seldom(Early::Alert(*alert))
+        self.seldom(Seldom::Alert(*alert))
     }
 
     /// A cue.
@@ -220,7 +165,7 @@ impl Recorder {
     /// # Errors
     /// As [`Recorder::frame`].
     pub fn cue(&mut self, cue: &Cue) -> Result<(), RecordError> {
-        self.seldom(Early::Cue(*cue))
+        self.seldom(Seldom::Cue(*cue))
     }
 
     /// A status.
@@ -228,7 +173,7 @@ impl Recorder {
     /// # Errors
     /// As [`Recorder::frame`].
     pub fn status(&mut self, status: &LoopStatus) -> Result<(), RecordError> {
-        self.seldom(Early::Status(*status))
+        self.seldom(Seldom::Status(*status))
     }
 
     /// Does what is due. To be called several times a second.
@@ -248,7 +193,7 @@ impl Recorder {
     /// As [`Recorder::frame`].
     pub fn finish_run(&mut self) -> Result<(), RecordError> {
         let Some(mut run) = self.run.take() else { return Ok(()) };
-        let attached = attach(&mut run, &self.config.name);
+        let attached = run.attach(&self.config.name);
         let finished = run.file.finish();
         let bytes = *finished.as_ref().unwrap_or_else(|(bytes, _)| bytes);
         self.finished_bytes += bytes;
@@ -319,7 +264,7 @@ impl Recorder {
             skipped,
             seldom,
         });
-        let held = [stage.map(Early::Stage), alert.map(Early::Alert), cue.map(Early::Cue)];
+        let held = [stage.map(Seldom::Stage), alert.map(Seldom::Alert), cue.map(Seldom::Cue)];
         held.into_iter().flatten().try_for_each(|held| self.seldom(held))
     }
 
@@ -330,7 +275,7 @@ impl Recorder {
             None => loop {
                 self.number += 1;
                 let path = numbered(&self.config.file, self.number);
-                let file = open(&path, self.config.replace);
+                let file = create(&path, self.config.replace);
                 // In the midst of a show no file is worth an end.
                 if !matches!(&file, Err(error) if error.kind() == io::ErrorKind::AlreadyExists) {
                     break (path, file);
@@ -347,41 +292,8 @@ impl Recorder {
         made.map_err(|error| self.error(error, "nothing is in it"))
     }
 
-    /// Makes the batch that of a frame.
-    fn encode_frame(&mut self, frame: &FrameHeader, handles: &[HandlePose]) {
-        self.batch.clear();
-        let (stamp_ns, sequence) = (frame.stamp_ns, frame.sequence as u32);
-        let run = self.run.as_ref();
-        for topic in &self.config.topics {
-            let (topic, batch) = (*topic, &mut self.batch);
-            match topic {
-                Topic::Handles => {
-                    self.handles.update(frame, handles);
-                    batch.push(topic, stamp_ns, sequence, &self.handles);
-                }
-                Topic::Poses => {
-                    self.poses.update(frame, handles);
-                    batch.push(topic, stamp_ns, sequence, &self.poses);
-                }
-                Topic::Clock => batch.push(topic, stamp_ns, sequence, &Clock::of(frame)),
-                Topic::Tf => {
-                    self.transforms.update(frame, handles);
-                    batch.push(topic, stamp_ns, sequence, &self.transforms);
-                }
-                Topic::Markers => {
-                    let stage = run.and_then(|run| run.stage.as_ref());
-                    if let (Some(markers), Some(stage)) = (&mut self.markers, stage) {
-                        markers.update(frame, handles, stage, run.and_then(|run| run.alert.as_ref()));
-                        batch.push(topic, stamp_ns, sequence, markers);
-                    }
-                }
-                Topic::Alerts | Topic::Stage | Topic::Diagnostics | Topic::Status | Topic::Path | Topic::Cues => (),
-            }
-        }
-    }
-
     /// A message that is not sent with every frame.
-    fn seldom(&mut self, message: Early) -> Result<(), RecordError> {
+    fn seldom(&mut self, message: Seldom) -> Result<(), RecordError> {
         let Some(run) = self.run.as_mut().filter(|run| run.run_id == message.run_id()) else {
             // Without frames there is nothing to keep it with.
             if self.early.len() < MOST_EARLY {
@@ -391,55 +303,50 @@ impl Recorder {
         };
         let sequence = run.seldom;
         run.seldom = sequence.wrapping_add(1);
-        self.batch.clear();
-        let batch = &mut self.batch;
-        let topics = &self.config.topics;
         match message {
-            Early::Stage(stage) => {
+            Seldom::Stage(stage) => {
                 run.stage = Some(stage);
-                if topics.contains(&Topic::Markers) {
-                    self.markers = Some(MarkerArray::of(&stage));
-                }
-                batch.push(Topic::Stage, stage.stamp_ns, sequence, &Stamped::stage(stage));
-                if topics.contains(&Topic::Path) {
-                    batch.push(Topic::Path, stage.stamp_ns, sequence, &PathMessage::of(&stage));
-                }
+                self.messages.stage(sequence, &stage);
             }
-            Early::Alert(alert) => {
+            Seldom::Alert(alert) => {
                 run.alert = Some(alert);
-                batch.push(Topic::Alerts, alert.stamp_ns, sequence, &Stamped::alert(alert));
+                self.messages.alert(sequence, alert);
             }
-            Early::Cue(cue) => {
+            Seldom::Cue(cue) => {
                 run.cue = Some(cue);
-                batch.push(Topic::Cues, cue.stamp_ns, sequence, &Stamped::cue(cue));
+                self.messages.cue(sequence, cue);
             }
-            Early::Status(status) => {
+            Seldom::Status(status) => {
                 run.status = Some(status);
-                let skipped = run.skipped.replace(status.skipped).unwrap_or(status.skipped);
-                let skipped = status.skipped.saturating_sub(skipped);
-                batch.push(Topic::Status, status.stamp_ns, sequence, &Stamped::status(status));
-                let message = DiagnosticArray::of(&self.config.name, &status, run.alert.as_ref(), skipped, 0);
-                batch.push(Topic::Diagnostics, status.stamp_ns, sequence, &message);
+                let before = run.skipped.replace(status.skipped).unwrap_or(status.skipped);
+                let skipped = status.skipped.saturating_sub(before);
+                self.messages.status(sequence, &status, run.alert.as_ref(), skipped);
             }
         }
         let attached = if run.attached || run.stage.is_none() || run.status.is_none() {
             Ok(())
         } else {
-            attach(run, &self.config.name)
+            run.attach(&self.config.name)
         };
         attached.or_else(|error| self.fail(error))?;
         // Files are split before frames only.
         self.append_batch()
     }
 
+    fn fill_frame(&mut self, frame: &FrameHeader, handles: &[HandlePose]) {
+        let run = self.run.as_ref();
+        let (stage, alert) = (run.and_then(|run| run.stage.as_ref()), run.and_then(|run| run.alert.as_ref()));
+        self.messages.frame(frame, handles, stage, alert);
+    }
+
     /// Whether the batch fits into this file.
     fn has_room(&mut self) -> Result<bool, RecordError> {
-        let room = self.run.as_mut().map_or(Ok(true), |run| run.file.has_room(&self.batch));
+        let room = self.run.as_mut().map_or(Ok(true), |run| run.file.has_room(&self.messages.batch));
         room.or_else(|error| self.fail(error))
     }
 
     fn append_batch(&mut self) -> Result<(), RecordError> {
-        let appended = self.run.as_mut().map_or(Ok(()), |run| run.file.append(&self.batch));
+        let appended = self.run.as_mut().map_or(Ok(()), |run| run.file.append(&self.messages.batch));
         appended.or_else(|error| self.fail(error))
     }
 
@@ -458,21 +365,11 @@ impl Recorder {
     }
 }
 
-/// Attaches what is known of the run and is no message.
-fn attach(run: &mut Run, name: &str) -> io::Result<()> {
-    if std::mem::replace(&mut run.attached, true) {
-        return Ok(());
-    }
-    let scene = run.status.as_ref().map(|status| status.scene.as_str().to_owned());
-    let object = json!({
-        "run_id": Exact(run.run_id), "name": name, "scene": scene, "stage": run.stage.as_ref().map(StageObject::from),
-    });
-    let time_ns = run.stage.as_ref().map_or(0, |stage| stage.stamp_ns);
-    run.file.attach(ATTACHMENT, "application/json", time_ns, object.to_string().as_bytes())
-}
-
-/// An empty file to write, or with `replace` one that keeps its content until its first frame.
-fn open(path: &Path, replace: bool) -> io::Result<File> {
+/// A new file to write, or with `replace` perhaps one that is there, with its content.
+///
+/// # Errors
+/// It cannot be made, or is there and is not to be replaced.
+pub fn create(path: &Path, replace: bool) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.write(true);
     if replace {

@@ -1,0 +1,70 @@
+//! A run while it is recorded: its open file, and what is known of it. Called by the [`recorder`](super::recorder).
+
+use std::io;
+
+use serde_json::json;
+
+use super::file::McapFile;
+use crate::wire::json::{Exact, StageObject};
+use crate::wire::{CollisionAlert, Cue, LoopStatus, Stage};
+
+/// The name of the attachment.
+const ATTACHMENT: &str = "bench_dragon.json";
+
+/// A message that is not sent with every frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Seldom {
+    Stage(Stage),
+    Alert(CollisionAlert),
+    Cue(Cue),
+    Status(LoopStatus),
+}
+
+impl Seldom {
+    /// The run that it belongs to.
+    pub fn run_id(&self) -> u64 {
+        match self {
+            Self::Stage(stage) => stage.run_id,
+            Self::Alert(alert) => alert.run_id,
+            Self::Cue(cue) => cue.run_id,
+            Self::Status(status) => status.run_id,
+        }
+    }
+}
+
+/// A run, and the file that its frames go to.
+pub(super) struct Run {
+    pub run_id: u64,
+    pub file: McapFile,
+    /// Of the file's first frame and of the run's latest.
+    pub file_began_ns: u64,
+    pub latest_deadline_ns: u64,
+    pub attached: bool,
+    /// What a subscriber that joins now would get besides frames.
+    pub stage: Option<Stage>,
+    pub alert: Option<CollisionAlert>,
+    pub cue: Option<Cue>,
+    pub status: Option<LoopStatus>,
+    /// Periods skipped as of the latest status; `None` where it is not known how many were skipped before.
+    pub skipped: Option<u64>,
+    /// Messages so far of what is not sent with every frame.
+    pub seldom: u32,
+}
+
+impl Run {
+    /// Attaches to the file what is known of the run and is no message, unless that has been done.
+    ///
+    /// # Errors
+    /// What the disk says.
+    pub fn attach(&mut self, name: &str) -> io::Result<()> {
+        if std::mem::replace(&mut self.attached, true) {
+            return Ok(());
+        }
+        let scene = self.status.as_ref().map(|status| status.scene.as_str().to_owned());
+        let object = json!({
+            "run_id": Exact(self.run_id), "name": name, "scene": scene, "stage": self.stage.as_ref().map(StageObject::from),
+        });
+        let time_ns = self.stage.as_ref().map_or(0, |stage| stage.stamp_ns);
+        self.file.attach(ATTACHMENT, "application/json", time_ns, object.to_string().as_bytes())
+    }
+}

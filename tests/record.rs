@@ -1,0 +1,357 @@
+//! `record` and `record --recover`, as programs: read by Python's own MCAP libraries, cut, killed, on a full disk.
+
+mod processes;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use bench_dragon::recording::mcap::recover::{RecoverError, Recovered, check_magic, recover};
+use mcap::{MessageStream, Summary};
+use nix::sys::signal::Signal;
+use processes::{Process, can_run, json_lines, long, program, python, python_modules, root, text, unique, wait};
+use serde_json::Value;
+
+/// A scene of the folder `config` whose subscribers may fall behind for seconds, by the safe solver: an unoptimised build
+/// makes tables for seconds.
+fn scene(folder: &Path, name: &str, added: &str) -> PathBuf {
+    let text = std::fs::read_to_string(format!("config/{name}.toml")).unwrap();
+    let lines = text.lines().filter(|line| !line.starts_with("accuracy"));
+    let text: String = lines.map(|line| format!("{line}\n")).collect();
+    let text = text.replace("[motion]\n", "[motion]\nsolver = \"newton\"\n");
+    assert_eq!(text.matches("[publish]\n").count(), 1);
+    let file = folder.join(format!("{name}.toml"));
+    std::fs::write(&file, text.replace("[publish]\n", "[publish]\nqueue = 3000\n") + added).unwrap();
+    file
+}
+
+fn publisher(name: &str, scene: &Path, arguments: &[&str]) -> Process {
+    let mut command = program(name);
+    command.args(["--json", "--scene", scene.to_str().unwrap(), "run"]).args(arguments);
+    Process::start(&mut command)
+}
+
+fn recorder(name: &str, file: &Path, arguments: &[&str]) -> Process {
+    let mut command = program(name);
+    command.args(["--json", "record", "--output", file.to_str().unwrap()]).args(arguments);
+    Process::start(&mut command)
+}
+
+/// Ends a recorder; its summary.
+fn stopped(recorder: Process) -> Value {
+    recorder.signal(Signal::SIGINT);
+    processes::summary(&recorder.output_within(60))
+}
+
+/// Waits until a file has so many bytes.
+fn wait_for_bytes(file: &Path, bytes: u64) {
+    for _ in 0..3000 {
+        if std::fs::metadata(file).is_ok_and(|data| data.len() >= bytes) {
+            return;
+        }
+        wait(0.02);
+    }
+    panic!("{} has no {bytes} bytes", file.display());
+}
+
+fn files(summary: &Value) -> Vec<PathBuf> {
+    summary["files"].as_array().unwrap().iter().map(|file| PathBuf::from(file.as_str().unwrap())).collect()
+}
+
+/// A message: topic, sequence, log time, and the hash of its data.
+type Entry = (String, u64, u64, String);
+
+/// The messages of a whole file, in the order in which it has them.
+fn entries(file: &[u8]) -> Vec<Entry> {
+    assert!(Summary::read(file).unwrap().is_some(), "a file without a summary");
+    let entry = |message: mcap::Message<'_>| {
+        let hash = blake3::hash(&message.data).to_hex().to_string();
+        (message.channel.topic.clone(), message.sequence.into(), message.log_time, hash)
+    };
+    MessageStream::new(file).unwrap().map(|message| entry(message.unwrap())).collect()
+}
+
+/// The log times of the frames in a file.
+fn frame_times(file: &Path) -> Vec<u64> {
+    let entries = entries(&std::fs::read(file).unwrap());
+    entries.into_iter().filter(|entry| entry.0.ends_with("/handles")).map(|entry| entry.2).collect()
+}
+
+/// A recording of some seconds of a small team.
+fn small_recording(name: &str, folder: &Path) -> PathBuf {
+    let file = folder.join("small.mcap");
+    let recorder = recorder(name, &file, &[]);
+    let arguments = ["--rate", "40", "--start", "20", "--duration", "5"];
+    publisher(name, &scene(folder, "school", ""), &arguments).output_within(120);
+    assert_eq!(files(&stopped(recorder)), std::slice::from_ref(&file));
+    file
+}
+
+/// The chunks of a file by the reference implementation: the byte after each, and its messages.
+fn chunks(file: &Path) -> Vec<(usize, Vec<Entry>)> {
+    let output = python().args(["tests/python/record_chunks.py", file.to_str().unwrap()]).output().unwrap();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let entry = |entry: &Value| {
+        let text = |at: usize| entry[at].as_str().unwrap().to_owned();
+        (text(0), entry[1].as_u64().unwrap(), entry[2].as_u64().unwrap(), text(3))
+    };
+    let chunk = |line: &Value| {
+        let messages = line["messages"].as_array().unwrap().iter().map(entry).collect();
+        (line["end"].as_u64().unwrap() as usize, messages)
+    };
+    json_lines(&output).iter().map(chunk).collect()
+}
+
+fn recovered(bytes: &[u8]) -> Result<(Recovered, Vec<u8>), RecoverError> {
+    let (mut input, mut output) = (bytes, Vec::new());
+    check_magic(&mut input)?;
+    Ok((recover(input, bytes.len() as u64, &mut output)?, output))
+}
+
+#[test]
+fn every_message_of_every_topic_is_what_another_subscriber_got() {
+    if !can_run(python_modules(&["iceoryx2", "mcap", "mcap_ros2", "rosbags"])) {
+        return;
+    }
+    let (name, folder) = ("record_equal", tempfile::tempdir().unwrap());
+    let cues = "[[cues]]\nname = \"soon\"\nat = 409.0\nthen = \"mark\"\n\n\
+                [[cues]]\nname = \"the coil closes\"\nbefore = \"contact\"\nseconds = 2.0\n";
+    let scene = scene(folder.path(), "paper", cues);
+    let (file, kept) = (folder.path().join("show.mcap"), folder.path().join("kept"));
+    let peer = |what: &str, more: &[&str]| {
+        let mut peer = python();
+        peer.args(["tests/python/record_peer.py", what, "--name", &unique(name), "--kept", kept.to_str().unwrap()]);
+        Process::start(peer.args(more))
+    };
+    let mut subscriber = peer("subscribe", &[]);
+    subscriber.lines().until("ready", 60);
+    let every = "handles,poses,alerts,stage,diagnostics,markers,status,path,cues,clock,tf";
+    let recorder = recorder(name, &file, &["--topics", every]);
+    let arguments = ["--rate", "50", "--start", "408", "--duration", "8"];
+    let summary = processes::summary(&publisher(name, &scene, &arguments).output_within(180));
+    assert!(subscriber.output_within(60).status.success());
+    let recorded = stopped(recorder);
+    assert_eq!((&recorded["frames"], &recorded["missed"]), (&summary["frames"], &0.into()), "{recorded}");
+    assert_eq!(recorded["bytes"].as_u64(), Some(std::fs::metadata(&file).unwrap().len()));
+    let output = peer("compare", &["--recordings", file.to_str().unwrap()]).output_within(600);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let counts = json_lines(&output).pop().unwrap();
+    assert_eq!(counts.as_object().unwrap().len(), 11, "{counts}");
+    let alerts = counts[format!("/{}/alerts", unique(name))].as_u64().unwrap();
+    let cues = counts[format!("/{}/cues", unique(name))].as_u64().unwrap();
+    assert!(alerts >= 3 && cues == 2, "{counts}");
+}
+
+#[test]
+fn a_file_that_is_cut_anywhere_keeps_every_finished_chunk() {
+    if !can_run(python_modules(&["mcap", "blake3"])) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = small_recording("record_cut", folder.path());
+    let (chunks, bytes) = (chunks(&file), std::fs::read(&file).unwrap());
+    assert!(chunks.len() >= 5 && chunks.iter().map(|chunk| chunk.1.len()).sum::<usize>() > 300, "{}", chunks.len());
+    let (whole, _) = recovered(&bytes).unwrap();
+    assert!(whole.whole && whole.chunks as usize == chunks.len() && whole.lost_bytes == 0, "{whole:?}");
+    assert_eq!(whole.attachments, 1);
+    let mut random = fastrand::Rng::with_seed(17);
+    let random_cuts: Vec<_> = (0..1000).map(|_| random.usize(8..bytes.len())).collect();
+    // And at the very bytes where a chunk ends.
+    let edges = chunks.iter().flat_map(|(end, _)| [end - 1, *end, end + 1]);
+    for cut in random_cuts.into_iter().chain(edges) {
+        let finished = chunks.iter().take_while(|(end, _)| *end <= cut);
+        let expected: Vec<_> = finished.flat_map(|(_, messages)| messages.clone()).collect();
+        let (counts, output) = recovered(&bytes[..cut]).unwrap();
+        assert!(entries(&output) == expected, "cut at {cut} of {}: {counts:?}", bytes.len());
+        assert_eq!(counts.messages, expected.len() as u64);
+        let last_end = chunks.iter().map(|(end, _)| *end).take_while(|end| *end <= cut).last().unwrap_or(8);
+        assert!(counts.lost_bytes as usize <= cut - last_end, "{counts:?} of {cut} bytes");
+    }
+    for cut in 0..8 {
+        assert!(matches!(recovered(&bytes[..cut]), Err(RecoverError::NotMcap)), "{cut} bytes");
+    }
+}
+
+#[test]
+fn a_byte_that_is_wrong_costs_messages_and_invents_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = small_recording("record_flip", folder.path());
+    let bytes = std::fs::read(&file).unwrap();
+    let all = entries(&bytes);
+    let mut random = fastrand::Rng::with_seed(18);
+    let mut damaged = 0;
+    for _ in 0..300 {
+        let mut wrong = bytes.clone();
+        wrong[random.usize(8..bytes.len())] ^= 1 << random.u32(0..8);
+        let Ok((counts, output)) = recovered(&wrong) else { continue };
+        let mut rest = all.iter();
+        for entry in entries(&output) {
+            assert!(rest.any(|known| *known == entry), "{entry:?} is in no place of the recording");
+        }
+        damaged += u64::from(counts.damaged > 0);
+    }
+    assert!(damaged > 100, "{damaged} of 300 were noticed in a chunk");
+}
+
+#[test]
+fn a_recorder_that_is_killed_loses_a_second_and_nobody_notices() {
+    let (name, folder) = ("record_killed", tempfile::tempdir().unwrap());
+    let publisher = publisher(name, &scene(folder.path(), "school", ""), &["--rate", "100", "--loop"]);
+    let mut random = fastrand::Rng::with_seed(19);
+    let mut losses = Vec::new();
+    let mut last = 0;
+    for round in 0..if long() { 100 } else { 5 } {
+        let file = folder.path().join(format!("killed{round}.mcap"));
+        let recorder = recorder(name, &file, &[]);
+        wait_for_bytes(&file, 1000);
+        wait(1.0 + random.f64() * 2.0);
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_nanos() as u64;
+        recorder.signal(Signal::SIGKILL);
+        recorder.output_within(20);
+        let output = program(name).args(["--json", "record", "--recover", file.to_str().unwrap()]).output().unwrap();
+        let counts = processes::summary(&output);
+        let mended = folder.path().join(format!("killed{round}-recovered.mcap"));
+        assert_eq!((counts["output"].as_str(), &counts["damaged"]), (mended.to_str(), &0.into()), "{counts}");
+        let times = frame_times(&mended);
+        assert!(times[0] > last && times.windows(2).all(|pair| pair[1] > pair[0]), "frames of round {round}");
+        last = *times.last().unwrap();
+        losses.push(now.saturating_sub(last) as f64 / 1e9);
+    }
+    publisher.signal(Signal::SIGINT);
+    let summary = processes::summary(&publisher.output_within(60));
+    assert_eq!(summary["end"], "signal", "{summary}");
+    losses.sort_by(f64::total_cmp);
+    processes::aloud(&format!(
+        "lost by {} kills: median {:.2} s, most {:.2} s",
+        losses.len(),
+        losses[losses.len() / 2],
+        losses[losses.len() - 1]
+    ));
+    // A loaded machine stops a recorder for seconds; one that wrote only at the end would lose two in the middle.
+    assert!(losses[losses.len() / 2] < 1.2 && losses[losses.len() - 1] < 5.0, "{losses:?}");
+}
+
+/// A recording on a disk that takes no more, which is whole up to there.
+fn check_full(recorder: Process, file: &Path) {
+    let output = recorder.output_within(120);
+    let sentence = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{sentence}");
+    let error = sentence.lines().find(|line| line.starts_with("error")).unwrap();
+    assert!(error.contains(": the recording ends there, the file is whole up to there"), "{sentence}");
+    let (summary, times) = (json_lines(&output).pop().unwrap(), frame_times(file));
+    assert!(times.len() > 20 && summary["frames"].as_u64() == Some(times.len() as u64), "{summary} {}", times.len());
+    assert_eq!(summary["bytes"].as_u64(), Some(std::fs::metadata(file).unwrap().len()));
+}
+
+#[test]
+fn a_full_disk_leaves_a_whole_file() {
+    let (name, folder) = ("record_full", tempfile::tempdir().unwrap());
+    let _publisher = publisher(name, &scene(folder.path(), "paper", ""), &["--rate", "100", "--start", "100"]);
+    // A file that may have 4 MB.
+    let file = folder.path().join("limited.mcap");
+    let mut limited = Command::new("bash");
+    limited.args(["-c", "ulimit -f 4000; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_bench-dragon")]);
+    limited.args(["--name", &unique(name), "--json", "record", "--output", file.to_str().unwrap()]);
+    check_full(Process::start(&mut limited), &file);
+    // A device that takes nothing.
+    let output = recorder(name, Path::new("/dev/full"), &["--force"]).output_within(60);
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("/dev/full: No space left on device"), "{}", text(&output.stderr));
+    // A disk of 5 MB.
+    if !can_run(root("make a small disk")) {
+        return;
+    }
+    let disk = folder.path().join("disk");
+    std::fs::create_dir(&disk).unwrap();
+    let mount =
+        |arguments: &[&str]| assert!(Command::new(arguments[0]).args(&arguments[1..]).status().unwrap().success());
+    mount(&["mount", "-t", "tmpfs", "-o", "size=5m", "tmpfs", disk.to_str().unwrap()]);
+    let file = disk.join("full.mcap");
+    let checked = std::panic::catch_unwind(|| check_full(recorder(name, &file, &[]), &file));
+    mount(&["umount", "--lazy", disk.to_str().unwrap()]);
+    checked.unwrap();
+}
+
+#[test]
+fn files_are_split_by_size_by_time_and_by_run() {
+    let (name, folder) = ("record_split", tempfile::tempdir().unwrap());
+    let scene = scene(folder.path(), "paper", "");
+    let (by_size, by_time) = (folder.path().join("size.mcap"), folder.path().join("time.mcap"));
+    // Somebody else's.
+    std::fs::write(folder.path().join("size-2.mcap"), "kept").unwrap();
+    let recorders = [
+        recorder(name, &by_size, &["--split", "2MB"]),
+        recorder(name, &by_time, &["--split", "2s", "--topics", "handles,stage"]),
+    ];
+    for _ in 0..2 {
+        publisher(name, &scene, &["--rate", "50", "--start", "100", "--duration", "5"]).output_within(120);
+    }
+    let [size, time] = recorders.map(stopped);
+    assert_eq!(std::fs::read(folder.path().join("size-2.mcap")).unwrap(), b"kept");
+    let names: Vec<_> =
+        files(&size).iter().map(|file| file.file_name().unwrap().to_str().unwrap().to_owned()).collect();
+    let count = names.len();
+    assert!(count >= 4 && names[..2] == ["size.mcap", "size-3.mcap"], "{names:?}");
+    assert_eq!(files(&time).len(), 6, "{time}");
+    assert_eq!((size["frames"].as_u64(), &size["missed"]), (time["frames"].as_u64(), &0.into()), "{size} {time}");
+    for (summary, topics) in [(&size, 7), (&time, 2)] {
+        let mut sequences = Vec::new();
+        for file in files(summary) {
+            let bytes = std::fs::read(&file).unwrap();
+            assert!(bytes.len() <= 2_000_000 || topics == 2, "{}: {} bytes", file.display(), bytes.len());
+            let entries = entries(&bytes);
+            let first = entries.iter().find(|entry| entry.0.ends_with("/stage"));
+            assert!(first.is_some(), "{} has no stage", file.display());
+            let mut frames = entries.iter().filter(|entry| entry.0.ends_with("/handles")).peekable();
+            let began = frames.peek().unwrap().2;
+            assert!(entries.iter().all(|entry| entry.2 >= began), "{} has a time before its frames", file.display());
+            sequences.extend(frames.map(|entry| entry.1));
+        }
+        let restarts = sequences.windows(2).filter(|pair| pair[1] != pair[0] + 1).count();
+        assert_eq!((restarts, sequences.len() as u64), (1, summary["frames"].as_u64().unwrap()), "{summary}");
+    }
+}
+
+#[test]
+fn a_thousand_frames_a_second_are_recorded_without_a_gap() {
+    let (name, folder) = ("record_fast", tempfile::tempdir().unwrap());
+    let scene = scene(folder.path(), "paper", "");
+    let file = folder.path().join("fast.mcap");
+    let seconds = if long() { "60" } else { "5" };
+    let recorder = recorder(name, &file, &[]);
+    let published =
+        publisher(name, &scene, &["--rate", "1000", "--start", "100", "--duration", seconds]).output_within(240);
+    let (published, recorded) = (processes::summary(&published), stopped(recorder));
+    assert_eq!((&recorded["frames"], &recorded["missed"]), (&published["frames"], &0.into()), "{recorded} {published}");
+    assert_eq!(frame_times(&file).len() as u64, recorded["frames"].as_u64().unwrap());
+}
+
+#[test]
+fn what_cannot_be_recorded_is_refused_in_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let there = folder.path().join("there.mcap");
+    std::fs::write(&there, "no recording").unwrap();
+    let there = there.to_str().unwrap();
+    let new = folder.path().join("new.mcap");
+    let new = new.to_str().unwrap();
+    for (arguments, expected) in [
+        (&["-o", there][..], "there.mcap exists, expected another file, or --force to replace it"),
+        (&["-o", "/no/such/folder/x.mcap"], "/no/such/folder/x.mcap: No such file or directory"),
+        (&["-o", new, "--topics", "handles,smoke"], "expected topics of handles, poses, alerts"),
+        (&["-o", new, "--split", "10"], "expected a size of at least 1MB"),
+        (&["-o", new, "--split", "10KB"], "expected a size of at least 1MB"),
+        (&["--recover", there], "there.mcap: it does not begin as MCAP does, expected a recording"),
+        (&["--recover", "/no/such/file"], "/no/such/file: No such file or directory"),
+        (&[], "--output <FILE>"),
+    ] {
+        let output = program("record_refused").arg("record").args(arguments).output().unwrap();
+        let sentence = text(&output.stderr);
+        assert!(output.status.code() == Some(2) && sentence.contains(expected), "{arguments:?}: {sentence}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "a refusal leaves no file");
+    // Nobody publishes.
+    let output = program("record_nobody").args(["record", "-o", new, "--duration", "0.2"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains("nothing came from"), "{}", text(&output.stderr));
+    assert!(!Path::new(new).exists());
+}
