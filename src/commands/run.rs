@@ -191,6 +191,7 @@ impl RunSession<'_> {
             }
         });
         let (counts, (summary, transports), error) = ended?;
+        log.iter().for_each(|log| log.ended(counts));
         let deliveries = transports.into_iter().filter_map(|transport| transport.finish());
         let deliveries = deliveries.map(|(name, of)| (name.to_owned(), of)).collect();
         self.print_summary(&counts, &summary, deliveries)?;
