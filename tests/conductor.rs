@@ -45,7 +45,10 @@ fn answers(actions: &[Action], between: impl FnOnce(), name: &str) -> Vec<(usize
     let (sender, receiver) = std::sync::mpsc::channel();
     let conductor = Conductor::start(&unique(name), move |number: usize, conducted| {
         let word = match conducted {
-            Ok((_, response)) => response.result().unwrap().name().to_owned(),
+            Ok((command, response)) => {
+                let name = Conduct::NAMES[command.number_and_value().0 as usize];
+                format!("{name}: {}", response.result().unwrap().name())
+            }
             Err(ControlError::Overtaken) => "overtaken".to_owned(),
             Err(error) => error.to_string(),
         };
@@ -81,7 +84,8 @@ fn nothing_that_was_asked_before_a_hold_is_done_after_it() {
     let mut answered = answers(&actions, || publisher.signal(Signal::SIGCONT), name);
     answered.sort();
     let words: Vec<&str> = answered.iter().map(|(_, word)| word.as_str()).collect();
-    let expected = ["done", "done", "overtaken", "done", "overtaken", "overtaken", "overtaken", "done"];
+    let [overtaken, pause, rate, seek, hold] = ["overtaken", "pause: done", "rate: done", "seek: done", "hold: done"];
+    let expected = [pause, rate, overtaken, seek, overtaken, overtaken, overtaken, hold];
     assert_eq!(words, expected);
     let state = done(name, &["state"]);
     assert_eq!((&state["playback"], &state["sim_time"]), (&"held".into(), &50.0.into()), "{state}");
@@ -110,6 +114,7 @@ fn commands_to_a_publisher_that_dies_are_given_up_in_their_order() {
     publisher.signal(Signal::SIGSTOP);
     let actions = [2.0, 3.0, 4.0, 5.0, 6.0].map(|rate| Action::Send(Conduct::Rate(rate)));
     let answered = answers(&actions, || publisher.signal(Signal::SIGKILL), name);
+    println!("{answered:?}");
     for (place, (number, word)) in answered.iter().enumerate() {
         assert_eq!(place, *number, "{answered:?}");
         assert!(word.contains("nobody publishes"), "{word}");
@@ -138,7 +143,7 @@ fn a_question_that_is_refused_answers_nothing() {
         }
         assert!(code == 1 && line.is_null(), "{code} {line}");
         assert!(sentence.contains("state is refused: too many commands are waiting"), "{sentence}");
-        assert_eq!(answers(&[Action::Toggle], || (), name), [(0, "too_many".to_owned())]);
+        assert_eq!(answers(&[Action::Toggle], || (), name), [(0, "state: too_many".to_owned())]);
         return;
     }
     panic!("the door is never full");
