@@ -298,7 +298,6 @@ impl LogReader {
             words.iter_mut().zip(first.iter().chain(second)).for_each(|(word, number)| *word = number.to_bits());
             let [kind, tick, third, fourth, fifth] = words;
             if kind == FRAME {
-                drop(record);
                 if !self.frame(third as usize, writer) {
                     return;
                 }

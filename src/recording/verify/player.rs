@@ -372,9 +372,8 @@ impl Reference {
 
 /// By how much an error of a place before a handle can have grown there, from the speeds of the handles.
 fn growth(speeds: &[f64], handle: usize) -> f64 {
-    let before = speeds.iter().take(handle + 1).map(|speed| speed.abs());
-    let least = before.clone().fold(f64::INFINITY, f64::min);
-    let growth = before.last().unwrap_or(f64::NAN) / least;
+    let least = speeds.iter().take(handle + 1).map(|speed| speed.abs()).fold(f64::INFINITY, f64::min);
+    let growth = speeds.get(handle).map_or(f64::NAN, |speed| speed.abs()) / least;
     // Not a number where a handle stands still and so do those behind it.
     if growth.is_nan() { MOST_GROWTH } else { growth.clamp(1.0, MOST_GROWTH) }
 }
