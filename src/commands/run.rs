@@ -17,6 +17,7 @@ use bench_dragon::live::{Announcement, Counts, Deliveries, End, LoopOptions, Pub
 use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::recording::arithmetic::Arithmetic;
+use bench_dragon::recording::histograms::HistogramLog;
 use bench_dragon::recording::lines::ShowLine;
 use bench_dragon::recording::log::{self as recording_log, LogOutcome};
 use bench_dragon::scene::{Accepted, AtEnd, Scene, SceneText};
@@ -65,6 +66,9 @@ pub struct RunArguments {
     /// Record commands and a hash of the frames each second, for `bench-dragon verify`
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
+    /// Record the distributions of wake-up lateness and step cost as an HdrHistogram interval log
+    #[arg(long, value_name = "FILE", hide = true)]
+    histograms: Option<PathBuf>,
     /// Publish ROS 2 topics too, those of the scene's [publish.ros2] or the default ones
     #[arg(long)]
     ros2: bool,
@@ -148,6 +152,7 @@ impl RunSession<'_> {
             transports.push(transport);
             outcome
         });
+        let mut histograms = self.open_histograms()?;
         let (reports, inbox) = statistics::queues();
         let done = AtomicBool::new(false);
         let (opened, opening) = mpsc::channel();
@@ -171,7 +176,8 @@ impl RunSession<'_> {
                 self.print_start(&transports);
                 let collecting = threads.spawn(|| {
                     // Without statistics the loop would run unseen.
-                    self.collect(inbox, transports, &done).inspect_err(|_| stop.store(true, Ordering::Relaxed))
+                    self.collect(inbox, transports, &mut histograms, &done)
+                        .inspect_err(|_| stop.store(true, Ordering::Relaxed))
                 });
                 let outcome = looping.join();
                 done.store(true, Ordering::Release);
@@ -185,6 +191,7 @@ impl RunSession<'_> {
             }
         });
         let (counts, (summary, transports), error) = ended?;
+        log.iter().for_each(|log| log.ended(counts));
         let deliveries = transports.into_iter().filter_map(|transport| transport.finish());
         let deliveries = deliveries.map(|(name, of)| (name.to_owned(), of)).collect();
         self.print_summary(&counts, &summary, deliveries)?;
@@ -192,6 +199,7 @@ impl RunSession<'_> {
         error
             .map(|error| error.to_string())
             .or(log_failure)
+            .or(histograms.and_then(HistogramLog::finish))
             .map_or(Ok(()), |sentence| Err(CommandError::Failed(sentence)))
     }
 
@@ -201,6 +209,13 @@ impl RunSession<'_> {
         let run = (self.run_id, realtime_ns());
         let show = ShowLine::new(self.text, &self.playback, Arithmetic::of(self.scene), &self.solver, run);
         Ok(Some(recording_log::open(file, show, self.scene.team().handles())?))
+    }
+
+    /// The log of distributions, where one is requested.
+    fn open_histograms(&self) -> Result<Option<HistogramLog>, CommandError> {
+        let Some(file) = &self.arguments.histograms else { return Ok(None) };
+        let log = HistogramLog::create(file, self.playback.rate, realtime_ns());
+        log.map(Some).map_err(|sentence| CommandError::BadInput(format!("--histograms: {sentence}")))
     }
 
     /// The transports, and the loop's ends of those that have a door for commands.
@@ -236,6 +251,7 @@ impl RunSession<'_> {
         &self,
         inbox: Inbox,
         mut transports: Vec<Box<dyn Transport>>,
+        histograms: &mut Option<HistogramLog>,
         done: &AtomicBool,
     ) -> Result<(Summary, Vec<Box<dyn Transport>>), CommandError> {
         let run = Run {
@@ -244,6 +260,7 @@ impl RunSession<'_> {
             scene: &self.scene.name,
             sinks: transports.iter_mut().map(|transport| transport.status()).collect::<Result<_, _>>()?,
             announce: Box::new(|announcement| self.print_announcement(announcement)),
+            record: Box::new(|sample| histograms.iter_mut().for_each(|log| log.record(sample))),
         };
         Ok((statistics::collect(&SystemClock, inbox, run, done), transports))
     }
