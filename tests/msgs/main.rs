@@ -25,6 +25,7 @@ use std::process::Command;
 use std::sync::LazyLock;
 
 use bench_dragon::ros2_messages::{HandlePoses, Header, MessageType, Stamped};
+use bench_dragon::scene::ros2::Topic;
 use bench_dragon::show::state::{FrameState, Level, PlaybackState};
 use bench_dragon::wire::{
     CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32, LoopStatus, NO_BENCH,

@@ -149,7 +149,7 @@ impl Recorder {
     /// # Errors
     /// As [`Recorder::frame`].
     pub fn stage(&mut self, stage: &Stage) -> Result<(), RecordError> {
-        self.seldom(Seldom::Stage(*stage))
+        self.seldom(Seldom::Stage(Box::new(*stage)))
     }
 
     /// An alert.
@@ -234,7 +234,7 @@ impl Recorder {
             alert: None,
             cue: None,
             status: None,
-            skipped: (frame.sequence == 0).then_some(0),
+            diagnosed: (frame.sequence == 0).then(LoopStatus::default),
             seldom: 0,
         });
         for early in std::mem::take(&mut self.early) {
@@ -248,7 +248,7 @@ impl Recorder {
     /// Goes on in another file, which begins with what a subscriber that joins now would get.
     fn next_file(&mut self, frame: &FrameHeader) -> Result<(), RecordError> {
         let Some(run) = &self.run else { return Ok(()) };
-        let Run { run_id, stage, alert, cue, status, skipped, seldom, latest_deadline_ns, .. } = *run;
+        let Run { run_id, stage, alert, cue, status, diagnosed, seldom, latest_deadline_ns, .. } = *run;
         self.finish_run()?;
         let file = self.make_file(frame)?;
         self.run = Some(Run {
@@ -261,10 +261,10 @@ impl Recorder {
             alert,
             cue,
             status,
-            skipped,
+            diagnosed,
             seldom,
         });
-        let held = [stage.map(Seldom::Stage), alert.map(Seldom::Alert), cue.map(Seldom::Cue)];
+        let held = [stage.map(|stage| Seldom::Stage(Box::new(stage))), alert.map(Seldom::Alert), cue.map(Seldom::Cue)];
         held.into_iter().flatten().try_for_each(|held| self.seldom(held))
     }
 
@@ -305,7 +305,7 @@ impl Recorder {
         run.seldom = sequence.wrapping_add(1);
         match message {
             Seldom::Stage(stage) => {
-                run.stage = Some(stage);
+                run.stage = Some(*stage);
                 self.messages.stage(sequence, &stage);
             }
             Seldom::Alert(alert) => {
@@ -318,9 +318,8 @@ impl Recorder {
             }
             Seldom::Status(status) => {
                 run.status = Some(status);
-                let before = run.skipped.replace(status.skipped).unwrap_or(status.skipped);
-                let skipped = status.skipped.saturating_sub(before);
-                self.messages.status(sequence, &status, run.alert.as_ref(), skipped);
+                let before = run.diagnosed.replace(status).unwrap_or(status);
+                self.messages.status(sequence, &status, run.alert.as_ref(), &before);
             }
         }
         let attached = if run.attached || run.stage.is_none() || run.status.is_none() {

@@ -12,9 +12,9 @@ use crate::wire::{CollisionAlert, Cue, LoopStatus, Stage};
 const ATTACHMENT: &str = "bench_dragon.json";
 
 /// A message that is not sent with every frame.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) enum Seldom {
-    Stage(Stage),
+    Stage(Box<Stage>),
     Alert(CollisionAlert),
     Cue(Cue),
     Status(LoopStatus),
@@ -45,8 +45,9 @@ pub(super) struct Run {
     pub alert: Option<CollisionAlert>,
     pub cue: Option<Cue>,
     pub status: Option<LoopStatus>,
-    /// Periods skipped as of the latest status; `None` where it is not known how many were skipped before.
-    pub skipped: Option<u64>,
+    /// The latest status that the run's diagnostics have judged, one without a skip before the first; `None` where it is not
+    /// known what was before.
+    pub diagnosed: Option<LoopStatus>,
     /// Messages so far of what is not sent with every frame.
     pub seldom: u32,
 }
