@@ -224,19 +224,7 @@ impl Recorder {
     fn begin(&mut self, frame: &FrameHeader) -> Result<(), RecordError> {
         self.finish_run()?;
         let file = self.make_file(frame)?;
-        self.run = Some(Run {
-            run_id: frame.run_id,
-            file,
-            file_began_ns: frame.deadline_ns,
-            latest_deadline_ns: frame.deadline_ns,
-            attached: false,
-            stage: None,
-            alert: None,
-            cue: None,
-            status: None,
-            diagnosed: (frame.sequence == 0).then(LoopStatus::default),
-            seldom: 0,
-        });
+        self.run = Some(Run::new(file, frame));
         for early in std::mem::take(&mut self.early) {
             if early.run_id() == frame.run_id {
                 self.seldom(early)?;
@@ -248,23 +236,12 @@ impl Recorder {
     /// Goes on in another file, which begins with what a subscriber that joins now would get.
     fn next_file(&mut self, frame: &FrameHeader) -> Result<(), RecordError> {
         let Some(run) = &self.run else { return Ok(()) };
-        let Run { run_id, stage, alert, cue, status, diagnosed, seldom, latest_deadline_ns, .. } = *run;
+        let Run { status, diagnosed, seldom, latest_deadline_ns, .. } = *run;
+        let stage = run.stage.clone().map(Seldom::Stage);
+        let held = [stage, run.alert.map(Seldom::Alert), run.cue.map(Seldom::Cue)];
         self.finish_run()?;
         let file = self.make_file(frame)?;
-        self.run = Some(Run {
-            run_id,
-            file,
-            file_began_ns: frame.deadline_ns,
-            latest_deadline_ns,
-            attached: false,
-            stage,
-            alert,
-            cue,
-            status,
-            diagnosed,
-            seldom,
-        });
-        let held = [stage.map(|stage| Seldom::Stage(Box::new(stage))), alert.map(Seldom::Alert), cue.map(Seldom::Cue)];
+        self.run = Some(Run { latest_deadline_ns, status, diagnosed, seldom, ..Run::new(file, frame) });
         held.into_iter().flatten().try_for_each(|held| self.seldom(held))
     }
 
@@ -305,8 +282,8 @@ impl Recorder {
         run.seldom = sequence.wrapping_add(1);
         match message {
             Seldom::Stage(stage) => {
-                run.stage = Some(*stage);
                 self.messages.stage(sequence, &stage);
+                run.stage = Some(stage);
             }
             Seldom::Alert(alert) => {
                 run.alert = Some(alert);
@@ -334,7 +311,7 @@ impl Recorder {
 
     fn fill_frame(&mut self, frame: &FrameHeader, handles: &[HandlePose]) {
         let run = self.run.as_ref();
-        let (stage, alert) = (run.and_then(|run| run.stage.as_ref()), run.and_then(|run| run.alert.as_ref()));
+        let (stage, alert) = (run.and_then(|run| run.stage.as_deref()), run.and_then(|run| run.alert.as_ref()));
         self.messages.frame(frame, handles, stage, alert);
     }
 

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::file::McapFile;
 use crate::wire::json::{Exact, StageObject};
-use crate::wire::{CollisionAlert, Cue, LoopStatus, Stage};
+use crate::wire::{CollisionAlert, Cue, FrameHeader, LoopStatus, Stage};
 
 /// The name of the attachment.
 const ATTACHMENT: &str = "bench_dragon.json";
@@ -41,7 +41,7 @@ pub(super) struct Run {
     pub latest_deadline_ns: u64,
     pub attached: bool,
     /// What a subscriber that joins now would get besides frames.
-    pub stage: Option<Stage>,
+    pub stage: Option<Box<Stage>>,
     pub alert: Option<CollisionAlert>,
     pub cue: Option<Cue>,
     pub status: Option<LoopStatus>,
@@ -53,6 +53,23 @@ pub(super) struct Run {
 }
 
 impl Run {
+    /// A run of which nothing is known but a frame, the first of its file.
+    pub fn new(file: McapFile, frame: &FrameHeader) -> Self {
+        Self {
+            run_id: frame.run_id,
+            file,
+            file_began_ns: frame.deadline_ns,
+            latest_deadline_ns: frame.deadline_ns,
+            attached: false,
+            stage: None,
+            alert: None,
+            cue: None,
+            status: None,
+            diagnosed: (frame.sequence == 0).then(LoopStatus::default),
+            seldom: 0,
+        }
+    }
+
     /// Attaches to the file what is known of the run and is no message, unless that has been done.
     ///
     /// # Errors
@@ -63,7 +80,7 @@ impl Run {
         }
         let scene = self.status.as_ref().map(|status| status.scene.as_str().to_owned());
         let object = json!({
-            "run_id": Exact(self.run_id), "name": name, "scene": scene, "stage": self.stage.as_ref().map(StageObject::from),
+            "run_id": Exact(self.run_id), "name": name, "scene": scene, "stage": self.stage.as_deref().map(StageObject::from),
         });
         let time_ns = self.stage.as_ref().map_or(0, |stage| stage.stamp_ns);
         self.file.attach(ATTACHMENT, "application/json", time_ns, object.to_string().as_bytes())
