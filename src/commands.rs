@@ -16,6 +16,7 @@ pub mod events;
 pub mod plan;
 mod realtime_scheduling;
 pub mod run;
+pub mod send;
 pub mod soak;
 pub mod soak_conductor;
 pub mod solve;

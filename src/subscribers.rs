@@ -10,6 +10,8 @@ pub mod feed;
 pub mod hermite;
 pub mod monitor;
 #[cfg(feature = "cli")]
+pub mod send;
+#[cfg(feature = "cli")]
 pub mod soak;
 #[cfg(feature = "cli")]
 pub mod view;
