@@ -13,6 +13,7 @@ pub mod check;
 pub mod control;
 pub mod draw;
 pub mod events;
+pub mod metrics;
 pub mod plan;
 mod realtime_scheduling;
 pub mod run;

@@ -3,12 +3,15 @@
 use std::net::{Ipv4Addr, SocketAddrV4};
 use std::sync::atomic::Ordering;
 
+use bench_dragon::subscribers::feed::Frames;
+use bench_dragon::subscribers::polling::poll_until;
 use bench_dragon::subscribers::send::axes::Axes;
 use bench_dragon::subscribers::send::network::{NetworkError, Outlet, Route, destination};
+use bench_dragon::subscribers::send::osc::Addresses;
+use bench_dragon::subscribers::send::osc_sender::{MOST_RATE, OscSender};
 use bench_dragon::subscribers::send::psn_sender::{
     Notice, PsnOptions, PsnSender, USUAL_ADDRESS, USUAL_PORT, USUAL_RATE,
 };
-use bench_dragon::subscribers::send::pump;
 use bench_dragon::subscribers::send::trackers::Selection;
 
 use super::{CommandError, Common, Output, number, stop_on_signals};
@@ -24,6 +27,8 @@ pub struct SendArguments {
 enum Kind {
     /// PosiStageNet 2.03 for lighting desks and media servers: handles as trackers
     Psn(PsnArguments),
+    /// OSC messages for show control: alerts, countdown, state, cues, the head
+    Osc(OscArguments),
 }
 
 /// Arguments of `send psn`.
@@ -55,6 +60,24 @@ struct PsnArguments {
     system_name: Option<String>,
 }
 
+/// Arguments of `send osc`.
+#[derive(Debug, Clone, clap::Args)]
+struct OscArguments {
+    /// Where to: any number of hosts
+    #[arg(long, value_name = "HOST:PORT", required = true, num_args = 1.., value_parser = osc_destination)]
+    to: Vec<SocketAddrV4>,
+    /// The address of this machine's interface to send by; without it, the machine's routes decide
+    #[arg(long, value_name = "IP")]
+    interface: Option<Ipv4Addr>,
+    /// Bundles of frames per second at most, up to 60; a slower publisher sets its own
+    #[arg(long, value_name = "HZ", default_value_t = f64::from(MOST_RATE), value_parser = rate::<MOST_RATE>)]
+    rate: f64,
+}
+
+fn osc_destination(text: &str) -> Result<SocketAddrV4, String> {
+    destination(text, None)
+}
+
 fn psn_destination(text: &str) -> Result<SocketAddrV4, String> {
     destination(text, Some(USUAL_PORT))
 }
@@ -73,6 +96,7 @@ fn system_name(text: &str) -> Result<String, String> {
 pub fn send(common: &Common, arguments: &SendArguments) -> Result<(), CommandError> {
     match &arguments.kind {
         Kind::Psn(arguments) => psn(common, arguments),
+        Kind::Osc(arguments) => osc(common, arguments),
     }
 }
 
@@ -108,7 +132,7 @@ fn psn(common: &Common, arguments: &PsnArguments) -> Result<(), CommandError> {
         }
     };
     let mut sender = PsnSender::new(options, outlet, &mut notify);
-    pump(name, &stop, &mut sender)?;
+    poll_until(&stop, name, Frames::Newest, &mut sender)?;
     let summary = sender.finish();
     printed?;
     let mut output = Output::standard();
@@ -118,6 +142,37 @@ fn psn(common: &Common, arguments: &PsnArguments) -> Result<(), CommandError> {
         output.line(&format!(
             "{} frames sent in {} packets; {} passed over, {} packets could not be sent",
             summary.frames, summary.packets, summary.passed_over, summary.unsent_packets
+        ))?;
+    }
+    output.finish()
+}
+
+fn osc(common: &Common, arguments: &OscArguments) -> Result<(), CommandError> {
+    let stop = stop_on_signals()?;
+    let OscArguments { to, interface, rate } = arguments;
+    let outlet = Outlet::open(to, Route { interface: *interface, multicast_ttl: 1 })?;
+    let addresses = Addresses::new(&common.name);
+    print(common, || {
+        let to = to.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+        let by = interface.map_or(String::new(), |interface| format!(" by {interface}"));
+        format!(
+            "Sending \"{}\" as OSC to {to}{by}: {}/alert, countdown, state, cue, head, sim_time; at most {} frames per \
+             second. Ctrl-C ends.",
+            common.name,
+            addresses.prefix(),
+            number(*rate)
+        )
+    })?;
+    let mut sender = OscSender::new(addresses, *rate, outlet);
+    poll_until(&stop, &common.name, Frames::Newest, &mut sender)?;
+    let summary = sender.finish();
+    let mut output = Output::standard();
+    if common.json {
+        output.json(&summary)?;
+    } else {
+        output.line(&format!(
+            "{} frames, {} alerts and {} cues sent in {} packets; {} packets could not be sent",
+            summary.frames, summary.alerts, summary.cues, summary.packets, summary.unsent_packets
         ))?;
     }
     output.finish()

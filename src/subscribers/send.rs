@@ -1,61 +1,24 @@
-//! What takes the dragon out of the machine: trackers for lighting desks ([`psn_sender`]).
+//! What takes the dragon out of the machine: trackers for lighting desks ([`psn_sender`]), OSC messages ([`osc_sender`]).
 //!
-//! Each is one more subscriber, in a process of its own, and reads by polling: the publisher is never kept waiting and
-//! wakes nobody. Here is what they have in common: the loop, which frames are due, and when they have stopped. In: a
-//! [`Feed`]. Out: UDP datagrams. Called by the command `send`.
+//! Each is a handler of one more subscriber, in a process of its own. Here is what they have in common: which frames are due,
+//! and when frames have stopped. In: the events of a feed. Out: UDP datagrams. Called by the command `send`.
 
 pub mod axes;
 pub mod network;
+pub mod osc;
+pub mod osc_sender;
 pub mod psn;
 pub mod psn_sender;
 pub mod trackers;
 
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use super::connection::Wake;
-use super::feed::{Feed, FeedEvent, FeedOptions, Frames};
-use crate::transports::iceoryx2::OpenError;
+use super::feed::FeedEvent;
 use crate::wire::FrameHeader;
 
-/// How often frames are polled, which is how much later than the publisher a sender can be. To be woken by each frame
-/// instead would cost the publisher more than it saves here.
-const POLL_INTERVAL: Duration = Duration::from_millis(2);
-/// How long to wait where the services cannot be used, before the next attempt.
-const RETRY_INTERVAL: Duration = Duration::from_millis(200);
 /// Time without frames after which a receiver is told that they have stopped. A publisher that is started again at once
 /// is back before that.
 pub const STOPPED_AFTER: Duration = Duration::from_secs(2);
-
-/// Something that turns what a publisher sends into datagrams.
-pub trait Sender {
-    /// Takes in what has come.
-    fn handle(&mut self, event: FeedEvent<'_>);
-    /// Sends what is due, whether anything has come or not.
-    fn send(&mut self, now: Instant);
-}
-
-/// Feeds a sender with the newest frames of a name, through any number of publishers, until `stop` is set.
-///
-/// # Errors
-/// [`OpenError`] for a name that iceoryx2 cannot take, or where this process may not use the shared memory. Services that
-/// cannot be used later on are waited for; the log names the reason once.
-pub fn pump(name: &str, stop: &AtomicBool, sender: &mut impl Sender) -> Result<(), OpenError> {
-    let mut feed = Feed::new(name, FeedOptions { wake: Wake::Never, frames: Frames::Newest })?;
-    let mut reason: Option<String> = None;
-    while !stop.load(Ordering::Relaxed) {
-        let polled = feed.poll(POLL_INTERVAL, &mut |event| sender.handle(event));
-        sender.send(Instant::now());
-        // The services may become usable while this continues: a program of another version ends, a subscriber leaves.
-        let now = polled.err().map(|error| error.to_string());
-        if now.is_some() {
-            now.iter().filter(|_| now != reason).for_each(|sentence| log::warn!("{sentence}"));
-            std::thread::sleep(RETRY_INTERVAL);
-        }
-        reason = now;
-    }
-    Ok(())
-}
 
 /// Which frames of a stream are due, at a rate of at most so many per second: the first one in each interval, by the times
 /// at which they should have been made. So a publisher of that rate or a lower one has every frame sent, however late some

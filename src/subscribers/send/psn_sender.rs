@@ -7,9 +7,10 @@ use super::axes::Axes;
 use super::network::Outlet;
 use super::psn::{MOST_PACKETS, Tracker, TrackerName, data_frame, info_frame};
 use super::trackers::{Selection, numbered};
-use super::{Arrivals, Pace, Sender};
+use super::{Arrivals, Pace};
 use crate::live::clock::monotonic_ns;
 use crate::subscribers::feed::FeedEvent;
+use crate::subscribers::polling::Handler;
 use crate::wire::{FrameHeader, HandlePose};
 
 /// The multicast group and the port of the protocol.
@@ -197,6 +198,9 @@ impl<'a> PsnSender<'a> {
 
     /// Sends the trackers as they are, all packets back to back. Returns the number of packets.
     fn send_trackers(&mut self) -> usize {
+        if self.trackers.is_empty() {
+            return 0;
+        }
         self.data_frame_id = self.data_frame_id.wrapping_add(1);
         let frame = data_frame(self.elapsed_us(), self.data_frame_id, &self.trackers);
         frame.packets.iter().for_each(|packet| self.outlet.send(packet));
@@ -235,7 +239,7 @@ impl<'a> PsnSender<'a> {
     }
 }
 
-impl Sender for PsnSender<'_> {
+impl Handler for PsnSender<'_> {
     fn handle(&mut self, event: FeedEvent<'_>) {
         self.arrivals.handle(&event, Instant::now());
         if let FeedEvent::Frame { header, handles, missed } = event {
@@ -250,7 +254,7 @@ impl Sender for PsnSender<'_> {
         }
     }
 
-    fn send(&mut self, now: Instant) {
+    fn polled(&mut self, now: Instant) {
         let mut packets = 0;
         if std::mem::take(&mut self.due) {
             self.summary.frames += 1;
