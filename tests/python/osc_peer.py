@@ -2,11 +2,12 @@
 
     osc_peer.py --port P
 
-Runs until it is ended.
+Ends when it hears that frames have stopped.
 """
 
 import argparse
 import json
+import os
 import socket
 
 from pythonosc.dispatcher import Dispatcher
@@ -15,6 +16,8 @@ from pythonosc.osc_server import BlockingOSCUDPServer
 
 def heard(address, *arguments):
     print(json.dumps({"address": address, "arguments": arguments}), flush=True)
+    if "stopped" in arguments:
+        os._exit(0)
 
 
 def main():

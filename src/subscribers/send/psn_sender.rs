@@ -201,7 +201,7 @@ impl<'a> PsnSender<'a> {
         if self.trackers.is_empty() {
             return 0;
         }
-        self.data_frame_id = self.data_frame_id.wrapping_add(1);
+        self.data_frame_id = next_frame_id(self.data_frame_id);
         let frame = data_frame(self.elapsed_us(), self.data_frame_id, &self.trackers);
         frame.packets.iter().for_each(|packet| self.outlet.send(packet));
         if frame.trackers < self.trackers.len() {
@@ -221,7 +221,7 @@ impl<'a> PsnSender<'a> {
     /// Sends the names. Returns the number of packets.
     fn send_names(&mut self) -> usize {
         let Some(team) = &self.team else { return 0 };
-        self.info_frame_id = self.info_frame_id.wrapping_add(1);
+        self.info_frame_id = next_frame_id(self.info_frame_id);
         let frame = info_frame(self.elapsed_us(), self.info_frame_id, &self.options.system_name, &team.names);
         frame.packets.iter().for_each(|packet| self.outlet.send(packet));
         self.summary.name_frames += 1;
@@ -237,6 +237,11 @@ impl<'a> PsnSender<'a> {
         self.send_trackers();
         self.summary.stopped_frames += 1;
     }
+}
+
+/// The number of the next frame: 1 to 255, and again. A receiver exists that takes 0 for none.
+fn next_frame_id(latest: u8) -> u8 {
+    latest % u8::MAX + 1
 }
 
 impl Handler for PsnSender<'_> {
