@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use nix::sys::signal::Signal;
-use processes::{Process, can_run, http_get, program, python, python_modules, scene_file, text, wait};
+use processes::{Process, can_run, http_get, program, python, python_modules, scene_file, summary, text, wait};
 use serde_json::Value;
 
 const DEADLINE: u64 = 120;
@@ -18,8 +18,9 @@ const OPENMETRICS: &str = "application/openmetrics-text;version=1.0.0,text/plain
 /// it is not installed.
 fn promtool() -> Result<PathBuf, String> {
     let beside = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/.venv/prometheus/usr/bin/promtool"));
-    let places = [PathBuf::from("/usr/bin/promtool"), beside];
-    places.into_iter().find(|place| place.exists()).ok_or_else(|| "no promtool; tests/run fetches it".to_owned())
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let mut places = std::env::split_paths(&path).map(|folder| folder.join("promtool")).chain([beside]);
+    places.find(|place| place.exists()).ok_or_else(|| "no promtool; tests/run fetches it".to_owned())
 }
 
 /// What a program prints that is given some text.
@@ -111,7 +112,15 @@ fn prometheus_reads_what_is_true_of_a_publisher() {
     });
     publisher.signal(Signal::SIGSTOP);
     until(url, "silent", |samples| samples["bench_dragon_silent"] == 1.0 && samples["bench_dragon_up"] == 1.0);
-    publisher.signal(Signal::SIGKILL);
+    publisher.signal(Signal::SIGCONT);
+    publisher.signal(Signal::SIGTERM);
+    let end = summary(&publisher.output_within(DEADLINE));
+    for (family, field) in [("step_seconds", "step_ns"), ("wakeup_lateness_seconds", "wakeup_ns")] {
+        // Of the same run, some seconds earlier.
+        let ratio = value(&format!("bench_dragon_{family},quantile=0.5,window=run")) * 1e9
+            / end[field]["p50"].as_f64().unwrap();
+        assert!((0.02..50.0).contains(&ratio), "{family}: {ratio} times that of {end}");
+    }
     let down = until(url, "down", |samples| samples["bench_dragon_up"] == 0.0);
     assert_eq!(down.as_object().unwrap().len(), 4, "nothing is told of one that is gone: {down}");
     assert!(down["bench_dragon_metrics_frames_received_total"].as_f64() > Some(100.0));

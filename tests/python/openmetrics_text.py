@@ -7,7 +7,7 @@ from prometheus_client.openmetrics.parser import text_string_to_metric_families
 
 families = list(text_string_to_metric_families(sys.stdin.read()))
 samples = {
-    sample.name + "".join(f",{label}={value}" for label, value in sorted(sample.labels.items()) if label != "name"): (
+    sample.name + "".join(f",{label}={value}" for label, value in sorted(sample.labels.items()) if label != "name"): float(
         sample.value
     )
     for family in families
