@@ -42,8 +42,8 @@ impl Pace {
             self.latest = Some((header.run_id, header.deadline_ns, 0));
             return true;
         };
-        // To the nearest: deadlines are rounded to nanoseconds.
-        let interval = (header.deadline_ns.saturating_sub(*first_ns) as f64 * 1e-9 * self.rate).round() as u64;
+        // Deadlines are rounded to nanoseconds: one at the beginning of an interval must not fall before it.
+        let interval = (header.deadline_ns.saturating_sub(*first_ns) as f64 * 1e-9 * self.rate + 0.01) as u64;
         let due = interval > *latest;
         *latest = interval.max(*latest);
         due
@@ -107,7 +107,7 @@ mod tests {
             let even = publisher / 60.0;
             assert!(gaps.iter().all(|gap| (gap - even).abs() <= 1.0), "{publisher} Hz: {gaps:?}");
         }
-        assert_eq!(due(60.0, 1.0, 10.0).len(), 11, "the interval of the last half second has begun");
+        assert_eq!(due(60.0, 1.0, 10.0), Vec::from_iter((0..10).map(|second| 60 * second)));
     }
 
     #[test]

@@ -19,12 +19,12 @@ fn the_bytes_are_those_of_the_protocol_description() {
     };
     #[rustfmt::skip]
     let data = [
-        0x55, 0x67, 96, 0x80,                               // PSN_DATA_PACKET, 96 bytes of chunks
+        0x55, 0x67, 92, 0x80,                               // PSN_DATA_PACKET, 92 bytes of chunks
         0x00, 0x00, 12, 0x00,                               //   PSN_DATA_PACKET_HEADER, 12 bytes
         0x18, 0x17, 0x16, 0x15, 0x14, 0x13, 0x12, 0x11,     //     packet_timestamp
         2, 3, 0xfe, 1,                                      //     version, frame_id, frame_packet_count
-        0x01, 0x00, 76, 0x80,                               //   PSN_DATA_TRACKER_LIST
-        0x01, 0x02, 72, 0x80,                               //     tracker 0x0201
+        0x01, 0x00, 72, 0x80,                               //   PSN_DATA_TRACKER_LIST
+        0x01, 0x02, 68, 0x80,                               //     tracker 0x0201
         0x00, 0x00, 12, 0x00,                               //       PSN_DATA_TRACKER_POS
         0, 0, 0x80, 0x3f,  0, 0, 0, 0xc0,  0, 0, 0, 0x3f,
         0x01, 0x00, 12, 0x00,                               //       PSN_DATA_TRACKER_SPEED
