@@ -46,7 +46,7 @@ fn every_tracker_is_heard(name: &str, seconds: f64, group: Option<&str>, axes: &
     if !can_run(python_modules(&["iceoryx2", "numpy", "pypsn"])) {
         return;
     }
-    let _publisher = publisher(name, &["--start", "300", "--duration", "600"]);
+    let _publisher = publisher(name, &["--start", "250", "--time-scale", "2", "--duration", "600"]);
     let (port, first) = (free_port().to_string(), first_id.to_string());
     let mut peer = python();
     peer.args(["tests/python/psn_peer.py", "--name", &unique(name), "--port", &port, &format!("--axes={axes}")]);
@@ -89,7 +89,7 @@ fn pypsn_hears_every_tracker_of_every_frame_by_multicast() {
 
 #[test]
 fn one_desk_hears_them_in_axes_and_numbers_of_its_own() {
-    every_tracker_is_heard("psn_axes", 2.0, None, "-y,x,up", 301, None);
+    every_tracker_is_heard("psn_axes", 2.0, None, "-y,up,x", 301, None);
 }
 
 /// Needs node and npm, which fetches the decoder.
