@@ -13,9 +13,9 @@ pub mod metrics;
 pub mod monitor;
 pub mod polling;
 #[cfg(feature = "cli")]
-pub mod send;
-#[cfg(feature = "cli")]
 pub mod record;
+#[cfg(feature = "cli")]
+pub mod send;
 #[cfg(feature = "cli")]
 pub mod soak;
 #[cfg(feature = "cli")]
