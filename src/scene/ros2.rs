@@ -113,7 +113,7 @@ pub enum Reliability {
 pub enum Durability {
     /// They do not.
     Volatile,
-    /// They get the last messages, as many as the depth.
+    /// They get the last message. (More, up to the depth, only while others subscribe at the same time.)
     TransientLocal,
 }
 

@@ -25,6 +25,8 @@ pub const PATIENCE: Duration = Duration::from_secs(30);
 /// How often it is tested whether a publisher that has not answered lives, and whether a step makes progress.
 const LIVENESS_INTERVAL: Duration = Duration::from_millis(200);
 const PROGRESS_INTERVAL: Duration = Duration::from_secs(1);
+/// A century: an instant farther off cannot be represented everywhere.
+const LONGEST_TIMEOUT: Duration = Duration::from_secs(100 * 365 * 86_400);
 
 /// Why there is no response.
 #[derive(Debug, thiserror::Error)]
@@ -92,7 +94,7 @@ impl Controller {
     /// # Errors
     /// [`ControlError::NoPublisher`], [`ControlError::Ended`] or [`ControlError::NoAnswer`].
     pub fn send(&mut self, command: Command, timeout: Duration) -> Result<ControlResponse, ControlError> {
-        let deadline = Instant::now() + timeout;
+        let deadline = Instant::now() + timeout.min(LONGEST_TIMEOUT);
         self.await_response(command, timeout, |_| deadline)
     }
 
@@ -215,13 +217,15 @@ impl Vigil {
         }
         if now.duration_since(self.probed) >= PROGRESS_INTERVAL {
             self.probed = now;
-            // One that is not answered is asked again.
-            let answer = self.probe.take().and_then(|probe| probe.poll().ok().flatten());
-            if let Some(state) = answer
-                && state.playback_state() == Some(PlaybackState::Playing)
-                && state.tick > self.tick
-            {
-                (self.tick, self.progressed) = (state.tick, now);
+            // One question at a time: each takes a period of the loop, and others wait behind it.
+            match self.probe.as_ref().map(PendingCommand::poll) {
+                Some(Ok(None)) => return Ok(()),
+                Some(Ok(Some(state)))
+                    if state.playback_state() == Some(PlaybackState::Playing) && state.tick > self.tick =>
+                {
+                    (self.tick, self.progressed) = (state.tick, now);
+                }
+                _ => {}
             }
             self.probe = controller.request(Command::State).ok();
         }

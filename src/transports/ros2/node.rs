@@ -95,9 +95,11 @@ impl Topics {
         }
         Ok(topics)
     }
+}
 
-    /// Looks after what late subscribers are to get.
+impl Sink for Topics {
     fn attend(&mut self) {
+        self.matches.update();
         fn end<T: Attend>(end: &mut Option<T>) -> Option<&mut dyn Attend> {
             end.as_mut().map(|end| end as &mut dyn Attend)
         }
@@ -105,14 +107,11 @@ impl Topics {
         let seldom = [end(&mut self.alerts), end(&mut self.cues), end(&mut self.stages), end(&mut self.path)];
         let others = [end(&mut self.status), end(&mut self.diagnostics), end(&mut self.clock)];
         for end in streams.into_iter().chain(seldom).chain(others).flatten() {
-            end.attend(&self.matches, &mut self.node, &mut self.discarded);
+            end.attend(&self.matches, &mut self.node);
         }
     }
-}
 
-impl Sink for Topics {
     fn frame(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
-        self.attend();
         let discarded = &mut self.discarded;
         if let Some(stream) = &mut self.handles {
             stream.publish(discarded, |message| message.update(header, handles));
@@ -133,7 +132,6 @@ impl Sink for Topics {
     }
 
     fn alert(&mut self, alert: CollisionAlert) {
-        self.attend();
         self.latest_alert = Some(alert);
         if let Some(port) = &mut self.alerts {
             port.send(Arc::new(Stamped::alert(alert)), &mut self.discarded);
@@ -141,14 +139,12 @@ impl Sink for Topics {
     }
 
     fn cue(&mut self, cue: Cue) {
-        self.attend();
         if let Some(port) = &mut self.cues {
             port.send(Arc::new(Stamped::cue(cue)), &mut self.discarded);
         }
     }
 
     fn status(&mut self, status: &LoopStatus) {
-        self.attend();
         if let Some(port) = &mut self.status {
             port.send(Arc::new(Stamped::status(*status)), &mut self.discarded);
         }
