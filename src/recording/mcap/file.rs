@@ -1,6 +1,6 @@
 //! One MCAP file: its channels, its chunks, and its end.
 //!
-//! A chunk is a little less than a second of messages, or 4 MB of them: what is in a finished chunk can be read whatever
+//! A chunk is half a second of messages, or 4 MB of them: what is in a finished chunk can be read whatever
 //! happens to the rest. Called by the [`recorder`](super::recorder).
 
 use std::collections::BTreeMap;
@@ -19,8 +19,9 @@ use super::disk::Disk;
 use crate::ros2_messages::MessageType;
 use crate::scene::ros2::{Durability, Qos, Reliability, Topic};
 
-/// How long messages wait for the end of their chunk. With the way to the disk this is less than a second.
-const CHUNK_INTERVAL: Duration = Duration::from_millis(800);
+/// How long messages wait for the end of their chunk: less than the second that a kill may cost, by what a busy machine may keep
+/// the processor from this one.
+const CHUNK_INTERVAL: Duration = Duration::from_millis(500);
 /// The bytes of messages after which a chunk ends early: readers hold whole chunks in memory.
 const CHUNK_BYTES: u64 = 4 << 20;
 /// How often what was written is forced to the disk.
