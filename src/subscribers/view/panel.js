@@ -66,7 +66,7 @@ export function showFigures({ clearance, colours, time, scale }) {
   bar.setAttribute("aria-valuemax", MOST_CLEARANCE);
   bar.setAttribute("aria-valuenow", Math.min(MOST_CLEARANCE, known ? metres : 0).toFixed(3));
   bar.setAttribute("aria-valuetext", element("metres").textContent);
-  put("speeds", colours.unsent ? say("notSent") : colours.resting ? say("rest") : "");
+  put("speeds", colours.unsent ? say("notSent") : colours.unseen ? say("restUnseen") : colours.resting ? say("rest") : "");
   showScale(colours);
   const rate = scale === 1 ? "" : say("rate", { rate: +scale.toPrecision(3) });
   put("time", say("time", { time: time.toFixed(1), rate }));
