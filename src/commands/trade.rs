@@ -1,5 +1,6 @@
 //! `trade`: what accuracy costs on this scene and machine, for every solver.
 
+use std::io::{IsTerminal, stderr};
 use std::path::{Path, PathBuf};
 
 use bench_dragon::drawing::palette::{LIGHT, SERIES, channels, with_dark_rules};
@@ -53,6 +54,7 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
     /// Of a progress bar of 1000, what measuring the solvers takes.
     const SOLVERS: f64 = 850.0;
     let scene = common.load_scene()?;
+    announce(&scene, common);
     let timeline = search_timeline(&scene, common);
     let bar = progress_bar(1000, common).with_message("measuring");
     let measured = measure(&scene, &timeline, &mut |share| bar.set_position((SOLVERS * share) as u64));
@@ -85,6 +87,16 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
         print_display(&mut output, &scene, &displayed)?;
     }
     output.finish()
+}
+
+/// Where no bar shows that something goes on, a line does.
+fn announce(scene: &Scene, common: &Common) {
+    if common.quiet || stderr().is_terminal() {
+        return;
+    }
+    let benches = scene.team().benches;
+    let time = if benches > 1000 { "some minutes" } else { "about half a minute" };
+    eprintln!("measuring every solver on scene {} ({benches} benches), which takes {time}", scene.name);
 }
 
 fn print(output: &mut Output, measurements: &[Measurement]) -> Result<(), CommandError> {

@@ -44,6 +44,7 @@ const WORDS = {
   one: ["bench {number}", "第 {number} 节板凳"],
   head: ["HEAD", "龙头"],
   tail: ["TAIL", "龙尾"],
+  body: ["body", "龙身"],
   headBench: ["HEAD (bench 1)", "龙头（第 1 节）"],
   numbers: ["benches {a} and {b}", "第 {a} 与第 {b} 节板凳"],
   number: ["bench {a}", "第 {a} 节板凳"],
@@ -56,7 +57,6 @@ const WORDS = {
   notComputed: ["not computed", "未计算"],
   overlap: ["{metres} m overlap", "重叠 {metres} m"],
   rest: ["at rest", "静止"],
-  restUnseen: ["at rest, speeds not seen", "静止，未见速度"],
 
   // Time.
   next: ["next: {kind} in", "下一事件：{kind}，还有"],
