@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use bench_dragon::live::Publisher;
+use bench_dragon::live::{Outgoing, Publisher};
 use bench_dragon::model::path::Path;
 use bench_dragon::model::team::Team;
 use bench_dragon::motion::timeline::Timeline;
@@ -241,7 +241,7 @@ fn publish_over_iceoryx2(bencher: Bencher) {
     let mut publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");
     let frame = show.frame(0);
     let header = FrameHeader { handles: 224, ..FrameHeader::default() };
-    bencher.bench_local(|| publisher.publish(&header, frame).expect("nobody else uses this service"));
+    bencher.bench_local(|| publisher.publish(Outgoing::new(&header, frame)).expect("nobody else uses this service"));
 }
 
 #[divan::bench(sample_count = 20, sample_size = 1)]

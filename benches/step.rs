@@ -14,7 +14,7 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use bench_dragon::live::control::{Door, Doors, door};
-use bench_dragon::live::{Frames, Publisher};
+use bench_dragon::live::{Outgoing, Publisher};
 use bench_dragon::recording::arithmetic::Arithmetic;
 use bench_dragon::recording::lines::ShowLine;
 use bench_dragon::recording::log;
@@ -124,7 +124,7 @@ fn measure(benches: usize) {
                 timed(times, || {
                     let frame = show.frame(tick);
                     let header = frame_header(frame, stamps(tick));
-                    publisher.publish(&header, frame).expect("nobody else uses this service");
+                    publisher.publish(Outgoing::new(&header, frame)).expect("nobody else uses this service");
                 });
                 drain(&connection);
             }
@@ -134,7 +134,9 @@ fn measure(benches: usize) {
             let chain = &mut frame.chain;
             timed(&mut times.solver, || choice.solver.solve(time, chain).expect("200 s is before the lock"));
             let header = frame_header(&frame, stamps(tick));
-            timed(&mut times.publish, || publisher.publish(&header, &frame).expect("nobody else uses this service"));
+            timed(&mut times.publish, || {
+                publisher.publish(Outgoing::new(&header, &frame)).expect("nobody else uses this service")
+            });
             drain(&connection);
         }
         for tick in ticks.clone() {
@@ -195,9 +197,9 @@ fn measure_doors() {
                 tick += 1;
                 timed(&mut times[count], || {
                     doors.take_one(&mut show, tick);
-                    let frame = Frames::frame(&mut show, tick);
+                    let frame = show.frame(tick);
                     let header = frame_header(frame, stamps(tick));
-                    publisher.publish(&header, frame).expect("nobody else uses this service");
+                    publisher.publish(Outgoing::new(&header, frame)).expect("nobody else uses this service");
                     doors.finish_step(&mut show, tick);
                 });
                 drain(&connection);

@@ -28,16 +28,61 @@ use statistics::Sample;
 /// Nanoseconds between two calls of [`Publisher::maintain`].
 const MAINTENANCE_NS: u64 = 100_000_000;
 
+/// Alerts and cues that are messages already, since they come from a recording. Their run and stamp are not used.
+#[derive(Debug, Default)]
+pub struct Messages {
+    /// The alerts, in order.
+    pub alerts: Vec<CollisionAlert>,
+    /// The cues, in order.
+    pub cues: Vec<Cue>,
+}
+
+impl Messages {
+    /// None.
+    pub const NONE: &'static Self = &Self { alerts: Vec::new(), cues: Vec::new() };
+}
+
+/// A frame on its way out, with what goes out beside it.
+#[derive(Debug, Clone, Copy)]
+pub struct Outgoing<'a> {
+    /// The frame's header, complete but for `sent_ns`, which the publisher sets just before sending.
+    pub header: &'a FrameHeader,
+    /// The frame.
+    pub frame: &'a Frame,
+    /// What goes out beside it and is not of the frame.
+    pub messages: &'a Messages,
+}
+
+impl<'a> Outgoing<'a> {
+    /// A frame with its own alerts and cues.
+    pub fn new(header: &'a FrameHeader, frame: &'a Frame) -> Self {
+        Self { header, frame, messages: Messages::NONE }
+    }
+
+    /// The alerts that go with the frame.
+    pub fn alerts(self) -> impl Iterator<Item = CollisionAlert> {
+        let FrameHeader { run_id, stamp_ns, .. } = *self.header;
+        let own = self.frame.alerts.iter().map(move |alert| collision_alert(self.header, alert));
+        own.chain(self.messages.alerts.iter().map(move |alert| CollisionAlert { run_id, stamp_ns, ..*alert }))
+    }
+
+    /// The cues that go with the frame.
+    pub fn cues(self) -> impl Iterator<Item = Cue> {
+        let FrameHeader { run_id, stamp_ns, .. } = *self.header;
+        let own = self.frame.cues.iter().map(move |reached| cue(self.header, reached));
+        own.chain(self.messages.cues.iter().map(move |cue| Cue { run_id, stamp_ns, ..*cue }))
+    }
+}
+
 /// Where frames go. Called on the real-time thread: an implementation must not allocate, lock, log or make a system
 /// call besides its transport's own.
 pub trait Publisher {
-    /// Sends one frame with its alerts. `header` is complete but for `sent_ns`, which the publisher sets just before
-    /// sending.
+    /// Sends one frame with its alerts and cues.
     ///
     /// # Errors
     /// A sentence for people where the transport failed in a way that ends the run; a slow or dead subscriber is no
     /// error.
-    fn publish(&mut self, header: &FrameHeader, frame: &Frame) -> Result<(), PublishError>;
+    fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError>;
 
     /// What makes the next frame cheaper. Called when a step is over and has been measured.
     fn prepare(&mut self) {}
@@ -60,10 +105,27 @@ pub trait StatusPublisher {
 #[error("{0}")]
 pub struct PublishError(pub String);
 
+/// What a period brings.
+#[derive(Debug, Clone, Copy)]
+pub enum Period<'a> {
+    /// A frame, and what goes out beside it.
+    Frame(&'a Frame, &'a Messages),
+    /// Nothing.
+    Empty,
+    /// Nothing, as all that follow: the loop ends.
+    Over,
+}
+
+impl<'a> From<&'a Frame> for Period<'a> {
+    fn from(frame: &'a Frame) -> Self {
+        Self::Frame(frame, Messages::NONE)
+    }
+}
+
 /// Where frames come from, by tick.
 pub trait Frames {
-    /// The frame of a tick. Each call's tick is greater than the one before.
-    fn frame(&mut self, tick: u64) -> &Frame;
+    /// What the period `tick` brings. Each call's tick is greater than the one before.
+    fn frame(&mut self, tick: u64) -> Period<'_>;
 
     /// Obeys a command at the beginning of the period `tick`, before its frame. `None` for one that is answered by
     /// [`finished_step`](Self::finished_step).
@@ -74,8 +136,8 @@ pub trait Frames {
 }
 
 impl Frames for Show {
-    fn frame(&mut self, tick: u64) -> &Frame {
-        Show::frame(self, tick)
+    fn frame(&mut self, tick: u64) -> Period<'_> {
+        Show::frame(self, tick).into()
     }
 
     fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
@@ -116,12 +178,14 @@ pub enum End {
     Duration,
     /// Its stop flag was set.
     Signal,
+    /// Its frames were over, as those of a recording are.
+    Recording,
     /// A publisher failed.
     Error,
 }
 
-/// What the loop counted. `frames + skipped` is the number of periods elapsed; where a publisher failed, those before
-/// the period in which it did.
+/// What the loop counted. `frames + skipped` is the number of periods elapsed, but for those that brought nothing; where a
+/// publisher failed, those before the period in which it did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counts {
     /// Frames published.
@@ -213,10 +277,22 @@ pub fn run_loop<C: Clock>(
             deadline_ns: deadlines.of(tick),
         };
         doors.take_one(frames, tick);
-        let frame = frames.frame(tick);
+        let (frame, messages) = match frames.frame(tick) {
+            Period::Frame(frame, messages) => (frame, messages),
+            Period::Empty => {
+                doors.finish_step(frames, tick);
+                tick += 1;
+                continue;
+            }
+            Period::Over => {
+                counts.end = End::Recording;
+                return Ok(counts);
+            }
+        };
         let header = frame_header(frame, stamps);
+        let outgoing = Outgoing { header: &header, frame, messages };
         for publisher in publishers.iter_mut() {
-            if let Err(error) = publisher.publish(&header, frame) {
+            if let Err(error) = publisher.publish(outgoing) {
                 counts.end = End::Error;
                 return Err((counts, error));
             }
@@ -233,7 +309,7 @@ pub fn run_loop<C: Clock>(
             step_ns: clock.monotonic_ns().saturating_sub(woke_ns),
             subscribers: publishers.iter().map(|publisher| publisher.subscribers()).sum(),
         };
-        report(&mut reports, &header, frame, sample);
+        report(&mut reports, outgoing, sample);
         doors.finish_step(frames, tick);
         publishers.iter_mut().for_each(|publisher| publisher.prepare());
         tick += 1;
@@ -267,13 +343,13 @@ fn wait<C: Clock>(
 
 /// Hands the statistics thread what it counts, and the alerts. Where that thread is behind by the whole queue, the
 /// sample or the line on the terminal is lost, never the frame or the alert that was published.
-fn report(reports: &mut Reports, header: &FrameHeader, frame: &Frame, sample: Sample) {
-    for alert in &frame.alerts {
-        let announcement = Announcement::Alert { alert: collision_alert(header, alert), time_scale: header.time_scale };
+fn report(reports: &mut Reports, outgoing: Outgoing<'_>, sample: Sample) {
+    for alert in outgoing.alerts() {
+        let announcement = Announcement::Alert { alert, time_scale: outgoing.header.time_scale };
         let _ = reports.announcements.push(announcement);
     }
-    for reached in &frame.cues {
-        let _ = reports.announcements.push(Announcement::Cue(cue(header, reached)));
+    for cue in outgoing.cues() {
+        let _ = reports.announcements.push(Announcement::Cue(cue));
     }
     let _ = reports.samples.push(sample);
 }

@@ -27,6 +27,8 @@ enum Command {
     Control(commands::control::ControlArguments),
     /// Record a running publisher as MCAP, or mend a recording that was cut
     Record(commands::record::RecordArguments),
+    /// Publish a recording again, as the show that it was
+    Replay(commands::replay::ReplayArguments),
     /// Play the show of a log again and compare every bit
     Verify(commands::verify::VerifyArguments),
     /// Watch a running publisher from another process
@@ -69,6 +71,7 @@ fn main() -> ExitCode {
         Command::Run(arguments) => commands::run::run(&common, arguments),
         Command::Control(arguments) => commands::control::control(&common, arguments),
         Command::Record(arguments) => commands::record::record(&common, arguments),
+        Command::Replay(arguments) => commands::replay::replay(&common, arguments),
         Command::Verify(arguments) => commands::verify::verify(&common, arguments),
         Command::Watch(arguments) => commands::watch::watch(&common, arguments),
         Command::View(arguments) => commands::view::view(&common, arguments),

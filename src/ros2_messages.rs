@@ -10,17 +10,17 @@ pub mod path;
 pub mod transforms;
 mod types;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::show::state::Level;
 use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
-pub use types::MessageType;
+pub use types::{MessageType, fields};
 
 /// The frame of all coordinates: metres, x to the right, y up, origin at the centre.
 pub const FRAME_ID: &str = "stage";
 
 /// builtin_interfaces/Time.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Time {
     /// Seconds since 1970, or simulated seconds.
     pub sec: i32,
@@ -44,7 +44,7 @@ impl Time {
 }
 
 /// std_msgs/Header.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Header {
     /// When what follows was true.
     pub stamp: Time,
@@ -60,7 +60,7 @@ impl Header {
 }
 
 /// bench_dragon_msgs/CollisionAlert, LoopStatus, Stage or Cue: a header and the layout's fields.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 pub struct Stamped<Layout> {
     /// The stamp of the layout.
     pub header: Header,
@@ -111,7 +111,7 @@ impl Clock {
 }
 
 /// bench_dragon_msgs/HandlePoses.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 pub struct HandlePoses {
     /// The frame's stamp.
     pub header: Header,

@@ -1,8 +1,8 @@
 //! The ways out of this process: one trait, a list, a folder each.
 //!
-//! In: a scene, the loop's rate, the stage. Out: for each transport that the scene requests, a [`Publisher`] for the
+//! In: what is to be offered, the loop's rate, the stage. Out: for each transport that is requested, a [`Publisher`] for the
 //! loop's thread and a [`StatusPublisher`] for the statistics thread. Transports know frames and messages, no solver, and
-//! not each other. [`background`] is for those that would keep the loop waiting. Called by the `run` command.
+//! not each other. [`background`] is for those that would keep the loop waiting. Called by the commands that publish.
 
 pub mod background;
 pub mod iceoryx2;
@@ -11,7 +11,8 @@ pub mod ros2;
 
 use crate::live::control::Door;
 use crate::live::{Deliveries, Publisher, StatusPublisher};
-use crate::scene::Scene;
+use crate::scene::ros2::Ros2Settings;
+use crate::scene::{Scene, SinglePrecision};
 use crate::wire::Stage;
 
 /// What every transport is given about the run.
@@ -19,12 +20,42 @@ use crate::wire::Stage;
 pub struct TransportConfig<'a> {
     /// The name under which services and topics appear.
     pub name: &'a str,
-    /// The scene, which states what to publish.
-    pub scene: &'a Scene,
+    /// Handles in a frame.
+    pub handles: usize,
+    /// Whether there are alerts.
+    pub alerts: bool,
+    /// Cues of the show.
+    pub cues: usize,
+    /// The service of poses in single precision, where there is one.
+    pub single_precision: Option<SinglePrecision>,
+    /// Frames a subscriber may fall behind; `None` for as many as suit their size.
+    pub queue: Option<usize>,
+    /// Subscribers that each iceoryx2 service admits at once.
+    pub subscribers: usize,
+    /// The ROS 2 topics; `None` for none.
+    pub ros2: Option<&'a Ros2Settings>,
     /// Frames per second of the loop.
     pub loop_rate: f64,
     /// The stage.
     pub stage: Stage,
+}
+
+impl<'a> TransportConfig<'a> {
+    /// What a scene asks for, published under a name.
+    pub fn of(name: &'a str, scene: &'a Scene, loop_rate: f64, stage: Stage) -> Self {
+        Self {
+            name,
+            handles: scene.team().handles(),
+            alerts: scene.alerts.is_some(),
+            cues: scene.cues.len(),
+            single_precision: scene.single_precision,
+            queue: scene.queue,
+            subscribers: scene.subscribers,
+            ros2: scene.ros2.as_ref(),
+            loop_rate,
+            stage,
+        }
+    }
 }
 
 /// Why a transport cannot be used: one sentence, which names what to change.
@@ -97,7 +128,7 @@ use ros2::open as ros2_if_built;
 
 #[cfg(not(feature = "ros2"))]
 fn ros2_if_built(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError> {
-    match config.scene.ros2 {
+    match config.ros2 {
         None => Ok(None),
         Some(_) => Err(TransportError::BadInput(
             "ROS 2 is requested and this program was built without it: build it with the feature \"jazzy\" or \

@@ -11,14 +11,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use bench_dragon::live::clock::SystemClock;
 use bench_dragon::live::control::{Doors, door};
 use bench_dragon::live::statistics::queues;
-use bench_dragon::live::{Frames, LoopOptions, run_loop};
+use bench_dragon::live::{Frames, LoopOptions, Period, run_loop};
 use bench_dragon::recording;
 use bench_dragon::recording::arithmetic::Arithmetic;
 use bench_dragon::recording::lines::ShowLine;
 use bench_dragon::scene::{AtEnd, Scene, SceneText, SinglePrecision};
 use bench_dragon::show::control::Command;
 use bench_dragon::show::state::FrameState;
-use bench_dragon::show::{Frame, Outcome, Playback, Show};
+use bench_dragon::show::{Outcome, Playback, Show};
 use bench_dragon::subscribers::connection::{Subscription, Wake};
 use bench_dragon::transports::{self, TransportConfig};
 use bench_dragon::wire::convert::stage;
@@ -69,7 +69,7 @@ struct Watched<'a> {
 }
 
 impl Frames for Watched<'_> {
-    fn frame(&mut self, tick: u64) -> &Frame {
+    fn frame(&mut self, tick: u64) -> Period<'_> {
         self.frames += 1;
         self.stop.store(self.frames == FRAMES, Ordering::Relaxed);
         if tick > 0 {
@@ -81,7 +81,7 @@ impl Frames for Watched<'_> {
         }
         self.states[frame.state as usize] += 1;
         self.shows_played = frame.shows_played;
-        frame
+        frame.into()
     }
 
     fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
@@ -107,8 +107,7 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     let timeline = scene.motion.timeline(&mut |_| ());
     let show = Show::new(&scene, timeline, playback).unwrap();
     let name = format!("test_{}_allocation", std::process::id());
-    let config =
-        TransportConfig { name: &name, scene: &scene, loop_rate: 500.0, stage: stage(1, 0, &scene.motion, &show) };
+    let config = TransportConfig::of(&name, &scene, 500.0, stage(1, 0, &scene.motion, &show));
     let mut transports = transports::open(&config).unwrap();
     #[cfg(feature = "ros2")]
     {

@@ -49,11 +49,11 @@ struct FakeFrames {
 }
 
 impl Frames for FakeFrames {
-    fn frame(&mut self, tick: u64) -> &Frame {
+    fn frame(&mut self, tick: u64) -> Period<'_> {
         self.log.borrow_mut().computed.push((tick, self.clock.monotonic_ns()));
         self.clock.advance(self.cost_ns.pop_front().unwrap_or(0));
         self.frame.tick = tick;
-        &self.frame
+        (&self.frame).into()
     }
 
     fn command(&mut self, _: u64, _: Command) -> Option<Outcome> {
@@ -75,7 +75,7 @@ struct FakePublisher {
 }
 
 impl Publisher for FakePublisher {
-    fn publish(&mut self, header: &FrameHeader, frame: &Frame) -> Result<(), PublishError> {
+    fn publish(&mut self, Outgoing { header, frame, .. }: Outgoing<'_>) -> Result<(), PublishError> {
         assert_eq!(header.tick, frame.tick);
         if self.log.borrow().published.len() >= self.lasts {
             return Err(PublishError("the transport is gone".into()));

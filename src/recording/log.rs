@@ -18,11 +18,10 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use super::hash::{HANDLE_WORDS, HEADER_WORDS, columns, header_words};
 use super::lines::ShowLine;
 use super::writer::LogWriter;
-use crate::live::{Counts, Deliveries, PublishError, Publisher, StatusPublisher};
-use crate::show::Frame;
+use crate::live::{Counts, Deliveries, Outgoing, PublishError, Publisher, StatusPublisher};
 use crate::show::control::{Code, Command, CommandRecord};
 use crate::transports::{Transport, TransportError};
-use crate::wire::{FrameHeader, LoopStatus};
+use crate::wire::LoopStatus;
 
 /// Seconds of frames that the thread may fall behind before frames are lost, and the memory that these may take.
 const QUEUED_SECONDS: f64 = 5.0;
@@ -169,7 +168,8 @@ impl LogPublisher {
 }
 
 impl Publisher for LogPublisher {
-    fn publish(&mut self, header: &FrameHeader, frame: &Frame) -> Result<(), PublishError> {
+    fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
+        let Outgoing { header, frame, .. } = outgoing;
         let tick = header.tick;
         if self.shared.missing_from.load(Ordering::Relaxed) != NEVER {
             return Ok(());

@@ -12,7 +12,7 @@ use super::lines::{Line, Seal, ShowLine};
 use super::log::queue_of;
 use super::writer::LogWriter;
 use crate::live::simulated::Wake;
-use crate::live::{Counts, End, Publisher};
+use crate::live::{Counts, End, Outgoing, Publisher};
 use crate::scene::AtEnd;
 use crate::show::control::{Code, Command, CommandRecord};
 use crate::show::{Playback, Show};
@@ -167,7 +167,7 @@ fn a_log_that_is_too_far_behind_says_where_it_ends() {
             }
         }
         let header = FrameHeader { tick, ..Default::default() };
-        publisher.publish(&header, show.frame(tick)).unwrap();
+        publisher.publish(Outgoing::new(&header, show.frame(tick))).unwrap();
     }
     let file = File::default();
     let line = ShowLine::new(&scene_text(NEWTON, false), &playback, Arithmetic::of(&scene), "", (1, 2));
@@ -179,7 +179,7 @@ fn a_log_that_is_too_far_behind_says_where_it_ends() {
     let text = String::from_utf8(file.borrow().clone()).unwrap();
     assert_eq!(text.matches("\"command\":\"state\"").count(), 3, "{text}");
     // It takes nothing more, though it has room again: what is missing would not show.
-    publisher.publish(&FrameHeader { tick: 40, ..Default::default() }, show.frame(40)).unwrap();
+    publisher.publish(Outgoing::new(&FrameHeader { tick: 40, ..Default::default() }, show.frame(40))).unwrap();
     assert!(reader.queue.is_empty());
 }
 
@@ -192,7 +192,7 @@ fn a_frame_is_read_when_all_of_it_has_come() {
     let mut show = Show::new(&scene, scene.motion.timeline_without_contact(), playback).unwrap();
     let line = ShowLine::new(&text, &playback, Arithmetic::of(&scene), "", (1, 2));
     let mut writer = LogWriter::new(Shared(File::default()), line);
-    publisher.publish(&FrameHeader::default(), show.frame(0)).unwrap();
+    publisher.publish(Outgoing::new(&FrameHeader::default(), show.frame(0))).unwrap();
     let mut whole = vec![0.0; reader.queue.slots()];
     reader.queue.pop_entire_slice(&mut whole).unwrap();
     for word in whole {

@@ -3,6 +3,8 @@
 //! One table for the ROS 2 transport, which needs the names, and for recordings, which carry the definitions with them. Those
 //! of the program's own messages are the files of `msgs/msg`; those of the standard packages are the fields alone.
 
+use std::collections::BTreeMap;
+
 use crate::scene::ros2::Topic;
 
 /// A message type: the package and the name in it.
@@ -64,6 +66,22 @@ impl MessageType {
         }
         schema
     }
+}
+
+/// What the bytes of a message depend on in a definition of the schema encoding `ros2msg`: the fields of its type, and of every
+/// type that it is made of by its name, each as type and name, in order. Comments and constants are left out.
+pub fn fields(schema: &str) -> BTreeMap<&str, Vec<[&str; 2]>> {
+    let (mut of, mut fields) = ("", BTreeMap::from([("", Vec::new())]));
+    for line in schema.lines().map(|line| line.split('#').next().unwrap_or_default().trim()) {
+        if let Some(name) = line.strip_prefix("MSG:") {
+            of = name.trim();
+            fields.entry(of).or_default();
+        } else if let Some((kind, name)) = line.split_once(char::is_whitespace).filter(|(_, name)| !name.contains('='))
+        {
+            fields.entry(of).or_default().push([kind, name.trim()]);
+        }
+    }
+    fields
 }
 
 /// The package of the program's own messages.
@@ -148,6 +166,18 @@ mod tests {
         used.sort_unstable();
         used.dedup();
         assert_eq!(used, DEFINITIONS.map(|(name, _)| name), "sorted, none unused, none missing");
+    }
+
+    #[test]
+    fn definitions_with_other_comments_and_constants_have_the_same_fields() {
+        let schema =
+            "uint8 ON=1\n# A lamp.\npkg/Place place # where\n\nfloat64[]  levels\n=====\nMSG: pkg/Place\nfloat64 x\n";
+        let expected =
+            [("", vec![["pkg/Place", "place"], ["float64[]", "levels"]]), ("pkg/Place", vec![["float64", "x"]])];
+        assert_eq!(fields(schema), BTreeMap::from(expected));
+        let own = MessageType::of(Topic::Handles).schema();
+        assert_eq!(fields(&own)["bench_dragon_msgs/HandlePose"].len(), 5);
+        assert_ne!(fields(&own), fields(&own.replace("float64 vx", "float32 vx")));
     }
 
     #[test]

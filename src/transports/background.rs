@@ -13,9 +13,8 @@ use std::time::Duration;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use crate::live::clock::{monotonic_ns, sleep_until};
-use crate::live::{Deliveries, PublishError, Publisher, StatusPublisher};
-use crate::show::Frame;
-use crate::wire::convert::{collision_alert, cue, handle_poses};
+use crate::live::{Deliveries, Outgoing, PublishError, Publisher, StatusPublisher};
+use crate::wire::convert::handle_poses;
 use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus};
 
 /// Seconds of frames that the thread may fall behind before it continues with the newest.
@@ -248,14 +247,15 @@ impl BackgroundPublisher {
 }
 
 impl Publisher for BackgroundPublisher {
-    fn publish(&mut self, header: &FrameHeader, frame: &Frame) -> Result<(), PublishError> {
-        for alert in &frame.alerts {
+    fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
+        for alert in outgoing.alerts() {
             // A thread that is 256 alerts behind has other troubles than this one.
-            let _ = self.alerts.push(collision_alert(header, alert));
+            let _ = self.alerts.push(alert);
         }
-        for reached in &frame.cues {
-            let _ = self.cues.push(cue(header, reached));
+        for cue in outgoing.cues() {
+            let _ = self.cues.push(cue);
         }
+        let Outgoing { header, frame, .. } = outgoing;
         if !self.due(header.tick) {
             return Ok(());
         }

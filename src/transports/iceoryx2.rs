@@ -23,10 +23,10 @@ use ::iceoryx2::service::port_factory::{event, publish_subscribe};
 
 use super::{Transport, TransportConfig, TransportError};
 use crate::live::control::Door;
-use crate::live::{Deliveries, PublishError, Publisher, StatusPublisher};
+use crate::live::{Deliveries, Outgoing, PublishError, Publisher, StatusPublisher};
 use crate::scene::SinglePrecision;
 use crate::show::Frame;
-use crate::wire::convert::{Decimation, collision_alert, cue, handle_pose, handle_pose_32, handle_poses};
+use crate::wire::convert::{Decimation, handle_pose, handle_pose_32, handle_poses};
 use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, HandlePose32, LoopStatus, Stage};
 
 pub use error::OpenError;
@@ -112,20 +112,20 @@ struct Iceoryx2 {
 /// # Errors
 /// [`TransportError::BadInput`] for a name that iceoryx2 cannot take.
 pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError> {
-    let TransportConfig { name, scene, stage, .. } = *config;
+    let TransportConfig { name, handles, alerts, cues, single_precision, queue, subscribers, stage, .. } = *config;
     service_name(name, "poses")?;
     stale_files::spawn_reaper();
     let mut config = PublisherConfig {
         name: name.to_owned(),
-        handles: scene.team().handles(),
-        single_precision: scene.single_precision,
+        handles,
+        single_precision,
         queue: 0,
-        subscribers: scene.subscribers,
-        alerts: scene.alerts.is_some(),
-        cues: !scene.cues.is_empty(),
+        subscribers,
+        alerts,
+        cues: cues > 0,
         stage,
     };
-    config.queue = scene.queue.unwrap_or_else(|| default_queue(&config));
+    config.queue = queue.unwrap_or_else(|| default_queue(&config));
     Ok(Some(Box::new(Iceoryx2 { config, control: None })))
 }
 
@@ -230,27 +230,27 @@ impl SharedMemoryPublisher {
         }
     }
 
-    fn send_cues(&self, header: &FrameHeader, frame: &Frame) -> Result<(), String> {
+    fn send_cues(&self, outgoing: Outgoing<'_>) -> Result<(), String> {
         let Some(port) = &self.cues else { return Ok(()) };
-        for reached in &frame.cues {
-            port.send_copy(cue(header, reached)).map_err(|error| error.to_string())?;
+        for cue in outgoing.cues() {
+            port.send_copy(cue).map_err(|error| error.to_string())?;
         }
         Ok(())
     }
 
-    fn send_alerts(&self, header: &FrameHeader, frame: &Frame) -> Result<(), String> {
+    fn send_alerts(&self, outgoing: Outgoing<'_>) -> Result<(), String> {
         let Some(port) = &self.alerts else { return Ok(()) };
-        for alert in &frame.alerts {
-            port.send_copy(collision_alert(header, alert)).map_err(|error| error.to_string())?;
+        for alert in outgoing.alerts() {
+            port.send_copy(alert).map_err(|error| error.to_string())?;
         }
         Ok(())
     }
 }
 
 impl Publisher for SharedMemoryPublisher {
-    fn publish(&mut self, header: &FrameHeader, frame: &Frame) -> Result<(), PublishError> {
-        let sent = self.send_frame(header, frame).and_then(|()| self.send_alerts(header, frame));
-        let sent = sent.and_then(|()| self.send_cues(header, frame));
+    fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
+        let sent = self.send_frame(outgoing.header, outgoing.frame).and_then(|()| self.send_alerts(outgoing));
+        let sent = sent.and_then(|()| self.send_cues(outgoing));
         sent.map_err(|reason| PublishError(format!("the shared memory failed: {reason}")))?;
         // Waking costs a socket write per listener, several times what sending does: it is left out for nobody.
         if self.tick_service.dynamic_config().number_of_listeners() > 0 {

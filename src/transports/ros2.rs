@@ -89,7 +89,7 @@ struct Ros2 {
 /// # Errors
 /// [`TransportError`]
 pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError> {
-    let Some(settings) = &config.scene.ros2 else { return Ok(None) };
+    let Some(settings) = config.ros2 else { return Ok(None) };
     let variable = |name: &str| std::env::var(name).ok();
     let network = Network::of(variable)?;
     if let Some(warning) = other_distribution(variable) {
@@ -114,13 +114,12 @@ pub fn open_on(
     config: &TransportConfig,
     settings: &Ros2Settings,
 ) -> Result<Box<dyn Transport>, Ros2Error> {
-    let TransportConfig { name, scene, loop_rate, stage } = *config;
+    let TransportConfig { name, handles, alerts, cues, loop_rate, stage, .. } = *config;
     check_name(name)?;
     if let Some(rate) = settings.rate.filter(|rate| *rate > loop_rate) {
         log::warn!("publish.ros2.rate is {rate}, more than the loop's {loop_rate}: ROS 2 gets {loop_rate} a second");
     }
-    let (alerts, rate, handles) = (scene.alerts.is_some(), settings.rate_of(loop_rate), scene.team().handles());
-    let cues = scene.cues.len();
+    let rate = settings.rate_of(loop_rate);
     let topics: Vec<String> = settings.offered(alerts, cues > 0).map(|topic| topic.path(name)).collect();
     let services = mapping.map_or(String::new(), |mapping| {
         format!("\nROS 2 services that conduct the show: /{name}/..., for clients of {}.", mapping.rmw())

@@ -13,7 +13,7 @@
 mod stage;
 
 use iceoryx2::prelude::ZeroCopySend;
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 pub use stage::*;
 
@@ -23,7 +23,7 @@ pub const NO_BENCH: u32 = u32::MAX;
 /// Where one handle is and how it moves.
 ///
 /// Over iceoryx2 the payload of `<name>/poses` is a slice of these, the head first.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/HandlePose/1")]
 #[repr(C)]
 pub struct HandlePose {
@@ -66,7 +66,7 @@ pub struct HandlePose32 {
 /// What is true of a whole frame.
 ///
 /// Over iceoryx2 the user header of `<name>/poses` and `<name>/poses32`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/FrameHeader/2")]
 #[repr(C)]
 pub struct FrameHeader {
@@ -113,7 +113,7 @@ pub struct FrameHeader {
 /// or approaching, the one that has happened otherwise.
 ///
 /// Over iceoryx2 the payload of `<name>/alerts`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/CollisionAlert/2")]
 #[repr(C)]
 pub struct CollisionAlert {
@@ -220,13 +220,19 @@ impl Serialize for SceneName {
     }
 }
 
+impl<'de> Deserialize<'de> for SceneName {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Ok(Self::new(&String::deserialize(deserializer)?))
+    }
+}
+
 /// How the loop is doing, once a second.
 ///
 /// Figures that end in `_second` are of the last second alone, those that end in `_total` since the start of the run;
 /// all durations are in nanoseconds.
 ///
 /// Over iceoryx2 the payload of `<name>/status`. Layout 2 added the unforeseen contacts and the unsolved frames.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/LoopStatus/2")]
 #[repr(C)]
 pub struct LoopStatus {
@@ -295,7 +301,7 @@ pub struct LoopStatus {
 /// A cue that the show has reached. Payload of `<name>/cues`.
 ///
 /// Each is sent once, with the frame at or after it; a seek over cues sends none.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/Cue/1")]
 #[repr(C)]
 pub struct Cue {

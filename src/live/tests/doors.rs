@@ -40,7 +40,7 @@ struct Arrivals {
 }
 
 impl Frames for Arrivals {
-    fn frame(&mut self, tick: u64) -> &Frame {
+    fn frame(&mut self, tick: u64) -> Period<'_> {
         for door in self.arrivals.pop_front().unwrap_or_default() {
             // Its number names the door: this show plays no steps.
             self.doors[door].send(Command::Step(door as u64)).unwrap();
@@ -49,7 +49,7 @@ impl Frames for Arrivals {
         self.clock.advance(self.cost_ns.pop_front().unwrap_or(0));
         self.computed += 1;
         self.frame.tick = tick;
-        &self.frame
+        (&self.frame).into()
     }
 
     fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {

@@ -225,7 +225,7 @@ impl<Output: Write> Mender<Output> {
 }
 
 /// The schemas, channels and messages of a chunk.
-fn records_of_chunk(body: &[u8]) -> Result<Vec<Record<'static>>, McapError> {
+pub(super) fn records_of_chunk(body: &[u8]) -> Result<Vec<Record<'static>>, McapError> {
     let mut head = vec![op::CHUNK];
     head.extend((body.len() as u64).to_le_bytes());
     let mut chunk = head.as_slice().chain(body);

@@ -10,12 +10,11 @@ use super::super::verify::{Verdict, VerifyError, verify};
 use super::super::writer::LogWriter;
 use crate::live::control::{Door, Doors, door};
 use crate::live::simulated::{SimulatedClock, Wake};
-use crate::live::{Counts, Frames, LoopOptions, PublishError, Publisher, Reports, run_loop};
+use crate::live::{Counts, Frames, LoopOptions, Outgoing, Period, PublishError, Publisher, Reports, run_loop};
 use crate::scene::SceneText;
 use crate::show::control::Command;
-use crate::show::{Frame, Outcome, Playback, Show};
+use crate::show::{Outcome, Playback, Show};
 use crate::solve::table::Instructions;
-use crate::wire::FrameHeader;
 
 pub const RATE: f64 = 50.0;
 
@@ -57,9 +56,9 @@ impl Conducted {
 }
 
 impl Frames for Conducted {
-    fn frame(&mut self, tick: u64) -> &Frame {
+    fn frame(&mut self, tick: u64) -> Period<'_> {
         self.exchange();
-        self.show.frame(tick)
+        self.show.frame(tick).into()
     }
 
     fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
@@ -97,9 +96,9 @@ pub struct Inline {
 }
 
 impl Publisher for Inline {
-    fn publish(&mut self, header: &FrameHeader, frame: &Frame) -> Result<(), PublishError> {
-        self.publisher.publish(header, frame)?;
-        if !(self.held_up)(header.tick) {
+    fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
+        self.publisher.publish(outgoing)?;
+        if !(self.held_up)(outgoing.header.tick) {
             self.reader.empty(&mut self.writer);
         }
         Ok(())
@@ -127,8 +126,8 @@ impl Drop for Inline {
 struct Failing(Option<u64>);
 
 impl Publisher for Failing {
-    fn publish(&mut self, header: &FrameHeader, _: &Frame) -> Result<(), PublishError> {
-        if self.0 == Some(header.tick) { Err(PublishError("it fails".to_owned())) } else { Ok(()) }
+    fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
+        if self.0 == Some(outgoing.header.tick) { Err(PublishError("it fails".to_owned())) } else { Ok(()) }
     }
 
     fn maintain(&mut self) {}

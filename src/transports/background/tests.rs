@@ -6,9 +6,9 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use proptest::prelude::*;
 
 use super::*;
-use crate::show::ReachedCue;
 use crate::show::alerts::Alert;
 use crate::show::state::Level;
+use crate::show::{Frame, ReachedCue};
 
 const HANDLES: usize = 3;
 
@@ -78,7 +78,7 @@ fn frame(tick: u64, alerts: usize) -> Frame {
 }
 
 fn publish(publisher: &mut BackgroundPublisher, tick: u64, alerts: usize) {
-    publisher.publish(&FrameHeader { tick, ..FrameHeader::default() }, &frame(tick, alerts)).unwrap();
+    publisher.publish(Outgoing::new(&FrameHeader { tick, ..FrameHeader::default() }, &frame(tick, alerts))).unwrap();
 }
 
 #[test]
@@ -133,7 +133,7 @@ fn cues_of_frames_that_are_not_sent_are_sent() {
             name: "".into(),
         });
         let frame = Frame { cues: cues.to_vec(), ..frame(tick, 0) };
-        publisher.publish(&FrameHeader { tick, ..FrameHeader::default() }, &frame).unwrap();
+        publisher.publish(Outgoing::new(&FrameHeader { tick, ..FrameHeader::default() }, &frame)).unwrap();
     }
     drop(publisher);
     assert_eq!(thread.finish().frames, 1, "the rate is a frame a second");

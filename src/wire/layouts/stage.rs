@@ -1,7 +1,7 @@
 //! The layout of the stage: the team, the path, the time line.
 
 use iceoryx2::prelude::ZeroCopySend;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::SceneName;
 
@@ -18,7 +18,7 @@ pub const SEGMENT_INWARD_SPIRAL: u32 = 2;
 pub const SEGMENT_OUTWARD_SPIRAL: u32 = 3;
 
 /// One segment of the path in a [`Stage`].
-#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/StageSegment/3")]
 #[repr(C)]
 pub struct StageSegment {
@@ -61,7 +61,7 @@ pub const MOST_EVENTS: usize = 4;
 pub const MOST_CUES: usize = 32;
 
 /// An event of the show in a [`Stage`].
-#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/StageEvent/4")]
 #[repr(C)]
 pub struct StageEvent {
@@ -74,7 +74,7 @@ pub struct StageEvent {
 }
 
 /// A cue of the show in a [`Stage`].
-#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/StageCue/4")]
 #[repr(C)]
 pub struct StageCue {
@@ -95,7 +95,7 @@ pub struct StageCue {
 ///
 /// Over iceoryx2 the payload of `<name>/stage`. Layout 2 added the segments of the path, layout 3 gave them their name,
 /// layout 4 added the time line: the freeze time, the events and the cues.
-#[derive(Debug, Clone, Copy, Default, PartialEq, ZeroCopySend, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/Stage/4")]
 #[repr(C)]
 pub struct Stage {

@@ -1,0 +1,159 @@
+//! `replay`: plays a recording again, as the live publisher that it was made of.
+
+use std::path::PathBuf;
+
+use bench_dragon::live::End;
+use bench_dragon::live::clock::realtime_ns;
+use bench_dragon::recording::mcap::reader::ReadError;
+use bench_dragon::recording::replay::{Pace, Prepared, ReplayOptions};
+use bench_dragon::scene::ros2::Topic;
+use bench_dragon::scene::{Accepted, Scene};
+use bench_dragon::transports::iceoryx2::service_name;
+use bench_dragon::transports::{Transport, TransportConfig};
+use bench_dragon::wire::Stage;
+use bench_dragon::wire::sentence::rounded;
+use jiff::{Timestamp, Unit};
+
+use super::publishing::{Hooks, Publishing, new_run_id, open_transports};
+use super::realtime_scheduling::RealtimeScheduling;
+use super::{CommandError, Common, number, stop_on_signals};
+
+/// The most cues that room is kept for, whatever a damaged stage states.
+const MOST_CUES: usize = 1000;
+
+/// Arguments of `replay`.
+#[derive(Debug, clap::Args)]
+pub struct ReplayArguments {
+    /// The recording (MCAP) to play
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Send the frames evenly, so many a second, in place of at their recorded times
+    #[arg(
+        long,
+        value_name = "HZ",
+        help_heading = "The show",
+        conflicts_with = "time_scale",
+        allow_negative_numbers = true
+    )]
+    rate: Option<f64>,
+    /// So many times as fast as recorded
+    #[arg(long, value_name = "X", default_value_t = 1.0, help_heading = "The show", allow_negative_numbers = true)]
+    time_scale: f64,
+    /// Begin with the first frame of the recording at or after these simulated seconds
+    #[arg(long, value_name = "SECONDS", help_heading = "The show", allow_negative_numbers = true)]
+    start: Option<f64>,
+    /// Wall time after which to end: 60, 90s, 5m, 8h
+    #[arg(long, value_name = "TIME", value_parser = super::wall_seconds, help_heading = "The show")]
+    duration: Option<f64>,
+    /// Begin again whenever the recording is over
+    #[arg(long = "loop", help_heading = "The show")]
+    looping: bool,
+    /// Publish ROS 2 topics too, the default ones or those of --scene's [publish.ros2]
+    #[arg(long)]
+    ros2: bool,
+    #[command(flatten)]
+    scheduling: RealtimeScheduling,
+}
+
+/// Plays the recording until it is over, its duration is, or a signal comes.
+pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), CommandError> {
+    let options = arguments.options()?;
+    let mut scene = common.load_scene()?;
+    if arguments.ros2 {
+        scene.ros2.get_or_insert_default();
+    }
+    // A recording cannot be conducted.
+    scene.ros2.iter_mut().for_each(|settings| settings.control = false);
+    service_name(&common.name, "poses")?;
+    let shown = arguments.file.display().to_string();
+    let refused = |error: ReadError| CommandError::BadInput(format!("{shown}: {error}"));
+    let prepared = Prepared::open(&arguments.file, options).map_err(refused)?;
+    let rate = Accepted::RATE.check("the rate of the replay", prepared.rate()).map_err(|sentence| {
+        CommandError::BadInput(format!("{shown}: {sentence}: choose another --rate or --time-scale"))
+    })?;
+    let stop = stop_on_signals()?;
+    let run_id = new_run_id();
+    let stem = || arguments.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let of = prepared.contents().scene.clone().unwrap_or_else(stem);
+    let (transports, doors) = open_transports(&config(common, &scene, &prepared, run_id))?;
+    let start = start_lines(&shown, &of, &prepared);
+    let benches = prepared.contents().stage.benches;
+    let (mut frames, reading) = prepared.begin()?;
+    let publishing = Publishing {
+        common,
+        scheduling: &arguments.scheduling,
+        run_id,
+        rate,
+        duration: arguments.duration,
+        scene: &format!("replay of {of}"),
+        benches,
+    };
+    let print_start = |transports: &[Box<dyn Transport>]| {
+        if !common.quiet && !common.json {
+            eprintln!("{start}");
+            transports.iter().for_each(|transport| eprintln!("{}", transport.describe()));
+        }
+    };
+    let hooks = Hooks { opened: Box::new(print_start), sample: Box::new(|_| ()), ended: Box::new(|_| ()) };
+    let mut published = publishing.run(&mut frames, transports, doors, &stop, hooks)?;
+    let (waited, failure) = reading.finish();
+    if waited > 0 {
+        log::warn!("in {waited} periods a frame was due that had not been read from the disk: it went out later");
+    }
+    if failure.is_some() && published.counts.end == End::Recording {
+        published.counts.end = End::Error;
+    }
+    published.print(common)?;
+    match (published.error, failure) {
+        (Some(error), _) => Err(CommandError::Failed(error.to_string())),
+        (None, Some(error)) => Err(refused(error)),
+        (None, None) => Ok(()),
+    }
+}
+
+impl ReplayArguments {
+    fn options(&self) -> Result<ReplayOptions, CommandError> {
+        let checked = |accepted: Accepted, name, value| accepted.check(name, value).map_err(CommandError::BadInput);
+        let pace = match self.rate {
+            Some(rate) => Pace::Even(checked(Accepted::RATE, "--rate", rate)?),
+            None => Pace::Recorded(checked(Accepted::TIME_SCALE, "--time-scale", self.time_scale)?),
+        };
+        if let Some(start) = self.start.filter(|start| !start.is_finite()) {
+            return Err(CommandError::BadInput(format!("--start is {start}, expected simulated seconds")));
+        }
+        Ok(ReplayOptions { pace, start: self.start, looping: self.looping })
+    }
+}
+
+/// What is offered: what the recording has, in the way that the scene states.
+fn config<'a>(common: &'a Common, scene: &'a Scene, prepared: &Prepared, run_id: u64) -> TransportConfig<'a> {
+    let contents = prepared.contents();
+    let stage = Stage { run_id, stamp_ns: realtime_ns(), ..contents.stage };
+    TransportConfig {
+        handles: contents.ends[0].handles as usize,
+        alerts: contents.topics.contains(&Topic::Alerts),
+        cues: (stage.cues as usize).min(MOST_CUES),
+        ..TransportConfig::of(&common.name, scene, prepared.rate(), stage)
+    }
+}
+
+/// What a person wants to know of the recording.
+fn start_lines(file: &str, scene: &str, prepared: &Prepared) -> String {
+    let contents = prepared.contents();
+    let [first, _] = contents.ends;
+    let recorded = i128::from(first.stamp_ns);
+    let recorded = Timestamp::from_nanosecond(recorded).and_then(|stamp| stamp.round(Unit::Second));
+    let recorded = recorded.map_or(String::new(), |stamp| format!(" of {stamp}"));
+    let frames = contents.frames.map_or(String::new(), |frames| format!("{frames} frames in "));
+    let topics: Vec<_> = contents.topics.iter().map(|topic| topic.name()).collect();
+    format!(
+        "Replay of \"{scene}\" from {file}, the recording of \"{}\"{recorded}: {frames}{} s, {} handles; {}.\n\
+         {} periods per second, from {} s.",
+        contents.name,
+        rounded(contents.seconds(), 3),
+        first.handles,
+        topics.join(", "),
+        rounded(prepared.rate(), 6),
+        number(prepared.start()),
+    )
+}

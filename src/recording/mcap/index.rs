@@ -1,0 +1,103 @@
+//! The end of a recording: which channels and chunks it has. Called by the [`reader`](super::reader).
+
+use std::collections::{BTreeMap, HashMap};
+use std::fmt::Display;
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::sync::Arc;
+
+use mcap::read::ChannelAccumulator;
+use mcap::records::{ChunkIndex, Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{Channel, MAGIC, McapError, parse_record};
+
+use super::reader::ReadError;
+
+/// The footer with the end's magic, and the record before the index.
+const FOOTER_BYTES: usize = 37;
+const DATA_END_BYTES: u64 = 13;
+
+/// What stands at the end of a file.
+#[derive(Default)]
+pub(super) struct Index {
+    pub channels: HashMap<u16, Arc<Channel<'static>>>,
+    pub chunks: Vec<ChunkIndex>,
+    /// Messages by channel, where the file counts them.
+    pub counts: Option<BTreeMap<u16, u64>>,
+}
+
+/// Reads the end of a file, whose bytes are checked.
+pub(super) fn index(file: &mut File, length: u64) -> Result<Index, ReadError> {
+    let mut magic = [0; MAGIC.len()];
+    file.seek(SeekFrom::Start(0))?;
+    match file.read_exact(&mut magic) {
+        Err(error) if error.kind() != io::ErrorKind::UnexpectedEof => return Err(error.into()),
+        _ if magic != *MAGIC => return Err(ReadError::NotMcap),
+        _ => (),
+    }
+    let at = length.checked_sub(FOOTER_BYTES as u64).ok_or(ReadError::NoEnd)?;
+    let mut footer = [0; FOOTER_BYTES];
+    file.seek(SeekFrom::Start(at))?;
+    file.read_exact(&mut footer)?;
+    let begins = match footer.split_at(FOOTER_BYTES - MAGIC.len()) {
+        ([op::FOOTER, _, _, _, _, _, _, _, _, begins @ ..], MAGIC) => begins.first_chunk(),
+        _ => return Err(ReadError::NoEnd),
+    };
+    let begins = begins.map_or(0, |begins| u64::from_le_bytes(*begins));
+    if begins == 0 {
+        return Err(ReadError::NoIndex);
+    }
+    let damaged = |reason: &dyn Display| ReadError::Damaged { at, reason: reason.to_string() };
+    let begins = begins.checked_sub(DATA_END_BYTES).filter(|begins| *begins <= at);
+    let begins = begins.ok_or_else(|| damaged(&"its index is elsewhere"))?;
+    let mut bytes = Vec::new();
+    file.seek(SeekFrom::Start(begins))?;
+    file.read_to_end(&mut bytes)?;
+    let options = LinearReaderOptions::default().with_skip_start_magic(true);
+    let options = options.with_validate_summary_section_crc(true).with_record_length_limit(bytes.len());
+    let (mut reader, mut left) = (LinearReader::new_with_options(options), bytes.as_slice());
+    let (mut index, mut known, mut ids) = (Index::default(), ChannelAccumulator::default(), Vec::new());
+    while let Some(event) = reader.next_event() {
+        let record = match event.map_err(|error| damaged(&told(&error)))? {
+            LinearReadEvent::ReadRequest(need) => {
+                // No more is asked for than there can be.
+                let read = left.read(reader.insert(need.min(left.len())))?;
+                reader.notify_read(read);
+                continue;
+            }
+            LinearReadEvent::Record { opcode: op::ATTACHMENT, .. } => continue,
+            LinearReadEvent::Record { data, opcode } => parse_record(opcode, data),
+        };
+        let added = record.map(Record::into_owned).and_then(|record| match record {
+            Record::Schema { header, data } => known.add_schema(header, data),
+            Record::Channel(channel) => {
+                ids.push(channel.id);
+                known.add_channel(channel)
+            }
+            Record::ChunkIndex(chunk) => {
+                index.chunks.push(chunk);
+                Ok(())
+            }
+            Record::Statistics(statistics) => {
+                index.counts = Some(statistics.channel_message_counts);
+                Ok(())
+            }
+            _ => Ok(()),
+        });
+        added.map_err(|error| damaged(&told(&error)))?;
+    }
+    index.channels = ids.into_iter().filter_map(|id| Some((id, known.get(id)?))).collect();
+    let has_messages = index.counts.as_ref().is_some_and(|counts| counts.values().any(|count| *count > 0));
+    if index.chunks.is_empty() && has_messages { Err(ReadError::NoIndex) } else { Ok(index) }
+}
+
+/// What the reader has to say, without what it says of itself.
+pub(super) fn told(error: &McapError) -> String {
+    match error {
+        McapError::UnsupportedCompression(name) => format!("its chunks are compressed by {name}, expected zstd"),
+        // binrw's sentences name its own types, over several lines.
+        McapError::Parse(_) => "a record cannot be read".to_owned(),
+        McapError::Io(error) => error.to_string(),
+        other => other.to_string(),
+    }
+}
