@@ -252,9 +252,9 @@ fn measure_log() {
         timed(&mut times[usize::from(logged)], || {
             let frame = show.frame(tick);
             let header = frame_header(frame, stamps(tick));
-            publisher.publish(&header, frame).expect("nobody else uses this service");
+            publisher.publish(Outgoing::new(&header, frame)).expect("nobody else uses this service");
             if logged {
-                logging.publish(&header, frame).expect("a log ends no run");
+                logging.publish(Outgoing::new(&header, frame)).expect("a log ends no run");
             }
         });
         if logged {
