@@ -1,4 +1,5 @@
-//! `record` and `record --recover`, as programs: read by Python's own MCAP libraries, cut, killed, on a full disk.
+//! `record` and `record --recover`, as programs: read by Python's own MCAP libraries, cut, killed, on a full disk, on one that
+//! takes nothing; and the recorder itself, given frames that no publisher can be made to send.
 
 mod processes;
 
@@ -6,7 +7,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use bench_dragon::recording::mcap::recorder::{Recorder, RecorderConfig};
 use bench_dragon::recording::mcap::recover::{RecoverError, Recovered, check_magic, recover};
+use bench_dragon::scene::ros2::Topic;
+use bench_dragon::wire::{CollisionAlert, FrameHeader, HandlePose};
 use mcap::{MessageStream, Summary};
 use nix::sys::signal::Signal;
 use processes::{Process, can_run, json_lines, long, program, python, python_modules, root, text, unique, wait};
@@ -91,13 +95,14 @@ fn check_whole(recorded: &Value, published: &Value, rate: u64) {
     );
 }
 
-/// A recording of some seconds of a small team.
+/// A recording of some seconds of a small team, whose terminal is closed at the end.
 fn small_recording(name: &str, folder: &Path) -> PathBuf {
     let file = folder.join("small.mcap");
     let recorder = recorder(name, &file, &[]);
     let arguments = ["--rate", "40", "--start", "20", "--duration", "5"];
     publisher(name, &scene(folder, "school", ""), &arguments).output_within(120);
-    assert_eq!(files(&stopped(recorder)), std::slice::from_ref(&file));
+    recorder.signal(Signal::SIGHUP);
+    assert_eq!(files(&processes::summary(&recorder.output_within(60))), std::slice::from_ref(&file));
     file
 }
 
@@ -114,6 +119,15 @@ fn chunks(file: &Path) -> Vec<(usize, Vec<Entry>)> {
         (line["end"].as_u64().unwrap() as usize, messages)
     };
     json_lines(&output).iter().map(chunk).collect()
+}
+
+/// The bytes at which the records of a file begin.
+fn record_starts(bytes: &[u8]) -> Vec<usize> {
+    let next = |at: &usize| {
+        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap());
+        Some(at + 9 + length as usize).filter(|next| *next < bytes.len() - 8)
+    };
+    std::iter::successors(Some(8), next).collect()
 }
 
 fn recovered(bytes: &[u8]) -> Result<(Recovered, Vec<u8>), RecoverError> {
@@ -177,7 +191,7 @@ fn a_file_that_is_cut_anywhere_keeps_every_finished_chunk() {
         let expected: Vec<_> = finished.flat_map(|(_, messages)| messages.clone()).collect();
         let (counts, output) = recovered(&bytes[..cut]).unwrap();
         assert!(entries(&output) == expected, "cut at {cut} of {}: {counts:?}", bytes.len());
-        assert_eq!(counts.messages, expected.len() as u64);
+        assert_eq!((counts.messages, counts.whole, counts.damaged), (expected.len() as u64, false, 0), "cut at {cut}");
         let last_end = chunks.iter().map(|(end, _)| *end).take_while(|end| *end <= cut).last().unwrap_or(8);
         assert!(counts.lost_bytes as usize <= cut - last_end, "{counts:?} of {cut} bytes");
     }
@@ -191,20 +205,144 @@ fn a_byte_that_is_wrong_costs_messages_and_invents_none() {
     let folder = tempfile::tempdir().unwrap();
     let file = small_recording("record_flip", folder.path());
     let bytes = std::fs::read(&file).unwrap();
-    let all = entries(&bytes);
+    let (all, chunks, starts) = (entries(&bytes), chunks(&file), record_starts(&bytes));
+    let record_of = |at: usize| starts[starts.partition_point(|start| *start <= at) - 1];
+    let (first_end, last_end) = (chunks[0].0, chunks[chunks.len() - 1].0);
     let mut random = fastrand::Rng::with_seed(18);
     let mut damaged = 0;
-    for _ in 0..300 {
-        let mut wrong = bytes.clone();
-        wrong[random.usize(8..bytes.len())] ^= 1 << random.u32(0..8);
-        let Ok((counts, output)) = recovered(&wrong) else { continue };
+    for round in 0..400 {
+        // Every other file was cut before its end, and every fourth byte is in the first chunk.
+        let length = if round % 2 == 0 { bytes.len() } else { last_end };
+        let from = if round % 4 < 2 { record_of(first_end - 1) } else { 8 };
+        let at = random.usize(from..if round % 4 < 2 { first_end } else { length });
+        let mut wrong = bytes[..length].to_vec();
+        wrong[at] ^= 1 << random.u32(0..8);
+        let (counts, output) = recovered(&wrong).unwrap();
+        let kept = entries(&output);
         let mut rest = all.iter();
-        for entry in entries(&output) {
-            assert!(rest.any(|known| *known == entry), "{entry:?} is in no place of the recording");
+        for entry in &kept {
+            assert!(rest.any(|known| known == entry), "{entry:?} is in no place of the recording");
+        }
+        let record = record_of(at);
+        let others = |chunk: &&(usize, Vec<Entry>)| record_of(chunk.0 - 1) != record;
+        let others: Vec<_> = chunks.iter().filter(others).flat_map(|(_, messages)| messages.clone()).collect();
+        if (1..9).contains(&(at - record)) {
+            // Where a length is wrong nothing says where the next record begins.
+            let before: usize = chunks.iter().take_while(|(end, _)| *end <= record).map(|chunk| chunk.1.len()).sum();
+            assert!(kept.len() >= before, "a length at {at}: {counts:?}");
+        } else {
+            assert!(kept == all || kept == others, "byte {at}, in the record at {record}: {counts:?}");
+            assert!(kept == all || counts.damaged == 1, "byte {at}, in the record at {record}: {counts:?}");
         }
         damaged += u64::from(counts.damaged > 0);
     }
-    assert!(damaged > 100, "{damaged} of 300 were noticed in a chunk");
+    assert!(damaged > 200, "{damaged} of 400 were noticed in a chunk");
+    // No record of MCAP, in place of the second chunk.
+    let mut wrong = bytes.clone();
+    wrong[record_of(chunks[1].0 - 1)] = 0x16;
+    let (counts, _) = recovered(&wrong).unwrap();
+    let lost = chunks[1].1.len() as u64;
+    assert_eq!((counts.damaged, counts.lost_messages, counts.messages), (1, lost, all.len() as u64 - lost));
+}
+
+/// A recorder of the publisher `p`.
+fn library_recorder(file: &Path, topics: &[Topic], replace: bool) -> Recorder {
+    let (name, file, topics) = ("p".to_owned(), file.to_owned(), topics.to_vec());
+    Recorder::new(RecorderConfig { name, file, replace, topics, split: None }).unwrap()
+}
+
+/// A frame of a run, one of 100 a second.
+fn frame(run_id: u64, tick: u64, stamp_ns: u64) -> FrameHeader {
+    FrameHeader {
+        run_id,
+        sequence: tick,
+        tick,
+        stamp_ns,
+        deadline_ns: tick * 10_000_000,
+        handles: 2,
+        ..Default::default()
+    }
+}
+
+#[test]
+fn a_clock_that_is_set_back_is_recorded_as_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("clock.mcap");
+    let mut recorder = library_recorder(&file, &[Topic::Handles, Topic::Alerts], false);
+    let handles = [HandlePose::default(); 2];
+    let alert = |tick, stamp_ns| CollisionAlert { run_id: 1, tick, stamp_ns, ..Default::default() };
+    let stamp = |tick: u64| 1_000_000_000_000 + tick * 10_000_000 - if tick >= 60 { 100_000_000_000 } else { 0 };
+    // One that was sent before anybody subscribed comes after the first frame.
+    recorder.frame(&frame(1, 50, stamp(50)), &handles, 0).unwrap();
+    recorder.alert(&alert(10, stamp(10))).unwrap();
+    (51..70).for_each(|tick| recorder.frame(&frame(1, tick, stamp(tick)), &handles, 0).unwrap());
+    recorder.alert(&alert(65, stamp(65))).unwrap();
+    recorder.finish().unwrap();
+    let entries = entries(&std::fs::read(&file).unwrap());
+    let times = |topic| entries.iter().filter(move |entry| entry.0 == topic).map(|entry| entry.2).collect::<Vec<_>>();
+    assert_eq!(times("/p/handles"), (50..70).map(stamp).collect::<Vec<_>>());
+    assert_eq!(times("/p/alerts"), [stamp(50), stamp(65)]);
+}
+
+#[test]
+fn every_file_that_is_replaced_is_emptied() {
+    let folder = tempfile::tempdir().unwrap();
+    let paths = ["again.mcap", "again-2.mcap"].map(|name| folder.path().join(name));
+    paths.iter().for_each(|path| std::fs::write(path, vec![7; 1_000_000]).unwrap());
+    let mut recorder = library_recorder(&paths[0], &[Topic::Handles], true);
+    let handles = [HandlePose::default(); 2];
+    for run_id in 1..=2 {
+        (0..5).for_each(|tick| recorder.frame(&frame(run_id, tick, tick), &handles, 0).unwrap());
+    }
+    recorder.finish().unwrap();
+    assert_eq!(recorder.recorded().files, paths);
+    let sizes = paths.map(|path| {
+        assert_eq!(frame_times(&path), [0, 1, 2, 3, 4], "{}", path.display());
+        std::fs::metadata(&path).unwrap().len()
+    });
+    assert_eq!(recorder.recorded().counts.bytes, sizes.iter().sum::<u64>());
+}
+
+#[test]
+fn what_is_counted_is_in_the_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("counts.mcap");
+    let mut recorder = library_recorder(&file, &[Topic::Alerts, Topic::Cues], false);
+    (0..5).for_each(|tick| recorder.frame(&frame(1, tick, tick), &[HandlePose::default(); 2], 0).unwrap());
+    recorder.alert(&CollisionAlert { run_id: 1, tick: 3, stamp_ns: 3, ..Default::default() }).unwrap();
+    recorder.finish().unwrap();
+    let counts = recorder.recorded().counts;
+    assert_eq!((counts.frames, counts.messages, entries(&std::fs::read(&file).unwrap()).len()), (0, 1, 1));
+}
+
+#[test]
+fn a_recorder_whose_disk_takes_nothing_can_be_stopped() {
+    let (name, folder) = ("record_stuck", tempfile::tempdir().unwrap());
+    let _publisher = publisher(name, &scene(folder.path(), "paper", ""), &["--rate", "1000", "--start", "100"]);
+    // A pipe that is open and that nobody reads.
+    let pipe = folder.path().join("pipe.mcap");
+    nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).unwrap();
+    let _open = std::fs::OpenOptions::new().read(true).write(true).open(&pipe).unwrap();
+    let recorder = recorder(name, &pipe, &["--force"]);
+    // The memory of a queue that is full.
+    let status = format!("/proc/{}/status", recorder.id());
+    let kilobytes = || {
+        let status = std::fs::read_to_string(&status).unwrap();
+        let line = status.lines().find(|line| line.starts_with("RssAnon:")).unwrap();
+        line.split_whitespace().nth(1).unwrap().parse::<u64>().unwrap()
+    };
+    for _ in 0..3000 {
+        if kilobytes() > 60_000 {
+            break;
+        }
+        wait(0.04);
+    }
+    assert!(kilobytes() > 60_000, "{} kB", kilobytes());
+    wait(1.0);
+    recorder.signal(Signal::SIGINT);
+    let output = recorder.output_within(100);
+    let sentence = text(&output.stderr);
+    assert!(output.status.code() == Some(1) && sentence.contains("nothing could be written for 30 s"), "{sentence}");
 }
 
 #[test]
@@ -231,6 +369,16 @@ fn a_recorder_that_is_killed_loses_a_second_and_nobody_notices() {
         last = *times.last().unwrap();
         losses.push(now.saturating_sub(last) as f64 / 1e9);
     }
+    // Under nohup the end of the terminal is not the recorder's.
+    let file = folder.path().join("nohup.mcap");
+    let mut nohup = Command::new("bash");
+    nohup.args(["-c", "trap '' HUP; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_bench-dragon")]);
+    nohup.args(["--name", &unique(name), "--json", "record", "--output", file.to_str().unwrap()]);
+    let recorder = Process::start(&mut nohup);
+    wait_for_bytes(&file, 1);
+    recorder.signal(Signal::SIGHUP);
+    wait_for_bytes(&file, std::fs::metadata(&file).unwrap().len() + 100_000);
+    stopped(recorder);
     publisher.signal(Signal::SIGINT);
     let summary = processes::summary(&publisher.output_within(60));
     assert_eq!(summary["end"], "signal", "{summary}");
