@@ -1,16 +1,16 @@
 //! `record` and `record --recover`, as programs: read by Python's own MCAP libraries, cut, killed, on a full disk, on one that
-//! takes nothing; and the recorder itself, given frames that no publisher can be made to send.
+//! takes nothing.
 
+#[path = "record/mending.rs"]
+mod mending;
 mod processes;
+#[path = "record/recorder.rs"]
+mod recorder_alone;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use bench_dragon::recording::mcap::recorder::{Recorder, RecorderConfig};
-use bench_dragon::recording::mcap::recover::{RecoverError, Recovered, check_magic, recover};
-use bench_dragon::scene::ros2::Topic;
-use bench_dragon::wire::{CollisionAlert, FrameHeader, HandlePose};
 use mcap::{MessageStream, Summary};
 use nix::sys::signal::Signal;
 use processes::{Process, can_run, json_lines, long, program, python, python_modules, root, text, unique, wait};
@@ -106,36 +106,6 @@ fn small_recording(name: &str, folder: &Path) -> PathBuf {
     file
 }
 
-/// The chunks of a file by the reference implementation: the byte after each, and its messages.
-fn chunks(file: &Path) -> Vec<(usize, Vec<Entry>)> {
-    let output = python().args(["tests/python/record_chunks.py", file.to_str().unwrap()]).output().unwrap();
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let entry = |entry: &Value| {
-        let text = |at: usize| entry[at].as_str().unwrap().to_owned();
-        (text(0), entry[1].as_u64().unwrap(), entry[2].as_u64().unwrap(), text(3))
-    };
-    let chunk = |line: &Value| {
-        let messages = line["messages"].as_array().unwrap().iter().map(entry).collect();
-        (line["end"].as_u64().unwrap() as usize, messages)
-    };
-    json_lines(&output).iter().map(chunk).collect()
-}
-
-/// The bytes at which the records of a file begin.
-fn record_starts(bytes: &[u8]) -> Vec<usize> {
-    let next = |at: &usize| {
-        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap());
-        Some(at + 9 + length as usize).filter(|next| *next < bytes.len() - 8)
-    };
-    std::iter::successors(Some(8), next).collect()
-}
-
-fn recovered(bytes: &[u8]) -> Result<(Recovered, Vec<u8>), RecoverError> {
-    let (mut input, mut output) = (bytes, Vec::new());
-    check_magic(&mut input)?;
-    Ok((recover(input, bytes.len() as u64, &mut output)?, output))
-}
-
 #[test]
 fn every_message_of_every_topic_is_what_another_subscriber_got() {
     if !can_run(python_modules(&["iceoryx2", "mcap", "mcap_ros2", "rosbags"])) {
@@ -168,151 +138,6 @@ fn every_message_of_every_topic_is_what_another_subscriber_got() {
     let alerts = counts[format!("/{}/alerts", unique(name))].as_u64().unwrap();
     let cues = counts[format!("/{}/cues", unique(name))].as_u64().unwrap();
     assert!(alerts >= 3 && cues == 2, "{counts}");
-}
-
-#[test]
-fn a_file_that_is_cut_anywhere_keeps_every_finished_chunk() {
-    if !can_run(python_modules(&["mcap", "blake3"])) {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let file = small_recording("record_cut", folder.path());
-    let (chunks, bytes) = (chunks(&file), std::fs::read(&file).unwrap());
-    assert!(chunks.len() >= 5 && chunks.iter().map(|chunk| chunk.1.len()).sum::<usize>() > 300, "{}", chunks.len());
-    let (whole, _) = recovered(&bytes).unwrap();
-    assert!(whole.whole && whole.chunks as usize == chunks.len() && whole.lost_bytes == 0, "{whole:?}");
-    assert_eq!(whole.attachments, 1);
-    let mut random = fastrand::Rng::with_seed(17);
-    let random_cuts: Vec<_> = (0..1000).map(|_| random.usize(8..bytes.len())).collect();
-    // And at the very bytes where a chunk ends.
-    let edges = chunks.iter().flat_map(|(end, _)| [end - 1, *end, end + 1]);
-    for cut in random_cuts.into_iter().chain(edges) {
-        let finished = chunks.iter().take_while(|(end, _)| *end <= cut);
-        let expected: Vec<_> = finished.flat_map(|(_, messages)| messages.clone()).collect();
-        let (counts, output) = recovered(&bytes[..cut]).unwrap();
-        assert!(entries(&output) == expected, "cut at {cut} of {}: {counts:?}", bytes.len());
-        assert_eq!((counts.messages, counts.whole, counts.damaged), (expected.len() as u64, false, 0), "cut at {cut}");
-        let last_end = chunks.iter().map(|(end, _)| *end).take_while(|end| *end <= cut).last().unwrap_or(8);
-        assert!(counts.lost_bytes as usize <= cut - last_end, "{counts:?} of {cut} bytes");
-    }
-    for cut in 0..8 {
-        assert!(matches!(recovered(&bytes[..cut]), Err(RecoverError::NotMcap)), "{cut} bytes");
-    }
-}
-
-#[test]
-fn a_byte_that_is_wrong_costs_messages_and_invents_none() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = small_recording("record_flip", folder.path());
-    let bytes = std::fs::read(&file).unwrap();
-    let (all, chunks, starts) = (entries(&bytes), chunks(&file), record_starts(&bytes));
-    let record_of = |at: usize| starts[starts.partition_point(|start| *start <= at) - 1];
-    let (first_end, last_end) = (chunks[0].0, chunks[chunks.len() - 1].0);
-    let mut random = fastrand::Rng::with_seed(18);
-    let mut damaged = 0;
-    for round in 0..400 {
-        // Every other file was cut before its end, and every fourth byte is in the first chunk.
-        let length = if round % 2 == 0 { bytes.len() } else { last_end };
-        let from = if round % 4 < 2 { record_of(first_end - 1) } else { 8 };
-        let at = random.usize(from..if round % 4 < 2 { first_end } else { length });
-        let mut wrong = bytes[..length].to_vec();
-        wrong[at] ^= 1 << random.u32(0..8);
-        let (counts, output) = recovered(&wrong).unwrap();
-        let kept = entries(&output);
-        let mut rest = all.iter();
-        for entry in &kept {
-            assert!(rest.any(|known| known == entry), "{entry:?} is in no place of the recording");
-        }
-        let record = record_of(at);
-        let others = |chunk: &&(usize, Vec<Entry>)| record_of(chunk.0 - 1) != record;
-        let others: Vec<_> = chunks.iter().filter(others).flat_map(|(_, messages)| messages.clone()).collect();
-        if (1..9).contains(&(at - record)) {
-            // Where a length is wrong nothing says where the next record begins.
-            let before: usize = chunks.iter().take_while(|(end, _)| *end <= record).map(|chunk| chunk.1.len()).sum();
-            assert!(kept.len() >= before, "a length at {at}: {counts:?}");
-        } else {
-            assert!(kept == all || kept == others, "byte {at}, in the record at {record}: {counts:?}");
-            assert!(kept == all || counts.damaged == 1, "byte {at}, in the record at {record}: {counts:?}");
-        }
-        damaged += u64::from(counts.damaged > 0);
-    }
-    assert!(damaged > 200, "{damaged} of 400 were noticed in a chunk");
-    // No record of MCAP, in place of the second chunk.
-    let mut wrong = bytes.clone();
-    wrong[record_of(chunks[1].0 - 1)] = 0x16;
-    let (counts, _) = recovered(&wrong).unwrap();
-    let lost = chunks[1].1.len() as u64;
-    assert_eq!((counts.damaged, counts.lost_messages, counts.messages), (1, lost, all.len() as u64 - lost));
-}
-
-/// A recorder of the publisher `p`.
-fn library_recorder(file: &Path, topics: &[Topic], replace: bool) -> Recorder {
-    let (name, file, topics) = ("p".to_owned(), file.to_owned(), topics.to_vec());
-    Recorder::new(RecorderConfig { name, file, replace, topics, split: None }).unwrap()
-}
-
-/// A frame of a run, one of 100 a second.
-fn frame(run_id: u64, tick: u64, stamp_ns: u64) -> FrameHeader {
-    FrameHeader {
-        run_id,
-        sequence: tick,
-        tick,
-        stamp_ns,
-        deadline_ns: tick * 10_000_000,
-        handles: 2,
-        ..Default::default()
-    }
-}
-
-#[test]
-fn a_clock_that_is_set_back_is_recorded_as_it_was() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("clock.mcap");
-    let mut recorder = library_recorder(&file, &[Topic::Handles, Topic::Alerts], false);
-    let handles = [HandlePose::default(); 2];
-    let alert = |tick, stamp_ns| CollisionAlert { run_id: 1, tick, stamp_ns, ..Default::default() };
-    let stamp = |tick: u64| 1_000_000_000_000 + tick * 10_000_000 - if tick >= 60 { 100_000_000_000 } else { 0 };
-    // One that was sent before anybody subscribed comes after the first frame.
-    recorder.frame(&frame(1, 50, stamp(50)), &handles, 0).unwrap();
-    recorder.alert(&alert(10, stamp(10))).unwrap();
-    (51..70).for_each(|tick| recorder.frame(&frame(1, tick, stamp(tick)), &handles, 0).unwrap());
-    recorder.alert(&alert(65, stamp(65))).unwrap();
-    recorder.finish().unwrap();
-    let entries = entries(&std::fs::read(&file).unwrap());
-    let times = |topic| entries.iter().filter(move |entry| entry.0 == topic).map(|entry| entry.2).collect::<Vec<_>>();
-    assert_eq!(times("/p/handles"), (50..70).map(stamp).collect::<Vec<_>>());
-    assert_eq!(times("/p/alerts"), [stamp(50), stamp(65)]);
-}
-
-#[test]
-fn every_file_that_is_replaced_is_emptied() {
-    let folder = tempfile::tempdir().unwrap();
-    let paths = ["again.mcap", "again-2.mcap"].map(|name| folder.path().join(name));
-    paths.iter().for_each(|path| std::fs::write(path, vec![7; 1_000_000]).unwrap());
-    let mut recorder = library_recorder(&paths[0], &[Topic::Handles], true);
-    let handles = [HandlePose::default(); 2];
-    for run_id in 1..=2 {
-        (0..5).for_each(|tick| recorder.frame(&frame(run_id, tick, tick), &handles, 0).unwrap());
-    }
-    recorder.finish().unwrap();
-    assert_eq!(recorder.recorded().files, paths);
-    let sizes = paths.map(|path| {
-        assert_eq!(frame_times(&path), [0, 1, 2, 3, 4], "{}", path.display());
-        std::fs::metadata(&path).unwrap().len()
-    });
-    assert_eq!(recorder.recorded().counts.bytes, sizes.iter().sum::<u64>());
-}
-
-#[test]
-fn what_is_counted_is_in_the_files() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("counts.mcap");
-    let mut recorder = library_recorder(&file, &[Topic::Alerts, Topic::Cues], false);
-    (0..5).for_each(|tick| recorder.frame(&frame(1, tick, tick), &[HandlePose::default(); 2], 0).unwrap());
-    recorder.alert(&CollisionAlert { run_id: 1, tick: 3, stamp_ns: 3, ..Default::default() }).unwrap();
-    recorder.finish().unwrap();
-    let counts = recorder.recorded().counts;
-    assert_eq!((counts.frames, counts.messages, entries(&std::fs::read(&file).unwrap()).len()), (0, 1, 1));
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! One MCAP file: its channels, its chunks, and its end.
 //!
-//! The channels stand before the first chunk and again in it: whichever is damaged, the others are of use. A chunk is a little less than a second of messages, or 4 MB of them: what is in a finished chunk can be read whatever
-//! happens to the rest. Called by the [`recorder`](super::recorder).
+//! The channels stand before the first chunk and again in it: whichever is damaged, the others are of use. A chunk is a little
+//! less than a second of messages, or 4 MB of them: what is in a finished chunk can be read whatever happens to the rest.
+//! Called by the [`recorder`](super::recorder).
 
 use std::collections::BTreeMap;
 use std::fs::File;

@@ -86,8 +86,9 @@ impl Run {
         }
     }
 
-    /// When a message is logged: at its own time, but not before the file's first frame where it goes with that or an earlier
-    /// one. What a late subscriber got was true before, and would leave a gap. Ticks tell, since a clock can be set back.
+    /// When a message is logged: at its own time, but not before the file's first frame where it goes with that or an
+    /// earlier one. What a late subscriber got was true before, and would leave a gap. Ticks tell, since a clock can be set
+    /// back.
     pub fn log_time(&self, message: &Seldom) -> u64 {
         let ((stamp_ns, tick), began) = (message.stamp(), self.file_began_stamp_ns);
         match tick.cmp(&self.file_began_tick) {
