@@ -149,21 +149,22 @@ fn a_recorder_whose_disk_takes_nothing_can_be_stopped() {
     nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).unwrap();
     let _open = std::fs::OpenOptions::new().read(true).write(true).open(&pipe).unwrap();
     let recorder = recorder(name, &pipe, &["--force"]);
-    // The memory of a queue that is full.
+    // The memory of a queue that is full grows no more.
     let status = format!("/proc/{}/status", recorder.id());
     let kilobytes = || {
         let status = std::fs::read_to_string(&status).unwrap();
         let line = status.lines().find(|line| line.starts_with("RssAnon:")).unwrap();
         line.split_whitespace().nth(1).unwrap().parse::<u64>().unwrap()
     };
-    for _ in 0..3000 {
-        if kilobytes() > 60_000 {
+    let (mut before, mut now) = (0, kilobytes());
+    for _ in 0..60 {
+        if now > 60_000 && now < before + 100 {
             break;
         }
-        wait(0.04);
+        wait(2.0);
+        (before, now) = (now, kilobytes());
     }
-    assert!(kilobytes() > 60_000, "{} kB", kilobytes());
-    wait(1.0);
+    assert!(now > 60_000 && now < before + 100, "{before} kB, then {now} kB");
     recorder.signal(Signal::SIGINT);
     let output = recorder.output_within(100);
     let sentence = text(&output.stderr);
