@@ -204,13 +204,25 @@ pub fn shows_colour(stream: &impl io::IsTerminal) -> bool {
     stream.is_terminal() && !anstyle_query::no_color()
 }
 
-/// A flag that SIGINT and SIGTERM set.
+/// A flag that SIGINT, SIGTERM and SIGHUP set: the last where a terminal was closed, unless `nohup` has it ignored.
 pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CommandError> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+    let hangup = if is_ignored(SIGHUP) { None } else { Some(SIGHUP) };
+    for signal in [SIGINT, SIGTERM].into_iter().chain(hangup) {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
     }
     Ok(stop)
+}
+
+/// Whether whoever started this process has it ignore a signal.
+fn is_ignored(signal: i32) -> bool {
+    let mut action = std::mem::MaybeUninit::<nix::libc::sigaction>::zeroed();
+    // SAFETY: without a new action, sigaction only writes the present one to `action`, of which all zeros are a valid value.
+    unsafe {
+        nix::libc::sigaction(signal, std::ptr::null(), action.as_mut_ptr()) == 0
+            && action.assume_init().sa_sigaction == nix::libc::SIG_IGN
+    }
 }
 
 /// Ends this program with a sentence where a page of shared memory cannot be had, which Linux signals by SIGBUS: others
