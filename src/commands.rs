@@ -215,14 +215,12 @@ pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CommandError> {
     Ok(stop)
 }
 
-/// Whether whoever started this process has it ignore a signal.
+/// Whether whoever started this process has it ignore a signal, as `nohup` does.
 fn is_ignored(signal: i32) -> bool {
-    let mut action = std::mem::MaybeUninit::<nix::libc::sigaction>::zeroed();
-    // SAFETY: without a new action, sigaction only writes the present one to `action`, of which all zeros are a valid value.
-    unsafe {
-        nix::libc::sigaction(signal, std::ptr::null(), action.as_mut_ptr()) == 0
-            && action.assume_init().sa_sigaction == nix::libc::SIG_IGN
-    }
+    // proc(5): SigIgn is a mask in hexadecimal, the first signal its lowest bit.
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
 /// Ends this program with a sentence where a page of shared memory cannot be had, which Linux signals by SIGBUS: others

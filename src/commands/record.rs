@@ -126,7 +126,7 @@ fn follow(
                 let seconds = Duration::try_from_secs_f64(UNREAD_FRAMES / status.rate);
                 interval = seconds.unwrap_or(longest).clamp(shortest, longest);
             }
-            queue.handle(&event, &over);
+            queue.handle(&event, over);
         })?;
         if shown.elapsed() >= PROGRESS_INTERVAL {
             shown = Instant::now();

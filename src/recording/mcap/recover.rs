@@ -244,7 +244,8 @@ impl<Output: Write> Mender<Output> {
                 }
             }
             Record::Channel(channel) => {
-                if self.channels.get(&channel.id).is_none_or(|known| known.channel != channel) {
+                let is_known = self.channels.get(&channel.id).is_some_and(|known| known.channel == channel);
+                if !is_known {
                     self.channels.insert(channel.id, Known { channel, id: None });
                 }
             }
