@@ -99,7 +99,7 @@ pub struct StageCue {
 #[type_name("bench_dragon/Stage/4")]
 #[repr(C)]
 pub struct Stage {
-    /// The run, as [`FrameHeader::run_id`].
+    /// The run, as [`FrameHeader::run_id`](super::FrameHeader::run_id).
     pub run_id: u64,
     /// CLOCK_REALTIME in nanoseconds when this was written.
     pub stamp_ns: u64,
