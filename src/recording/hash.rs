@@ -1,8 +1,8 @@
 //! The hash of frames: BLAKE3 over what is the same whenever the same show is played.
 //!
 //! A frame contributes the bytes of its message as subscribers get it: of [`FrameHeader`] `sequence` and `tick` (bytes 8
-//! to 23) and all from `sim_time` on (bytes 48 to 95), then every [`HandlePose`](crate::wire::HandlePose). What is left out is the run's: its
-//! number and its stamps.
+//! to 23) and all from `sim_time` on (bytes 48 to 95), then every [`HandlePose`](crate::wire::HandlePose). What is left out is
+//! the run's: its number and its stamps.
 
 use crate::solve::Chain;
 use crate::wire::FrameHeader;
