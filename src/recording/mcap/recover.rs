@@ -243,10 +243,8 @@ impl<Output: Write> Mender<Output> {
                     self.channels.values_mut().for_each(|known| known.id = None);
                 }
             }
-            Record::Channel(channel) => {
-                if self.channels.get(&channel.id).is_none_or(|known| known.channel != channel) {
-                    self.channels.insert(channel.id, Known { channel, id: None });
-                }
+            Record::Channel(channel) if self.channels.get(&channel.id).is_none_or(|known| known.channel != channel) => {
+                self.channels.insert(channel.id, Known { channel, id: None });
             }
             Record::Message { mut header, data } => match self.channel(header.channel_id)? {
                 Some(channel) => {
@@ -263,7 +261,7 @@ impl<Output: Write> Mender<Output> {
                 self.recovered.attachments += 1;
             }
             Record::Metadata(metadata) => self.writer.write_metadata(&metadata)?,
-            // Indexes are made anew.
+            // A channel that is known; indexes, which are made anew.
             _ => (),
         }
         Ok(())
