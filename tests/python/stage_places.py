@@ -36,13 +36,18 @@ def approaching(page, url, address=""):
     until(page, "picture.drawn > 0 && document.body.dataset.level === 'approaching' && document.getElementById('time').textContent", "the approach", 60)
 
 
+def undimmed(page):
+    """A picture that was dimmed while nothing came takes a moment to be itself again."""
+    until(page, "picture.drawn > 0 && getComputedStyle(document.getElementById('stage')).opacity === '1'", "a picture that is not dimmed", 120)
+
+
 def nothing_needed_is_cut_off():
     """As a window and as a frame in another page, with and without the transport bar, in both languages."""
     with server() as url, started("view", "--json", "--port", "0", "--control") as conducted, publisher(*APPROACH), browser() as (page, complaints):
         conduct = re.search(r"http://[^\"]+", conducted.stdout.readline()).group()
         for language in ("en", "zh"):
             for address in (url, conduct):
-                for width, height in [(844, 390), (900, 500), (390, 844), (1280, 800)]:
+                for width, height in [(844, 390), (900, 500), (1120, 630), (1280, 720), (390, 844), (1280, 800)]:
                     page.set_viewport_size({"width": width, "height": height})
                     approaching(page, address, f"lang={language}")
                     if address == conduct:
@@ -121,6 +126,7 @@ def frozen_before_it_was_seen():
         until_frozen = "picture.drawn > 0 && document.body.dataset.level === 'contact' && document.getElementById('speeds').textContent === 'at rest'"
         page.goto(url)
         until(page, until_frozen, "the contact", 60)
+        undimmed(page)
         until(page, "document.getElementById('scale').innerText.replaceAll(/\\s+/g, ' ').trim() === 'tail body head'", "words for the colours")
         pixels, to_pixel = shot(page)[..., :3].astype(int), projection(page)
         handles = numpy.array(page.evaluate("[...picture.shown.handles]")).reshape(-1, 5)[:, :2]
@@ -152,7 +158,7 @@ def five_thousand_boards_are_drawn():
         for address in ("", "show,nolabels"):
             page.goto("about:blank")
             page.goto(f"{url}#{address}")
-            until(page, "picture.drawn > 0", "5,000 benches", 120)
+            undimmed(page)
             pixels, to_pixel = shot(page), projection(page)
             ground = luminance(pixels[3, -3])
             # A quarter of a link from the handles, where no lantern is. A turn is some five pixels wide: the neighbours count.

@@ -222,7 +222,7 @@ def outline_has_contrast(to_pixel, pixels, handles, bench, what):
 def speaks_chinese(page):
     """All of it; the transport bar is looked at in stage_places.py."""
     assert page.evaluate("document.documentElement.lang") == "zh-Hans"
-    assert "第 9 节板凳" in page.get_by_role("alert").inner_text() and "(1.474, 2.111) m" in page.get_by_role("alert").inner_text(), words(page)
+    assert "第 9 节板凳" in page.get_by_role("alert").inner_text() and "(1.474, 2.111) m" in page.get_by_role("alert").inner_text().replace("\xa0", " "), words(page)
     page.keyboard.press("?")
     everything = page.inner_text("body") + "".join(page.evaluate("picture.labels.map((one) => one.text)")) + page.evaluate("document.title.split('（')[1]")
     everything += "".join(page.evaluate("[...document.querySelectorAll('[aria-label]')].filter((one) => !one.closest('#conduct')).map((one) => one.getAttribute('aria-label'))"))

@@ -67,6 +67,9 @@ export function conduct(stream) {
     sentenceAt = performance.now();
   }
   function command(name, value) {
+    // A seek that waits goes before what was commanded after it; a hold does without.
+    if (name === "hold") wanted = null;
+    if (name !== "seek" && wanted !== null) sendWanted();
     const id = ++numbered;
     if (!stream.send({ command: name, value, id })) report(say("nothingSent"));
     return id;
@@ -80,6 +83,9 @@ export function conduct(stream) {
   function sendSeek() {
     const passed = performance.now() - soughtAt;
     if (wanted === null || passed < SEEK_INTERVAL || (sought !== null && passed < PATIENCE)) return;
+    sendWanted();
+  }
+  function sendWanted() {
     sought = { time: wanted, id: command("seek", wanted) };
     [wanted, soughtAt] = [null, performance.now()];
   }
