@@ -7,6 +7,7 @@ use std::fs::File;
 use std::hash::BuildHasher;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
+use std::time::{Duration, Instant};
 
 use anstyle::Style;
 use bench_dragon::live::clock::{SystemClock, realtime_ns};
@@ -21,6 +22,9 @@ use bench_dragon::wire::sentence::{Figures, alert_sentence, cue_sentence};
 
 use super::realtime_scheduling::RealtimeScheduling;
 use super::{CommandError, Common, Output, severity_colour, shows_colour};
+
+/// How often subscribers are let in before the first frame.
+const LEAD_INTERVAL: Duration = Duration::from_millis(10);
 
 /// A run's number that no other has.
 pub fn new_run_id() -> u64 {
@@ -56,6 +60,8 @@ pub struct Publishing<'a> {
     pub scene: &'a str,
     /// Benches, of which alerts tell.
     pub benches: u32,
+    /// How long subscribers that wait are given to connect before the first frame.
+    pub lead: Duration,
 }
 
 /// The transports of a run.
@@ -106,7 +112,8 @@ impl Publishing<'_> {
         let ended = std::thread::scope(|threads| {
             let looping = threads.spawn(|| {
                 let (mut publishers, _awake) = match self.prepare_loop(transports) {
-                    Ok((publishers, transports, awake)) => {
+                    Ok((mut publishers, transports, awake)) => {
+                        self.let_subscribers_in(&mut publishers, stop);
                         let _ = opened.send(Ok(transports));
                         (publishers, awake)
                     }
@@ -150,6 +157,15 @@ impl Publishing<'_> {
         let awake = self.scheduling.prepare_thread()?;
         let publishers = transports.iter_mut().map(|transport| transport.publisher()).collect::<Result<_, _>>()?;
         Ok((publishers, transports, awake))
+    }
+
+    /// Waits for [`lead`](Self::lead).
+    fn let_subscribers_in(&self, publishers: &mut [Box<dyn Publisher>], stop: &AtomicBool) {
+        let began = Instant::now();
+        while began.elapsed() < self.lead && !stop.load(Ordering::Relaxed) {
+            publishers.iter_mut().for_each(|publisher| publisher.maintain());
+            std::thread::sleep(LEAD_INTERVAL);
+        }
     }
 
     fn loop_options(&self) -> LoopOptions {

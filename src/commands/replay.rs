@@ -1,6 +1,7 @@
 //! `replay`: plays a recording again, as the live publisher that it was made of.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use bench_dragon::live::End;
 use bench_dragon::live::clock::realtime_ns;
@@ -18,6 +19,8 @@ use super::publishing::{Hooks, Publishing, new_run_id, open_transports};
 use super::realtime_scheduling::RealtimeScheduling;
 use super::{CommandError, Common, number, stop_on_signals};
 
+/// How long subscribers that wait have before the first frame, which is not sent again as a show's would be.
+const LEAD: Duration = Duration::from_millis(500);
 /// The most cues that room is kept for, whatever a damaged stage states.
 const MOST_CUES: usize = 1000;
 
@@ -87,6 +90,7 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
         duration: arguments.duration,
         scene: &format!("replay of {of}"),
         benches,
+        lead: LEAD,
     };
     let print_start = |transports: &[Box<dyn Transport>]| {
         if !common.quiet && !common.json {

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 use bench_dragon::live::clock::realtime_ns;
 use bench_dragon::motion::event::EventKind;
@@ -148,6 +149,7 @@ impl RunSession<'_> {
             duration: self.arguments.duration,
             scene: &self.scene.name,
             benches: self.scene.team().benches as u32,
+            lead: Duration::ZERO,
         };
         let hooks = Hooks {
             opened: Box::new(|transports| self.print_start(transports)),

@@ -68,20 +68,31 @@ impl MessageType {
     }
 }
 
-/// What the bytes of a message depend on in a definition of the schema encoding `ros2msg`: the fields of its type, and of every
-/// type that it is made of by its name, each as type and name, in order. Comments and constants are left out.
-pub fn fields(schema: &str) -> BTreeMap<&str, Vec<[&str; 2]>> {
-    let (mut of, mut fields) = ("", BTreeMap::from([("", Vec::new())]));
+/// What the bytes of a message of the type `name`, `package/Name`, depend on in its definition of the schema encoding `ros2msg`:
+/// the fields of every type that it is made of, each as type and name, in order. Comments and constants are left out, and
+/// every type has its package.
+pub fn fields(name: &str, schema: &str) -> BTreeMap<String, Vec<[String; 2]>> {
+    let (mut of, mut fields) = (name.to_owned(), BTreeMap::from([(name.to_owned(), Vec::new())]));
     for line in schema.lines().map(|line| line.split('#').next().unwrap_or_default().trim()) {
         if let Some(name) = line.strip_prefix("MSG:") {
-            of = name.trim();
-            fields.entry(of).or_default();
+            of = name.trim().to_owned();
+            fields.entry(of.clone()).or_default();
         } else if let Some((kind, name)) = line.split_once(char::is_whitespace).filter(|(_, name)| !name.contains('='))
         {
-            fields.entry(of).or_default().push([kind, name.trim()]);
+            fields.entry(of.clone()).or_default().push([with_package(kind, &of), name.trim().to_owned()]);
         }
     }
     fields
+}
+
+/// The type of a field, with the package of the message that has the field where it names none and is a message.
+fn with_package(kind: &str, of: &str) -> String {
+    let package = of.split('/').next().unwrap_or_default();
+    if kind.contains('/') || !kind.starts_with(char::is_uppercase) {
+        kind.to_owned()
+    } else {
+        format!("{package}/{kind}")
+    }
 }
 
 /// The package of the program's own messages.
@@ -94,11 +105,10 @@ fn definition(name: &str) -> Option<&'static str> {
 
 /// The types, `package/Name`, that a definition has fields of.
 fn parts(name: &str, definition: &str) -> Vec<String> {
-    let package = name.split('/').next().unwrap_or_default();
     let words = definition.lines().filter_map(|line| line.split('#').next()?.split_whitespace().next());
     let types = words.map(|word| word.split('[').next().unwrap_or_default());
     let messages = types.filter(|of| of.contains('/') || of.starts_with(char::is_uppercase));
-    messages.map(|of| if of.contains('/') { of.to_owned() } else { format!("{package}/{of}") }).collect()
+    messages.map(|of| with_package(of, name)).collect()
 }
 
 /// Every type that a topic is made of. Of the standard ones the fields in their order, which is all that the bytes depend on.
@@ -169,15 +179,16 @@ mod tests {
     }
 
     #[test]
-    fn definitions_with_other_comments_and_constants_have_the_same_fields() {
+    fn definitions_that_are_written_otherwise_have_the_same_fields() {
         let schema =
-            "uint8 ON=1\n# A lamp.\npkg/Place place # where\n\nfloat64[]  levels\n=====\nMSG: pkg/Place\nfloat64 x\n";
-        let expected =
-            [("", vec![["pkg/Place", "place"], ["float64[]", "levels"]]), ("pkg/Place", vec![["float64", "x"]])];
-        assert_eq!(fields(schema), BTreeMap::from(expected));
-        let own = MessageType::of(Topic::Handles).schema();
-        assert_eq!(fields(&own)["bench_dragon_msgs/HandlePose"].len(), 5);
-        assert_ne!(fields(&own), fields(&own.replace("float64 vx", "float32 vx")));
+            "uint8 ON=1\n# A lamp.\npkg/Place place # where\n\nfloat64[]  levels\n===\nMSG: pkg/Place\nfloat64 x\n";
+        let other = "Place place\nfloat64[] levels\n===\nMSG: pkg/Place\nfloat64   x\nuint8 LAST=2\n";
+        assert_eq!(fields("pkg/Lamp", schema), fields("pkg/Lamp", other));
+        let of = fields("pkg/Lamp", schema)["pkg/Lamp"].iter().map(|field| field.join(" ")).collect::<Vec<_>>();
+        assert_eq!(of, ["pkg/Place place", "float64[] levels"]);
+        let (own, name) = (MessageType::of(Topic::Handles).schema(), "bench_dragon_msgs/HandlePoses");
+        assert_eq!(fields(name, &own)["bench_dragon_msgs/HandlePose"].len(), 5);
+        assert_ne!(fields(name, &own), fields(name, &own.replace("float64 vx", "float32 vx")));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use mcap::{Message, Schema};
 
 use crate::files::{is_frame, on_channel, rewrite, with_bytes};
 use crate::played::small_recording;
-use crate::processes::{Process, json_lines, text};
+use crate::processes::{Process, can_run, json_lines, python, python_modules, text};
 use crate::{replay, scene};
 
 /// The message with another schema.
@@ -184,6 +184,19 @@ fn contents(file: &Path, expected_failure: Option<&mut bool>) -> Result<Vec<(u64
         (None, _) => (),
     }
     Ok(frames)
+}
+
+#[test]
+fn a_bag_of_another_recorder_is_played() {
+    if !can_run(python_modules(&["rosbags"])) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = small_recording("replay_bag", folder.path());
+    let bag = folder.path().join("bag");
+    let written = python().arg("tests/python/bag_writer.py").args([&file, &bag]).output().unwrap();
+    assert!(written.status.success(), "{}", text(&written.stderr));
+    assert_eq!(contents(&bag.join("bag.mcap"), None).unwrap(), contents(&file, None).unwrap());
 }
 
 #[test]

@@ -359,7 +359,9 @@ fn check_type(channel: &Channel<'_>, topic: Topic) -> Result<(), ReadError> {
         });
     }
     let text = schema.map(|schema| String::from_utf8_lossy(&schema.data)).unwrap_or_default();
-    if fields(&text) == fields(&of.schema()) {
+    // As definitions name it.
+    let name = of.ros_name().replace("/msg/", "/");
+    if fields(&name, &text) == fields(&name, &of.schema()) {
         Ok(())
     } else {
         Err(ReadError::Fields { topic: channel.topic.clone(), of: of.ros_name() })
