@@ -59,6 +59,8 @@ export function conduct(stream) {
   let greeted = null, numbered = 0, shownStage = null, rate = null, dragged = false, sentenceAt = 0, cueAt = 0;
   /** Where a seek that has not been answered goes, and one that waits for that answer; the time of the last one sent. */
   let sought = null, wanted = null, soughtAt = -Infinity;
+  /** The last answer to a seek: frames from before it are still on their way. */
+  let landed = null;
 
   const put = (element, text) => element.textContent !== text && (element.textContent = text);
   const seconds = (time) => say("showTime", { time: time.toFixed(1) });
@@ -89,7 +91,10 @@ export function conduct(stream) {
     sought = { time: wanted, id: command("seek", wanted) };
     [wanted, soughtAt] = [null, performance.now()];
   }
-  const now = () => wanted ?? sought?.time ?? stream.playback.newest?.time ?? 0;
+  function now() {
+    const { newest } = stream.playback, isBefore = landed && newest?.run === landed.run && newest.tick < landed.tick;
+    return wanted ?? sought?.time ?? (isBefore ? landed.time : newest?.time) ?? 0;
+  }
 
   function showStage(stage) {
     if (stage === shownStage) return;
@@ -147,7 +152,10 @@ export function conduct(stream) {
       show();
     }
     if (message.type === "answer") {
-      if (message.id === sought?.id) sought = null;
+      if (message.id === sought?.id) {
+        landed = message.code ? { run: stream.playback.newest?.run, tick: message.tick, time: message.sim_time } : null;
+        sought = null;
+      }
       if (message.sentence) report(answerTo(message));
       else if (message.code) put(part("answer"), "");
       sendSeek();
