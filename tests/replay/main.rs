@@ -167,6 +167,16 @@ fn subscribers_get_the_show_that_was_recorded() {
     let named = |status: &Bytes| status.0.windows(scene.len()).any(|text| text == scene);
     assert!(!replayed.statuses.is_empty() && replayed.statuses.iter().all(named), "the scene's name");
 
+    // From a moment on: each alert and cue still goes with its frame, of which the number is another.
+    let (_, later) = recorded_replay("replay_later", &file, &publish, &["--start", "411.7"]);
+    let from = recorded.frames.iter().position(|frame| frame.sim_time() >= 411.7).unwrap();
+    assert_eq!(later.frames.len(), recorded.frames.len() - from);
+    let contact = |kept: &Kept| {
+        let alert = kept.alerts.iter().find(|alert| alert.u32(88) == 2).unwrap();
+        kept.frames.iter().position(|frame| frame.tick() == alert.u64(8)).unwrap()
+    };
+    assert_eq!(contact(&later) + from, contact(&recorded));
+
     let of = |line: &Value, fields: &[&str]| fields.iter().map(|field| line[*field].clone()).collect::<Vec<_>>();
     for (transport, peer, lines) in peers {
         peer.signal(Signal::SIGTERM);

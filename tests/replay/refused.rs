@@ -199,15 +199,28 @@ fn a_bag_of_another_recorder_is_played() {
     assert_eq!(contents(&bag.join("bag.mcap"), None).unwrap(), contents(&file, None).unwrap());
 }
 
+fn length_at(bytes: &[u8], at: usize) -> u64 {
+    u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap())
+}
+
 #[test]
 fn a_wrong_byte_costs_frames_and_invents_none() {
     let folder = tempfile::tempdir().unwrap();
     let file = small_recording("replay_bytes", folder.path());
     let bytes = std::fs::read(&file).unwrap();
     let all = contents(&file, None).unwrap();
+    let damaged = folder.path().join("damaged.mcap");
+    // An index without one of its chunks: a record of its kind (8) becomes one that readers pass over.
+    let chunk_indexes =
+        (0..bytes.len() - 9).filter(|at| bytes[*at] == 8 && (60..300).contains(&length_at(&bytes, at + 1)));
+    let mut wrong = bytes.clone();
+    wrong[chunk_indexes.last().unwrap()] = 0x80;
+    std::fs::write(&damaged, &wrong).unwrap();
+    let refusal = contents(&damaged, None).unwrap_err().to_string();
+    assert!(refusal.contains("Summary section CRC failed"), "{refusal}");
+
     let mut random = fastrand::Rng::with_seed(23);
     let (mut refused, mut ended) = (0, 0);
-    let damaged = folder.path().join("damaged.mcap");
     for _ in 0..300 {
         let mut wrong = bytes.clone();
         // The index at the end is a tenth of the file, and the most there is to go wrong with.
