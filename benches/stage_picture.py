@@ -5,6 +5,7 @@
                                                         # what follows is handed to `run`: cost --realtime 80
     .venv/bin/python benches/stage_picture.py latency   # from sent_ns to received and to drawn, at 20 Hz, 60 Hz and 1 kHz
     .venv/bin/python benches/stage_picture.py long      # pictures a second of a scene of 5,000 benches, and of it as a show
+    .venv/bin/python benches/stage_picture.py renderers # the same boards by canvas and by WebGL, in stage_picture_renderers.html
     .venv/bin/python benches/stage_picture.py pictures  # makes the pictures of docs/driving-a-stage-picture.md
 
 Takes the release build, or the debug build where there is no other. Needs Debian's Chromium and Playwright, which
@@ -14,6 +15,7 @@ the ratios are more telling than the times.
 
 import contextlib
 import json
+import os
 import pathlib
 import signal
 import statistics
@@ -112,12 +114,44 @@ def latency():
             print(f"{rate:>5} Hz: {received:.0f} frames/s received after {spread(ways)}; {drawn:.0f} pictures/s, what they show was sent {spread(drawn_after)} before")
 
 
+def chromium_cpu():
+    """Milliseconds of processor that every Chromium started here has used so far."""
+    parents, used = {}, {}
+    for folder in pathlib.Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            fields = (folder / "stat").read_text().rsplit(")", 1)[1].split()
+            parents[int(folder.name)] = int(fields[1])
+            used[int(folder.name)] = (int(fields[11]) + int(fields[12])) * 1000 / os.sysconf("SC_CLK_TCK")
+    def is_here(process):
+        while process in parents and process != os.getpid():
+            process = parents[process]
+        return process == os.getpid()
+    return sum(time for process, time in used.items() if process != os.getpid() and is_here(process))
+
+
+def renderers():
+    """In turn, so that what else the machine does falls on all alike."""
+    found = {"paths": [], "lines": [], "webgl": []}
+    for _ in range(5):
+        for renderer, turns in found.items():
+            with pages((pathlib.Path(__file__).parent / "stage_picture_renderers.html").as_uri(), 1, f"#{renderer}", width=1920, height=1080) as [page]:
+                page.wait_for_timeout(1000)
+                first, before = page.evaluate("[pictures, performance.now()]"), chromium_cpu()
+                page.wait_for_timeout(3000)
+                last, after = page.evaluate("[pictures, performance.now()]"), chromium_cpu()
+                drawn = last[0] - first[0]
+                turns.append((1000 * drawn / (last[1] - first[1]), (after - before) / drawn))
+    for renderer, turns in found.items():
+        rate, cost = (statistics.median(figures) for figures in zip(*turns))
+        print(f"{renderer:6} {rate:5.1f} pictures/s, {cost:5.1f} ms of processor a picture")
+
+
 def long():
     scene = ROOT / "config" / "long.toml"
-    with server() as (url, _), started("run", "--quiet", "--json", "--scene", str(scene)), pages(url, 1, width=1600, height=900) as [page]:
+    with server() as (url, _), started("run", "--quiet", "--json", "--scene", str(scene)), pages(url, 1, width=1920, height=1080) as [page]:
         page.wait_for_timeout(3000)
         received, drawn, _, _ = rates(page, 10)
-        print(f"5,000 benches, 1600 x 900: {received:.1f} frames/s received, {drawn:.1f} pictures/s")
+        print(f"5,000 benches, 1920 x 1080: {received:.1f} frames/s received, {drawn:.1f} pictures/s")
         trace = page.context.new_cdp_session(page)
         trace.send("Profiler.enable")
         trace.send("Profiler.start")
@@ -134,7 +168,7 @@ def long():
         page.wait_for_timeout(1000)
         received, drawn, _, _ = rates(page, 5)
         print(f"following the head: {drawn:.1f} pictures/s")
-    with server() as (url, _), started("run", "--quiet", "--json", "--scene", str(scene)), pages(url, 1, "#show", width=1600, height=900) as [page]:
+    with server() as (url, _), started("run", "--quiet", "--json", "--scene", str(scene)), pages(url, 1, "#show", width=1920, height=1080) as [page]:
         page.wait_for_timeout(3000)
         print(f"#show: {rates(page, 10)[1]:.1f} pictures/s")
 
@@ -160,4 +194,4 @@ def pictures():
 
 if __name__ == "__main__":
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
-    {"cost": cost, "latency": latency, "long": long, "pictures": pictures}[sys.argv[1]]()
+    {"cost": cost, "latency": latency, "long": long, "renderers": renderers, "pictures": pictures}[sys.argv[1]]()

@@ -4,15 +4,21 @@
 //!
 //! Then the step of the paper's team once more, beside the same with one and with two doors at which no command waits.
 //!
+//! And the step of the paper's team at 10 kHz, beside the same with a log of the run (`run --log`), and what the log does
+//! when the step is over.
+//!
 //! `cargo bench --bench step`, or with some numbers of benches: `cargo bench --bench step -- 223 100000`, or the doors
-//! alone: `cargo bench --bench step -- doors`
+//! alone: `cargo bench --bench step -- doors`, or the log: `cargo bench --bench step -- log`
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use bench_dragon::live::control::{Door, Doors, door};
 use bench_dragon::live::{Outgoing, Publisher};
-use bench_dragon::scene::Scene;
+use bench_dragon::recording::arithmetic::Arithmetic;
+use bench_dragon::recording::lines::ShowLine;
+use bench_dragon::recording::log;
+use bench_dragon::scene::{Scene, SceneText};
 use bench_dragon::show::{Playback, Show};
 use bench_dragon::subscribers::connection::{Connection, Subscription, Wake};
 use bench_dragon::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher, node, service_name};
@@ -42,6 +48,9 @@ fn main() {
     if std::env::args().any(|argument| argument == "doors") {
         return measure_doors();
     }
+    if std::env::args().any(|argument| argument == "log") {
+        return measure_log();
+    }
     let given: Vec<usize> = std::env::args().filter_map(|argument| argument.parse().ok()).collect();
     println!(
         "| benches | bytes | solver | clearance | publish | step | step without alerts | memcpy | (step without alerts - \
@@ -51,6 +60,7 @@ fn main() {
         measure(benches);
     }
     measure_doors();
+    measure_log();
 }
 
 /// The paper's scene with another number of benches.
@@ -213,6 +223,52 @@ fn measure_doors() {
         let alone = take[count] * 1e3 / POLLS as f64;
         println!("| {count} | {:.3} us | {:.3} | {alone:.1} ns |", step[count], step[count] / step[0]);
     }
+}
+
+/// Steps at 10 kHz without a log and with one, in turn. The log's thread reads what the step has written, so the next step
+/// must come as late as it does in a run.
+fn measure_log() {
+    let scene = scene(223);
+    let playback = Playback { start: START, rate: 10_000.0, ..Playback::of(&scene) };
+    let timeline = scene.motion.timeline(&mut |_| ());
+    let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
+    let (mut publisher, connection) =
+        publisher_and_subscriber(&format!("bench_{}_log", std::process::id()), &scene, &show);
+    let file = std::env::temp_dir().join(format!("bench_dragon_step_{}.jsonl", std::process::id()));
+    let line = ShowLine::new(&SceneText::paper(), &playback, Arithmetic::of(&scene), show.solver_reason(), (1, 0));
+    let (mut log, outcome) = log::open(&file, line, scene.team().handles()).expect("a file in the temporary folder");
+    let mut logging = log.publisher().expect("nobody has taken it");
+    let (mut times, mut after): ([Vec<f64>; 2], Vec<f64>) = Default::default();
+    let began = Instant::now();
+    for tick in 1.. {
+        while began.elapsed().as_secs_f64() < tick as f64 / playback.rate {
+            std::hint::spin_loop();
+        }
+        if began.elapsed() > 2 * TIME {
+            break;
+        }
+        // The same number of frames each, in blocks that are longer than the log's thread sleeps.
+        let logged = tick / 100 % 2 == 1;
+        timed(&mut times[usize::from(logged)], || {
+            let frame = show.frame(tick);
+            let header = frame_header(frame, stamps(tick));
+            publisher.publish(Outgoing::new(&header, frame)).expect("nobody else uses this service");
+            if logged {
+                logging.publish(Outgoing::new(&header, frame)).expect("a log ends no run");
+            }
+        });
+        if logged {
+            timed(&mut after, || logging.prepare());
+        }
+        drain(&connection);
+    }
+    log.finish();
+    let whole = outcome.failure().is_none();
+    // It has no further use.
+    let _ = std::fs::remove_file(&file);
+    let ([without, with], after) = (times.map(median), median(after));
+    println!("\n| step at 10 kHz | with a log | difference | after the step | log whole |\n|---|---|---|---|---|");
+    println!("| {without:.2} us | {with:.2} us | {:.2} us | {after:.2} us | {whole} |", with - without);
 }
 
 fn stamps(sequence: u64) -> Stamps {

@@ -13,12 +13,14 @@ pub mod check;
 pub mod control;
 pub mod draw;
 pub mod events;
+pub mod metrics;
 pub mod plan;
 mod publishing;
 mod realtime_scheduling;
 pub mod record;
 pub mod replay;
 pub mod run;
+pub mod send;
 pub mod soak;
 pub mod soak_conductor;
 pub mod solve;
@@ -202,13 +204,23 @@ pub fn shows_colour(stream: &impl io::IsTerminal) -> bool {
     stream.is_terminal() && !anstyle_query::no_color()
 }
 
-/// A flag that SIGINT and SIGTERM set.
+/// A flag that SIGINT, SIGTERM and SIGHUP set: the last where a terminal was closed, unless `nohup` has it ignored.
 pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CommandError> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+    let hangup = if is_ignored(SIGHUP) { None } else { Some(SIGHUP) };
+    for signal in [SIGINT, SIGTERM].into_iter().chain(hangup) {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
     }
     Ok(stop)
+}
+
+/// Whether whoever started this process has it ignore a signal, as `nohup` does.
+fn is_ignored(signal: i32) -> bool {
+    // proc(5): SigIgn is a mask in hexadecimal, the first signal its lowest bit.
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
 /// Ends this program with a sentence where a page of shared memory cannot be had, which Linux signals by SIGBUS: others

@@ -84,6 +84,9 @@ pub trait Publisher {
     /// error.
     fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError>;
 
+    /// What makes the next frame cheaper. Called when a step is over and has been measured.
+    fn prepare(&mut self) {}
+
     /// Lets late subscribers in; called about ten times a second.
     fn maintain(&mut self);
 
@@ -308,6 +311,7 @@ pub fn run_loop<C: Clock>(
         };
         report(&mut reports, outgoing, sample);
         doors.finish_step(frames, tick);
+        publishers.iter_mut().for_each(|publisher| publisher.prepare());
         tick += 1;
     }
 }

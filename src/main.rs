@@ -35,6 +35,10 @@ enum Command {
     Watch(commands::watch::WatchArguments),
     /// Serve the live stage picture to a browser
     View(commands::view::ViewArguments),
+    /// Send a running publisher's dragon to lighting desks and other hosts
+    Send(commands::send::SendArguments),
+    /// Serve a running publisher's figures to Prometheus
+    Metrics(commands::metrics::MetricsArguments),
     /// Solve a scene offline and print every handle as a table
     Solve(commands::solve::SolveArguments),
     /// Find contact, stall, lock and path end
@@ -71,6 +75,8 @@ fn main() -> ExitCode {
         Command::Verify(arguments) => commands::verify::verify(&common, arguments),
         Command::Watch(arguments) => commands::watch::watch(&common, arguments),
         Command::View(arguments) => commands::view::view(&common, arguments),
+        Command::Send(arguments) => commands::send::send(&common, arguments),
+        Command::Metrics(arguments) => commands::metrics::metrics(&common, arguments),
         Command::Solve(arguments) => commands::solve::solve(&common, arguments),
         Command::Events => commands::events::events(&common),
         Command::Draw(arguments) => commands::draw::draw(&common, arguments),

@@ -8,9 +8,14 @@ pub mod connection;
 pub mod control;
 pub mod feed;
 pub mod hermite;
+#[cfg(feature = "cli")]
+pub mod metrics;
 pub mod monitor;
+pub mod polling;
 #[cfg(feature = "cli")]
 pub mod record;
+#[cfg(feature = "cli")]
+pub mod send;
 #[cfg(feature = "cli")]
 pub mod soak;
 #[cfg(feature = "cli")]

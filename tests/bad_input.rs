@@ -104,6 +104,21 @@ fn scenes_that_cannot_be_played() {
         ("velocities = true", "[publish.ros2]\ncontrol = 1", &["line 29", "publish.ros2.control", "boolean"]),
         ("velocities = true", "[publish.ros2.qos.poses]\ndepth = 0", &["line 29", "publish.ros2.qos.poses.depth"]),
         ("velocities = true", "[publish.ros2.qos.markers]\ndepth = 5", &["line 28", "markers", "topics"]),
+        (
+            "velocities = true",
+            "[publish.ros2.diagnostics]\nskipped_warn = 0",
+            &["line 29", "publish.ros2.diagnostics.skipped_warn", "1"],
+        ),
+        (
+            "velocities = true",
+            "[publish.ros2.diagnostics]\nlateness_warn = 2e-3\nlateness_error = 1e-3",
+            &["line 30", "publish.ros2.diagnostics.lateness_error", "0.002"],
+        ),
+        (
+            "velocities = true",
+            "[publish.ros2]\ntopics = [\"poses\"]\n[publish.ros2.diagnostics]\nskipped_error = 3",
+            &["line 30", "diagnostics", "topics"],
+        ),
         ("velocities = true", "[publish.ros2.qos.poses]\nreliability = \"yes\"", &["line 29", "best_effort"]),
     ];
     for (from, to, named) in cases {

@@ -1,12 +1,16 @@
-//! `record` and `record --recover`, as programs: read by Python's own MCAP libraries, cut, killed, on a full disk.
+//! `record` and `record --recover`, as programs: read by Python's own MCAP libraries, cut, killed, on a full disk, on one that
+//! takes nothing.
 
+#[path = "record/mending.rs"]
+mod mending;
 mod processes;
+#[path = "record/recorder.rs"]
+mod recorder_alone;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use bench_dragon::recording::mcap::recover::{RecoverError, Recovered, check_magic, recover};
 use mcap::{MessageStream, Summary};
 use nix::sys::signal::Signal;
 use processes::{Process, can_run, json_lines, long, program, python, python_modules, root, text, unique, wait};
@@ -77,35 +81,29 @@ fn frame_times(file: &Path) -> Vec<u64> {
     entries.into_iter().filter(|entry| entry.0.ends_with("/handles")).map(|entry| entry.2).collect()
 }
 
-/// A recording of some seconds of a small team.
+/// Whether a recording has every frame of a publisher, but those that it sent before anybody could subscribe.
+fn check_whole(recorded: &Value, published: &Value, rate: u64) {
+    let entries = entries(&std::fs::read(&files(recorded)[0]).unwrap());
+    let sequences: Vec<_> = entries.iter().filter(|entry| entry.0.ends_with("/handles")).map(|entry| entry.1).collect();
+    let numbers = |value: &Value, field: &str| value[field].as_u64().unwrap();
+    assert_eq!((sequences.len() as u64, numbers(recorded, "missed")), (numbers(recorded, "frames"), 0), "{recorded}");
+    assert_eq!(sequences[0] + sequences.len() as u64, numbers(published, "frames"), "{recorded} {published}");
+    assert!(
+        sequences[0] < rate && sequences.windows(2).all(|pair| pair[1] == pair[0] + 1),
+        "it begins at {}",
+        sequences[0]
+    );
+}
+
+/// A recording of some seconds of a small team, whose terminal is closed at the end.
 fn small_recording(name: &str, folder: &Path) -> PathBuf {
     let file = folder.join("small.mcap");
     let recorder = recorder(name, &file, &[]);
     let arguments = ["--rate", "40", "--start", "20", "--duration", "5"];
     publisher(name, &scene(folder, "school", ""), &arguments).output_within(120);
-    assert_eq!(files(&stopped(recorder)), std::slice::from_ref(&file));
+    recorder.signal(Signal::SIGHUP);
+    assert_eq!(files(&processes::summary(&recorder.output_within(60))), std::slice::from_ref(&file));
     file
-}
-
-/// The chunks of a file by the reference implementation: the byte after each, and its messages.
-fn chunks(file: &Path) -> Vec<(usize, Vec<Entry>)> {
-    let output = python().args(["tests/python/record_chunks.py", file.to_str().unwrap()]).output().unwrap();
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let entry = |entry: &Value| {
-        let text = |at: usize| entry[at].as_str().unwrap().to_owned();
-        (text(0), entry[1].as_u64().unwrap(), entry[2].as_u64().unwrap(), text(3))
-    };
-    let chunk = |line: &Value| {
-        let messages = line["messages"].as_array().unwrap().iter().map(entry).collect();
-        (line["end"].as_u64().unwrap() as usize, messages)
-    };
-    json_lines(&output).iter().map(chunk).collect()
-}
-
-fn recovered(bytes: &[u8]) -> Result<(Recovered, Vec<u8>), RecoverError> {
-    let (mut input, mut output) = (bytes, Vec::new());
-    check_magic(&mut input)?;
-    Ok((recover(input, bytes.len() as u64, &mut output)?, output))
 }
 
 #[test]
@@ -131,7 +129,7 @@ fn every_message_of_every_topic_is_what_another_subscriber_got() {
     let summary = processes::summary(&publisher(name, &scene, &arguments).output_within(180));
     assert!(subscriber.output_within(60).status.success());
     let recorded = stopped(recorder);
-    assert_eq!((&recorded["frames"], &recorded["missed"]), (&summary["frames"], &0.into()), "{recorded}");
+    check_whole(&recorded, &summary, 50);
     assert_eq!(recorded["bytes"].as_u64(), Some(std::fs::metadata(&file).unwrap().len()));
     let output = peer("compare", &["--recordings", file.to_str().unwrap()]).output_within(600);
     assert!(output.status.success(), "{}", text(&output.stderr));
@@ -143,54 +141,34 @@ fn every_message_of_every_topic_is_what_another_subscriber_got() {
 }
 
 #[test]
-fn a_file_that_is_cut_anywhere_keeps_every_finished_chunk() {
-    if !can_run(python_modules(&["mcap", "blake3"])) {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let file = small_recording("record_cut", folder.path());
-    let (chunks, bytes) = (chunks(&file), std::fs::read(&file).unwrap());
-    assert!(chunks.len() >= 5 && chunks.iter().map(|chunk| chunk.1.len()).sum::<usize>() > 300, "{}", chunks.len());
-    let (whole, _) = recovered(&bytes).unwrap();
-    assert!(whole.whole && whole.chunks as usize == chunks.len() && whole.lost_bytes == 0, "{whole:?}");
-    assert_eq!(whole.attachments, 1);
-    let mut random = fastrand::Rng::with_seed(17);
-    let random_cuts: Vec<_> = (0..1000).map(|_| random.usize(8..bytes.len())).collect();
-    // And at the very bytes where a chunk ends.
-    let edges = chunks.iter().flat_map(|(end, _)| [end - 1, *end, end + 1]);
-    for cut in random_cuts.into_iter().chain(edges) {
-        let finished = chunks.iter().take_while(|(end, _)| *end <= cut);
-        let expected: Vec<_> = finished.flat_map(|(_, messages)| messages.clone()).collect();
-        let (counts, output) = recovered(&bytes[..cut]).unwrap();
-        assert!(entries(&output) == expected, "cut at {cut} of {}: {counts:?}", bytes.len());
-        assert_eq!(counts.messages, expected.len() as u64);
-        let last_end = chunks.iter().map(|(end, _)| *end).take_while(|end| *end <= cut).last().unwrap_or(8);
-        assert!(counts.lost_bytes as usize <= cut - last_end, "{counts:?} of {cut} bytes");
-    }
-    for cut in 0..8 {
-        assert!(matches!(recovered(&bytes[..cut]), Err(RecoverError::NotMcap)), "{cut} bytes");
-    }
-}
-
-#[test]
-fn a_byte_that_is_wrong_costs_messages_and_invents_none() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = small_recording("record_flip", folder.path());
-    let bytes = std::fs::read(&file).unwrap();
-    let all = entries(&bytes);
-    let mut random = fastrand::Rng::with_seed(18);
-    let mut damaged = 0;
-    for _ in 0..300 {
-        let mut wrong = bytes.clone();
-        wrong[random.usize(8..bytes.len())] ^= 1 << random.u32(0..8);
-        let Ok((counts, output)) = recovered(&wrong) else { continue };
-        let mut rest = all.iter();
-        for entry in entries(&output) {
-            assert!(rest.any(|known| *known == entry), "{entry:?} is in no place of the recording");
+fn a_recorder_whose_disk_takes_nothing_can_be_stopped() {
+    let (name, folder) = ("record_stuck", tempfile::tempdir().unwrap());
+    let _publisher = publisher(name, &scene(folder.path(), "paper", ""), &["--rate", "1000", "--start", "100"]);
+    // A pipe that is open and that nobody reads.
+    let pipe = folder.path().join("pipe.mcap");
+    nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).unwrap();
+    let _open = std::fs::OpenOptions::new().read(true).write(true).open(&pipe).unwrap();
+    let recorder = recorder(name, &pipe, &["--force"]);
+    // The memory of a queue that is full grows no more.
+    let status = format!("/proc/{}/status", recorder.id());
+    let kilobytes = || {
+        let status = std::fs::read_to_string(&status).unwrap();
+        let line = status.lines().find(|line| line.starts_with("RssAnon:")).unwrap();
+        line.split_whitespace().nth(1).unwrap().parse::<u64>().unwrap()
+    };
+    let (mut before, mut now) = (0, kilobytes());
+    for _ in 0..60 {
+        if now > 60_000 && now < before + 100 {
+            break;
         }
-        damaged += u64::from(counts.damaged > 0);
+        wait(2.0);
+        (before, now) = (now, kilobytes());
     }
-    assert!(damaged > 100, "{damaged} of 300 were noticed in a chunk");
+    assert!(now > 60_000 && now < before + 100, "{before} kB, then {now} kB");
+    recorder.signal(Signal::SIGINT);
+    let output = recorder.output_within(100);
+    let sentence = text(&output.stderr);
+    assert!(output.status.code() == Some(1) && sentence.contains("nothing could be written for 30 s"), "{sentence}");
 }
 
 #[test]
@@ -217,6 +195,16 @@ fn a_recorder_that_is_killed_loses_a_second_and_nobody_notices() {
         last = *times.last().unwrap();
         losses.push(now.saturating_sub(last) as f64 / 1e9);
     }
+    // Under nohup the end of the terminal is not the recorder's.
+    let file = folder.path().join("nohup.mcap");
+    let mut nohup = Command::new("bash");
+    nohup.args(["-c", "trap '' HUP; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_bench-dragon")]);
+    nohup.args(["--name", &unique(name), "--json", "record", "--output", file.to_str().unwrap()]);
+    let recorder = Process::start(&mut nohup);
+    wait_for_bytes(&file, 1);
+    recorder.signal(Signal::SIGHUP);
+    wait_for_bytes(&file, std::fs::metadata(&file).unwrap().len() + 100_000);
+    stopped(recorder);
     publisher.signal(Signal::SIGINT);
     let summary = processes::summary(&publisher.output_within(60));
     assert_eq!(summary["end"], "signal", "{summary}");
@@ -293,7 +281,7 @@ fn files_are_split_by_size_by_time_and_by_run() {
     let count = names.len();
     assert!(count >= 4 && names[..2] == ["size.mcap", "size-3.mcap"], "{names:?}");
     assert_eq!(files(&time).len(), 6, "{time}");
-    assert_eq!((size["frames"].as_u64(), &size["missed"]), (time["frames"].as_u64(), &0.into()), "{size} {time}");
+    assert_eq!((&size["missed"], &time["missed"]), (&0.into(), &0.into()), "{size} {time}");
     for (summary, topics) in [(&size, 7), (&time, 2)] {
         let mut sequences = Vec::new();
         for file in files(summary) {
@@ -322,8 +310,7 @@ fn a_thousand_frames_a_second_are_recorded_without_a_gap() {
     let published =
         publisher(name, &scene, &["--rate", "1000", "--start", "100", "--duration", seconds]).output_within(240);
     let (published, recorded) = (processes::summary(&published), stopped(recorder));
-    assert_eq!((&recorded["frames"], &recorded["missed"]), (&published["frames"], &0.into()), "{recorded} {published}");
-    assert_eq!(frame_times(&file).len() as u64, recorded["frames"].as_u64().unwrap());
+    check_whole(&recorded, &published, 1000);
 }
 
 #[test]

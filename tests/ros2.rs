@@ -128,7 +128,7 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs
 
     let markers = messages(&lines, "markers");
     let markers = markers.last().unwrap()["markers"].as_array().unwrap();
-    assert_eq!(markers.len(), 224, "a cube for every bench, a sphere for the contact");
+    assert_eq!(markers.len(), 223 + 7, "a cube for every bench, and signs");
     // The head's cube lies between its handles, along the line that joins them.
     let bench = &markers[0];
     assert_eq!((&bench["type"], &bench["action"]), (&1.into(), &0.into()));
@@ -142,6 +142,9 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs
     let contact = &markers[223];
     assert_eq!((&contact["ns"], &contact["type"], &contact["action"]), (&"contact".into(), &2.into(), &0.into()));
     assert_eq!(contact["pose"]["position"]["x"], alert["event_x"]);
+    assert_eq!((&markers[224]["ns"], &markers[224]["action"]), (&"coming".into(), &2.into()), "it has come");
+    let sentence = "bench 1 (the head) and bench 9 touched at (1.474, 2.111) m, t = 412.473838 s (counting from 1)";
+    assert_eq!((&markers[225]["action"], &markers[225]["text"]), (&0.into(), &sentence.into()));
 
     // Every publisher's diagnostics are on one topic.
     let diagnostics = messages(&lines, "diagnostics");
@@ -159,6 +162,45 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs
     let [frames, skipped] = ["frames", "skipped"].map(|key| number(&summary[key]));
     let offered = number(&summary["ros2"]["frames"]) + number(&summary["ros2"]["skipped"]);
     assert!((frames / 2..=(frames + skipped) / 2 + 1).contains(&offered), "{summary}");
+}
+
+#[test]
+fn markers_show_what_is_coming_and_where() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let scene = scene_file("markers_coming", &[]);
+    let topics = "[publish.ros2]\ntopics = [\"markers\", \"alerts\"]\n";
+    std::fs::write(&scene, format!("{}\n{topics}", std::fs::read_to_string(&scene).unwrap())).unwrap();
+    let arguments = ["--start", "408", "--time-scale", "0.01", "--duration", "60"];
+    let _publisher =
+        Process::start(program("coming").args(["--scene", scene.to_str().unwrap(), "run", "--quiet"]).args(arguments));
+    let output = Process::start(&mut peer("coming", "6", &["markers", "alerts"])).output_within(60);
+    let lines = json_lines(&output);
+    let markers = messages(&lines, "markers");
+    let markers = markers.last().expect("markers")["markers"].as_array().unwrap();
+    let of = |ns: &str| markers.iter().filter(|marker| marker["ns"] == ns && marker["action"] == 0).collect::<Vec<_>>();
+    assert!(of("contact").is_empty(), "nothing has touched");
+    // A dashed ring of 0.75 m around the place where the paper's contact will be.
+    let ring = of("coming")[0];
+    let [x, y] = ["x", "y"].map(|part| ring["pose"]["position"][part].as_f64().unwrap());
+    assert!((x - 1.474).abs() < 5e-4 && (y - 2.111).abs() < 5e-4, "({x}, {y})");
+    let points = ring["points"].as_array().unwrap();
+    let radius = |point: &Value| point["x"].as_f64().unwrap().hypot(point["y"].as_f64().unwrap());
+    assert!(points.len() == 32 && points.iter().all(|point| (radius(point) - 0.75).abs() < 1e-9), "{points:?}");
+    let sentence = of("sentence")[0]["text"].as_str().unwrap();
+    let rest = sentence.strip_prefix("contact: bench 1 (the head) and bench 9 at (1.474, 2.111) m in ").unwrap();
+    let (seconds, nearest) = rest.split_once(" s; nearest now are bench ").unwrap();
+    // 4.47 s at a hundredth of the speed.
+    assert!((380.0..448.0).contains(&seconds.parse::<f64>().unwrap()), "{sentence}");
+    assert!(nearest.ends_with("(counting from 1)"), "{sentence}");
+    let named: Vec<_> = of("numbers").iter().map(|marker| marker["text"].as_str().unwrap()).collect();
+    assert!(named.starts_with(&["bench 1 (the head)", "bench 9"]) && named.len() <= 4, "{named:?}");
+    // Red is what it will happen to, as on the page.
+    let red = |bench: usize| {
+        markers[bench]["color"]["r"].as_f64().unwrap() > 0.8 && markers[bench]["color"]["g"].as_f64().unwrap() < 0.2
+    };
+    assert!(red(0) && red(8) && !red(100));
 }
 
 #[test]

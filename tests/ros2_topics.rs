@@ -177,6 +177,10 @@ fn a_late_subscriber_gets_the_current_alert_and_none_before_it() {
         let current = published.iter().rfind(|stamp| **stamp + 200_000_000 < made).unwrap();
         assert!(alerts[0] >= *current, "{} ms old", (current - alerts[0]) / 1_000_000);
     }
+    // Who does not ask for what was sent before gets none of it.
+    for (made, alerts) in joined("countdown", joins / 4, &["--volatile"]) {
+        assert!(alerts.first() > Some(&made), "{alerts:?} of before {made}");
+    }
     for (made, alerts) in joined("countdown", joins / 4, &["--beside"]) {
         let published = publish_until(made.max(alerts[alerts.len() - 1]));
         let current = published.iter().rfind(|stamp| **stamp + 200_000_000 < made).unwrap();

@@ -15,7 +15,10 @@ use nix::sys::signal::kill;
 use nix::unistd::Pid;
 use serde_json::Value;
 
-use processes::{Place, Process, aloud, json_lines, long, program, scene_file, summary, text, unique, wait};
+use processes::{
+    Place, Process, aloud, can_run, json_lines, long, program, python, python_modules, scene_file, summary, text,
+    unique, wait,
+};
 
 /// Limits that any machine keeps.
 const ANY_SPEED: [&str; 6] = ["--max-skipped", "100%", "--max-lateness-p999", "3600s", "--max-rss-growth", "1MB"];
@@ -74,7 +77,39 @@ fn twenty_seconds_pass_with_nothing_missed() {
     assert_is_whole_page(&std::fs::read_to_string(place.folder().join("report.html")).unwrap(), subscribers.len());
     let filed: Value = serde_json::from_slice(&std::fs::read(place.folder().join("report.json")).unwrap()).unwrap();
     assert_eq!(filed, report);
+    assert_can_be_sent(&place, &report);
     place.assert_clean();
+}
+
+/// The files beside a report say the same, to readers that know nothing of this program: the JSON fits its schema, the
+/// histograms have the percentiles of the JSON, and the show of the log is that of the frames.
+fn assert_can_be_sent(place: &Place, report: &Value) {
+    let publisher = &report["publisher"];
+    let verified = Process::start(place.program().args(["--json", "verify", "report.log.jsonl"])).output_within(120);
+    let verdict = json_lines(&verified).pop().unwrap_or_else(|| panic!("{}", text(&verified.stderr)));
+    assert_eq!((&verdict["verdict"], &verdict["complete"]), (&"same".into(), &true.into()), "{verdict}");
+    assert_eq!(number(&verdict, "frames") + number(&verdict, "lost"), number(publisher, "frames"), "{verdict}");
+    if !can_run(python_modules(&["jsonschema", "hdrh"])) {
+        return;
+    }
+    let schema = std::path::absolute("docs/soak-report.schema.json").unwrap();
+    let script = std::path::absolute("tests/python/soak_report.py").unwrap();
+    let mut reader = python();
+    reader.current_dir(place.folder()).arg(script).arg("report").arg(schema);
+    let output = Process::start(&mut reader).output_within(60);
+    let line = json_lines(&output).pop().unwrap_or_else(|| panic!("{}", text(&output.stderr)));
+    assert!(number(&line, "left_out") > 60, "{line}");
+    let began = line["began_at"].as_f64().unwrap();
+    assert!((began - report["began_at"].as_f64().unwrap()).abs() < 60.0, "{line}");
+    for (tag, field) in [("lateness", "wakeup_ns"), ("step", "step_ns")] {
+        for percentile in ["p50", "p99", "p999", "max"] {
+            assert_eq!(line[tag][percentile], publisher[field][percentile], "{tag} {percentile}");
+        }
+        let intervals: Vec<f64> = line[tag]["intervals"].as_array().unwrap().iter().flat_map(Value::as_f64).collect();
+        assert!(intervals.windows(2).all(|pair| pair[1] - pair[0] >= 10.0), "{intervals:?}");
+    }
+    assert_eq!(line["step"]["count"], publisher["frames"]);
+    assert!(!line["step"]["intervals"].as_array().unwrap().is_empty());
 }
 
 /// One page with every plot drawn inside it, which fetches nothing.
@@ -182,6 +217,7 @@ fn a_conducted_show_obeys_while_clients_are_killed() {
     }
     let page = std::fs::read_to_string(place.folder().join("report.html")).unwrap();
     assert!(page.contains("<th>command") && page.contains("<td>resume") && page.contains("conducted with seed 7"));
+    assert_can_be_sent(&place, &report);
     place.assert_clean();
 }
 

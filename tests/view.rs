@@ -1,7 +1,7 @@
 //! The stage picture as its users meet it: browsers, programs that read its WebSocket, and strangers.
 //!
-//! The browser is Debian's Chromium; what is done in it stands in `tests/python/stage_picture.py`, `stage_motion.py` and
-//! `stage_show.py`.
+//! The browser is Debian's Chromium; what is done in it stands in `tests/python/stage_picture.py`, `stage_motion.py`,
+//! `stage_show.py` and `stage_places.py`.
 //! Nothing asserts a speed.
 
 mod processes;
@@ -133,6 +133,8 @@ fn the_python_example_reads_the_socket() {
     }
     let (_server, address) = server("example");
     let _publisher = publisher("example", &["--start", "300", "--time-scale", "1e-6"]);
+    // A publisher that is not optimised makes its tables for seconds.
+    frame(&mut connect(&address));
     let url = format!("ws://{address}/frames");
     let arguments = ["examples/python/stage_socket.py", "--url", &url, "--seconds", "4"];
     let output = Process::start(python().args(arguments)).output_within(30);
@@ -249,6 +251,10 @@ fn on_stage(scenario: &str) {
     run_scenario("tests/python/stage_show.py", scenario);
 }
 
+fn in_place(scenario: &str) {
+    run_scenario("tests/python/stage_places.py", scenario);
+}
+
 fn run_scenario(script: &str, scenario: &str) {
     if !can_run(chromium().and_then(|()| python_modules(&["playwright", "numpy"]))) {
         return;
@@ -335,4 +341,29 @@ fn colours_mean_the_same_all_along() {
 #[test]
 fn nothing_is_complained_about() {
     on_stage("nothing_is_complained_about");
+}
+
+#[test]
+fn nothing_needed_is_cut_off() {
+    in_place("nothing_needed_is_cut_off");
+}
+
+#[test]
+fn kiosk_shows_no_buttons() {
+    in_place("kiosk_shows_no_buttons");
+}
+
+#[test]
+fn forced_colours_keep_their_meaning() {
+    in_place("forced_colours_keep_their_meaning");
+}
+
+#[test]
+fn frozen_before_it_was_seen() {
+    in_place("frozen_before_it_was_seen");
+}
+
+#[test]
+fn five_thousand_boards_are_drawn() {
+    in_place("five_thousand_boards_are_drawn");
 }

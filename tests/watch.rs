@@ -41,6 +41,12 @@ fn keys_conduct() {
 }
 
 #[test]
+fn keys_are_read_once_a_shell_brings_it_to_the_front() {
+    let scene = scene_file("foreground_later", &[NEWTON]);
+    run_script("tests/python/watch_keys.py", "foreground_later", &[scene.to_str().unwrap()]);
+}
+
+#[test]
 fn terminal_is_restored() {
     run_script("tests/python/watch_keys.py", "terminal_is_restored", &["unused"]);
 }

@@ -11,17 +11,14 @@ use serde::Serialize;
 
 use super::{CommandError, Common, Output};
 
-/// How long a publisher is given to answer; a step answers when it is over.
-const TIMEOUT: Duration = Duration::from_secs(30);
-
 /// Arguments of `control`.
 #[derive(Debug, clap::Args)]
 pub struct ControlArguments {
     #[command(subcommand)]
     action: Action,
-    /// Wait at most so long for the answer, seconds: a step answers when it is over
-    #[arg(long, value_name = "SECONDS", default_value_t = TIMEOUT.as_secs_f64(), global = true)]
-    timeout: f64,
+    /// Wait at most so long for the answer, seconds; by default 30, and for a step as long as it makes progress
+    #[arg(long, value_name = "SECONDS", global = true, allow_negative_numbers = true)]
+    timeout: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, clap::Subcommand)]
@@ -75,17 +72,25 @@ struct ResponseLine {
 
 /// Sends one command and prints what became of it.
 pub fn control(common: &Common, arguments: &ControlArguments) -> Result<(), CommandError> {
-    let timeout = Duration::try_from_secs_f64(arguments.timeout);
-    let timeout = timeout.map_err(|_| {
-        CommandError::BadInput(format!("--timeout is {}, expected a number of seconds", arguments.timeout))
-    })?;
+    let timeout = arguments.timeout.map(|seconds| {
+        let sentence = || CommandError::BadInput(format!("--timeout is {seconds}, expected a number of seconds"));
+        Duration::try_from_secs_f64(seconds).map_err(|_| sentence())
+    });
+    let timeout = timeout.transpose()?;
+    let send = |controller: &mut Controller, command| match timeout {
+        Some(timeout) => controller.send(command, timeout),
+        None => controller.send_patiently(command),
+    };
     let mut controller = Controller::new(&common.name)?;
     let command = match arguments.action {
         Action::State => Command::State,
         Action::Pause => Command::Pause,
         Action::Resume => Command::Resume,
         Action::Toggle => {
-            let state = controller.send(Command::State, timeout)?;
+            let state = send(&mut controller, Command::State)?;
+            if let Some(sentence) = refusal(&state, Command::State) {
+                return Err(CommandError::Failed(sentence));
+            }
             Conducting::Toggle.command(&state)
         }
         Action::Rate { rate } => Command::Rate(rate),
@@ -96,7 +101,7 @@ pub fn control(common: &Common, arguments: &ControlArguments) -> Result<(), Comm
         Action::Release => Command::Release,
         Action::Go => Command::Go,
     };
-    let response = controller.send(command, timeout)?;
+    let response = send(&mut controller, command)?;
     print(common, &response)?;
     refusal(&response, command).map_or(Ok(()), |sentence| Err(CommandError::Failed(sentence)))
 }

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use anstyle::Style;
 use bench_dragon::live::clock::{SystemClock, realtime_ns};
 use bench_dragon::live::control::{Doors, door};
-use bench_dragon::live::statistics::{self, Inbox, Run, RunSummary, Summary};
+use bench_dragon::live::statistics::{self, Inbox, Run, RunSummary, Sample, Summary};
 use bench_dragon::live::{
     Announcement, Counts, Deliveries, End, Frames, LoopOptions, PublishError, Publisher, run_loop,
 };
@@ -64,6 +64,19 @@ pub struct Publishing<'a> {
     pub lead: Duration,
 }
 
+/// The transports of a run.
+type OpenTransports = [Box<dyn Transport>];
+
+/// What a command does at certain moments.
+pub struct Hooks<'a> {
+    /// Once all is open.
+    pub opened: Box<dyn FnOnce(&OpenTransports) + 'a>,
+    /// With each period that was measured, on the statistics thread.
+    pub sample: Box<dyn FnMut(&Sample) + Send + 'a>,
+    /// Once the loop has ended, before the transports take leave.
+    pub ended: Box<dyn FnOnce(Counts) + 'a>,
+}
+
 /// What has been published.
 pub struct Published {
     /// What the loop has counted.
@@ -80,7 +93,7 @@ pub struct Published {
 type LoopEnds = (Vec<Box<dyn Publisher>>, Vec<Box<dyn Transport>>, Option<File>);
 
 impl Publishing<'_> {
-    /// Runs the loop on one thread and the statistics on another. `print_start` is called once all is open.
+    /// Runs the loop on one thread and the statistics on another.
     ///
     /// # Errors
     /// What cannot be opened, or a thread that panicked.
@@ -90,8 +103,9 @@ impl Publishing<'_> {
         transports: Vec<Box<dyn Transport>>,
         mut doors: Doors,
         stop: &AtomicBool,
-        print_start: impl FnOnce(&[Box<dyn Transport>]),
+        hooks: Hooks,
     ) -> Result<Published, CommandError> {
+        let Hooks { opened: when_open, mut sample, ended: when_ended } = hooks;
         let (reports, inbox) = statistics::queues();
         let done = AtomicBool::new(false);
         let (opened, opening) = mpsc::channel();
@@ -113,10 +127,11 @@ impl Publishing<'_> {
             // The thread sends exactly once; should it have died, nothing comes.
             let transports = opening.recv().unwrap_or_else(|_| Err(lost("loop's")));
             let collected = transports.and_then(|transports| {
-                print_start(&transports);
+                when_open(&transports);
                 let collecting = threads.spawn(|| {
                     // Without statistics the loop would run unseen.
-                    self.collect(inbox, transports, &done).inspect_err(|_| stop.store(true, Ordering::Relaxed))
+                    self.collect(inbox, transports, &mut sample, &done)
+                        .inspect_err(|_| stop.store(true, Ordering::Relaxed))
                 });
                 let outcome = looping.join();
                 done.store(true, Ordering::Release);
@@ -130,6 +145,7 @@ impl Publishing<'_> {
             }
         });
         let (counts, (summary, transports), error) = ended?;
+        when_ended(counts);
         let deliveries = transports.into_iter().filter_map(|transport| transport.finish());
         let deliveries = deliveries.map(|(name, of)| (name.to_owned(), of)).collect();
         Ok(Published { counts, summary, deliveries, error })
@@ -161,6 +177,7 @@ impl Publishing<'_> {
         &self,
         inbox: Inbox,
         mut transports: Vec<Box<dyn Transport>>,
+        sample: &mut (dyn FnMut(&Sample) + Send),
         done: &AtomicBool,
     ) -> Result<(Summary, Vec<Box<dyn Transport>>), CommandError> {
         let run = Run {
@@ -169,6 +186,7 @@ impl Publishing<'_> {
             scene: self.scene,
             sinks: transports.iter_mut().map(|transport| transport.status()).collect::<Result<_, _>>()?,
             announce: Box::new(|announcement| self.print_announcement(announcement)),
+            record: Box::new(sample),
         };
         Ok((statistics::collect(&SystemClock, inbox, run, done), transports))
     }

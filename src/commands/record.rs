@@ -7,7 +7,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use bench_dragon::recording::mcap::recorder::{DEFAULT_TOPICS, Recorded, Recorder, RecorderConfig, Split, create};
+use bench_dragon::recording::mcap::recorder::{
+    Counts, DEFAULT_TOPICS, Recorded, Recorder, RecorderConfig, Split, create,
+};
 use bench_dragon::recording::mcap::recover::{RecoverError, Recovered, check_magic, recover};
 use bench_dragon::scene::ros2::Topic;
 use bench_dragon::subscribers::connection::Wake;
@@ -56,6 +58,7 @@ pub struct RecordArguments {
 #[derive(Serialize)]
 struct Summary {
     files: Vec<String>,
+    messages: u64,
     frames: u64,
     missed: u64,
     bytes: u64,
@@ -96,7 +99,7 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
     fed?;
     match failure {
         Some(error) => Err(CommandError::Failed(error.to_string())),
-        None if recorded.frames == 0 => {
+        None if recorded.files.is_empty() => {
             Err(CommandError::Failed(format!("nothing came from \"{}\": there is no recording", common.name)))
         }
         None => Ok(()),
@@ -115,13 +118,15 @@ fn follow(
     let began = Instant::now();
     let (shortest, longest) = POLL_INTERVAL;
     let (mut interval, mut shown) = (shortest, began);
-    while !over() && !thread.has_ended() && duration.is_none_or(|seconds| began.elapsed().as_secs_f64() < seconds) {
+    let over =
+        || over() || thread.has_ended() || duration.is_some_and(|seconds| began.elapsed().as_secs_f64() >= seconds);
+    while !over() {
         feed.poll(interval, &mut |event| {
             if let FeedEvent::Status(status) = event {
                 let seconds = Duration::try_from_secs_f64(UNREAD_FRAMES / status.rate);
                 interval = seconds.unwrap_or(longest).clamp(shortest, longest);
             }
-            queue.handle(&event);
+            queue.handle(&event, over);
         })?;
         if shown.elapsed() >= PROGRESS_INTERVAL {
             shown = Instant::now();
@@ -145,16 +150,16 @@ fn progress(common: &Common) -> ProgressBar {
 
 /// How much has been recorded.
 fn sentence(recorded: &Recorded) -> String {
-    let Recorded { frames, missed, bytes, .. } = *recorded;
-    if frames == 0 {
+    let Counts { messages, frames, missed, bytes, .. } = recorded.counts;
+    if recorded.files.is_empty() {
         return "waiting for a publisher".to_owned();
     }
-    format!("{}, {}, {frames} frames, {missed} missed", time(recorded), size(bytes))
+    format!("{}, {}, {messages} messages, {frames} frames, {missed} missed", time(recorded), size(bytes))
 }
 
 /// The time that was recorded, as 1:02:03.4.
 fn time(recorded: &Recorded) -> String {
-    let tenths = recorded.nanoseconds / 100_000_000;
+    let tenths = recorded.counts.nanoseconds / 100_000_000;
     let (seconds, minutes, hours) = (tenths / 10 % 60, tenths / 600 % 60, tenths / 36_000);
     format!("{hours}:{minutes:02}:{seconds:02}.{}", tenths % 10)
 }
@@ -166,10 +171,10 @@ fn size(bytes: u64) -> String {
 fn print(common: &Common, recorded: &Recorded) -> Result<(), CommandError> {
     let mut output = Output::standard();
     let files: Vec<String> = recorded.files.iter().map(|file| file.display().to_string()).collect();
-    let Recorded { frames, missed, bytes, nanoseconds, .. } = *recorded;
+    let Counts { messages, frames, missed, bytes, nanoseconds } = recorded.counts;
     if common.json {
-        output.json(&Summary { files, frames, missed, bytes, seconds: nanoseconds as f64 / 1e9 })?;
-    } else if frames > 0 {
+        output.json(&Summary { files, messages, frames, missed, bytes, seconds: nanoseconds as f64 / 1e9 })?;
+    } else if !files.is_empty() {
         output.line(&format!("Recorded {}: {}", sentence(recorded), files.join(", ")))?;
     }
     output.finish()
@@ -221,16 +226,18 @@ fn mend(common: &Common, file: &Path, arguments: &RecordArguments) -> Result<(),
         lines.json(&MendedLine { file: shown, output, recovered })?;
         return lines.finish();
     }
-    let Recovered { chunks, messages, damaged, unknown, lost_bytes, whole, .. } = recovered;
+    let Recovered { chunks, messages, damaged, lost_messages, unknown, lost_bytes, whole, .. } = recovered;
     lines.line(&format!("{output} has the {messages} messages of {chunks} finished chunks of {shown}."))?;
     if damaged > 0 {
-        let unknown = if unknown > 0 { format!(", and {unknown} messages that needed them") } else { String::new() };
-        lines.line(&format!("Left out: {damaged} damaged records{unknown}."))?;
+        lines.line(&format!("Left out: {damaged} damaged records, with at least {lost_messages} messages."))?;
     }
-    if whole {
-        lines.line("Nothing had been cut off.")?;
-    } else {
-        lines.line(&format!("Lost: the last {lost_bytes} bytes, which are no whole chunk."))?;
+    if unknown > 0 {
+        lines.line(&format!("Left out: {unknown} messages whose channel cannot be read."))?;
+    }
+    match lost_bytes {
+        _ if whole => lines.line("Nothing had been cut off.")?,
+        0 => lines.line("It was cut between two records.")?,
+        _ => lines.line(&format!("Lost: the last {lost_bytes} bytes, from the first record that cannot be read."))?,
     }
     lines.finish()
 }

@@ -15,7 +15,7 @@ use bench_dragon::wire::Stage;
 use bench_dragon::wire::sentence::rounded;
 use jiff::{Timestamp, Unit};
 
-use super::publishing::{Publishing, new_run_id, open_transports};
+use super::publishing::{Hooks, Publishing, new_run_id, open_transports};
 use super::realtime_scheduling::RealtimeScheduling;
 use super::{CommandError, Common, number, stop_on_signals};
 
@@ -98,7 +98,8 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
             transports.iter().for_each(|transport| eprintln!("{}", transport.describe()));
         }
     };
-    let mut published = publishing.run(&mut frames, transports, doors, &stop, print_start)?;
+    let hooks = Hooks { opened: Box::new(print_start), sample: Box::new(|_| ()), ended: Box::new(|_| ()) };
+    let mut published = publishing.run(&mut frames, transports, doors, &stop, hooks)?;
     let (waited, failure) = reading.finish();
     if waited > 0 {
         log::warn!("in {waited} periods a frame was due that had not been read from the disk: it went out later");

@@ -8,6 +8,7 @@ use bench_dragon::live::clock::realtime_ns;
 use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::recording::arithmetic::Arithmetic;
+use bench_dragon::recording::histograms::HistogramLog;
 use bench_dragon::recording::lines::ShowLine;
 use bench_dragon::recording::log::{self as recording_log, LogOutcome};
 use bench_dragon::scene::{Accepted, AtEnd, Scene, SceneText};
@@ -17,7 +18,7 @@ use bench_dragon::transports::{Transport, TransportConfig};
 use bench_dragon::wire::convert;
 
 use super::events::sentence;
-use super::publishing::{Publishing, new_run_id, open_transports};
+use super::publishing::{Hooks, Publishing, new_run_id, open_transports};
 use super::realtime_scheduling::RealtimeScheduling;
 use super::{CommandError, Common, number, search_timeline, stop_on_signals, warn_of_gap};
 
@@ -54,6 +55,9 @@ pub struct RunArguments {
     /// Record commands and a hash of the frames each second, for `bench-dragon verify`
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
+    /// Record the distributions of wake-up lateness and step cost as an HdrHistogram interval log
+    #[arg(long, value_name = "FILE", hide = true)]
+    histograms: Option<PathBuf>,
     /// Publish ROS 2 topics too, those of the scene's [publish.ros2] or the default ones
     #[arg(long)]
     ros2: bool,
@@ -136,6 +140,7 @@ impl RunSession<'_> {
             transports.push(transport);
             outcome
         });
+        let mut histograms = self.open_histograms()?;
         let publishing = Publishing {
             common: self.common,
             scheduling: &self.arguments.scheduling,
@@ -146,11 +151,16 @@ impl RunSession<'_> {
             benches: self.scene.team().benches as u32,
             lead: Duration::ZERO,
         };
-        let published =
-            publishing.run(&mut show, transports, doors, stop, |transports| self.print_start(transports))?;
+        let hooks = Hooks {
+            opened: Box::new(|transports| self.print_start(transports)),
+            sample: Box::new(|sample| histograms.iter_mut().for_each(|log| log.record(sample))),
+            ended: Box::new(|counts| log.iter().for_each(|log| log.ended(counts))),
+        };
+        let published = publishing.run(&mut show, transports, doors, stop, hooks)?;
         published.print(self.common)?;
         let log_failure = log.and_then(|outcome| outcome.failure());
         let failure = published.error.map(|error| error.to_string()).or(log_failure);
+        let failure = failure.or(histograms.and_then(HistogramLog::finish));
         failure.map_or(Ok(()), |sentence| Err(CommandError::Failed(sentence)))
     }
 
@@ -160,6 +170,13 @@ impl RunSession<'_> {
         let run = (self.run_id, realtime_ns());
         let show = ShowLine::new(self.text, &self.playback, Arithmetic::of(self.scene), &self.solver, run);
         Ok(Some(recording_log::open(file, show, self.scene.team().handles())?))
+    }
+
+    /// The log of distributions, where one is requested.
+    fn open_histograms(&self) -> Result<Option<HistogramLog>, CommandError> {
+        let Some(file) = &self.arguments.histograms else { return Ok(None) };
+        let log = HistogramLog::create(file, self.playback.rate, realtime_ns());
+        log.map(Some).map_err(|sentence| CommandError::BadInput(format!("--histograms: {sentence}")))
     }
 
     /// What a person wants to know at the start, on standard error: standard output is for the summary.

@@ -17,7 +17,7 @@ use bench_dragon::subscribers::soak::history::History;
 use bench_dragon::subscribers::soak::member::Role;
 use bench_dragon::subscribers::soak::observer::Observer;
 use bench_dragon::subscribers::soak::processes::{ConductPlan, Plan};
-use bench_dragon::subscribers::soak::report::{Machine, Report, SubscriberReport};
+use bench_dragon::subscribers::soak::report::{Machine, Report, SCHEMA, SubscriberReport};
 use bench_dragon::subscribers::soak::verdict::{Limits, Verdict};
 use bench_dragon::transports::iceoryx2;
 use indicatif::ProgressBar;
@@ -59,7 +59,7 @@ pub struct SoakArguments {
     /// Publish ROS 2 topics too
     #[arg(long, help_heading = "The test")]
     ros2: bool,
-    /// Write the report to FILE.json and FILE.html
+    /// Write the report to FILE.json and FILE.html, histograms to FILE.hgrm, the log of the show to FILE.log.jsonl
     #[arg(long, value_name = "FILE", help_heading = "The test")]
     report: Option<PathBuf>,
     #[command(flatten)]
@@ -112,6 +112,7 @@ pub fn soak(common: &Common, arguments: &SoakArguments) -> Result<(), CommandErr
     let limits = arguments.limits();
     let verdict = Verdict::of(&fleet, &limits);
     let report = Report {
+        schema: SCHEMA,
         verdict: verdict.word(),
         checks: verdict.checks,
         command: std::env::args().collect(),
@@ -197,6 +198,10 @@ impl SoakArguments {
         publisher.extend(self.ros2.then(|| "--ros2".into()));
         publisher.extend(self.rate.into_iter().flat_map(|rate| ["--rate".into(), rate.to_string().into()]));
         publisher.extend(self.scheduling.arguments());
+        if let Some(stem) = &self.report {
+            let options = [("--histograms", HISTOGRAMS), ("--log", LOG)];
+            publisher.extend(options.into_iter().flat_map(|(option, end)| [option.into(), with_end(stem, end)]));
+        }
         let role = |role, count| std::iter::repeat_n(role, count);
         let roles = role(Role::Steady, self.subscribers)
             .chain(role(Role::Slow, self.slow))
@@ -221,6 +226,17 @@ impl From<FleetError> for CommandError {
     }
 }
 
+/// What the names of the files end with that the publisher writes beside a report.
+const HISTOGRAMS: &str = ".hgrm";
+const LOG: &str = ".log.jsonl";
+
+/// A report's file name with its end.
+fn with_end(stem: &Path, end: &str) -> OsString {
+    let mut name = stem.as_os_str().to_owned();
+    name.push(end);
+    name
+}
+
 /// Both files of a report, opened before the test: after eight hours is too late to learn that they cannot be.
 struct ReportFiles {
     json: File,
@@ -229,14 +245,15 @@ struct ReportFiles {
 
 impl ReportFiles {
     fn create(stem: &Path) -> Result<Self, CommandError> {
-        let create = |extension: &str| {
-            let mut name = stem.as_os_str().to_owned();
-            name.push(extension);
+        let create = |end: &str| {
+            let name = with_end(stem, end);
             File::create(&name).map_err(|error| {
                 let file = Path::new(&name).display();
                 CommandError::BadInput(format!("--report: {file}: {error}, expected a file to write"))
             })
         };
+        // The publisher makes these again.
+        [HISTOGRAMS, LOG].into_iter().try_for_each(|end| create(end).map(drop))?;
         Ok(Self { json: create(".json")?, html: create(".html")? })
     }
 

@@ -1,5 +1,6 @@
 //! `trade`: what accuracy costs on this scene and machine, for every solver.
 
+use std::io::{IsTerminal, stderr};
 use std::path::{Path, PathBuf};
 
 use bench_dragon::drawing::palette::{LIGHT, SERIES, channels, with_dark_rules};
@@ -53,6 +54,7 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
     /// Of a progress bar of 1000, what measuring the solvers takes.
     const SOLVERS: f64 = 850.0;
     let scene = common.load_scene()?;
+    announce(&scene, common);
     let timeline = search_timeline(&scene, common);
     let bar = progress_bar(1000, common).with_message("measuring");
     let measured = measure(&scene, &timeline, &mut |share| bar.set_position((SOLVERS * share) as u64));
@@ -85,6 +87,16 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
         print_display(&mut output, &scene, &displayed)?;
     }
     output.finish()
+}
+
+/// Where no bar shows that something goes on, a line does.
+fn announce(scene: &Scene, common: &Common) {
+    if common.quiet || stderr().is_terminal() {
+        return;
+    }
+    let benches = scene.team().benches;
+    let time = if benches > 1000 { "some minutes" } else { "about half a minute" };
+    eprintln!("measuring every solver on scene {} ({benches} benches), which takes {time}", scene.name);
 }
 
 fn print(output: &mut Output, measurements: &[Measurement]) -> Result<(), CommandError> {
@@ -174,6 +186,9 @@ fn print_display(output: &mut Output, scene: &Scene, displayed: &[DisplayMeasure
     ))
 }
 
+/// Pixels across and down: on a phone, half as large, words can still be read.
+const SIZE: (u32, u32) = (760, 720);
+
 /// The least error that is drawn: below it all is rounding.
 const LEAST_ERROR: f64 = 1e-15;
 
@@ -203,16 +218,19 @@ fn words(size: u32, colour: RGBColor) -> TextStyle<'static> {
 fn plot(svg: &mut String, scene: &str, measurements: &[Measurement]) -> Result<(), DrawingError> {
     let point = |m: &Measurement| Point {
         at: (m.frame_ns / 1e3, m.max_position_error.max(LEAST_ERROR)),
-        text: m.solver.clone(),
+        // What all tables have in common would only make the words smaller.
+        text: m.solver.replace("follower_table", "table").replace(" precision", ""),
         colour: colour(if m.solver.starts_with("paper") { LIGHT.danger } else { LIGHT.slow }),
         on_front: m.on_front,
     };
     let points: Vec<Point> = measurements.iter().map(point).collect();
     let caption = format!("Error against cost, scene {scene}");
-    let note =
-        "Blue: exact motion. Red: the paper's rules. Filled, on the line: no other is both faster and more exact.";
+    let notes = [
+        "Blue: exact motion. Red: the paper's rules. Table: follower_table.",
+        "Filled, on the line: no other is both faster and more exact.",
+    ];
     let axes = ["microseconds per frame (median)", "largest position error, metres"];
-    scatter(svg, [&caption, note], axes, &[(front(&points), colour(LIGHT.slow))], points)
+    scatter(svg, &caption, notes, axes, &[(front(&points), colour(LIGHT.slow))], points)
 }
 
 fn display_plot(svg: &mut String, scene: &str, displayed: &[DisplayMeasurement]) -> Result<(), DrawingError> {
@@ -242,8 +260,11 @@ fn display_plot(svg: &mut String, scene: &str, displayed: &[DisplayMeasurement])
     }
     lines.push((front(&points), colour(LIGHT.ink)));
     let caption = format!("Error at the moment of display, scene {scene}");
-    let note = "Filled, on the dark line: no other has both fewer bytes and a smaller error.";
-    scatter(svg, [&caption, note], ["kilobytes per second", "largest position error, metres"], &lines, points)
+    let notes = [
+        "Orange: hold. Yellow: linear. Blue: Hermite; green: from single precision.",
+        "Filled: no other has both fewer bytes and a smaller error.",
+    ];
+    scatter(svg, &caption, notes, ["kilobytes per second", "largest position error, metres"], &lines, points)
 }
 
 /// A point of a plot, with its label.
@@ -264,33 +285,38 @@ fn front(points: &[Point]) -> Vec<(f64, f64)> {
 /// Lines below labelled points, both axes logarithmic.
 fn scatter(
     svg: &mut String,
-    [caption, note]: [&str; 2],
+    caption: &str,
+    notes: [&str; 2],
     [x_desc, y_desc]: [&str; 2],
     lines: &[(Vec<(f64, f64)>, RGBColor)],
     points: Vec<Point>,
 ) -> Result<(), DrawingError> {
     let (ink, quiet) = (colour(LIGHT.ink), colour(LIGHT.quiet));
-    let sheet = SVGBackend::with_string(svg, (1080, 720)).into_drawing_area();
+    let sheet = SVGBackend::with_string(svg, SIZE).into_drawing_area();
     sheet.fill(&colour(LIGHT.ground))?;
-    let area = sheet.margin(12, 0, 0, 0).titled(caption, words(28, ink))?.titled(note, words(18, quiet))?;
+    let mut area = sheet.margin(12, 0, 0, 0).titled(caption, words(30, ink))?;
+    for note in notes {
+        area = area.titled(note, words(20, quiet))?;
+    }
     let (mut least, mut most) = (f64::INFINITY, 0f64);
     for Point { at: (cost, _), .. } in &points {
         (least, most) = (least.min(*cost), most.max(*cost));
     }
     let mut chart = ChartBuilder::on(&area)
         .margin(14)
-        .x_label_area_size(50)
-        .y_label_area_size(80)
-        .build_cartesian_2d((0.5 * least..8.0 * most).log_scale(), (LEAST_ERROR..10.0).log_scale())?;
+        .x_label_area_size(58)
+        .y_label_area_size(92)
+        .build_cartesian_2d((0.5 * least..4.0 * most).log_scale(), (LEAST_ERROR..10.0).log_scale())?;
     chart
         .configure_mesh()
         .x_desc(x_desc)
         .y_desc(y_desc)
-        .axis_desc_style(words(18, quiet))
-        .label_style(words(16, quiet))
+        .axis_desc_style(words(22, quiet))
+        .label_style(words(20, quiet))
+        .x_labels(5)
         .axis_style(quiet)
         .bold_line_style(colour(LIGHT.line))
-        .x_label_formatter(&|x| format!("{x}"))
+        .x_label_formatter(&|x| if *x < 1e5 { format!("{x}") } else { format!("{x:.0e}") })
         .y_label_formatter(&|y| format!("{y:.0e}"))
         .light_line_style(TRANSPARENT)
         .draw()?;
@@ -324,7 +350,7 @@ fn draw_points(chart: &mut LogChart, points: Vec<Point>) -> Result<(), DrawingEr
         }
         let style = if on_front { colour.filled() } else { colour.stroke_width(2) };
         chart.draw_series([Circle::new(at, 5, style)])?;
-        let text = Text::new(text, (label.left - x, label.top - y), words(16, self::colour(LIGHT.ink)));
+        let text = Text::new(text, (label.left - x, label.top - y), words(20, self::colour(LIGHT.ink)));
         chart.draw_series([EmptyElement::at(at) + text])?;
         taken.push(label);
     }
@@ -339,18 +365,19 @@ struct Label {
 }
 
 impl Label {
-    const HEIGHT: i32 = 16;
-    /// What a letter takes, rounded up.
-    const LETTER: i32 = 7;
+    const HEIGHT: i32 = 19;
+    /// What a letter takes.
+    const LETTER: i32 = 8;
     /// Where labels may stand.
-    const LEFTMOST: i32 = 98;
-    const RIGHTMOST: i32 = 1066;
-    const TOPMOST: i32 = 84;
-    const LOWEST: i32 = 632;
+    const LEFTMOST: i32 = 110;
+    const RIGHTMOST: i32 = 748;
+    const TOPMOST: i32 = 108;
+    const LOWEST: i32 = 624;
 
     /// A label beside a point, or as near to that as it lies on none of `others` and on the plot.
     fn near(others: &[Self], (x, y): (i32, i32), text: &str) -> Self {
-        let width = Self::LETTER * text.len() as i32;
+        // One more, since capitals and digits are wider than most.
+        let width = Self::LETTER * (text.len() as i32 + 1);
         let overlaps = |label: &Self, other: &Self| {
             label.left < other.right && other.left < label.right && (label.top - other.top).abs() < Self::HEIGHT
         };

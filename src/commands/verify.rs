@@ -16,7 +16,7 @@ pub struct VerifyArguments {
     file: PathBuf,
 }
 
-/// Verifies a log: same or close is exit code 0, a difference 1, a file that is no log 2.
+/// Verifies a log: same or close is exit code 0, a difference or nothing to compare 1, a file that is no log 2.
 pub fn verify(common: &Common, arguments: &VerifyArguments) -> Result<(), CommandError> {
     let shown = arguments.file.display().to_string();
     let unread = |error: io::Error| CommandError::BadInput(format!("{shown}: {error}, expected a log to read"));
@@ -31,6 +31,9 @@ pub fn verify(common: &Common, arguments: &VerifyArguments) -> Result<(), Comman
     })?;
     print(common, &verdict)?;
     match verdict.difference {
+        None if verdict.seconds == 0 => {
+            Err(CommandError::Failed(format!("{shown}: nothing could be compared: the log has no hash of any second")))
+        }
         None => Ok(()),
         Some(of) => {
             let from_another = if verdict.version == env!("CARGO_PKG_VERSION") {
@@ -64,7 +67,7 @@ fn print(common: &Common, verdict: &Verdict) -> Result<(), CommandError> {
             verdict.instructions
         ))?;
     }
-    if verdict.difference.is_none() {
+    if verdict.difference.is_none() && seconds > 0 {
         output.line(&format!(
             "{} of {seconds} seconds have the same bits: {frames} frames, {commands} commands, {skipped} periods skipped.",
             same_seconds

@@ -1,6 +1,6 @@
 //! The colours of every picture that this program makes: those of the stage page's style sheet, for light and for dark.
 //!
-//! `tests/draw.rs` compares them with `src/subscribers/view/style.css`. Drawings take one palette; plots are made in the
+//! `tests/draw` compares them with `src/subscribers/view/style.css`. Drawings take one palette; plots are made in the
 //! light one and get the dark one by [`with_dark_rules`], which a viewer that prefers dark applies.
 
 use std::fmt::Write;

@@ -17,7 +17,7 @@ use super::clock::Clock;
 use super::{Announcement, Deliveries, End, StatusPublisher};
 use crate::wire::LoopStatus;
 
-pub use accumulator::{Accumulator, Percentiles, Sample, Summary};
+pub use accumulator::{Accumulator, Durations, Percentiles, Sample, Summary};
 
 /// Samples that their queue holds: three seconds of the highest rate.
 const QUEUED_SAMPLES: usize = 1 << 16;
@@ -76,6 +76,8 @@ pub struct Run<'a> {
     pub sinks: Vec<Box<dyn StatusPublisher>>,
     /// What is done with each alert and cue.
     pub announce: Box<dyn FnMut(&Announcement) + 'a>,
+    /// What else is done with each sample.
+    pub record: Box<dyn FnMut(&Sample) + 'a>,
 }
 
 /// Collects until `done` is set and the queues are empty.
@@ -89,6 +91,7 @@ pub fn collect<C: Clock>(clock: &C, mut inbox: Inbox, mut run: Run, done: &Atomi
         }
         while let Ok(sample) = inbox.samples.pop() {
             accumulator.record(&sample);
+            (run.record)(&sample);
         }
         let now_ns = clock.monotonic_ns();
         let status = if ending { accumulator.status(now_ns) } else { accumulator.status_if_due(now_ns) };

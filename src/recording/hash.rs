@@ -1,31 +1,37 @@
 //! The hash of frames: BLAKE3 over what is the same whenever the same show is played.
 //!
 //! A frame contributes the bytes of its message as subscribers get it: of [`FrameHeader`] `sequence` and `tick` (bytes 8
-//! to 23) and all from `sim_time` on (bytes 48 to 95), then every [`HandlePose`]. What is left out is the run's: its
-//! number and its stamps.
+//! to 23) and all from `sim_time` on (bytes 48 to 95), then every [`HandlePose`](crate::wire::HandlePose). What is left out is
+//! the run's: its number and its stamps.
 
-use crate::wire::{FrameHeader, HandlePose};
+use crate::solve::Chain;
+use crate::wire::FrameHeader;
 
-/// Eight bytes in five: a pose, or half of what a header contributes. The queue to the log's thread is made of them.
-pub(super) type Slot = [u64; 5];
+/// Words of eight bytes that a header contributes.
+pub(super) const HEADER_WORDS: usize = 8;
+/// Words of a handle.
+pub(super) const HANDLE_WORDS: usize = 5;
 
-/// Slots that a header takes.
-pub(super) const HEADER_SLOTS: usize = 2;
-
-/// What a header contributes, in the order of its bytes, and room for two words more.
-pub(super) fn header_slots(header: &FrameHeader, spare: [u64; 2]) -> [Slot; HEADER_SLOTS] {
+/// What a header contributes, in the order of its bytes.
+pub(super) fn header_words(header: &FrameHeader) -> [u64; HEADER_WORDS] {
     let FrameHeader { sequence, tick, sim_time, time_scale, min_clearance, .. } = *header;
     let FrameHeader { handles, state, playback, cue, epoch, reserved, .. } = *header;
     let pair = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
     [
-        [spare[0], sequence, tick, sim_time.to_bits(), time_scale.to_bits()],
-        [min_clearance.to_bits(), pair(handles, state), pair(playback, cue), pair(epoch, reserved), spare[1]],
+        sequence,
+        tick,
+        sim_time.to_bits(),
+        time_scale.to_bits(),
+        min_clearance.to_bits(),
+        pair(handles, state),
+        pair(playback, cue),
+        pair(epoch, reserved),
     ]
 }
 
-/// What a pose contributes.
-pub(super) fn pose_slot(pose: HandlePose) -> Slot {
-    [pose.x, pose.y, pose.heading, pose.vx, pose.vy].map(f64::to_bits)
+/// The arrays of a chain that its poses are made of, in the order of a pose's fields.
+pub(super) fn columns(chain: &Chain) -> [&[f64]; HANDLE_WORDS] {
+    [&chain.x, &chain.y, &chain.heading, &chain.vx, &chain.vy]
 }
 
 /// The hash of some frames.
@@ -36,12 +42,15 @@ pub(super) struct FrameHasher {
 }
 
 impl FrameHasher {
-    /// Adds a frame: its header's slots, then its poses, which may come in two parts.
-    pub fn frame(&mut self, header: &[Slot; HEADER_SLOTS], poses: [&[Slot]; 2]) {
+    /// Adds a frame: what its header contributes, and its [`columns`].
+    pub fn frame(&mut self, header: &[u64; HEADER_WORDS], columns: [&[f64]; HANDLE_WORDS]) {
         self.bytes.clear();
-        let [first, second] = header;
-        let words = first[1..].iter().chain(&second[..4]).chain(poses.into_iter().flatten().flatten());
-        self.bytes.extend(words.flat_map(|word| word.to_le_bytes()));
+        self.bytes.extend(header.iter().flat_map(|word| word.to_le_bytes()));
+        let [x, y, heading, vx, vy] = columns;
+        let poses = x.iter().zip(y).zip(heading).zip(vx.iter().zip(vy));
+        for (((x, y), heading), (vx, vy)) in poses {
+            [x, y, heading, vx, vy].iter().for_each(|number| self.bytes.extend(number.to_bits().to_le_bytes()));
+        }
         self.hasher.update(&self.bytes);
     }
 

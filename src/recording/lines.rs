@@ -6,12 +6,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::arithmetic::Arithmetic;
+use crate::live::End;
 use crate::scene::{AtEnd, OnContact, SceneText};
 use crate::show::Playback;
 use crate::show::control::{Code, Command, CommandRecord};
 
 /// The version of this format.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 
 /// What stands before a line's check, and after it.
 const CHECK: &str = ",\"check\":\"";
@@ -63,7 +64,7 @@ pub enum Line {
         /// The first tick that it has not seen.
         tick: u64,
     },
-    /// The last line of a run that ended in good order.
+    /// The last line of a run whose end the log has seen.
     End {
         /// Frames in the hashes.
         frames: u64,
@@ -71,6 +72,8 @@ pub enum Line {
         skipped: u64,
         /// Frames in no hash.
         lost: u64,
+        /// Why the run ended. After an error the frame of its period may have been published and is not here.
+        reason: End,
     },
 }
 

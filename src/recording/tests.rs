@@ -9,10 +9,10 @@ use proptest::test_runner::TestRng;
 
 use super::arithmetic::Arithmetic;
 use super::lines::{Line, Seal, ShowLine};
-use super::log::{empty, queue_of};
+use super::log::queue_of;
 use super::writer::LogWriter;
 use crate::live::simulated::Wake;
-use crate::live::{Outgoing, Publisher};
+use crate::live::{Counts, End, Outgoing, Publisher};
 use crate::scene::AtEnd;
 use crate::show::control::{Code, Command, CommandRecord};
 use crate::show::{Playback, Show};
@@ -82,8 +82,7 @@ fn ten_thousand_commands_with_skipped_periods_play_again_bit_for_bit() {
     let verdict = verified(&run.log).unwrap();
     assert_eq!((verdict.verdict, verdict.complete, verdict.commands), ("same", true, wanted as u64), "{verdict:?}");
     assert_eq!((verdict.frames, verdict.lost), (run.counts.frames, 0));
-    // Periods skipped after the last frame determine nothing and are not in the log.
-    assert!((500..=run.counts.skipped).contains(&verdict.skipped), "{verdict:?}");
+    assert_eq!(verdict.skipped, run.counts.skipped);
     assert!(verdict.same_seconds >= 16_000 / 50 - 1 && verdict.seconds == verdict.same_seconds, "{verdict:?}");
 }
 
@@ -105,10 +104,11 @@ proptest! {
         };
         let run = Setup { commands, wakes, playback, ..Setup::new(periods) }.run();
         let verdict = verified(&run.log).unwrap();
-        prop_assert_eq!(verdict.verdict, "same", "{:?}", verdict);
-        prop_assert!(verdict.frames == run.counts.frames && verdict.skipped <= run.counts.skipped);
-        let last = (verdict.frames > 0).then(|| verdict.frames + verdict.skipped - 1);
-        prop_assert_eq!(verdict.last_tick, last);
+        let expected = if run.counts.frames > 0 { "same" } else { "nothing" };
+        prop_assert_eq!(verdict.verdict, expected, "{:?}", verdict);
+        // Also those that were skipped after the last frame.
+        prop_assert_eq!((verdict.frames, verdict.skipped), (run.counts.frames, run.counts.skipped));
+        prop_assert!(verdict.complete && verdict.last_tick < Some(verdict.frames + verdict.skipped), "{:?}", verdict);
     }
 
     #[test]
@@ -130,7 +130,8 @@ fn a_log_that_was_cut_proves_what_it_holds() {
     for end in &ends[..ends.len() - 1] {
         for (until, cut) in [(*end, false), (end + 20, true)] {
             let verdict = verified(&run.log[..until]).unwrap();
-            assert_eq!((verdict.verdict, verdict.complete, verdict.cut), ("same", false, cut), "{until} bytes");
+            let expected = if seconds(*end) == 0 { "nothing" } else { "same" };
+            assert_eq!((verdict.verdict, verdict.complete, verdict.cut), (expected, false, cut), "{until} bytes");
             assert_eq!(verdict.seconds, seconds(*end), "{until} bytes");
         }
     }
@@ -142,7 +143,7 @@ fn frames_that_the_log_lost_are_named_and_the_others_proved() {
     // Ten frames fit; the thread sleeps over thirty, and again over a command.
     let held_up: fn(u64) -> bool = |tick| (20..50).contains(&tick) || (60..80).contains(&tick);
     let commands = vec![Command::Seek(20.0); 70];
-    let run = Setup { held_up, slots: 150, commands, ..Setup::new(120) }.run();
+    let run = Setup { held_up, words: 750, commands, ..Setup::new(120) }.run();
     let verdict = verified(&run.log).unwrap();
     assert_eq!((verdict.verdict, verdict.frames + verdict.lost), ("same", 120), "{verdict:?}");
     assert!(verdict.lost >= 20 && verdict.commands >= 68, "{verdict:?}");
@@ -153,24 +154,71 @@ fn frames_that_the_log_lost_are_named_and_the_others_proved() {
 
 #[test]
 fn a_log_that_is_too_far_behind_says_where_it_ends() {
-    let (mut publisher, mut queue) = queue_of(60, 10);
+    // Frames of 76 words, room for four of them and for ten records.
+    let (mut publisher, mut reader) = queue_of(4 * 76, 50);
     let scene = scene_text(NEWTON, false).parse().unwrap();
     let playback = Playback { rate: RATE, ..Playback::of(&scene) };
     let mut show = Show::new(&scene, scene.motion.timeline_without_contact(), playback).unwrap();
     for tick in 0..40 {
+        // In some periods more is to be recorded than there is room for, though there is room for some of it.
+        if tick >= 10 {
+            for _ in 0..3 {
+                let _ = show.command(tick, Command::State);
+            }
+        }
         let header = FrameHeader { tick, ..Default::default() };
         publisher.publish(Outgoing::new(&header, show.frame(tick))).unwrap();
     }
     let file = File::default();
     let line = ShowLine::new(&scene_text(NEWTON, false), &playback, Arithmetic::of(&scene), "", (1, 2));
     let mut writer = LogWriter::new(Shared(file.clone()), line);
-    empty(&mut queue, &mut writer);
+    reader.empty(&mut writer);
     let counts = writer.counts();
-    // Four frames of 15 slots, then the ticks of ten: the next one has no room.
-    assert_eq!((counts.frames, counts.lost), (4, 10));
+    // Four frames, the ticks of six, and of the next with its three commands; that of the one behind has no room whole.
+    assert_eq!((counts.frames, counts.lost), (4, 7));
+    let text = String::from_utf8(file.borrow().clone()).unwrap();
+    assert_eq!(text.matches("\"command\":\"state\"").count(), 3, "{text}");
     // It takes nothing more, though it has room again: what is missing would not show.
     publisher.publish(Outgoing::new(&FrameHeader { tick: 40, ..Default::default() }, show.frame(40))).unwrap();
-    assert!(queue.is_empty());
+    assert!(reader.queue.is_empty());
+}
+
+#[test]
+fn a_frame_is_read_when_all_of_it_has_come() {
+    let (mut publisher, mut reader) = queue_of(1000, 50);
+    let text = scene_text(NEWTON, false);
+    let scene = text.parse().unwrap();
+    let playback = Playback { rate: RATE, ..Playback::of(&scene) };
+    let mut show = Show::new(&scene, scene.motion.timeline_without_contact(), playback).unwrap();
+    let line = ShowLine::new(&text, &playback, Arithmetic::of(&scene), "", (1, 2));
+    let mut writer = LogWriter::new(Shared(File::default()), line);
+    publisher.publish(Outgoing::new(&FrameHeader::default(), show.frame(0))).unwrap();
+    let mut whole = vec![0.0; reader.queue.slots()];
+    reader.queue.pop_entire_slice(&mut whole).unwrap();
+    for word in whole {
+        assert_eq!(writer.counts().frames, 0);
+        publisher.push(&[word]);
+        reader.empty(&mut writer);
+    }
+    assert_eq!((writer.counts().frames, reader.queue.slots()), (1, 0));
+}
+
+#[test]
+fn the_last_line_says_why_the_run_ended_and_holds_the_periods_after_the_last_frame() {
+    // Every period after tick 77 passes before the loop wakes again.
+    let mut wakes = vec![Wake::Late(0); 79];
+    wakes[78] = Wake::Late(10_000_000_000);
+    for (fails_at, wakes, reason) in
+        [(None, vec![], End::Duration), (None, wakes, End::Duration), (Some(40), vec![], End::Error)]
+    {
+        let late = !wakes.is_empty();
+        let run = Setup { fails_at, wakes, ..Setup::new(100) }.run();
+        assert_eq!((run.counts.end, run.counts.skipped > 0), (reason, late), "{:?}", run.counts);
+        let Some(Line::End { frames, skipped, reason: found, .. }) = run.lines().pop() else { panic!("no end") };
+        assert_eq!((frames, skipped, found), (run.counts.frames, run.counts.skipped, reason));
+        let verdict = verified(&run.log).unwrap();
+        assert_eq!((verdict.verdict, verdict.complete, verdict.skipped), ("same", true, skipped), "{verdict:?}");
+    }
 }
 
 /// A file that is full after so many bytes.
@@ -196,7 +244,7 @@ fn a_full_disk_is_reported_once_and_nothing_more_is_written() {
     let record = CommandRecord::Given { command: Command::State, code: Some(Code::Done) };
     (0..200).for_each(|tick| writer.command(tick, record));
     assert_eq!(writer.take_failure().unwrap().kind(), std::io::ErrorKind::StorageFull);
-    writer.end();
+    writer.end(&Counts { frames: 200, overruns: 0, skipped: 0, end: End::Duration });
     assert!(writer.take_failure().is_none());
 }
 

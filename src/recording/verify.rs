@@ -7,7 +7,7 @@
 
 mod player;
 
-use std::io::BufRead;
+use std::io::{BufRead, Read};
 
 use serde::Serialize;
 
@@ -40,6 +40,7 @@ pub enum VerifyError {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
     /// `same`: every bit. `close`: on a machine with another arithmetic, every place within the tolerance. `differs`.
+    /// `nothing`: the log has no second that could be compared.
     pub verdict: &'static str,
     /// The first difference.
     pub difference: Option<Difference>,
@@ -87,6 +88,9 @@ pub struct Difference {
     /// What differs, in words.
     pub what: String,
 }
+
+/// Bytes of the longest line that is read: the scene in the first one is text that a person or a program wrote.
+const LONGEST_LINE: u64 = 1 << 26;
 
 /// Plays a log again.
 ///
@@ -180,12 +184,15 @@ impl<R: BufRead> Lines<R> {
     /// The next line; `None` at the end, and where the last line is cut.
     fn next(&mut self) -> Result<Option<Line>, VerifyError> {
         let mut bytes = Vec::new();
-        let read = self.log.read_until(b'\n', &mut bytes)?;
+        let read = (&mut self.log).take(LONGEST_LINE).read_until(b'\n', &mut bytes)?;
         if read == 0 {
             return Ok(None);
         }
         self.number += 1;
         self.bytes += read as u64;
+        if bytes.last() != Some(&b'\n') && read as u64 == LONGEST_LINE {
+            return Err(self.error(&format!("it is longer than {LONGEST_LINE} bytes, expected a line of a log")));
+        }
         if bytes.last() != Some(&b'\n') {
             self.cut = true;
             return Ok(None);

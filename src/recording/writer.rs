@@ -4,8 +4,9 @@
 
 use std::io::{self, Write};
 
-use super::hash::{FrameHasher, HEADER_SLOTS, Slot};
+use super::hash::{FrameHasher, HANDLE_WORDS, HEADER_WORDS};
 use super::lines::{Line, Seal, SecondLine, ShowLine};
+use crate::live::Counts;
 use crate::show::control::CommandRecord;
 
 /// Handles whose places stand in the line of a second: evenly spread, head and tail among them.
@@ -92,12 +93,12 @@ impl<W: Write> LogWriter<W> {
         self.write(&Line::of(tick, record));
     }
 
-    /// A frame: its header's slots, then its poses in up to two parts.
-    pub fn frame(&mut self, header: &[Slot; HEADER_SLOTS], poses: [&[Slot]; 2]) {
-        let (tick, sim_time) = (header[0][2], f64::from_bits(header[0][3]));
+    /// A frame: what its header contributes to the hash, and its columns.
+    pub fn frame(&mut self, header: &[u64; HEADER_WORDS], columns: [&[f64]; HANDLE_WORDS]) {
+        let (tick, sim_time) = (header[1], f64::from_bits(header[2]));
         self.arrive(tick);
         self.close_lost_range();
-        self.hasher.frame(header, poses);
+        self.hasher.frame(header, columns);
         self.counts.frames += 1;
         self.expected = tick + 1;
         let second = self.second.get_or_insert_with(|| OpenSecond {
@@ -109,13 +110,9 @@ impl<W: Write> LogWriter<W> {
         });
         (second.to, second.sim_time) = (tick, sim_time);
         second.frames += 1;
-        let [first, rest] = poses;
-        let pose = |handle: usize| first.get(handle).unwrap_or_else(|| &rest[handle - first.len()]);
+        let [x, y, ..] = columns;
         second.handles.clear();
-        second.handles.extend(sampled(first.len() + rest.len()).map(|handle| {
-            let [x, y, ..] = pose(handle).map(f64::from_bits);
-            (handle as u32, x, y)
-        }));
+        second.handles.extend(sampled(x.len()).map(|handle| (handle as u32, x[handle], y[handle])));
     }
 
     /// A frame that was published and is not here.
@@ -132,11 +129,18 @@ impl<W: Write> LogWriter<W> {
         self.write(&Line::Stopped { tick });
     }
 
-    /// The end of a run.
-    pub fn end(&mut self) {
+    /// The end of a run of which the loop has counted this.
+    pub fn end(&mut self, run: &Counts) {
+        // Periods may have passed between the last frame and the end.
+        self.arrive(run.frames + run.skipped);
         self.close_second();
         let LogCounts { frames, skipped, lost } = self.counts;
-        self.write(&Line::End { frames, skipped, lost });
+        self.write(&Line::End { frames, skipped, lost, reason: run.end });
+    }
+
+    /// The end of a run of which nothing is known: the log has no last line.
+    pub fn break_off(&mut self) {
+        self.close_second();
     }
 
     /// Something of this tick follows: what comes before it is complete.

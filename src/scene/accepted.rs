@@ -52,6 +52,10 @@ impl Accepted {
     pub const EVERY: Self = Self { least: 1.0, greatest: 1e6, unit: "handles" };
     /// Subscribers at once.
     pub const SUBSCRIBERS: Self = Self { least: 1.0, greatest: 256.0, unit: "subscribers" };
+    /// Periods skipped in a second.
+    pub const SKIPPED: Self = Self { least: 1.0, greatest: 1e6, unit: "periods" };
+    /// Wake-up lateness.
+    pub const LATENESS: Self = Self { least: 1e-9, greatest: 1e3, unit: "seconds" };
     /// Messages that a ROS 2 topic keeps.
     pub const DEPTH: Self = Self { least: 1.0, greatest: 1e3, unit: "messages" };
 

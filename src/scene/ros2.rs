@@ -113,7 +113,7 @@ pub enum Reliability {
 pub enum Durability {
     /// They do not.
     Volatile,
-    /// They get the last messages, as many as the depth.
+    /// They get the last message. (More, up to the depth, only while others subscribe at the same time.)
     TransientLocal,
 }
 
@@ -128,6 +128,32 @@ pub struct Qos {
     pub depth: u32,
 }
 
+/// From when on the diagnostics of the loop's last second are a warning, and from when on an error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DiagnosticLimits {
+    /// Periods skipped, at least 1.
+    pub skipped_warn: u64,
+    /// The same; by default a tenth of the loop's rate.
+    pub skipped_error: Option<u64>,
+    /// Wake-up lateness, 99th percentile, seconds; infinite by default: what is late but in time has no consequence.
+    pub lateness_warn: f64,
+    /// The same.
+    pub lateness_error: f64,
+}
+
+impl Default for DiagnosticLimits {
+    fn default() -> Self {
+        Self { skipped_warn: 1, skipped_error: None, lateness_warn: f64::INFINITY, lateness_error: f64::INFINITY }
+    }
+}
+
+impl DiagnosticLimits {
+    /// Periods skipped in a second that are an error at a rate of the loop.
+    pub fn skipped_error_at(&self, rate: f64) -> u64 {
+        self.skipped_error.unwrap_or(((0.1 * rate).ceil() as u64).max(2)).max(self.skipped_warn)
+    }
+}
+
 /// What a scene states about its ROS 2 topics.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ros2Settings {
@@ -137,12 +163,14 @@ pub struct Ros2Settings {
     pub topics: BTreeMap<Topic, Qos>,
     /// Whether there are services that conduct the show.
     pub control: bool,
+    /// What the diagnostics judge by.
+    pub diagnostics: DiagnosticLimits,
 }
 
 impl Default for Ros2Settings {
     fn default() -> Self {
         let topics = Topic::DEFAULT.into_iter().map(|topic| (topic, topic.default_qos())).collect();
-        Self { rate: None, topics, control: false }
+        Self { rate: None, topics, control: false, diagnostics: DiagnosticLimits::default() }
     }
 }
 
@@ -173,6 +201,53 @@ pub(super) struct RawRos2 {
     control: bool,
     #[serde(default)]
     qos: BTreeMap<Topic, Spanned<RawQos>>,
+    diagnostics: Option<Spanned<RawDiagnostics>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawDiagnostics {
+    skipped_warn: Option<Spanned<i64>>,
+    skipped_error: Option<Spanned<i64>>,
+    lateness_warn: Option<Spanned<f64>>,
+    lateness_error: Option<Spanned<f64>>,
+}
+
+impl RawDiagnostics {
+    fn validated(&self, source: &Source) -> Result<DiagnosticLimits, SceneError> {
+        let count = |field: &str, given: &Option<Spanned<i64>>| {
+            let field = format!("publish.ros2.diagnostics.{field}");
+            let given = given.as_ref().map(|given| source.check_count(&field, given, Accepted::SKIPPED));
+            given.transpose().map(|count| count.map(|count| count as u64))
+        };
+        let seconds = |field: &str, given: &Option<Spanned<f64>>| {
+            let field = format!("publish.ros2.diagnostics.{field}");
+            given.as_ref().map(|given| source.check(&field, given, Accepted::LATENESS)).transpose()
+        };
+        let default = DiagnosticLimits::default();
+        let limits = DiagnosticLimits {
+            skipped_warn: count("skipped_warn", &self.skipped_warn)?.unwrap_or(default.skipped_warn),
+            skipped_error: count("skipped_error", &self.skipped_error)?,
+            lateness_warn: seconds("lateness_warn", &self.lateness_warn)?.unwrap_or(default.lateness_warn),
+            lateness_error: seconds("lateness_error", &self.lateness_error)?.unwrap_or(default.lateness_error),
+        };
+        let order = "expected the warning first: publish.ros2.diagnostics.";
+        if let (Some(given), Some(error)) = (&self.skipped_error, limits.skipped_error)
+            && error < limits.skipped_warn
+        {
+            let warn = limits.skipped_warn;
+            let sentence = format!("{order}skipped_error is {error}, below skipped_warn, which is {warn}");
+            return Err(source.field_error(given, &sentence));
+        }
+        if let (Some(given), true) =
+            (&self.lateness_error, self.lateness_warn.is_some() && limits.lateness_error < limits.lateness_warn)
+        {
+            let DiagnosticLimits { lateness_warn: warn, lateness_error: error, .. } = limits;
+            let sentence = format!("{order}lateness_error is {error}, below lateness_warn, which is {warn}");
+            return Err(source.field_error(given, &sentence));
+        }
+        Ok(limits)
+    }
 }
 
 #[derive(Deserialize)]
@@ -207,7 +282,16 @@ impl RawRos2 {
             };
             *qos = raw.get_ref().validated(*topic, source)?;
         }
-        Ok(Ros2Settings { rate, topics, control: self.control })
+        let diagnostics = match &self.diagnostics {
+            None => DiagnosticLimits::default(),
+            Some(raw) if !topics.contains_key(&Topic::Diagnostics) => {
+                let sentence = "publish.ros2.diagnostics is given but \"diagnostics\" is not among publish.ros2.topics, \
+                                expected both or neither";
+                return Err(source.field_error(raw, sentence));
+            }
+            Some(raw) => raw.get_ref().validated(source)?,
+        };
+        Ok(Ros2Settings { rate, topics, control: self.control, diagnostics })
     }
 }
 

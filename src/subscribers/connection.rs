@@ -192,10 +192,13 @@ impl Connection {
         }
     }
 
-    /// Hands every frame that has come to `each`, oldest first; how many there were.
+    /// Hands the frames that have come to `each`, oldest first; how many there were. They are at most as many as the queue
+    /// holds: a publisher that is faster than `each` would otherwise keep the caller here.
     pub fn frames(&self, mut each: impl FnMut(&FrameHeader, &[HandlePose])) -> usize {
         let mut count = 0;
-        while let Ok(Some(sample)) = self.poses.receive() {
+        while count < self.poses.buffer_size()
+            && let Ok(Some(sample)) = self.poses.receive()
+        {
             each(sample.user_header(), sample.payload());
             count += 1;
         }

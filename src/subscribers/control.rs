@@ -11,6 +11,7 @@ use iceoryx2::pending_response::PendingResponse;
 use iceoryx2::port::client::Client;
 use iceoryx2::prelude::*;
 use iceoryx2::service::builder::request_response::RequestResponseOpenError as Open;
+use iceoryx2::service::port_factory::request_response;
 
 use crate::show::control::{Code, Command};
 use crate::show::state::PlaybackState;
@@ -19,6 +20,13 @@ use crate::wire::{ControlRequest, ControlResponse};
 
 /// How often a response is looked for.
 const POLL_INTERVAL: Duration = Duration::from_micros(500);
+/// How long a publisher is given to answer, and a step to make progress.
+pub const PATIENCE: Duration = Duration::from_secs(30);
+/// How often it is tested whether a publisher that has not answered lives, and whether a step makes progress.
+const LIVENESS_INTERVAL: Duration = Duration::from_millis(200);
+const PROGRESS_INTERVAL: Duration = Duration::from_secs(1);
+/// A century: an instant farther off cannot be represented everywhere.
+const LONGEST_TIMEOUT: Duration = Duration::from_secs(100 * 365 * 86_400);
 
 /// Why there is no response.
 #[derive(Debug, thiserror::Error)]
@@ -29,6 +37,12 @@ pub enum ControlError {
     /// There is no publisher to conduct.
     #[error("nobody publishes under the name \"{0}\"")]
     NoPublisher(String),
+    /// The publisher has ended or was killed before it answered.
+    #[error("the publisher of \"{0}\" has ended without an answer")]
+    Ended(String),
+    /// A hold came while the command waited to be sent, and it was dropped.
+    #[error("a hold overtook this command, which was not sent")]
+    Overtaken,
     /// The publisher did not answer.
     #[error("the publisher of \"{name}\" has not answered within {} s", timeout.as_secs_f64())]
     NoAnswer {
@@ -44,8 +58,9 @@ pub struct Controller {
     name: String,
     client: Client<ipc::Service, ControlRequest, (), ControlResponse, ()>,
     sent: u64,
-    // Dropped last: the port above belongs to it.
-    _node: Node<ipc::Service>,
+    service: request_response::PortFactory<ipc::Service, ControlRequest, (), ControlResponse, ()>,
+    // Dropped last: the ports above belong to it.
+    node: Node<ipc::Service>,
 }
 
 impl Controller {
@@ -71,23 +86,54 @@ impl Controller {
         }
         let client = opened.client_builder().backpressure_strategy(BackpressureStrategy::DiscardData).create();
         let client = client.map_err(|error| failed(name, format!("{error:?}")))?;
-        Ok(Self { name: name.to_owned(), client, sent: 0, _node: node })
+        Ok(Self { name: name.to_owned(), client, sent: 0, service: opened, node })
     }
 
     /// Sends a command and waits for what became of it, at most `timeout`.
     ///
     /// # Errors
-    /// [`ControlError::NoPublisher`] or [`ControlError::NoAnswer`].
+    /// [`ControlError::NoPublisher`], [`ControlError::Ended`] or [`ControlError::NoAnswer`].
     pub fn send(&mut self, command: Command, timeout: Duration) -> Result<ControlResponse, ControlError> {
-        let pending = self.request(command)?;
+        let deadline = Instant::now() + timeout.min(LONGEST_TIMEOUT);
+        self.await_response(command, timeout, |_| deadline)
+    }
+
+    /// Sends a command and waits for what became of it: [`PATIENCE`], and for a step as long as it makes progress.
+    ///
+    /// # Errors
+    /// As [`Self::send`].
+    pub fn send_patiently(&mut self, command: Command) -> Result<ControlResponse, ControlError> {
         let began = Instant::now();
-        while began.elapsed() < timeout {
-            match pending.poll()? {
-                Some(response) => return Ok(response),
-                None => std::thread::sleep(POLL_INTERVAL),
+        self.await_response(command, PATIENCE, |vigil| vigil.deadline(command, began))
+    }
+
+    fn await_response(
+        &mut self,
+        command: Command,
+        timeout: Duration,
+        deadline: impl Fn(&Vigil) -> Instant,
+    ) -> Result<ControlResponse, ControlError> {
+        let pending = self.request(command)?;
+        let mut vigil = Vigil::new();
+        loop {
+            if let Some(response) = pending.poll()? {
+                return Ok(response);
             }
+            if let Err(error) = vigil.check(self) {
+                // It may have answered just before its end.
+                return pending.poll()?.ok_or(error);
+            }
+            if Instant::now() >= deadline(&vigil) {
+                return Err(ControlError::NoAnswer { name: self.name.clone(), timeout });
+            }
+            std::thread::sleep(POLL_INTERVAL);
         }
-        Err(ControlError::NoAnswer { name: self.name.clone(), timeout })
+    }
+
+    /// Whether a publisher is there and alive. Cleans up after one that was killed.
+    fn publisher_is_alive(&self) -> bool {
+        let _ = self.node.try_cleanup_dead_nodes();
+        self.service.dynamic_config().number_of_servers() > 0
     }
 
     /// Sends a command. Dropping what is returned gives up the response, not the command.
@@ -114,15 +160,76 @@ impl PendingCommand {
     /// The response, if it has come.
     ///
     /// # Errors
-    /// [`ControlError::NoPublisher`] where nobody is there any more who could answer.
+    /// [`ControlError::NoPublisher`] where nobody was there who could answer, [`ControlError::Ended`] where nobody is any
+    /// more.
     pub fn poll(&self) -> Result<Option<ControlResponse>, ControlError> {
+        // Looked at before the response, which may have been the last that the publisher did.
+        let awaited = self.pending.is_connected();
         match self.pending.receive().map_err(|error| failed(&self.name, format!("{error:?}")))? {
             Some(response) => Ok(Some(*response)),
             None if self.pending.number_of_server_connections() == 0 => {
                 Err(ControlError::NoPublisher(self.name.clone()))
             }
+            None if !awaited => Err(ControlError::Ended(self.name.clone())),
             None => Ok(None),
         }
+    }
+}
+
+/// Watches over a publisher whose answer is awaited.
+///
+/// One that was killed leaves requests that seem to wait for ever. A step may last for hours: whether it makes progress is
+/// seen by asking how the show stands.
+struct Vigil {
+    tested: Instant,
+    probed: Instant,
+    /// When the show was last seen to have played on, and the tick then.
+    progressed: Instant,
+    tick: u64,
+    probe: Option<PendingCommand>,
+}
+
+impl Vigil {
+    fn new() -> Self {
+        let now = Instant::now();
+        Self { tested: now, probed: now, progressed: now, tick: 0, probe: None }
+    }
+
+    /// Until when the answer to a command that was sent at `sent` is awaited.
+    fn deadline(&self, command: Command, sent: Instant) -> Instant {
+        match command {
+            Command::Step(_) => self.progressed.max(sent) + PATIENCE,
+            _ => sent + PATIENCE,
+        }
+    }
+
+    /// Tests what is due by now.
+    ///
+    /// # Errors
+    /// [`ControlError::Ended`]
+    fn check(&mut self, controller: &mut Controller) -> Result<(), ControlError> {
+        let now = Instant::now();
+        if now.duration_since(self.tested) >= LIVENESS_INTERVAL {
+            self.tested = now;
+            if !controller.publisher_is_alive() {
+                return Err(ControlError::Ended(controller.name.clone()));
+            }
+        }
+        if now.duration_since(self.probed) >= PROGRESS_INTERVAL {
+            self.probed = now;
+            // One question at a time: each takes a period of the loop, and others wait behind it.
+            match self.probe.as_ref().map(PendingCommand::poll) {
+                Some(Ok(None)) => return Ok(()),
+                Some(Ok(Some(state)))
+                    if state.playback_state() == Some(PlaybackState::Playing) && state.tick > self.tick =>
+                {
+                    (self.tick, self.progressed) = (state.tick, now);
+                }
+                _ => {}
+            }
+            self.probe = controller.request(Command::State).ok();
+        }
+        Ok(())
     }
 }
 

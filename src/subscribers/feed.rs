@@ -104,8 +104,8 @@ impl Feed {
         })
     }
 
-    /// Waits until something comes, at most `timeout`, and hands all that has come to `handle`. Does what is due
-    /// besides, so it is to be called again and again, a few times a second at least; it may return sooner and with
+    /// Waits until something comes, at most `timeout`, and hands all that has come to `handle`, but of frames at most as
+    /// many as the queue holds. Does what is due besides, so it is to be called again and again, a few times a second at least; it may return sooner and with
     /// nothing.
     ///
     /// # Errors

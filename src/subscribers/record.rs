@@ -1,15 +1,15 @@
 //! A subscriber that records: from the feed through a queue to a thread that compresses and writes.
 //!
 //! The feed's end copies each frame and returns, so that a slow disk does not keep it from the shared memory. Where the thread
-//! is 64 MB behind, the feed's end waits for it: frames then stay in the shared memory until the oldest of them are
-//! overwritten, which shows as a gap, and neither the publisher nor the memory of this process notices. Called by the command
-//! `record`.
+//! is 64 MB behind, the feed's end waits for it with the next frame, until the recording is over: frames then stay in the shared
+//! memory until the oldest of them are overwritten, which shows as a gap, and neither the publisher nor the memory of this
+//! process notices. What is not sent with every frame is little and never waits. Called by the command `record`.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::feed::FeedEvent;
 use crate::recording::mcap::recorder::{RecordError, Recorded, Recorder};
@@ -21,6 +21,10 @@ const QUEUED_BYTES: usize = 64_000_000;
 const MAINTAIN_INTERVAL: Duration = Duration::from_millis(50);
 /// How long the feed's end waits for room before it looks again.
 const ROOM_INTERVAL: Duration = Duration::from_millis(1);
+/// How long the end of a recording waits for a disk that takes nothing: a slow one needs seconds for what it was given.
+const STUCK_SECONDS: u64 = 30;
+/// How often the end of a recording looks whether the thread is done.
+const FINISH_INTERVAL: Duration = Duration::from_millis(10);
 
 /// What the feed brings.
 enum Item {
@@ -54,6 +58,20 @@ pub struct RecordThread {
     handle: JoinHandle<(Recorded, Option<RecordError>)>,
 }
 
+/// Why a recording has not all that its queue was given, in one sentence.
+#[derive(Debug, thiserror::Error)]
+pub enum UnfinishedError {
+    /// The disk refused it.
+    #[error(transparent)]
+    Record(RecordError),
+    /// The disk neither takes nor refuses it.
+    #[error(
+        "nothing could be written for {STUCK_SECONDS} s: the recording ends there, a file without an end is mended by \
+         record --recover"
+    )]
+    Stuck,
+}
+
 /// Starts the thread of a recorder.
 ///
 /// # Errors
@@ -73,10 +91,16 @@ pub fn start(recorder: Recorder) -> std::io::Result<(RecordQueue, RecordThread)>
 }
 
 impl RecordQueue {
-    /// Passes an event on.
-    pub fn handle(&self, event: &FeedEvent<'_>) {
+    /// Passes an event on. A frame waits for room until `over`, after which there is none for it.
+    pub fn handle(&self, event: &FeedEvent<'_>, over: impl Fn() -> bool) {
         let item = match event {
             FeedEvent::Frame { header, handles, missed } => {
+                while self.shared.queued_bytes.load(Ordering::Acquire) > QUEUED_BYTES {
+                    if over() {
+                        return;
+                    }
+                    std::thread::sleep(ROOM_INTERVAL);
+                }
                 let mut copy = self.free.try_recv().unwrap_or_default();
                 copy.clear();
                 copy.extend_from_slice(handles);
@@ -89,11 +113,7 @@ impl RecordQueue {
             FeedEvent::Gone => Item::Gone,
             FeedEvent::Started { .. } | FeedEvent::Silent => return,
         };
-        let Shared { queued_bytes, ended, .. } = &*self.shared;
-        while queued_bytes.load(Ordering::Acquire) > QUEUED_BYTES && !ended.load(Ordering::Acquire) {
-            std::thread::sleep(ROOM_INTERVAL);
-        }
-        queued_bytes.fetch_add(bytes(&item), Ordering::AcqRel);
+        self.shared.queued_bytes.fetch_add(bytes(&item), Ordering::AcqRel);
         // A thread that has failed takes nothing more, and its error is reported when it is joined.
         let _ = self.items.send(item);
     }
@@ -110,12 +130,24 @@ impl RecordThread {
         self.shared.recorded.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Ends the thread once it has written all that `queue` was given. What it has recorded, and why not everything.
-    pub fn finish(self, queue: RecordQueue) -> (Recorded, Option<RecordError>) {
+    /// Ends the thread once it has written all that `queue` was given. What it has recorded, and why not everything. A thread
+    /// that gets on with nothing is left behind.
+    pub fn finish(self, queue: RecordQueue) -> (Recorded, Option<UnfinishedError>) {
         drop(queue);
+        let (mut left, mut since) = (usize::MAX, Instant::now());
+        while !self.handle.is_finished() {
+            let queued = self.shared.queued_bytes.load(Ordering::Acquire);
+            if queued != left {
+                (left, since) = (queued, Instant::now());
+            } else if since.elapsed() >= Duration::from_secs(STUCK_SECONDS) {
+                return (self.recorded(), Some(UnfinishedError::Stuck));
+            }
+            std::thread::sleep(FINISH_INTERVAL);
+        }
         let recorded = self.recorded();
         // A panic has been printed by then.
-        self.handle.join().unwrap_or((recorded, None))
+        let (recorded, error) = self.handle.join().unwrap_or((recorded, None));
+        (recorded, error.map(UnfinishedError::Record))
     }
 }
 
@@ -160,7 +192,12 @@ fn serve(
         if let Err(error) = done.and_then(|()| recorder.maintain()) {
             break Err(error);
         }
-        shared.recorded.lock().unwrap_or_else(PoisonError::into_inner).clone_from(recorder.recorded());
+        let (mut shown, recorded) =
+            (shared.recorded.lock().unwrap_or_else(PoisonError::into_inner), recorder.recorded());
+        shown.counts = recorded.counts;
+        if shown.files.len() != recorded.files.len() {
+            shown.files.clone_from(&recorded.files);
+        }
     };
     (recorder.recorded().clone(), done.err())
 }

@@ -18,4 +18,6 @@ mod plots;
 pub mod processes;
 pub mod report;
 pub mod resources;
+#[cfg(test)]
+mod strategies;
 pub mod verdict;

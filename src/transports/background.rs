@@ -35,6 +35,9 @@ const LONGEST_SLEEP_NS: u64 = 50_000_000;
 
 /// What a transport does with what comes, on the thread. It is made there and dropped there.
 pub trait Sink {
+    /// Does what is due besides sending: before each look into the queues, every 50 ms at least.
+    fn attend(&mut self) {}
+
     /// Sends a frame.
     fn frame(&mut self, header: &FrameHeader, handles: &[HandlePose]);
 
@@ -195,6 +198,7 @@ fn serve(mut sink: impl Sink, period_ns: u64, mut inbox: Inbox) {
         // Read before the queues are emptied: what was put there before it was set is then still sent.
         let ending = stop.load(Ordering::Acquire);
         sleep_until(poll_at);
+        sink.attend();
         while let Ok(alert) = inbox.alerts.pop() {
             sink.alert(alert);
         }

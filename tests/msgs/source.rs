@@ -1,5 +1,5 @@
-//! The contents of `src/wire/layouts.rs`, `src/show/state.rs` and `src/motion/event.rs`, read from their text: layouts,
-//! constants, enums, and the doc comments on all of them.
+//! The contents of `src/wire/layouts.rs` and the file below it, `src/show/state.rs` and `src/motion/event.rs`, read from
+//! their text: layouts, constants, enums, and the doc comments on all of them.
 
 use std::collections::BTreeMap;
 
@@ -83,8 +83,9 @@ pub struct Source {
 impl Source {
     /// Reads the sources of this checkout.
     pub fn read() -> Self {
-        let (layouts, states, events) =
-            (items("src/wire/layouts.rs"), items("src/show/state.rs"), items("src/motion/event.rs"));
+        let layouts: Vec<_> =
+            ["src/wire/layouts.rs", "src/wire/layouts/stage.rs"].into_iter().flat_map(items).collect();
+        let (states, events) = (items("src/show/state.rs"), items("src/motion/event.rs"));
         let mut enums: Vec<_> = states.iter().filter_map(enumeration).collect();
         let mut kinds = events.iter().filter_map(enumeration).find(|item| item.name == "EventKind").unwrap();
         let states = &enums.iter().find(|item| item.name == "FrameState").unwrap().variants;

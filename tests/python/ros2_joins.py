@@ -1,9 +1,10 @@
 """A ROS 2 user without ROS who looks at the alerts now and then: Cyclone DDS subscribers, one after the other.
 
-    ros2_joins.py --name NAME --joins N [--pause SECONDS] [--beside] [--seed S]
+    ros2_joins.py --name NAME --joins N [--pause SECONDS] [--beside] [--volatile] [--seed S]
 
 Each joins at a random moment and stays until its first alert, and a little longer. Prints for each a JSON line: when it was
-made, in nanoseconds of CLOCK_REALTIME, and the alerts that it got. With --beside one that stays is there, too.
+made, in nanoseconds of CLOCK_REALTIME, and the alerts that it got. With --beside one that stays is there, too. With --volatile
+they do not ask for what was sent before.
 """
 
 import argparse
@@ -19,10 +20,10 @@ from cyclonedds.topic import Topic
 from ros2_peer import TOPICS, quality
 
 
-def join(name, domain):
+def join(name, domain, durability="transient_local"):
     participant = DomainParticipant(domain)
     topic = Topic(participant, f"rt/{name}/alerts", TOPICS["alerts"])
-    return participant, DataReader(participant, topic, qos=quality("reliable", "transient_local"))
+    return participant, DataReader(participant, topic, qos=quality("reliable", durability))
 
 
 def take(reader):
@@ -35,6 +36,7 @@ def main():
     parser.add_argument("--joins", type=int, required=True)
     parser.add_argument("--pause", type=float, default=0.6, help="seconds between two, at most")
     parser.add_argument("--beside", action="store_true")
+    parser.add_argument("--volatile", action="store_true")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--domain", type=int, default=0)
     arguments = parser.parse_args()
@@ -47,7 +49,9 @@ def main():
                 take(beside[1])
             time.sleep(0.01)
         made = time.time_ns()
-        participant, reader = join(arguments.name, arguments.domain)
+        participant, reader = join(
+            arguments.name, arguments.domain, "volatile" if arguments.volatile else "transient_local"
+        )
         alerts, deadline, linger = [], time.monotonic() + 60.0, None
         while time.monotonic() < (linger or deadline):
             alerts += take(reader)

@@ -220,9 +220,9 @@ def outline_has_contrast(to_pixel, pixels, handles, bench, what):
 
 
 def speaks_chinese(page):
-    """All but the transport bar, which is in English."""
+    """All of it; the transport bar is looked at in stage_places.py."""
     assert page.evaluate("document.documentElement.lang") == "zh-Hans"
-    assert "第 9 节板凳" in page.get_by_role("alert").inner_text() and "(1.474, 2.111) m" in page.get_by_role("alert").inner_text(), words(page)
+    assert "第 9 节板凳" in page.get_by_role("alert").inner_text() and "(1.474, 2.111) m" in page.get_by_role("alert").inner_text().replace("\xa0", " "), words(page)
     page.keyboard.press("?")
     everything = page.inner_text("body") + "".join(page.evaluate("picture.labels.map((one) => one.text)")) + page.evaluate("document.title.split('（')[1]")
     everything += "".join(page.evaluate("[...document.querySelectorAll('[aria-label]')].filter((one) => !one.closest('#conduct')).map((one) => one.getAttribute('aria-label'))"))
@@ -318,13 +318,26 @@ def nothing_is_complained_about():
             drawn(one)
             one.mouse.click(300, 200)
             until(one, "picture.played.includes('gong') && ['1', '2', '3'].some((tick) => picture.played.includes(tick))", "ticks and a gong", 60)
+        before = [heap(one) for one in (page, show)]
         deadline, keys = time.monotonic() + seconds, 0
         while time.monotonic() < deadline:
             page.keyboard.press("0ft+-s"[keys % 6])
             keys += 1
             time.sleep(0.3)
+        after = [heap(one) for one in (page, show)]
+        print(f"heaps of {before} MB became {after} MB in {seconds} s")
         assert page.evaluate("picture.drawn") > 0 and show.evaluate("picture.drawn") > 0
         assert not complaints and not seen, complaints + seen
+        assert all(late < early + 5 for early, late in zip(before, after)), f"memory: {before} MB became {after} MB"
+
+
+def heap(page):
+    """Megabytes that JavaScript holds, once what nobody needs is gone."""
+    session = page.context.new_cdp_session(page)
+    session.send("HeapProfiler.collectGarbage")
+    used = session.send("Runtime.getHeapUsage")["usedSize"]
+    session.detach()
+    return round(used / 1e6, 2)
 
 
 if __name__ == "__main__":

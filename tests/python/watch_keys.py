@@ -131,6 +131,15 @@ def keys_conduct():
         watch.shows("resume is refused: the show is held")
         watch.press("r")
         until(lambda: state()["playback"] == "paused", "r releases")
+        # Escape by hand is no beginning of a sequence: the two keys behind it count.
+        watch.press("\x1b")
+        time.sleep(0.5)
+        watch.press("[")
+        time.sleep(0.5)
+        watch.press("h")
+        until(lambda: state()["playback"] == "held", "h after Escape and [ holds")
+        watch.press("r")
+        until(lambda: state()["playback"] == "paused", "r releases")
         # Seeks stay within the show.
         watch.press(LEFT * 16)
         until(lambda: state()["sim_time"] < 40, "seeks to the left")
@@ -182,6 +191,40 @@ def terminal_is_restored():
         os.close(slave)
 
 
+def foreground_later():
+    # A shell starts it in the background, with the terminal's keys its own, and brings it to the front by fg, which sends no
+    # signal to a program that runs.
+    with publisher("--start", "100", "--paused"):
+        child, master = pty.fork()
+        if child == 0:
+            os.execvp("bash", ["bash", "--norc", "--noprofile", "-i"])
+        output = []
+
+        def read():
+            with contextlib.suppress(OSError):
+                while printed := os.read(master, 65536):
+                    output.append(printed)
+
+        reader = threading.Thread(target=read, daemon=True)
+        reader.start()
+        shown = lambda words: lambda: words in b"".join(output).decode(errors="replace")
+        os.write(master, f"{PROGRAM} --name {NAME} watch &\n".encode())
+        until(shown("(paused)"), "the monitor's line")
+        os.write(master, b"fg\n")
+        until(lambda: not termios.tcgetattr(master)[3] & termios.ICANON, "keys are read in the foreground")
+        os.write(master, b"h")
+        until(lambda: state()["playback"] == "held", "h holds")
+        os.write(master, b"q")
+
+        def ended():
+            # The monitor may have read it instead.
+            os.write(master, b"exit\n")
+            time.sleep(0.2)
+            return os.waitpid(child, os.WNOHANG)[0]
+
+        until(ended, "the shell ends")
+
+
 signal.signal(signal.SIGALRM, lambda *_: sys.exit(f"{SCENARIO} did not end within {WATCHDOG} s"))
 signal.alarm(WATCHDOG)
-{scenario.__name__: scenario for scenario in [keys_conduct, terminal_is_restored]}[SCENARIO]()
+{scenario.__name__: scenario for scenario in [keys_conduct, terminal_is_restored, foreground_later]}[SCENARIO]()

@@ -132,26 +132,31 @@ def is_publishing(rows):
 
 def figures_are_redrawn_in_place():
     started = [rf'Watching "{NAME}"; Ctrl-C ends, \? lists the keys\.', rf'A publisher of "{NAME}" is running \(run [0-9a-f]{{16}}\)\.']
-    with Terminal(80) as terminal, Terminal(50) as narrow:
-        for each in [terminal, narrow]:
+    with Terminal(80) as terminal, Terminal(200) as wide, Terminal(60) as narrow, Terminal(50) as narrowest:
+        every = [terminal, wide, narrow, narrowest]
+        for each in every:
             each.read_until(lambda rows: rows and rows[-1].startswith("waiting for a publisher"))
         with publisher() as running:
-            for each in [terminal, narrow]:
+            for each in every:
                 each.read_until(is_publishing)
             # Whatever has been redrawn by then, nothing else stands there, until several seconds of alerts have come.
             alerts = []
             while len(alerts) < 6:
-                terminal.read_until_quiet()
-                narrow.read_until_quiet()
-                lines = terminal.lines()
-                alerts = lines[len(started) : -len(FIGURES)]
-                assert_matches(lines, started + [ALERT] * len(alerts) + FIGURES)
+                for each in every:
+                    each.read_until_quiet()
+                for each in [terminal, wide]:
+                    lines = each.lines()
+                    alerts = lines[len(started) : -len(FIGURES)]
+                    assert_matches(lines, started + [ALERT] * len(alerts) + FIGURES)
+            # Wide enough for a whole alert.
+            assert any(re.fullmatch(ALERT, row) for row in wide.rows()), "\n".join(wide.rows())
             print("\n".join(terminal.rows()))
             # Where the terminal is narrower, a figure's line is cut and takes one row all the same.
-            rows = narrow.rows()
-            assert [row[:4] for row in rows[-6:]] == ["t   ", "rate", "late", "head", "publ", "late"], "\n".join(rows)
-            for begin in ["rate ", "head (", "publisher: "]:
-                assert sum(row.startswith(begin) for row in rows) == 1, "\n".join(rows)
+            for each in [narrow, narrowest]:
+                rows = each.rows()
+                assert [row[:4] for row in rows[-6:]] == ["t   ", "rate", "late", "head", "publ", "late"], "\n".join(rows)
+                for begin in ["rate ", "head (", "publisher: "]:
+                    assert sum(row.startswith(begin) for row in rows) == 1, "\n".join(rows)
             running.send_signal(signal.SIGKILL)
             ended = [rf'The publisher of "{NAME}" has ended; waiting for the next\.', rf'waiting for a publisher of "{NAME}"']
             terminal.read_until(lambda rows: rows and rows[-1].startswith("waiting for a publisher"))

@@ -42,6 +42,7 @@ pub enum KeyOutcome {
 /// A keyboard that conducts the publisher of one name.
 pub struct Keyboard {
     mode: Option<KeyMode>,
+    terminal_is_gone: bool,
     conductor: Conductor<()>,
     answers: Receiver<Conducted>,
     waiting: VecDeque<Action>,
@@ -71,7 +72,18 @@ impl Keyboard {
         }
         let (waiting, unanswered, end) = (VecDeque::new(), 0, f64::INFINITY);
         let mode = KeyMode::enter();
-        Ok(Self { mode, conductor, answers, waiting, unanswered, rate: None, end, suspend, resumed })
+        Ok(Self {
+            mode,
+            terminal_is_gone: false,
+            conductor,
+            answers,
+            waiting,
+            unanswered,
+            rate: None,
+            end,
+            suspend,
+            resumed,
+        })
     }
 
     /// Takes in what the keys' commands depend on.
@@ -92,7 +104,9 @@ impl Keyboard {
         self.follow_job_control();
         match self.mode.as_mut().map(KeyMode::keys) {
             Some(Ok(keys)) => keys.into_iter().for_each(|key| outcomes.extend(self.press(key))),
-            Some(Err(_)) => self.mode = None,
+            Some(Err(_)) => (self.mode, self.terminal_is_gone) = (None, true),
+            // In the background of its terminal: no signal comes when a shell brings it to the front.
+            None if !self.terminal_is_gone => self.mode = KeyMode::enter(),
             None => (),
         }
         while let Ok(conducted) = self.answers.try_recv() {
@@ -109,8 +123,8 @@ impl Keyboard {
             let _ = signal_hook::low_level::emulate_default_handler(SIGTSTP);
         }
         if self.resumed.swap(false, Ordering::Relaxed) {
+            // Whoever stopped it may have changed the settings: they are made anew.
             self.mode = None;
-            self.mode = KeyMode::enter();
         }
     }
 
@@ -145,11 +159,18 @@ impl Keyboard {
         let is_hold = action == Action::Send(Command::Hold);
         if is_hold {
             // What was asked before it is not to be done after it.
-            self.waiting.clear();
-        } else if self.waiting.len() >= MOST_WAITING {
+            let dropped = self.waiting.drain(..).count();
+            let line = match dropped {
+                0 => None,
+                1 => Some("The hold overtook a key, which is dropped.".to_owned()),
+                more => Some(format!("The hold overtook {more} keys, which are dropped.")),
+            };
+            return self.send(action).or(line.map(KeyOutcome::Line));
+        }
+        if self.waiting.len() >= MOST_WAITING {
             return Some(KeyOutcome::Line("The publisher has not answered the keys before this one.".to_owned()));
         }
-        if is_hold || self.unanswered == 0 {
+        if self.unanswered == 0 {
             self.send(action)
         } else {
             self.waiting.push_back(action);

@@ -84,14 +84,23 @@ pub struct Summary {
     pub samples: u64,
 }
 
-/// The distributions of the two durations over some time.
-struct Histograms {
-    lateness: Histogram<u64>,
-    step: Histogram<u64>,
+/// The distributions of the two durations over some time, nanoseconds.
+pub struct Durations {
+    /// Wake-up lateness; skipped periods count with the lateness they would have had.
+    pub lateness: Histogram<u64>,
+    /// Cost of a step.
+    pub step: Histogram<u64>,
 }
 
-impl Histograms {
-    fn new() -> Self {
+impl Default for Durations {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Durations {
+    /// Nothing yet.
+    pub fn new() -> Self {
         // 1 ns to an hour with three digits are bounds the constructor accepts.
         let histogram = || Histogram::new_with_bounds(1, LONGEST_NS, 3).expect("valid bounds");
         Self { lateness: histogram(), step: histogram() }
@@ -100,7 +109,7 @@ impl Histograms {
     /// Counts a sample. A late wake-up delays every period it covers, and each counts with what was left of it:
     /// HdrHistogram's correction for coordinated omission. Where it covers very many, neighbours share an entry, so that
     /// an hour's stop does not hold the thread up.
-    fn record(&mut self, sample: &Sample, period_ns: u64) {
+    pub fn record(&mut self, sample: &Sample, period_ns: u64) {
         let values = (sample.lateness_ns / period_ns).max(1);
         let stride = values.div_ceil(MOST_ENTRIES);
         for first in (0..values).step_by(stride as usize) {
@@ -110,7 +119,8 @@ impl Histograms {
         self.step.saturating_record(sample.step_ns);
     }
 
-    fn clear(&mut self) {
+    /// Forgets all.
+    pub fn clear(&mut self) {
         self.lateness.reset();
         self.step.reset();
     }
@@ -121,9 +131,9 @@ pub struct Accumulator {
     run_id: u64,
     rate: f64,
     scene: SceneName,
-    total: Histograms,
+    total: Durations,
     /// Since the latest status.
-    second: Histograms,
+    second: Durations,
     latest: Option<Sample>,
     samples: u64,
     /// When the latest status was made, or the run began, and the frames published until then.
@@ -139,8 +149,8 @@ impl Accumulator {
             run_id,
             rate,
             scene: SceneName::new(scene),
-            total: Histograms::new(),
-            second: Histograms::new(),
+            total: Durations::new(),
+            second: Durations::new(),
             latest: None,
             samples: 0,
             second_began_ns: now_ns,

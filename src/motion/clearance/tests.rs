@@ -94,7 +94,6 @@ fn the_same_as_all_pairs_past_a_stall() {
     }
 }
 
-/// The closest points are on the boards' outlines and as far apart as the clearance.
 /// A coarse bisection leaves links off their length by centimetres, and more from handle to handle.
 #[test]
 fn the_same_as_all_pairs_where_links_are_off() {
@@ -116,6 +115,7 @@ fn the_same_as_all_pairs_where_links_are_off() {
     assert!(most_off > 1e-3 && most_off <= motion.link_error(), "{most_off} m");
 }
 
+/// The closest points are on the boards' outlines and as far apart as the clearance.
 #[test]
 fn the_closest_points_are_the_clearance_apart() {
     let team = team(223, 0.3);

@@ -104,6 +104,16 @@ impl Inner {
     }
 }
 
+impl Seek for Disk {
+    /// Tells the position, for which the writer asks.
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        match to {
+            SeekFrom::Current(0) => Ok(self.position()),
+            _ => Err(io::ErrorKind::Unsupported.into()),
+        }
+    }
+}
+
 impl Write for Disk {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.inner().buffer.extend_from_slice(bytes);

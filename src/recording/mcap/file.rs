@@ -1,11 +1,12 @@
 //! One MCAP file: its channels, its chunks, and its end.
 //!
-//! A chunk is a little less than a second of messages, or 4 MB of them: what is in a finished chunk can be read whatever
-//! happens to the rest. Called by the [`recorder`](super::recorder).
+//! The channels stand before the first chunk and again in it: whichever is damaged, the others are of use. A chunk is half a
+//! second of messages, or 4 MB of them: what is in a finished chunk can be read whatever happens to the rest. Called by the
+//! [`recorder`](super::recorder).
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, Seek, Write};
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
@@ -19,8 +20,9 @@ use super::disk::Disk;
 use crate::ros2_messages::MessageType;
 use crate::scene::ros2::{Durability, Qos, Reliability, Topic};
 
-/// How long messages wait for the end of their chunk. With the way to the disk this is less than a second.
-const CHUNK_INTERVAL: Duration = Duration::from_millis(800);
+/// How long messages wait for the end of their chunk: less than the second that a kill may cost, by what a busy machine may keep
+/// the processor from this one.
+const CHUNK_INTERVAL: Duration = Duration::from_millis(500);
 /// The bytes of messages after which a chunk ends early: readers hold whole chunks in memory.
 const CHUNK_BYTES: u64 = 4 << 20;
 /// How often what was written is forced to the disk.
@@ -79,13 +81,11 @@ impl Batch {
 
 /// An open file.
 pub struct McapFile {
-    writer: Writer<NoSeek<Disk>>,
+    writer: Writer<Disk>,
     disk: Disk,
     channels: BTreeMap<Topic, u16>,
     /// The size that the file must not exceed.
     limit: Option<u64>,
-    /// No message is logged earlier.
-    earliest_ns: u64,
     /// A bound of the bytes of the open chunk, and when it was begun.
     pending: u64,
     chunk_began: Instant,
@@ -95,36 +95,29 @@ pub struct McapFile {
 }
 
 impl McapFile {
-    /// A file with a channel for each topic of the publisher `name`. No message is logged before `earliest_ns`, whatever its
-    /// stamp: what a late subscriber got was true before, and would leave a gap.
+    /// A file with a channel for each topic of the publisher `name`.
     ///
     /// # Errors
     /// What the disk says.
-    pub fn new(
-        file: File,
-        name: &str,
-        topics: &[Topic],
-        earliest_ns: u64,
-        limit: Option<u64>,
-    ) -> Result<Self, io::Error> {
+    pub fn new(file: File, name: &str, topics: &[Topic], limit: Option<u64>) -> Result<Self, io::Error> {
         let disk = Disk::new(file);
-        let mut writer = options().create(NoSeek::new(disk.clone())).map_err(io_error)?;
-        let (mut channels, mut end_bytes) = (BTreeMap::new(), END_BYTES);
-        for topic in topics {
-            let (of, qos) = (MessageType::of(*topic), qos_profile(topic.default_qos()));
-            let schema = of.schema();
-            end_bytes += (schema.len() + qos.len() + 512) as u64;
-            let id = writer.add_schema(&of.ros_name(), "ros2msg", schema.as_bytes()).map_err(io_error)?;
-            let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), qos)]);
-            let id = writer.add_channel(id, &topic.path(name), "cdr", &metadata).map_err(io_error)?;
-            channels.insert(*topic, id);
-        }
+        // What it has not written itself would not be in its check of all data. Chunks and attachments have their own.
+        let options = options().calculate_data_section_crc(false);
+        let mut bare = options.clone().use_chunks(false).create(NoSeek::new(Vec::new())).map_err(io_error)?;
+        add_channels(&mut bare, name, topics)?;
+        let bare = bare.into_inner().into_inner();
+        let mut writer = options.create(disk.clone()).map_err(io_error)?;
+        // Both begin with the same header.
+        let channel_bytes = bare.get(disk.position() as usize..).unwrap_or_default();
+        disk.clone().write_all(channel_bytes)?;
+        let channels = add_channels(&mut writer, name, topics)?;
         // A recorder that is killed within its first second leaves an empty recording, and no empty file.
         disk.clone().flush()?;
         // The channels are in the first chunk and in the end.
+        let end_bytes = END_BYTES + channel_bytes.len() as u64;
         let (now, pending) = (Instant::now(), end_bytes);
         let (chunk_began, synced) = (now, now);
-        Ok(Self { writer, disk, channels, limit, earliest_ns, pending, chunk_began, chunks: 0, end_bytes, synced })
+        Ok(Self { writer, disk, channels, limit, pending, chunk_began, chunks: 0, end_bytes, synced })
     }
 
     /// Whether these messages fit into a file of the size that it may have. An empty file takes any.
@@ -140,28 +133,34 @@ impl McapFile {
         Ok(self.bytes_with(batch.bound()) <= limit)
     }
 
-    /// Writes messages: all of them, or none.
+    /// Writes messages: all of them, or none; how many are of this file's topics. They are logged at their own times or at
+    /// `log_time`.
     ///
     /// # Errors
     /// What the disk says.
-    pub fn append(&mut self, batch: &Batch) -> io::Result<()> {
+    pub fn append(&mut self, batch: &Batch, log_time: Option<u64>) -> io::Result<u64> {
         let more = batch.bound();
         self.disk.reserve(self.bytes_with(more))?;
+        let mut written = 0;
         for Encoded { topic, sequence, stamp_ns, bytes } in &batch.messages {
             let Some(channel) = self.channels.get(topic) else { continue };
             let header = MessageHeader {
                 channel_id: *channel,
                 sequence: *sequence,
-                log_time: (*stamp_ns).max(self.earliest_ns),
+                log_time: log_time.unwrap_or(*stamp_ns),
                 publish_time: *stamp_ns,
             };
             self.writer.write_to_known_channel(&header, &batch.bytes[bytes.clone()]).map_err(io_error)?;
+            written += 1;
         }
         if self.pending == 0 {
             self.chunk_began = Instant::now();
         }
         self.pending += more;
-        if self.pending >= CHUNK_BYTES { self.end_chunk() } else { Ok(()) }
+        if self.pending >= CHUNK_BYTES {
+            self.end_chunk()?;
+        }
+        Ok(written)
     }
 
     /// Writes what goes with the recording and is no message, between two chunks.
@@ -231,6 +230,21 @@ impl McapFile {
         }
         Ok(())
     }
+}
+
+/// Adds a channel for each topic of the publisher `name`; their numbers.
+fn add_channels<Output: Write + Seek>(
+    writer: &mut Writer<Output>,
+    name: &str,
+    topics: &[Topic],
+) -> io::Result<BTreeMap<Topic, u16>> {
+    let add = |topic: &Topic| {
+        let of = MessageType::of(*topic);
+        let schema = writer.add_schema(&of.ros_name(), "ros2msg", of.schema().as_bytes())?;
+        let qos = BTreeMap::from([("offered_qos_profiles".to_owned(), qos_profile(topic.default_qos()))]);
+        Ok((*topic, writer.add_channel(schema, &topic.path(name), "cdr", &qos)?))
+    };
+    topics.iter().map(add).collect::<Result<_, McapError>>().map_err(io_error)
 }
 
 /// What every file of this program is written with.

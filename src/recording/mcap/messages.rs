@@ -4,12 +4,12 @@
 //! [`recorder`](super::recorder).
 
 use super::file::Batch;
-use crate::ros2_messages::diagnostics::DiagnosticArray;
+use crate::ros2_messages::diagnostics::{DiagnosticArray, LoopSecond};
 use crate::ros2_messages::markers::MarkerArray;
 use crate::ros2_messages::path::Path;
 use crate::ros2_messages::transforms::TfMessage;
 use crate::ros2_messages::{Clock, HandlePoses, PoseArray, Stamped};
-use crate::scene::ros2::Topic;
+use crate::scene::ros2::{DiagnosticLimits, Topic};
 use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
 
 /// The messages of one publisher.
@@ -98,12 +98,14 @@ impl Messages {
         self.batch.push(Topic::Cues, cue.stamp_ns, sequence, &Stamped::cue(cue));
     }
 
-    /// Those of a status: with it come the diagnostics, at the alert that holds, with the periods that were skipped since the
-    /// last ones.
-    pub fn status(&mut self, sequence: u32, status: &LoopStatus, alert: Option<&CollisionAlert>, skipped: u64) {
+    /// Those of a status: with it come the diagnostics, at the alert that holds, of what has changed since the status
+    /// `before`, by the default limits: those of the scene are not on the wire.
+    pub fn status(&mut self, sequence: u32, status: &LoopStatus, alert: Option<&CollisionAlert>, before: &LoopStatus) {
         self.batch.clear();
         self.batch.push(Topic::Status, status.stamp_ns, sequence, &Stamped::status(*status));
-        let message = DiagnosticArray::of(&self.name, status, alert, skipped, 0);
+        let limits = DiagnosticLimits::default();
+        let second = LoopSecond { before, discarded: 0, discarded_before: 0, limits };
+        let message = DiagnosticArray::of(&self.name, status, alert, &second);
         self.batch.push(Topic::Diagnostics, status.stamp_ns, sequence, &message);
     }
 }

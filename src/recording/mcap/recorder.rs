@@ -56,7 +56,16 @@ pub struct RecorderConfig {
 pub struct Recorded {
     /// The files, in the order of time.
     pub files: Vec<PathBuf>,
-    /// Frames in them.
+    /// How much is in them.
+    pub counts: Counts,
+}
+
+/// How much has been recorded.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Messages of all topics.
+    pub messages: u64,
+    /// Frames of which there is a message.
     pub frames: u64,
     /// Frames of the same runs that did not come, between those that did.
     pub missed: u64,
@@ -120,7 +129,7 @@ impl Recorder {
     /// # Errors
     /// [`RecordError`]; the files are finished then.
     pub fn frame(&mut self, frame: &FrameHeader, handles: &[HandlePose], missed: u64) -> Result<(), RecordError> {
-        self.recorded.missed += missed;
+        self.recorded.counts.missed += missed;
         match &self.run {
             Some(run) if run.run_id == frame.run_id => {
                 let since = frame.deadline_ns.saturating_sub(run.file_began_ns);
@@ -135,10 +144,10 @@ impl Recorder {
             self.next_file(frame)?;
             self.fill_frame(frame, handles);
         }
-        self.append_batch()?;
-        self.recorded.frames += 1;
+        let written = self.append_batch(None)?;
+        self.recorded.counts.frames += u64::from(written > 0);
         if let Some(run) = &mut self.run {
-            self.recorded.nanoseconds += frame.deadline_ns.saturating_sub(run.latest_deadline_ns);
+            self.recorded.counts.nanoseconds += frame.deadline_ns.saturating_sub(run.latest_deadline_ns);
             run.latest_deadline_ns = frame.deadline_ns;
         }
         Ok(())
@@ -183,7 +192,7 @@ impl Recorder {
     pub fn maintain(&mut self) -> Result<(), RecordError> {
         let Some(run) = &mut self.run else { return Ok(()) };
         let done = run.file.maintain();
-        self.recorded.bytes = self.finished_bytes + run.file.bytes();
+        self.recorded.counts.bytes = self.finished_bytes + run.file.bytes();
         done.or_else(|error| self.fail(error))
     }
 
@@ -197,7 +206,7 @@ impl Recorder {
         let finished = run.file.finish();
         let bytes = *finished.as_ref().unwrap_or_else(|(bytes, _)| bytes);
         self.finished_bytes += bytes;
-        self.recorded.bytes = self.finished_bytes;
+        self.recorded.counts.bytes = self.finished_bytes;
         match (attached, finished) {
             (Err(error), _) | (_, Err((_, error))) => {
                 Err(self.error(error, "the file has no end: mend it with record --recover"))
@@ -223,7 +232,7 @@ impl Recorder {
     /// Begins the first file of a run with what came before its first frame.
     fn begin(&mut self, frame: &FrameHeader) -> Result<(), RecordError> {
         self.finish_run()?;
-        let file = self.make_file(frame)?;
+        let file = self.make_file()?;
         self.run = Some(Run::new(file, frame));
         for early in std::mem::take(&mut self.early) {
             if early.run_id() == frame.run_id {
@@ -236,19 +245,19 @@ impl Recorder {
     /// Goes on in another file, which begins with what a subscriber that joins now would get.
     fn next_file(&mut self, frame: &FrameHeader) -> Result<(), RecordError> {
         let Some(run) = &self.run else { return Ok(()) };
-        let Run { status, skipped, seldom, latest_deadline_ns, .. } = *run;
+        let Run { status, diagnosed, seldom, latest_deadline_ns, .. } = *run;
         let stage = run.stage.clone().map(Seldom::Stage);
         let held = [stage, run.alert.map(Seldom::Alert), run.cue.map(Seldom::Cue)];
         self.finish_run()?;
-        let file = self.make_file(frame)?;
-        self.run = Some(Run { latest_deadline_ns, status, skipped, seldom, ..Run::new(file, frame) });
+        let file = self.make_file()?;
+        self.run = Some(Run { latest_deadline_ns, status, diagnosed, seldom, ..Run::new(file, frame) });
         held.into_iter().flatten().try_for_each(|held| self.seldom(held))
     }
 
-    /// The next file, for which this is the first frame.
-    fn make_file(&mut self, frame: &FrameHeader) -> Result<McapFile, RecordError> {
+    /// The next file, emptied where it was there.
+    fn make_file(&mut self) -> Result<McapFile, RecordError> {
         let (path, file) = match self.first.take() {
-            Some((file, _)) => (self.config.file.clone(), file.set_len(0).or_else(no_regular_file).map(|()| file)),
+            Some((file, _)) => (self.config.file.clone(), Ok(file)),
             None => loop {
                 self.number += 1;
                 let path = numbered(&self.config.file, self.number);
@@ -265,7 +274,8 @@ impl Recorder {
             _ => None,
         };
         let RecorderConfig { name, topics, .. } = &self.config;
-        let made = file.and_then(|file| McapFile::new(file, name, topics, frame.stamp_ns, limit));
+        let emptied = file.and_then(|file| file.set_len(0).or_else(no_regular_file).map(|()| file));
+        let made = emptied.and_then(|file| McapFile::new(file, name, topics, limit));
         made.map_err(|error| self.error(error, "nothing is in it"))
     }
 
@@ -278,6 +288,7 @@ impl Recorder {
             }
             return Ok(());
         };
+        let log_time = run.log_time(&message);
         let sequence = run.seldom;
         run.seldom = sequence.wrapping_add(1);
         match message {
@@ -295,9 +306,8 @@ impl Recorder {
             }
             Seldom::Status(status) => {
                 run.status = Some(status);
-                let before = run.skipped.replace(status.skipped).unwrap_or(status.skipped);
-                let skipped = status.skipped.saturating_sub(before);
-                self.messages.status(sequence, &status, run.alert.as_ref(), skipped);
+                let before = run.diagnosed.replace(status).unwrap_or(status);
+                self.messages.status(sequence, &status, run.alert.as_ref(), &before);
             }
         }
         let attached = if run.attached || run.stage.is_none() || run.status.is_none() {
@@ -307,7 +317,7 @@ impl Recorder {
         };
         attached.or_else(|error| self.fail(error))?;
         // Files are split before frames only.
-        self.append_batch()
+        self.append_batch(Some(log_time)).map(drop)
     }
 
     fn fill_frame(&mut self, frame: &FrameHeader, handles: &[HandlePose]) {
@@ -322,9 +332,12 @@ impl Recorder {
         room.or_else(|error| self.fail(error))
     }
 
-    fn append_batch(&mut self) -> Result<(), RecordError> {
-        let appended = self.run.as_mut().map_or(Ok(()), |run| run.file.append(&self.messages.batch));
-        appended.or_else(|error| self.fail(error))
+    /// Writes the batch, logged at its messages' own times or at another; how many messages that were.
+    fn append_batch(&mut self, log_time: Option<u64>) -> Result<u64, RecordError> {
+        let appended = self.run.as_mut().map_or(Ok(0), |run| run.file.append(&self.messages.batch, log_time));
+        let written = appended.or_else(|error| self.fail(error))?;
+        self.recorded.counts.messages += written;
+        Ok(written)
     }
 
     /// Finishes the file as far as the disk takes it, and returns the error.

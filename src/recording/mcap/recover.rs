@@ -1,21 +1,31 @@
 //! Mends a recording that was cut: by a kill, a full disk or a loss of power.
 //!
-//! In: the bytes that are there. Out: a whole file with every message of every finished chunk, in order, and none besides. Called by the command `record --recover`.
+//! In: the bytes that are there. Out: a whole file with every message of every finished chunk, in order, and none besides.
+//! Called by the command `record --recover`.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
 
 use mcap::read::parse_record;
-use mcap::records::{Record, op};
+use mcap::records::{self, Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::write::NoSeek;
-use mcap::{Attachment, MAGIC, McapError, Writer};
+use mcap::{Attachment, MAGIC, McapError, Schema, Writer};
 use serde::Serialize;
 
 use super::file::{io_error, options};
 
 /// A longer record is taken for damage: a chunk is to fit into memory.
 const MOST_RECORD_BYTES: u64 = 1 << 30;
+/// Bytes of the last record of a file, and of the one that ends its messages.
+const FOOTER_BYTES: usize = 20;
+const DATA_END_BYTES: usize = 4;
+/// Bytes of a record that says where a part of the index is.
+const SUMMARY_OFFSET_BYTES: usize = 17;
+/// Bytes of each message in the record that lists those of a chunk and a channel.
+const MESSAGE_INDEX_ENTRY_BYTES: usize = 16;
+/// Records from here on are no part of MCAP; each program may have its own.
+const FIRST_PRIVATE: u8 = 0x80;
 /// Bytes of an attachment's record besides its two names and its data.
 const ATTACHMENT_BYTES: usize = 36;
 
@@ -28,13 +38,15 @@ pub struct Recovered {
     pub messages: u64,
     /// Attachments.
     pub attachments: u64,
-    /// Chunks and attachments whose content does not agree with its check.
+    /// Records that cannot be what they say, or whose content does not agree with its check.
     pub damaged: u64,
-    /// Messages whose channel was in a damaged chunk.
+    /// Messages of damaged chunks, as far as the indexes after these count them.
+    pub lost_messages: u64,
+    /// Messages whose channel cannot be read.
     pub unknown: u64,
-    /// Bytes after the last whole record.
+    /// Bytes from the first record that cannot be read, to the end.
     pub lost_bytes: u64,
-    /// Whether the data were whole: nothing had been cut off.
+    /// Whether the file has its end: nothing had been cut off.
     pub whole: bool,
 }
 
@@ -77,34 +89,33 @@ pub fn check_magic(mut input: impl Read) -> Result<(), RecoverError> {
 /// [`RecoverError`]
 pub fn recover(input: impl Read, length: u64, output: impl Write) -> Result<Recovered, RecoverError> {
     let mut input = Records { input, left: length.saturating_sub(MAGIC.len() as u64), body: Vec::new() };
-    let mut first = input.next()?;
+    let mut opcode = input.next()?;
     let mut made = options();
-    if let Some((op::HEADER, body)) = first
-        && let Ok(Record::Header(header)) = parse_record(op::HEADER, body)
+    if opcode == Some(op::HEADER)
+        && let Ok(Record::Header(header)) = parse_record(op::HEADER, &input.body)
     {
         made = made.profile(header.profile).library(header.library);
-        first = None;
+        opcode = input.next()?;
     }
     let writer = made.create(NoSeek::new(output))?;
-    let mut mender =
-        Mender { writer, schemas: HashMap::new(), channels: HashMap::new(), recovered: Recovered::default() };
-    if let Some((opcode, body)) = first {
-        mender.keep(opcode, body)?;
-    }
-    while let Some((opcode, body)) = input.next()? {
-        // What follows is an index of what has been kept.
-        if matches!(opcode, op::DATA_END | op::FOOTER) {
-            mender.recovered.whole = true;
-            break;
+    let (schemas, channels) = (BTreeMap::new(), BTreeMap::new());
+    let mut mender = Mender { writer, schemas, channels, lost_chunk: false, recovered: Recovered::default() };
+    let mut in_index = false;
+    while let Some(found) = opcode {
+        match (found, input.body.len()) {
+            (op::FOOTER, FOOTER_BYTES) if input.left == MAGIC.len() as u64 => {
+                mender.recovered.whole = input.fill(MAGIC.len() as u64)? && input.body == MAGIC;
+                break;
+            }
+            // What follows is an index of what has been kept.
+            (op::DATA_END, DATA_END_BYTES) => in_index = true,
+            _ if in_index => (),
+            _ => mender.keep(found, &input.body)?,
         }
-        mender.keep(opcode, body)?;
+        opcode = input.next()?;
     }
-    let Mender { mut writer, mut recovered, .. } = mender;
-    if !recovered.whole {
-        recovered.lost_bytes = input.left;
-    }
-    writer.finish()?;
-    Ok(recovered)
+    mender.recovered.lost_bytes = if mender.recovered.whole { 0 } else { input.left };
+    mender.finish()
 }
 
 /// The records of a file, as far as they are whole.
@@ -112,12 +123,13 @@ struct Records<Input> {
     input: Input,
     /// Bytes that follow.
     left: u64,
+    /// The content of the record.
     body: Vec<u8>,
 }
 
 impl<Input: Read> Records<Input> {
-    /// The next record's opcode and content; `None` where what follows is no whole record.
-    fn next(&mut self) -> Result<Option<(u8, &[u8])>, RecoverError> {
+    /// Reads the next record; its opcode, or `None` where what follows is no whole record.
+    fn next(&mut self) -> Result<Option<u8>, RecoverError> {
         const HEAD: u64 = 9;
         if self.left < HEAD {
             return Ok(None);
@@ -134,7 +146,7 @@ impl<Input: Read> Records<Input> {
             return Ok(None);
         }
         self.left -= HEAD + length;
-        Ok(Some((opcode, &self.body)))
+        Ok(Some(opcode))
     }
 
     /// Reads so many bytes, or fewer at the end of the file; whether they were there.
@@ -148,40 +160,75 @@ impl<Input: Read> Records<Input> {
 /// Writes what is kept.
 struct Mender<Output: Write> {
     writer: Writer<NoSeek<Output>>,
-    /// From the file's numbers to those of the mended one.
-    schemas: HashMap<u16, u16>,
-    channels: HashMap<u16, u16>,
+    /// By the file's numbers, of which the latest meaning holds: what stands before the first chunk has no check, and is
+    /// repeated in it.
+    schemas: BTreeMap<u16, Schema<'static>>,
+    channels: BTreeMap<u16, Known>,
+    /// Whether the indexes that come now are of a chunk that was left out.
+    lost_chunk: bool,
     recovered: Recovered,
+}
+
+/// A channel of the file.
+struct Known {
+    channel: records::Channel,
+    /// Its number in the mended file, once it is there.
+    id: Option<u16>,
 }
 
 impl<Output: Write> Mender<Output> {
     /// Keeps a whole record of the file.
     fn keep(&mut self, opcode: u8, body: &[u8]) -> Result<(), RecoverError> {
-        if opcode == op::ATTACHMENT && !is_attachment(body) {
-            self.recovered.damaged += 1;
-            return Ok(());
-        }
-        if opcode != op::CHUNK {
-            return match parse_record(opcode, body) {
-                Ok(record) => self.keep_record(record),
-                Err(_) => {
-                    self.recovered.damaged += 1;
-                    Ok(())
+        let kept = match opcode {
+            // All of it is read before any of it is kept: its check comes last.
+            op::CHUNK => match records_of_chunk(body) {
+                Ok(records) => {
+                    self.recovered.chunks += 1;
+                    records.into_iter().try_for_each(|record| self.keep_record(record))?;
+                    self.writer.flush()?;
+                    true
                 }
-            };
+                Err(McapError::UnsupportedCompression(name)) if name == "lz4" => {
+                    return Err(RecoverError::Compression(name));
+                }
+                Err(_) => false,
+            },
+            FIRST_PRIVATE.. => {
+                self.writer.write_private_record(opcode, body, Default::default())?;
+                true
+            }
+            _ if !self.is_possible(opcode, body) => false,
+            _ => match parse_record(opcode, body) {
+                Ok(record) => {
+                    self.keep_record(record)?;
+                    true
+                }
+                Err(_) => false,
+            },
+        };
+        self.recovered.damaged += u64::from(!kept);
+        match opcode {
+            op::MESSAGE_INDEX if kept && self.lost_chunk => {
+                self.recovered.lost_messages += message_index_entries(body).unwrap_or_default() as u64;
+            }
+            op::MESSAGE_INDEX => (),
+            _ => self.lost_chunk = !kept,
         }
-        // All of it is read before any of it is kept: its check comes last.
-        match records_of_chunk(body) {
-            Ok(records) => {
-                self.recovered.chunks += 1;
-                records.into_iter().try_for_each(|record| self.keep_record(record))?;
-                Ok(self.writer.flush()?)
-            }
-            Err(McapError::UnsupportedCompression(name)) => Err(RecoverError::Compression(name)),
-            Err(_) => {
-                self.recovered.damaged += 1;
-                Ok(())
-            }
+        Ok(())
+    }
+
+    /// Whether a record outside of chunks can be what it says: where the opcode is damaged the parser may make something of
+    /// the content all the same.
+    fn is_possible(&self, opcode: u8, body: &[u8]) -> bool {
+        match opcode {
+            // A file has chunks or has none.
+            op::MESSAGE => self.recovered.chunks == 0,
+            op::MESSAGE_INDEX => message_index_entries(body).is_some(),
+            op::ATTACHMENT => is_attachment(body),
+            op::SUMMARY_OFFSET => body.len() == SUMMARY_OFFSET_BYTES,
+            op::FOOTER => body.len() == FOOTER_BYTES,
+            op::HEADER..=op::DATA_END => true,
+            _ => false,
         }
     }
 
@@ -189,22 +236,22 @@ impl<Output: Write> Mender<Output> {
     fn keep_record(&mut self, record: Record<'_>) -> Result<(), RecoverError> {
         match record {
             Record::Schema { header, data } => {
-                let id = self.writer.add_schema(&header.name, &header.encoding, &data)?;
-                self.schemas.insert(header.id, id);
-            }
-            Record::Channel(channel) => {
-                // Number 0 is that of no schema.
-                let schema =
-                    if channel.schema_id == 0 { Some(0) } else { self.schemas.get(&channel.schema_id).copied() };
-                if let Some(schema) = schema {
-                    let (topic, encoding) = (&channel.topic, &channel.message_encoding);
-                    let id = self.writer.add_channel(schema, topic, encoding, &channel.metadata)?;
-                    self.channels.insert(channel.id, id);
+                let (id, name, encoding) = (header.id, header.name, header.encoding);
+                let schema = Schema { id, name, encoding, data: data.into_owned().into() };
+                if self.schemas.get(&id) != Some(&schema) {
+                    self.schemas.insert(id, schema);
+                    self.channels.values_mut().for_each(|known| known.id = None);
                 }
             }
-            Record::Message { mut header, data } => match self.channels.get(&header.channel_id) {
+            Record::Channel(channel) => {
+                let is_known = self.channels.get(&channel.id).is_some_and(|known| known.channel == channel);
+                if !is_known {
+                    self.channels.insert(channel.id, Known { channel, id: None });
+                }
+            }
+            Record::Message { mut header, data } => match self.channel(header.channel_id)? {
                 Some(channel) => {
-                    header.channel_id = *channel;
+                    header.channel_id = channel;
                     self.writer.write_to_known_channel(&header, &data)?;
                     self.recovered.messages += 1;
                 }
@@ -221,6 +268,33 @@ impl<Output: Write> Mender<Output> {
             _ => (),
         }
         Ok(())
+    }
+
+    /// The number in the mended file of the channel that the file calls `id`. It comes with its first message, when it is
+    /// known what it is.
+    fn channel(&mut self, id: u16) -> Result<Option<u16>, RecoverError> {
+        let Some(Known { channel, id }) = self.channels.get_mut(&id) else { return Ok(None) };
+        if id.is_some() {
+            return Ok(*id);
+        }
+        // Number 0 is that of no schema.
+        let schema = match self.schemas.get(&channel.schema_id) {
+            Some(schema) => self.writer.add_schema(&schema.name, &schema.encoding, &schema.data)?,
+            None if channel.schema_id == 0 => 0,
+            None => return Ok(None),
+        };
+        *id = Some(self.writer.add_channel(schema, &channel.topic, &channel.message_encoding, &channel.metadata)?);
+        Ok(*id)
+    }
+
+    /// Ends the mended file, with the channels that have no message.
+    fn finish(mut self) -> Result<Recovered, RecoverError> {
+        let ids: Vec<u16> = self.channels.keys().copied().collect();
+        for id in ids {
+            self.channel(id)?;
+        }
+        self.writer.finish()?;
+        Ok(self.recovered)
     }
 }
 
@@ -246,6 +320,16 @@ pub(super) fn records_of_chunk(body: &[u8]) -> Result<Vec<Record<'static>>, Mcap
         }
     }
     Ok(records)
+}
+
+/// How many messages a record lists, if it is such a list.
+fn message_index_entries(body: &[u8]) -> Option<usize> {
+    let (_, list) = body.split_at_checked(2)?;
+    let (length, entries) = list.split_first_chunk()?;
+    let count = entries.len() / MESSAGE_INDEX_ENTRY_BYTES;
+    let agrees =
+        u32::from_le_bytes(*length) as usize == entries.len() && count * MESSAGE_INDEX_ENTRY_BYTES == entries.len();
+    agrees.then_some(count)
 }
 
 /// Whether the lengths in an attachment's record can be true, on which the parser relies.

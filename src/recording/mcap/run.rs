@@ -1,5 +1,6 @@
 //! A run while it is recorded: its open file, and what is known of it. Called by the [`recorder`](super::recorder).
 
+use std::cmp::Ordering;
 use std::io;
 
 use serde_json::json;
@@ -30,12 +31,25 @@ impl Seldom {
             Self::Status(status) => status.run_id,
         }
     }
+
+    /// Its time, and the tick of the frame that it goes with; a stage goes with the first of the run.
+    fn stamp(&self) -> (u64, u64) {
+        match self {
+            Self::Stage(stage) => (stage.stamp_ns, 0),
+            Self::Alert(alert) => (alert.stamp_ns, alert.tick),
+            Self::Cue(cue) => (cue.stamp_ns, cue.tick),
+            Self::Status(status) => (status.stamp_ns, status.tick),
+        }
+    }
 }
 
 /// A run, and the file that its frames go to.
 pub(super) struct Run {
     pub run_id: u64,
     pub file: McapFile,
+    /// The file's first frame: its tick, and the time at which it is logged.
+    pub file_began_tick: u64,
+    pub file_began_stamp_ns: u64,
     /// Of the file's first frame and of the run's latest.
     pub file_began_ns: u64,
     pub latest_deadline_ns: u64,
@@ -45,8 +59,9 @@ pub(super) struct Run {
     pub alert: Option<CollisionAlert>,
     pub cue: Option<Cue>,
     pub status: Option<LoopStatus>,
-    /// Periods skipped as of the latest status; `None` where it is not known how many were skipped before.
-    pub skipped: Option<u64>,
+    /// The latest status that the run's diagnostics have judged, one without a skip before the first; `None` where it is not
+    /// known what was before.
+    pub diagnosed: Option<LoopStatus>,
     /// Messages so far of what is not sent with every frame.
     pub seldom: u32,
 }
@@ -57,6 +72,8 @@ impl Run {
         Self {
             run_id: frame.run_id,
             file,
+            file_began_tick: frame.tick,
+            file_began_stamp_ns: frame.stamp_ns,
             file_began_ns: frame.deadline_ns,
             latest_deadline_ns: frame.deadline_ns,
             attached: false,
@@ -64,8 +81,20 @@ impl Run {
             alert: None,
             cue: None,
             status: None,
-            skipped: (frame.sequence == 0).then_some(0),
+            diagnosed: (frame.sequence == 0).then(LoopStatus::default),
             seldom: 0,
+        }
+    }
+
+    /// When a message is logged: at its own time, but not before the file's first frame where it goes with that or an
+    /// earlier one. What a late subscriber got was true before, and would leave a gap. Ticks tell, since a clock can be set
+    /// back.
+    pub fn log_time(&self, message: &Seldom) -> u64 {
+        let ((stamp_ns, tick), began) = (message.stamp(), self.file_began_stamp_ns);
+        match tick.cmp(&self.file_began_tick) {
+            Ordering::Less => began,
+            Ordering::Equal => stamp_ns.max(began),
+            Ordering::Greater => stamp_ns,
         }
     }
 

@@ -1,12 +1,11 @@
 //! Runs of the loop on a simulated clock with a log in memory, and logs that were changed.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use super::super::arithmetic::Arithmetic;
-use super::super::hash::Slot;
 use super::super::lines::{Line, Seal, ShowLine};
-use super::super::log::{LogPublisher, empty, queue_of};
+use super::super::log::{LogPublisher, LogReader, queue_of};
 use super::super::verify::{Verdict, VerifyError, verify};
 use super::super::writer::LogWriter;
 use crate::live::control::{Door, Doors, door};
@@ -90,18 +89,23 @@ impl std::io::Write for Shared {
 /// The log's publisher with the thread's work done by the loop, after each frame but while it is to be held up.
 pub struct Inline {
     publisher: LogPublisher,
-    queue: rtrb::Consumer<Slot>,
+    reader: LogReader,
     writer: LogWriter<Shared>,
     held_up: fn(u64) -> bool,
+    ended: Rc<Cell<Option<Counts>>>,
 }
 
 impl Publisher for Inline {
     fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
         self.publisher.publish(outgoing)?;
         if !(self.held_up)(outgoing.header.tick) {
-            empty(&mut self.queue, &mut self.writer);
+            self.reader.empty(&mut self.writer);
         }
         Ok(())
+    }
+
+    fn prepare(&mut self) {
+        self.publisher.prepare();
     }
 
     fn maintain(&mut self) {}
@@ -113,8 +117,23 @@ impl Publisher for Inline {
 
 impl Drop for Inline {
     fn drop(&mut self) {
-        empty(&mut self.queue, &mut self.writer);
-        self.writer.end();
+        self.reader.empty(&mut self.writer);
+        self.ended.get().iter().for_each(|counts| self.writer.end(counts));
+    }
+}
+
+/// A transport that fails at a tick.
+struct Failing(Option<u64>);
+
+impl Publisher for Failing {
+    fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
+        if self.0 == Some(outgoing.header.tick) { Err(PublishError("it fails".to_owned())) } else { Ok(()) }
+    }
+
+    fn maintain(&mut self) {}
+
+    fn subscribers(&self) -> u32 {
+        0
     }
 }
 
@@ -125,8 +144,10 @@ pub struct Setup {
     pub commands: Vec<Command>,
     pub wakes: Vec<Wake>,
     pub periods: u64,
-    pub slots: usize,
+    pub words: usize,
     pub held_up: fn(u64) -> bool,
+    /// The tick at which another transport fails.
+    pub fails_at: Option<u64>,
     pub instructions: Instructions,
 }
 
@@ -138,8 +159,9 @@ impl Setup {
             commands: Vec::new(),
             wakes: Vec::new(),
             periods,
-            slots: 1000,
+            words: 5000,
             held_up: |_| false,
+            fails_at: None,
             instructions: Instructions::available()[0],
         }
     }
@@ -157,9 +179,10 @@ impl Setup {
         let solver = show.solver_reason().to_owned();
         let line = ShowLine::new(&self.text, &playback, Arithmetic::of(&scene), &solver, (7, 8));
         let file = File::default();
-        let (publisher, queue) = queue_of(self.slots, 40);
+        let (publisher, reader) = queue_of(self.words, 200);
+        let ended = Rc::new(Cell::new(None));
         let writer = LogWriter::new(Shared(file.clone()), line);
-        let publisher = Inline { publisher, queue, writer, held_up: self.held_up };
+        let publisher = Inline { publisher, reader, writer, held_up: self.held_up, ended: ended.clone() };
         let (port, door) = door();
         let answers = Rc::new(RefCell::new(Vec::new()));
         let mut frames = Conducted { show, door, commands: self.commands.into_iter(), answers: answers.clone() };
@@ -167,11 +190,13 @@ impl Setup {
         let (samples, _inbox) = rtrb::RingBuffer::new(1);
         let (announcements, _lines) = rtrb::RingBuffer::new(1);
         let options = LoopOptions { run_id: 7, rate: playback.rate, periods: Some(self.periods) };
-        let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(publisher)];
+        let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(Failing(self.fails_at)), Box::new(publisher)];
         let reports = Reports { samples, announcements };
         let mut doors = Doors::new(vec![port]);
-        let counts = run_loop(&clock, &mut frames, &mut doors, &mut publishers, options, reports, &clock.stop).unwrap();
+        let counts = run_loop(&clock, &mut frames, &mut doors, &mut publishers, options, reports, &clock.stop);
+        let counts = counts.unwrap_or_else(|(counts, _)| counts);
         frames.exchange();
+        ended.set(Some(counts));
         drop((publishers, frames));
         Run {
             counts,

@@ -130,15 +130,27 @@ fn lines_that_no_run_can_have_written_are_refused_with_their_number() {
     assert!(sentence.contains("not understood"), "{sentence}");
     let (line, sentence) = problem(forged(&run, |line| match line {
         Line::Show(show) => {
-            show.format = 2;
+            show.format = 1;
             true
         }
         _ => false,
     }));
-    assert!(line == 1 && sentence == "the format is 2, expected 1", "{sentence}");
+    assert!(line == 1 && sentence == "the format is 1, expected 2", "{sentence}");
     let mut lines = run.lines();
     lines.remove(0);
     assert!(problem(verified(&sealed(&lines))).1.contains("expected the line of the show"));
+    // What stands between the last hash and the end.
+    let mut lines = run.lines();
+    let end = lines.pop().unwrap();
+    let late = Line::Command { tick: 150, command: "hold".to_owned(), value: None, code: Some("done".to_owned()) };
+    lines.extend([late, end]);
+    let (line, sentence) = problem(verified(&sealed(&lines)));
+    assert!(line == lines.len() as u64 && sentence.contains("tick 150"), "{line} {sentence}");
+    let mut lines = run.lines();
+    let unhashed = lines.iter().rposition(|line| matches!(line, Line::Second(_))).unwrap();
+    lines[unhashed] = Line::Lost { from: 149, to: 149 };
+    let (_, sentence) = problem(verified(&sealed(&lines)));
+    assert_eq!(sentence, "the frames from tick 100 on have no hash");
     let scene = forged(&run, |line| match line {
         Line::Show(show) => {
             show.scene = show.scene.replace("benches = 12", "benches = 0");

@@ -11,23 +11,22 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::{ControlError, Controller, PendingCommand};
-use crate::show::control::Command;
+use super::{ControlError, Controller, PATIENCE, PendingCommand, Vigil};
+use crate::show::control::{Code, Command};
 use crate::show::state::PlaybackState;
 use crate::wire::ControlResponse;
 
-/// How long a publisher is given to answer; a step answers when it is over.
-const TIMEOUT: Duration = Duration::from_secs(30);
 /// How often responses are looked for while some are awaited.
 const POLL_INTERVAL: Duration = Duration::from_micros(500);
 /// After so long without a command the service is let go of, so that it can be made anew by another publisher.
 const IDLE: Duration = Duration::from_secs(1);
-/// Commands that may be sent and unanswered at once, and holds besides: the service admits 8 of a client.
+/// Commands that may be sent and unanswered at once, and holds besides: the service admits 8 of a client, and one asks
+/// whether a step makes progress.
 const MOST_PENDING: usize = 4;
-const MOST_HOLDS: usize = 4;
+const MOST_HOLDS: usize = 3;
 /// Commands that may be unanswered, sent or not.
 const MOST_WAITING: usize = 64;
-/// What overtakes all that waits.
+/// What overtakes all that waits, which is then dropped: nothing that was asked before a hold is done after it.
 const HOLD: Action = Action::Send(Command::Hold);
 
 /// What a person asks of a show: a command, or one that depends on how the show stands.
@@ -88,13 +87,14 @@ impl<Tag: Send + 'static> Conductor<Tag> {
         let (name, counter) = (name.to_owned(), Arc::clone(&unanswered));
         let thread = std::thread::Builder::new().name("conductor".to_owned()).spawn(move || {
             let (waiting, pending) = (VecDeque::new(), Vec::new());
-            Conducting { name, controller: None, unanswered: counter, waiting, pending, handle }.run(&receiver);
+            let (controller, vigil) = (None, Vigil::new());
+            Conducting { name, controller, unanswered: counter, waiting, pending, vigil, handle }.run(&receiver);
         });
         let thread = Some(thread?);
         Ok(Self { requests: Some(sender), unanswered, thread })
     }
 
-    /// Asks for an action. A hold overtakes all that waits.
+    /// Asks for an action. A hold overtakes all that waits; that gets [`ControlError::Overtaken`].
     ///
     /// # Errors
     /// [`TooMany`]: nothing will become of it.
@@ -129,7 +129,9 @@ struct Pending<Tag> {
     command: Command,
     /// Whether it has been sent before, to a publisher that was gone.
     repeated: bool,
-    deadline: Instant,
+    /// Whether a hold has come since: nothing more is sent for it.
+    overtaken: bool,
+    sent: Instant,
     response: PendingCommand,
 }
 
@@ -140,6 +142,7 @@ struct Conducting<Tag, Handle> {
     unanswered: Arc<AtomicUsize>,
     waiting: VecDeque<(Tag, Action)>,
     pending: Vec<Pending<Tag>>,
+    vigil: Vigil,
     handle: Handle,
 }
 
@@ -148,7 +151,7 @@ impl<Tag, Handle: FnMut(Tag, Conducted)> Conducting<Tag, Handle> {
         loop {
             let patience = if self.pending.is_empty() { IDLE } else { POLL_INTERVAL };
             match requests.recv_timeout(patience) {
-                Ok(hold) if hold.1 == HOLD => self.waiting.push_front(hold),
+                Ok((tag, action)) if action == HOLD => self.hold(tag),
                 Ok(request) => self.waiting.push_back(request),
                 Err(RecvTimeoutError::Timeout) if self.pending.is_empty() => self.controller = None,
                 Err(RecvTimeoutError::Timeout) => (),
@@ -157,10 +160,18 @@ impl<Tag, Handle: FnMut(Tag, Conducted)> Conducting<Tag, Handle> {
             while let Some((tag, action)) = self.next_waiting() {
                 self.begin(tag, action, false);
             }
-            for index in (0..self.pending.len()).rev() {
-                self.poll(index);
-            }
+            self.poll();
         }
+    }
+
+    /// Drops what waits, but for holds, and has the hold sent next.
+    fn hold(&mut self, tag: Tag) {
+        let (holds, overtaken) = self.waiting.drain(..).partition(|(_, action)| *action == HOLD);
+        self.waiting = holds;
+        self.waiting.push_back((tag, HOLD));
+        let overtaken: VecDeque<_> = overtaken;
+        overtaken.into_iter().for_each(|(tag, _)| self.answer(tag, Err(ControlError::Overtaken)));
+        self.pending.iter_mut().for_each(|pending| pending.overtaken = pending.action != HOLD);
     }
 
     /// The next action that may be sent by now.
@@ -177,8 +188,11 @@ impl<Tag, Handle: FnMut(Tag, Conducted)> Conducting<Tag, Handle> {
     fn send(&mut self, tag: Tag, action: Action, command: Command, repeated: bool) {
         match self.request(command) {
             Ok(response) => {
-                let deadline = Instant::now() + TIMEOUT;
-                self.pending.push(Pending { tag, action, command, repeated, deadline, response });
+                if self.pending.is_empty() {
+                    self.vigil = Vigil::new();
+                }
+                let sent = Instant::now();
+                self.pending.push(Pending { tag, action, command, repeated, overtaken: false, sent, response });
             }
             Err(error) => self.answer(tag, Err(error)),
         }
@@ -192,27 +206,49 @@ impl<Tag, Handle: FnMut(Tag, Conducted)> Conducting<Tag, Handle> {
         controller.request(command)
     }
 
-    /// Looks for the response to one of those that are pending.
-    fn poll(&mut self, index: usize) {
-        let Pending { command, action, deadline, ref response, .. } = self.pending[index];
-        let polled = match response.poll() {
-            Ok(None) if Instant::now() < deadline => return,
-            Ok(None) => Err(ControlError::NoAnswer { name: self.name.clone(), timeout: TIMEOUT }),
-            Ok(Some(response)) => Ok(response),
-            Err(error) => Err(error),
+    /// Looks for the responses to all that are pending, in the order in which they were sent.
+    fn poll(&mut self) {
+        let alive = match &mut self.controller {
+            _ if self.pending.is_empty() => return,
+            Some(controller) => self.vigil.check(controller),
+            None => Err(ControlError::Ended(self.name.clone())),
         };
-        let Pending { tag, repeated, .. } = self.pending.swap_remove(index);
-        match polled {
-            Ok(state) if action != Action::Send(command) && command == Command::State => {
-                self.send(tag, action, action.command(&state), repeated);
-            }
-            Err(ControlError::NoPublisher(_)) if !repeated => {
+        let now = Instant::now();
+        let mut repeats = Vec::new();
+        for pending in std::mem::take(&mut self.pending) {
+            let Pending { action, command, repeated, overtaken, sent, .. } = pending;
+            let polled = match pending.response.poll() {
+                Ok(None) if alive.is_err() => Err(ControlError::Ended(self.name.clone())),
+                Ok(None) if now < self.vigil.deadline(command, sent) => {
+                    self.pending.push(pending);
+                    continue;
+                }
+                Ok(None) => Err(ControlError::NoAnswer { name: self.name.clone(), timeout: PATIENCE }),
+                Ok(Some(response)) => Ok(response),
+                Err(error) => Err(error),
+            };
+            let tag = pending.tag;
+            let is_question = command == Command::State && action != Action::Send(Command::State);
+            match polled {
+                // A question that was refused has told nothing.
+                Ok(state) if is_question && matches!(state.result(), Some(Code::Done | Code::Already)) => {
+                    if overtaken {
+                        self.answer(tag, Err(ControlError::Overtaken));
+                    } else {
+                        self.send(tag, action, action.command(&state), repeated);
+                    }
+                }
                 // The publisher may have been started again since the service was opened.
-                self.controller = None;
-                self.begin(tag, action, true);
+                Err(ControlError::NoPublisher(_) | ControlError::Ended(_)) if !repeated && !overtaken => {
+                    repeats.push((tag, action));
+                }
+                polled => self.answer(tag, polled.map(|response| (command, response))),
             }
-            polled => self.answer(tag, polled.map(|response| (command, response))),
         }
+        if !repeats.is_empty() || alive.is_err() {
+            self.controller = None;
+        }
+        repeats.into_iter().for_each(|(tag, action)| self.begin(tag, action, true));
     }
 
     fn answer(&mut self, tag: Tag, conducted: Conducted) {

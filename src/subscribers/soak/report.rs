@@ -17,9 +17,15 @@ use crate::drawing::palette::dark_rules;
 use crate::live::Deliveries;
 use crate::live::statistics::RunSummary;
 
+/// The name of the report's JSON, whose schema is docs/soak-report.schema.json. A change that a reader of the former one
+/// would not survive raises the number.
+pub const SCHEMA: &str = "bench_dragon/soak/1";
+
 /// All that is known of a soak test.
 #[derive(Debug, Serialize)]
 pub struct Report {
+    /// [`SCHEMA`].
+    pub schema: &'static str,
     /// `PASS` or `FAIL`.
     pub verdict: &'static str,
     /// Each limit and its value.

@@ -1,6 +1,8 @@
 // The transport bar: conducts the show where the server says that this page may, and shows the cues everywhere. In: the
 // stream's messages and frames. Out: commands over the same WebSocket.
 
+import { answerTo, say, translate } from "./words.js";
+
 /** The numbers of the states of playback. */
 const PLAYING = 0, HELD = 2;
 /** Simulated seconds of one seek by a key. */
@@ -14,13 +16,13 @@ const SENTENCE_TIME = 8000, CUE_TIME = 6000;
 const RATES = [0.1, 0.25, 0.5, 1, 2, 4, 10];
 
 const BAR = `
-  <button id="conduct-toggle" title="Space"></button>
-  <button id="conduct-step" title=". (while paused)">Step</button>
-  <button id="conduct-restart">Restart</button>
-  <label>Speed <select id="conduct-rate"></select></label>
+  <button id="conduct-toggle" data-title="toggleKey"></button>
+  <button id="conduct-step" data-title="stepKey" data-word="step"></button>
+  <button id="conduct-restart" data-word="restart"></button>
+  <label><span data-word="rateInForce"></span> <select id="conduct-rate"></select></label>
   <span id="conduct-time"></span>
   <div id="conduct-line">
-    <input id="conduct-seek" type="range" min="0" max="1" step="any" value="0" aria-label="Time of the show" aria-describedby="conduct-events" title="← →">
+    <input id="conduct-seek" type="range" min="0" max="1" step="any" value="0" data-label="timeLine" aria-describedby="conduct-events" title="← →">
     <div id="conduct-marks" aria-hidden="true"></div>
     <p id="conduct-events" class="unseen"></p>
   </div>
@@ -49,6 +51,7 @@ const token = takeToken();
 export function conduct(stream) {
   const bar = document.getElementById("conduct"), main = bar.parentElement;
   bar.innerHTML = BAR;
+  translate(bar);
   const part = (name) => document.getElementById(`conduct-${name}`);
   const line = part("seek"), rates = part("rate");
   const cue = main.appendChild(Object.assign(document.createElement("p"), { id: "cue", hidden: true }));
@@ -56,16 +59,21 @@ export function conduct(stream) {
   let greeted = null, numbered = 0, shownStage = null, rate = null, dragged = false, sentenceAt = 0, cueAt = 0;
   /** Where a seek that has not been answered goes, and one that waits for that answer; the time of the last one sent. */
   let sought = null, wanted = null, soughtAt = -Infinity;
+  /** The last answer to a seek: frames from before it are still on their way. */
+  let landed = null;
 
   const put = (element, text) => element.textContent !== text && (element.textContent = text);
-  const seconds = (time) => `${time.toFixed(1)} s`;
+  const seconds = (time) => say("showTime", { time: time.toFixed(1) });
   function report(sentence) {
     put(part("answer"), sentence);
     sentenceAt = performance.now();
   }
   function command(name, value) {
+    // A seek that waits goes before what was commanded after it; a hold does without.
+    if (name === "hold") wanted = null;
+    if (name !== "seek" && wanted !== null) sendWanted();
     const id = ++numbered;
-    if (!stream.send({ command: name, value, id })) report("The server is not there: nothing was sent.");
+    if (!stream.send({ command: name, value, id })) report(say("nothingSent"));
     return id;
   }
 
@@ -77,18 +85,24 @@ export function conduct(stream) {
   function sendSeek() {
     const passed = performance.now() - soughtAt;
     if (wanted === null || passed < SEEK_INTERVAL || (sought !== null && passed < PATIENCE)) return;
+    sendWanted();
+  }
+  function sendWanted() {
     sought = { time: wanted, id: command("seek", wanted) };
     [wanted, soughtAt] = [null, performance.now()];
   }
-  const now = () => wanted ?? sought?.time ?? stream.playback.newest?.time ?? 0;
+  function now() {
+    const { newest } = stream.playback, isBefore = landed && newest?.run === landed.run && newest.tick < landed.tick;
+    return wanted ?? sought?.time ?? (isBefore ? landed.time : newest?.time) ?? 0;
+  }
 
   function showStage(stage) {
     if (stage === shownStage) return;
     shownStage = stage;
     line.max = stage.freeze_time;
     const marks = [
-      ...stage.events.filter(({ time }) => time <= stage.freeze_time).map(({ event, time }) => ({ kind: event, text: `${event.replaceAll("_", " ")}, ${time.toFixed(3)} s`, time })),
-      ...stage.cues.map(({ name, time, pauses }) => ({ kind: "cue", text: `cue "${name}", ${time.toFixed(3)} s${pauses ? ", waits there" : ""}`, time })),
+      ...stage.events.filter(({ time }) => time <= stage.freeze_time).map(({ event, time }) => ({ kind: event, text: say("eventMark", { kind: say(event), time: time.toFixed(3) }), time })),
+      ...stage.cues.map(({ name, time, pauses }) => ({ kind: "cue", text: say("cueMark", { name, time: time.toFixed(3), waits: pauses ? say("waitsThere") : "" }), time })),
     ];
     part("marks").replaceChildren(
       ...marks.map(({ kind, text, time }) => {
@@ -98,7 +112,7 @@ export function conduct(stream) {
         return mark;
       }),
     );
-    put(part("events"), marks.map(({ text }) => text).join("; "));
+    put(part("events"), marks.map(({ text }) => text).join(say("between")));
   }
   function showRate(scale) {
     if (!(scale > 0) || scale === rate) return;
@@ -117,9 +131,9 @@ export function conduct(stream) {
     sendSeek();
     showStage(stage);
     showRate(newest.scale);
-    const toggle = newest.playback === PLAYING ? "Pause" : "Play", held = newest.playback === HELD;
-    put(part("toggle"), toggle);
-    put(part("hold"), held ? "HELD: release" : "Hold");
+    const held = newest.playback === HELD;
+    put(part("toggle"), say(newest.playback === PLAYING ? "pause" : "play"));
+    put(part("hold"), say(held ? "heldRelease" : "hold"));
     part("hold").setAttribute("aria-pressed", held);
     bar.dataset.held = held;
     const time = dragged || sought !== null || wanted !== null ? now() : stream.playback.time(at);
@@ -138,15 +152,18 @@ export function conduct(stream) {
       show();
     }
     if (message.type === "answer") {
-      if (message.id === sought?.id) sought = null;
-      if (message.sentence) report(`${message.sentence[0].toUpperCase()}${message.sentence.slice(1)}.`);
+      if (message.id === sought?.id) {
+        landed = message.code ? { run: stream.playback.newest?.run, tick: message.tick, time: message.sim_time } : null;
+        sought = null;
+      }
+      if (message.sentence) report(answerTo(message));
       else if (message.code) put(part("answer"), "");
       sendSeek();
     }
     // A cue that passed before this page came is no news.
     const { newest } = stream.playback, age = message.type === "cue" && newest ? Math.abs(newest.time - message.sim_time) : Infinity;
     if (age <= (CUE_TIME / 1000) * (newest?.scale || 1)) {
-      cue.textContent = `${message.number}. ${message.name}${message.pauses ? " (waiting for go)" : ""}`;
+      cue.textContent = `${message.number}. ${message.name}${message.pauses ? say("waitingForGo") : ""}`;
       [cue.hidden, cueAt] = [false, performance.now()];
     }
   };

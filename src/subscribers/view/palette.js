@@ -73,8 +73,14 @@ export class SpeedScale {
     return 0.5 + 0.5 * Math.sign(difference) * Math.min(1, part);
   }
 
-  /** Which of the shades a bench has; SHADES where its speed is not known. */
+  /** Whether the show was at rest before a moving frame was seen: then colours tell head, body and tail apart. */
+  get unseen() {
+    return this.resting && !this.unsent && !this.handles;
+  }
+
+  /** Which of the shades a bench has; SHADES where its speed is not sent. */
   shade(bench) {
+    if (this.unseen) return bench === 0 ? SHADES - 1 : bench === this.frame.handles.length / STRIDE - 2 ? 0 : SHADES >> 1;
     const speed = this.handles ? speedOf(this.handles, bench) : NaN;
     if (Number.isNaN(speed)) return SHADES;
     return Math.min(SHADES - 1, Math.floor(this.place(speed / this.head - 1) * SHADES));

@@ -73,10 +73,11 @@ export function showFigures({ clearance, colours, time, scale }) {
 }
 
 let scaleShown = "";
-/** Speeds under the colours, where they stand. */
-function showScale({ ticks, width }) {
+/** Speeds under the colours, where they stand; of a show that was at rest all the while, what has which colour. */
+function showScale({ ticks, width, unseen }) {
   const digits = Math.max(2, Math.ceil(-Math.log10(width / 10)));
-  const shown = ticks.map(({ at, speed }) => ({ at: (100 * at).toFixed(1), text: String(+speed.toPrecision(digits + 1)) })), key = JSON.stringify(shown);
+  const parts = ["tail", "body", "head"].map((part, k) => ({ at: (50 * k).toFixed(1), text: say(part).toLowerCase() }));
+  const shown = unseen ? parts : ticks.map(({ at, speed }) => ({ at: (100 * at).toFixed(1), text: String(+speed.toPrecision(digits + 1)) })), key = JSON.stringify(shown);
   if (key === scaleShown) return;
   scaleShown = key;
   const spans = shown.map(({ at, text }) => {

@@ -60,10 +60,7 @@ export class Show {
     const pixel = camera.unit / camera.scale, count = places.length / STRIDE - 1, wide = stage.width * camera.scale;
     const light = (draw) => this.light(context, palette, draw);
     light(() => this.embers(context, palette, pixel, stage));
-    context.fillStyle = palette.wood;
-    context.strokeStyle = palette.rim;
-    context.lineWidth = Math.max(0.06 * stage.width, 0.7 / camera.scale);
-    fillBoards(context, stage, places, benches, wide > 4);
+    fillBoards(context, stage, places, benches, palette.wood, wide > 4 ? [palette.rim, Math.max(0.06 * stage.width, 0.7 / camera.scale)] : null);
     light(() => {
       const radius = Math.max(2.1 * stage.width, 7 * pixel);
       const each = Math.ceil(benches.length / MOST_GLOWS);
@@ -105,15 +102,15 @@ export class Show {
     const radius = Math.max(0.36 * stage.width, 1.7 * pixel);
     for (const [part, colour] of wide > 9 ? [[1, palette.silk], [0.62, palette.lantern]] : [[1, palette.lantern]]) {
       context.fillStyle = colour;
-      for (let first = 0; first < benches.length; first += 100) {
-        context.beginPath();
-        for (const k of benches.slice(first, first + 100)) {
-          const x = places[STRIDE * k], y = places[STRIDE * k + 1], r = radius * part;
-          context.moveTo(x + r, y);
-          // Of a dot nobody sees the corners.
-          wide < 5 ? context.rect(x - r, y - r, 2 * r, 2 * r) : context.arc(x, y, r, 0, 7);
+      for (const k of benches) {
+        const x = places[STRIDE * k], y = places[STRIDE * k + 1], r = radius * part;
+        // Of a dot nobody sees the corners.
+        if (wide < 5) context.fillRect(x - r, y - r, 2 * r, 2 * r);
+        else {
+          context.beginPath();
+          context.arc(x, y, r, 0, 7);
+          context.fill();
         }
-        context.fill();
       }
     }
   }

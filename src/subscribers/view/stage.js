@@ -14,7 +14,7 @@ import { element, put, showBench, showFigures, showNames, showSituation } from "
 import { Show } from "./show.js";
 import { Sound } from "./sound.js";
 import { Stream } from "./stream.js";
-import { benchesOf, nameOf, remaining, say, setLanguage, translate } from "./words.js";
+import { benchesOf, capital, nameOf, remaining, say, setLanguage, translate } from "./words.js";
 
 /** While there is nothing to show. */
 const WAITING = { name: "waiting", severity: "ok", happened: false, sentence: null };
@@ -183,8 +183,10 @@ function showText(sight, now) {
   showSituation(sight);
   const stopped = sight.trouble ?? (sight.silent === null ? null : "silent"), kept = newest && stage && stopped;
   const notice = { server: "lostServer", silent: "silent" }[stopped] ?? "lostPublisher";
-  element("notice").hidden = !kept || "nolabels" in words;
-  put("notice", kept ? say(notice, { seconds: sight.silent, time: newest.time.toFixed(1) }) : "");
+  // The picture alone has no panel that says why it is empty.
+  const empty = show && !kept && sight.trouble;
+  element("notice").hidden = !(kept || empty) || "nolabels" in words;
+  put("notice", kept ? say(notice, { seconds: sight.silent, time: newest.time.toFixed(1) }) : empty ? capital(say(sight.trouble)) : "");
   // The rest changes too often to be read at every pass.
   if (!newest || !stage || now - figuresAt < 100) return;
   figuresAt = now;

@@ -32,6 +32,7 @@ function frameOf(data, at) {
     sequence: Number(bytes.getBigUint64(24, true)),
     run: String(bytes.getBigUint64(32, true)),
     sent: Number(bytes.getBigUint64(40, true)) / 1e6,
+    tick: Number(bytes.getBigUint64(48, true)),
     clearance: bytes.getFloat32(56, true),
     epoch: bytes.getUint32(60, true),
     handles: new Float32Array(data, HEADER_BYTES),

@@ -1,7 +1,7 @@
 // Every word of the page, in English and in Chinese, and the sentences about alerts.
 //
-// English sentences come from the server, which has them from the same source as `run` and `watch`; the Chinese ones are
-// made here from the same numbers.
+// English sentences about alerts and refused commands come from the server, which has them from the same source as `run`,
+// `watch` and `control`; the Chinese ones are made here from the same numbers and names.
 
 const WORDS = {
   title: ["{scene} ({publisher}): stage picture", "{scene}（{publisher}）：舞台画面"],
@@ -44,6 +44,7 @@ const WORDS = {
   one: ["bench {number}", "第 {number} 节板凳"],
   head: ["HEAD", "龙头"],
   tail: ["TAIL", "龙尾"],
+  body: ["body", "龙身"],
   headBench: ["HEAD (bench 1)", "龙头（第 1 节）"],
   numbers: ["benches {a} and {b}", "第 {a} 与第 {b} 节板凳"],
   number: ["bench {a}", "第 {a} 节板凳"],
@@ -78,6 +79,39 @@ const WORDS = {
   lostServer: ["No server. The picture is from t = {time} s.", "没有服务器。画面停在 t = {time} s。"],
   silent: ["No frames for {seconds} s. The picture is from t = {time} s.", "已有 {seconds} 秒没有新帧。画面停在 t = {time} s。"],
 
+  // The transport bar, and the commands and states of playback that an answer names.
+  conduct: ["Conduct the show", "操控演出"],
+  toggleKey: ["Space", "空格键"],
+  stepKey: [". (while paused)", ".（暂停时）"],
+  play: ["Play", "播放"],
+  pause: ["Pause", "暂停"],
+  resume: ["Play", "播放"],
+  step: ["Step", "单步"],
+  restart: ["Restart", "从头开始"],
+  seek: ["Seek", "跳转"],
+  go: ["Go", "继续"],
+  hold: ["Hold", "锁定"],
+  release: ["Release", "解除锁定"],
+  heldRelease: ["HELD: release", "已锁定：解除"],
+  rateInForce: ["Speed", "倍速"],
+  timeLine: ["Time of the show", "演出时间"],
+  showTime: ["{time} s", "{time} 秒"],
+  eventMark: ["{kind}, {time} s", "{kind}，{time} 秒"],
+  cueMark: ["cue \"{name}\", {time} s{waits}", "提示点“{name}”，{time} 秒{waits}"],
+  waitsThere: [", waits there", "，在此等待"],
+  waitingForGo: [" (waiting for go)", "（等待继续）"],
+  between: ["; ", "；"],
+  nothingSent: ["The server is not there: nothing was sent.", "服务器不在：命令未发送。"],
+  playing: ["playing", "播放中"],
+  paused: ["paused", "已暂停"],
+  held: ["held", "已锁定"],
+  ended: ["ended", "已结束"],
+  refused: ["", "{command}被拒绝：演出{playback}。"],
+  out_of_range: ["", "{command}被拒绝：数值超出范围。"],
+  too_many: ["", "{command}被拒绝：等待中的命令过多。"],
+  not_understood: ["", "发布端不理解命令“{command}”。"],
+  notDelivered: ["", "命令未送达发布端：{reason}"],
+
   // What the page is doing, and says once.
   server: ["waiting for the server", "等待服务器"],
   publisher: ["waiting for a publisher", "等待发布端"],
@@ -105,7 +139,15 @@ export function say(key, values = {}) {
 /** Puts the words of the page's language where an element has `data-word`, `data-label` or `data-title`. */
 export function translate(root) {
   for (const one of root.querySelectorAll("[data-word]")) one.textContent = say(one.dataset.word);
+  for (const one of root.querySelectorAll("[data-title]")) one.title = say(one.dataset.title);
   for (const one of root.querySelectorAll("[data-label]")) one.setAttribute("aria-label", say(one.dataset.label));
+}
+
+/** Why a command was not obeyed. English sentences are the server's; one about a command that went nowhere stays so. */
+export function answerTo({ code, command, playback, sentence }) {
+  if (language === 0) return `${capital(sentence)}.`;
+  if (!WORDS[code]) return say("notDelivered", { reason: sentence });
+  return say(code, { command: command === "rate" ? say("rateInForce") : say(command), playback: say(playback) });
 }
 
 export const capital = (words) => words && words[0].toUpperCase() + words.slice(1);
@@ -137,9 +179,9 @@ export function sentenceOf(state, alert, count) {
   if (state.severity === "ok" || alert.level !== state.name) return "";
   const name = (bench) => `第 ${bench + 1} 节板凳${bench === 0 ? "（龙头）" : bench === count - 1 ? "（龙尾）" : ""}`;
   const both = (...pair) => pair.filter((bench) => bench !== null).map(name).join("与");
-  const event = both(alert.event_bench_a, alert.event_bench_b), place = alert.event_x === null ? "" : `(${alert.event_x.toFixed(3)}, ${alert.event_y.toFixed(3)}) m`;
+  const event = both(alert.event_bench_a, alert.event_bench_b), place = alert.event_x === null ? "" : `(${alert.event_x.toFixed(3)},\u00a0${alert.event_y.toFixed(3)})\u00a0m`;
   if (state.happened) {
-    const at = `t = ${alert.event_time?.toFixed(6)} s`;
+    const at = `t\u00a0=\u00a0${alert.event_time?.toFixed(6)}\u00a0s`;
     if (alert.event === "contact") return `${event}于 ${place} 处相触，${at}（编号从 1 起）。`;
     if (alert.event === "stall") return `${event}到达死点，${at}：自 ${place} 处的把手起，其后的队伍被向后推（编号从 1 起）。`;
     return `${event}锁死，其后把手位于 ${place}，${at}：无法继续行进（编号从 1 起）。`;

@@ -8,6 +8,7 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ros2_client::Context;
+use rustdds::policy::Durability;
 use rustdds::{DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, StatusEvented};
 
 /// The matches of one participant, shared by its threads.
@@ -16,19 +17,39 @@ pub(super) struct Matches {
     ends: Arc<Mutex<Ends>>,
 }
 
+/// The subscribers of a writer.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Readers {
+    /// Those that ask for what was sent before.
+    pub transient_local: usize,
+    /// Those that do not.
+    pub volatile: usize,
+}
+
+impl Readers {
+    /// Whether there are any.
+    pub(super) fn any(self) -> bool {
+        self.transient_local + self.volatile > 0
+    }
+}
+
 struct Ends {
     events: DomainParticipantStatusListener,
     /// A writer here and a reader there.
     readers: BTreeSet<(GUID, GUID)>,
     /// A reader here and a writer there.
     writers: BTreeSet<(GUID, GUID)>,
+    /// Readers there that ask for what was sent before.
+    transient_local: BTreeSet<GUID>,
 }
 
 impl Matches {
     /// The matches of a context from now on.
     pub(super) fn new(context: &Context) -> Self {
         let events = context.domain_participant().status_listener();
-        Self { ends: Arc::new(Mutex::new(Ends { events, readers: BTreeSet::new(), writers: BTreeSet::new() })) }
+        let [readers, writers] = [BTreeSet::new(), BTreeSet::new()];
+        let ends = Ends { events, readers, writers, transient_local: BTreeSet::new() };
+        Self { ends: Arc::new(Mutex::new(ends)) }
     }
 
     /// The state as of now.
@@ -38,9 +59,23 @@ impl Matches {
         read(&ends)
     }
 
-    /// Whether anybody subscribes to what this writer sends.
-    pub(super) fn has_reader(&self, writer: GUID) -> bool {
-        self.with(|ends| ends.readers.iter().any(|(here, _)| *here == writer))
+    /// Takes in what has happened. RustDDS holds 2048 events and drops what is more: to be called often.
+    pub(super) fn update(&self) {
+        self.with(|_| ());
+    }
+
+    /// Who subscribes to what this writer sends.
+    pub(super) fn readers(&self, writer: GUID) -> Readers {
+        self.with(|ends| {
+            let mut readers = Readers { transient_local: 0, volatile: 0 };
+            for (_, reader) in ends.readers.iter().filter(|(here, _)| *here == writer) {
+                match ends.transient_local.contains(reader) {
+                    true => readers.transient_local += 1,
+                    false => readers.volatile += 1,
+                }
+            }
+            readers
+        })
     }
 
     /// Whether what is written to `responses` reaches the client whose request came from `client` to `requests`.
@@ -72,10 +107,20 @@ impl Ends {
                 Event::RemoteWriterMatched { local_reader, remote_writer } => {
                     self.writers.insert((local_reader, remote_writer));
                 }
-                Event::ReaderLost { guid, .. } => self.readers.retain(|(_, reader)| *reader != guid),
+                // Sent before the matches of that reader.
+                Event::ReaderDetected { reader } => {
+                    if matches!(reader.qos.durability(), Some(durability) if durability != Durability::Volatile) {
+                        self.transient_local.insert(reader.guid);
+                    }
+                }
+                Event::ReaderLost { guid, .. } => {
+                    self.readers.retain(|(_, reader)| *reader != guid);
+                    self.transient_local.remove(&guid);
+                }
                 Event::WriterLost { guid, .. } => self.writers.retain(|(_, writer)| *writer != guid),
                 Event::ParticipantLost { id, .. } => {
                     self.readers.retain(|(_, reader)| reader.prefix != id);
+                    self.transient_local.retain(|reader| reader.prefix != id);
                     self.writers.retain(|(_, writer)| writer.prefix != id);
                 }
                 _ => {}

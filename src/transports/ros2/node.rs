@@ -10,12 +10,12 @@ use ros2_client::{Context, Node, NodeName, NodeOptions};
 use super::matching::Matches;
 use super::port::{Attend, Maker, Port, SELDOM_BYTES, Stream};
 use super::{Ros2Config, Ros2Error};
-use crate::ros2_messages::diagnostics::DiagnosticArray;
+use crate::ros2_messages::diagnostics::{DiagnosticArray, LoopSecond};
 use crate::ros2_messages::markers::MarkerArray;
 use crate::ros2_messages::path::Path;
 use crate::ros2_messages::transforms::TfMessage;
 use crate::ros2_messages::{Clock, HandlePoses, PoseArray, Stamped};
-use crate::scene::ros2::Topic;
+use crate::scene::ros2::{DiagnosticLimits, Topic};
 use crate::transports::background::Sink;
 use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
 
@@ -42,7 +42,9 @@ pub(super) struct Topics {
     transforms: Option<Stream<TfMessage>>,
     path: Option<Port<Path>>,
     latest_alert: Option<CollisionAlert>,
-    skipped_periods: u64,
+    /// The latest status, and the messages discarded by then.
+    diagnosed: (LoopStatus, u64),
+    limits: DiagnosticLimits,
     /// Messages that a full queue of RustDDS did not take, because a reliable subscriber was slow or dead.
     discarded: u64,
     matches: Matches,
@@ -78,7 +80,8 @@ impl Topics {
                 .map(|port| port.stream(TfMessage::of(&config.name))),
             path: maker.port(Topic::Path, path_bytes, 1.0)?,
             latest_alert: None,
-            skipped_periods: 0,
+            diagnosed: (LoopStatus::default(), 0),
+            limits: config.settings.diagnostics,
             discarded: 0,
             matches,
             node: maker.node,
@@ -92,9 +95,11 @@ impl Topics {
         }
         Ok(topics)
     }
+}
 
-    /// Looks after what late subscribers are to get.
+impl Sink for Topics {
     fn attend(&mut self) {
+        self.matches.update();
         fn end<T: Attend>(end: &mut Option<T>) -> Option<&mut dyn Attend> {
             end.as_mut().map(|end| end as &mut dyn Attend)
         }
@@ -102,14 +107,11 @@ impl Topics {
         let seldom = [end(&mut self.alerts), end(&mut self.cues), end(&mut self.stages), end(&mut self.path)];
         let others = [end(&mut self.status), end(&mut self.diagnostics), end(&mut self.clock)];
         for end in streams.into_iter().chain(seldom).chain(others).flatten() {
-            end.attend(&self.matches, &mut self.node, &mut self.discarded);
+            end.attend(&self.matches, &mut self.node);
         }
     }
-}
 
-impl Sink for Topics {
     fn frame(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
-        self.attend();
         let discarded = &mut self.discarded;
         if let Some(stream) = &mut self.handles {
             stream.publish(discarded, |message| message.update(header, handles));
@@ -130,7 +132,6 @@ impl Sink for Topics {
     }
 
     fn alert(&mut self, alert: CollisionAlert) {
-        self.attend();
         self.latest_alert = Some(alert);
         if let Some(port) = &mut self.alerts {
             port.send(Arc::new(Stamped::alert(alert)), &mut self.discarded);
@@ -138,22 +139,20 @@ impl Sink for Topics {
     }
 
     fn cue(&mut self, cue: Cue) {
-        self.attend();
         if let Some(port) = &mut self.cues {
             port.send(Arc::new(Stamped::cue(cue)), &mut self.discarded);
         }
     }
 
     fn status(&mut self, status: &LoopStatus) {
-        self.attend();
         if let Some(port) = &mut self.status {
             port.send(Arc::new(Stamped::status(*status)), &mut self.discarded);
         }
         if let Some(port) = &mut self.diagnostics {
-            let skipped_since = status.skipped - self.skipped_periods;
-            self.skipped_periods = status.skipped;
-            let alert = self.latest_alert.as_ref();
-            let message = DiagnosticArray::of(&self.name, status, alert, skipped_since, self.discarded);
+            let (before, discarded_before) = std::mem::replace(&mut self.diagnosed, (*status, self.discarded));
+            let (discarded, limits) = (self.discarded, self.limits);
+            let second = LoopSecond { before: &before, discarded, discarded_before, limits };
+            let message = DiagnosticArray::of(&self.name, status, self.latest_alert.as_ref(), &second);
             port.send(Arc::new(message), &mut self.discarded);
         }
     }
@@ -185,8 +184,17 @@ mod tests {
     fn no_message_is_larger_than_its_bound() {
         let status = LoopStatus { scene: SceneName::new(&"n".repeat(100)), ..LoopStatus::default() };
         let alert = CollisionAlert { level: 1, event: 2, ..CollisionAlert::default() };
+        let worst = LoopStatus {
+            skipped: u64::MAX,
+            unforeseen_contacts: u64::MAX,
+            unsolved_frames: u64::MAX,
+            lateness_p99_second: u64::MAX,
+            ..status
+        };
+        let limits = DiagnosticLimits { lateness_warn: 0.0, ..DiagnosticLimits::default() };
+        let second = LoopSecond { before: &status, discarded: u64::MAX, discarded_before: 0, limits };
         // iceoryx2 takes no longer name.
-        let diagnostics = DiagnosticArray::of(&"n".repeat(255), &status, Some(&alert), u64::MAX, u64::MAX);
+        let diagnostics = DiagnosticArray::of(&"n".repeat(255), &worst, Some(&alert), &second);
         let seldom = [
             bytes(&Stamped::stage(Stage::default())),
             bytes(&Stamped::status(status)),

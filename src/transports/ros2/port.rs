@@ -1,10 +1,10 @@
 //! A publisher of one topic: its quality of service, what it keeps for late and slow subscribers, and what it discards.
 //!
-//! RustDDS keeps of a transient-local topic more than its depth: whatever nobody has acknowledged, and the rest until it tidies
-//! up every six seconds; a late subscriber would get all of that first. So what nobody subscribes to is not written before
-//! somebody does, and when the last subscriber has left, a new publisher takes the place of the one that still keeps what was
-//! written for it. Whoever comes while others are there gets the older messages of the last six seconds, too; the current
-//! one is the last.
+//! A transient-local topic holds one message here: the latest. RustDDS keeps more, whatever the depth: what a subscriber has
+//! not acknowledged, and the rest until it tidies up every six seconds; a late subscriber would get all of that first. So
+//! what nobody subscribes to is not written, but held until somebody asks for it, and a publisher that has kept more than
+//! the latest is replaced once the last subscriber has left. Whoever comes while others are there still gets what RustDDS
+//! keeps; the current message is the last.
 
 use std::sync::Arc;
 
@@ -43,6 +43,10 @@ pub(super) struct Port<Message: Serialize> {
 /// What a transient-local topic holds.
 struct Latched<Message> {
     latest: Option<Arc<Message>>,
+    /// Whether the latest has been written.
+    is_written: bool,
+    /// Messages that the publisher has written.
+    written: u64,
     /// Whether somebody was there at the last look.
     has_reader: bool,
 }
@@ -57,15 +61,12 @@ impl<Message: Serialize> Port<Message> {
     pub(super) fn send(&mut self, message: Arc<Message>, discarded: &mut u64) {
         if let Some(latched) = &mut self.latched {
             latched.latest = Some(Arc::clone(&message));
+            latched.is_written = false;
             if !latched.has_reader {
                 return;
             }
         }
-        self.write(message, discarded);
-    }
-
-    fn write(&mut self, message: Arc<Message>, discarded: &mut u64) {
-        if self.publisher.publish(message).is_ok() {
+        if self.write(message) {
             return;
         }
         *discarded += 1;
@@ -78,37 +79,63 @@ impl<Message: Serialize> Port<Message> {
             );
         }
     }
+
+    fn write(&mut self, message: Arc<Message>) -> bool {
+        let is_written = self.publisher.publish(message).is_ok();
+        if let Some(latched) = &mut self.latched
+            && is_written
+        {
+            latched.is_written = true;
+            latched.written += 1;
+        }
+        is_written
+    }
+
+    /// Begins anew with a publisher that has written nothing.
+    fn replace(&mut self, node: &mut Node) {
+        match node.create_publisher(&self.dds, None) {
+            Ok(publisher) => self.publisher = publisher,
+            Err(error) => log::warn!("ROS 2 topic {}: late subscribers get old messages first: {error}", self.topic),
+        }
+        if let Some(latched) = &mut self.latched {
+            (latched.written, latched.is_written) = (0, false);
+        }
+    }
 }
 
 /// A publisher that knows what late subscribers are to get.
 pub(super) trait Attend {
-    /// Sends what is held for the first subscriber, and forgets what was sent when the last one has left. To be called often.
-    fn attend(&mut self, matches: &Matches, node: &mut Node, discarded: &mut u64);
+    /// Sends what is held where somebody asks for it, and forgets what was sent when the last subscriber has left. To be
+    /// called often.
+    fn attend(&mut self, matches: &Matches, node: &mut Node);
 }
 
 impl<Message: Serialize> Attend for Port<Message> {
-    fn attend(&mut self, matches: &Matches, node: &mut Node, discarded: &mut u64) {
+    fn attend(&mut self, matches: &Matches, node: &mut Node) {
         let Some(latched) = &mut self.latched else { return };
-        let has_reader = matches.has_reader(self.publisher.guid());
-        let had_reader = std::mem::replace(&mut latched.has_reader, has_reader);
-        if has_reader && !had_reader {
-            if let Some(latest) = latched.latest.clone() {
-                self.write(latest, discarded);
+        let readers = matches.readers(self.publisher.guid());
+        latched.has_reader = readers.any();
+        if !readers.any() {
+            let keeps_latest_alone = latched.written == 1 && latched.is_written;
+            if latched.written > 0 && !keeps_latest_alone {
+                self.replace(node);
             }
-        } else if had_reader && !has_reader {
-            match node.create_publisher(&self.dds, None) {
-                Ok(publisher) => self.publisher = publisher,
-                Err(error) => {
-                    log::warn!("topic {}: a late subscriber will get old messages first: {error}", self.topic)
-                }
+        } else if readers.transient_local > 0
+            && !latched.is_written
+            && let Some(latest) = latched.latest.clone()
+        {
+            // For those who have not asked for it, it would be news. Of a new publisher they get what comes from now on.
+            if readers.volatile > 0 {
+                self.replace(node);
             }
+            self.write(latest);
         }
     }
 }
 
 impl<Message: Serialize> Attend for Stream<Message> {
-    fn attend(&mut self, matches: &Matches, node: &mut Node, discarded: &mut u64) {
-        self.port.attend(matches, node, discarded);
+    fn attend(&mut self, matches: &Matches, node: &mut Node) {
+        self.port.attend(matches, node);
     }
 }
 
@@ -161,8 +188,8 @@ impl Maker<'_> {
             .create_topic(format!("rt{name}"), type_name, &policies(*qos, bytes, rate), TopicKind::NoKey)
             .map_err(|error| failed(&error))?;
         let publisher = self.node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
-        let latched =
-            (qos.durability == Durability::TransientLocal).then_some(Latched { latest: None, has_reader: false });
+        let nothing = Latched { latest: None, is_written: false, written: 0, has_reader: false };
+        let latched = (qos.durability == Durability::TransientLocal).then_some(nothing);
         Ok(Some(Port { publisher, dds, topic: name, reported: false, latched }))
     }
 }

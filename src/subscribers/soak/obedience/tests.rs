@@ -7,23 +7,9 @@ use crate::scene::{AtEnd, OnContact};
 use crate::show::Playback;
 use crate::show::clock::ShowClock;
 use crate::show::control::Command;
+use crate::subscribers::soak::strategies::commands;
 
 const RATE: f64 = 50.0;
-
-fn commands() -> impl Strategy<Value = Command> {
-    prop_oneof![
-        Just(Command::State),
-        Just(Command::Pause),
-        Just(Command::Resume),
-        Just(Command::Resume),
-        prop_oneof![Just(1e6), Just(1e-6), 0.1f64..10.0].prop_map(Command::Rate),
-        prop_oneof![Just(7.0), 0.0f64..7.0].prop_map(Command::Seek),
-        (1u64..40).prop_map(Command::Step),
-        Just(Command::Restart),
-        Just(Command::Hold),
-        Just(Command::Release),
-    ]
-}
 
 /// The frames of a show that these commands conduct, each after so many frames, each frame after so many periods.
 fn frames(list: &[(u64, u64, Command)]) -> Vec<(FrameHeader, Vec<HandlePose>)> {

@@ -6,27 +6,10 @@ use super::*;
 use crate::scene::AtEnd;
 use crate::show::clock::{CueTime, ShowClock};
 use crate::show::{Outcome, Playback};
+use crate::subscribers::soak::strategies::commands;
 use crate::wire::convert::control_response;
 
 const RATE: f64 = 50.0;
-
-fn commands() -> impl Strategy<Value = Command> {
-    prop_oneof![
-        Just(Command::State),
-        Just(Command::Pause),
-        Just(Command::Resume),
-        Just(Command::Resume),
-        prop_oneof![Just(0.0), Just(f64::NAN), Just(1e6), Just(1e-6), 0.1f64..10.0].prop_map(Command::Rate),
-        prop_oneof![Just(-1.0), Just(7.0), Just(f64::NAN), 0.0f64..7.5].prop_map(Command::Seek),
-        (1u64..40).prop_map(Command::Step),
-        (1u64..40).prop_map(Command::Step),
-        Just(Command::Restart),
-        Just(Command::Hold),
-        Just(Command::Release),
-        Just(Command::Release),
-        Just(Command::Go),
-    ]
-}
 
 /// A show whose answers the model checks, as the conductor hands them over.
 struct Checked {

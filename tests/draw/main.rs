@@ -1,6 +1,9 @@
 //! `draw`, by another program's reading of its SVG: where boards stand against the handles that `solve` prints, what is
 //! clipped, what the words and marks say at a time, sequences, and the colours against the page's style sheet.
 
+mod colours;
+mod moving;
+#[path = "../processes/mod.rs"]
 mod processes;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -354,148 +357,8 @@ fn people_read_what_it_is_and_no_number_of_sixteen_digits() {
 }
 
 #[test]
-fn pictures_of_a_sequence_have_one_camera_and_true_times() {
-    let folder = tempfile::tempdir().unwrap();
-    let pattern = folder.path().join("%03d.svg");
-    let pattern = pattern.to_str().unwrap();
-    let arguments = ["draw", "--every", "2.5", "--from", "405", "--until", "contact", "-o", pattern, "--json"];
-    let lines: Vec<serde_json::Value> =
-        answer(&arguments).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-    assert_eq!(lines.len(), 3);
-    let mut cameras = BTreeSet::new();
-    let paper = scene_file("paper");
-    for (line, (file, time)) in lines.iter().zip([("000.svg", 405.0), ("001.svg", 407.5), ("002.svg", 410.0)]) {
-        let file = folder.path().join(file);
-        assert_eq!((line["time"].as_f64(), line["file"].as_str()), (Some(time), file.to_str()));
-        assert!(line["svg"].is_null());
-        let svg = std::fs::read_to_string(&file).unwrap();
-        let svg = Document::parse(&svg).unwrap();
-        let stage = with_id(&svg, "stage").unwrap().attribute("transform").unwrap();
-        let speeds = texts(&svg).into_iter().find(|words| words.ends_with(" m/s")).unwrap();
-        cameras.insert((svg.root_element().attribute("viewBox").unwrap().to_owned(), stage.to_owned(), speeds));
-        assert!(texts(&svg).contains(&format!("paper at {time} s")), "{:?}", texts(&svg));
-        let (drawn, boards) = (drawn(&svg), boards(&paper, &time.to_string()));
-        assert_eq!(drawn.len(), boards.len());
-        assert!(boards.iter().enumerate().all(|(bench, board)| worst_corner(&drawn[&bench], board) < 1e-6));
-    }
-    assert_eq!(cameras.len(), 1, "{cameras:?}");
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
-    let refused = refusal(&["draw", "--every", "1", "--until", "3", "-o", "picture.svg"]);
-    assert!(refused.contains("%05d") && !Path::new("picture.svg").exists(), "{refused}");
-    for (arguments, word) in [
-        (&["draw", "--every", "0", "--until", "3", "-o", pattern][..], "--every is 0"),
-        (&["draw", "--every", "1", "--from", "5", "--until", "3", "-o", pattern], "--until is before --from"),
-        (&["draw", "--every", "1e-9", "--until", "3", "-o", pattern], "expected at most"),
-        (&["draw", "--every", "1", "--until", "1e4", "-o", pattern], "--until 1e4: the motion ends"),
-        (&["draw", "--every", "1", "--until", "3", "--animated", "--theme", "auto"], "--theme auto"),
-        (&["draw", "--view", "1,2"], "--view"),
-        (&["draw", "--width", "0"], "--width"),
-        (&["draw", "--theme", "blue"], "--theme"),
-    ] {
-        let refused = refusal(arguments);
-        assert!(refused.contains(word), "{arguments:?}: {refused}");
-    }
-}
-
-#[test]
 fn json_lines_hold_the_picture_where_no_file_is_named() {
     let line: serde_json::Value = serde_json::from_str(&answer(&["draw", "--at", "contact", "--json"])).unwrap();
     assert!((line["time"].as_f64().unwrap() - 412.473837682115).abs() < 1e-9 && line["file"].is_null());
     assert_eq!(line["svg"].as_str().unwrap().trim_end(), answer(&["draw", "--at", "contact"]).trim_end());
-}
-
-/// The values of an animation of an element's first child of a kind.
-fn values<'a>(node: &Node<'a, '_>, kind: &str) -> Vec<&'a str> {
-    let of_kind = |node: &Node| node.attribute("type") == Some(kind);
-    let animation = node.descendants().find(of_kind).unwrap();
-    animation.attribute("values").unwrap().split(';').collect()
-}
-
-#[test]
-fn a_picture_that_moves_begins_and_ends_where_solve_has_the_boards() {
-    let svg =
-        answer(&["draw", "--animated", "--every", "0.5", "--from", "408", "--until", "contact", "--theme", "dark"]);
-    let svg = Document::parse(&svg).unwrap();
-    let paper = scene_file("paper");
-    let mut colours = BTreeSet::new();
-    for (time, last) in [("408", false), ("contact", true)] {
-        for (bench, board) in boards(&paper, time).iter().enumerate() {
-            let group = with_id(&svg, &format!("bench-{bench}")).unwrap();
-            let (places, angles) = (values(&group, "translate"), values(&group, "rotate"));
-            // 9 steps of half a second, and 4 s at the end.
-            assert_eq!((places.len(), angles.len()), (19, 19));
-            let at = |values: &[&str]| values[if last { values.len() - 1 } else { 0 }].to_owned();
-            let place = at(&places);
-            let (x, y) =
-                place.split_once(' ').map(|(x, y)| (x.parse::<f64>().unwrap(), y.parse::<f64>().unwrap())).unwrap();
-            let centre = [0, 1].map(|k| board.iter().map(|corner| corner[k]).sum::<f64>() / 4.0);
-            assert!(
-                (x - centre[0]).hypot(y - centre[1]) < 0.01,
-                "bench {bench} at {time}: {place}, expected {centre:?}"
-            );
-            let heading = (board[0][1] - board[1][1]).atan2(board[0][0] - board[1][0]);
-            let angle: f64 = at(&angles).parse().unwrap();
-            let off = (angle.to_radians() - heading).sin().hypot((angle.to_radians() - heading).cos() - 1.0);
-            assert!(off < 2e-3, "bench {bench} at {time} is turned by {angle}");
-            if last {
-                // Where nothing moves, the last moment stands.
-                assert_eq!(group.attribute("transform"), Some(format!("translate({place})").as_str()));
-                let fill = group.descendants().find_map(|node| node.attribute("fill").filter(|fill| *fill != "none"));
-                colours.insert(fill.unwrap().to_owned());
-            }
-        }
-    }
-    assert!(colours.len() > 8, "{colours:?}");
-    let turns = values(&with_id(&svg, "bench-100").unwrap(), "rotate");
-    let turns: Vec<f64> = turns.iter().map(|angle| angle.parse().unwrap()).collect();
-    assert!(turns.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 20.0), "no board spins round: {turns:?}");
-    let words = texts(&svg);
-    for expected in ["contact in", "5 s", "1 s", "CONTACT", "benches 1 and 9"] {
-        assert!(words.iter().any(|words| words == expected), "{expected}: {words:?}");
-    }
-}
-
-/// The custom properties of the block of a style sheet that begins with a selector.
-fn properties<'a>(css: &'a str, selector: &str) -> BTreeMap<&'a str, &'a str> {
-    let block = css.split_once(&format!("\n{selector} {{")).unwrap_or_else(|| panic!("no {selector}")).1;
-    let declarations = block.split_once('}').unwrap().0.split(';');
-    let property = |declaration: &'a str| declaration.trim().strip_prefix("--")?.split_once(':');
-    declarations.filter_map(property).map(|(name, value)| (name, value.trim())).collect()
-}
-
-#[test]
-fn the_colours_are_those_of_the_page() {
-    let css = include_str!("../src/subscribers/view/style.css");
-    for (palette, selector) in [(LIGHT, ":root"), (DARK, ":root[data-theme=dark]")] {
-        let page = properties(css, selector);
-        for (name, colour) in palette.named() {
-            assert_eq!(page.get(name), Some(&colour), "--{name} of {selector}");
-        }
-    }
-}
-
-#[test]
-fn a_theme_has_its_own_colours_and_auto_has_both() {
-    let draw = |theme: &str| answer(&["draw", "--at", "contact", "--theme", theme]);
-    let has = |svg: &str, palette: &Palette| {
-        // Colours of the scale can be alike in both.
-        let names = ["ground", "ink", "quiet", "faint", "danger"];
-        let colours = palette.named().into_iter().filter(|(name, _)| names.contains(name));
-        colours.filter(|(_, colour)| svg.contains(&format!("=\"{colour}\""))).count()
-    };
-    let [light, dark, auto] = ["light", "dark", "auto"].map(draw);
-    assert_eq!((has(&light, &LIGHT), has(&light, &DARK)), (5, 0));
-    assert_eq!((has(&dark, &LIGHT), has(&dark, &DARK)), (0, 5));
-    let (before, rest) = auto.split_once("<style>").unwrap();
-    let (rules, after) = rest.split_once("</style>").unwrap();
-    assert_eq!(format!("{before}{after}"), light, "auto is light with rules");
-    Document::parse(&auto).unwrap();
-    // Each colour that is drawn has a rule with the dark one.
-    for attribute in ["fill", "stroke", "stop-color"] {
-        for part in light.split(&format!("{attribute}=\"#")).skip(1) {
-            let rule = format!("[{attribute}=\"#{}\"]{{{attribute}:#", &part[..6]);
-            assert!(rules.contains(&rule), "no {rule}");
-        }
-    }
-    assert!(rules.starts_with("@media(prefers-color-scheme:dark){[") && rules.contains(DARK.ground));
 }

@@ -5,7 +5,9 @@
 //! travelled)), and links hold to 1e-12 link + 4 ulp(r). `BENCH_DRAGON_LONG=1` runs 100,000 random scenes instead of
 //! 300.
 
-#[path = "truth/tables.rs"]
+mod bits;
+mod random;
+#[path = "../truth/tables.rs"]
 mod tables;
 
 use std::cell::Cell;
@@ -176,9 +178,9 @@ fn tables() -> [(&'static str, Subject, Vec<Row>); 2] {
     let turnaround =
         PathDescription::Turnaround { pitch: 1.7, turn_radius: 4.5, arc_ratio: 2.0, lead_in: 100.0, lead_out: 369.16 };
     let since_start = |row: Row| Row { time: row.time + 100.0, ..row };
-    let turning = table(include_str!("truth/turnaround_table.csv")).into_iter().map(since_start);
+    let turning = table(include_str!("../truth/turnaround_table.csv")).into_iter().map(since_start);
     [
-        ("paper", Subject::new(paper, paper_team(), 1.0), table(include_str!("truth/paper_scene_exact.csv"))),
+        ("paper", Subject::new(paper, paper_team(), 1.0), table(include_str!("../truth/paper_scene_exact.csv"))),
         ("turnaround", Subject::new(turnaround, paper_team(), 1.0), turning.collect()),
     ]
 }
@@ -203,7 +205,7 @@ fn errors<'a>(solver: &mut dyn Solver, rows: impl Iterator<Item = &'a Row>) -> (
 /// as is printed there.
 #[test]
 fn the_readme_says_how_exact_every_solver_is() {
-    let readme = include_str!("../README.md");
+    let readme = include_str!("../../README.md");
     let mut compared = 0;
     for (scene, subject, rows) in tables() {
         for (who, mut solver) in subject.solvers() {
@@ -387,149 +389,4 @@ fn no_handle_jumps_from_piece_to_piece() {
         // Only the paper's motion continues where its table ends: near the lock.
         assert_eq!(solver.fallbacks(), u64::from(name == "paper"), "{name}: the table ends at {valid} s of {end} s");
     }
-}
-
-/// A hash of all bits of frames over a show.
-fn hash_of_frames(subject: &Subject, solver: &mut dyn Solver) -> u64 {
-    let mut chain = Chain::new(subject.motion.team().handles());
-    let mut hash = 0xcbf2_9ce4_8422_2325u64;
-    for frame in 0..200 {
-        solver.solve(0.98 * subject.end * f64::from(frame) / 200.0, &mut chain).unwrap();
-        let Chain { x, y, heading, speed, vx, vy } = &chain;
-        for number in [x, y, heading, speed, vx, vy].into_iter().flatten() {
-            hash = (hash ^ number.to_bits()).wrapping_mul(0x0100_0000_01b3);
-        }
-    }
-    hash
-}
-
-/// The bits of frames, as they were when these hashes were written down: a change that changes a bit shows here.
-///
-/// The hashes are for the C library's sine and cosine on x86-64 with FMA, which the making of a table uses.
-#[test]
-fn frames_have_the_bits_they_had() {
-    let golden: &[(&str, &str, u64)] = &GOLDEN;
-    let fma = cfg!(all(target_arch = "x86_64", target_os = "linux")) && Instructions::available().len() > 1;
-    for name in ["paper", "turnaround", "procession"] {
-        let subject = Subject::scene(name);
-        for (who, mut solver) in subject.solvers().into_iter().chain(subject.selected()) {
-            let hash = hash_of_frames(&subject, solver.as_mut());
-            assert_eq!(hash, hash_of_frames(&subject, solver.as_mut()), "{who} on {name}: two plays");
-            println!("    (\"{name}\", \"{who}\", {hash:#018x}),");
-            let known = golden.iter().find(|(scene, solver, _)| (*scene, *solver) == (name, who.as_str()));
-            match known {
-                Some((.., known)) if fma => assert_eq!(hash, *known, "{who} on {name}"),
-                _ => println!("{who} on {name}: no hash to compare with on this machine"),
-            }
-        }
-    }
-}
-
-const GOLDEN: [(&str, &str, u64); 21] = [
-    ("paper", "newton", 0xb40aca31845b91e3),
-    ("paper", "follower_table (AVX-512)", 0x70710b94d07541e9),
-    ("paper", "follower_table (AVX2 and FMA)", 0x70710b94d07541e9),
-    ("paper", "follower_table (portable)", 0x510351ee79d20005),
-    ("paper", "1e-9 m (AVX-512)", 0xdc2349c7e9223e97),
-    ("paper", "1e-9 m (AVX2 and FMA)", 0xdc2349c7e9223e97),
-    ("paper", "1e-9 m (portable)", 0x6aa81313a8f8c036),
-    ("turnaround", "newton", 0x724bcfbf23324f3b),
-    ("turnaround", "follower_table (AVX-512)", 0x3143c365033aebb4),
-    ("turnaround", "follower_table (AVX2 and FMA)", 0x3143c365033aebb4),
-    ("turnaround", "follower_table (portable)", 0x02d2fa78c99b3990),
-    ("turnaround", "1e-9 m (AVX-512)", 0xc3a262ad2188a2c1),
-    ("turnaround", "1e-9 m (AVX2 and FMA)", 0xc3a262ad2188a2c1),
-    ("turnaround", "1e-9 m (portable)", 0xcb8c31538d957dc8),
-    ("procession", "newton", 0xd7c900bb92e96ee7),
-    ("procession", "follower_table (AVX-512)", 0x580192ef8b8d08e0),
-    ("procession", "follower_table (AVX2 and FMA)", 0x580192ef8b8d08e0),
-    ("procession", "follower_table (portable)", 0xc3c5ce95d5a83fbc),
-    ("procession", "1e-9 m (AVX-512)", 0xb9ed1e808c559be7),
-    ("procession", "1e-9 m (AVX2 and FMA)", 0xb9ed1e808c559be7),
-    ("procession", "1e-9 m (portable)", 0x0fc7c8b2c00119bb),
-];
-
-/// Numbers between two others, evenly by magnitude.
-fn magnitude(least: f64, most: f64) -> impl Strategy<Value = f64> {
-    (least.log10()..most.log10()).prop_map(|exponent| 10f64.powf(exponent))
-}
-
-fn spirals() -> impl Strategy<Value = Subject> {
-    // Links against the pitch, and the start in links from the centre: most of the plain ranges are illegal starts.
-    (
-        1usize..40,
-        magnitude(1e-3, 1e4),
-        magnitude(0.02, 50.0),
-        magnitude(0.3, 3.0),
-        magnitude(1.0, 1e4),
-        magnitude(1e-9, 1e6),
-    )
-        .prop_map(|(benches, pitch, ratio, head, far, speed)| {
-            let link = (ratio * pitch).clamp(2e-3, 9e3);
-            let start_turn = (1.0 + far * link * head.max(1.0) / pitch).min(1e7);
-            spiral(benches, link * head, link, pitch, start_turn, speed)
-        })
-        .prop_filter("a show of some length", |subject| subject.end > 0.0)
-}
-
-/// Routes and turnarounds, bends down to a third of a link included.
-fn routes() -> impl Strategy<Value = Subject> {
-    let step = (0.3..8.0f64, 0.05..0.7f64, any::<bool>(), any::<bool>()).prop_map(|(size, turns, left, line)| {
-        let side = if left { Side::Left } else { Side::Right };
-        if line { RouteStep::Line { length: 2.0 * size } } else { RouteStep::Arc { side, radius: size, turns } }
-    });
-    let route = prop::collection::vec(step, 1..12).prop_map(|steps| PathDescription::Route {
-        start: Point::new(5.0, -3.0),
-        heading_turns: 0.17,
-        steps,
-    });
-    let turnaround = (0.4..3.0f64, 1.5..6.0f64, 0.2..5.0f64).prop_map(|(pitch, turns, arc_ratio)| {
-        let turn_radius = pitch * turns;
-        PathDescription::Turnaround { pitch, turn_radius, arc_ratio, lead_in: 30.0, lead_out: 40.0 }
-    });
-    (prop_oneof![3 => route, 1 => turnaround], 2usize..60, 0.2..3.0f64, 0.2..3.0f64).prop_map(
-        |(description, benches, head, body)| {
-            let team = Team { benches, head_length: head + 0.1, body_length: body + 0.1, width: 0.1, hole_inset: 0.05 };
-            Subject::new(description, team, 1.0)
-        },
-    )
-}
-
-/// Random subjects: every solver at a random time, the velocities as central differences, and how often a table served.
-fn random_subjects(subjects: impl Strategy<Value = Subject>, least_share_of_tables: f64) {
-    let long = std::env::var("BENCH_DRAGON_LONG").is_ok_and(|value| value == "1");
-    let config = Config { cases: if long { 100_000 } else { 300 }, failure_persistence: None, ..Config::default() };
-    let (cases, tables, compared) = (config.cases, Cell::new(0), Cell::new(0u64));
-    let case = (subjects, 0.0..0.995f64);
-    TestRunner::new(config)
-        .run(&case, |(subject, share)| {
-            let time = share * subject.end;
-            let mut reference = subject.reference();
-            let handles = subject.motion.team().handles();
-            let (mut chain, mut safe) = (Chain::new(handles), Chain::new(handles));
-            subject.newton().solve(time, &mut safe).unwrap();
-            subject.assert_sound(&safe, time, "newton");
-            subject.assert_true(&mut reference, &safe, time, "newton");
-            if let Some(mut table) = subject.table() {
-                table.solve(time, &mut chain).unwrap();
-                subject.assert_sound(&chain, time, "follower_table");
-                subject.assert_true(&mut reference, &chain, time, "follower_table");
-                tables.set(tables.get() + 1 - table.fallbacks());
-            }
-            compared.set(compared.get() + handles as u64);
-            Ok(())
-        })
-        .unwrap();
-    println!("{} of {cases} frames came from a table, {} handles compared", tables.get(), compared.get());
-    assert!(tables.get() as f64 > least_share_of_tables * f64::from(cases), "{} tables", tables.get());
-}
-
-#[test]
-fn random_spirals_keep_the_promise() {
-    random_subjects(spirals(), 0.1);
-}
-
-#[test]
-fn random_routes_keep_the_promise() {
-    random_subjects(routes(), 0.5);
 }

@@ -1,0 +1,220 @@
+//! `send`: what takes a running publisher's dragon out of this machine. Each kind is a process of its own.
+
+use std::net::{Ipv4Addr, SocketAddrV4};
+use std::sync::atomic::Ordering;
+
+use bench_dragon::subscribers::feed::Frames;
+use bench_dragon::subscribers::polling::poll_until;
+use bench_dragon::subscribers::send::axes::Axes;
+use bench_dragon::subscribers::send::network::{NetworkError, Outlet, Route, destination};
+use bench_dragon::subscribers::send::osc::Addresses;
+use bench_dragon::subscribers::send::osc_sender::{MOST_RATE, OscSender};
+use bench_dragon::subscribers::send::psn_sender::{
+    Notice, PsnOptions, PsnSender, USUAL_ADDRESS, USUAL_PORT, USUAL_RATE,
+};
+use bench_dragon::subscribers::send::trackers::Selection;
+
+use super::{CommandError, Common, Output, number, stop_on_signals};
+
+/// Arguments of `send`.
+#[derive(Debug, Clone, clap::Args)]
+pub struct SendArguments {
+    #[command(subcommand)]
+    kind: Kind,
+}
+
+#[derive(Debug, Clone, clap::Subcommand)]
+enum Kind {
+    /// PosiStageNet 2.03 for lighting desks and media servers: handles as trackers
+    Psn(PsnArguments),
+    /// OSC messages for show control: alerts, countdown, state, cues, the head
+    Osc(OscArguments),
+}
+
+/// Arguments of `send psn`.
+#[derive(Debug, Clone, clap::Args)]
+struct PsnArguments {
+    /// The multicast group, or one desk; port 56565 where none is given
+    #[arg(long, value_name = "ADDR[:PORT]", default_value = USUAL_ADDRESS, value_parser = psn_destination)]
+    to: SocketAddrV4,
+    /// The address of this machine's interface to send by; without it, the machine's routes decide
+    #[arg(long, value_name = "IP")]
+    interface: Option<Ipv4Addr>,
+    /// Which handles, counted from 1: all, head, tail, 1,2,9 or head,20-40
+    #[arg(long, value_name = "WHICH", default_value = "all")]
+    trackers: Selection,
+    /// What the desk's x, y and z are: the stage's x, y (into the depth) and up, in any order, with a minus to reverse one
+    #[arg(long, value_name = "X,Y,Z", default_value_t = Axes::default(), allow_hyphen_values = true)]
+    axes: Axes,
+    /// How many networks multicast may pass, this one included
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=255))]
+    ttl: u32,
+    /// Frames per second at most, up to 250; a slower publisher sets its own
+    #[arg(long, value_name = "HZ", default_value_t = USUAL_RATE, value_parser = rate::<250>)]
+    rate: f64,
+    /// The tracker number of the head, so that several dragons fit one desk
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    first_id: u16,
+    /// The name under which desks list this sender; without it, the publisher's
+    #[arg(long, value_name = "S", value_parser = system_name)]
+    system_name: Option<String>,
+}
+
+/// Arguments of `send osc`.
+#[derive(Debug, Clone, clap::Args)]
+struct OscArguments {
+    /// Where to: any number of hosts
+    #[arg(long, value_name = "HOST:PORT", required = true, num_args = 1.., value_parser = osc_destination)]
+    to: Vec<SocketAddrV4>,
+    /// The address of this machine's interface to send by; without it, the machine's routes decide
+    #[arg(long, value_name = "IP")]
+    interface: Option<Ipv4Addr>,
+    /// Bundles of frames per second at most, up to 60; a slower publisher sets its own
+    #[arg(long, value_name = "HZ", default_value_t = f64::from(MOST_RATE), value_parser = rate::<MOST_RATE>)]
+    rate: f64,
+}
+
+fn osc_destination(text: &str) -> Result<SocketAddrV4, String> {
+    destination(text, None)
+}
+
+fn psn_destination(text: &str) -> Result<SocketAddrV4, String> {
+    destination(text, Some(USUAL_PORT))
+}
+
+/// A rate of at most so many frames per second.
+fn rate<const MOST: u32>(text: &str) -> Result<f64, String> {
+    let rate = text.trim().parse::<f64>().ok().filter(|rate| *rate >= 0.01 && *rate <= f64::from(MOST));
+    rate.ok_or_else(|| format!("expected frames per second from 0.01 to {MOST}"))
+}
+
+fn system_name(text: &str) -> Result<String, String> {
+    if (1..=128).contains(&text.len()) { Ok(text.to_owned()) } else { Err("expected 1 to 128 bytes".to_owned()) }
+}
+
+/// Sends until a signal comes.
+pub fn send(common: &Common, arguments: &SendArguments) -> Result<(), CommandError> {
+    match &arguments.kind {
+        Kind::Psn(arguments) => psn(common, arguments),
+        Kind::Osc(arguments) => osc(common, arguments),
+    }
+}
+
+fn psn(common: &Common, arguments: &PsnArguments) -> Result<(), CommandError> {
+    let stop = stop_on_signals()?;
+    let PsnArguments { to, interface, ttl, rate, axes, .. } = *arguments;
+    let outlet = Outlet::open(&[to], Route { interface, multicast_ttl: ttl })?;
+    let name = &common.name;
+    print(common, || {
+        let by = interface.map_or(String::new(), |interface| format!(" by {interface}"));
+        let ttl = if to.ip().is_multicast() { format!(", TTL {ttl}") } else { String::new() };
+        format!(
+            "Sending \"{name}\" as PosiStageNet 2.03 to {to}{by}{ttl}: at most {} frames per second, x,y,z = {axes}. \
+             Ctrl-C ends.",
+            number(rate)
+        )
+    })?;
+    let options = PsnOptions {
+        trackers: arguments.trackers.clone(),
+        axes,
+        rate,
+        first_id: arguments.first_id,
+        system_name: arguments.system_name.clone().unwrap_or_else(|| name.clone()),
+    };
+    let mut printed = Ok(());
+    let mut notify = |notice: Notice| {
+        if let Notice::LeftOut(sentence) = notice {
+            log::warn!("{sentence}");
+        } else if printed.is_ok() {
+            printed = print(common, || notice_line(name, &notice));
+            // Whoever read this has gone, as `| head` does.
+            stop.fetch_or(printed.is_err(), Ordering::Relaxed);
+        }
+    };
+    let mut sender = PsnSender::new(options, outlet, &mut notify);
+    poll_until(&stop, name, Frames::Newest, &mut sender)?;
+    let summary = sender.finish();
+    printed?;
+    let mut output = Output::standard();
+    if common.json {
+        output.json(&summary)?;
+    } else {
+        output.line(&format!(
+            "{} frames sent in {} packets; {} passed over, {} packets could not be sent",
+            summary.frames, summary.packets, summary.passed_over, summary.unsent_packets
+        ))?;
+    }
+    output.finish()
+}
+
+fn osc(common: &Common, arguments: &OscArguments) -> Result<(), CommandError> {
+    let stop = stop_on_signals()?;
+    let OscArguments { to, interface, rate } = arguments;
+    let outlet = Outlet::open(to, Route { interface: *interface, multicast_ttl: 1 })?;
+    let addresses = Addresses::new(&common.name);
+    print(common, || {
+        let to = to.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+        let by = interface.map_or(String::new(), |interface| format!(" by {interface}"));
+        format!(
+            "Sending \"{}\" as OSC to {to}{by}: {}/alert, countdown, state, cue, head, sim_time; at most {} frames per \
+             second. Ctrl-C ends.",
+            common.name,
+            addresses.prefix(),
+            number(*rate)
+        )
+    })?;
+    let mut sender = OscSender::new(addresses, *rate, outlet);
+    poll_until(&stop, &common.name, Frames::Newest, &mut sender)?;
+    let summary = sender.finish();
+    let mut output = Output::standard();
+    if common.json {
+        output.json(&summary)?;
+    } else {
+        output.line(&format!(
+            "{} frames, {} alerts and {} cues sent in {} packets; {} packets could not be sent",
+            summary.frames, summary.alerts, summary.cues, summary.packets, summary.unsent_packets
+        ))?;
+    }
+    output.finish()
+}
+
+fn notice_line(name: &str, notice: &Notice) -> String {
+    match notice {
+        Notice::Team { handles, trackers, packets, name_packets } => {
+            let plural = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
+            let numbers = match &trackers[..] {
+                [] => String::new(),
+                [only] => format!(" ({} = {})", only.id, only.name),
+                [first, .., last] => format!(" ({} = {} to {} = {})", first.id, first.name, last.id, last.name),
+            };
+            format!(
+                "{} of {handles} handles{numbers}: {} a frame, and {} of names a second",
+                plural(trackers.len(), "tracker"),
+                plural(*packets, "packet"),
+                plural(*name_packets, "packet")
+            )
+        }
+        Notice::LeftOut(sentence) => sentence.clone(),
+        Notice::Stopped => format!("No frames come from \"{name}\": the trackers have status 0."),
+        Notice::Resumed => format!("Frames come from \"{name}\" again."),
+    }
+}
+
+/// Prints a line for people at once; machines get the summary only.
+fn print(common: &Common, line: impl FnOnce() -> String) -> Result<(), CommandError> {
+    if common.json {
+        return Ok(());
+    }
+    let mut output = Output::standard();
+    output.line(&line())?;
+    output.finish()
+}
+
+impl From<NetworkError> for CommandError {
+    fn from(error: NetworkError) -> Self {
+        match error {
+            NetworkError::Interface(_) => Self::BadInput(error.to_string()),
+            NetworkError::Socket(_) => Self::Failed(error.to_string()),
+        }
+    }
+}

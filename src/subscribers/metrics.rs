@@ -1,0 +1,124 @@
+//! The figures of a running publisher for Prometheus, over HTTP. In: the services of a name, one more subscriber of them.
+//! Out: text at `/metrics`. Called by the command `metrics`.
+//!
+//! A [`Monitor`] on a thread of its own takes all that comes, since ports cannot leave the thread that made them; each
+//! request gets what it knows at that moment. In `families`, which figures; in `exposition`, the text.
+
+pub mod exposition;
+pub mod families;
+
+use std::net::SocketAddr;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use axum::Router;
+use axum::extract::State;
+use axum::http::{HeaderMap, header};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use exposition::{Format, render};
+use families::families;
+
+use super::feed::{FeedEvent, Frames};
+use super::monitor::{IntervalReport, Monitor};
+use super::polling::{Handler, poll_until};
+use crate::live::clock::monotonic_ns;
+use crate::transports::iceoryx2::{OpenError, service_name};
+
+/// Why the figures could not be served.
+#[derive(Debug, thiserror::Error)]
+pub enum MetricsError {
+    /// The publisher's services cannot be used.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// The address cannot be listened on.
+    #[error(
+        "cannot serve metrics at {address}: {source}; choose a free port and an address of this machine with --listen"
+    )]
+    Listen {
+        /// The address given.
+        address: SocketAddr,
+        /// What the system reported.
+        source: std::io::Error,
+    },
+}
+
+#[derive(Clone)]
+struct Server {
+    name: Arc<str>,
+    monitor: Arc<Mutex<Monitor>>,
+}
+
+impl Server {
+    fn report(&self) -> IntervalReport {
+        // A monitor that a panic left behind is still the best there is.
+        self.monitor.lock().unwrap_or_else(PoisonError::into_inner).report()
+    }
+}
+
+impl Handler for Server {
+    fn handle(&mut self, event: FeedEvent<'_>) {
+        let received_ns = monotonic_ns();
+        self.monitor.lock().unwrap_or_else(PoisonError::into_inner).handle(&event, received_ns);
+    }
+
+    fn polled(&mut self, _now: Instant) {}
+}
+
+/// Serves the figures of the publisher `name` at `address` until `stop` is set; port 0 takes any free one. `ready` is
+/// called with the address once requests are answered.
+///
+/// # Errors
+/// [`MetricsError`] for a name or an address that cannot be used.
+pub fn serve<Refused: From<MetricsError>>(
+    name: &str,
+    address: SocketAddr,
+    stop: &Arc<AtomicBool>,
+    ready: impl FnOnce(SocketAddr) -> Result<(), Refused>,
+) -> Result<(), Refused> {
+    service_name(name, "poses").map_err(MetricsError::from)?;
+    let listen = |source| MetricsError::Listen { address, source };
+    // One thread for all requests: they must not take the cores a publisher on this machine needs.
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(listen)?;
+    let listener = runtime.block_on(tokio::net::TcpListener::bind(address)).map_err(listen)?;
+    ready(listener.local_addr().map_err(listen)?)?;
+    let server = Server { name: name.into(), monitor: Arc::default() };
+    let reader = std::thread::spawn({
+        let (name, mut handler, stop) = (name.to_owned(), server.clone(), Arc::clone(stop));
+        move || {
+            // Every frame, so that one that is missing was lost.
+            let read = poll_until(&stop, &name, Frames::All, &mut handler);
+            stop.store(true, Ordering::Relaxed);
+            read
+        }
+    });
+    let router = Router::new()
+        .route("/", get(|| async { "The metrics of bench-dragon are at /metrics.\n" }))
+        .route("/metrics", get(metrics))
+        .with_state(server);
+    let served = runtime.block_on(async {
+        tokio::select! {
+            served = async { axum::serve(listener, router).await } => served,
+            () = stopped(stop) => Ok(()),
+        }
+    });
+    stop.store(true, Ordering::Relaxed);
+    // A panic of the reader has already been printed.
+    let read = reader.join().unwrap_or(Ok(()));
+    served.map_err(listen)?;
+    Ok(read.map_err(MetricsError::from)?)
+}
+
+async fn stopped(stop: &AtomicBool) {
+    while !stop.load(Ordering::Relaxed) {
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+}
+
+async fn metrics(State(server): State<Server>, headers: HeaderMap) -> Response {
+    let accept = headers.get_all(header::ACCEPT).iter().filter_map(|accept| accept.to_str().ok());
+    let format = Format::accepted(&accept.collect::<Vec<_>>().join(","));
+    let text = render(&families(&server.name, &server.report()), format);
+    ([(header::CONTENT_TYPE, format.content_type()), (header::CACHE_CONTROL, "no-store")], text).into_response()
+}

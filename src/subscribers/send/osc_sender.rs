@@ -1,0 +1,170 @@
+//! When OSC messages go out, and which once only. In: the events of a feed. Out: datagrams by [`osc`](super::osc). Called
+//! by `send osc`.
+
+use std::time::{Duration, Instant};
+
+use rosc::OscMessage;
+
+use super::network::Outlet;
+use super::osc::{Addresses, State, datagrams, next_event};
+use super::{Arrivals, Pace};
+use crate::subscribers::feed::FeedEvent;
+use crate::subscribers::polling::Handler;
+use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage};
+
+/// The most bundles of frames per second.
+pub const MOST_RATE: u32 = 60;
+/// The least time between two countdowns.
+const COUNTDOWN_INTERVAL: Duration = Duration::from_millis(100);
+/// How often the state is told that has not changed, for who listens later.
+const STATE_INTERVAL: Duration = Duration::from_secs(1);
+/// A cue is sent that was reached so much before the first frame that came: to be connected takes a moment, and a show can
+/// begin with a cue.
+const CUE_GRACE_NS: u64 = 1_000_000_000;
+
+/// What has been sent.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
+pub struct OscSummary {
+    /// Frames of the publisher that were sent.
+    pub frames: u64,
+    /// Alerts sent.
+    pub alerts: u64,
+    /// Cues sent.
+    pub cues: u64,
+    /// Datagrams sent, to all destinations together.
+    pub packets: u64,
+    /// Datagrams that could not be sent.
+    pub unsent_packets: u64,
+}
+
+/// The sender of one publisher's messages.
+pub struct OscSender {
+    addresses: Addresses,
+    outlet: Outlet,
+    pace: Pace,
+    arrivals: Arrivals,
+    stage: Option<Stage>,
+    /// The latest frame of the run, and when the first one that came was made.
+    latest: Option<(FrameHeader, HandlePose)>,
+    first_stamp_ns: u64,
+    due: bool,
+    /// Alerts and cues in their order.
+    pending: Vec<OscMessage>,
+    last_alert: Option<CollisionAlert>,
+    last_cue: Option<Cue>,
+    told_state: Option<State>,
+    told_countdown: bool,
+    next_state: Instant,
+    next_countdown: Instant,
+    summary: OscSummary,
+}
+
+impl OscSender {
+    /// A sender of at most `rate` bundles of frames per second by `outlet`.
+    pub fn new(addresses: Addresses, rate: f64, outlet: Outlet) -> Self {
+        Self {
+            addresses,
+            outlet,
+            pace: Pace::new(rate),
+            arrivals: Arrivals::default(),
+            stage: None,
+            latest: None,
+            first_stamp_ns: 0,
+            due: false,
+            pending: Vec::new(),
+            last_alert: None,
+            last_cue: None,
+            told_state: None,
+            told_countdown: false,
+            next_state: Instant::now(),
+            next_countdown: Instant::now(),
+            summary: OscSummary::default(),
+        }
+    }
+
+    /// Tells receivers that nothing holds any more, and returns what has been sent.
+    pub fn finish(mut self) -> OscSummary {
+        let mut messages = std::mem::take(&mut self.pending);
+        if self.latest.is_some() {
+            messages.push(self.addresses.state(State::Stopped));
+        }
+        self.send_all(messages);
+        OscSummary { packets: self.outlet.sent(), unsent_packets: self.outlet.unsent(), ..self.summary }
+    }
+
+    fn send_all(&mut self, messages: Vec<OscMessage>) {
+        datagrams(messages).iter().for_each(|datagram| self.outlet.send(datagram));
+    }
+
+    /// An alert is sent once, though a connection that is made anew begins with the current one again.
+    fn take_alert(&mut self, alert: &CollisionAlert) {
+        let of = |alert: &CollisionAlert| (alert.run_id, alert.tick, alert.level, alert.event);
+        if self.last_alert.as_ref().is_some_and(|last| of(last) == of(alert)) {
+            return;
+        }
+        self.last_alert = Some(*alert);
+        let header = self.latest.map(|(header, _)| header).filter(|header| header.run_id == alert.run_id);
+        self.pending.push(self.addresses.alert(alert, header.map_or(0, |header| header.cue)));
+        self.summary.alerts += 1;
+    }
+
+    /// A cue is sent once, and never one that the show had passed long before this sender listened.
+    fn take_cue(&mut self, cue: &Cue) {
+        let of = |cue: &Cue| (cue.run_id, cue.tick, cue.number);
+        let is_known = self.last_cue.as_ref().is_some_and(|last| of(last) == of(cue));
+        let of_this_run = self.latest.is_some_and(|(header, _)| header.run_id == cue.run_id);
+        let is_old = cue.stamp_ns.saturating_add(CUE_GRACE_NS) < self.first_stamp_ns;
+        if is_known || !of_this_run || is_old {
+            return;
+        }
+        self.last_cue = Some(*cue);
+        self.pending.push(self.addresses.cue(cue));
+        self.summary.cues += 1;
+    }
+}
+
+impl Handler for OscSender {
+    fn handle(&mut self, event: FeedEvent<'_>) {
+        self.arrivals.handle(&event, Instant::now());
+        match event {
+            FeedEvent::Frame { header, handles, .. } => {
+                if self.latest.is_none_or(|(latest, _)| latest.run_id != header.run_id) {
+                    self.first_stamp_ns = header.stamp_ns;
+                }
+                self.latest = Some((*header, handles.first().copied().unwrap_or_default()));
+                self.due |= self.pace.is_due(header);
+            }
+            FeedEvent::Stage(stage) => self.stage = Some(*stage),
+            FeedEvent::Alert(alert) => self.take_alert(alert),
+            FeedEvent::Cue(cue) => self.take_cue(cue),
+            FeedEvent::Gone => self.stage = None,
+            FeedEvent::Started { .. } | FeedEvent::Status(_) | FeedEvent::Silent => (),
+        }
+    }
+
+    fn polled(&mut self, now: Instant) {
+        let mut messages = std::mem::take(&mut self.pending);
+        let due = std::mem::take(&mut self.due);
+        if let Some((header, head)) = &self.latest {
+            let stopped = self.arrivals.stopped_since(now).is_some();
+            let state = if stopped { Some(State::Stopped) } else { State::of(header) };
+            // A change waits for no interval; nor does a countdown that ends.
+            if let Some(state) = state.filter(|state| self.told_state != Some(*state) || now >= self.next_state) {
+                messages.push(self.addresses.state(state));
+                (self.told_state, self.next_state) = (Some(state), now + STATE_INTERVAL);
+            }
+            let stage = self.stage.as_ref().filter(|stage| stage.run_id == header.run_id && !stopped);
+            let coming = stage.and_then(|stage| next_event(stage, header));
+            let is_due = if coming.is_some() { due && now >= self.next_countdown } else { self.told_countdown };
+            if is_due {
+                messages.push(self.addresses.countdown(coming));
+                (self.told_countdown, self.next_countdown) = (coming.is_some(), now + COUNTDOWN_INTERVAL);
+            }
+            if due {
+                self.summary.frames += 1;
+                messages.extend([self.addresses.sim_time(header), self.addresses.head(header, head)]);
+            }
+        }
+        self.send_all(messages);
+    }
+}

@@ -1,0 +1,212 @@
+"""A lighting desk that checks what it hears: PosiStageNet as PyPI's pypsn decodes it, against the shared memory.
+
+    psn_peer.py --name NAME --port P [--group 236.10.10.10] [--axes x,up,y] [--first-id N] [--npm FOLDER]
+
+Listens to UDP port P and subscribes to the publisher NAME, which has to run already. Ends once no packet has come for two
+seconds after the first. Every frame was decoded whole, and each is held against the frame of the shared memory that has the
+same head, every tracker, to float32. Prints a line when it listens, and one with what it has seen. With --npm, the decoder
+of that folder (npm's @jwetzell/posistagenet) gets the same packets and has to see the same in them.
+"""
+
+import argparse
+import base64
+import json
+import pathlib
+import socket
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pypsn
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
+
+import bench_dragon_messages as messages  # noqa: E402
+import iceoryx2 as iox2  # noqa: E402
+
+
+def listen(port, group):
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    # Room for a slow machine's hesitations; more of it for root.
+    for option in (socket.SO_RCVBUF, getattr(socket, "SO_RCVBUFFORCE", 33)):
+        try:
+            sock.setsockopt(socket.SOL_SOCKET, option, 1 << 26)
+        except PermissionError:
+            pass
+    sock.bind((group or "127.0.0.1", port))
+    if group:
+        sock.setsockopt(
+            socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + socket.inet_aton("127.0.0.1")
+        )
+    return sock
+
+
+class Memory(threading.Thread):
+    """The frames of the shared memory, by the place of the head in float32."""
+
+    def __init__(self, name):
+        super().__init__(daemon=True)
+        iox2.set_log_level(iox2.LogLevel.Fatal)
+        self.name, self.frames, self.missed, self.stop = name, {}, 0, False
+
+    def run(self):
+        node = (
+            iox2.NodeBuilder.new().signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
+        )
+        port, last = None, None
+        while not self.stop:
+            if port is None:
+                builder = node.service_builder(iox2.ServiceName.new(f"{self.name}/poses"))
+                builder = builder.publish_subscribe(iox2.Slice[messages.HandlePose])
+                try:
+                    service = builder.user_header(messages.FrameHeader).open()
+                    port = service.subscriber_builder().create()
+                except iox2.PublishSubscribeOpenError:
+                    time.sleep(0.01)
+                    continue
+            while (sample := port.receive()) is not None:
+                header = sample.user_header().contents
+                handles = messages.handles_of(sample).copy()
+                self.missed += 0 if last is None else header.sequence - last - 1
+                last = header.sequence
+                sample.delete()
+                self.frames[np.float32([handles["x"][0], handles["y"][0]]).tobytes()] = (handles, header.time_scale)
+            time.sleep(0.001)
+
+
+def mapped(axes, vectors):
+    """Vectors (x, y, up) of the stage in a desk's axes."""
+    columns = {"x": vectors[:, 0], "y": vectors[:, 1], "up": vectors[:, 2]}
+    chosen = [-columns[axis[1:]] if axis[0] == "-" else columns[axis] for axis in axes.split(",")]
+    return np.stack(chosen, axis=1)
+
+
+def turned(vector, orientations):
+    """Rodrigues' formula: a vector turned by each of the orientations (axis times angle)."""
+    angle = np.linalg.norm(orientations, axis=1, keepdims=True)
+    axis = orientations / np.where(angle > 0, angle, 1)
+    along = (axis @ vector)[:, None]
+    return vector * np.cos(angle) + np.cross(axis, vector) * np.sin(angle) + axis * along * (1 - np.cos(angle))
+
+
+def compare(trackers, handles, scale, axes, first_id):
+    """The trackers of a frame against all handles of the shared memory's."""
+    assert [tracker.id for tracker in trackers] == list(range(first_id, first_id + len(handles)))
+    zero = np.zeros(len(handles))
+    vectors = lambda x, y: mapped(axes, np.stack([x, y, zero], axis=1))  # noqa: E731
+    got = lambda field: np.array([tuple(getattr(tracker, field)) for tracker in trackers])  # noqa: E731
+    assert (got("pos") == np.float32(vectors(handles["x"], handles["y"]))).all(), "positions"
+    assert (got("speed") == np.float32(vectors(handles["vx"] * scale, handles["vy"] * scale))).all(), "speeds"
+    forward = mapped(axes, np.array([[1.0, 0.0, 0.0]]))[0]
+    benches = vectors(np.cos(handles["heading"]), np.sin(handles["heading"]))
+    assert abs(turned(forward, got("ori")) - benches).max() < 1e-6, "orientations"
+    assert {tracker.status for tracker in trackers} == {1.0}, "status"
+    assert len({tracker.timestamp for tracker in trackers}) == 1, "timestamps"
+
+
+def decode_again(folder, packets, frames, names):
+    """The same packets through npm's decoder: the same trackers in every frame."""
+    script = pathlib.Path(__file__).with_name("psn_npm.mjs")
+    lines = b"\n".join(map(base64.b64encode, packets)) + b"\n"
+    result = subprocess.run(["node", script, folder], input=lines, stdout=subprocess.PIPE, check=True)
+    decoded = [json.loads(line) for line in result.stdout.splitlines()]
+    assert len(decoded) == len(frames), f"{len(decoded)} of {len(frames)} frames"
+    for trackers, (_, expected) in zip(decoded, frames):
+        vectors = [[list(it.pos), list(it.speed), list(it.ori), it.status, it.timestamp] for it in expected]
+        assert [it[1:6] for it in trackers] == vectors and [it[0] for it in trackers] == [it.id for it in expected]
+    assert {str(it[0]): it[6] for it in decoded[-1]} == {str(number): name for number, name in names.items()}
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--name", required=True)
+    parser.add_argument("--port", type=int, required=True)
+    parser.add_argument("--group")
+    parser.add_argument("--axes", default="x,up,y")
+    parser.add_argument("--first-id", type=int, default=1)
+    parser.add_argument("--npm")
+    arguments = parser.parse_args()
+
+    memory = Memory(arguments.name)
+    memory.start()
+    while not memory.frames:
+        time.sleep(0.01)
+    sock, packets = listen(arguments.port, arguments.group), []
+    print(json.dumps({"type": "listening"}), flush=True)
+    sock.settimeout(120)
+    try:
+        while True:
+            packets.append(sock.recv(65536))
+            sock.settimeout(2)
+    except TimeoutError:
+        assert packets, "nothing was sent"
+    memory.stop = True
+    memory.join()
+
+    frames, begun, names, systems, last_time = [], None, {}, set(), -1
+    for packet in packets:
+        decoded = pypsn.parse_psn_packet(packet)
+        info = decoded.info
+        assert (info.version_high, info.version_low) == (2, 3)
+        assert info.timestamp >= last_time, "time runs on"
+        last_time = info.timestamp
+        if isinstance(decoded, pypsn.psn_info_packet):
+            assert begun is None, "an INFO packet between those of a frame"
+            systems.add(decoded.name.decode())
+            names.update({tracker.tracker_id: tracker.tracker_name.decode() for tracker in decoded.trackers})
+            continue
+        if begun is None:
+            begun = (info.frame_id, info.packet_count, [])
+        assert begun[:2] == (info.frame_id, info.packet_count), "the packets of a frame come back to back"
+        begun[2].append(decoded.trackers)
+        if len(begun[2]) == info.packet_count:
+            frames.append((info.frame_id, [tracker for part in begun[2] for tracker in part]))
+            begun = None
+    assert begun is None, "the last frame is whole"
+    ids = [frame_id for frame_id, _ in frames]
+    # npm's decoder takes a frame with the number 0 for one without a number.
+    assert all(later == sooner % 255 + 1 for sooner, later in zip(ids, ids[1:])), "none is lost"
+
+    equal, unknown, stopped = 0, 0, 0
+    for _, trackers in frames:
+        if trackers[0].status == 0:
+            assert {tracker.status for tracker in trackers} == {0.0}
+            assert all(tuple(tracker.speed) == (0, 0, 0) for tracker in trackers), "it stands still"
+            stopped += 1
+            continue
+        # The head's place on the stage again.
+        place = dict(zip([axis.strip("-") for axis in arguments.axes.split(",")], trackers[0].pos))
+        sign = {axis.strip("-"): -1 if axis[0] == "-" else 1 for axis in arguments.axes.split(",")}
+        key = np.float32([place["x"] * sign["x"], place["y"] * sign["y"]]).tobytes()
+        if key not in memory.frames:
+            unknown += 1
+            continue
+        compare(trackers, *memory.frames[key], arguments.axes, arguments.first_id)
+        equal += 1
+    if arguments.npm:
+        decode_again(arguments.npm, packets, frames, names)
+    print(
+        json.dumps(
+            {
+                "type": "summary",
+                "packets": len(packets),
+                "largest": max(map(len, packets)),
+                "frames": len(frames),
+                "equal": equal,
+                "unknown": unknown,
+                "stopped": stopped,
+                "memory_frames": len(memory.frames),
+                "memory_missed": memory.missed,
+                "trackers": len(frames[0][1]),
+                "names": names,
+                "systems": sorted(systems),
+            }
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,88 @@
+//! Random spirals and routes: the promise, and velocities as differences of places.
+
+use super::*;
+
+/// Numbers between two others, evenly by magnitude.
+fn magnitude(least: f64, most: f64) -> impl Strategy<Value = f64> {
+    (least.log10()..most.log10()).prop_map(|exponent| 10f64.powf(exponent))
+}
+
+fn spirals() -> impl Strategy<Value = Subject> {
+    // Links against the pitch, and the start in links from the centre: most of the plain ranges are illegal starts.
+    (
+        1usize..40,
+        magnitude(1e-3, 1e4),
+        magnitude(0.02, 50.0),
+        magnitude(0.3, 3.0),
+        magnitude(1.0, 1e4),
+        magnitude(1e-9, 1e6),
+    )
+        .prop_map(|(benches, pitch, ratio, head, far, speed)| {
+            let link = (ratio * pitch).clamp(2e-3, 9e3);
+            let start_turn = (1.0 + far * link * head.max(1.0) / pitch).min(1e7);
+            spiral(benches, link * head, link, pitch, start_turn, speed)
+        })
+        .prop_filter("a show of some length", |subject| subject.end > 0.0)
+}
+
+/// Routes and turnarounds, bends down to a third of a link included.
+fn routes() -> impl Strategy<Value = Subject> {
+    let step = (0.3..8.0f64, 0.05..0.7f64, any::<bool>(), any::<bool>()).prop_map(|(size, turns, left, line)| {
+        let side = if left { Side::Left } else { Side::Right };
+        if line { RouteStep::Line { length: 2.0 * size } } else { RouteStep::Arc { side, radius: size, turns } }
+    });
+    let route = prop::collection::vec(step, 1..12).prop_map(|steps| PathDescription::Route {
+        start: Point::new(5.0, -3.0),
+        heading_turns: 0.17,
+        steps,
+    });
+    let turnaround = (0.4..3.0f64, 1.5..6.0f64, 0.2..5.0f64).prop_map(|(pitch, turns, arc_ratio)| {
+        let turn_radius = pitch * turns;
+        PathDescription::Turnaround { pitch, turn_radius, arc_ratio, lead_in: 30.0, lead_out: 40.0 }
+    });
+    (prop_oneof![3 => route, 1 => turnaround], 2usize..60, 0.2..3.0f64, 0.2..3.0f64).prop_map(
+        |(description, benches, head, body)| {
+            let team = Team { benches, head_length: head + 0.1, body_length: body + 0.1, width: 0.1, hole_inset: 0.05 };
+            Subject::new(description, team, 1.0)
+        },
+    )
+}
+
+/// Random subjects: every solver at a random time, the velocities as central differences, and how often a table served.
+fn random_subjects(subjects: impl Strategy<Value = Subject>, least_share_of_tables: f64) {
+    let long = std::env::var("BENCH_DRAGON_LONG").is_ok_and(|value| value == "1");
+    let config = Config { cases: if long { 100_000 } else { 300 }, failure_persistence: None, ..Config::default() };
+    let (cases, tables, compared) = (config.cases, Cell::new(0), Cell::new(0u64));
+    let case = (subjects, 0.0..0.995f64);
+    TestRunner::new(config)
+        .run(&case, |(subject, share)| {
+            let time = share * subject.end;
+            let mut reference = subject.reference();
+            let handles = subject.motion.team().handles();
+            let (mut chain, mut safe) = (Chain::new(handles), Chain::new(handles));
+            subject.newton().solve(time, &mut safe).unwrap();
+            subject.assert_sound(&safe, time, "newton");
+            subject.assert_true(&mut reference, &safe, time, "newton");
+            if let Some(mut table) = subject.table() {
+                table.solve(time, &mut chain).unwrap();
+                subject.assert_sound(&chain, time, "follower_table");
+                subject.assert_true(&mut reference, &chain, time, "follower_table");
+                tables.set(tables.get() + 1 - table.fallbacks());
+            }
+            compared.set(compared.get() + handles as u64);
+            Ok(())
+        })
+        .unwrap();
+    println!("{} of {cases} frames came from a table, {} handles compared", tables.get(), compared.get());
+    assert!(tables.get() as f64 > least_share_of_tables * f64::from(cases), "{} tables", tables.get());
+}
+
+#[test]
+fn random_spirals_keep_the_promise() {
+    random_subjects(spirals(), 0.1);
+}
+
+#[test]
+fn random_routes_keep_the_promise() {
+    random_subjects(routes(), 0.5);
+}
