@@ -7,6 +7,7 @@
 //! keeps; the current message is the last.
 
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use ros2_client::{Context, Node, Publisher};
 use rustdds::policy::{self, ResourceLimits};
@@ -25,6 +26,11 @@ const LEASE_SECONDS: f64 = 12.0;
 const UNACKNOWLEDGED_BYTES: f64 = 64_000_000.0;
 /// RustDDS's own limit.
 const UNACKNOWLEDGED_MESSAGES: f64 = 8192.0;
+/// How long a subscriber that has just been matched is given to match in turn. Now and then RustDDS does not deliver what it
+/// sends meanwhile, although it keeps it.
+const SETTLING_TIME: Duration = Duration::from_millis(200);
+/// When the first message is sent once more, for a subscriber that took longer.
+const REPETITION_TIME: Duration = Duration::from_millis(1500);
 /// More bytes than a message has besides its handles.
 pub(super) const HEADER_BYTES: usize = 200;
 /// More bytes than any message has that is not of every frame; the largest of them is the stage.
@@ -45,10 +51,25 @@ struct Latched<Message> {
     latest: Option<Arc<Message>>,
     /// Whether the latest has been written.
     is_written: bool,
-    /// Messages that the publisher has written.
+    /// Messages that the publisher has written, one that was written twice counted once.
     written: u64,
-    /// Whether somebody was there at the last look.
-    has_reader: bool,
+    /// Whether the one message has been written a second time.
+    is_repeated: bool,
+    /// Since when somebody has been there without a break.
+    reader_since: Option<Instant>,
+    /// Whether those who are there have come just now.
+    is_settling: bool,
+}
+
+impl<Message> Latched<Message> {
+    const NOTHING: Self = Self {
+        latest: None,
+        is_written: false,
+        written: 0,
+        is_repeated: false,
+        reader_since: None,
+        is_settling: false,
+    };
 }
 
 impl<Message: Serialize> Port<Message> {
@@ -62,7 +83,7 @@ impl<Message: Serialize> Port<Message> {
         if let Some(latched) = &mut self.latched {
             latched.latest = Some(Arc::clone(&message));
             latched.is_written = false;
-            if !latched.has_reader {
+            if latched.reader_since.is_none() || latched.is_settling {
                 return;
             }
         }
@@ -85,8 +106,8 @@ impl<Message: Serialize> Port<Message> {
         if let Some(latched) = &mut self.latched
             && is_written
         {
+            latched.written += u64::from(!latched.is_written);
             latched.is_written = true;
-            latched.written += 1;
         }
         is_written
     }
@@ -98,7 +119,7 @@ impl<Message: Serialize> Port<Message> {
             Err(error) => log::warn!("ROS 2 topic {}: late subscribers get old messages first: {error}", self.topic),
         }
         if let Some(latched) = &mut self.latched {
-            (latched.written, latched.is_written) = (0, false);
+            (latched.written, latched.is_written, latched.is_repeated) = (0, false, false);
         }
     }
 }
@@ -114,20 +135,26 @@ impl<Message: Serialize> Attend for Port<Message> {
     fn attend(&mut self, matches: &Matches, node: &mut Node) {
         let Some(latched) = &mut self.latched else { return };
         let readers = matches.readers(self.publisher.guid());
-        latched.has_reader = readers.any();
         if !readers.any() {
+            (latched.reader_since, latched.is_settling) = (None, false);
             let keeps_latest_alone = latched.written == 1 && latched.is_written;
             if latched.written > 0 && !keeps_latest_alone {
                 self.replace(node);
             }
-        } else if readers.transient_local > 0
-            && !latched.is_written
-            && let Some(latest) = latched.latest.clone()
-        {
+            return;
+        }
+        let present = latched.reader_since.get_or_insert_with(Instant::now).elapsed();
+        // Who has not asked for what was sent before awaits what is sent from now on, at once.
+        latched.is_settling = readers.volatile == 0 && present < SETTLING_TIME;
+        let Some(latest) = latched.latest.clone().filter(|_| readers.transient_local > 0) else { return };
+        if !latched.is_written && !latched.is_settling {
             // For those who have not asked for it, it would be news. Of a new publisher they get what comes from now on.
             if readers.volatile > 0 {
                 self.replace(node);
             }
+            self.write(latest);
+        } else if latched.written == 1 && readers.volatile == 0 && !latched.is_repeated && present >= REPETITION_TIME {
+            latched.is_repeated = true;
             self.write(latest);
         }
     }
@@ -188,8 +215,7 @@ impl Maker<'_> {
             .create_topic(format!("rt{name}"), type_name, &policies(*qos, bytes, rate), TopicKind::NoKey)
             .map_err(|error| failed(&error))?;
         let publisher = self.node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
-        let nothing = Latched { latest: None, is_written: false, written: 0, has_reader: false };
-        let latched = (qos.durability == Durability::TransientLocal).then_some(nothing);
+        let latched = (qos.durability == Durability::TransientLocal).then_some(Latched::NOTHING);
         Ok(Some(Port { publisher, dds, topic: name, reported: false, latched }))
     }
 }
