@@ -211,10 +211,10 @@ fn a_wrong_byte_costs_frames_and_invents_none() {
     let all = contents(&file, None).unwrap();
     let damaged = folder.path().join("damaged.mcap");
     // An index without one of its chunks: a record of its kind (8) becomes one that readers pass over.
-    let chunk_indexes =
+    let mut chunk_indexes =
         (0..bytes.len() - 9).filter(|at| bytes[*at] == 8 && (60..300).contains(&length_at(&bytes, at + 1)));
     let mut wrong = bytes.clone();
-    wrong[chunk_indexes.last().unwrap()] = 0x80;
+    wrong[chunk_indexes.next_back().unwrap()] = 0x80;
     std::fs::write(&damaged, &wrong).unwrap();
     let refusal = contents(&damaged, None).unwrap_err().to_string();
     assert!(refusal.contains("Summary section CRC failed"), "{refusal}");
