@@ -249,9 +249,8 @@ fn add_channels<Output: Write + Seek>(
 
 /// What every file of this program is written with.
 pub(super) fn options() -> WriteOptions {
-    WriteOptions::new()
+    WriteOptions::library(WriteOptions::new(), concat!("bench-dragon ", env!("CARGO_PKG_VERSION")))
         .profile("ros2")
-        .library(concat!("bench-dragon ", env!("CARGO_PKG_VERSION")))
         .compression(Some(Compression::Zstd))
         .compression_level(COMPRESSION_LEVEL)
         .compression_threads(0)

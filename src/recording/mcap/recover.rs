@@ -7,10 +7,10 @@ use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
 
 use mcap::read::parse_record;
-use mcap::records::{self, Record, op};
+use mcap::records::{self, Header, Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::write::NoSeek;
-use mcap::{Attachment, MAGIC, McapError, Schema, Writer};
+use mcap::{Attachment, MAGIC, McapError, Schema, WriteOptions, Writer};
 use serde::Serialize;
 
 use super::file::{io_error, options};
@@ -92,9 +92,9 @@ pub fn recover(input: impl Read, length: u64, output: impl Write) -> Result<Reco
     let mut opcode = input.next()?;
     let mut made = options();
     if opcode == Some(op::HEADER)
-        && let Ok(Record::Header(header)) = parse_record(op::HEADER, &input.body)
+        && let Ok(Record::Header(Header { profile, library })) = parse_record(op::HEADER, &input.body)
     {
-        made = made.profile(header.profile).library(header.library);
+        made = WriteOptions::library(made.profile(profile), library);
         opcode = input.next()?;
     }
     let writer = made.create(NoSeek::new(output))?;
