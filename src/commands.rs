@@ -29,6 +29,7 @@ pub mod verify;
 pub mod view;
 pub mod watch;
 
+use std::ffi::OsString;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
@@ -49,9 +50,9 @@ pub struct Common {
     /// The scene to play (TOML); without it, the paper's, which is built in
     #[arg(long, value_name = "FILE", global = true)]
     pub scene: Option<std::path::PathBuf>,
-    /// The name under which services and topics appear
-    #[arg(long, value_name = "NAME", global = true, default_value = "bench_dragon")]
-    pub name: String,
+    /// The name under which services and topics appear; view, send and metrics take several
+    #[arg(long = "name", value_name = "NAME", global = true, default_value = "bench_dragon")]
+    pub names: Vec<String>,
     /// Print JSON lines for machines
     #[arg(long, global = true)]
     pub json: bool,
@@ -64,6 +65,45 @@ pub struct Common {
 }
 
 impl Common {
+    /// The first name; the only one for a command of one publisher.
+    pub fn name(&self) -> &str {
+        // The default stands where none is given.
+        self.names.first().map_or("", String::as_str)
+    }
+
+    /// Tests the names: each once, one alone where the command is of one publisher, and all of them in one place, since those
+    /// after the command would replace those before it.
+    ///
+    /// # Errors
+    /// Bad input: the sentence says what was expected.
+    pub fn check_names(&self, takes_several: bool) -> Result<(), CommandError> {
+        let refused = |sentence: String| Err(CommandError::BadInput(sentence));
+        let is_option = |argument: &OsString| {
+            argument.to_str().is_some_and(|text| text == "--name" || text.starts_with("--name="))
+        };
+        let given = std::env::args_os().skip(1).take_while(|argument| argument != "--").filter(is_option).count();
+        let count = self.names.len();
+        if !takes_several && count.max(given) > 1 {
+            return refused(format!(
+                "--name is given {} times, expected one: this command is of one publisher; view, send and metrics take \
+                 several",
+                count.max(given)
+            ));
+        }
+        if given > count {
+            return refused("--name stands before and after the command, expected all of them in one place".to_owned());
+        }
+        match self.names.iter().enumerate().find(|(at, name)| self.names[..*at].contains(name)) {
+            Some((_, name)) => refused(format!("--name {name} is given twice, expected each name once")),
+            None => Ok(()),
+        }
+    }
+
+    /// The names for a sentence, each in quotation marks.
+    pub fn quoted_names(&self) -> String {
+        self.names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
+    }
+
     /// The scene that the command line names.
     ///
     /// # Errors

@@ -67,7 +67,9 @@ enum Command {
 fn main() -> ExitCode {
     let CommandLine { common, command } = CommandLine::parse();
     set_up_logging(&common);
-    let done = commands::end_when_shared_memory_is_full().and_then(|()| match &command {
+    let takes_several = matches!(command, Command::View(_) | Command::Send(_) | Command::Metrics(_));
+    let ready = common.check_names(takes_several).and_then(|()| commands::end_when_shared_memory_is_full());
+    let done = ready.and_then(|()| match &command {
         Command::Run(arguments) => commands::run::run(&common, arguments),
         Command::Control(arguments) => commands::control::control(&common, arguments),
         Command::Record(arguments) => commands::record::record(&common, arguments),

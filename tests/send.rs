@@ -41,55 +41,93 @@ fn end(process: Process) -> Value {
     summary(&process.output_within(DEADLINE))
 }
 
-/// What is sent in some seconds, every tracker of every frame, against the shared memory.
-fn every_tracker_is_heard(name: &str, seconds: f64, group: Option<&str>, axes: &str, first_id: u64, npm: Option<&str>) {
-    if !can_run(python_modules(&["iceoryx2", "numpy", "pypsn"])) {
-        return;
+/// What is sent, and how long.
+struct Sending<'a> {
+    name: &'a str,
+    seconds: f64,
+    group: Option<&'a str>,
+    axes: &'a str,
+    first_id: u64,
+    /// The folder of npm's decoder, which then has to see the same.
+    npm: Option<&'a str>,
+}
+
+impl Default for Sending<'_> {
+    fn default() -> Self {
+        Self { name: "psn", seconds: 2.0, group: None, axes: "x,up,y", first_id: 1, npm: None }
     }
-    let _publisher = publisher(name, &["--start", "250", "--time-scale", "2", "--duration", "600"]);
-    let (port, first) = (free_port().to_string(), first_id.to_string());
-    let mut peer = python();
-    peer.args(["tests/python/psn_peer.py", "--name", &unique(name), "--port", &port, &format!("--axes={axes}")]);
-    peer.args(["--first-id", &first]).args(group.map(|group| ["--group", group]).into_iter().flatten());
-    let mut peer = Process::start(peer.args(npm.map(|folder| ["--npm", folder]).into_iter().flatten()));
-    let lines = peer.lines();
-    lines.until("listening", DEADLINE);
-    let to = format!("{}:{port}", group.unwrap_or("127.0.0.1"));
-    let mut send = program(name);
-    send.args(["send", "psn", "--json", "--to", &to, "--interface", "127.0.0.1"]);
-    send.args([&format!("--axes={axes}"), "--first-id", &first, "--system-name", "The dragon"]);
-    let sender = Process::start(&mut send);
-    wait(seconds);
-    let sent = end(sender);
-    let last = lines.rest(DEADLINE).pop();
-    let output = peer.output_within(DEADLINE);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let heard: Value = serde_json::from_str(&last.unwrap()).unwrap();
-    println!("sent {sent}, heard {}", heard["frames"]);
-    let number = |of: &Value, field: &str| of[field].as_u64().unwrap_or_else(|| panic!("no {field} in {of}"));
-    assert!(number(&heard, "equal") > 30, "{heard}");
-    assert!(number(&heard, "unknown") <= number(&heard, "memory_missed"), "{heard}");
-    assert_eq!(number(&heard, "equal") + number(&heard, "unknown"), number(&sent, "frames"));
-    assert_eq!((number(&heard, "stopped"), number(&sent, "stopped_frames")), (1, 1), "the sender says that it ends");
-    assert_eq!((number(&heard, "packets"), number(&sent, "unsent_packets")), (number(&sent, "packets"), 0));
-    assert_eq!(number(&heard, "trackers"), 224);
-    assert!(number(&heard, "largest") <= 1472, "{heard}");
-    let names = &heard["names"];
-    assert_eq!(names.as_object().unwrap().len(), 224);
-    let named = |handle: u64| names[(first_id + handle).to_string()].as_str().unwrap();
-    assert_eq!((named(0), named(11), named(223)), ("head", "handle 12", "tail"));
-    assert_eq!(heard["systems"], json!(["The dragon"]));
+}
+
+impl Sending<'_> {
+    /// What pypsn hears of the paper's team: every tracker of every frame equals the shared memory.
+    fn of_the_paper(&self) {
+        let publish = || publisher(self.name, &["--start", "250", "--time-scale", "2", "--duration", "600"]);
+        self.is_heard(publish, 224, 30);
+    }
+
+    /// What pypsn hears of a publisher of so many handles, at least so many frames that are equal.
+    fn is_heard(&self, publish: impl FnOnce() -> Process, handles: u64, least: u64) {
+        if !can_run(python_modules(&["iceoryx2", "numpy", "pypsn"])) {
+            return;
+        }
+        let Sending { name, seconds, group, axes, first_id, npm } = *self;
+        let _publisher = publish();
+        let (port, first) = (free_port().to_string(), first_id.to_string());
+        let mut peer = python();
+        peer.args(["tests/python/psn_peer.py", "--name", &unique(name), "--port", &port, &format!("--axes={axes}")]);
+        peer.args(["--first-id", &first]).args(group.map(|group| ["--group", group]).into_iter().flatten());
+        let mut peer = Process::start(peer.args(npm.map(|folder| ["--npm", folder]).into_iter().flatten()));
+        let lines = peer.lines();
+        lines.until("listening", DEADLINE);
+        let to = format!("{}:{port}", group.unwrap_or("127.0.0.1"));
+        let mut send = program(name);
+        send.args(["send", "psn", "--json", "--to", &to, "--interface", "127.0.0.1"]);
+        send.args([&format!("--axes={axes}"), "--first-id", &first, "--system-name", "The dragon"]);
+        let sender = Process::start(&mut send);
+        wait(seconds);
+        let sent = end(sender);
+        let last = lines.rest(DEADLINE).pop();
+        let output = peer.output_within(DEADLINE);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let heard: Value = serde_json::from_str(&last.unwrap()).unwrap();
+        let number = |of: &Value, field: &str| of[field].as_u64().unwrap_or_else(|| panic!("no {field} in {of}"));
+        println!("sent {sent}, heard {}, {} equal", heard["frames"], heard["equal"]);
+        assert!(number(&heard, "equal") > least, "{}", heard["publishers"]);
+        assert!(number(&heard, "unknown") <= number(&heard, "memory_missed"), "{}", heard["publishers"]);
+        assert_eq!(number(&heard, "equal") + number(&heard, "unknown"), number(&sent, "frames"));
+        assert_eq!((number(&heard, "stopped"), number(&sent, "stopped_frames")), (1, 1), "the sender says that it ends");
+        assert_eq!((number(&heard, "packets"), number(&sent, "unsent_packets")), (number(&sent, "packets"), 0));
+        assert_eq!(number(&heard, "trackers"), handles);
+        assert!(number(&heard, "largest") <= 1472, "{} bytes", heard["largest"]);
+        let names = &heard["names"];
+        assert_eq!(names.as_object().unwrap().len() as u64, handles);
+        let named = |handle: u64| names[(first_id + handle).to_string()].as_str().unwrap();
+        assert_eq!((named(0), named(11), named(handles - 1)), ("head", "handle 12", "tail"));
+        assert_eq!(heard["systems"], json!(["The dragon"]));
+    }
 }
 
 #[test]
 fn pypsn_hears_every_tracker_of_every_frame_by_multicast() {
     let seconds = if long() { 60.0 } else { 3.0 };
-    every_tracker_is_heard("psn_multicast", seconds, Some("236.10.10.10"), "x,up,y", 1, None);
+    Sending { name: "psn_multicast", seconds, group: Some("236.10.10.10"), ..Sending::default() }.of_the_paper();
 }
 
 #[test]
 fn one_desk_hears_them_in_axes_and_numbers_of_its_own() {
-    every_tracker_is_heard("psn_axes", 2.0, None, "-y,up,x", 301, None);
+    Sending { name: "psn_axes", axes: "-y,up,x", first_id: 301, ..Sending::default() }.of_the_paper();
+}
+
+#[test]
+fn pypsn_hears_every_one_of_five_thousand() {
+    let name = "psn_5001";
+    let seconds = if long() { 60.0 } else { 4.0 };
+    let publish = || {
+        let mut run = program(name);
+        run.args(["--scene", "config/long.toml", "run", "--json", "--rate", "5", "--duration", "600"]);
+        Process::start(&mut run)
+    };
+    Sending { name, seconds, ..Sending::default() }.is_heard(publish, 5001, 5);
 }
 
 /// Needs node and npm, which fetches the decoder.
@@ -106,7 +144,7 @@ fn a_second_decoder_sees_the_same() {
         installed.and_then(|output| if output.status.success() { Ok(()) } else { Err(text(&output.stderr)) });
     if can_run(installed) {
         let package = folder.path().join("node_modules/@jwetzell/posistagenet");
-        every_tracker_is_heard("psn_npm", 10.0, None, "x,up,y", 1, package.to_str());
+        Sending { name: "psn_npm", seconds: 10.0, npm: package.to_str(), ..Sending::default() }.of_the_paper();
     }
 }
 

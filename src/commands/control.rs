@@ -81,7 +81,7 @@ pub fn control(common: &Common, arguments: &ControlArguments) -> Result<(), Comm
         Some(timeout) => controller.send(command, timeout),
         None => controller.send_patiently(command),
     };
-    let mut controller = Controller::new(&common.name)?;
+    let mut controller = Controller::new(common.name())?;
     let command = match arguments.action {
         Action::State => Command::State,
         Action::Pause => Command::Pause,

@@ -26,13 +26,13 @@ struct ReadyLine {
 /// Serves until a signal comes.
 pub fn metrics(common: &Common, arguments: &MetricsArguments) -> Result<(), CommandError> {
     let stop = stop_on_signals()?;
-    serve(&common.name, arguments.listen, &stop, |address| {
+    serve(&common.names, arguments.listen, &stop, |address| {
         let url = format!("http://{address}/metrics");
         let mut output = Output::standard();
         if common.json {
             output.json(&ReadyLine { r#type: "ready", url })?;
         } else {
-            output.line(&format!("The metrics of \"{}\" are at {url}. Ctrl-C ends.", common.name))?;
+            output.line(&format!("The metrics of {} are at {url}. Ctrl-C ends.", common.quoted_names()))?;
         }
         if !address.ip().is_loopback() {
             eprintln!("WARNING: anyone who can reach {address} can read these figures; there is no password.");

@@ -76,12 +76,12 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
     let mut topics = if arguments.topics.is_empty() { DEFAULT_TOPICS.to_vec() } else { arguments.topics.clone() };
     topics.sort_unstable();
     topics.dedup();
-    let mut feed = Feed::new(&common.name, FeedOptions { wake: Wake::Never, frames: Frames::All })?;
+    let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::Never, frames: Frames::All })?;
     let stop = stop_on_signals()?;
     // A file that may not grow is then a failed write, and no signal that ends the process.
     signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
     let config = RecorderConfig {
-        name: common.name.clone(),
+        name: common.name().to_owned(),
         file: file.clone(),
         replace: arguments.force,
         topics,
@@ -90,7 +90,7 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
     let recorder = Recorder::new(config).map_err(|error| refused(file, &error))?;
     let (queue, thread) = record::start(recorder)?;
     if !common.quiet {
-        eprintln!("Recording \"{}\" to {}; Ctrl-C ends.", common.name, file.display());
+        eprintln!("Recording \"{}\" to {}; Ctrl-C ends.", common.name(), file.display());
     }
     let over = || stop.load(Ordering::Relaxed);
     let fed = follow(&mut feed, &queue, &thread, arguments.duration, over, &progress(common));
@@ -100,7 +100,7 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
     match failure {
         Some(error) => Err(CommandError::Failed(error.to_string())),
         None if recorded.files.is_empty() => {
-            Err(CommandError::Failed(format!("nothing came from \"{}\": there is no recording", common.name)))
+            Err(CommandError::Failed(format!("nothing came from \"{}\": there is no recording", common.name())))
         }
         None => Ok(()),
     }

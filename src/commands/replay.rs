@@ -67,7 +67,7 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
     }
     // A recording cannot be conducted.
     scene.ros2.iter_mut().for_each(|settings| settings.control = false);
-    service_name(&common.name, "poses")?;
+    service_name(common.name(), "poses")?;
     let shown = arguments.file.display().to_string();
     let refused = |error: ReadError| CommandError::BadInput(format!("{shown}: {error}"));
     let prepared = Prepared::open(&arguments.file, options).map_err(refused)?;
@@ -137,7 +137,7 @@ fn config<'a>(common: &'a Common, scene: &'a Scene, prepared: &Prepared, run_id:
         handles: contents.ends[0].handles as usize,
         alerts: contents.topics.contains(&Topic::Alerts),
         cues: (stage.cues as usize).min(MOST_CUES),
-        ..TransportConfig::of(&common.name, scene, prepared.rate(), stage)
+        ..TransportConfig::of(common.name(), scene, prepared.rate(), stage)
     }
 }
 

@@ -90,7 +90,7 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
         settings.control = true;
     }
     let playback = arguments.playback(&scene)?;
-    service_name(&common.name, "poses")?;
+    service_name(common.name(), "poses")?;
     let timeline = if scene.alerts.is_some() {
         search_timeline(&scene, common)
     } else {
@@ -133,7 +133,7 @@ impl RunSession<'_> {
     /// Opens what is published to, publishes, and prints the summary.
     fn run(&self, mut show: Show, stop: &AtomicBool) -> Result<(), CommandError> {
         let stage = convert::stage(self.run_id, realtime_ns(), &self.scene.motion, &show);
-        let config = TransportConfig::of(&self.common.name, self.scene, self.playback.rate, stage);
+        let config = TransportConfig::of(self.common.name(), self.scene, self.playback.rate, stage);
         let (mut transports, doors) = open_transports(&config)?;
         // The last of them: what reaches the log has been published.
         let log = self.open_log()?.map(|(transport, outcome)| {

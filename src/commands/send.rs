@@ -8,11 +8,11 @@ use bench_dragon::subscribers::polling::poll_until;
 use bench_dragon::subscribers::send::axes::Axes;
 use bench_dragon::subscribers::send::network::{NetworkError, Outlet, Route, destination};
 use bench_dragon::subscribers::send::osc::Addresses;
-use bench_dragon::subscribers::send::osc_sender::{MOST_RATE, OscSender};
+use bench_dragon::subscribers::send::osc_sender::{MOST_RATE, OscSender, OscSenders};
 use bench_dragon::subscribers::send::psn_sender::{
     Notice, PsnOptions, PsnSender, USUAL_ADDRESS, USUAL_PORT, USUAL_RATE,
 };
-use bench_dragon::subscribers::send::trackers::Selection;
+use bench_dragon::subscribers::send::trackers::{Numbers, Selection};
 
 use super::{CommandError, Common, Output, number, stop_on_signals};
 
@@ -40,7 +40,7 @@ struct PsnArguments {
     /// The address of this machine's interface to send by; without it, the machine's routes decide
     #[arg(long, value_name = "IP")]
     interface: Option<Ipv4Addr>,
-    /// Which handles, counted from 1: all, head, tail, 1,2,9 or head,20-40
+    /// Which handles of each publisher, counted from 1: all, head, tail, 1,2,9 or head,20-40
     #[arg(long, value_name = "WHICH", default_value = "all")]
     trackers: Selection,
     /// What the desk's x, y and z are: the stage's x, y (into the depth) and up, in any order, with a minus to reverse one
@@ -52,10 +52,13 @@ struct PsnArguments {
     /// Frames per second at most, up to 250; a slower publisher sets its own
     #[arg(long, value_name = "HZ", default_value_t = USUAL_RATE, value_parser = rate::<250>)]
     rate: f64,
-    /// The tracker number of the head, so that several dragons fit one desk
+    /// The tracker number of the head, of the first publisher where there are several
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     first_id: u16,
-    /// The name under which desks list this sender; without it, the publisher's
+    /// How far the tracker numbers of several publishers' heads are apart
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u16).range(1..))]
+    id_step: u16,
+    /// The name under which desks list this sender; without it, the publisher's, or bench-dragon for several
     #[arg(long, value_name = "S", value_parser = system_name)]
     system_name: Option<String>,
 }
@@ -103,14 +106,15 @@ pub fn send(common: &Common, arguments: &SendArguments) -> Result<(), CommandErr
 fn psn(common: &Common, arguments: &PsnArguments) -> Result<(), CommandError> {
     let stop = stop_on_signals()?;
     let PsnArguments { to, interface, ttl, rate, axes, .. } = *arguments;
+    let names = &common.names;
+    let numbers = numbers(names, arguments)?;
     let outlet = Outlet::open(&[to], Route { interface, multicast_ttl: ttl })?;
-    let name = &common.name;
     print(common, || {
         let by = interface.map_or(String::new(), |interface| format!(" by {interface}"));
         let ttl = if to.ip().is_multicast() { format!(", TTL {ttl}") } else { String::new() };
         format!(
-            "Sending \"{name}\" as PosiStageNet 2.03 to {to}{by}{ttl}: at most {} frames per second, x,y,z = {axes}. \
-             Ctrl-C ends.",
+            "Sending {} as PosiStageNet 2.03 to {to}{by}{ttl}: at most {} frames per second, x,y,z = {axes}. Ctrl-C ends.",
+            common.quoted_names(),
             number(rate)
         )
     })?;
@@ -118,21 +122,24 @@ fn psn(common: &Common, arguments: &PsnArguments) -> Result<(), CommandError> {
         trackers: arguments.trackers.clone(),
         axes,
         rate,
-        first_id: arguments.first_id,
-        system_name: arguments.system_name.clone().unwrap_or_else(|| name.clone()),
+        numbers,
+        system_name: arguments.system_name.clone().unwrap_or_else(|| match &names[..] {
+            [only] => only.clone(),
+            _ => "bench-dragon".to_owned(),
+        }),
     };
     let mut printed = Ok(());
-    let mut notify = |notice: Notice| {
+    let mut notify = |publisher: usize, notice: Notice| {
         if let Notice::LeftOut(sentence) = notice {
             log::warn!("{sentence}");
         } else if printed.is_ok() {
-            printed = print(common, || notice_line(name, &notice));
+            printed = print(common, || notice_line(names.get(publisher).map_or("", String::as_str), &notice));
             // Whoever read this has gone, as `| head` does.
             stop.fetch_or(printed.is_err(), Ordering::Relaxed);
         }
     };
     let mut sender = PsnSender::new(options, outlet, &mut notify);
-    poll_until(&stop, name, Frames::Newest, &mut sender)?;
+    poll_until(&stop, names, Frames::Newest, &mut sender)?;
     let summary = sender.finish();
     printed?;
     let mut output = Output::standard();
@@ -147,25 +154,50 @@ fn psn(common: &Common, arguments: &PsnArguments) -> Result<(), CommandError> {
     output.finish()
 }
 
+/// The numbers of each publisher's trackers.
+fn numbers(names: &[String], arguments: &PsnArguments) -> Result<Vec<Numbers>, CommandError> {
+    let PsnArguments { first_id, id_step, .. } = *arguments;
+    if names.len() == 1 {
+        return Ok(vec![Numbers::from(first_id)]);
+    }
+    Numbers::of_several(names, first_id, id_step).ok_or_else(|| {
+        CommandError::BadInput(format!(
+            "--first-id {first_id} and --id-step {id_step} leave no tracker numbers for {} publishers, expected the last \
+             head's at most {}",
+            names.len(),
+            u16::MAX
+        ))
+    })
+}
+
 fn osc(common: &Common, arguments: &OscArguments) -> Result<(), CommandError> {
     let stop = stop_on_signals()?;
     let OscArguments { to, interface, rate } = arguments;
-    let outlet = Outlet::open(to, Route { interface: *interface, multicast_ttl: 1 })?;
-    let addresses = Addresses::new(&common.name);
+    let addresses: Vec<_> = common.names.iter().map(|name| Addresses::new(name)).collect();
+    let prefixes: Vec<_> = addresses.iter().map(|addresses| addresses.prefix().to_owned()).collect();
+    if let Some(twice) = prefixes.iter().enumerate().find(|(at, prefix)| prefixes[..*at].contains(prefix)) {
+        let sentence = format!("two of the names have the OSC address {}, expected names that differ there", twice.1);
+        return Err(CommandError::BadInput(sentence));
+    }
+    let sender = |addresses| {
+        let outlet = Outlet::open(to, Route { interface: *interface, multicast_ttl: 1 })?;
+        Ok(OscSender::new(addresses, *rate, outlet))
+    };
+    let senders = addresses.into_iter().map(sender).collect::<Result<_, NetworkError>>()?;
+    let mut senders = OscSenders::new(senders);
     print(common, || {
         let to = to.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
         let by = interface.map_or(String::new(), |interface| format!(" by {interface}"));
         format!(
-            "Sending \"{}\" as OSC to {to}{by}: {}/alert, countdown, state, cue, head, sim_time; at most {} frames per \
+            "Sending {} as OSC to {to}{by}: {}/alert, countdown, state, cue, head, sim_time; at most {} frames per \
              second. Ctrl-C ends.",
-            common.name,
-            addresses.prefix(),
+            common.quoted_names(),
+            prefixes.join(", "),
             number(*rate)
         )
     })?;
-    let mut sender = OscSender::new(addresses, *rate, outlet);
-    poll_until(&stop, &common.name, Frames::Newest, &mut sender)?;
-    let summary = sender.finish();
+    poll_until(&stop, &common.names, Frames::Newest, &mut senders)?;
+    let summary = senders.finish();
     let mut output = Output::standard();
     if common.json {
         output.json(&summary)?;

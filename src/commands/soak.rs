@@ -160,7 +160,7 @@ fn conclude(report: &Report, common: &Common, files: Option<ReportFiles>) -> Res
 impl SoakArguments {
     fn check(&self, common: &Common) -> Result<(), CommandError> {
         let admitted = common.load_scene()?.subscribers;
-        iceoryx2::service_name(&common.name, "poses")?;
+        iceoryx2::service_name(common.name(), "poses")?;
         if let Some(rate) = self.rate {
             Accepted::RATE.check("--rate", rate).map_err(CommandError::BadInput)?;
         }
@@ -188,7 +188,7 @@ impl SoakArguments {
     }
 
     fn plan(&self, common: &Common) -> Result<Plan, CommandError> {
-        let mut shared: Vec<OsString> = vec!["--name".into(), (&common.name).into()];
+        let mut shared: Vec<OsString> = vec!["--name".into(), common.name().into()];
         if let Some(scene) = &common.scene {
             shared.extend(["--scene".into(), scene.into()]);
         }
@@ -267,7 +267,7 @@ impl ReportFiles {
 /// Observes until a signal comes, an observation a second on standard output.
 pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result<(), CommandError> {
     end_with_parent()?;
-    let mut feed = Feed::new(&common.name, FeedOptions { wake: Wake::OnFrame, frames: Frames::All })?;
+    let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::OnFrame, frames: Frames::All })?;
     let mut observer = Observer::new(common.load_scene()?.motion.link_tolerance());
     let stop = stop_on_signals()?;
     let mut output = std::io::stdout().lock();

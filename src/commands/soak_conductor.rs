@@ -32,7 +32,7 @@ pub fn conduct(common: &Common, arguments: &SoakConductorArguments) -> Result<()
     let scene = common.load_scene()?;
     let facts = ShowFacts::of(&scene, arguments.rate.unwrap_or(scene.rate));
     let mut output = std::io::stdout().lock();
-    conductor::conduct(&common.name, &facts, arguments.seed, &stop, &mut |conducted| -> Result<(), CommandError> {
+    conductor::conduct(common.name(), &facts, arguments.seed, &stop, &mut |conducted| -> Result<(), CommandError> {
         serde_json::to_writer(&mut output, &conducted).map_err(std::io::Error::from)?;
         writeln!(output)?;
         Ok(output.flush()?)
@@ -43,7 +43,7 @@ pub fn conduct(common: &Common, arguments: &SoakConductorArguments) -> Result<()
 pub fn client(common: &Common) -> Result<(), CommandError> {
     end_with_parent()?;
     let stop = stop_on_signals()?;
-    let Some(mut controller) = conductor::connect(&common.name, &stop) else { return Ok(()) };
+    let Some(mut controller) = conductor::connect(common.name(), &stop) else { return Ok(()) };
     while !stop.load(Ordering::Relaxed) {
         controller.send(Command::State, TIMEOUT)?;
     }

@@ -45,7 +45,7 @@ pub fn view(common: &Common, arguments: &ViewArguments) -> Result<(), CommandErr
     let stop = stop_on_signals()?;
     let ViewArguments { port, listen, control, allow_origin, pages } = arguments.clone();
     let options = ViewOptions { address: SocketAddr::new(listen, port), control, origins: allow_origin, pages };
-    serve(&common.name, options, &stop, |ready| announce(common, arguments, ready))
+    serve(&common.names, options, &stop, |ready| announce(common, arguments, ready))
 }
 
 fn announce(common: &Common, arguments: &ViewArguments, ready: &Ready) -> Result<(), CommandError> {
@@ -60,15 +60,15 @@ fn announce(common: &Common, arguments: &ViewArguments, ready: &Ready) -> Result
         output.json(&ReadyLine { r#type: "ready", url, others, token })?;
         return output.finish();
     }
-    let (name, of_all) = (&common.name, address.ip().is_unspecified());
+    let (names, of_all) = (common.quoted_names(), address.ip().is_unspecified());
     if of_all {
         output.line(&format!(
-            "The stage picture of \"{name}\" is at port {port} of every address of this machine; here, \
+            "The stage picture of {names} is at port {port} of every address of this machine; here, \
              http://localhost:{port}/{fragment}. Ctrl-C ends."
         ))?;
         others.iter().try_for_each(|url| output.line(&format!("  from elsewhere: {url}{fragment}")))?;
     } else {
-        output.line(&format!("The stage picture of \"{name}\" is at http://{address}/{fragment}. Ctrl-C ends."))?;
+        output.line(&format!("The stage picture of {names} is at http://{address}/{fragment}. Ctrl-C ends."))?;
     }
     if arguments.pages.is_some() {
         let host = if of_all { format!("localhost:{port}") } else { address.to_string() };

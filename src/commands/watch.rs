@@ -66,7 +66,7 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
         (false, true) => Display::Terminal,
         (false, false) => Display::Lines,
     };
-    let mut feed = Feed::new(&common.name, FeedOptions { wake: Wake::OnFrame, frames: Frames::All })?;
+    let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::OnFrame, frames: Frames::All })?;
     let mut monitor = Monitor::default();
     let stop = stop_on_signals()?;
     let began = Instant::now();
@@ -74,12 +74,12 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
     let interval = Duration::from_secs(1);
     let mut next = began + interval;
     let mut screen =
-        Screen { display, name: &common.name, time_scale: 1.0, benches: 0, drawn: Vec::new(), answer: None };
+        Screen { display, name: common.name(), time_scale: 1.0, benches: 0, drawn: Vec::new(), answer: None };
     let has_keys = display == Display::Terminal && stdin().is_terminal();
-    let mut keyboard = if has_keys { Some(Keyboard::new(&common.name, &stop)?) } else { None };
+    let mut keyboard = if has_keys { Some(Keyboard::new(common.name(), &stop)?) } else { None };
     if display != Display::Json {
         let keys = if has_keys { ", ? lists the keys" } else { "" };
-        eprintln!("Watching \"{}\"; Ctrl-C ends{keys}.", common.name);
+        eprintln!("Watching \"{}\"; Ctrl-C ends{keys}.", common.name());
     }
     while !stop.load(Ordering::Relaxed) {
         let now = Instant::now();

@@ -181,8 +181,11 @@ impl Connection {
         open.into_iter().filter(|open| !open).count()
     }
 
-    /// Waits until a frame is announced, or for `timeout` but at least 1 ms.
+    /// Waits until a frame is announced, or for `timeout` but at least 1 ms; not at all where that is zero.
     pub fn wait(&self, timeout: Duration) {
+        if timeout.is_zero() {
+            return;
+        }
         // iceoryx2 takes less than a microsecond for "for ever".
         let timeout = timeout.max(Duration::from_millis(1));
         let waited = self.tick.as_ref().map(|tick| tick.timed_wait(|_| (), timeout));

@@ -1,7 +1,7 @@
-//! The figures of a running publisher for Prometheus, over HTTP. In: the services of a name, one more subscriber of them.
-//! Out: text at `/metrics`. Called by the command `metrics`.
+//! The figures of running publishers for Prometheus, over HTTP. In: the services of one name or several, one more subscriber of
+//! them. Out: text at `/metrics`, in which the label `name` tells them apart. Called by the command `metrics`.
 //!
-//! A [`Monitor`] on a thread of its own takes all that comes, since ports cannot leave the thread that made them; each
+//! A [`Monitor`] for each publisher, on a thread of its own takes all that comes, since ports cannot leave the thread that made them; each
 //! request gets what it knows at that moment. In `families`, which figures; in `exposition`, the text.
 
 pub mod exposition;
@@ -17,11 +17,11 @@ use axum::extract::State;
 use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use exposition::{Format, render};
-use families::families;
+use exposition::{Family, Format, render};
+use families::{families, joined};
 
 use super::feed::{FeedEvent, Frames};
-use super::monitor::{IntervalReport, Monitor};
+use super::monitor::Monitor;
 use super::polling::{Handler, poll_until};
 use crate::live::clock::monotonic_ns;
 use crate::transports::iceoryx2::{OpenError, service_name};
@@ -46,49 +46,58 @@ pub enum MetricsError {
 
 #[derive(Clone)]
 struct Server {
-    name: Arc<str>,
-    monitor: Arc<Mutex<Monitor>>,
+    names: Arc<[String]>,
+    /// One for each name.
+    monitors: Arc<[Mutex<Monitor>]>,
 }
 
 impl Server {
-    fn report(&self) -> IntervalReport {
+    fn new(names: &[String]) -> Self {
+        Self { names: names.into(), monitors: names.iter().map(|_| Mutex::default()).collect() }
+    }
+
+    /// Every publisher's figures, each family once.
+    fn families(&self) -> Vec<Family> {
         // A monitor that a panic left behind is still the best there is.
-        self.monitor.lock().unwrap_or_else(PoisonError::into_inner).report()
+        let report = |monitor: &Mutex<Monitor>| monitor.lock().unwrap_or_else(PoisonError::into_inner).report();
+        joined(self.names.iter().zip(&*self.monitors).map(|(name, monitor)| families(name, &report(monitor))))
     }
 }
 
 impl Handler for Server {
-    fn handle(&mut self, event: FeedEvent<'_>) {
+    fn handle(&mut self, publisher: usize, event: FeedEvent<'_>) {
         let received_ns = monotonic_ns();
-        self.monitor.lock().unwrap_or_else(PoisonError::into_inner).handle(&event, received_ns);
+        if let Some(monitor) = self.monitors.get(publisher) {
+            monitor.lock().unwrap_or_else(PoisonError::into_inner).handle(&event, received_ns);
+        }
     }
 
     fn polled(&mut self, _now: Instant) {}
 }
 
-/// Serves the figures of the publisher `name` at `address` until `stop` is set; port 0 takes any free one. `ready` is
+/// Serves the figures of the publishers `names` at `address` until `stop` is set; port 0 takes any free one. `ready` is
 /// called with the address once requests are answered.
 ///
 /// # Errors
 /// [`MetricsError`] for a name or an address that cannot be used.
 pub fn serve<Refused: From<MetricsError>>(
-    name: &str,
+    names: &[String],
     address: SocketAddr,
     stop: &Arc<AtomicBool>,
     ready: impl FnOnce(SocketAddr) -> Result<(), Refused>,
 ) -> Result<(), Refused> {
-    service_name(name, "poses").map_err(MetricsError::from)?;
+    names.iter().try_for_each(|name| service_name(name, "poses").map(drop)).map_err(MetricsError::from)?;
     let listen = |source| MetricsError::Listen { address, source };
     // One thread for all requests: they must not take the cores a publisher on this machine needs.
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(listen)?;
     let listener = runtime.block_on(tokio::net::TcpListener::bind(address)).map_err(listen)?;
     ready(listener.local_addr().map_err(listen)?)?;
-    let server = Server { name: name.into(), monitor: Arc::default() };
+    let server = Server::new(names);
     let reader = std::thread::spawn({
-        let (name, mut handler, stop) = (name.to_owned(), server.clone(), Arc::clone(stop));
+        let (names, mut handler, stop) = (Arc::clone(&server.names), server.clone(), Arc::clone(stop));
         move || {
             // Every frame, so that one that is missing was lost.
-            let read = poll_until(&stop, &name, Frames::All, &mut handler);
+            let read = poll_until(&stop, &names, Frames::All, &mut handler);
             stop.store(true, Ordering::Relaxed);
             read
         }
@@ -119,6 +128,6 @@ async fn stopped(stop: &AtomicBool) {
 async fn metrics(State(server): State<Server>, headers: HeaderMap) -> Response {
     let accept = headers.get_all(header::ACCEPT).iter().filter_map(|accept| accept.to_str().ok());
     let format = Format::accepted(&accept.collect::<Vec<_>>().join(","));
-    let text = render(&families(&server.name, &server.report()), format);
+    let text = render(&server.families(), format);
     ([(header::CONTENT_TYPE, format.content_type()), (header::CACHE_CONTROL, "no-store")], text).into_response()
 }

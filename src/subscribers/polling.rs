@@ -1,5 +1,5 @@
 //! The loop of a subscriber that is not woken by frames: what `send` and `metrics` stand on. In: the events of a
-//! [`Feed`]. Out: calls of a [`Handler`].
+//! [`Feed`] for each publisher. Out: calls of a [`Handler`].
 //!
 //! To be woken by each frame would cost the publisher more than it saves here; polling costs it nothing.
 
@@ -17,30 +17,48 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(200);
 
 /// What is called with all that comes.
 pub trait Handler {
-    /// Takes in what has come.
-    fn handle(&mut self, event: FeedEvent<'_>);
+    /// Takes in what has come from a publisher, which is known by its place in the list of names, from 0.
+    fn handle(&mut self, publisher: usize, event: FeedEvent<'_>);
     /// Does what is due, whether anything has come or not.
     fn polled(&mut self, now: Instant);
 }
 
-/// Feeds a handler from the services of a name, through any number of publishers, until `stop` is set.
+/// The feed of one publisher, and why it cannot be used where that is so.
+struct Source {
+    feed: Feed,
+    reason: Option<String>,
+    next: Instant,
+}
+
+/// Feeds a handler from the services of each name, through any number of publishers, until `stop` is set.
 ///
 /// # Errors
 /// [`OpenError`] for a name that iceoryx2 cannot take, or where this process may not use the shared memory. Services that
-/// cannot be used later on are waited for; the log names the reason once.
-pub fn poll_until(stop: &AtomicBool, name: &str, frames: Frames, handler: &mut impl Handler) -> Result<(), OpenError> {
-    let mut feed = Feed::new(name, FeedOptions { wake: Wake::Never, frames })?;
-    let mut reason: Option<String> = None;
+/// cannot be used later on are waited for, and keep no other waiting; the log names the reason once.
+pub fn poll_until(
+    stop: &AtomicBool,
+    names: &[String],
+    frames: Frames,
+    handler: &mut impl Handler,
+) -> Result<(), OpenError> {
+    let source = |name: &String| {
+        let feed = Feed::new(name, FeedOptions { wake: Wake::Never, frames })?;
+        Ok(Source { feed, reason: None, next: Instant::now() })
+    };
+    let mut sources = names.iter().map(source).collect::<Result<Vec<_>, OpenError>>()?;
     while !stop.load(Ordering::Relaxed) {
-        let polled = feed.poll(POLL_INTERVAL, &mut |event| handler.handle(event));
-        handler.polled(Instant::now());
-        // The services may become usable while this continues: a program of another version ends, a subscriber leaves.
-        let now = polled.err().map(|error| error.to_string());
-        if now.is_some() {
-            now.iter().filter(|_| now != reason).for_each(|sentence| log::warn!("{sentence}"));
-            std::thread::sleep(RETRY_INTERVAL);
+        std::thread::sleep(POLL_INTERVAL);
+        for (publisher, source) in sources.iter_mut().enumerate().filter(|(_, source)| source.next <= Instant::now()) {
+            let polled = source.feed.poll(Duration::ZERO, &mut |event| handler.handle(publisher, event));
+            // The services may become usable while this continues: a program of another version ends, a subscriber leaves.
+            let now = polled.err().map(|error| error.to_string());
+            if now.is_some() {
+                now.iter().filter(|_| now != source.reason).for_each(|sentence| log::warn!("{sentence}"));
+                source.next = Instant::now() + RETRY_INTERVAL;
+            }
+            source.reason = now;
         }
-        reason = now;
+        handler.polled(Instant::now());
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! What takes the dragon out of the machine: trackers for lighting desks ([`psn_sender`]), OSC messages ([`osc_sender`]).
 //!
-//! Each is a handler of one more subscriber, in a process of its own. Here is what they have in common: which frames are due,
+//! Each is a handler of one more subscriber of each publisher, in a process of its own. Here is what they have in common: which frames are due,
 //! and when frames have stopped. In: the events of a feed. Out: UDP datagrams. Called by the command `send`.
 
 pub mod axes;
@@ -9,6 +9,7 @@ pub mod osc;
 pub mod osc_sender;
 pub mod psn;
 pub mod psn_sender;
+mod psn_source;
 pub mod trackers;
 
 use std::time::{Duration, Instant};

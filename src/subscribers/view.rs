@@ -1,8 +1,10 @@
-//! The live stage picture: reads a publisher's frames and serves them to browsers, with the page that draws them.
+//! The live stage picture: reads the frames of one publisher or several and serves them to browsers, with the page that draws
+//! them.
 //!
-//! Called by the `view` command. `reader` reads the shared memory on a thread of its own, since ports cannot leave the
-//! thread that made them, and hands the newest picture over; `browser` sends it to one browser at that one's pace;
-//! `wire` is its layout on the way. `origin` is who may connect, `gate` who may command, and how.
+//! Called by the `view` command. `reader` reads a publisher's shared memory on a thread of its own, since ports cannot leave
+//! the thread that made them, and hands the newest picture over; `browser` sends it to one browser at that one's pace, over
+//! one WebSocket for each publisher; `wire` is its layout on the way. `origin` is who may connect, `gate` who may command,
+//! and how.
 
 mod browser;
 mod gate;
@@ -20,7 +22,7 @@ use axum::Router;
 use axum::body::Bytes;
 use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::ws::{Utf8Bytes, WebSocketUpgrade};
-use axum::extract::{RawQuery, Request, State as Shared};
+use axum::extract::{Query, Request, State as Shared};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Redirect, Response};
@@ -62,8 +64,15 @@ impl Picture {
 
 #[derive(Clone)]
 struct Server {
-    pictures: watch::Receiver<Picture>,
+    channels: Arc<[Channel]>,
     admission: Arc<Admission>,
+}
+
+/// What a browser is served of one publisher.
+#[derive(Clone)]
+struct Channel {
+    name: String,
+    pictures: watch::Receiver<Picture>,
     /// `None` where nobody may command.
     gate: Option<Arc<Gate>>,
 }
@@ -120,18 +129,18 @@ pub enum ViewError {
     Token(#[from] getrandom::Error),
 }
 
-/// Serves the picture of the publisher `name` until `stop` is set. `ready` is called once browsers can connect.
+/// Serves the picture of the publishers `names` until `stop` is set. `ready` is called once browsers can connect.
 ///
 /// # Errors
 /// [`ViewError`] for a name, an address or a folder that cannot be used.
 pub fn serve<Refused: From<ViewError>>(
-    name: &str,
+    names: &[String],
     options: ViewOptions,
     stop: &Arc<AtomicBool>,
     ready: impl FnOnce(&Ready) -> Result<(), Refused>,
 ) -> Result<(), Refused> {
     let ViewOptions { address, control, origins, pages } = options;
-    service_name(name, "poses").map_err(ViewError::from)?;
+    names.iter().try_for_each(|name| service_name(name, "poses").map(drop)).map_err(ViewError::from)?;
     if let Some(folder) = &pages {
         std::fs::read_dir(folder).map_err(|source| ViewError::Pages { folder: folder.clone(), source })?;
     }
@@ -143,19 +152,22 @@ pub fn serve<Refused: From<ViewError>>(
     let loopback = address.ip().is_loopback();
     let needs_token = control && (!loopback || !origins.is_empty());
     let token = if needs_token { Some(Token::random().map_err(ViewError::from)?) } else { None };
-    let gate = if control { Some(Arc::new(Gate::new(name, token.clone()).map_err(listen)?)) } else { None };
-    ready(&Ready { address, token })?;
-    let (sender, pictures) = watch::channel(Picture::default());
-    let reader = std::thread::spawn({
-        let (name, stop) = (name.to_owned(), Arc::clone(stop));
-        move || {
+    let gate = |name: &str| control.then(|| Gate::new(name, token.clone()).map(Arc::new)).transpose();
+    let gates = names.iter().map(|name| gate(name)).collect::<Result<Vec<_>, _>>().map_err(listen)?;
+    ready(&Ready { address, token: token.clone() })?;
+    let (mut channels, mut readers) = (Vec::new(), Vec::new());
+    for (name, gate) in names.iter().zip(gates) {
+        let (sender, pictures) = watch::channel(Picture::default());
+        channels.push(Channel { name: name.clone(), pictures, gate });
+        let (name, stop) = (name.clone(), Arc::clone(stop));
+        readers.push(std::thread::spawn(move || {
             let read = Feed::new(&name, FEED).map(|feed| reader::read(feed, &name, &sender, &stop));
             stop.store(true, Ordering::Relaxed);
             read
-        }
-    });
+        }));
+    }
     let admission = Arc::new(Admission { loopback, origins });
-    let router = router(Server { pictures, admission, gate }, pages.as_deref());
+    let router = router(Server { channels: channels.into(), admission }, pages.as_deref());
     let served = runtime.block_on(async {
         tokio::select! {
             served = async { axum::serve(listener, router).await } => served,
@@ -163,14 +175,15 @@ pub fn serve<Refused: From<ViewError>>(
         }
     });
     stop.store(true, Ordering::Relaxed);
-    // A panic of the reader has already been printed.
-    let read = reader.join().unwrap_or(Ok(()));
+    // A panic of a reader has already been printed.
+    let read = readers.into_iter().try_for_each(|reader| reader.join().unwrap_or(Ok(())));
     served.map_err(listen)?;
     Ok(read.map_err(ViewError::from)?)
 }
 
 fn router(server: Server, pages: Option<&Path>) -> Router {
-    let file = |kind, text| get(move || async move { file(kind, text) });
+    let file = |kind, text| get(move || async move { served(kind, text) });
+    let names = publishers_module(&server.channels);
     let mut router = Router::new();
     if let Some(folder) = pages {
         let own = Router::new().fallback_service(ServeDir::new(folder));
@@ -182,12 +195,15 @@ fn router(server: Server, pages: Option<&Path>) -> Router {
         .route("/address.js", file("text/javascript; charset=utf-8", include_str!("view/address.js")))
         .route("/boards.js", file("text/javascript; charset=utf-8", include_str!("view/boards.js")))
         .route("/camera.js", file("text/javascript; charset=utf-8", include_str!("view/camera.js")))
+        .route("/dragon.js", file("text/javascript; charset=utf-8", include_str!("view/dragon.js")))
         .route("/drawing.js", file("text/javascript; charset=utf-8", include_str!("view/drawing.js")))
         .route("/hands.js", file("text/javascript; charset=utf-8", include_str!("view/hands.js")))
         .route("/hermite.js", file("text/javascript; charset=utf-8", include_str!("view/hermite.js")))
         .route("/marks.js", file("text/javascript; charset=utf-8", include_str!("view/marks.js")))
         .route("/palette.js", file("text/javascript; charset=utf-8", include_str!("view/palette.js")))
         .route("/panel.js", file("text/javascript; charset=utf-8", include_str!("view/panel.js")))
+        .route("/publishers.js", get(move || async move { served("text/javascript; charset=utf-8", names) }))
+        .route("/roster.js", file("text/javascript; charset=utf-8", include_str!("view/roster.js")))
         .route("/show.js", file("text/javascript; charset=utf-8", include_str!("view/show.js")))
         .route("/signs.js", file("text/javascript; charset=utf-8", include_str!("view/signs.js")))
         .route("/sound.js", file("text/javascript; charset=utf-8", include_str!("view/sound.js")))
@@ -207,8 +223,15 @@ async fn stopped(stop: &AtomicBool) {
     }
 }
 
+/// The module that tells the page whose dragons it draws.
+fn publishers_module(channels: &[Channel]) -> String {
+    let names: Vec<_> = channels.iter().map(|channel| &channel.name).collect();
+    // JSON is JavaScript.
+    format!("export const publishers = {};\n", serde_json::json!(names))
+}
+
 /// A file of the page, which fetches nothing from anywhere else.
-fn file(kind: &'static str, text: &'static str) -> Response {
+fn served(kind: &'static str, text: impl IntoResponse) -> Response {
     let headers = [
         (header::CONTENT_TYPE, kind),
         (header::CACHE_CONTROL, "no-cache"),
@@ -237,29 +260,37 @@ fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
 async fn frames(
     Shared(server): Shared<Server>,
     headers: HeaderMap,
-    RawQuery(query): RawQuery,
+    Query(query): Query<Vec<(String, String)>>,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Response {
     if !server.admission.allows(text_of(&headers, header::ORIGIN), text_of(&headers, header::HOST)) {
         let sentence = "a page from elsewhere may not watch the stage picture; view --allow-origin lets it in";
         return (StatusCode::FORBIDDEN, sentence).into_response();
     }
-    let Some(gap) = gap(query.as_deref().unwrap_or_default()) else {
+    let field = |wanted: &str| query.iter().find(|(field, _)| field == wanted).map(|(_, value)| value.as_str());
+    let Some(gap) = gap(field("rate")) else {
         return (StatusCode::BAD_REQUEST, "rate: expected 1 to 1000000 frames a second").into_response();
+    };
+    let mut channels = server.channels.iter();
+    let channel = match field("name") {
+        None => channels.next(),
+        Some(name) => channels.find(|channel| channel.name == name),
+    };
+    let Some(channel) = channel.cloned() else {
+        return (StatusCode::NOT_FOUND, "name: expected one of the publishers that this server was started for")
+            .into_response();
     };
     match upgrade {
         Ok(upgrade) => upgrade
             .max_frame_size(MAX_REQUEST_BYTES)
             .max_message_size(MAX_REQUEST_BYTES)
-            .on_upgrade(move |socket| browser::serve(socket, server, gap)),
+            .on_upgrade(move |socket| browser::serve(socket, channel, gap)),
         Err(_) => (StatusCode::UPGRADE_REQUIRED, "frames come over a WebSocket: open ws://.../frames").into_response(),
     }
 }
 
-/// The least time between two frames that the query of `/frames` asks for, none without a `rate`; `None` for a rate that
-/// cannot be.
-fn gap(query: &str) -> Option<Duration> {
-    let rate = query.split('&').find_map(|field| field.strip_prefix("rate="));
+/// The least time between two frames at a `rate` that was asked for, none without one; `None` for a rate that cannot be.
+fn gap(rate: Option<&str>) -> Option<Duration> {
     match rate.map(str::parse::<f64>) {
         None => Some(Duration::ZERO),
         Some(Ok(rate)) if (1.0..=1e6).contains(&rate) => Some(Duration::from_secs_f64(rate.recip())),

@@ -1,9 +1,9 @@
 """A lighting desk that checks what it hears: PosiStageNet as PyPI's pypsn decodes it, against the shared memory.
 
-    psn_peer.py --name NAME --port P [--group 236.10.10.10] [--axes x,up,y] [--first-id N] [--npm FOLDER]
+    psn_peer.py --name NAME... --port P [--group 236.10.10.10] [--axes x,up,y] [--first-id N] [--id-step N] [--npm FOLDER]
 
-Listens to UDP port P and subscribes to the publisher NAME, which has to run already. Ends once no packet has come for two
-seconds after the first. Every frame was decoded whole, and each is held against the frame of the shared memory that has the
+Listens to UDP port P and subscribes to the publishers NAME, the first of which has to run already. Ends once no packet has
+come for two seconds after the first. A frame's trackers belong to the publishers by their numbers, STEP apart. Every frame was decoded whole, and each is held against the frame of the shared memory that has the
 same head, every tracker, to float32. Prints a line when it listens, and one with what it has seen. With --npm, the decoder
 of that folder (npm's @jwetzell/posistagenet) gets the same packets and has to see the same in them.
 """
@@ -56,9 +56,10 @@ class Memory(threading.Thread):
         node = (
             iox2.NodeBuilder.new().signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
         )
-        port, last = None, None
+        port = last = None
         while not self.stop:
             if port is None:
+                last = None
                 builder = node.service_builder(iox2.ServiceName.new(f"{self.name}/poses"))
                 builder = builder.publish_subscribe(iox2.Slice[messages.HandlePose])
                 try:
@@ -71,9 +72,12 @@ class Memory(threading.Thread):
                 header = sample.user_header().contents
                 handles = messages.handles_of(sample).copy()
                 self.missed += 0 if last is None else header.sequence - last - 1
-                last = header.sequence
+                last, heard = header.sequence, time.monotonic()
                 sample.delete()
                 self.frames[np.float32([handles["x"][0], handles["y"][0]]).tobytes()] = (handles, header.time_scale)
+            # A publisher that has ended: its service is let go of, so that the next one can make it anew.
+            if last is not None and time.monotonic() - heard > 0.5:
+                port = service = None
             time.sleep(0.001)
 
 
@@ -107,6 +111,22 @@ def compare(trackers, handles, scale, axes, first_id):
     assert len({tracker.timestamp for tracker in trackers}) == 1, "timestamps"
 
 
+def hold_against(trackers, memory, axes, first_id):
+    """What one publisher's trackers of a frame are: `equal` to the shared memory's, `stopped`, or `unknown` to it."""
+    if trackers[0].status == 0:
+        assert {tracker.status for tracker in trackers} == {0.0}
+        assert all(tuple(tracker.speed) == (0, 0, 0) for tracker in trackers), "it stands still"
+        return "stopped"
+    # The head's place on the stage again.
+    place = dict(zip([axis.strip("-") for axis in axes.split(",")], trackers[0].pos))
+    sign = {axis.strip("-"): -1 if axis[0] == "-" else 1 for axis in axes.split(",")}
+    key = np.float32([place["x"] * sign["x"], place["y"] * sign["y"]]).tobytes()
+    if key not in memory.frames:
+        return "unknown"
+    compare(trackers, *memory.frames[key], axes, first_id)
+    return "equal"
+
+
 def decode_again(folder, packets, frames, names):
     """The same packets through npm's decoder: the same trackers in every frame."""
     script = pathlib.Path(__file__).with_name("psn_npm.mjs")
@@ -122,17 +142,19 @@ def decode_again(folder, packets, frames, names):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--name", required=True)
+    parser.add_argument("--name", required=True, action="append")
     parser.add_argument("--port", type=int, required=True)
     parser.add_argument("--group")
     parser.add_argument("--axes", default="x,up,y")
     parser.add_argument("--first-id", type=int, default=1)
+    parser.add_argument("--id-step", type=int, default=1000)
     parser.add_argument("--npm")
     arguments = parser.parse_args()
 
-    memory = Memory(arguments.name)
-    memory.start()
-    while not memory.frames:
+    memories = [Memory(name) for name in arguments.name]
+    for memory in memories:
+        memory.start()
+    while not memories[0].frames:
         time.sleep(0.01)
     sock, packets = listen(arguments.port, arguments.group), []
     print(json.dumps({"type": "listening"}), flush=True)
@@ -143,8 +165,9 @@ def main():
             sock.settimeout(2)
     except TimeoutError:
         assert packets, "nothing was sent"
-    memory.stop = True
-    memory.join()
+    for memory in memories:
+        memory.stop = True
+        memory.join()
 
     frames, begun, names, systems, last_time = [], None, {}, set(), -1
     for packet in packets:
@@ -170,22 +193,19 @@ def main():
     # npm's decoder takes a frame with the number 0 for one without a number.
     assert all(later == sooner % 255 + 1 for sooner, later in zip(ids, ids[1:])), "none is lost"
 
-    equal, unknown, stopped = 0, 0, 0
+    seen = [{"equal": 0, "unknown": 0, "stopped": 0, "changes": []} for _ in memories]
     for _, trackers in frames:
-        if trackers[0].status == 0:
-            assert {tracker.status for tracker in trackers} == {0.0}
-            assert all(tuple(tracker.speed) == (0, 0, 0) for tracker in trackers), "it stands still"
-            stopped += 1
-            continue
-        # The head's place on the stage again.
-        place = dict(zip([axis.strip("-") for axis in arguments.axes.split(",")], trackers[0].pos))
-        sign = {axis.strip("-"): -1 if axis[0] == "-" else 1 for axis in arguments.axes.split(",")}
-        key = np.float32([place["x"] * sign["x"], place["y"] * sign["y"]]).tobytes()
-        if key not in memory.frames:
-            unknown += 1
-            continue
-        compare(trackers, *memory.frames[key], arguments.axes, arguments.first_id)
-        equal += 1
+        for place, (memory, counts) in enumerate(zip(memories, seen)):
+            first = arguments.first_id + place * arguments.id_step
+            part = [one for one in trackers if first <= one.id and (one.id < first + arguments.id_step or len(seen) == 1)]
+            what = hold_against(part, memory, arguments.axes, first) if part else "absent"
+            if what != "absent":
+                counts[what] += 1
+            state = "moving" if what in ("equal", "unknown") else what
+            if counts["changes"][-1:] != [state]:
+                counts["changes"].append(state)
+    equal, unknown, stopped = (seen[0][what] for what in ("equal", "unknown", "stopped"))
+    memory = memories[0]
     if arguments.npm:
         decode_again(arguments.npm, packets, frames, names)
     print(
@@ -202,6 +222,7 @@ def main():
                 "memory_missed": memory.missed,
                 "trackers": len(frames[0][1]),
                 "names": names,
+                "publishers": seen,
                 "systems": sorted(systems),
             }
         )

@@ -26,6 +26,18 @@ pub fn families(name: &str, report: &IntervalReport) -> Vec<Family> {
     all
 }
 
+/// The families of several publishers as one list, in which each family stands once with the samples of all.
+pub fn joined(publishers: impl IntoIterator<Item = Vec<Family>>) -> Vec<Family> {
+    let mut all: Vec<Family> = Vec::new();
+    for family in publishers.into_iter().flatten() {
+        match all.iter_mut().find(|known| known.name == family.name) {
+            Some(known) => known.samples.extend(family.samples),
+            None => all.push(family),
+        }
+    }
+    all
+}
+
 struct Families<'a> {
     name: &'a str,
 }

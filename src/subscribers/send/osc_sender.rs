@@ -37,6 +37,19 @@ pub struct OscSummary {
     pub unsent_packets: u64,
 }
 
+impl OscSummary {
+    /// What two senders have sent together.
+    fn plus(self, other: Self) -> Self {
+        Self {
+            frames: self.frames + other.frames,
+            alerts: self.alerts + other.alerts,
+            cues: self.cues + other.cues,
+            packets: self.packets + other.packets,
+            unsent_packets: self.unsent_packets + other.unsent_packets,
+        }
+    }
+}
+
 /// The sender of one publisher's messages.
 pub struct OscSender {
     addresses: Addresses,
@@ -123,8 +136,9 @@ impl OscSender {
     }
 }
 
-impl Handler for OscSender {
-    fn handle(&mut self, event: FeedEvent<'_>) {
+impl OscSender {
+    /// Takes in what has come.
+    fn take(&mut self, event: FeedEvent<'_>) {
         self.arrivals.handle(&event, Instant::now());
         match event {
             FeedEvent::Frame { header, handles, .. } => {
@@ -142,7 +156,8 @@ impl Handler for OscSender {
         }
     }
 
-    fn polled(&mut self, now: Instant) {
+    /// Sends what is due.
+    fn send_due(&mut self, now: Instant) {
         let mut messages = std::mem::take(&mut self.pending);
         let due = std::mem::take(&mut self.due);
         if let Some((header, head)) = &self.latest {
@@ -166,5 +181,32 @@ impl Handler for OscSender {
             }
         }
         self.send_all(messages);
+    }
+}
+
+/// The senders of several publishers, each with addresses of its own.
+pub struct OscSenders(Vec<OscSender>);
+
+impl OscSenders {
+    /// One for each publisher, in the order in which they are polled.
+    pub fn new(senders: Vec<OscSender>) -> Self {
+        Self(senders)
+    }
+
+    /// Tells receivers that nothing holds any more, and returns what has been sent, of all together.
+    pub fn finish(self) -> OscSummary {
+        self.0.into_iter().map(OscSender::finish).fold(OscSummary::default(), OscSummary::plus)
+    }
+}
+
+impl Handler for OscSenders {
+    fn handle(&mut self, publisher: usize, event: FeedEvent<'_>) {
+        if let Some(sender) = self.0.get_mut(publisher) {
+            sender.take(event);
+        }
+    }
+
+    fn polled(&mut self, now: Instant) {
+        self.0.iter_mut().for_each(|sender| sender.send_due(now));
     }
 }

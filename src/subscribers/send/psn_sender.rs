@@ -1,13 +1,17 @@
-//! Trackers for lighting desks: which, when, and what they say while no frames come. In: the events of a feed. Out:
-//! datagrams by [`psn`](super::psn). Called by `send psn`.
+//! Trackers for lighting desks: which, when, and what they say while no frames come. In: the events of the feeds of one
+//! publisher or several. Out: datagrams by [`psn`](super::psn). Called by `send psn`.
+//!
+//! A receiver holds for present what is in the latest frame. So each frame has the trackers of all publishers, each with the
+//! time for which its place holds, and there is one count of frames: two senders to one desk would mix theirs.
 
 use std::time::{Duration, Instant};
 
+use super::Pace;
 use super::axes::Axes;
 use super::network::Outlet;
-use super::psn::{MOST_PACKETS, Tracker, TrackerName, data_frame, info_frame};
-use super::trackers::{Selection, numbered};
-use super::{Arrivals, Pace};
+use super::psn::{MOST_PACKETS, TrackerName, data_frame, info_frame};
+use super::psn_source::{Source, made_ns};
+use super::trackers::{Numbers, Selection};
 use crate::live::clock::monotonic_ns;
 use crate::subscribers::feed::FeedEvent;
 use crate::subscribers::polling::Handler;
@@ -25,20 +29,18 @@ const INFO_INTERVAL: Duration = Duration::from_secs(1);
 const STOPPED_FULL_RATE: Duration = Duration::from_secs(10);
 /// See [`STOPPED_FULL_RATE`].
 const STOPPED_INTERVAL: Duration = Duration::from_secs(1);
-/// A frame that seems older than this was made on a machine with another clock.
-const OLDEST_NS: u64 = 10_000_000_000;
 
 /// What is sent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PsnOptions {
-    /// Which handles.
+    /// Which handles of each publisher.
     pub trackers: Selection,
     /// In which axes.
     pub axes: Axes,
     /// At most so many frames per second.
     pub rate: f64,
-    /// The number of the first handle's tracker.
-    pub first_id: u16,
+    /// The trackers' numbers, for each publisher in the order in which they are polled.
+    pub numbers: Vec<Numbers>,
     /// The name under which desks list this sender.
     pub system_name: String,
 }
@@ -52,14 +54,14 @@ pub enum Notice {
         handles: u32,
         /// The trackers, in the order of their numbers.
         trackers: Vec<TrackerName>,
-        /// Packets of positions a frame.
+        /// Packets of positions a frame, of all publishers together.
         packets: usize,
         /// Packets of names a second.
         name_packets: usize,
     },
     /// Some that were chosen cannot be sent; one sentence.
     LeftOut(String),
-    /// Frames have stopped: the trackers have status 0.
+    /// Frames have stopped: the publisher's trackers have status 0.
     Stopped,
     /// They come again.
     Resumed,
@@ -68,9 +70,9 @@ pub enum Notice {
 /// What has been sent.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct PsnSummary {
-    /// Frames of the publisher that were sent.
+    /// Frames that were sent, each with the newest of every publisher.
     pub frames: u64,
-    /// Frames of the publisher that came too soon after one that was sent, or were overtaken before they were read.
+    /// Frames of publishers that came too soon after one that was sent, or were overtaken before they were read or sent.
     pub passed_over: u64,
     /// Frames sent with status 0 while none came.
     pub stopped_frames: u64,
@@ -82,46 +84,35 @@ pub struct PsnSummary {
     pub unsent_packets: u64,
 }
 
-/// The sender of one team.
+/// The sender of all publishers' trackers.
 pub struct PsnSender<'a> {
     options: PsnOptions,
     outlet: Outlet,
-    notify: &'a mut dyn FnMut(Notice),
+    /// Called with the place of a publisher and what a person wants to know of it.
+    notify: &'a mut dyn FnMut(usize, Notice),
     started_ns: u64,
     pace: Pace,
-    arrivals: Arrivals,
-    /// The handles of the present team that are sent, and their trackers.
-    team: Option<Team>,
-    /// The latest frame that was due.
-    trackers: Vec<Tracker>,
+    /// One for each publisher, in the order of their trackers' numbers.
+    sources: Vec<Source>,
     due: bool,
     next_info: Instant,
-    /// When desks are told again that frames have stopped.
+    /// When desks are told again that the frames of all have stopped.
     next_stopped: Option<Instant>,
     data_frame_id: u8,
     info_frame_id: u8,
     summary: PsnSummary,
 }
 
-struct Team {
-    handles: u32,
-    chosen: Vec<u32>,
-    names: Vec<TrackerName>,
-    announced: bool,
-}
-
 impl<'a> PsnSender<'a> {
-    /// A sender by `outlet`, which calls `notify` with what a person wants to know.
-    pub fn new(options: PsnOptions, outlet: Outlet, notify: &'a mut dyn FnMut(Notice)) -> Self {
+    /// A sender by `outlet`, which calls `notify` with the place of a publisher and what a person wants to know of it.
+    pub fn new(options: PsnOptions, outlet: Outlet, notify: &'a mut dyn FnMut(usize, Notice)) -> Self {
         Self {
             pace: Pace::new(options.rate),
+            sources: options.numbers.iter().cloned().map(Source::new).collect(),
             options,
             outlet,
             notify,
             started_ns: monotonic_ns(),
-            arrivals: Arrivals::default(),
-            team: None,
-            trackers: Vec::new(),
             due: false,
             next_info: Instant::now(),
             next_stopped: None,
@@ -133,7 +124,8 @@ impl<'a> PsnSender<'a> {
 
     /// Tells desks that nothing holds any more, and returns what has been sent.
     pub fn finish(mut self) -> PsnSummary {
-        if self.team.is_some() {
+        if self.sources.iter().any(Source::is_known) {
+            self.sources.iter_mut().for_each(Source::stop);
             self.send_stopped();
         }
         PsnSummary { packets: self.outlet.sent(), unsent_packets: self.outlet.unsent(), ..self.summary }
@@ -143,99 +135,96 @@ impl<'a> PsnSender<'a> {
         monotonic_ns().saturating_sub(self.started_ns) / 1000
     }
 
-    fn take_frame(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
-        if self.next_stopped.take().is_some() {
-            (self.notify)(Notice::Resumed);
+    /// Whether a frame goes out for this one. Several publishers have one count of intervals, on the clock that their deadlines
+    /// have in common; that of one alone begins with its run.
+    fn is_due(&mut self, header: &FrameHeader) -> bool {
+        match &self.sources[..] {
+            [_] => self.pace.is_due(header),
+            _ => self.pace.is_due(&FrameHeader { run_id: 0, deadline_ns: made_ns(header), ..*header }),
         }
-        if self.team.as_ref().is_none_or(|team| team.handles != header.handles) {
-            self.meet(header.handles);
-        }
-        let Some(team) = &self.team else { return };
-        let now_ns = monotonic_ns();
-        let known = now_ns.checked_sub(header.deadline_ns).is_some_and(|age| age < OLDEST_NS);
-        let made_ns = if known { header.deadline_ns } else { now_ns };
-        let timestamp_us = made_ns.saturating_sub(self.started_ns) / 1000;
-        let axes = self.options.axes;
-        let vector = |x, y| axes.vector([x, y, 0.0]).map(|part| part as f32);
-        let tracker = |(handle, name): (&u32, &TrackerName)| {
-            let pose = handles.get(*handle as usize)?;
-            // Desks count seconds of wall time.
-            let (vx, vy) = (pose.vx * header.time_scale, pose.vy * header.time_scale);
-            Some(Tracker {
-                id: name.id,
-                position: vector(pose.x, pose.y),
-                speed: (!vx.is_nan() && !vy.is_nan()).then(|| vector(vx, vy)),
-                orientation: axes.rotation(pose.heading).map(|part| part as f32),
-                status: 1.0,
-                timestamp_us,
-            })
-        };
-        self.trackers.clear();
-        self.trackers.extend(team.chosen.iter().zip(&team.names).filter_map(tracker));
-        self.due = true;
     }
 
-    /// Chooses the trackers of a team of another size.
-    fn meet(&mut self, handles: u32) {
-        let mut chosen = self.options.trackers.of(handles);
-        let names = numbered(&chosen, handles, self.options.first_id);
-        if let Some(beyond) = self.options.trackers.beyond(handles) {
-            self.leave_out(format!("there is no handle {beyond}: the team has {handles}"));
+    fn take_frame(&mut self, publisher: usize, header: &FrameHeader, handles: &[HandlePose]) {
+        let is_due = self.is_due(header);
+        let alone = self.sources.len() == 1;
+        let Some(source) = self.sources.get_mut(publisher) else { return };
+        // Of several, each frame goes out with the next that is due of any.
+        if alone && !is_due {
+            self.summary.passed_over += 1;
+            return;
         }
-        if names.len() < chosen.len() {
-            let (sent, chosen) = (names.len(), chosen.len());
-            self.leave_out(format!("only {sent} of {chosen} handles are sent: trackers' numbers end at 65535"));
+        if std::mem::take(&mut source.stopped) {
+            (self.notify)(publisher, Notice::Resumed);
         }
-        chosen.truncate(names.len());
-        // At once, after the frame at hand.
-        self.next_info = Instant::now();
-        self.team = Some(Team { handles, chosen, names, announced: false });
+        self.next_stopped = None;
+        if let Some(left_out) = source.meet(header.handles, &self.options.trackers) {
+            // At once, after the frame at hand.
+            self.next_info = Instant::now();
+            left_out.into_iter().for_each(|sentence| (self.notify)(publisher, Notice::LeftOut(sentence)));
+        }
+        let timestamp_us = made_ns(header).saturating_sub(self.started_ns) / 1000;
+        let overtakes = source.take(header, handles, self.options.axes, timestamp_us);
+        self.summary.passed_over += u64::from(overtakes);
+        self.due |= is_due;
     }
 
-    fn leave_out(&mut self, sentence: String) {
-        (self.notify)(Notice::LeftOut(sentence));
-    }
-
-    /// Sends the trackers as they are, all packets back to back. Returns the number of packets.
+    /// Sends all trackers as they are, all packets back to back. Returns the number of packets.
     fn send_trackers(&mut self) -> usize {
-        if self.trackers.is_empty() {
-            return 0;
-        }
         self.data_frame_id = next_frame_id(self.data_frame_id);
-        let frame = data_frame(self.elapsed_us(), self.data_frame_id, &self.trackers);
+        let mut trackers = Vec::with_capacity(self.sources.iter().map(|source| source.trackers.len()).sum());
+        for source in &mut self.sources {
+            source.unsent = false;
+            trackers.extend_from_slice(&source.trackers);
+        }
+        let frame = data_frame(self.elapsed_us(), self.data_frame_id, &trackers);
         frame.packets.iter().for_each(|packet| self.outlet.send(packet));
-        if frame.trackers < self.trackers.len() {
-            let (sent, chosen) = (frame.trackers, self.trackers.len());
+        if frame.trackers < trackers.len() {
             // From the next frame on there is nothing to leave out.
-            self.team.iter_mut().for_each(|team| {
-                team.chosen.truncate(sent);
-                team.names.truncate(sent);
-            });
-            self.leave_out(format!(
-                "only {sent} of {chosen} handles are sent: a frame has {MOST_PACKETS} packets at most; --trackers chooses others"
-            ));
+            let mut room = frame.trackers;
+            for (publisher, source) in self.sources.iter_mut().enumerate() {
+                if let Some(chosen) = source.truncate(room) {
+                    let sentence = format!(
+                        "only {room} of {chosen} handles are sent: a frame has {MOST_PACKETS} packets at most; --trackers \
+                         chooses others"
+                    );
+                    (self.notify)(publisher, Notice::LeftOut(sentence));
+                }
+                room -= source.trackers.len().min(room);
+            }
         }
         frame.packets.len()
     }
 
     /// Sends the names. Returns the number of packets.
     fn send_names(&mut self) -> usize {
-        let Some(team) = &self.team else { return 0 };
         self.info_frame_id = next_frame_id(self.info_frame_id);
-        let frame = info_frame(self.elapsed_us(), self.info_frame_id, &self.options.system_name, &team.names);
+        let names: Vec<TrackerName> = self.sources.iter().flat_map(Source::names).cloned().collect();
+        let frame = info_frame(self.elapsed_us(), self.info_frame_id, &self.options.system_name, &names);
         frame.packets.iter().for_each(|packet| self.outlet.send(packet));
         self.summary.name_frames += 1;
         frame.packets.len()
     }
 
-    /// Sends the trackers where they last were, standing still, with status 0.
+    /// Sends the trackers of publishers that have all stopped.
     fn send_stopped(&mut self) {
-        for tracker in &mut self.trackers {
-            tracker.status = 0.0;
-            tracker.speed = tracker.speed.map(|_| [0.0; 3]);
-        }
         self.send_trackers();
         self.summary.stopped_frames += 1;
+    }
+
+    /// Stops the trackers of those publishers from which no frames come any more. Since when none comes from any.
+    fn stop_silent(&mut self, now: Instant) -> Option<Instant> {
+        let mut since = None;
+        let mut all = true;
+        for (publisher, source) in self.sources.iter_mut().enumerate().filter(|(_, source)| source.is_known()) {
+            let stopped = source.stopped_since(now);
+            if stopped.is_some() && !source.stopped {
+                source.stop();
+                (self.notify)(publisher, Notice::Stopped);
+            }
+            all &= stopped.is_some();
+            since = since.max(stopped);
+        }
+        since.filter(|_| all)
     }
 }
 
@@ -245,17 +234,13 @@ fn next_frame_id(latest: u8) -> u8 {
 }
 
 impl Handler for PsnSender<'_> {
-    fn handle(&mut self, event: FeedEvent<'_>) {
-        self.arrivals.handle(&event, Instant::now());
+    fn handle(&mut self, publisher: usize, event: FeedEvent<'_>) {
+        if let Some(source) = self.sources.get_mut(publisher) {
+            source.arrived(&event, Instant::now());
+        }
         if let FeedEvent::Frame { header, handles, missed } = event {
             self.summary.passed_over += missed;
-            if self.pace.is_due(header) {
-                // One that a newer one overtakes before it is sent.
-                self.summary.passed_over += u64::from(self.due);
-                self.take_frame(header, handles);
-            } else {
-                self.summary.passed_over += 1;
-            }
+            self.take_frame(publisher, header, handles);
         }
     }
 
@@ -265,10 +250,7 @@ impl Handler for PsnSender<'_> {
             self.summary.frames += 1;
             packets = self.send_trackers();
         }
-        if let Some(since) = self.arrivals.stopped_since(now).filter(|_| self.team.is_some()) {
-            if self.next_stopped.is_none() {
-                (self.notify)(Notice::Stopped);
-            }
+        if let Some(since) = self.stop_silent(now) {
             let next = self.next_stopped.unwrap_or(now);
             if now >= next {
                 self.send_stopped();
@@ -278,13 +260,15 @@ impl Handler for PsnSender<'_> {
                 self.next_stopped = Some((next + interval).max(now));
             }
         }
-        if self.team.is_some() && now >= self.next_info {
+        // No names between a place and the frame that it waits for.
+        let is_sent = self.sources.iter().any(Source::is_known) && self.sources.iter().all(|source| !source.unsent);
+        if is_sent && now >= self.next_info {
             self.next_info = now + INFO_INTERVAL;
             let name_packets = self.send_names();
-            if let Some(team) = self.team.as_mut().filter(|team| !team.announced) {
-                team.announced = true;
-                let (handles, trackers) = (team.handles, team.names.clone());
-                (self.notify)(Notice::Team { handles, trackers, packets, name_packets });
+            for (publisher, source) in self.sources.iter_mut().enumerate() {
+                if let Some((handles, trackers)) = source.announce() {
+                    (self.notify)(publisher, Notice::Team { handles, trackers, packets, name_packets });
+                }
             }
         }
     }

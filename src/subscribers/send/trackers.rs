@@ -75,12 +75,49 @@ pub fn handle_name(handle: u32, handles: u32) -> String {
     }
 }
 
-/// The trackers of the chosen handles, where the first handle of the team is the tracker `first_id`. Those that would have
-/// a number above 65,535, which no tracker has, are left out.
-pub fn numbered(chosen: &[u32], handles: u32, first_id: u16) -> Vec<TrackerName> {
-    let number = |handle: u32| u16::try_from(u64::from(handle) + u64::from(first_id)).ok();
-    let named = |handle: &u32| Some(TrackerName { id: number(*handle)?, name: handle_name(*handle, handles) });
-    chosen.iter().map_while(named).collect()
+/// The numbers that the trackers of a team may have, and what their names begin with.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Numbers {
+    /// The number of the first handle's tracker.
+    pub first: u16,
+    /// The last number that is left to this team.
+    pub last: u16,
+    /// The publisher's name, where several send to one desk.
+    pub of: Option<String>,
+}
+
+impl Numbers {
+    /// Those of one publisher alone.
+    pub fn from(first: u16) -> Self {
+        Self { first, last: u16::MAX, of: None }
+    }
+
+    /// Those of several publishers, whose heads' numbers are `step` apart whether the others are there or not. `None` where
+    /// there are more publishers than numbers.
+    pub fn of_several(names: &[String], first: u16, step: u16) -> Option<Vec<Self>> {
+        let starts = (0..names.len()).map(|place| {
+            let start = u64::from(first) + place as u64 * u64::from(step);
+            u16::try_from(start).ok()
+        });
+        let starts = starts.collect::<Option<Vec<_>>>()?;
+        let numbers = names.iter().zip(starts).map(|(name, first)| Self {
+            first,
+            last: first.saturating_add(step - 1),
+            of: Some(name.clone()),
+        });
+        Some(numbers.collect())
+    }
+
+    /// The trackers of the chosen handles. Those that would have a number above the last are left out.
+    pub fn trackers(&self, chosen: &[u32], handles: u32) -> Vec<TrackerName> {
+        let number = |handle: u32| u16::try_from(u64::from(handle) + u64::from(self.first)).ok();
+        let named = |handle: &u32| {
+            let id = number(*handle).filter(|id| *id <= self.last)?;
+            let name = handle_name(*handle, handles);
+            Some(TrackerName { id, name: self.of.as_ref().map_or(name.clone(), |of| format!("{of} {name}")) })
+        };
+        chosen.iter().map_while(named).collect()
+    }
 }
 
 #[cfg(test)]
@@ -106,10 +143,33 @@ mod tests {
     }
 
     #[test]
-    fn several_teams_have_numbers_of_their_own_on_one_desk() {
-        let trackers = numbered(&[0, 11, 223], 224, 301);
+    fn one_team_has_numbers_from_its_first_to_the_greatest() {
+        let trackers = Numbers::from(301).trackers(&[0, 11, 223], 224);
         let names: Vec<_> = trackers.iter().map(|it| (it.id, it.name.as_str())).collect();
         assert_eq!(names, [(301, "head"), (312, "handle 12"), (524, "tail")]);
-        assert_eq!(numbered(&Vec::from_iter(0..100), 100, 65_500).len(), 36, "numbers end at 65,535");
+        let trackers = Numbers::from(65_500).trackers(&Vec::from_iter(0..100), 100);
+        assert_eq!(trackers.len(), 36, "numbers end at 65,535");
+    }
+
+    #[test]
+    fn several_teams_have_numbers_and_names_of_their_own_on_one_desk() {
+        let names = ["gold", "silver", "jade"].map(str::to_owned);
+        let numbers = Numbers::of_several(&names, 11, 300).unwrap();
+        let ends = |numbers: &Numbers| {
+            let trackers = numbers.trackers(&Vec::from_iter(0..5001), 5001);
+            assert!(trackers.windows(2).all(|pair| pair[0].id + 1 == pair[1].id));
+            let named = |it: &TrackerName| (it.id, it.name.clone());
+            (named(&trackers[0]), named(trackers.last().unwrap()))
+        };
+        let expected = [(11, 310, "gold"), (311, 610, "silver"), (611, 910, "jade")];
+        for (numbers, (first, last, name)) in numbers.iter().zip(expected) {
+            assert_eq!(ends(numbers), ((first, format!("{name} head")), (last, format!("{name} handle 300"))));
+        }
+        assert_eq!(Numbers::of_several(&names, 1, 32_767).unwrap()[2], Numbers { last: u16::MAX, ..numbers_at(65_535) });
+        assert_eq!(Numbers::of_several(&names, 1, 32_768), None);
+    }
+
+    fn numbers_at(first: u16) -> Numbers {
+        Numbers { first, last: first, of: Some("jade".to_owned()) }
     }
 }

@@ -12,7 +12,7 @@ use tokio::sync::{mpsc, watch};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout};
 
 use super::gate::Visitor;
-use super::{Picture, Server, wire};
+use super::{Channel, Picture, wire};
 use crate::live::clock::monotonic_ns;
 
 /// Frames that may be in flight to a browser: enough for 60 a second over a network that takes 50 ms.
@@ -22,9 +22,9 @@ const PING_INTERVAL: Duration = Duration::from_secs(10);
 /// A browser that sends nothing for so long, or takes so long to be written to, is gone.
 const TIMEOUT: Duration = Duration::from_secs(30);
 
-/// Serves a browser until it goes. `gap` is the least time between two frames.
-pub(super) async fn serve(socket: WebSocket, server: Server, gap: Duration) {
-    let Server { mut pictures, gate, .. } = server;
+/// Serves a browser one publisher until it goes. `gap` is the least time between two frames.
+pub(super) async fn serve(socket: WebSocket, channel: Channel, gap: Duration) {
+    let Channel { mut pictures, gate, .. } = channel;
     let (mut sink, mut stream) = socket.split();
     let (sender, mut answers) = mpsc::unbounded_channel();
     let mut visitor = Visitor::new(gate.as_deref(), sender);

@@ -52,10 +52,10 @@ export class Camera {
     this.zoom = 1;
   }
 
-  /** Looks at where everything is. */
-  update(stage, places, passed) {
-    this.longest = Math.max(stage.head_length, stage.body_length);
-    const box = this.box(stage, places);
+  /** Looks at where everything is: all teams, each with `stage` and `places`, and the one whose bench is followed. */
+  update(teams, passed, followed = teams[0]) {
+    this.longest = Math.max(...teams.map(({ stage }) => Math.max(stage.head_length, stage.body_length)));
+    const box = teams.map(({ stage, places }) => this.box(stage, places)).reduce(around), { places } = followed;
     if (!this.goal || this.stale || outgrown(this.goal, box)) this.goal = grown(box);
     if (!this.frame || this.stale) this.frame = this.goal;
     this.stale = false;
@@ -136,6 +136,12 @@ export class Camera {
     this.x += before - after;
     this.y += above - below;
   }
+}
+
+/** The box around two boxes. */
+function around([x, y, wide, high], [bx, by, bw, bh]) {
+  const [left, right, low, top] = [Math.min(x - wide, bx - bw), Math.max(x + wide, bx + bw), Math.min(y - high, by - bh), Math.max(y + high, by + bh)];
+  return [(left + right) / 2, (low + top) / 2, (right - left) / 2, (top - low) / 2];
 }
 
 const grown = ([x, y, wide, high]) => [x, y, wide * (1 + MARGIN), high * (1 + MARGIN)];

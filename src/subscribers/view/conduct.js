@@ -1,5 +1,6 @@
 // The transport bar: conducts the show where the server says that this page may, and shows the cues everywhere. In: the
-// stream's messages and frames. Out: commands over the same WebSocket.
+// streams' messages and frames. Out: commands over the same WebSockets. Of several dragons one may be chosen; a hold and its
+// release are for all of them always.
 
 import { answerTo, say, translate } from "./words.js";
 
@@ -16,6 +17,7 @@ const SENTENCE_TIME = 8000, CUE_TIME = 6000;
 const RATES = [0.1, 0.25, 0.5, 1, 2, 4, 10];
 
 const BAR = `
+  <label id="conduct-choice" hidden><span data-word="conductWhom"></span> <select id="conduct-whom"></select></label>
   <button id="conduct-toggle" data-title="toggleKey"></button>
   <button id="conduct-step" data-title="stepKey" data-word="step"></button>
   <button id="conduct-restart" data-word="restart"></button>
@@ -48,7 +50,10 @@ function takeToken() {
 }
 const token = takeToken();
 
-export function conduct(stream) {
+/** Whether commands have somebody to obey them. */
+const isThere = ({ playback, stage, trouble }) => Boolean(playback.newest && stage && trouble === null);
+
+export function conduct(dragons) {
   const bar = document.getElementById("conduct"), main = bar.parentElement;
   bar.innerHTML = BAR;
   translate(bar);
@@ -56,12 +61,20 @@ export function conduct(stream) {
   const line = part("seek"), rates = part("rate");
   const cue = main.appendChild(Object.assign(document.createElement("p"), { id: "cue", hidden: true }));
   cue.setAttribute("role", "status");
-  let greeted = null, numbered = 0, shownStage = null, rate = null, dragged = false, sentenceAt = 0, cueAt = 0;
+  const streams = dragons.map(({ stream }) => stream), several = dragons.length > 1, nameOf = (stream) => dragons[streams.indexOf(stream)].name;
+  const greeted = new Map(), allowed = new Map();
+  /** The stream that is conducted, null for all; the commands so far, and the one whose refusal is shown. */
+  let chosen = null, numbered = 0, refused = 0;
+  let shownStages = [], rate = null, dragged = false, sentenceAt = 0, cueAt = 0;
   /** Where a seek that has not been answered goes, and one that waits for that answer; the time of the last one sent. */
   let sought = null, wanted = null, soughtAt = -Infinity;
   /** The last answer to a seek: frames from before it are still on their way. */
   let landed = null;
 
+  const targets = () => (chosen ? [chosen] : streams), there = () => targets().filter(isThere);
+  /** The one whose time and speed are shown. */
+  const lead = () => chosen ?? streams.find(isThere) ?? streams[0];
+  const own = (stream, sentence) => (several ? say("refusedBy", { name: nameOf(stream), sentence }) : sentence);
   const put = (element, text) => element.textContent !== text && (element.textContent = text);
   const seconds = (time) => say("showTime", { time: time.toFixed(1) });
   function report(sentence) {
@@ -72,9 +85,20 @@ export function conduct(stream) {
     // A seek that waits goes before what was commanded after it; a hold does without.
     if (name === "hold") wanted = null;
     if (name !== "seek" && wanted !== null) sendWanted();
-    const id = ++numbered;
-    if (!stream.send({ command: name, value, id })) report(say("nothingSent"));
+    // What is for all goes to those that are there; a hold, and its end, to every one: a refusal says where it did not arrive.
+    const id = ++numbered, to = name === "hold" || name === "release" ? streams : there().length ? there() : targets();
+    const sent = to.filter((stream) => {
+      // A show that is shorter than another one stands at its end.
+      const within = name === "seek" && stream.stage ? Math.min(value, stream.stage.freeze_time) : value;
+      return stream.send({ command: name, value: within, id });
+    });
+    if (!sent.length) report(say("nothingSent"));
     return id;
+  }
+  /** Of several, all pause where any plays. */
+  function toggle() {
+    const plays = there().some(({ playback }) => playback.newest.playback === PLAYING);
+    command(targets().length === 1 ? "toggle" : plays ? "pause" : "resume");
   }
 
   // The time line. One seek is on its way at a time, so that a hand that moves fast leaves no queue behind.
@@ -88,27 +112,33 @@ export function conduct(stream) {
     sendWanted();
   }
   function sendWanted() {
-    sought = { time: wanted, id: command("seek", wanted) };
+    sought = { time: wanted, id: command("seek", wanted), stream: lead() };
     [wanted, soughtAt] = [null, performance.now()];
   }
   function now() {
-    const { newest } = stream.playback, isBefore = landed && newest?.run === landed.run && newest.tick < landed.tick;
+    const { newest } = lead().playback, isBefore = landed?.stream === lead() && newest?.run === landed.run && newest.tick < landed.tick;
     return wanted ?? sought?.time ?? (isBefore ? landed.time : newest?.time) ?? 0;
   }
 
-  function showStage(stage) {
-    if (stage === shownStage) return;
-    shownStage = stage;
-    line.max = stage.freeze_time;
-    const marks = [
-      ...stage.events.filter(({ time }) => time <= stage.freeze_time).map(({ event, time }) => ({ kind: event, text: say("eventMark", { kind: say(event), time: time.toFixed(3) }), time })),
-      ...stage.cues.map(({ name, time, pauses }) => ({ kind: "cue", text: say("cueMark", { name, time: time.toFixed(3), waits: pauses ? say("waitsThere") : "" }), time })),
-    ];
+  /** The events and cues of those that are conducted, on a line as long as the longest show. */
+  function showStages(all) {
+    const stages = all.map(({ stage }) => stage);
+    if (stages.length === shownStages.length && stages.every((stage, k) => stage === shownStages[k])) return;
+    shownStages = stages;
+    line.max = Math.max(...stages.map(({ freeze_time }) => freeze_time));
+    const marksOf = (stream) => {
+      const { stage } = stream, by = (text) => (all.length > 1 ? own(stream, text) : text);
+      return [
+        ...stage.events.filter(({ time }) => time <= stage.freeze_time).map(({ event, time }) => ({ kind: event, text: by(say("eventMark", { kind: say(event), time: time.toFixed(3) })), time })),
+        ...stage.cues.map(({ name, time, pauses }) => ({ kind: "cue", text: by(say("cueMark", { name, time: time.toFixed(3), waits: pauses ? say("waitsThere") : "" })), time })),
+      ];
+    };
+    const marks = all.flatMap(marksOf);
     part("marks").replaceChildren(
       ...marks.map(({ kind, text, time }) => {
         const mark = Object.assign(document.createElement("i"), { className: kind === "cue" ? "cue" : "event", title: text });
         Object.assign(mark.dataset, { kind, time });
-        mark.style.setProperty("--share", time / stage.freeze_time);
+        mark.style.setProperty("--share", time / line.max);
         return mark;
       }),
     );
@@ -120,56 +150,80 @@ export function conduct(stream) {
     const all = [...new Set([...RATES, scale])].sort((a, b) => a - b);
     rates.replaceChildren(...all.map((one) => new Option(`${+one.toPrecision(3)} ×`, one, false, one === scale)));
   }
+  /** Whether all that are there are held. */
+  function allHeld() {
+    const all = streams.filter(isThere);
+    return all.length > 0 && all.every(({ playback }) => playback.newest.playback === HELD);
+  }
+  function showHold() {
+    if (!streams.some(isThere)) return;
+    const held = allHeld();
+    put(part("hold"), say(held ? "heldRelease" : "hold"));
+    part("hold").setAttribute("aria-pressed", held);
+    bar.dataset.held = held;
+  }
   function show() {
-    const { newest } = stream.playback, { stage } = stream, at = performance.now(), there = newest && stage && stream.trouble === null;
+    const at = performance.now(), all = there();
     if (at - sentenceAt > SENTENCE_TIME) put(part("answer"), "");
     if (at - cueAt > CUE_TIME) cue.hidden = true;
     if (bar.hidden) return;
     main.style.setProperty("--conduct-height", `${bar.offsetHeight}px`);
-    for (const control of bar.querySelectorAll("button, input, select")) control.disabled = !there;
-    if (!there) return;
+    for (const control of bar.querySelectorAll("button, input, select:not(#conduct-whom)")) control.disabled = !all.length;
+    // All can be held while the one that is chosen is gone.
+    part("hold").disabled = !streams.some(isThere);
+    showHold();
+    if (!all.length) return;
+    const { playback } = isThere(lead()) ? lead() : all[0], { newest } = playback;
     sendSeek();
-    showStage(stage);
+    showStages(all);
     showRate(newest.scale);
-    const held = newest.playback === HELD;
-    put(part("toggle"), say(newest.playback === PLAYING ? "pause" : "play"));
-    put(part("hold"), say(held ? "heldRelease" : "hold"));
-    part("hold").setAttribute("aria-pressed", held);
-    bar.dataset.held = held;
-    const time = dragged || sought !== null || wanted !== null ? now() : stream.playback.time(at);
+    const plays = all.some((stream) => stream.playback.newest.playback === PLAYING);
+    put(part("toggle"), say(plays ? "pause" : "play"));
+    const time = dragged || sought !== null || wanted !== null ? now() : playback.time(at);
     if (!dragged) line.value = time;
     line.setAttribute("aria-valuetext", seconds(time));
-    put(part("time"), `${time.toFixed(1)} / ${seconds(stage.freeze_time)}`);
+    put(part("time"), `${time.toFixed(1)} / ${seconds(Number(line.max))}`);
   }
 
-  stream.onmessage = (message) => {
+  const receive = (stream) => (message) => {
     if (message.type === "control") {
       // The first message of a connection tells whether the token is asked for; the second whether it was right.
-      if (!message.allowed && token && greeted !== stream.socket) stream.send({ token });
-      greeted = stream.socket;
-      bar.hidden = !message.allowed;
-      [sought, wanted] = [null, null];
+      if (!message.allowed && token && greeted.get(stream) !== stream.socket) stream.send({ token });
+      greeted.set(stream, stream.socket);
+      allowed.set(stream, message.allowed);
+      bar.hidden = ![...allowed.values()].some(Boolean);
+      if (stream === lead()) [sought, wanted] = [null, null];
       show();
     }
     if (message.type === "answer") {
-      if (message.id === sought?.id) {
-        landed = message.code ? { run: stream.playback.newest?.run, tick: message.tick, time: message.sim_time } : null;
+      if (message.id === sought?.id && stream === sought.stream) {
+        landed = message.code ? { stream, run: stream.playback.newest?.run, tick: message.tick, time: message.sim_time } : null;
         sought = null;
       }
-      if (message.sentence) report(answerTo(message));
-      else if (message.code) put(part("answer"), "");
+      if (message.sentence) {
+        report(own(stream, answerTo(message)));
+        refused = message.id;
+      } else if (message.code && message.id !== refused) put(part("answer"), "");
       sendSeek();
     }
     // A cue that passed before this page came is no news.
     const { newest } = stream.playback, age = message.type === "cue" && newest ? Math.abs(newest.time - message.sim_time) : Infinity;
     if (age <= (CUE_TIME / 1000) * (newest?.scale || 1)) {
-      cue.textContent = `${message.number}. ${message.name}${message.pauses ? say("waitingForGo") : ""}`;
+      cue.textContent = own(stream, `${message.number}. ${message.name}${message.pauses ? say("waitingForGo") : ""}`);
       [cue.hidden, cueAt] = [false, performance.now()];
     }
   };
+  for (const stream of streams) stream.onmessage = receive(stream);
 
-  const hold = () => command(stream.playback.newest?.playback === HELD ? "release" : "hold");
-  part("toggle").onclick = () => command("toggle");
+  part("choice").hidden = !several;
+  part("whom").replaceChildren(new Option(say("all"), ""), ...dragons.map(({ name }, place) => new Option(name, place)));
+  part("whom").onchange = ({ target }) => {
+    chosen = target.value === "" ? null : streams[target.value];
+    [sought, wanted, landed, rate] = [null, null, null, null];
+    show();
+  };
+  const hold = () => command(allHeld() ? "release" : "hold");
+  part("toggle").onclick = toggle;
   part("step").onclick = () => command("step", 1);
   part("restart").onclick = () => command("restart");
   part("hold").onclick = hold;
@@ -190,7 +244,7 @@ export function conduct(stream) {
   };
 
   const keys = {
-    " ": () => command("toggle"), ".": () => command("step", 1), h: hold,
+    " ": toggle, ".": () => command("step", 1), h: hold,
     "[": () => rate && command("rate", rate / 2), "]": () => rate && command("rate", rate * 2),
     ArrowLeft: () => seek(now() - SEEK), ArrowRight: () => seek(now() + SEEK),
   };

@@ -7,6 +7,10 @@ import { Labels, doubled, scaleBar, target } from "./signs.js";
 
 /** Edges drawn at once: with thousands in one path, it takes several times as long. */
 const BATCH = 100;
+/** How far a casing reaches beyond the boards, pixels. */
+const CASING = 3;
+/** How much is left of a dragon that is no longer true beside others that are. */
+const DIMMED = 0.4;
 /** Beyond so many turns the lines of the path lie closer together than pixels. */
 const MOST_TURNS = 1500;
 
@@ -78,12 +82,13 @@ export class Ground {
     this.transparent = transparent;
     this.canvas = document.createElement("canvas");
     this.context = this.canvas.getContext("2d", { alpha: transparent });
-    this.path = this.look = null;
+    this.paths = [];
+    this.look = null;
     this.x = this.y = 0;
   }
 
-  /** Covers another context's canvas. */
-  cover(other, camera, palette, path) {
+  /** Covers another context's canvas: the ground with paths on it, each with its `lines` and `dashes` in pixels. */
+  cover(other, camera, palette, paths) {
     const { width, height } = other.canvas, { c, s, unit } = camera, scale = camera.scale * camera.ratio, right = width >> 2, down = height >> 2;
     const look = [width, height, camera.scale, camera.ratio, c, s, palette.ground, palette.faint].join();
     const moved = () => {
@@ -91,17 +96,36 @@ export class Ground {
       return [Math.round(dx * c - dy * s), Math.round(-dx * s - dy * c)];
     };
     const away = moved();
-    if (this.path !== path || this.look !== look || Math.abs(away[0]) > right || Math.abs(away[1]) > down) {
-      Object.assign(this, { path, look, x: camera.x, y: camera.y });
-      this.paint(width + 2 * right, height + 2 * down, () => inMetres(this.context, camera, right, down), palette, (1.2 * unit) / camera.scale);
+    const isSame = this.paths.length === paths.length && paths.every(({ lines }, k) => lines === this.paths[k].lines);
+    if (!isSame || this.look !== look || Math.abs(away[0]) > right || Math.abs(away[1]) > down) {
+      Object.assign(this, { paths, look, x: camera.x, y: camera.y });
+      this.paint(width + 2 * right, height + 2 * down, () => inMetres(this.context, camera, right, down), palette, unit / camera.scale);
     }
     const [x, y] = moved();
+    this.at = [x - right, y - down];
     other.setTransform(1, 0, 0, 1, 0, 0);
     if (this.transparent) other.clearRect(0, 0, width, height);
-    other.drawImage(this.canvas, x - right, y - down);
+    other.drawImage(this.canvas, ...this.at);
   }
 
-  paint(width, height, metres, palette, line) {
+  /** Dims what has been drawn since, to the share `left`. */
+  dim(other, left) {
+    const { width, height } = other.canvas;
+    other.setTransform(1, 0, 0, 1, 0, 0);
+    other.globalAlpha = 1 - left;
+    if (!this.transparent) other.drawImage(this.canvas, ...this.at);
+    else {
+      other.globalCompositeOperation = "destination-out";
+      other.fillRect(0, 0, width, height);
+      other.globalAlpha = 1;
+      other.globalCompositeOperation = "destination-over";
+      other.drawImage(this.canvas, ...this.at);
+      other.globalCompositeOperation = "source-over";
+    }
+    other.globalAlpha = 1;
+  }
+
+  paint(width, height, metres, palette, pixel) {
     const { canvas, context } = this;
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     context.setTransform(1, 0, 0, 1, 0, 0);
@@ -109,24 +133,42 @@ export class Ground {
     context.fillStyle = palette.ground;
     if (!this.transparent) context.fillRect(0, 0, width, height);
     metres();
-    context.lineWidth = line;
+    context.lineWidth = 1.2 * pixel;
     context.strokeStyle = palette.faint;
-    context.stroke(this.path);
+    for (const { lines, dashes } of this.paths) {
+      context.setLineDash(dashes.map((dash) => dash * pixel));
+      context.stroke(lines);
+    }
+    context.setLineDash([]);
   }
 }
 
 /**
- * Draws everything. `scene` has: stage, places (STRIDE numbers a handle, as all handles here), colours (a SpeedScale),
- * ground, path, marks (see marks.js), chosen, words (false: none are written), show (a Show, or null). Returns the words
- * written, as boxes in pixels.
+ * Draws everything. `scene` has: ground, words (false: none are written), and dragons, each with stage, places (STRIDE
+ * numbers a handle, as all handles here), colours (a SpeedScale), path, marks (see marks.js), chosen (a bench, or -1), its
+ * chosenName, its endNames, show (a Show, or null), stale (whether it is no longer true and others are), and identity (what
+ * tells it from others, see palette.js; null for one alone). Returns the words written, as boxes in pixels.
  */
-export function draw(context, camera, palette, scene) {
-  const { stage, places, ground, path, marks, chosen, words, show } = scene, pixel = camera.unit / camera.scale;
-  const world = () => inMetres(context, camera);
-  const count = places.length / STRIDE - 1, board = (bench) => rectangle(stage, places, bench);
-  ground.cover(context, camera, palette, path);
-  world();
+export function draw(context, camera, palette, { ground, dragons, words }) {
+  ground.cover(context, camera, palette, dragons.map(({ path, identity }) => ({ lines: path, dashes: identity?.dashes ?? [] })));
+  const stale = dragons.filter((dragon) => dragon.stale);
+  for (const dragon of stale) drawDragon(context, camera, palette, dragon);
+  if (stale.length) ground.dim(context, DIMMED);
+  for (const dragon of dragons) if (!dragon.stale) drawDragon(context, camera, palette, dragon);
+  if (!words) return [];
+  const labels = new Labels(camera);
+  label(labels, palette, dragons);
+  if (!dragons[0].show) labels.keep(scaleBar(context, camera, palette));
+  labels.write(context, palette);
+  inMetres(context, camera);
+  return labels.boxes;
+}
+
+function drawDragon(context, camera, palette, dragon) {
+  const { stage, places, marks, chosen, show, identity } = dragon, pixel = camera.unit / camera.scale;
+  inMetres(context, camera);
   context.lineJoin = "miter";
+  const count = places.length / STRIDE - 1, board = (bench) => rectangle(stage, places, bench);
   const mark = (bench, ink, width, dashes = []) => {
     const trace = () => {
       context.beginPath();
@@ -135,48 +177,62 @@ export function draw(context, camera, palette, scene) {
     };
     doubled(context, palette, pixel, ink, width, trace, dashes);
   };
-  if (show) show.draw(context, camera, palette, scene, inSight(camera, stage, places));
+  if (identity) casing(context, pixel, stage, places, identity);
+  if (show) show.draw(context, camera, palette, dragon, inSight(camera, stage, places));
   else {
-    benches(context, camera, palette, scene);
+    benches(context, camera, palette, dragon);
     headSign(context, board(0), palette, pixel);
     if (count > 1) tailSign(context, board(count - 1), palette, pixel);
     mark(0, palette.ink, 2);
     if (count > 1) mark(count - 1, palette.ink, 1);
   }
-  const labels = new Labels(camera), sides = (bench) => {
-    const r = board(bench);
-    return [r.x - 0.6 * r.l * r.c, r.y - 0.6 * r.l * r.s];
-  };
-  const there = (pair) => pair.filter((bench) => bench < count);
   // What comes first in the list lies on top.
-  for (const { pair, ink, dashes } of marks.toReversed()) there(pair).forEach((bench) => mark(bench, palette[ink], 3.5, dashes));
+  for (const { pair, ink, dashes } of marks.toReversed()) pair.filter((bench) => bench < count).forEach((bench) => mark(bench, palette[ink], 3.5, dashes));
   if (chosen >= 0 && chosen < count) mark(chosen, palette.ink, 3, [7, 4]);
   for (const { place, ink, ghost } of marks.toReversed()) if (place) target(context, place, palette, pixel, palette[ink], ghost);
-  show?.crown(context, camera, palette, scene);
-  if (!words) return [];
-  // The most important words take their places first.
-  for (const { place } of marks) if (place) labels.ring(place.x, place.y);
-  for (const { place, ink, text } of marks) if (place && text) labels.add(text, place.x, place.y, palette[ink], 34, 1.25);
-  const named = new Set();
-  for (const { pair, ink, names } of marks) {
-    there(pair).forEach((bench, k) => {
-      if (!named.has(bench) && names[k]) labels.add(names[k], ...sides(bench), palette[ink], 30);
-      named.add(bench);
-    });
-  }
-  if (chosen >= 0 && chosen < count && !named.has(chosen)) {
-    labels.add(scene.chosenName, board(chosen).x, board(chosen).y, palette.ink, 30);
-    named.add(chosen);
-  }
-  if (!show) {
-    const [head, tail] = [board(0), board(count - 1)], [front, rear] = scene.endNames;
-    if (!named.has(0)) labels.add(front, head.x + head.l * head.c, head.y + head.l * head.s, palette.ink);
-    if (count > 1 && !named.has(count - 1)) labels.add(rear, tail.x - tail.l * tail.c, tail.y - tail.l * tail.s, palette.ink);
-    labels.keep(scaleBar(context, camera, palette));
-  }
-  labels.write(context, palette);
-  world();
-  return labels.boxes;
+  show?.crown(context, camera, palette, dragon);
+}
+
+/** A line on both sides of all boards, below them, in the colour and the dashes that tell a dragon from others. */
+function casing(context, pixel, stage, places, { colour, dashes }) {
+  context.beginPath();
+  for (let k = 0; k < places.length; k += STRIDE) context.lineTo(places[k], places[k + 1]);
+  context.lineJoin = "round";
+  context.strokeStyle = colour;
+  context.lineWidth = stage.width + 2 * CASING * pixel;
+  context.setLineDash(dashes.map((dash) => dash * pixel));
+  context.stroke();
+  context.setLineDash([]);
+  context.lineJoin = "miter";
+}
+
+/** Words for all dragons; the most important ones take their places first. */
+function label(labels, palette, dragons) {
+  const each = (write) => dragons.forEach((dragon) => write(dragon, dragon.places.length / STRIDE - 1, (bench) => rectangle(dragon.stage, dragon.places, bench)));
+  each(({ marks }) => {
+    for (const { place } of marks) if (place) labels.ring(place.x, place.y);
+  });
+  each(({ marks }) => {
+    for (const { place, ink, text } of marks) if (place && text) labels.add(text, place.x, place.y, palette[ink], 34, 1.25);
+  });
+  each(({ marks, chosen, chosenName, endNames: [front, rear], show }, count, board) => {
+    const named = new Set();
+    for (const { pair, ink, names } of marks) {
+      pair.filter((bench) => bench < count).forEach((bench, k) => {
+        const { x, y, c, s, l } = board(bench);
+        if (!named.has(bench) && names[k]) labels.add(names[k], x - 0.6 * l * c, y - 0.6 * l * s, palette[ink], 30);
+        named.add(bench);
+      });
+    }
+    if (chosen >= 0 && chosen < count && !named.has(chosen)) {
+      labels.add(chosenName, board(chosen).x, board(chosen).y, palette.ink, 30);
+      named.add(chosen);
+    }
+    const [head, tail] = [board(0), board(count - 1)];
+    // In the show look the benches of marks have no names, and a dragon's own is not theirs.
+    if (front && (show || !named.has(0))) labels.add(front, head.x + head.l * head.c, head.y + head.l * head.s, palette.ink);
+    if (rear && count > 1 && !named.has(count - 1)) labels.add(rear, tail.x - tail.l * tail.c, tail.y - tail.l * tail.s, palette.ink);
+  });
 }
 
 /** The benches that are in the picture. */

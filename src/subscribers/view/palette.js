@@ -11,6 +11,26 @@ const FINEST = 0.001;
 /** How much of a colour is left while the dragon rests. */
 const AT_REST = 0.5;
 
+/**
+ * What tells several dragons apart, besides their names: dashes (pixels of ink and of gap in turn), and a colour that stands
+ * out from a light ground as from a dark one. Two of them differ in their dashes to an eye that sees no colour.
+ */
+const IDENTITIES = [
+  { colour: "#1f6fb5", dashes: [] },
+  { colour: "#c4560a", dashes: [12, 8] },
+  { colour: "#0b8560", dashes: [3, 5] },
+  { colour: "#a8478c", dashes: [22, 5, 4, 5] },
+  { colour: "#8a6a00", dashes: [28, 14] },
+  { colour: "#6c58d0", dashes: [8, 3] },
+  { colour: "#1b8296", dashes: [4, 14] },
+  { colour: "#b5424a", dashes: [14, 4, 3, 4, 3, 4] },
+  { colour: "#5f7a1e", dashes: [40, 6] },
+  { colour: "#757980", dashes: [6, 22] },
+];
+
+/** The identity of the dragon at a place in the list, from 0. */
+export const identityOf = (place) => IDENTITIES[place % IDENTITIES.length];
+
 const colour = (style, name) => style.getPropertyValue(name).trim();
 const channels = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 const mixed = (from, to, part) => `rgb(${from.map((one, k) => Math.round(one + (to[k] - one) * part)).join(" ")})`;

@@ -4,7 +4,7 @@ import { STRIDE, speedOf } from "./hermite.js";
 import { capital, remaining, say, sentenceOf } from "./words.js";
 
 /** By severity; the list of the states, with the severity of each, comes with the stage. */
-const SIGNS = { ok: "○", warning: "△", error: "✖" };
+export const SIGNS = { ok: "○", warning: "△", error: "✖" };
 /** The clearance bar is logarithmic from the least to the most metres, so that it has something to show near zero. */
 const LEAST_CLEARANCE = 0.001, MOST_CLEARANCE = 1;
 
@@ -18,17 +18,19 @@ let before = null, spokenAt = Infinity;
 
 /**
  * The state, the sentence and the countdown of a situation: `state`, `alert`, `trouble` (why nothing comes, or null),
- * `silent` (seconds without a frame, or null), `seconds` until what is `ahead` (NaN where nothing is counted down),
+ * `silent` (seconds without a frame, or null), `stale` (whether the whole picture is no longer true), `of` (whose situation it
+ * is, or null where there is one dragon), `seconds` until what is `ahead` (NaN where nothing is counted down),
  * `benches`, and `now` (what is so at this moment, in words).
  */
-export function showSituation({ state, alert, trouble, silent, seconds, ahead, benches, now }) {
+export function showSituation({ state, alert, trouble, silent, stale, of, seconds, ahead, benches, now }) {
   const { dataset } = document.body, calm = state.severity === "ok" && !state.happened;
   const changed = dataset.level !== state.name;
   if (changed) Object.assign(dataset, { level: state.name, severity: state.severity, happened: state.happened });
-  dataset.stale = String(Boolean(trouble) || silent !== null);
+  dataset.stale = String(stale);
   const words = trouble ? say(trouble) : silent === null ? say(state.name) : say("noFrames", { seconds: silent });
   put("state", `${trouble ? "○" : silent === null ? SIGNS[state.severity] : "…"} ${trouble ? words : capital(words)}`);
-  put("alert", trouble ? "" : sentenceOf(state, alert, benches));
+  const sentence = trouble ? "" : sentenceOf(state, alert, benches);
+  put("alert", of && sentence ? `${of}: ${sentence}` : sentence);
   put("now", capital(now));
   element("now").hidden = !now;
   countdown(state, seconds, ahead);
@@ -108,9 +110,9 @@ export function showBench(chosen, handles) {
   put("bench", say("detail", values));
 }
 
-/** Which show this is, on the page and in the title. */
-export function showNames({ scene, publisher }) {
-  const title = scene ? say("title", { scene, publisher }) : say("stage");
+/** Which show this is, on the page and in the title; with `several`, the names of all publishers, the title is theirs. */
+export function showNames({ scene, publisher }, several) {
+  const title = several ? say("titleSeveral", { publishers: several.join(", ") }) : scene ? say("title", { scene, publisher }) : say("stage");
   if (document.title !== title) document.title = title;
   put("name", [scene, publisher].filter(Boolean).join(" · "));
 }

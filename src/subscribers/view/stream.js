@@ -106,7 +106,9 @@ class Playback {
 
 /** The server's stream, opened again whenever it breaks. */
 export class Stream {
-  constructor() {
+  /** The stream of a publisher; of the server's only one where `name` is null. */
+  constructor(name = null) {
+    this.name = name;
     this.playback = new Playback();
     this.messages = { stage: {}, alert: {} };
     /** Why no frames come: a key of the page's words, or the server's own reason; null while they come. */
@@ -123,7 +125,8 @@ export class Stream {
 
   open() {
     const scheme = location.protocol === "https:" ? "wss" : "ws";
-    const socket = new WebSocket(`${scheme}://${location.host}/frames?rate=${MOST_FRAMES}`);
+    const whose = this.name === null ? "" : `&name=${encodeURIComponent(this.name)}`;
+    const socket = new WebSocket(`${scheme}://${location.host}/frames?rate=${MOST_FRAMES}${whose}`);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
     let requested = null, nearest = Infinity;

@@ -5,8 +5,10 @@
 
 const WORDS = {
   title: ["{scene} ({publisher}): stage picture", "{scene}（{publisher}）：舞台画面"],
+  titleSeveral: ["{publishers}: stage picture", "{publishers}：舞台画面"],
   stage: ["Bench dragon: stage picture", "板凳龙：舞台画面"],
   canvas: ["The stage from above. Arrow keys move the picture, plus and minus zoom, F follows the head, 0 shows all, question mark lists the keys.", "从上方看的舞台。方向键移动画面，加减号缩放，F 跟随龙头，0 显示全部，问号列出按键。"],
+  dragons: ["All dragons", "全部舞龙队"],
   clearance: ["Clearance", "间距"],
   speed: ["Speed, m/s", "速度（m/s）"],
   bench: ["Bench", "板凳"],
@@ -112,11 +114,16 @@ const WORDS = {
   not_understood: ["", "发布端不理解命令“{command}”。"],
   notDelivered: ["", "命令未送达发布端：{reason}"],
 
+  conductWhom: ["Dragon", "舞龙队"],
+  all: ["All", "全部"],
+  refusedBy: ["{name}: {sentence}", "{name}：{sentence}"],
+
   // What the page is doing, and says once.
   server: ["waiting for the server", "等待服务器"],
   publisher: ["waiting for a publisher", "等待发布端"],
   noStage: ["waiting for the stage", "等待舞台数据"],
   version: ["this page is for another version of the server: load it again", "本页面与服务器版本不符：请重新载入"],
+  noFramesNow: ["no frames", "没有新帧"],
   noFrames: ["no frames for {seconds} s", "已有 {seconds} 秒没有新帧"],
   dragonMoves: ["The dragon moves.", "龙在行进。"],
   clearAgain: ["Clear again.", "警报解除。"],

@@ -1,0 +1,113 @@
+#!/usr/bin/env python3
+"""What a second and a tenth dragon cost: publishers under different names on one machine, all read by one `metrics`.
+
+For each rate, one, two and ten publishers of the same scene in turn, for some rounds, so that the machine's moods fall on all.
+Of each publisher: its CPU time and resident memory, how late its loop woke, the periods it skipped; and the frames that the
+reader missed. Printed are medians over publishers and rounds, but of skipped and missed the sums, and beside each the ratio to
+one publisher alone. The load of the machine stands above: other programs are in all of this. Needs:
+
+    cargo build --release
+    python3 benches/several.py [--seconds 15] [--rounds 3] [--counts 1,2,10] [--rates 60,1000] [--scene FILE]
+"""
+
+import argparse
+import json
+import os
+import re
+import signal
+import statistics
+import subprocess
+import time
+import urllib.request
+
+PROGRAM = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "target", "release", "bench-dragon")
+# Until tables are made and every service is connected.
+WARM_UP = 4
+COLUMNS = ("cpu", "memory", "p50", "p99", "max")
+
+
+def cpu_seconds(process):
+    """User and system time of a process so far: proc(5), fields 14 and 15."""
+    with open(f"/proc/{process.pid}/stat", encoding="ascii") as file:
+        fields = file.read().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def resident_mb(process):
+    with open(f"/proc/{process.pid}/status", encoding="ascii") as file:
+        return int(re.search(r"VmRSS:\s+(\d+)", file.read()).group(1)) / 1024
+
+
+def missed(url):
+    """Frames that the reader has received and missed, over all names."""
+    with urllib.request.urlopen(url) as answer:
+        text = answer.read().decode()
+    count = lambda what: sum(float(value) for value in re.findall(rf"^bench_dragon_metrics_frames_{what}_total\{{.*\}} (\S+)$", text, re.M))
+    return count("received"), count("missed")
+
+
+def round_of(count, rate, arguments):
+    names = [f"several_{os.getpid()}_{place}" for place in range(count)]
+    scene = ["--scene", arguments.scene] if arguments.scene else []
+    run = ["run", "--json", "--quiet", "--loop", "--rate", str(rate)]
+    publishers = [subprocess.Popen([PROGRAM, "--name", name, *scene, *run], stdout=subprocess.PIPE) for name in names]
+    reader = [part for name in names for part in ("--name", name)] + ["metrics", "--json", "--listen", "127.0.0.1:0"]
+    reader = subprocess.Popen([PROGRAM, *reader], stdout=subprocess.PIPE)
+    try:
+        url = json.loads(reader.stdout.readline())["url"]
+        time.sleep(WARM_UP)
+        began = time.monotonic()
+        before = [cpu_seconds(one) for one in [*publishers, reader]]
+        received, lost = missed(url)
+        time.sleep(arguments.seconds)
+        passed = time.monotonic() - began
+        cpu = [100 * (cpu_seconds(one) - then) / passed for one, then in zip([*publishers, reader], before)]
+        memory = [resident_mb(one) for one in publishers]
+        now_received, now_lost = missed(url)
+        for one in publishers:
+            one.send_signal(signal.SIGTERM)
+        summaries = [json.loads(one.communicate()[0].splitlines()[-1]) for one in publishers]
+    finally:
+        for one in [*publishers, reader]:
+            one.kill()
+            one.wait()
+    lateness = {name: [one["wakeup_ns"][name] / 1000 for one in summaries] for name in ("p50", "p99", "max")}
+    return {
+        "cpu": cpu[:-1], "memory": memory, **lateness, "reader": cpu[-1],
+        "skipped": sum(one["skipped"] for one in summaries), "periods": sum(one["skipped"] + one["frames"] for one in summaries),
+        "missed": now_lost - lost, "received": now_received - received,
+    }
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    numbers = lambda text: [int(one) for one in text.split(",")]
+    parser.add_argument("--seconds", type=float, default=15)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--counts", type=numbers, default=[1, 2, 10])
+    parser.add_argument("--rates", type=numbers, default=[60, 1000])
+    parser.add_argument("--scene")
+    arguments = parser.parse_args()
+    print(f"{os.cpu_count()} CPUs; load before: {' '.join(f'{one:.2f}' for one in os.getloadavg())}")
+    heads = ("CPU each, %", "memory, MB", "late p50, us", "late p99, us", "late max, us")
+    print(f"{'Hz':>5} {'dragons':>7}" + "".join(f"{one:>22}" for one in heads) + f"{'skipped':>22}{'missed by the reader':>22}{'reader CPU, %':>15}")
+    for rate in arguments.rates:
+        rounds = {count: [] for count in arguments.counts}
+        for _ in range(arguments.rounds):
+            for count in arguments.counts:
+                rounds[count].append(round_of(count, rate, arguments))
+        alone = None
+        for count, found in rounds.items():
+            medians = {name: statistics.median(value for one in found for value in one[name]) for name in COLUMNS}
+            alone = alone or medians
+            figures = "".join(f"{f'{medians[name]:.1f} ({medians[name] / alone[name]:.2f} x)':>22}" for name in COLUMNS)
+            total = lambda name: sum(one[name] for one in found)
+            share = lambda part, whole: f"{total(part):.0f} ({100 * total(part) / max(1, whole):.3f} %)"
+            lost = share("missed", total("missed") + total("received"))
+            reader = statistics.median(one["reader"] for one in found)
+            print(f"{rate:>5} {count:>7}{figures}{share('skipped', total('periods')):>22}{lost:>22}{reader:>15.1f}", flush=True)
+    print(f"load after: {' '.join(f'{one:.2f}' for one in os.getloadavg())}")
+
+
+if __name__ == "__main__":
+    main()

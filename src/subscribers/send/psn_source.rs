@@ -1,0 +1,143 @@
+//! The trackers of one publisher: which handles, their names, where they are, whether frames come. In: frames. Out: trackers,
+//! which the [`sender`](super::psn_sender) puts into packets. Called by it alone.
+
+use std::time::{Duration, Instant};
+
+use super::axes::Axes;
+use super::psn::{Tracker, TrackerName};
+use super::trackers::{Numbers, Selection};
+use super::Arrivals;
+use crate::live::clock::monotonic_ns;
+use crate::subscribers::feed::FeedEvent;
+use crate::wire::{FrameHeader, HandlePose};
+
+/// A frame that seems older than this was made on a machine with another clock.
+const OLDEST: Duration = Duration::from_secs(10);
+
+/// When a frame should have been made, CLOCK_MONOTONIC in ns of this machine; one of another machine counts as made now.
+pub(super) fn made_ns(header: &FrameHeader) -> u64 {
+    let now_ns = monotonic_ns();
+    let known = now_ns.checked_sub(header.deadline_ns).is_some_and(|age| u128::from(age) < OLDEST.as_nanos());
+    if known { header.deadline_ns } else { now_ns }
+}
+
+/// The trackers of one publisher.
+pub(super) struct Source {
+    numbers: Numbers,
+    arrivals: Arrivals,
+    team: Option<Team>,
+    /// Where they were in the latest frame that was taken.
+    pub(super) trackers: Vec<Tracker>,
+    /// Whether that frame has not been sent yet.
+    pub(super) unsent: bool,
+    /// Whether desks have been told that frames have stopped.
+    pub(super) stopped: bool,
+}
+
+struct Team {
+    handles: u32,
+    chosen: Vec<u32>,
+    names: Vec<TrackerName>,
+    announced: bool,
+}
+
+impl Source {
+    pub(super) fn new(numbers: Numbers) -> Self {
+        Self { numbers, arrivals: Arrivals::default(), team: None, trackers: Vec::new(), unsent: false, stopped: false }
+    }
+
+    /// Whether there are trackers: a frame has come at some time.
+    pub(super) fn is_known(&self) -> bool {
+        self.team.is_some()
+    }
+
+    /// Names of the trackers; none before the first frame.
+    pub(super) fn names(&self) -> &[TrackerName] {
+        self.team.as_ref().map_or(&[], |team| &team.names)
+    }
+
+    /// Takes in an event for what it tells of arrivals.
+    pub(super) fn arrived(&mut self, event: &FeedEvent<'_>, now: Instant) {
+        self.arrivals.handle(event, now);
+    }
+
+    /// See [`Arrivals::stopped_since`]; none where there are no trackers.
+    pub(super) fn stopped_since(&self, now: Instant) -> Option<Instant> {
+        self.arrivals.stopped_since(now).filter(|_| self.is_known())
+    }
+
+    /// Chooses the trackers where the team is another one. A sentence for each kind of handles that is left out, or `None` where
+    /// the team is known.
+    pub(super) fn meet(&mut self, handles: u32, selection: &Selection) -> Option<Vec<String>> {
+        if self.team.as_ref().is_some_and(|team| team.handles == handles) {
+            return None;
+        }
+        let mut sentences = Vec::new();
+        let mut chosen = selection.of(handles);
+        let names = self.numbers.trackers(&chosen, handles);
+        let of = self.numbers.of.as_ref().map_or(String::new(), |of| format!(" of \"{of}\""));
+        if let Some(beyond) = selection.beyond(handles) {
+            sentences.push(format!("there is no handle {beyond}{of}: the team has {handles}"));
+        }
+        if names.len() < chosen.len() {
+            let (sent, chosen, last) = (names.len(), chosen.len(), self.numbers.last);
+            let (whose, advice) =
+                if of.is_empty() { ("trackers'", "") } else { ("its", "; --id-step leaves room for more") };
+            sentences
+                .push(format!("only {sent} of {chosen} handles{of} are sent: {whose} numbers end at {last}{advice}"));
+        }
+        chosen.truncate(names.len());
+        self.team = Some(Team { handles, chosen, names, announced: false });
+        Some(sentences)
+    }
+
+    /// Takes over a frame's places, made at `timestamp_us`. Whether it replaces one that was not sent.
+    pub(super) fn take(&mut self, header: &FrameHeader, handles: &[HandlePose], axes: Axes, timestamp_us: u64) -> bool {
+        let Some(team) = &self.team else { return false };
+        let vector = |x, y| axes.vector([x, y, 0.0]).map(|part| part as f32);
+        let tracker = |(handle, name): (&u32, &TrackerName)| {
+            let pose = handles.get(*handle as usize)?;
+            // Desks count seconds of wall time.
+            let (vx, vy) = (pose.vx * header.time_scale, pose.vy * header.time_scale);
+            Some(Tracker {
+                id: name.id,
+                position: vector(pose.x, pose.y),
+                speed: (!vx.is_nan() && !vy.is_nan()).then(|| vector(vx, vy)),
+                orientation: axes.rotation(pose.heading).map(|part| part as f32),
+                status: 1.0,
+                timestamp_us,
+            })
+        };
+        self.trackers.clear();
+        self.trackers.extend(team.chosen.iter().zip(&team.names).filter_map(tracker));
+        std::mem::replace(&mut self.unsent, true)
+    }
+
+    /// From here on the trackers are where they last were, standing still, with status 0.
+    pub(super) fn stop(&mut self) {
+        self.stopped = true;
+        for tracker in &mut self.trackers {
+            tracker.status = 0.0;
+            tracker.speed = tracker.speed.map(|_| [0.0; 3]);
+        }
+    }
+
+    /// Leaves out all but the first so many trackers from now on. How many were chosen, where that leaves some out.
+    pub(super) fn truncate(&mut self, most: usize) -> Option<usize> {
+        let chosen = self.trackers.len();
+        if let Some(team) = self.team.as_mut().filter(|_| chosen > most) {
+            team.chosen.truncate(most);
+            team.names.truncate(most);
+            self.trackers.truncate(most);
+            return Some(chosen);
+        }
+        None
+    }
+
+    /// The number of handles and the trackers, once for each team.
+    pub(super) fn announce(&mut self) -> Option<(u32, Vec<TrackerName>)> {
+        let team = self.team.as_mut().filter(|team| !team.announced)?;
+        team.announced = true;
+        Some((team.handles, team.names.clone()))
+    }
+}

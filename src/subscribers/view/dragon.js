@@ -1,0 +1,174 @@
+// One publisher's dragon: its stream, where it is now, its path and colours, what is so and what is marked. Knows the words for
+// its marks, and no canvas.
+
+import { pathOf } from "./drawing.js";
+import { STRIDE } from "./hermite.js";
+import { Overlap, marksOf } from "./marks.js";
+import { SpeedScale } from "./palette.js";
+import { Show } from "./show.js";
+import { Stream } from "./stream.js";
+import { benchesOf, nameOf, remaining, say } from "./words.js";
+
+/** While there is nothing to show. */
+const WAITING = { name: "waiting", severity: "ok", happened: false, sentence: null };
+/** A state that the server does not list is shown as one without danger. */
+const UNKNOWN = { ...WAITING, name: "unknown" };
+/** Frames that do not come for so long (ms) are missed. */
+const SILENCE = 2000;
+
+/** How far from the centre the outermost bench is. */
+function reachOf(stage, handles) {
+  let most = 0;
+  for (let k = 0; k < handles.length; k += STRIDE) most = Math.max(most, Math.hypot(handles[k], handles[k + 1]));
+  return most + stage.width + stage.hole_inset || 1;
+}
+
+/** When the head reaches the end of the path, where the show comes so far and nothing that is counted down is before. */
+function pathEnd(stage, alert) {
+  const end = stage.events.find(({ event, time }) => event === "path_end" && time <= stage.freeze_time);
+  return end && alert?.event == null ? end.time : NaN;
+}
+
+function overlapWords({ pair, depth }) {
+  return depth < 0.0005 ? say("touchNow", { benches: benchesOf(pair) }) : say("overlapNow", { benches: benchesOf(pair), metres: depth.toFixed(3) });
+}
+
+export class Dragon {
+  /** `name` is the publisher's, which stands before its words where there are `several`; `show` asks for the show look, `still` for no motion in it. */
+  constructor(name, { several, show, still }) {
+    this.name = name;
+    this.several = several;
+    this.stream = new Stream(several ? name : null);
+    this.colours = new SpeedScale();
+    this.show = show ? new Show(still) : null;
+    this.overlap = new Overlap();
+    /** The handles at the moment of the picture, and between which two frames they lie. */
+    this.places = this.shown = null;
+    this.path = this.run = this.team = this.epoch = null;
+    this.reach = 1;
+    this.state = WAITING;
+    this.sight = null;
+    this.marks = [];
+  }
+
+  get stage() {
+    return this.stream.stage;
+  }
+
+  get newest() {
+    return this.stream.playback.newest;
+  }
+
+  /** Whether there is something to draw. */
+  get isThere() {
+    return Boolean(this.newest && this.stage);
+  }
+
+  /** A word or a sentence of the picture, with the publisher's name before it where there are several. */
+  own(words) {
+    return this.several ? `${this.name}: ${words}` : words;
+  }
+
+  /** What is so now: the state, what is ahead and in how many seconds of wall time. */
+  situation(now) {
+    const { playback, stage, alert, trouble } = this.stream, { newest } = playback;
+    const silence = newest ? now - newest.at : 0;
+    const silent = !trouble && newest && silence > Math.max(SILENCE, 3 * playback.interval) ? Math.floor(silence / 1000) : null;
+    const lost = trouble ?? (newest && stage ? null : "noStage");
+    const current = lost ? WAITING : stage.states[newest.state] ?? UNKNOWN;
+    let [seconds, ahead] = [NaN, null];
+    if (!lost && silent === null && newest.playing && !current.happened) {
+      ahead = alert?.event ?? "path_end";
+      seconds = ((alert?.event_time ?? pathEnd(stage, alert)) - playback.time(now)) / newest.scale;
+    }
+    return { state: current, alert, trouble: lost, silent, stale: Boolean(lost) || silent !== null, seconds, ahead, benches: stage?.benches, now: "" };
+  }
+
+  /**
+   * Looks at what is so now, and where everything is. Whether its team is another one than before: what was chosen for the
+   * last one does not fit. `struck` then tells whether something has just happened.
+   */
+  look(now) {
+    const before = this.state, { playback } = this.stream, { newest, stage } = this;
+    this.sight = this.situation(now);
+    this.state = this.sight.state;
+    this.struck = false;
+    if (!this.isThere) return false;
+    this.shown = playback.at(now, this.places);
+    this.places = this.shown.handles;
+    const isOther = this.run !== newest.run && this.begin(stage, newest);
+    this.colours.take(newest);
+    this.measure(stage, newest);
+    const { alert } = this.stream, known = stage.states[newest.state] ?? UNKNOWN;
+    const deepest = known.happened && known.severity !== "ok" ? this.overlap.look(stage, this.places, newest, this.reach, now) : null;
+    const all = marksOf({ state: known, alert, stage, places: this.places, overlap: deepest });
+    // An audience is shown where it will happen, not what the crew watches.
+    this.marks = this.named(this.show ? all.filter(({ kind }) => kind !== "now") : all, deepest);
+    this.sight.now = deepest && !this.sight.trouble ? overlapWords(deepest) : "";
+    const happened = this.state.happened && this.state.severity === "error";
+    this.struck = happened && before !== WAITING && before.name !== this.state.name;
+    const { from } = this.shown;
+    this.show?.update(now, this.places, this.epoch !== from.epoch, happened ? { x: alert?.event_x ?? this.places[0], y: alert?.event_y ?? this.places[1] } : null);
+    this.epoch = from.epoch;
+    return isOther;
+  }
+
+  /** Another run: another path and other speeds. */
+  begin(stage, newest) {
+    const look = JSON.stringify({ ...stage, run_id: null, scene: null }), isOther = this.team !== null && this.team !== look;
+    [this.team, this.run] = [look, newest.run];
+    this.colours.clear();
+    return isOther;
+  }
+
+  /** How far the team reaches, and the path so far out. */
+  measure(stage, newest) {
+    const reach = (this.reach = reachOf(stage, newest.handles));
+    // Positions are rounded to 32 bits, which alone moves the outermost bench a little.
+    if (this.path && this.path.run === this.run && reach <= 1.001 * this.path.reach) return;
+    // A team that moves outward is given room ahead.
+    const far = this.path?.run === this.run ? 1.1 * reach : reach;
+    this.path = { run: this.run, reach: far, lines: pathOf(stage, far) };
+  }
+
+  /** Words for the marks, in the page's language. */
+  named(marks, deepest) {
+    const { seconds } = this.sight, time = seconds > -1 ? remaining(Math.max(0, seconds)).join(" ") : null;
+    for (const mark of marks) {
+      mark.names = this.show ? [] : mark.pair.map((bench) => this.own(nameOf(bench)));
+      const benches = mark.pair.length ? benchesOf(mark.pair) : "", { alert } = this.stream;
+      if (mark.kind === "coming") mark.text = this.own(say(time === null ? "comingStill" : "coming", { kind: say(alert.event), benches, time }));
+      if (mark.kind === "overlap") mark.text = this.own(overlapWords(deepest));
+    }
+    return marks;
+  }
+
+  /** What stands at its ends: head and tail, with its name where there are several; in the show look the name alone. */
+  endNames() {
+    const gone = this.several && this.sight.stale ? ` (${say(this.sight.trouble ?? "noFramesNow")})` : "";
+    if (this.show) return this.several ? [this.name + gone, null] : [null, null];
+    return [this.own(say("head")) + gone, this.own(say("tail"))];
+  }
+
+  /** Changes where the picture of it does. */
+  lookKey() {
+    const { newest, colours, shown, stream, marks, stage } = this, texts = marks.map(({ kind, pair, text }) => [kind, pair, text]);
+    return [newest.run, newest.state, colours.resting, shown.time, shown.from.epoch, this.path.reach, colours.step, colours.head, stream.alert?.level, texts, stage.scene, this.show?.phase, this.sight.stale].join();
+  }
+
+  /** The last words on why nothing comes, once it has been seen; empty where frames come. */
+  notice() {
+    const { newest, sight } = this, stopped = sight.trouble ?? (sight.silent === null ? null : "silent");
+    if (!stopped || !this.isThere) return "";
+    const words = { server: "lostServer", silent: "silent" }[stopped] ?? "lostPublisher";
+    return this.own(say(words, { seconds: sight.silent, time: newest.time.toFixed(1) }));
+  }
+
+  /** For tests and measurements; nothing of a publisher that is gone. */
+  report(camera) {
+    const { newest } = this, there = this.isThere && !this.sight.trouble;
+    if (!there) return { name: this.name, state: null, run: null, sequence: null, head: null, shown: null, time: newest?.time ?? null };
+    const head = camera.toPixel(this.places[0], this.places[1]);
+    return { name: this.name, state: newest.state, run: newest.run, sequence: newest.sequence, time: newest.time, head, shown: this.shown };
+  }
+}

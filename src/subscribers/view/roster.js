@@ -1,0 +1,57 @@
+// The list of several dragons beside the picture: of each its sign, its name, its state, its countdown and its sentence. Where
+// there is one dragon, there is no list.
+
+import { identityOf } from "./palette.js";
+import { SIGNS, element } from "./panel.js";
+import { capital, remaining, say, sentenceOf } from "./words.js";
+
+const SVG = "http://www.w3.org/2000/svg";
+
+/** A stretch of the line that a dragon has on the picture. */
+function swatch({ colour, dashes }) {
+  const svg = document.createElementNS(SVG, "svg"), line = document.createElementNS(SVG, "line");
+  for (const [name, value] of Object.entries({ viewBox: "0 0 60 8", "aria-hidden": "true" })) svg.setAttribute(name, value);
+  const look = { x1: 0, y1: 4, x2: 60, y2: 4, stroke: colour, "stroke-width": 5, "stroke-dasharray": dashes.join(" ") };
+  for (const [name, value] of Object.entries(look)) line.setAttribute(name, value);
+  svg.append(line);
+  return svg;
+}
+
+/** An element with a class, and words in it. */
+const made = (tag, name) => Object.assign(document.createElement(tag), { className: name });
+
+export class Roster {
+  /** `select` is called with the dragon whose row is pressed, or with null where it was selected already. */
+  constructor(dragons, select) {
+    this.selected = null;
+    this.rows = dragons.map((dragon, place) => {
+      const [item, button, name, state, sentence] = [made("li", ""), made("button", ""), made("b", "whose"), made("span", "state"), made("p", "sentence")];
+      name.textContent = dragon.name;
+      button.append(swatch(identityOf(place)), name, state);
+      button.onclick = () => select(this.selected === dragon ? null : dragon);
+      item.append(button, sentence);
+      return { dragon, item, button, state, sentence };
+    });
+    element("dragons").replaceChildren(...this.rows.map(({ item }) => item));
+    element("dragons").hidden = false;
+  }
+
+  /** Shows how each is; `first` is the dragon of the header, which has its sentence there, `selected` that of the figures. */
+  show(first, selected) {
+    this.selected = selected;
+    for (const { dragon, item, button, state, sentence } of this.rows) {
+      const { sight } = dragon, words = sight.stale ? this.lost(sight) : `${SIGNS[sight.state.severity]} ${say(sight.state.name)}`;
+      const left = sight.seconds > -1 ? `, ${say(sight.ahead)} ${remaining(Math.max(0, sight.seconds)).join(" ")}` : "";
+      const text = dragon === first || sight.stale ? "" : sentenceOf(sight.state, sight.alert, sight.benches);
+      if (state.textContent !== words + left) state.textContent = words + left;
+      if (sentence.textContent !== text) sentence.textContent = text;
+      item.dataset.severity = sight.stale ? "lost" : sight.state.severity;
+      button.setAttribute("aria-pressed", dragon === selected);
+    }
+  }
+
+  /** Why nothing comes. */
+  lost({ trouble, silent }) {
+    return trouble ? `○ ${capital(say(trouble))}` : `… ${capital(say("noFrames", { seconds: silent }))}`;
+  }
+}

@@ -1,0 +1,264 @@
+"""Two dragons on one page, in Debian's Chromium: the paper's coil and a procession that passes it.
+
+    several_page.py SCENARIO PROGRAM NAME
+
+Starts its own server and publishers under the service names NAME_a and NAME_b, looks at what the page shows and draws, and
+asks the publishers themselves what they do. Ends with exit code 0, or with what it found instead.
+"""
+
+import contextlib
+import csv
+import json
+import subprocess
+import time
+
+import numpy
+
+import stage_picture
+from stage_picture import NAME, PROGRAM, WIDTH, browser, canvas_pixels, is_board, opened, play, truth_at, until, words
+from stage_show import contrast, luminance, projection, shot
+
+A, B = f"{NAME}_a", f"{NAME}_b"
+PROCESSION = ["--scene", "config/procession.toml"]
+STILL_A = ["run", "--quiet", "--json", "--start", "300", "--time-scale", "1e-6"]
+STILL_B = [*PROCESSION, "run", "--quiet", "--json", "--start", "20", "--time-scale", "1e-6"]
+DEFICIENCIES = ("none", "protanopia", "deuteranopia", "tritanopia", "achromatopsia")
+# How far beyond a board the middle of its casing is, pixels.
+CASING = 1.5
+
+
+@contextlib.contextmanager
+def started(*arguments):
+    child = subprocess.Popen([PROGRAM, *arguments], stdout=subprocess.PIPE, text=True)
+    try:
+        yield child
+    finally:
+        child.kill()
+        child.wait()
+
+
+@contextlib.contextmanager
+def server(*arguments, port=0):
+    with started("--name", A, "--name", B, "view", "--json", "--port", str(port), *arguments) as child:
+        yield json.loads(child.stdout.readline())["url"]
+
+
+def publisher(name, arguments):
+    return started("--name", name, *arguments)
+
+
+def places_of(arguments, second):
+    """Where the handles of a scene are, as `solve` has them."""
+    command = [PROGRAM, *arguments, "solve", "--at", str(second)]
+    rows = csv.DictReader(subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines())
+    return numpy.array([[float(row["x"]), float(row["y"])] for row in rows])
+
+
+def both_drawn(page):
+    until(page, "picture.dragons.length === 2 && picture.dragons.every((one) => one.head !== null)", "both dragons")
+    # The camera moves to where both are.
+    time.sleep(4)
+
+
+def row(page, name):
+    return page.locator("#dragons li", has_text=name)
+
+
+def beside(handles, bench, side, pixel):
+    """A line of places beside a board, so many pixels beyond its edge, without its rounded ends."""
+    front, rear = handles[bench], handles[bench + 1]
+    along = (front - rear) / numpy.linalg.norm(front - rear)
+    across = numpy.array([-along[1], along[0]])
+    start = rear + 0.2 * (front - rear)
+    return [start + share * 0.6 * (front - rear) + side * (WIDTH / 2 + CASING * pixel) * across for share in numpy.linspace(0, 1, 25)]
+
+
+def two_on_one_stage():
+    handles = {A: truth_at(300.0), B: places_of(PROCESSION, 20)}
+    with server() as url, publisher(A, STILL_A), publisher(B, STILL_B), browser(viewport={"width": 1600, "height": 900}) as (page, complaints):
+        page.goto(url)
+        both_drawn(page)
+        pixels, to_pixel, scale = canvas_pixels(page)
+        high, wide = pixels.shape[:2]
+        for name, places in handles.items():
+            middles = to_pixel((places[:-1] + places[1:]) / 2)
+            assert ((middles >= 0) & (middles < [wide, high])).all(), f"{name} is not all in the picture"
+            missing = [bench for bench, (x, y) in enumerate(middles) if not is_board(pixels[y, x])]
+            assert not missing, f"{name}: no board is drawn where benches {missing} (from 0) are"
+        labels = page.evaluate("picture.labels.map((one) => one.text)")
+        assert {f"{A}: HEAD", f"{B}: HEAD"} <= set(labels), labels
+        for name in (A, B):
+            assert "moving" in row(page, name).inner_text(), words(page)
+        assert page.title() == f"{A}, {B}: stage picture", page.title()
+        told_apart(page, handles)
+        chosen_by_hand(page, handles)
+        show, seen = opened(page.context.browser, viewport={"width": 1280, "height": 720})
+        show.goto(f"{url}#show")
+        both_drawn(show)
+        assert show.evaluate("picture.labels.map((one) => one.text)") == [A, B], "the names in the show look"
+        assert not complaints and not seen, complaints + seen
+
+
+def told_apart(page, handles):
+    """By their casings: one a whole line, one dashed, both with a contrast of 3 to the ground, for eyes of any kind."""
+    vision = page.context.new_cdp_session(page)
+    to_pixel = projection(page)
+    pixel = 1 / numpy.hypot(*(to_pixel(1, 0) - to_pixel(0, 0)))
+    for theme in ("light", "dark"):
+        page.emulate_media(color_scheme=theme)
+        time.sleep(0.5)
+        for deficiency in DEFICIENCIES:
+            vision.send("Emulation.setEmulatedVisionDeficiency", {"type": deficiency})
+            time.sleep(0.2)
+            pixels = shot(page)
+            box = page.locator("#stage").bounding_box()
+            ground = pixels[int(box["y"]) + 3, int(box["x"]) + 3]
+            shares = {}
+            # The outermost turn of the coil from outside, and the straight part of the procession from both sides.
+            for name, benches, sides in [(A, range(150, 215), (1, -1)), (B, range(12, 50), (1, -1))]:
+                best = []
+                for side in sides:
+                    inked = []
+                    for bench in benches:
+                        line = numpy.array([to_pixel(*place) for place in beside(handles[name], bench, side, pixel)]).astype(int)
+                        inked += [max(contrast(pixels[y, x], ground), 1) >= 3 for x, y in line]
+                    best.append(numpy.mean(inked))
+                shares[name] = best
+            whole, dashed = max(shares[A]), min(shares[B])
+            assert whole > 0.9, f"{theme}, {deficiency}: the casing of {A} is inked on {shares[A]}"
+            assert 0.35 < dashed < 0.85 and max(shares[B]) < 0.85, f"{theme}, {deficiency}: the casing of {B} is inked on {shares[B]}"
+    vision.send("Emulation.setEmulatedVisionDeficiency", {"type": "none"})
+    page.emulate_media(color_scheme="light")
+
+
+def chosen_by_hand(page, handles):
+    """A click on a bench shows that dragon's; so does a row, and Escape gives the figures back."""
+    to_pixel = projection(page)
+    x, y = to_pixel(*((handles[B][0] + handles[B][1]) / 2))
+    page.mouse.click(x, y)
+    until(page, "document.getElementById('bench').textContent.startsWith('Bench 1 of 60, the head')", "the procession's head")
+    until(page, "document.querySelectorAll('#dragons button')[1].getAttribute('aria-pressed') === 'true'", "its row")
+    row(page, A).get_by_role("button").click()
+    page.fill("#pick", "223")
+    until(page, "document.getElementById('bench').textContent.startsWith('Bench 223 of 223, the tail')", "the coil's tail")
+    page.locator("#stage").focus()
+    page.keyboard.press("Escape")
+    until(page, "[...document.querySelectorAll('#dragons button')].every((one) => one.getAttribute('aria-pressed') === 'false')", "no row")
+
+
+def one_dies_alone():
+    handles = {A: truth_at(300.0), B: places_of(PROCESSION, 20)}
+    with browser(viewport={"width": 1600, "height": 900}) as (page, complaints):
+        with server() as url, publisher(A, STILL_A):
+            with publisher(B, STILL_B):
+                page.goto(url)
+                both_drawn(page)
+                first = page.evaluate("picture.dragons[1].run")
+                before = light(page, handles)
+            until(page, "picture.dragons[1].head === null", "its death")
+            notice = until(page, "!document.getElementById('notice').hidden && document.getElementById('notice').textContent", "a notice")
+            assert notice == f"{B}: No publisher. The picture is from t = 20.0 s.", notice
+            assert page.evaluate("document.body.dataset.stale") == "false", "the whole picture is dimmed"
+            assert "waiting for a publisher" in row(page, B).inner_text().lower() and "moving" in row(page, A).inner_text(), words(page)
+            time.sleep(0.5)
+            after = light(page, handles)
+            assert after[B] > before[B] + 0.15, f"{B} is not dimmed: {before} became {after}"
+            assert abs(after[A] - before[A]) < 0.02, f"{A} is dimmed: {before} became {after}"
+            labels = page.evaluate("picture.labels.map((one) => one.text)")
+            assert f"{B}: HEAD (waiting for a publisher)" in labels and f"{A}: HEAD" in labels, labels
+            with publisher(B, STILL_B):
+                until(page, f"picture.dragons[1].run !== null && picture.dragons[1].run !== '{first}'", "its return")
+                until(page, "document.getElementById('notice').hidden", "no notice")
+                time.sleep(0.5)
+                assert abs(light(page, handles)[B] - before[B]) < 0.02, "it is dimmed still"
+        until(page, "document.body.dataset.stale === 'true'", "the server's death")
+        port = int(url.rstrip("/").rsplit(":", 1)[1])
+        assert not complaints, complaints
+        with server(port=port), publisher(A, ["run", "--quiet", "--json", "--start", "406", "--rate", "20"]), publisher(B, STILL_B):
+            until(page, "picture.dragons.every((one) => one.head !== null)", "the server's return")
+            until(page, "document.body.dataset.level === 'contact'", "the contact")
+            alert = page.get_by_role("alert").inner_text()
+            assert alert.startswith(f"{A}: ") and "and bench 9 touch" in alert, alert
+            assert "moving" in row(page, B).inner_text() and "contact" in row(page, A).inner_text(), words(page)
+
+
+def light(page, handles):
+    """How light the boards of each are, below which no word lies."""
+    pixels, to_pixel, _ = canvas_pixels(page)
+    mean = {}
+    for name, places in handles.items():
+        benches = range(60, 180) if name == A else range(15, 45)
+        at = to_pixel(numpy.array([(places[bench] + places[bench + 1]) / 2 for bench in benches]))
+        mean[name] = float(numpy.median(luminance(pixels[at[:, 1], at[:, 0]])))
+    return mean
+
+
+def state(name):
+    asked = subprocess.run([PROGRAM, "--name", name, "--json", "control", "state"], capture_output=True)
+    return json.loads(asked.stdout) if asked.returncode == 0 else {"playback": None}
+
+
+def both(playback, what, seconds=30):
+    """Waits until the two publishers are so."""
+    deadline = time.monotonic() + seconds
+    while (now := [state(name)["playback"] for name in (A, B)]) != playback:
+        assert time.monotonic() < deadline, f"{what}: {now}, not {playback}"
+        time.sleep(0.05)
+
+
+def bar_conducts_one_or_all():
+    run = ["run", "--quiet", "--json", "--rate", "50"]
+    with server("--control") as url, publisher(A, [*run, "--start", "100"]) as first, publisher(B, [*PROCESSION, *run]), browser() as (page, complaints):
+        page.goto(url)
+        until(page, "picture.dragons.length === 2 && picture.dragons.every((one) => one.head !== null)", "both dragons")
+        until(page, "!document.getElementById('conduct').hidden", "the bar")
+        whom, toggle, hold = page.locator("#conduct-whom"), page.locator("#conduct-toggle"), page.locator("#conduct-hold")
+        assert whom.locator("option").all_inner_texts() == ["All", A, B]
+        toggle.click()
+        both(["paused", "paused"], "all pause")
+        until(page, "document.getElementById('conduct-toggle').textContent === 'Play'", "the button is Play")
+        whom.select_option(B)
+        toggle.click()
+        both(["paused", "playing"], "one plays")
+        page.locator("#conduct-rate").select_option("2 ×")
+        deadline = time.monotonic() + 30
+        while state(B)["time_scale"] != 2.0:
+            assert time.monotonic() < deadline, "the speed of one"
+        assert state(A)["playback"] == "paused"
+        # One is paused and one plays: all pause, and then all play.
+        whom.select_option("")
+        until(page, "document.getElementById('conduct-toggle').textContent === 'Pause'", "the button is Pause")
+        toggle.click()
+        both(["paused", "paused"], "all pause again")
+        until(page, "document.getElementById('conduct-toggle').textContent === 'Play'", "the button is Play")
+        toggle.click()
+        both(["playing", "playing"], "all play")
+        # A hold is for all, whoever is chosen.
+        whom.select_option(A)
+        hold.click()
+        both(["held", "held"], "both are held")
+        until(page, "document.getElementById('conduct-hold').getAttribute('aria-pressed') === 'true'", "the button is latched")
+        toggle.click()
+        until(page, f"document.getElementById('conduct-answer').textContent.startsWith('{A}: Resume is refused')", "whose refusal")
+        hold.click()
+        both(["paused", "paused"], "both are released")
+        # Beyond the end of one, that one stands at its end.
+        whom.select_option("")
+        page.evaluate("(() => { const line = document.getElementById('conduct-seek'); line.value = line.max; line.onchange(); })()")
+        longest = page.evaluate("Number(document.getElementById('conduct-seek').max)")
+        deadline = time.monotonic() + 30
+        while abs(max(now := [state(name)["sim_time"] for name in (A, B)]) - longest) > 1e-6 or min(now) < 100:
+            assert time.monotonic() < deadline, f"the end of both: {now}, {longest}"
+            time.sleep(0.05)
+        # One is gone: a hold reaches the other, and the bar says where it did not arrive.
+        first.kill()
+        until(page, "picture.dragons[0].head === null", "its death")
+        hold.click()
+        both([None, "held"], "the one that is left is held")
+        until(page, f"document.getElementById('conduct-answer').textContent.includes('{A}: ')", "where the hold did not arrive")
+        assert not complaints, complaints
+
+
+if __name__ == "__main__":
+    stage_picture.WATCHDOG = 180
+    play(two_on_one_stage, one_dies_alone, bar_conducts_one_or_all)
