@@ -78,9 +78,8 @@ impl Common {
     /// Bad input: the sentence says what was expected.
     pub fn check_names(&self, takes_several: bool) -> Result<(), CommandError> {
         let refused = |sentence: String| Err(CommandError::BadInput(sentence));
-        let is_option = |argument: &OsString| {
-            argument.to_str().is_some_and(|text| text == "--name" || text.starts_with("--name="))
-        };
+        let is_option =
+            |argument: &OsString| argument.to_str().is_some_and(|text| text == "--name" || text.starts_with("--name="));
         let given = std::env::args_os().skip(1).take_while(|argument| argument != "--").filter(is_option).count();
         let count = self.names.len();
         if !takes_several && count.max(given) > 1 {

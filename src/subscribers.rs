@@ -9,6 +9,8 @@ pub mod control;
 pub mod feed;
 pub mod hermite;
 #[cfg(feature = "cli")]
+mod http;
+#[cfg(feature = "cli")]
 pub mod metrics;
 pub mod monitor;
 pub mod polling;

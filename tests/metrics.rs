@@ -8,7 +8,9 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use nix::sys::signal::Signal;
-use processes::{Process, can_run, http_get, program, python, python_modules, scene_file, summary, text, wait};
+use processes::{
+    Process, can_run, http_get, http_get_as, program, python, python_modules, scene_file, summary, text, wait,
+};
 use serde_json::Value;
 
 const DEADLINE: u64 = 120;
@@ -141,6 +143,20 @@ fn an_address_in_use_is_a_sentence() {
 }
 
 /// The dashboard asks for nothing that is not served, in the scene of the documents.
+#[test]
+fn a_foreign_name_for_this_machine_is_answered_nothing() {
+    let mut server = Process::start(program("host").args(["metrics", "--json", "--listen", "127.0.0.1:0"]));
+    let ready: Value = serde_json::from_str(&server.first_line_within(DEADLINE)).unwrap();
+    let url = ready["url"].as_str().unwrap();
+    for host in ["evil.example", "evil.example:9464", "127.0.0.1.evil.example"] {
+        let answer = http_get_as(url, host, "*/*");
+        assert!(answer.starts_with("HTTP/1.1 403") && !answer.contains("bench_dragon_up"), "{host}: {answer}");
+    }
+    for host in ["localhost:9464", "127.0.0.1", "[::1]:9464"] {
+        assert!(http_get_as(url, host, "*/*").contains("bench_dragon_up{"), "{host}");
+    }
+}
+
 #[test]
 fn the_dashboard_shows_what_is_served() {
     let dashboard: Value = serde_json::from_str(include_str!("../docs/grafana/bench-dragon.json")).unwrap();

@@ -95,7 +95,11 @@ impl Sending<'_> {
         assert!(number(&heard, "equal") > least, "{}", heard["publishers"]);
         assert!(number(&heard, "unknown") <= number(&heard, "memory_missed"), "{}", heard["publishers"]);
         assert_eq!(number(&heard, "equal") + number(&heard, "unknown"), number(&sent, "frames"));
-        assert_eq!((number(&heard, "stopped"), number(&sent, "stopped_frames")), (1, 1), "the sender says that it ends");
+        assert_eq!(
+            (number(&heard, "stopped"), number(&sent, "stopped_frames")),
+            (1, 1),
+            "the sender says that it ends"
+        );
         assert_eq!((number(&heard, "packets"), number(&sent, "unsent_packets")), (number(&sent, "packets"), 0));
         assert_eq!(number(&heard, "trackers"), handles);
         assert!(number(&heard, "largest") <= 1472, "{} bytes", heard["largest"]);

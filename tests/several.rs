@@ -59,7 +59,10 @@ fn a_command_of_one_publisher_refuses_a_second_name() {
     let printed = refused(&[&["--name", "two", "send", "psn", "--first-id", "65000"], &desks[..]].concat());
     assert!(printed.contains("--id-step 1000"), "{printed}");
     let alike = same.replace('_', "#");
-    assert!(refused(&[&["--name", &alike, "--name", &same.replace('_', "*"), "send", "osc"], &desks[..]].concat()).contains("OSC address"));
+    assert!(
+        refused(&[&["--name", &alike, "--name", &same.replace('_', "*"), "send", "osc"], &desks[..]].concat())
+            .contains("OSC address")
+    );
 }
 
 /// Frames and messages of a publisher over a server's WebSocket: its stage, then a frame's run.
@@ -94,7 +97,8 @@ fn a_program_reads_each_dragon_by_its_name() {
     assert_ne!(seen[0].1, seen[1].1);
     let (first, _) = stage_and_run(&address, "");
     assert_eq!(first["publisher"], json!(unique(names[0])), "without a name, the first");
-    let Err(tungstenite::Error::Http(response)) = tungstenite::connect(format!("ws://{address}/frames?name=other")) else {
+    let Err(tungstenite::Error::Http(response)) = tungstenite::connect(format!("ws://{address}/frames?name=other"))
+    else {
         panic!("a name that is not served");
     };
     assert_eq!(response.status(), 404);
@@ -197,7 +201,8 @@ fn metrics_and_osc_tell_two_dragons_apart() {
             wait(0.1);
             http_get(ready["url"].as_str().unwrap(), "*/*")
         });
-        let mut right = answers.filter(|answer| names.iter().zip(expected).all(|(name, value)| up(answer, name, value)));
+        let mut right =
+            answers.filter(|answer| names.iter().zip(expected).all(|(name, value)| up(answer, name, value)));
         right.next().expect("the figures of both")
     };
     let answer = until([1, 1]);
@@ -214,7 +219,7 @@ fn in_a_browser(scenario: &str) {
         return;
     }
     let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let arguments = ["tests/python/several_page.py", scenario, env!("CARGO_BIN_EXE_bench-dragon"), &unique(scenario)];
+    let arguments = ["tests/python/several_page.py", scenario, env!("CARGO_BIN_EXE_bench-dragon"), &unique(&scenario[..3])];
     let output = Process::start(python().args(arguments)).output_within(200);
     println!("{}", text(&output.stdout));
     assert!(output.status.success(), "{}", text(&output.stderr));

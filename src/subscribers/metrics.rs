@@ -10,19 +10,22 @@ pub mod families;
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use axum::Router;
-use axum::extract::State;
-use axum::http::{HeaderMap, header};
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::middleware::{Next, from_fn};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use exposition::{Family, Format, render};
 use families::{families, joined};
 
 use super::feed::{FeedEvent, Frames};
+use super::http::Listening;
 use super::monitor::Monitor;
 use super::polling::{Handler, poll_until};
+use super::view::origin::Admission;
 use crate::live::clock::monotonic_ns;
 use crate::transports::iceoryx2::{OpenError, service_name};
 
@@ -88,10 +91,9 @@ pub fn serve<Refused: From<MetricsError>>(
 ) -> Result<(), Refused> {
     names.iter().try_for_each(|name| service_name(name, "poses").map(drop)).map_err(MetricsError::from)?;
     let listen = |source| MetricsError::Listen { address, source };
-    // One thread for all requests: they must not take the cores a publisher on this machine needs.
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(listen)?;
-    let listener = runtime.block_on(tokio::net::TcpListener::bind(address)).map_err(listen)?;
-    ready(listener.local_addr().map_err(listen)?)?;
+    let listening = Listening::at(address).map_err(listen)?;
+    let admission = Admission { loopback: listening.address.ip().is_loopback(), origins: Vec::new() };
+    ready(listening.address)?;
     let server = Server::new(names);
     let reader = std::thread::spawn({
         let (names, mut handler, stop) = (Arc::clone(&server.names), server.clone(), Arc::clone(stop));
@@ -105,24 +107,22 @@ pub fn serve<Refused: From<MetricsError>>(
     let router = Router::new()
         .route("/", get(|| async { "The metrics of bench-dragon are at /metrics.\n" }))
         .route("/metrics", get(metrics))
+        .layer(from_fn(move |request, next| own_host(admission.clone(), request, next)))
         .with_state(server);
-    let served = runtime.block_on(async {
-        tokio::select! {
-            served = async { axum::serve(listener, router).await } => served,
-            () = stopped(stop) => Ok(()),
-        }
-    });
-    stop.store(true, Ordering::Relaxed);
+    let served = listening.serve(router, stop);
     // A panic of the reader has already been printed.
     let read = reader.join().unwrap_or(Ok(()));
     served.map_err(listen)?;
     Ok(read.map_err(MetricsError::from)?)
 }
 
-async fn stopped(stop: &AtomicBool) {
-    while !stop.load(Ordering::Relaxed) {
-        tokio::time::sleep(Duration::from_millis(100)).await;
+/// A foreign name that resolves to this machine is answered nothing: a page of that name could read the figures.
+async fn own_host(admission: Admission, request: Request, next: Next) -> Response {
+    let host = request.headers().get(header::HOST).and_then(|host| host.to_str().ok());
+    if !admission.allows_host(host) {
+        return (StatusCode::FORBIDDEN, "this server has another name").into_response();
     }
+    next.run(request).await
 }
 
 async fn metrics(State(server): State<Server>, headers: HeaderMap) -> Response {

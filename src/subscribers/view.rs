@@ -8,7 +8,7 @@
 
 mod browser;
 mod gate;
-mod origin;
+pub(in crate::subscribers) mod origin;
 mod reader;
 mod wire;
 
@@ -32,6 +32,7 @@ use tower_http::services::ServeDir;
 
 use super::connection::Wake;
 use super::feed::{Feed, FeedOptions, Frames};
+use super::http::Listening;
 use crate::transports::iceoryx2::{OpenError, service_name};
 use gate::Gate;
 pub use gate::Token;
@@ -145,10 +146,8 @@ pub fn serve<Refused: From<ViewError>>(
         std::fs::read_dir(folder).map_err(|source| ViewError::Pages { folder: folder.clone(), source })?;
     }
     let listen = |source| ViewError::Listen { address, source };
-    // One thread for all browsers: they must not take the cores a publisher on this machine needs.
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(listen)?;
-    let listener = runtime.block_on(tokio::net::TcpListener::bind(address)).map_err(listen)?;
-    let address = listener.local_addr().map_err(listen)?;
+    let server = Listening::at(address).map_err(listen)?;
+    let address = server.address;
     let loopback = address.ip().is_loopback();
     let needs_token = control && (!loopback || !origins.is_empty());
     let token = if needs_token { Some(Token::random().map_err(ViewError::from)?) } else { None };
@@ -168,13 +167,7 @@ pub fn serve<Refused: From<ViewError>>(
     }
     let admission = Arc::new(Admission { loopback, origins });
     let router = router(Server { channels: channels.into(), admission }, pages.as_deref());
-    let served = runtime.block_on(async {
-        tokio::select! {
-            served = async { axum::serve(listener, router).await } => served,
-            () = stopped(stop) => Ok(()),
-        }
-    });
-    stop.store(true, Ordering::Relaxed);
+    let served = server.serve(router, stop);
     // A panic of a reader has already been printed.
     let read = readers.into_iter().try_for_each(|reader| reader.join().unwrap_or(Ok(())));
     served.map_err(listen)?;
@@ -215,12 +208,6 @@ fn router(server: Server, pages: Option<&Path>) -> Router {
         .route("/conduct.css", file("text/css; charset=utf-8", include_str!("view/conduct.css")))
         .route("/frames", get(frames))
         .with_state(server)
-}
-
-async fn stopped(stop: &AtomicBool) {
-    while !stop.load(Ordering::Relaxed) {
-        tokio::time::sleep(Duration::from_millis(100)).await;
-    }
 }
 
 /// The module that tells the page whose dragons it draws.

@@ -240,11 +240,17 @@ pub fn summary(output: &Output) -> Value {
 
 /// What a server of this machine answers, header and body, or nothing where it does not.
 pub fn http_get(url: &str, accept: &str) -> String {
+    let (address, _) = url.strip_prefix("http://").unwrap().split_once('/').unwrap();
+    http_get_as(url, address, accept)
+}
+
+/// The same, asked as one who takes the server for another host.
+pub fn http_get_as(url: &str, host: &str, accept: &str) -> String {
     let (address, path) = url.strip_prefix("http://").unwrap().split_once('/').unwrap();
     let answer = || -> std::io::Result<String> {
         let mut stream = std::net::TcpStream::connect(address)?;
         stream.set_read_timeout(Some(Duration::from_secs(60)))?;
-        write!(stream, "GET /{path} HTTP/1.1\r\nHost: {address}\r\nAccept: {accept}\r\nConnection: close\r\n\r\n")?;
+        write!(stream, "GET /{path} HTTP/1.1\r\nHost: {host}\r\nAccept: {accept}\r\nConnection: close\r\n\r\n")?;
         let mut text = String::new();
         stream.read_to_string(&mut text)?;
         Ok(text)

@@ -3,10 +3,10 @@
 
 use std::time::{Duration, Instant};
 
+use super::Arrivals;
 use super::axes::Axes;
 use super::psn::{Tracker, TrackerName};
 use super::trackers::{Numbers, Selection};
-use super::Arrivals;
 use crate::live::clock::monotonic_ns;
 use crate::subscribers::feed::FeedEvent;
 use crate::wire::{FrameHeader, HandlePose};

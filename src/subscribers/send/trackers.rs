@@ -165,7 +165,10 @@ mod tests {
         for (numbers, (first, last, name)) in numbers.iter().zip(expected) {
             assert_eq!(ends(numbers), ((first, format!("{name} head")), (last, format!("{name} handle 300"))));
         }
-        assert_eq!(Numbers::of_several(&names, 1, 32_767).unwrap()[2], Numbers { last: u16::MAX, ..numbers_at(65_535) });
+        assert_eq!(
+            Numbers::of_several(&names, 1, 32_767).unwrap()[2],
+            Numbers { last: u16::MAX, ..numbers_at(65_535) }
+        );
         assert_eq!(Numbers::of_several(&names, 1, 32_768), None);
     }
 

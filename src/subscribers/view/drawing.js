@@ -7,8 +7,8 @@ import { Labels, doubled, scaleBar, target } from "./signs.js";
 
 /** Edges drawn at once: with thousands in one path, it takes several times as long. */
 const BATCH = 100;
-/** How far a casing reaches beyond the boards, pixels. */
-const CASING = 3;
+/** Where the line around a dragon begins and ends, pixels beyond its boards. */
+const CASING_FROM = 1, CASING_TO = 4;
 /** How much is left of a dragon that is no longer true beside others that are. */
 const DIMMED = 0.4;
 /** Beyond so many turns the lines of the path lie closer together than pixels. */
@@ -152,9 +152,9 @@ export class Ground {
 export function draw(context, camera, palette, { ground, dragons, words }) {
   ground.cover(context, camera, palette, dragons.map(({ path, identity }) => ({ lines: path, dashes: identity?.dashes ?? [] })));
   const stale = dragons.filter((dragon) => dragon.stale);
-  for (const dragon of stale) drawDragon(context, camera, palette, dragon);
+  for (const dragon of stale) drawDragon(context, camera, palette, ground.transparent, dragon);
   if (stale.length) ground.dim(context, DIMMED);
-  for (const dragon of dragons) if (!dragon.stale) drawDragon(context, camera, palette, dragon);
+  for (const dragon of dragons) if (!dragon.stale) drawDragon(context, camera, palette, ground.transparent, dragon);
   if (!words) return [];
   const labels = new Labels(camera);
   label(labels, palette, dragons);
@@ -164,7 +164,7 @@ export function draw(context, camera, palette, { ground, dragons, words }) {
   return labels.boxes;
 }
 
-function drawDragon(context, camera, palette, dragon) {
+function drawDragon(context, camera, palette, transparent, dragon) {
   const { stage, places, marks, chosen, show, identity } = dragon, pixel = camera.unit / camera.scale;
   inMetres(context, camera);
   context.lineJoin = "miter";
@@ -177,7 +177,7 @@ function drawDragon(context, camera, palette, dragon) {
     };
     doubled(context, palette, pixel, ink, width, trace, dashes);
   };
-  if (identity) casing(context, pixel, stage, places, identity);
+  if (identity) casing(context, camera, palette, transparent, dragon);
   if (show) show.draw(context, camera, palette, dragon, inSight(camera, stage, places));
   else {
     benches(context, camera, palette, dragon);
@@ -193,16 +193,25 @@ function drawDragon(context, camera, palette, dragon) {
   show?.crown(context, camera, palette, dragon);
 }
 
-/** A line on both sides of all boards, below them, in the colour and the dashes that tell a dragon from others. */
-function casing(context, pixel, stage, places, { colour, dashes }) {
+/**
+ * A line around all boards together, below them, in the colour and the dashes that tell a dragon from others. Between two turns of
+ * a coil that leave no room for it there is none.
+ */
+function casing(context, camera, palette, transparent, { stage, places, identity }) {
+  const pixel = camera.unit / camera.scale;
   context.beginPath();
   for (let k = 0; k < places.length; k += STRIDE) context.lineTo(places[k], places[k + 1]);
   context.lineJoin = "round";
-  context.strokeStyle = colour;
-  context.lineWidth = stage.width + 2 * CASING * pixel;
-  context.setLineDash(dashes.map((dash) => dash * pixel));
+  context.strokeStyle = identity.colour;
+  context.lineWidth = stage.width + 2 * CASING_TO * pixel;
+  context.setLineDash(identity.dashes.map((dash) => dash * pixel));
   context.stroke();
   context.setLineDash([]);
+  if (transparent) context.globalCompositeOperation = "destination-out";
+  context.strokeStyle = palette.ground;
+  context.lineWidth = stage.width + 2 * CASING_FROM * pixel;
+  context.stroke();
+  context.globalCompositeOperation = "source-over";
   context.lineJoin = "miter";
 }
 

@@ -1,5 +1,5 @@
 //! Who may open the WebSocket: this server's own page, programs, and the pages that the user lets in. Called by the
-//! server.
+//! server, and by that of `metrics` for the host.
 
 use std::net::IpAddr;
 use std::str::FromStr;
@@ -36,11 +36,11 @@ impl FromStr for AllowedOrigin {
 
 /// Which pages are let in.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Admission {
+pub(in crate::subscribers) struct Admission {
     /// Whether the server listens on a loopback address.
-    pub(super) loopback: bool,
+    pub(in crate::subscribers) loopback: bool,
     /// Pages of other places that are let in.
-    pub(super) origins: Vec<AllowedOrigin>,
+    pub(in crate::subscribers) origins: Vec<AllowedOrigin>,
 }
 
 impl Admission {
@@ -50,7 +50,7 @@ impl Admission {
     /// Own is a page over http whose origin is the host it asks for. Behind a proxy that speaks TLS the page's origin
     /// begins with https, and nothing that the proxy says of itself is believed, since anyone can say it: such an origin
     /// has to be let in by name.
-    pub(super) fn allows(&self, origin: Option<&str>, host: Option<&str>) -> bool {
+    pub(in crate::subscribers) fn allows(&self, origin: Option<&str>, host: Option<&str>) -> bool {
         if origin.is_some_and(|origin| self.origins.iter().any(|allowed| allowed.0.eq_ignore_ascii_case(origin))) {
             return true;
         }
@@ -62,7 +62,7 @@ impl Admission {
 
     /// Whether a request for this host is meant for this server. On loopback the host must be a loopback name, or a
     /// foreign name that resolves to this machine would pass as our own.
-    pub(super) fn allows_host(&self, host: Option<&str>) -> bool {
+    pub(in crate::subscribers) fn allows_host(&self, host: Option<&str>) -> bool {
         host.is_some_and(|host| !self.loopback || is_loopback_name(host))
     }
 }

@@ -27,6 +27,7 @@ if (words.dark || words.light || words.show) root.dataset.theme = words.light ? 
 const canvas = element("stage"), context = canvas.getContext("2d", { alpha: "transparent" in words });
 const camera = new Camera(), ground = new Ground("transparent" in words), sound = new Sound();
 const several = publishers.length > 1, dragons = publishers.map((name) => new Dragon(name, { several, show: words.show, still: stillness.matches }));
+root.toggleAttribute("data-several", several);
 const roster = several ? new Roster(dragons, select) : null;
 /** `chosen` is a bench (from 0, or -1) of the dragon `whose`; `selected` is the dragon whose figures are shown, null for the one that the header is about. */
 let palette = paletteOf(canvas), chosen = -1, whose = dragons[0], selected = null, last = null, passedAt = 0;
