@@ -219,7 +219,8 @@ fn in_a_browser(scenario: &str) {
         return;
     }
     let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let arguments = ["tests/python/several_page.py", scenario, env!("CARGO_BIN_EXE_bench-dragon"), &unique(&scenario[..3])];
+    let arguments =
+        ["tests/python/several_page.py", scenario, env!("CARGO_BIN_EXE_bench-dragon"), &unique(&scenario[..3])];
     let output = Process::start(python().args(arguments)).output_within(200);
     println!("{}", text(&output.stdout));
     assert!(output.status.success(), "{}", text(&output.stderr));

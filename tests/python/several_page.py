@@ -121,7 +121,7 @@ def told_apart(page, handles):
             light = luminance(pixels)
             shares = {}
             # The outermost turn of the coil from outside, and the straight part of the procession from both sides.
-            for name, benches in [(A, range(150, 215)), (B, range(12, 50))]:
+            for name, benches in [(A, range(193, 219)), (B, range(12, 50))]:
                 lines = [numpy.array([to_pixel(*place) for bench in benches for place in beside(handles[name], bench, side, pixel)]) for side in (1, -1)]
                 seen = [light[line[:, 1].astype(int), line[:, 0].astype(int)] for line in lines]
                 low = float(luminance(ground))
