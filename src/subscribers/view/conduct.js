@@ -17,7 +17,7 @@ const SENTENCE_TIME = 8000, CUE_TIME = 6000;
 const RATES = [0.1, 0.25, 0.5, 1, 2, 4, 10];
 
 const BAR = `
-  <label id="conduct-choice" hidden><span data-word="conductWhom"></span> <select id="conduct-whom"></select></label>
+  <label id="conduct-choice"><span data-word="conductWhom"></span> <select id="conduct-whom"></select></label>
   <button id="conduct-toggle" data-title="toggleKey"></button>
   <button id="conduct-step" data-title="stepKey" data-word="step"></button>
   <button id="conduct-restart" data-word="restart"></button>
@@ -215,13 +215,14 @@ export function conduct(dragons) {
   };
   for (const stream of streams) stream.onmessage = receive(stream);
 
-  part("choice").hidden = !several;
-  part("whom").replaceChildren(new Option(say("all"), ""), ...dragons.map(({ name }, place) => new Option(name, place)));
-  part("whom").onchange = ({ target }) => {
-    chosen = target.value === "" ? null : streams[target.value];
-    [sought, wanted, landed, rate] = [null, null, null, null];
-    show();
-  };
+  if (several) {
+    part("whom").replaceChildren(new Option(say("all"), ""), ...dragons.map(({ name }, place) => new Option(name, place)));
+    part("whom").onchange = ({ target }) => {
+      chosen = target.value === "" ? null : streams[target.value];
+      [sought, wanted, landed, rate] = [null, null, null, null];
+      show();
+    };
+  } else part("choice").remove();
   const hold = () => command(allHeld() ? "release" : "hold");
   part("toggle").onclick = toggle;
   part("step").onclick = () => command("step", 1);
