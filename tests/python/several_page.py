@@ -16,7 +16,7 @@ import numpy
 
 import stage_picture
 from stage_picture import NAME, PROGRAM, WIDTH, browser, canvas_pixels, is_board, opened, play, truth_at, until, words
-from stage_show import luminance, projection, shot
+from stage_show import contrast, luminance, projection, shot
 
 A, B = f"{NAME}_a", f"{NAME}_b"
 PROCESSION = ["--scene", "config/procession.toml"]
@@ -104,11 +104,24 @@ def two_on_one_stage():
         assert not complaints and not seen, complaints + seen
 
 
+# A square of each dragon's colour, over everything.
+SQUARES = """async () => {
+    const { identityOf } = await import("/palette.js"), all = Array.from({length: 10}, (_, place) => identityOf(place));
+    for (const [place, { colour }] of all.entries()) {
+        const square = document.body.appendChild(Object.assign(document.createElement("div"), { className: "square" }));
+        square.style.cssText = `position: fixed; left: ${20 * place}px; top: 0; width: 20px; height: 20px; z-index: 9; background: ${colour}`;
+    }
+    return all.map(({ dashes }) => dashes.join());
+}"""
+
+
 def told_apart(page, handles):
     """By their casings: one a whole line, one dashed, both with a contrast of 3 to the ground, for eyes of any kind."""
     vision = page.context.new_cdp_session(page)
     to_pixel = projection(page)
     pixel = 1 / numpy.hypot(*(to_pixel(1, 0) - to_pixel(0, 0)))
+    dashes = page.evaluate(SQUARES)
+    assert len(set(dashes)) == 10, f"two of ten have the same dashes: {dashes}"
     for theme in ("light", "dark"):
         page.emulate_media(color_scheme=theme)
         time.sleep(0.5)
@@ -119,6 +132,8 @@ def told_apart(page, handles):
             box = page.locator("#stage").bounding_box()
             ground = pixels[int(box["y"]) + 3, int(box["x"]) + 3]
             light = luminance(pixels)
+            squares = [contrast(pixels[10, 20 * place + 10], ground) for place in range(10)]
+            assert min(squares) >= 3, f"{theme}, {deficiency}: lines with a contrast of {squares}"
             shares = {}
             # The outermost turn of the coil from outside, and the straight part of the procession from both sides.
             for name, benches in [(A, range(193, 219)), (B, range(12, 50))]:
@@ -131,6 +146,7 @@ def told_apart(page, handles):
             assert 0.35 < dashed < 0.85 and max(shares[B]) < 0.85, f"{theme}, {deficiency}: the casing of {B} is inked on {shares[B]}"
     vision.send("Emulation.setEmulatedVisionDeficiency", {"type": "none"})
     page.emulate_media(color_scheme="light")
+    page.evaluate("document.querySelectorAll('.square').forEach((one) => one.remove())")
 
 
 def chosen_by_hand(page, handles):
