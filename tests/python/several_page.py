@@ -127,7 +127,7 @@ def told_apart(page, handles):
         time.sleep(0.5)
         for deficiency in DEFICIENCIES:
             vision.send("Emulation.setEmulatedVisionDeficiency", {"type": deficiency})
-            time.sleep(0.2)
+            time.sleep(0.5)
             pixels = shot(page)
             box = page.locator("#stage").bounding_box()
             ground = pixels[int(box["y"]) + 3, int(box["x"]) + 3]

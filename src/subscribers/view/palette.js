@@ -23,7 +23,7 @@ const IDENTITIES = [
   { colour: "#8a6a00", dashes: [28, 14] },
   { colour: "#6c58d0", dashes: [8, 3] },
   { colour: "#1b8296", dashes: [4, 14] },
-  { colour: "#b5424a", dashes: [14, 4, 3, 4, 3, 4] },
+  { colour: "#c9525c", dashes: [14, 4, 3, 4, 3, 4] },
   { colour: "#5f7a1e", dashes: [40, 6] },
   { colour: "#757980", dashes: [6, 22] },
 ];
