@@ -30,8 +30,12 @@ enum Side {
 }
 
 impl Interval {
-    /// The interval of a single number, exactly.
+    /// The interval of a single number, exactly; but for the numbers below 1e-307, which `astro-float` does not take over
+    /// right: they are held between the least that it does and its negative.
     pub fn new(number: f64) -> Self {
+        if number.is_subnormal() {
+            return Self::new(f64::MIN_POSITIVE).around_zero();
+        }
         let end = BigFloat::from_f64(number, BITS);
         Self { lo: end.clone(), hi: end }
     }
