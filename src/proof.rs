@@ -23,7 +23,7 @@ use std::io::{self, BufRead, Read};
 
 use serde::Serialize;
 
-use self::events::Events;
+use self::events::{Events, LockShown};
 use self::lines::Line;
 pub use self::lines::{EventKind, Outcome, Status};
 use self::path::Span;
@@ -143,8 +143,13 @@ impl Checker {
                 events.add_contact(scene, steps, benches, Span(from, to), &spans, point)
             }
             Line::Stall { link, from, to, spans } => events.add_stall(scene, steps, link, Span(from, to), &spans),
-            Line::Lock { link, to, spans, last, window } => {
-                events.add_lock(scene, steps, (link, to), (&spans, &last), window)
+            Line::Lock { link, to, spans, last, window, jump } => {
+                let shown = match (window, jump) {
+                    (Some(window), None) => LockShown::Vanishes(window),
+                    (None, Some(jump)) => LockShown::Jumps(jump),
+                    _ => return Err("expected one of `window` and `jump`".to_owned()),
+                };
+                events.add_lock(scene, steps, (link, to), (&spans, &last), shown)
             }
             Line::PathEnd {} => events.add_path_end(scene, steps),
             Line::Result(outcome) => {

@@ -64,11 +64,12 @@ impl<'a> Board<'a> {
             (n.dot(&capsule.point), slack)
         };
         let ((f, f_slack), (r, r_slack)) = (projected(self.front), projected(self.rear));
-        let e = &self.overhang;
-        let both = (Interval::new(1.0) + e) * &f_slack + e * &r_slack;
-        let ahead = &f + e * (&f - &r) + both;
-        let both = (Interval::new(1.0) + e) * &r_slack + e * &f_slack;
-        let behind = &r + e * (&r - &f) + both;
+        let slack = &f_slack + &r_slack;
+        // Beyond a handle the board reaches e (F - R) further, which is no longer than e l.
+        let longest = norm * &self.length;
+        let beyond = |towards: Interval| &self.overhang * (towards + &slack).min(&longest);
+        let ahead = &f + &f_slack + beyond(&f - &r);
+        let behind = &r + &r_slack + beyond(&r - &f);
         let across = n.cross(&self.middle).abs()
             + n.cross(&self.front.tangent).abs() * &self.front.half
             + n.cross(&self.rear.tangent).abs() * &self.rear.half
@@ -150,9 +151,8 @@ impl Rough {
     fn extent(&self, n: [f64; 2]) -> f64 {
         let norm = n[0].hypot(n[1]);
         let ((f, f_slack), (r, r_slack)) = (self.front.projected(n, norm), self.rear.projected(n, norm));
-        let e = self.overhang;
-        let ahead = (1.0 + e) * (f + f_slack) - e * (r - r_slack);
-        let behind = (1.0 + e) * (r + r_slack) - e * (f - f_slack);
+        let beyond = |towards: f64| self.overhang * (towards + f_slack + r_slack).min(norm * self.length);
+        let (ahead, behind) = (f + f_slack + beyond(f - r), r + r_slack + beyond(r - f));
         let across = cross(n, self.direction()).abs()
             + (cross(n, self.front.tangent).abs() * self.front.half
                 + cross(n, self.rear.tangent).abs() * self.rear.half

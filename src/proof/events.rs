@@ -30,6 +30,14 @@ pub(super) enum Finish {
     PathEnd,
 }
 
+/// How a lock shows.
+pub(super) enum LockShown {
+    /// In the end no place of this span around the follower is at the link's length any more.
+    Vanishes(Span),
+    /// In the end a place ahead of this span's end is at the link's length, and none could pass its beginning.
+    Jumps(Span),
+}
+
 /// That an event with the head at `to` is one of the motion: from its start to the path's end.
 fn check_is_in_motion(scene: &Scene, to: Place) -> Result<(), String> {
     if !Interval::new(0.0).is_at_most(&scene.path.travelled(to)) {
@@ -123,7 +131,7 @@ impl Events {
         steps: &Steps,
         (link, to): (usize, Place),
         (spans, last): (&[Span], &[Span]),
-        window: Span,
+        shown: LockShown,
     ) -> Result<(), String> {
         let path = &scene.path;
         check_is_in_motion(scene, to)?;
@@ -139,20 +147,36 @@ impl Events {
         let while_going = Chain::check(scene, Span(from, to), spans)?;
         let at_end = Chain::check(scene, Span(to, to), last)?;
         let (front, front_at_end) = (&while_going.capsules[link], &at_end.capsules[link]);
-        span_is_one(scene, window).map_err(|problem| format!("the window: {problem}"))?;
-        let Span(w1, w2) = window;
-        let is_around = w1 != rear.0 && path.in_order(w1, rear.0) && rear.1 != w2 && path.in_order(rear.1, w2);
-        if !is_around || !path.in_order(w2, front.span.0) {
-            return Err("the window is not around the rear's span and behind the front's".to_owned());
-        }
         let squared = scene.team.link(link).square();
-        for place in [w1, w2] {
-            if !link::is_all_nearer(path, front, Span(place, place), &squared, 0) {
-                return Err("an end of the window may be at the link's length (Lemma 5)".to_owned());
+        let is_before = |a: Place, b: Place| a != b && path.in_order(a, b);
+        let cannot_be_at = |place: Place| link::is_all_nearer(path, front, Span(place, place), &squared, 0);
+        match shown {
+            LockShown::Vanishes(window) => {
+                span_is_one(scene, window).map_err(|problem| format!("the window: {problem}"))?;
+                let Span(w1, w2) = window;
+                if !(is_before(w1, rear.0) && is_before(rear.1, w2) && path.in_order(w2, front.span.0)) {
+                    return Err("the window is not around the rear's span and behind the front's".to_owned());
+                }
+                if !(cannot_be_at(w1) && cannot_be_at(w2)) {
+                    return Err("an end of the window may be at the link's length (Lemma 5)".to_owned());
+                }
+                if !link::is_all_nearer(path, front_at_end, window, &squared, MOST_HALVINGS) {
+                    return Err("a place of the window may be at the link's length in the end (Lemma 5)".to_owned());
+                }
             }
-        }
-        if !link::is_all_nearer(path, front_at_end, window, &squared, MOST_HALVINGS) {
-            return Err("a place of the window may be at the link's length in the end (Lemma 5)".to_owned());
+            LockShown::Jumps(jump) => {
+                span_is_one(scene, jump).map_err(|problem| format!("the jump: {problem}"))?;
+                let Span(w, y) = jump;
+                if !(is_before(rear.1, w) && path.in_order(y, front_at_end.span.0)) {
+                    return Err("the jump is not between the rear's span and the front's".to_owned());
+                }
+                if !cannot_be_at(w) {
+                    return Err("where the jump begins may be at the link's length (Lemma 5)".to_owned());
+                }
+                if !link::is_farther(path, front_at_end, y, &squared) {
+                    return Err("where the jump ends may be too near in the end (Lemma 5)".to_owned());
+                }
+            }
         }
         self.finish = Some(Finish::Lock(link, to));
         Ok(())

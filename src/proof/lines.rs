@@ -8,11 +8,42 @@ use super::path::{Place, Span};
 #[derive(Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub(super) enum Line {
-    Certificate { format: u32, version: String, scene: String },
-    Step { links: Links, from: Place, to: Place, moving: bool, clear: bool, spans: Vec<Span> },
-    Contact { benches: [usize; 2], from: Place, to: Place, spans: Vec<Span>, point: [f64; 2] },
-    Stall { link: usize, from: Place, to: Place, spans: Vec<Span> },
-    Lock { link: usize, to: Place, spans: Vec<Span>, last: Vec<Span>, window: Span },
+    Certificate {
+        format: u32,
+        version: String,
+        scene: String,
+    },
+    Step {
+        links: Links,
+        from: Place,
+        to: Place,
+        moving: bool,
+        clear: bool,
+        spans: Vec<Span>,
+    },
+    Contact {
+        benches: [usize; 2],
+        from: Place,
+        to: Place,
+        spans: Vec<Span>,
+        point: [f64; 2],
+    },
+    Stall {
+        link: usize,
+        from: Place,
+        to: Place,
+        spans: Vec<Span>,
+    },
+    Lock {
+        link: usize,
+        to: Place,
+        spans: Vec<Span>,
+        last: Vec<Span>,
+        #[serde(default)]
+        window: Option<Span>,
+        #[serde(default)]
+        jump: Option<Span>,
+    },
     PathEnd {},
     Result(Outcome),
 }

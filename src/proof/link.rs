@@ -52,6 +52,11 @@ fn over_front(front: &Capsule, x: &Vector) -> Interval {
     from.norm_squared() + slack(front, &slope, &distance).around_zero()
 }
 
+/// Whether D(u, x) > l^2 for all u of the front.
+pub(super) fn is_farther(path: &Path, front: &Capsule, x: Place, squared: &Interval) -> bool {
+    squared.is_below(&over_front(front, &path.at(x).point))
+}
+
 /// 2 |slope| h + (1 + K |d|) h^2.
 fn slack(capsule: &Capsule, slope: &Interval, distance: &Interval) -> Interval {
     let Capsule { half, curvature, .. } = capsule;
