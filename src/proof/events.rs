@@ -14,9 +14,9 @@ const MOST_HALVINGS: usize = 40;
 /// What has been shown to happen.
 #[derive(Default)]
 pub(super) struct Events {
-    /// The benches that overlap, and where the head is then.
+    /// The benches that overlap, and where the head is then; if that is before the start, they do at the start.
     pub contact: Option<([usize; 2], Place)>,
-    /// The link that has stalled, and where the head is then.
+    /// The link that has stalled, and where the head is then; as above.
     pub stall: Option<(usize, Place)>,
     /// The end of the motion.
     pub finish: Option<Finish>,
@@ -85,7 +85,7 @@ impl Events {
                 return Err(format!("the point may be outside bench {bench} (Lemma 5)"));
             }
         }
-        self.contact = Some((benches, to));
+        self.contact = Some((benches, from));
         Ok(())
     }
 
@@ -117,7 +117,7 @@ impl Events {
         if !chain.products.get(link).is_some_and(Interval::is_negative) {
             return Err(format!("link {link} may not have stalled (Lemma 5)"));
         }
-        self.stall = Some((link, head.1));
+        self.stall = Some((link, head.0));
         Ok(())
     }
 
