@@ -61,6 +61,17 @@ impl Capsule {
             + Interval::point(other.radius)
     }
 
+    /// The square of the distance of any place of the span from a point, by Taylor's formula.
+    pub fn distance_squared(&self, x: Vector) -> Interval {
+        let Self { point, tangent, half, curvature, radius } = *self;
+        let between = minus(point, x);
+        let most = norm(between) + Interval::point(half) + Interval::point(radius);
+        let half = Interval::point(half);
+        let linear = dot(tangent, between).abs() * 2.0 * half;
+        let square = (Interval::ONE + most * curvature) * half.square();
+        norm_squared(between) + Interval::within((linear + square).hi)
+    }
+
     /// t . (u - x) over all u here and x there, t being the tangent at u, or at x.
     pub fn product(&self, other: &Self, at_other: bool) -> Interval {
         let between = minus(self.point, other.point);
@@ -84,17 +95,6 @@ impl Spanned {
         let Span(first, last) = span;
         let point = |place: Place| path.curve(place).point(place.1);
         Self { span, first: point(first), last: point(last), capsule: Capsule::new(path, span) }
-    }
-
-    /// The square of the distance of any place of the span from a point, by Taylor's formula.
-    pub fn distance_squared(&self, x: Vector) -> Interval {
-        let Capsule { point, tangent, half, curvature, .. } = self.capsule;
-        let between = minus(point, x);
-        let most = norm(between) + Interval::point(half) + Interval::point(self.capsule.radius);
-        let half = Interval::point(half);
-        let linear = dot(tangent, between).abs() * 2.0 * half;
-        let square = (Interval::ONE + most * curvature) * half.square();
-        norm_squared(between) + Interval::within((linear + square).hi)
     }
 }
 

@@ -68,8 +68,13 @@ pub enum Line<'a> {
         spans: Vec<Span>,
         /// Where they are at the end.
         last: Vec<Span>,
-        /// Places behind and ahead of the link's follower that it cannot pass.
-        window: Span,
+        /// Places behind and ahead of the link's follower that it cannot pass, where it vanishes.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        window: Option<Span>,
+        /// A place ahead of the follower that it cannot pass, and one that it would have to be at or ahead of, where a
+        /// nearer place comes to be at the distance.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        jump: Option<Span>,
     },
     /// The last step has come to the path's end.
     PathEnd,

@@ -39,8 +39,8 @@ pub(super) fn follower_within(path: &ExactPath, front: &Spanned, rear: &Spanned,
     } else if product.is_negative() {
         (Front::Backward, beyond(apart(front.last, rear.first)) && within(apart(front.first, rear.last)))
     } else {
-        let first = beyond(front.distance_squared(rear.first));
-        (Front::Unknown, first && within(front.distance_squared(rear.last)))
+        let first = beyond(front.capsule.distance_squared(rear.first));
+        (Front::Unknown, first && within(front.capsule.distance_squared(rear.last)))
     };
     let near = || {
         path.turning(rear.span.0, front.span.1) < QUARTER
@@ -56,9 +56,8 @@ pub(super) fn nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Int
         return true;
     }
     let y = Capsule::new(path, stretch);
-    let u = &front.capsule;
-    let growing = path.in_order(last, front.span.0) && u.product(&y, true).is_positive();
-    if growing || u.most_apart(&y) < link.lo {
+    let growing = path.in_order(last, front.span.0) && front.capsule.product(&y, true).is_positive();
+    if growing || is_nearer(&y, front, link) {
         return true;
     }
     let Some(middle) = path.between(first, last).filter(|_| halvings > 0) else { return false };
@@ -66,12 +65,17 @@ pub(super) fn nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Int
         && nearer(path, front, Span(middle, last), link, halvings - 1)
 }
 
-/// Whether all places of a stretch are proved to be nearer than the link to all of `front`, by Taylor's formula in both.
-pub(super) fn all_nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Interval, halvings: u32) -> bool {
+/// Whether all places of a stretch are proved to be nearer than the link to all of `front`, in one piece: by Taylor's
+/// formula along the stretch.
+fn is_nearer(stretch: &Capsule, front: &Spanned, link: Interval) -> bool {
     let Capsule { point, half, radius, .. } = front.capsule;
     let spread = Interval::within((Interval::point(half) + Interval::point(radius)).hi);
-    let places = Spanned::new(path, stretch);
-    if places.distance_squared(point.map(|part| part + spread)).is_below(link.square()) {
+    stretch.distance_squared(point.map(|part| part + spread)).is_below(link.square())
+}
+
+/// Whether all places of a stretch are proved to be nearer than the link to all of `front`.
+pub(super) fn all_nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Interval, halvings: u32) -> bool {
+    if is_nearer(&Capsule::new(path, stretch), front, link) {
         return true;
     }
     let Some(middle) = path.between(stretch.0, stretch.1).filter(|_| halvings > 0) else { return false };

@@ -13,6 +13,7 @@ use super::path::{ExactPath, Place};
 use super::step::{Chain, Claim, Obstacle, Shown};
 use super::{CertifyError, Given};
 use crate::model::board::Board;
+use crate::model::root::golden_section_min;
 use crate::model::separation::overlap_centre;
 use crate::motion::event::{Event, EventKind};
 
@@ -20,7 +21,7 @@ use crate::motion::event::{Event, EventKind};
 const AROUND: f64 = 3e-10;
 
 /// Metres, as a share of the way, below which doubles tell no places apart.
-const LEAST: f64 = 4e-13;
+const LEAST: f64 = 7e-13;
 
 /// What a step that succeeded, and one that did not, do to the length of the next.
 const GROWTH: f64 = 1.3;
@@ -28,6 +29,12 @@ const SHRINK: f64 = 0.5;
 
 /// How many times longer spans are made before a step is given up.
 const PADS: [f64; 3] = [1.0, 16.0, 256.0];
+
+/// How near an event, in links, a step that cannot be shown is taken to be in the way of the event's own proof.
+const NEAR: f64 = 1e-3;
+
+/// Places between the handles of a link at which a nearer follower is looked for.
+const JUMP_SAMPLES: usize = 1000;
 
 /// Halvings of the stretch in which a link that locks has no follower any more.
 const LOCK_HALVINGS: u32 = 12;
@@ -104,35 +111,33 @@ impl<'a, 'w> Search<'a, 'w> {
     /// The whole motion, event by event.
     fn motion(&mut self, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
         let end = self.given.events.last().map_or(self.given.path.length(), |event| event.travelled);
+        let mut progress = |at: f64| progress((at / end).clamp(0.0, 1.0));
         for event in self.given.events {
-            if event.kind == EventKind::Contact && event.travelled == 0.0 {
-                self.overlap_at_start(event)?;
-                continue;
-            }
-            let around = self.around(event);
-            let until = if event.kind == EventKind::PathEnd { event.travelled } else { event.travelled - around };
-            let mut share = |at: f64| progress((at / end).clamp(0.0, 1.0));
-            if event.kind == EventKind::PathEnd {
-                let beyond = self.path_end();
-                self.go_to(until - around, &mut share)?;
-                self.go_to_knot(beyond, &mut share)?;
-                (self.write)(&Line::PathEnd)?;
-                self.proofs[EventKind::PathEnd as usize] = Some(self.at_path_end());
-                continue;
-            }
-            self.go_to(until, &mut share)?;
             match event.kind {
-                EventKind::Contact => self.contact(event, around, &mut share)?,
-                EventKind::Stall => self.stall(event, around, &mut share)?,
-                _ => self.lock(event, around)?,
+                EventKind::Contact if event.travelled == 0.0 => self.overlap_at_start(event)?,
+                EventKind::PathEnd => {
+                    let beyond = self.path_end();
+                    self.go_to(event.travelled - self.around(), None, &mut progress)?;
+                    self.go_to_knot(&beyond, None, &mut progress)?;
+                    (self.write)(&Line::PathEnd)?;
+                    self.proofs[EventKind::PathEnd as usize] = Some(self.at_path_end());
+                }
+                kind => {
+                    self.go_to(event.travelled - self.around(), Some(event), &mut progress)?;
+                    match kind {
+                        EventKind::Contact => self.contact(event, &mut progress)?,
+                        EventKind::Stall => self.stall(event, &mut progress)?,
+                        _ => self.lock(event)?,
+                    }
+                }
             }
         }
         Ok(())
     }
 
     /// Metres on each side of an event.
-    fn around(&self, event: &Event) -> f64 {
-        (AROUND * self.given.head_speed).clamp(LEAST * (1.0 + self.given.path.length()), 1e-8)
+    fn around(&self) -> f64 {
+        (AROUND * self.given.head_speed).min(1e-8).max(LEAST * (1.0 + self.given.path.length()))
     }
 
     /// Time at a place of the head, from below and above, and never below 0.
@@ -169,16 +174,30 @@ impl<'a, 'w> Search<'a, 'w> {
         }
     }
 
-    fn go_to(&mut self, travelled: f64, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+    /// Places at which an event of doubtful digits is tried to be shown, from near to far.
+    fn beyond(&self, event: &Event) -> impl Iterator<Item = f64> + use<> {
+        let around = self.around().max(2.0 * (event.travelled - self.at.travelled));
+        let (at, most) = (event.travelled, NEAR * self.given.team.shortest_link());
+        (0..8).map(move |power| around * 10f64.powi(power)).take_while(move |far| *far <= most.max(around)).map(move |far| at + far)
+    }
+
+    /// See [`Search::go_to_knot`].
+    fn go_to(&mut self, travelled: f64, event: Option<&Event>, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
         if travelled <= self.at.travelled {
             return Ok(());
         }
         let target = self.knot(travelled);
-        self.go_to_knot(target, progress)
+        self.go_to_knot(&target, event, progress)
     }
 
-    /// Goes in steps to a knot. A claim that cannot be shown at any length of the step is given up.
-    fn go_to_knot(&mut self, target: Knot, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+    /// Goes in steps to a knot, or so near to an event that a step cannot be shown for its sake. A claim that cannot be
+    /// shown at any length of the step is given up.
+    fn go_to_knot(
+        &mut self,
+        target: &Knot,
+        event: Option<&Event>,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<(), Halt> {
         let least = 0.01 * LEAST * (1.0 + self.given.path.length());
         let longest = self.given.team.shortest_link();
         while self.at.head != target.head {
@@ -198,11 +217,17 @@ impl<'a, 'w> Search<'a, 'w> {
                 Err(obstacle) if self.step.min(remaining) > least => {
                     self.step = SHRINK * self.step.min(remaining);
                     // Turns of handles behind the first are not followed by the links of boards 0 and 1 alone.
-                    if self.links == Links::Front && matches!(obstacle, Obstacle::Stall(1)) && !self.moving {
+                    if self.links == Links::Front && obstacle == Obstacle::Stall(1) && !self.moving {
                         self.links = Links::All;
                     }
                 }
-                Err(obstacle) => self.give_up(obstacle)?,
+                Err(obstacle) => {
+                    let near = |event: &&Event| event.travelled - self.at.travelled < NEAR * longest;
+                    if event.filter(near).is_some_and(|event| obstacle.is_of(event.kind)) {
+                        return Ok(());
+                    }
+                    self.give_up(obstacle)?;
+                }
             }
         }
         Ok(())
@@ -278,33 +303,27 @@ impl<'a, 'w> Search<'a, 'w> {
 
     /// Boards that overlap before anything has moved.
     fn overlap_at_start(&mut self, event: &Event) -> Result<(), Halt> {
-        let mut to = self.knot(LEAST * (1.0 + self.given.path.length()));
-        let from = self.at.head;
-        self.touch(event, &mut to, from)?;
+        let (from, mut to) = (self.at.clone(), self.knot(LEAST * (1.0 + self.given.path.length())));
+        self.clear = false;
+        let status = if self.touch(event, from, &mut to)? {
+            let [bench_a, bench_b] = [event.bench_a, event.bench_b].map(|bench| bench.map(|bench| bench as usize));
+            Status::Proved { time_lo: 0.0, time_hi: 0.0, bench_a, bench_b }
+        } else {
+            let because = "the boards that overlap from the start do so too little for doubles".to_owned();
+            Status::Undecided { time_lo: 0.0, because }
+        };
+        self.proofs[EventKind::Contact as usize] = Some(status);
         Ok(())
     }
 
-    /// Writes that two boards have a point in common with the head from `from` to a knot. A touch that cannot be shown is
-    /// left undecided.
-    fn touch(&mut self, event: &Event, to: &mut Knot, from: Place) -> Result<(), Halt> {
-        self.clear = false;
-        let begin = self.at.head;
+    /// Writes that two boards have a point in common with the head between two knots, if that can be shown.
+    fn touch(&mut self, event: &Event, mut from: Knot, to: &mut Knot) -> Result<bool, Halt> {
         let benches = [event.bench_a, event.bench_b].map(|bench| bench.unwrap_or(0) as usize);
-        let mut first = Knot::at(from, to.travelled);
-        if let Ok(handles) = self.chain.spans(&mut first, to, benches[1] + 1, PADS[0])
-            && let Some(point) = self.common_point(&handles, benches)
-        {
-            let spans = handles[1..].iter().map(|handle| handle.span).collect();
-            (self.write)(&Line::Contact { benches, from, to: to.head, spans, point })?;
-            let (earliest, latest) = (begin, to.head);
-            self.proofs[EventKind::Contact as usize] =
-                Some(self.proved(earliest, latest, event.bench_a, event.bench_b));
-            return Ok(());
-        }
-        let because = format!("whether boards {} and {} touch there cannot be shown with doubles", benches[0], benches[1]);
-        let time_lo = self.time(begin).lo;
-        self.proofs[EventKind::Contact as usize] = Some(Status::Undecided { time_lo, because });
-        Ok(())
+        let Ok(handles) = self.chain.spans(&mut from, to, benches[1] + 1, PADS[0]) else { return Ok(false) };
+        let Some(point) = self.common_point(&handles, benches) else { return Ok(false) };
+        let spans = handles[1..].iter().map(|handle| handle.span).collect();
+        (self.write)(&Line::Contact { benches, from: from.head, to: to.head, spans, point })?;
+        Ok(true)
     }
 
     /// A point that is surely in both boards.
@@ -322,24 +341,28 @@ impl<'a, 'w> Search<'a, 'w> {
         benches.iter().all(|bench| holds(self.chain.board(handles, *bench))).then_some(point)
     }
 
-    fn contact(&mut self, event: &Event, around: f64, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+    fn contact(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
         if !self.clear {
             return Ok(());
         }
-        let earliest = self.time(self.at.head).lo;
+        let earliest = self.at.head;
         self.clear = false;
-        self.go_to(event.travelled + around, progress)?;
-        let mut to = Knot::at(self.at.head, self.at.travelled);
-        self.touch(event, &mut to, self.at.head)?;
-        if let Some(Status::Proved { time_lo, .. } | Status::Undecided { time_lo, .. }) =
-            &mut self.proofs[EventKind::Contact as usize]
-        {
-            *time_lo = earliest;
+        for travelled in self.beyond(event) {
+            self.go_to(travelled, None, progress)?;
+            let (from, mut to) = (self.at.clone(), self.at.clone());
+            if self.touch(event, from, &mut to)? {
+                let status = self.proved(earliest, self.at.head, event.bench_a, event.bench_b);
+                self.proofs[EventKind::Contact as usize] = Some(status);
+                return Ok(());
+            }
         }
+        let because = "whether the boards that come so near do touch cannot be shown with doubles".to_owned();
+        let status = Status::Undecided { time_lo: self.time(earliest).lo, because };
+        self.proofs[EventKind::Contact as usize] = Some(status);
         Ok(())
     }
 
-    fn stall(&mut self, event: &Event, around: f64, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+    fn stall(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
         if !self.moving {
             return Ok(());
         }
@@ -349,41 +372,77 @@ impl<'a, 'w> Search<'a, 'w> {
         if link > 0 {
             self.links = Links::All;
         }
-        self.go_to(event.travelled + around, progress)?;
-        let (mut from, mut to) = (self.at.clone(), self.at.clone());
-        let handles = self.chain.spans(&mut from, &mut to, link + 1, PADS[0]);
-        let head = self.at.head;
-        let stalled = handles.ok().filter(|handles| {
-            handles[link].capsule.product(&handles[link + 1].capsule, false).is_negative()
-        });
-        let status = match stalled {
-            Some(handles) => {
-                let spans = handles[1..].iter().map(|handle| handle.span).collect();
+        for travelled in self.beyond(event) {
+            self.go_to(travelled, None, progress)?;
+            let (mut from, mut to) = (self.at.clone(), self.at.clone());
+            let handles = self.chain.spans(&mut from, &mut to, link + 1, PADS[0]);
+            let stalled = |handles: &Vec<Spanned>| {
+                handles[link].capsule.product(&handles[link + 1].capsule, false).is_negative()
+            };
+            if let Some(handles) = handles.ok().filter(stalled) {
+                let (head, spans) = (self.at.head, handles[1..].iter().map(|handle| handle.span).collect());
                 (self.write)(&Line::Stall { link, from: head, to: head, spans })?;
-                self.proved(earliest, head, event.bench_a, None)
+                self.proofs[EventKind::Stall as usize] = Some(self.proved(earliest, head, event.bench_a, None));
+                return Ok(());
             }
-            None => {
-                let because = format!("whether link {link} stalls there cannot be shown with doubles");
-                Status::Undecided { time_lo: self.time(earliest).lo, because }
-            }
-        };
-        self.proofs[EventKind::Stall as usize] = Some(status);
+        }
+        let because = "whether the link that comes so near a stall does stall cannot be shown with doubles".to_owned();
+        self.proofs[EventKind::Stall as usize] = Some(Status::Undecided { time_lo: self.time(earliest).lo, because });
         Ok(())
     }
 
-    fn lock(&mut self, event: &Event, around: f64) -> Result<(), Halt> {
+    fn lock(&mut self, event: &Event) -> Result<(), Halt> {
         let link = event.bench_a.unwrap_or(0) as usize;
-        let mut to = self.knot(event.travelled + around);
-        let stuck = || Halt::Stuck(format!("whether link {link} locks there cannot be shown with doubles"));
-        let handles = self.chain.spans(&mut self.at, &mut to, link, PADS[0]).map_err(|_| stuck())?;
-        let mut end = to.clone();
-        let last = self.chain.spans(&mut to, &mut end, link, PADS[0]).map_err(|_| stuck())?;
-        let window = self.window(link, &handles[link], &last[link]).ok_or_else(stuck)?;
-        let spans = |handles: &[Spanned]| handles[1..].iter().map(|handle| handle.span).collect();
-        let line = Line::Lock { link, to: to.head, spans: spans(&handles), last: spans(&last), window };
-        (self.write)(&line)?;
-        self.proofs[EventKind::Lock as usize] = Some(self.proved(self.at.head, to.head, event.bench_a, None));
-        Ok(())
+        for travelled in self.beyond(event) {
+            let mut to = self.knot(travelled);
+            let Ok(handles) = self.chain.spans(&mut self.at, &mut to, link, PADS[0]) else { continue };
+            let mut end = to.clone();
+            let Ok(last) = self.chain.spans(&mut to, &mut end, link, PADS[0]) else { continue };
+            let (window, jump) = match self.window(link, &handles[link], &last[link]) {
+                Some(window) => (Some(window), None),
+                None => (None, self.jump(link, &handles[link], &last[link])),
+            };
+            if window.is_none() && jump.is_none() {
+                continue;
+            }
+            let spans = |handles: &[Spanned]| handles[1..].iter().map(|handle| handle.span).collect();
+            let line = Line::Lock { link, to: to.head, spans: spans(&handles), last: spans(&last), window, jump };
+            (self.write)(&line)?;
+            self.proofs[EventKind::Lock as usize] = Some(self.proved(self.at.head, to.head, event.bench_a, None));
+            return Ok(());
+        }
+        Err(Halt::Stuck(format!("whether link {link} locks there cannot be shown with doubles")))
+    }
+
+    /// A place ahead of the follower of a link that is nearer than the link for all of `front`, and one ahead of that which
+    /// is further away for all of `last`.
+    fn jump(&mut self, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
+        let Chain { path, team, .. } = self.chain;
+        self.at.extend_to(link + 1, path, team).ok()?;
+        let rear = self.at.handles[link + 1].param;
+        let exact = &self.chain.exact;
+        let square = self.chain.links[link.min(1)].square();
+        let (from, to) = (path.travelled(rear), path.travelled(self.at.handles[link].param));
+        let origin = last.first.map(Interval::middle);
+        let distance = |travelled: f64| {
+            let at = path.point(path.param_at(travelled));
+            (at.x - origin[0]).hypot(at.y - origin[1])
+        };
+        // The furthest place that is not just ahead of the follower, where places are about as far.
+        let sampled = |k: usize| from + (to - from) * k as f64 / JUMP_SAMPLES as f64;
+        let falling = (1..JUMP_SAMPLES).find(|k| distance(sampled(*k)) > distance(sampled(k - 1)))?;
+        let peak = (falling..JUMP_SAMPLES).max_by(|j, k| distance(sampled(*j)).total_cmp(&distance(sampled(*k))))?;
+        let step = (to - from) / JUMP_SAMPLES as f64;
+        let (_, top) = golden_section_min(|at| -distance(at), sampled(peak) - step, sampled(peak) + step);
+        let at = |travelled: f64| exact.moved(place(path.param_at(travelled)), 0.0);
+        let (between, beyond) = (at(sampled(falling - 1)), at(top));
+        let point = |place: Place| exact.curve(place).point(place.1);
+        let holds = exact.in_order(span(exact, rear, rear, 0.0).1, between)
+            && exact.in_order(between, beyond)
+            && exact.in_order(beyond, front.span.0)
+            && front.capsule.distance_squared(point(between)).is_below(square)
+            && square.is_below(last.capsule.distance_squared(point(beyond)));
+        holds.then_some(Span(between, beyond))
     }
 
     /// Places behind and ahead of the follower of a link that it cannot pass while the front is in `front`, and between
@@ -414,10 +473,7 @@ impl<'a, 'w> Search<'a, 'w> {
             let behind = path.param_at(path.travelled(rear) - top * (1.0 + wider));
             let ahead = path.param_at(path.travelled(rear) + top * wider);
             let window = Span(exact.moved(place(behind), 0.0), exact.moved(place(ahead), 0.0));
-            let near = |place: Place| front.distance_squared(exact.curve(place).point(place.1)).is_below(square);
-            if std::env::var("DBG").is_ok() {
-                eprintln!("top {top} window {window:?} follower {follower:?} order {} {} {} near {} {} all {}", exact.in_order(window.0, follower.0), exact.in_order(follower.1, window.1), exact.in_order(window.1, front.span.0), near(window.0), near(window.1), all_nearer(exact, last, window, length, LOCK_HALVINGS));
-            }
+            let near = |place: Place| front.capsule.distance_squared(exact.curve(place).point(place.1)).is_below(square);
             let holds = exact.in_order(window.0, follower.0)
                 && exact.in_order(follower.1, window.1)
                 && exact.in_order(window.1, front.span.0)

@@ -9,6 +9,7 @@ use super::link::{Front, follower_within};
 use super::path::{Curve, ExactPath, Place};
 use crate::model::path::Path;
 use crate::model::team::Team;
+use crate::motion::event::EventKind;
 
 /// What a step is to show.
 #[derive(Debug, Clone, Copy)]
@@ -29,6 +30,18 @@ pub(super) enum Obstacle {
     Behind,
     /// Two boards may touch.
     Pair(usize, usize),
+}
+
+impl Obstacle {
+    /// Whether an event of a kind is what stands in the way.
+    pub fn is_of(self, kind: EventKind) -> bool {
+        match self {
+            Self::Pair(..) => kind == EventKind::Contact,
+            Self::Stall(_) => kind == EventKind::Stall,
+            Self::Link(_) => kind == EventKind::Lock,
+            Self::Behind => false,
+        }
+    }
 }
 
 /// A step that holds.
@@ -155,7 +168,14 @@ impl<'c, 'a> Listed<'c, 'a> {
         let front = self.handles[link];
         let ends = [from.handles[link + 1], to.handles[link + 1]];
         let length = self.chain.link(link);
-        let size = length.hi + front.first[0].magnitude() + front.first[1].magnitude();
+        // A unit in the last place of a spiral's coordinate theta is theta times as many metres as one of its radius.
+        let turned = if matches!(exact.curve(front.span.0), Curve::Inward { .. } | Curve::Outward { .. }) {
+            front.span.0.1
+        } else {
+            0.0
+        };
+        let radius = front.first[0].magnitude() + front.first[1].magnitude();
+        let size = length.hi + radius * (1.0 + 0.1 * turned);
         let rear_cosine = ends[0].rear_cosine.min(ends[1].rear_cosine).max(1e-12);
         let front_cosine = ends.iter().map(|end| end.front_cosine.abs()).fold(0.0, f64::max);
         let mut pad = (self.pads * PAD * size + 1.01 * self.pad * front_cosine) / rear_cosine;
