@@ -27,9 +27,6 @@ const LEAST: f64 = 7e-13;
 const GROWTH: f64 = 1.3;
 const SHRINK: f64 = 0.5;
 
-/// How many times longer spans are made before a step is given up.
-const PADS: [f64; 3] = [1.0, 16.0, 256.0];
-
 /// How near an event, in links, a step that cannot be shown is taken to be in the way of the event's own proof.
 const NEAR: f64 = 1e-3;
 
@@ -178,7 +175,7 @@ impl<'a, 'w> Search<'a, 'w> {
     fn beyond(&self, event: &Event) -> impl Iterator<Item = f64> + use<> {
         let around = self.around().max(2.0 * (event.travelled - self.at.travelled));
         let (at, most) = (event.travelled, NEAR * self.given.team.shortest_link());
-        (0..8).map(move |power| around * 10f64.powi(power)).take_while(move |far| *far <= most.max(around)).map(move |far| at + far)
+        (0..24).map(move |power| around * 2f64.powi(power)).take_while(move |far| *far <= most.max(around)).map(move |far| at + far)
     }
 
     /// See [`Search::go_to_knot`].
@@ -208,7 +205,7 @@ impl<'a, 'w> Search<'a, 'w> {
                 self.knot(self.at.travelled + self.step)
             };
             let claim = Claim { links: self.links, moving: self.moving, clear: self.clear };
-            match self.show(&mut to, claim) {
+            match self.chain.show(&mut self.at, &mut to, claim) {
                 Ok(shown) => {
                     self.accept(to, shown)?;
                     self.step = (self.step * GROWTH).min(longest);
@@ -231,16 +228,6 @@ impl<'a, 'w> Search<'a, 'w> {
             }
         }
         Ok(())
-    }
-
-    fn show(&mut self, to: &mut Knot, claim: Claim) -> Result<Shown, Obstacle> {
-        self.chain.show(&mut self.at, to, claim, PADS[0]).or_else(|first| {
-            PADS[1..]
-                .iter()
-                .filter(|_| matches!(first, Obstacle::Link(_)))
-                .find_map(|pads| self.chain.show(&mut self.at, to, claim, *pads).ok())
-                .ok_or(first)
-        })
     }
 
     fn accept(&mut self, to: Knot, shown: Shown) -> Result<(), Halt> {
@@ -319,7 +306,7 @@ impl<'a, 'w> Search<'a, 'w> {
     /// Writes that two boards have a point in common with the head between two knots, if that can be shown.
     fn touch(&mut self, event: &Event, mut from: Knot, to: &mut Knot) -> Result<bool, Halt> {
         let benches = [event.bench_a, event.bench_b].map(|bench| bench.unwrap_or(0) as usize);
-        let Ok(handles) = self.chain.spans(&mut from, to, benches[1] + 1, PADS[0]) else { return Ok(false) };
+        let Some(handles) = self.chain.spans(&mut from, to, benches[1] + 1) else { return Ok(false) };
         let Some(point) = self.common_point(&handles, benches) else { return Ok(false) };
         let spans = handles[1..].iter().map(|handle| handle.span).collect();
         (self.write)(&Line::Contact { benches, from: from.head, to: to.head, spans, point })?;
@@ -375,11 +362,11 @@ impl<'a, 'w> Search<'a, 'w> {
         for travelled in self.beyond(event) {
             self.go_to(travelled, None, progress)?;
             let (mut from, mut to) = (self.at.clone(), self.at.clone());
-            let handles = self.chain.spans(&mut from, &mut to, link + 1, PADS[0]);
+            let handles = self.chain.spans(&mut from, &mut to, link + 1);
             let stalled = |handles: &Vec<Spanned>| {
                 handles[link].capsule.product(&handles[link + 1].capsule, false).is_negative()
             };
-            if let Some(handles) = handles.ok().filter(stalled) {
+            if let Some(handles) = handles.filter(stalled) {
                 let (head, spans) = (self.at.head, handles[1..].iter().map(|handle| handle.span).collect());
                 (self.write)(&Line::Stall { link, from: head, to: head, spans })?;
                 self.proofs[EventKind::Stall as usize] = Some(self.proved(earliest, head, event.bench_a, None));
@@ -395,9 +382,9 @@ impl<'a, 'w> Search<'a, 'w> {
         let link = event.bench_a.unwrap_or(0) as usize;
         for travelled in self.beyond(event) {
             let mut to = self.knot(travelled);
-            let Ok(handles) = self.chain.spans(&mut self.at, &mut to, link, PADS[0]) else { continue };
+            let Some(handles) = self.chain.spans(&mut self.at, &mut to, link) else { continue };
             let mut end = to.clone();
-            let Ok(last) = self.chain.spans(&mut to, &mut end, link, PADS[0]) else { continue };
+            let Some(last) = self.chain.spans(&mut to, &mut end, link) else { continue };
             let (window, jump) = match self.window(link, &handles[link], &last[link]) {
                 Some(window) => (Some(window), None),
                 None => (None, self.jump(link, &handles[link], &last[link])),

@@ -65,6 +65,9 @@ pub(super) struct Chain<'a> {
 /// How much longer than the rounding of doubles a span is made, at both ends.
 const PAD: f64 = 64.0 * f64::EPSILON;
 
+/// How many times that is tried, in turn.
+const PADS: [f64; 3] = [1.0, 16.0, 256.0];
+
 impl<'a> Chain<'a> {
     pub fn new(path: &'a Path, exact: ExactPath, team: &'a Team) -> Self {
         let link = |length: f64| Interval::point(length) - Interval::point(team.hole_inset) * 2.0;
@@ -77,10 +80,16 @@ impl<'a> Chain<'a> {
     }
 
     /// Shows a claim over the step between two knots, or tells what stands in the way.
-    pub fn show(&self, from: &mut Knot, to: &mut Knot, claim: Claim, pads: f64) -> Result<Shown, Obstacle> {
+    pub fn show(&self, from: &mut Knot, to: &mut Knot, claim: Claim) -> Result<Shown, Obstacle> {
+        self.show_with(from, to, claim, PADS[0]).or_else(|first| {
+            let mut wider = PADS[1..].iter().filter(|_| matches!(first, Obstacle::Link(_)));
+            wider.find_map(|pads| self.show_with(from, to, claim, *pads).ok()).ok_or(first)
+        })
+    }
+
+    fn show_with(&self, from: &mut Knot, to: &mut Knot, claim: Claim, pads: f64) -> Result<Shown, Obstacle> {
         let mut listed = Listed::new(self, Span(from.head, to.head), pads);
-        let benches = self.team.benches;
-        while listed.handles.len() <= benches && !listed.is_enough(claim) {
+        while listed.handles.len() <= self.team.benches && !listed.is_enough(claim) {
             listed.extend(from, to, claim)?;
         }
         if claim.clear {
@@ -92,14 +101,16 @@ impl<'a> Chain<'a> {
         Ok(Shown { step, body_forward: listed.body_forward })
     }
 
-    /// The spans of handles 1 to `handle` between two knots, if Lemma 1 holds for every one.
-    pub fn spans(&self, from: &mut Knot, to: &mut Knot, handle: usize, pads: f64) -> Result<Vec<Spanned>, Obstacle> {
-        let mut listed = Listed::new(self, Span(from.head, to.head), pads);
+    /// Handles 0 to `handle` between two knots, if Lemma 1 holds for every link between them.
+    pub fn spans(&self, from: &mut Knot, to: &mut Knot, handle: usize) -> Option<Vec<Spanned>> {
         let claim = Claim { links: Links::All, moving: false, clear: false };
-        while listed.handles.len() <= handle {
-            listed.extend(from, to, claim)?;
-        }
-        Ok(listed.handles)
+        PADS.iter().find_map(|pads| {
+            let mut listed = Listed::new(self, Span(from.head, to.head), *pads);
+            while listed.handles.len() <= handle {
+                listed.extend(from, to, claim).ok()?;
+            }
+            Some(listed.handles)
+        })
     }
 
     /// The board of a bench over listed handles.
@@ -178,7 +189,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         let size = length.hi + radius * (1.0 + 0.1 * turned);
         let rear_cosine = ends[0].rear_cosine.min(ends[1].rear_cosine).max(1e-12);
         let front_cosine = ends.iter().map(|end| end.front_cosine.abs()).fold(0.0, f64::max);
-        let mut pad = (self.pads * PAD * size + 1.01 * self.pad * front_cosine) / rear_cosine;
+        let mut pad = (self.pads * PAD * size + 1.000_001 * self.pad * front_cosine) / rear_cosine;
         let turns = ends[0].front_cosine.signum() != ends[1].front_cosine.signum();
         if turns {
             let half = front.capsule.half;
