@@ -30,8 +30,10 @@ const SHRINK: f64 = 0.5;
 /// How near an event, in links, a step that cannot be shown is taken to be in the way of the event's own proof.
 const NEAR: f64 = 1e-3;
 
-/// Places between the handles of a link at which a nearer follower is looked for.
-const JUMP_SAMPLES: usize = 1000;
+/// Places between the handles of a link at which a nearer follower is looked for, and how many times as far from the
+/// follower as the one before each is.
+const JUMP_SAMPLES: i32 = 400;
+const JUMP_RATIO: f64 = 1.05;
 
 /// Halvings of the stretch in which a link that locks has no follower any more.
 const LOCK_HALVINGS: u32 = 12;
@@ -415,12 +417,11 @@ impl<'a, 'w> Search<'a, 'w> {
             let at = path.point(path.param_at(travelled));
             (at.x - origin[0]).hypot(at.y - origin[1])
         };
-        // The furthest place that is not just ahead of the follower, where places are about as far.
-        let sampled = |k: usize| from + (to - from) * k as f64 / JUMP_SAMPLES as f64;
+        // The furthest place ahead of the first that is nearer than its neighbours, however near to the follower it is.
+        let sampled = |k: i32| from + (to - from) * JUMP_RATIO.powi(k - JUMP_SAMPLES);
         let falling = (1..JUMP_SAMPLES).find(|k| distance(sampled(*k)) > distance(sampled(k - 1)))?;
         let peak = (falling..JUMP_SAMPLES).max_by(|j, k| distance(sampled(*j)).total_cmp(&distance(sampled(*k))))?;
-        let step = (to - from) / JUMP_SAMPLES as f64;
-        let (_, top) = golden_section_min(|at| -distance(at), sampled(peak) - step, sampled(peak) + step);
+        let (_, top) = golden_section_min(|at| -distance(at), sampled(peak - 1), sampled(peak + 1));
         let at = |travelled: f64| exact.moved(place(path.param_at(travelled)), 0.0);
         let (between, beyond) = (at(sampled(falling - 1)), at(top));
         let point = |place: Place| exact.curve(place).point(place.1);
