@@ -16,6 +16,7 @@
 //! - [`transports`]: iceoryx2 shared memory and ROS 2 topics, as publishers of the loop.
 //! - `recording` (feature `cli`): the log of a run, the proof that it can be played again, and every message as MCAP.
 //! - [`subscribers`]: the feed of a publisher's messages, the terminal monitor, the stage picture, the soak test; no solver.
+//! - `proof` (feature `cli`): the checker of certificates of events; it uses none of the others.
 //! - [`trade`]: accuracy against cost, measured for every solver on a scene and this machine.
 
 #![deny(missing_docs)]
@@ -31,6 +32,8 @@ pub mod live;
 pub mod model;
 pub mod motion;
 pub mod plan;
+#[cfg(feature = "cli")]
+pub mod proof;
 #[cfg(feature = "cli")]
 pub mod recording;
 #[cfg(any(feature = "cli", feature = "ros2"))]
