@@ -24,6 +24,7 @@
 #[cfg(all(feature = "jazzy", feature = "humble"))]
 compile_error!("choose one ROS 2 distribution: `--no-default-features --features cli,humble` for Humble");
 
+pub mod certify;
 #[cfg(feature = "cli")]
 pub mod drawing;
 pub mod linkage;
