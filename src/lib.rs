@@ -6,6 +6,7 @@
 //! - [`linkage`]: links on a path: the follower and how a link lies.
 //! - [`solve`]: from the head's travel to the state of every handle; several solvers behind one interface.
 //! - [`motion`]: a team on a path: its solver, its events, its clearance.
+//! - [`certify`]: events with a proof, as the lines of a certificate.
 //! - [`scene`]: the file a user writes, checked and turned into the types above.
 //! - [`show`]: from a scene and a tick to one frame, deterministic.
 //! - [`plan`]: the least pitch and the greatest speed, for a choreographer.
