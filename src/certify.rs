@@ -30,7 +30,7 @@ use crate::motion::event::Event;
 use crate::motion::timeline::Timeline;
 
 /// Steps after which the search gives up.
-const MOST_STEPS: u64 = 200_000;
+const MOST_STEPS: u64 = 50_000;
 
 /// Why there is no certificate.
 #[derive(Debug, thiserror::Error)]
@@ -74,3 +74,6 @@ pub fn certify(
     };
     search::Search::new(given, write).run(progress)
 }
+
+#[cfg(test)]
+mod tests;

@@ -41,9 +41,9 @@ impl Shape {
         let share = self.inset.over(link);
         // Any point is s of the way between the handles, s in [-e, 1 + e], and half a width aside; the middle of the two
         // handles moves no more than both do.
-        let slack = [front, rear].iter().fold(Interval::ZERO, |sum, capsule| {
-            sum + Interval::point(capsule.half) + Interval::point(capsule.radius)
-        });
+        let slack = [front, rear]
+            .iter()
+            .fold(Interval::ZERO, |sum, capsule| sum + Interval::point(capsule.half) + Interval::point(capsule.radius));
         let off = norm([middle[0] - Interval::point(centre[0]), middle[1] - Interval::point(centre[1])]);
         let radius = (link * 0.5 + self.inset + self.half_width + slack + off).hi;
         let direction = along.map(|part| part / length);
@@ -117,15 +117,14 @@ impl MovingBoard {
 
     /// Whether a point is proved to be in the board at every moment of the step.
     pub fn holds(&self, point: Vector) -> bool {
-        let slack = |capsule: &Capsule| Interval::within((Interval::point(capsule.half) + Interval::point(capsule.radius)).hi);
+        let slack =
+            |capsule: &Capsule| Interval::within((Interval::point(capsule.half) + Interval::point(capsule.radius)).hi);
         let ends = [&self.front, &self.rear].map(|capsule| capsule.point.map(|part| part + slack(capsule)));
         let [front, rear] = ends;
         let (along, to) = (minus(front, rear), minus(point, rear));
         let square = self.link.square();
         let reach = dot(to, along);
         let (least, most) = (-(self.share * square), (Interval::ONE + self.share) * square);
-        least.is_below(reach)
-            && reach.is_below(most)
-            && cross(to, along).abs().is_below(self.link * self.half_width)
+        least.is_below(reach) && reach.is_below(most) && cross(to, along).abs().is_below(self.link * self.half_width)
     }
 }

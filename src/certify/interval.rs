@@ -61,7 +61,8 @@ impl Interval {
     }
 
     pub fn square(self) -> Self {
-        let (least, most) = (if self.lo <= 0.0 && self.hi >= 0.0 { 0.0 } else { self.lo.abs().min(self.hi.abs()) }, self.magnitude());
+        let (least, most) =
+            (if self.lo <= 0.0 && self.hi >= 0.0 { 0.0 } else { self.lo.abs().min(self.hi.abs()) }, self.magnitude());
         let Self { lo, hi } = Self::outward(least * least, most * most);
         Self { lo: lo.max(0.0), hi }
     }
@@ -77,8 +78,7 @@ impl Interval {
         if divisor.lo <= 0.0 && divisor.hi >= 0.0 {
             return Self::LINE;
         }
-        let quotients =
-            [self.lo / divisor.lo, self.lo / divisor.hi, self.hi / divisor.lo, self.hi / divisor.hi];
+        let quotients = [self.lo / divisor.lo, self.lo / divisor.hi, self.hi / divisor.lo, self.hi / divisor.hi];
         hull(quotients)
     }
 

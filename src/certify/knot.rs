@@ -46,11 +46,7 @@ impl Knot {
             let (front, length) = (self.handles[link].param, team.link(link));
             let rear = follower(path, front, length)?;
             let pose = link_pose(path, front, rear, length);
-            self.handles.push(Handle {
-                param: rear,
-                front_cosine: pose.front_cosine,
-                rear_cosine: pose.rear_cosine,
-            });
+            self.handles.push(Handle { param: rear, front_cosine: pose.front_cosine, rear_cosine: pose.rear_cosine });
         }
         Ok(())
     }

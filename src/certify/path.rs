@@ -144,8 +144,7 @@ impl ExactPath {
                 let inward = Curve::Inward { a };
                 let (start, tangent) = (inward.point_of(theta, turn), inward.tangent_of(theta, turn));
                 let right: Vector = [tangent[1], -tangent[0]];
-                let first =
-                    Curve::Arc { origin: start, direction: tangent, inward: right, radius: first_radius };
+                let first = Curve::Arc { origin: start, direction: tangent, inward: right, radius: first_radius };
                 // The end of arc 2 and its tangent are known; its beginning follows, angle radians back.
                 let (sine, cosine) = sin_cos_of(angle);
                 let middle = first.point_of(angle, (sine, cosine));

@@ -165,19 +165,17 @@ impl<'a, 'w> Search<'a, 'w> {
         let length = self.given.path.length();
         let end = place(self.given.path.param_at(length));
         let (before, after) = (self.chain.exact.moved(end, -LEAST * (1.0 + length)), self.at.head);
-        Status::Proved {
-            time_lo: self.time(before).lo,
-            time_hi: self.time(after).hi,
-            bench_a: None,
-            bench_b: None,
-        }
+        Status::Proved { time_lo: self.time(before).lo, time_hi: self.time(after).hi, bench_a: None, bench_b: None }
     }
 
     /// Places at which an event of doubtful digits is tried to be shown, from near to far.
     fn beyond(&self, event: &Event) -> impl Iterator<Item = f64> + use<> {
         let around = self.around().max(2.0 * (event.travelled - self.at.travelled));
         let (at, most) = (event.travelled, NEAR * self.given.team.shortest_link());
-        (0..24).map(move |power| around * 2f64.powi(power)).take_while(move |far| *far <= most.max(around)).map(move |far| at + far)
+        (0..24)
+            .map(move |power| around * 2f64.powi(power))
+            .take_while(move |far| *far <= most.max(around))
+            .map(move |far| at + far)
     }
 
     /// See [`Search::go_to_knot`].
@@ -191,21 +189,13 @@ impl<'a, 'w> Search<'a, 'w> {
 
     /// Goes in steps to a knot, or so near to an event that a step cannot be shown for its sake. A claim that cannot be
     /// shown at any length of the step is given up.
-    fn go_to_knot(
-        &mut self,
-        target: &Knot,
-        event: Option<&Event>,
-        progress: &mut dyn FnMut(f64),
-    ) -> Result<(), Halt> {
+    fn go_to_knot(&mut self, target: &Knot, event: Option<&Event>, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
         let least = 0.01 * LEAST * (1.0 + self.given.path.length());
         let longest = self.given.team.shortest_link();
         while self.at.head != target.head {
             let remaining = target.travelled - self.at.travelled;
-            let mut to = if self.step >= 0.9 * remaining {
-                target.clone()
-            } else {
-                self.knot(self.at.travelled + self.step)
-            };
+            let mut to =
+                if self.step >= 0.9 * remaining { target.clone() } else { self.knot(self.at.travelled + self.step) };
             let claim = Claim { links: self.links, moving: self.moving, clear: self.clear };
             match self.chain.show(&mut self.at, &mut to, claim) {
                 Ok(shown) => {
@@ -276,9 +266,7 @@ impl<'a, 'w> Search<'a, 'w> {
                 self.covered = false;
                 Ok(())
             }
-            Obstacle::Link(link) => {
-                Err(Halt::Stuck(format!("the handle behind link {link} cannot be enclosed there")))
-            }
+            Obstacle::Link(link) => Err(Halt::Stuck(format!("the handle behind link {link} cannot be enclosed there"))),
             Obstacle::Stall(_) | Obstacle::Behind | Obstacle::Pair(..) => {
                 Err(Halt::Stuck(format!("a step cannot be shown there: {obstacle:?}")))
             }
@@ -365,9 +353,8 @@ impl<'a, 'w> Search<'a, 'w> {
             self.go_to(travelled, None, progress)?;
             let (mut from, mut to) = (self.at.clone(), self.at.clone());
             let handles = self.chain.spans(&mut from, &mut to, link + 1);
-            let stalled = |handles: &Vec<Spanned>| {
-                handles[link].capsule.product(&handles[link + 1].capsule, false).is_negative()
-            };
+            let stalled =
+                |handles: &Vec<Spanned>| handles[link].capsule.product(&handles[link + 1].capsule, false).is_negative();
             if let Some(handles) = handles.filter(stalled) {
                 let (head, spans) = (self.at.head, handles[1..].iter().map(|handle| handle.span).collect());
                 (self.write)(&Line::Stall { link, from: head, to: head, spans })?;
@@ -461,7 +448,8 @@ impl<'a, 'w> Search<'a, 'w> {
             let behind = path.param_at(path.travelled(rear) - top * (1.0 + wider));
             let ahead = path.param_at(path.travelled(rear) + top * wider);
             let window = Span(exact.moved(place(behind), 0.0), exact.moved(place(ahead), 0.0));
-            let near = |place: Place| front.capsule.distance_squared(exact.curve(place).point(place.1)).is_below(square);
+            let near =
+                |place: Place| front.capsule.distance_squared(exact.curve(place).point(place.1)).is_below(square);
             let holds = exact.in_order(window.0, follower.0)
                 && exact.in_order(follower.1, window.1)
                 && exact.in_order(window.1, front.span.0)
