@@ -12,10 +12,12 @@
 //! - [`wire`]: the memory layouts that go over the wire, and every conversion to them.
 //! - `ros2_messages` (features `cli`, `jazzy`, `humble`): the messages of ROS 2, on its network and in recordings.
 //! - `drawing` (feature `cli`): a moment of a motion as an SVG, and the colours of all pictures.
+//! - [`certify`]: events with a proof, as a certificate that other code can check.
 //! - [`live`]: the fixed-rate loop, its clock, its statistics.
 //! - [`transports`]: iceoryx2 shared memory and ROS 2 topics, as publishers of the loop.
 //! - `recording` (feature `cli`): the log of a run, the proof that it can be played again, and every message as MCAP.
 //! - [`subscribers`]: the feed of a publisher's messages, the terminal monitor, the stage picture, the soak test; no solver.
+//! - `proof` (feature `cli`): the checker of certificates of events; it uses none of the others.
 //! - [`trade`]: accuracy against cost, measured for every solver on a scene and this machine.
 
 #![deny(missing_docs)]
@@ -23,6 +25,7 @@
 #[cfg(all(feature = "jazzy", feature = "humble"))]
 compile_error!("choose one ROS 2 distribution: `--no-default-features --features cli,humble` for Humble");
 
+pub mod certify;
 #[cfg(feature = "cli")]
 pub mod drawing;
 pub mod linkage;
@@ -30,6 +33,8 @@ pub mod live;
 pub mod model;
 pub mod motion;
 pub mod plan;
+#[cfg(feature = "cli")]
+pub mod proof;
 #[cfg(feature = "cli")]
 pub mod recording;
 #[cfg(any(feature = "cli", feature = "ros2"))]

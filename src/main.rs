@@ -42,7 +42,7 @@ enum Command {
     /// Solve a scene offline and print every handle as a table
     Solve(commands::solve::SolveArguments),
     /// Find contact, stall, lock and path end
-    Events,
+    Events(commands::events::EventsArguments),
     /// Draw the stage at a time as an SVG
     Draw(commands::draw::DrawArguments),
     /// Measure accuracy against cost for every solver on this scene and machine
@@ -80,7 +80,7 @@ fn main() -> ExitCode {
         Command::Send(arguments) => commands::send::send(&common, arguments),
         Command::Metrics(arguments) => commands::metrics::metrics(&common, arguments),
         Command::Solve(arguments) => commands::solve::solve(&common, arguments),
-        Command::Events => commands::events::events(&common),
+        Command::Events(arguments) => commands::events::events(&common, arguments),
         Command::Draw(arguments) => commands::draw::draw(&common, arguments),
         Command::Trade(arguments) => commands::trade::trade(&common, arguments),
         Command::Plan(arguments) => commands::plan::plan(&common, arguments),

@@ -47,3 +47,19 @@ fn no_room_imports_upward() {
     }
     assert!(imports > 100, "{imports} imports seen");
 }
+
+/// The checker of certificates shares nothing with the search that writes them, nor with anything else.
+#[test]
+fn the_checker_stands_alone() {
+    let mut files = sources(Path::new("src/proof"));
+    files.push("src/proof.rs".into());
+    assert!(files.len() > 10, "{files:?}");
+    for file in files {
+        for line in std::fs::read_to_string(&file).unwrap().lines() {
+            for start in ["crate::", "bench_dragon::", "super::super::super::super"] {
+                let other = line.split(start).skip(1).find(|used| !used.starts_with("proof::"));
+                assert!(other.is_none(), "{}: {line}", file.display());
+            }
+        }
+    }
+}

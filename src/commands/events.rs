@@ -1,11 +1,31 @@
-//! `events`: everything that ends the show, in order.
+//! `events`: everything that ends the show, in order; with a proof where one is requested.
 
+use std::io::{self, BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+
+use bench_dragon::certify::{self, CertifyError, Outcome, Status};
+use bench_dragon::motion::Method;
 use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
 use bench_dragon::scene::Scene;
 use serde::Serialize;
 
 use super::{CommandError, Common, Output, figure, progress_bar, search_timeline};
+
+/// Arguments of `events`.
+#[derive(Debug, clap::Args)]
+pub struct EventsArguments {
+    /// Prove the events and write the certificate to this file, for `verify`
+    #[arg(long, value_name = "FILE")]
+    certify: Option<PathBuf>,
+}
+
+/// The times between which an event is proved to be; both null where that was not decided.
+#[derive(Serialize)]
+struct Enclosure {
+    time_lo: Option<f64>,
+    time_hi: Option<f64>,
+}
 
 /// One line of `events --json`.
 #[derive(Serialize)]
@@ -16,12 +36,23 @@ struct EventLine {
     bench_b: Option<u32>,
     x: Option<f64>,
     y: Option<f64>,
+    #[serde(flatten)]
+    enclosure: Option<Enclosure>,
 }
 
 /// Prints the events of the scene.
-pub fn events(common: &Common) -> Result<(), CommandError> {
-    let scene = common.load_scene()?;
+pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), CommandError> {
+    let text = common.scene_text()?;
+    let scene = text.parse()?;
     let timeline = search_timeline(&scene, common);
+    let proved = match &arguments.certify {
+        Some(file) => Some(certified(&scene, &timeline, &text.text, file, common)?),
+        None => None,
+    };
+    let status = |kind: EventKind| {
+        let outcome = proved.as_ref()?.iter().find(|outcome| outcome.event == kind)?;
+        Some(&outcome.status)
+    };
     let mut output = Output::standard();
     for timed in timeline.events() {
         if common.json {
@@ -33,20 +64,76 @@ pub fn events(common: &Common) -> Result<(), CommandError> {
                 bench_b: event.bench_b,
                 x: event.place.map(|place| place.x),
                 y: event.place.map(|place| place.y),
+                enclosure: status(event.kind).map(enclosure),
             })?;
         } else {
             output.line(&sentence(&scene, timed))?;
+            if let Some(status) = status(event.kind) {
+                output.line(&proof_sentence(event.kind, status))?;
+            }
         }
     }
     if !common.json {
         for kind in [EventKind::Contact, EventKind::Stall] {
             if timeline.find(kind).is_none() {
                 output.line(&format!("There is no {} before the motion ends.", kind.name()))?;
+                if let Some(status) = status(kind) {
+                    output.line(&proof_sentence(kind, status))?;
+                }
             }
         }
         output.line(&least_clearance(&scene, &timeline, common))?;
     }
     output.finish()
+}
+
+/// Writes the certificate of a scene's events, and returns what it proves.
+fn certified(
+    scene: &Scene,
+    timeline: &Timeline,
+    text: &str,
+    file: &Path,
+    common: &Common,
+) -> Result<Vec<Outcome>, CommandError> {
+    if matches!(scene.motion.method(), Method::Paper(_)) {
+        let sentence = "the scene names the solver \"paper\", whose head is too fast: only exact motion can be certified, \
+                        expected motion.accuracy or another solver";
+        return Err(CommandError::BadInput(sentence.to_owned()));
+    }
+    let shown = file.display();
+    let refused = |error| CommandError::BadInput(format!("{shown}: {error}, expected a file to write"));
+    let mut writer = BufWriter::new(std::fs::File::create(file).map_err(refused)?);
+    let bar = progress_bar(1000, common).with_message("proving");
+    let mut write = |line: &certify::Line| {
+        serde_json::to_writer(&mut writer, line).map_err(io::Error::from)?;
+        writer.write_all(b"\n")
+    };
+    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+    let outcomes = certify::certify(&scene.motion, timeline, text, &mut write, &mut progress);
+    bar.finish_and_clear();
+    let outcomes = outcomes.and_then(|outcomes| Ok(writer.flush().map(|()| outcomes)?));
+    outcomes.map_err(|CertifyError::Write(error)| CommandError::Failed(format!("{shown}: {error}")))
+}
+
+fn enclosure(status: &Status) -> Enclosure {
+    match *status {
+        Status::Proved { time_lo, time_hi, .. } => Enclosure { time_lo: Some(time_lo), time_hi: Some(time_hi) },
+        Status::None | Status::Undecided { .. } => Enclosure { time_lo: None, time_hi: None },
+    }
+}
+
+/// What was proved of an event, for people.
+fn proof_sentence(kind: EventKind, status: &Status) -> String {
+    let name = kind.name().replace('_', " ");
+    match status {
+        Status::Proved { time_lo, time_hi, .. } => {
+            format!("           Proved: the first {name} is between t = {time_lo} s and {time_hi} s.")
+        }
+        Status::None => "           Proved.".to_owned(),
+        Status::Undecided { time_lo, because } => {
+            format!("           Proved up to t = {time_lo} s that there is no {name}; not decided beyond: {because}.")
+        }
+    }
 }
 
 /// An event for people; benches are counted from 1, and the sentence states it.

@@ -1,9 +1,12 @@
-//! `verify`: plays the show of a log again and compares every bit.
+//! `verify`: plays the show of a log again and compares every bit, or checks a certificate of events.
+
+mod certificate;
 
 use std::fs::File;
-use std::io::{self, BufReader};
+use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::PathBuf;
 
+use bench_dragon::proof;
 use bench_dragon::recording::verify::{self, Verdict, VerifyError};
 
 use super::{CommandError, Common, Output, progress_bar};
@@ -11,18 +14,36 @@ use super::{CommandError, Common, Output, progress_bar};
 /// Arguments of `verify`.
 #[derive(Debug, clap::Args)]
 pub struct VerifyArguments {
-    /// A log, as `run --log` writes it
+    /// A log, as `run --log` writes it, or a certificate, as `events --certify` does
     #[arg(value_name = "FILE")]
     file: PathBuf,
 }
 
-/// Verifies a log: same or close is exit code 0, a difference or nothing to compare 1, a file that is no log 2.
+/// Bytes of the longest first line that is read to see what the file is.
+const LONGEST_FIRST_LINE: u64 = 1 << 26;
+
+/// Verifies a log or a certificate. Exit code 0: a log has the same show, or close to it; a certificate proves what it
+/// says. 1: a difference, nothing to compare; a line that does not follow. 2: a file that is neither.
 pub fn verify(common: &Common, arguments: &VerifyArguments) -> Result<(), CommandError> {
     let shown = arguments.file.display().to_string();
-    let unread = |error: io::Error| CommandError::BadInput(format!("{shown}: {error}, expected a log to read"));
+    let unread =
+        |error: io::Error| CommandError::BadInput(format!("{shown}: {error}, expected a log or a certificate to read"));
     let file = File::open(&arguments.file).map_err(unread)?;
-    let bar = progress_bar(file.metadata().map_or(0, |data| data.len()), common).with_message("playing again");
-    let verdict = verify::verify(BufReader::new(file), &shown, &mut |bytes| bar.set_position(bytes));
+    let bar = progress_bar(file.metadata().map_or(0, |data| data.len()), common);
+    let mut file = BufReader::new(file);
+    let mut first = Vec::new();
+    file.by_ref().take(LONGEST_FIRST_LINE).read_until(b'\n', &mut first).map_err(unread)?;
+    let is_certificate = is_certificate(&first);
+    let lines = Cursor::new(first).chain(file);
+    let mut progress = |bytes| bar.set_position(bytes);
+    if is_certificate {
+        bar.set_message("checking");
+        let checked = proof::verify(lines, &mut progress);
+        bar.finish_and_clear();
+        return certificate::print(common, &shown, checked);
+    }
+    bar.set_message("playing again");
+    let verdict = verify::verify(lines, &shown, &mut progress);
     bar.finish_and_clear();
     let verdict = verdict.map_err(|error| match error {
         VerifyError::Line { line, problem } => CommandError::BadInput(format!("{shown}, line {line}: {problem}")),
@@ -47,6 +68,12 @@ pub fn verify(common: &Common, arguments: &VerifyArguments) -> Result<(), Comman
             )))
         }
     }
+}
+
+/// Whether the first line of a file is that of a certificate.
+fn is_certificate(line: &[u8]) -> bool {
+    let value: Option<serde_json::Value> = serde_json::from_slice(line).ok();
+    value.is_some_and(|value| value["type"] == "certificate")
 }
 
 fn print(common: &Common, verdict: &Verdict) -> Result<(), CommandError> {

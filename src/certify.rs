@@ -1,0 +1,79 @@
+//! Events with a proof: enclosures of every handle over steps of the head, rounded outward, from which it follows when
+//! contact, stall, lock and the path's end happen for the first time, or that they do not.
+//!
+//! In: a scene's motion, its events as the ordinary search found them, its text. Out: the lines of a certificate, and what
+//! they prove. The `events` command calls it; `proof` checks what it writes, with code of its own. The ordinary search only
+//! tells where to look: what it has missed makes the proof fail. Lemmas and file: `docs/proofs.md`.
+
+mod boards;
+mod capsule;
+mod elementary;
+mod interval;
+mod knot;
+mod lines;
+mod link;
+mod path;
+mod search;
+mod step;
+
+use std::io;
+
+pub use capsule::Span;
+pub use lines::{FORMAT, Line, Links, Outcome, Status, Step};
+pub use path::Place;
+
+use crate::model::description::PathDescription;
+use crate::model::path::Path;
+use crate::model::team::Team;
+use crate::motion::Motion;
+use crate::motion::event::Event;
+use crate::motion::timeline::Timeline;
+
+/// Steps after which the search gives up.
+const MOST_STEPS: u64 = 50_000;
+
+/// Why there is no certificate.
+#[derive(Debug, thiserror::Error)]
+pub enum CertifyError {
+    /// It cannot be written.
+    #[error(transparent)]
+    Write(#[from] io::Error),
+}
+
+/// What the search is given.
+#[derive(Clone, Copy)]
+pub(crate) struct Given<'a> {
+    scene: &'a str,
+    description: &'a PathDescription,
+    path: &'a Path,
+    team: &'a Team,
+    head_speed: f64,
+    events: &'a [Event],
+}
+
+/// Certifies the events of a motion. `scene` is the text that states it. Each line of the certificate is given to `write`;
+/// `progress` gets the share of the motion that is done, from 0 to 1.
+///
+/// # Errors
+/// [`CertifyError::Write`]
+pub fn certify(
+    motion: &Motion,
+    timeline: &Timeline,
+    scene: &str,
+    write: &mut dyn FnMut(&Line) -> io::Result<()>,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Vec<Outcome>, CertifyError> {
+    let events: Vec<Event> = timeline.events().iter().map(|timed| timed.event).collect();
+    let given = Given {
+        scene,
+        description: motion.description(),
+        path: motion.path(),
+        team: motion.team(),
+        head_speed: motion.head_speed(),
+        events: &events,
+    };
+    search::Search::new(given, write).run(progress)
+}
+
+#[cfg(test)]
+mod tests;

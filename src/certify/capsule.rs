@@ -1,0 +1,104 @@
+//! Spans of the path and the capsules that hold their points. See "Capsules" in `docs/proofs.md`. Only [`super`] uses it.
+
+use serde::Serialize;
+
+use super::interval::{Interval, Vector, dot, minus, norm, norm_squared, scaled};
+use super::path::{ExactPath, Place};
+
+/// All places from the first to the second.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Span(pub Place, pub Place);
+
+/// Points and tangents over a span.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Capsule {
+    /// The point of a place m of the span.
+    pub point: Vector,
+    /// The tangent there.
+    pub tangent: Vector,
+    /// At least the metres from m to either end.
+    pub half: f64,
+    /// At least the radius of the disc that is added to the tangent's stretch.
+    pub radius: f64,
+    /// At least the curvature anywhere in the span, 1/m.
+    pub curvature: f64,
+}
+
+/// A span with what lemmas ask of it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Spanned {
+    pub span: Span,
+    pub first: Vector,
+    pub last: Vector,
+    pub capsule: Capsule,
+}
+
+impl Capsule {
+    pub fn new(path: &ExactPath, Span(first, last): Span) -> Self {
+        let middle = if first.0 == last.0 { Place(first.0, 0.5 * first.1 + 0.5 * last.1) } else { first };
+        let half = path.length(first, middle).max(path.length(middle, last));
+        let curvature = path.curvature(first, last);
+        let radius = (Interval::point(curvature) * Interval::point(half).square() * 0.5).hi;
+        let curve = path.curve(middle);
+        Self { point: curve.point(middle.1), tangent: curve.tangent(middle.1), half, radius, curvature }
+    }
+
+    /// How far n . x can be from n . point.
+    pub fn reach(&self, n: Vector, length: f64) -> Interval {
+        dot(n, self.tangent).abs() * self.half + Interval::point(length) * self.radius
+    }
+
+    /// The distance of a point here from one there, at most.
+    pub fn most_apart(&self, other: &Self) -> f64 {
+        (norm(minus(self.point, other.point)) + self.slack(other)).hi
+    }
+
+    /// By how much points can be elsewhere than in the middle.
+    fn slack(&self, other: &Self) -> Interval {
+        Interval::point(self.half)
+            + Interval::point(other.half)
+            + Interval::point(self.radius)
+            + Interval::point(other.radius)
+    }
+
+    /// The square of the distance of any place of the span from a point, by Taylor's formula.
+    pub fn distance_squared(&self, x: Vector) -> Interval {
+        let Self { point, tangent, half, curvature, radius } = *self;
+        let between = minus(point, x);
+        let most = norm(between) + Interval::point(half) + Interval::point(radius);
+        let half = Interval::point(half);
+        let linear = dot(tangent, between).abs() * 2.0 * half;
+        let square = (Interval::ONE + most * curvature) * half.square();
+        norm_squared(between) + Interval::within((linear + square).hi)
+    }
+
+    /// t . (u - x) over all u here and x there, t being the tangent at u, or at x.
+    pub fn product(&self, other: &Self, at_other: bool) -> Interval {
+        let between = minus(self.point, other.point);
+        let (tangent, bend) = if at_other {
+            (other.tangent, Interval::point(other.curvature) * other.half)
+        } else {
+            (self.tangent, Interval::point(self.curvature) * self.half)
+        };
+        let along = |capsule: &Self| dot(tangent, capsule.tangent).abs() * capsule.half;
+        let off = along(self)
+            + along(other)
+            + Interval::point(self.radius)
+            + Interval::point(other.radius)
+            + bend * self.most_apart(other);
+        dot(tangent, between) + Interval::within(off.hi)
+    }
+}
+
+impl Spanned {
+    pub fn new(path: &ExactPath, span: Span) -> Self {
+        let Span(first, last) = span;
+        let point = |place: Place| path.curve(place).point(place.1);
+        Self { span, first: point(first), last: point(last), capsule: Capsule::new(path, span) }
+    }
+}
+
+/// A capsule moved back along its own tangent, for handles on one straight line.
+pub(super) fn moved_back(capsule: &Capsule, metres: Interval) -> Capsule {
+    Capsule { point: minus(capsule.point, scaled(capsule.tangent, metres)), ..*capsule }
+}

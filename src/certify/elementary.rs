@@ -1,0 +1,117 @@
+//! Enclosures of pi, sine and cosine, arctangent and logarithm, from their series. Only [`super`] uses it.
+
+use super::interval::Interval;
+
+/// Pi over 2 in three doubles of 26 digits, so that their products with a whole number below 2^27 are exact.
+const HALF_PI: [f64; 3] = [1.5707963109016418, 1.5893254712295857e-8, 6.123233932053594e-17];
+
+/// More than pi over 2 exceeds the sum of [`HALF_PI`].
+const HALF_PI_REST: f64 = 6.4e-25;
+
+/// The greatest argument of [`sin_cos`]: beyond it the whole range is returned.
+const GREATEST_ARGUMENT: f64 = 2e8;
+
+/// Pi.
+pub(super) fn pi() -> Interval {
+    let [high, middle, low] = HALF_PI.map(Interval::point);
+    (high + (middle + (low + Interval { lo: 0.0, hi: HALF_PI_REST }))) * 2.0
+}
+
+/// Sine and cosine of a double.
+///
+/// x = k pi / 2 + y with |y| <= 0.79; then the series of y to y^19 and y^20, whose remainders are below the first term left
+/// out, 0.79^21 / 21! < 2e-22 (the terms alternate and fall).
+pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
+    if x.is_nan() || x.abs() > GREATEST_ARGUMENT {
+        let any = Interval::within(1.0);
+        return (any, any);
+    }
+    let turns = (x / std::f64::consts::FRAC_PI_2).round();
+    let [high, middle, low] = HALF_PI.map(|part| Interval::point(part * turns));
+    let rest = Interval::point(turns) * Interval { lo: 0.0, hi: HALF_PI_REST };
+    let y = Interval::point(x) - high - middle - low - rest;
+    let square = y.square();
+    let remainder = Interval::within(2e-22);
+    let sine = y * (alternating(square, &ODD) + remainder);
+    let cosine = alternating(square, &EVEN) + remainder;
+    let within = |value: Interval| Interval { lo: value.lo.max(-1.0), hi: value.hi.min(1.0) };
+    let (sine, cosine) = (within(sine), within(cosine));
+    // A whole number below 2^27 is exact in both types.
+    match (turns as i64).rem_euclid(4) {
+        0 => (sine, cosine),
+        1 => (cosine, -sine),
+        2 => (-sine, -cosine),
+        _ => (-cosine, sine),
+    }
+}
+
+/// n! / (n - 2)! of the terms of the sine: each term is the one before times -y^2 over this.
+const ODD: [f64; 9] = [6.0, 20.0, 42.0, 72.0, 110.0, 156.0, 210.0, 272.0, 342.0];
+
+/// The same for the cosine.
+const EVEN: [f64; 10] = [2.0, 12.0, 30.0, 56.0, 90.0, 132.0, 182.0, 240.0, 306.0, 380.0];
+
+/// 1 - s/q1 (1 - s/q2 (1 - ...)), which is the series whose terms have these quotients.
+fn alternating(s: Interval, quotients: &[f64]) -> Interval {
+    quotients.iter().rev().fold(Interval::ONE, |sum, quotient| {
+        // A quotient of whole numbers below 2^53: its reciprocal is off by one rounding.
+        let reciprocal = Interval::outward(1.0 / quotient, 1.0 / quotient);
+        Interval::ONE - s * reciprocal * sum
+    })
+}
+
+/// Arctangent of what is not negative.
+///
+/// atan x = 2 atan(x / (1 + sqrt(1 + x^2))), four times: then x < 0.0985 and the series to x^17 leaves less than
+/// x 0.0985^18 / 19 < x 5e-20.
+pub(super) fn atan(x: Interval) -> Interval {
+    let mut reduced = x;
+    for _ in 0..4 {
+        reduced = reduced.over(Interval::ONE + (Interval::ONE + reduced.square()).sqrt());
+        // The quotient grows with x to 1: what rounding adds beyond that is not there.
+        reduced = Interval { lo: reduced.lo.max(0.0), hi: reduced.hi.min(1.0) };
+    }
+    let square = reduced.square();
+    let series = (0..9).rev().fold(Interval::ZERO, |sum, n| {
+        let reciprocal = 1.0 / f64::from(2 * n + 1);
+        Interval::outward(reciprocal, reciprocal) - square * sum
+    });
+    reduced * (series + Interval::within(5e-20)) * 16.0
+}
+
+/// Natural logarithm of what is positive.
+///
+/// x = 2^k m with m in [0.7, 1.42]; ln m = 2 atanh z, z = (m - 1) / (m + 1), |z| < 0.18; the series to z^21 leaves less than
+/// z^23 / 23 / (1 - z^2) < 1e-18 z.
+pub(super) fn ln(x: Interval) -> Interval {
+    let Interval { lo, hi } = x;
+    Interval { lo: ln_of(lo).lo, hi: ln_of(hi).hi }
+}
+
+fn ln_of(x: f64) -> Interval {
+    if !(f64::MIN_POSITIVE..f64::INFINITY).contains(&x) {
+        return Interval { lo: f64::NEG_INFINITY, hi: f64::INFINITY };
+    }
+    let (exponent, mantissa) = split(x);
+    let m = Interval::point(mantissa);
+    let z = (m - Interval::ONE).over(m + Interval::ONE);
+    let square = z.square();
+    let series = (0..11).rev().fold(Interval::ZERO, |sum, n| {
+        let reciprocal = 1.0 / f64::from(2 * n + 1);
+        Interval::outward(reciprocal, reciprocal) + square * sum
+    });
+    let logarithm = z * (series + Interval::within(1e-18)) * 2.0;
+    logarithm + LN_2 * f64::from(exponent)
+}
+
+/// ln 2 = 0.693147180559945309417...
+const LN_2: Interval = Interval { lo: 0.693_147_180_559_945_2, hi: 0.693_147_180_559_945_4 };
+
+/// x = 2^exponent mantissa, mantissa from 0.7 to 1.42, exactly.
+fn split(x: f64) -> (i32, f64) {
+    let bits = x.to_bits();
+    // Eleven bits fit.
+    let exponent = (bits >> 52) as i32 - 1023;
+    let mantissa = f64::from_bits((bits & ((1 << 52) - 1)) | (1023 << 52));
+    if mantissa > std::f64::consts::SQRT_2 { (exponent + 1, 0.5 * mantissa) } else { (exponent, mantissa) }
+}

@@ -1,0 +1,177 @@
+//! Real numbers held between two doubles.
+//!
+//! Every operation rounds its lower end down and its upper end up, by one unit in the last place more than IEEE 754
+//! arithmetic can be off in any rounding mode: nothing here depends on the mode in force. Ends may be infinite; where an
+//! operation has no meaning (a division by an interval that holds 0) the result is the whole line. Only [`super`] uses it.
+
+use std::ops::{Add, Mul, Neg, Sub};
+
+/// All real numbers from `lo` to `hi`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Interval {
+    pub lo: f64,
+    pub hi: f64,
+}
+
+/// A vector of the plane.
+pub(super) type Vector = [Interval; 2];
+
+impl Interval {
+    pub const ZERO: Self = Self::point(0.0);
+    pub const ONE: Self = Self::point(1.0);
+    const LINE: Self = Self { lo: f64::NEG_INFINITY, hi: f64::INFINITY };
+
+    /// The double itself.
+    pub const fn point(value: f64) -> Self {
+        Self { lo: value, hi: value }
+    }
+
+    /// From `lo` to `hi`, both rounded to nearest: one unit in the last place further out each. What is not a number
+    /// bounds nothing.
+    pub(super) fn outward(lo: f64, hi: f64) -> Self {
+        if lo.is_nan() || hi.is_nan() { Self::LINE } else { Self { lo: lo.next_down(), hi: hi.next_up() } }
+    }
+
+    /// All numbers within `radius` of 0.
+    pub fn within(radius: f64) -> Self {
+        Self { lo: -radius, hi: radius }
+    }
+
+    /// The greatest absolute value.
+    pub fn magnitude(self) -> f64 {
+        self.lo.abs().max(self.hi.abs())
+    }
+
+    /// A double near the middle.
+    pub fn middle(self) -> f64 {
+        0.5 * self.lo + 0.5 * self.hi
+    }
+
+    pub fn is_positive(self) -> bool {
+        self.lo > 0.0
+    }
+
+    pub fn is_negative(self) -> bool {
+        self.hi < 0.0
+    }
+
+    /// Whether every number here is below every number there.
+    pub fn is_below(self, other: Self) -> bool {
+        self.hi < other.lo
+    }
+
+    pub fn square(self) -> Self {
+        let (least, most) =
+            (if self.lo <= 0.0 && self.hi >= 0.0 { 0.0 } else { self.lo.abs().min(self.hi.abs()) }, self.magnitude());
+        let Self { lo, hi } = Self::outward(least * least, most * most);
+        Self { lo: lo.max(0.0), hi }
+    }
+
+    /// The square root; of what is negative, 0.
+    pub fn sqrt(self) -> Self {
+        let Self { lo, hi } = Self::outward(self.lo.max(0.0).sqrt(), self.hi.max(0.0).sqrt());
+        Self { lo: lo.max(0.0), hi }
+    }
+
+    /// The quotient; the whole line where the divisor may be 0.
+    pub fn over(self, divisor: Self) -> Self {
+        if divisor.lo <= 0.0 && divisor.hi >= 0.0 {
+            return Self::LINE;
+        }
+        let quotients = [self.lo / divisor.lo, self.lo / divisor.hi, self.hi / divisor.lo, self.hi / divisor.hi];
+        hull(quotients)
+    }
+
+    pub fn abs(self) -> Self {
+        if self.lo >= 0.0 {
+            self
+        } else if self.hi <= 0.0 {
+            -self
+        } else {
+            Self { lo: 0.0, hi: self.magnitude() }
+        }
+    }
+
+    pub fn max(self, other: Self) -> Self {
+        Self { lo: self.lo.max(other.lo), hi: self.hi.max(other.hi) }
+    }
+
+    pub fn min(self, other: Self) -> Self {
+        Self { lo: self.lo.min(other.lo), hi: self.hi.min(other.hi) }
+    }
+}
+
+/// The hull of four numbers rounded to nearest, outward.
+fn hull([a, b, c, d]: [f64; 4]) -> Interval {
+    if a.is_nan() || b.is_nan() || c.is_nan() || d.is_nan() {
+        return Interval::LINE;
+    }
+    Interval::outward(a.min(b).min(c.min(d)), a.max(b).max(c.max(d)))
+}
+
+impl Add for Interval {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self::outward(self.lo + other.lo, self.hi + other.hi)
+    }
+}
+
+impl Sub for Interval {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        Self::outward(self.lo - other.hi, self.hi - other.lo)
+    }
+}
+
+impl Neg for Interval {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self { lo: -self.hi, hi: -self.lo }
+    }
+}
+
+impl Mul for Interval {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        hull([self.lo * other.lo, self.lo * other.hi, self.hi * other.lo, self.hi * other.hi])
+    }
+}
+
+impl Mul<f64> for Interval {
+    type Output = Self;
+    fn mul(self, factor: f64) -> Self {
+        self * Self::point(factor)
+    }
+}
+
+/// a . b
+pub(super) fn dot(a: Vector, b: Vector) -> Interval {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+/// a x b
+pub(super) fn cross(a: Vector, b: Vector) -> Interval {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+pub(super) fn minus(a: Vector, b: Vector) -> Vector {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+pub(super) fn plus(a: Vector, b: Vector) -> Vector {
+    [a[0] + b[0], a[1] + b[1]]
+}
+
+pub(super) fn scaled(a: Vector, factor: Interval) -> Vector {
+    [a[0] * factor, a[1] * factor]
+}
+
+/// |a|^2
+pub(super) fn norm_squared(a: Vector) -> Interval {
+    a[0].square() + a[1].square()
+}
+
+/// |a|
+pub(super) fn norm(a: Vector) -> Interval {
+    norm_squared(a).sqrt()
+}

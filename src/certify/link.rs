@@ -1,0 +1,84 @@
+//! Lemma 1 of `docs/proofs.md`: the follower of a span is in another span. Only [`super`] uses it.
+
+use std::f64::consts::FRAC_PI_2;
+
+use super::capsule::{Capsule, Span, Spanned};
+use super::interval::{Interval, minus, norm_squared};
+use super::path::ExactPath;
+
+/// Halvings of a stretch in which places are to be nearer than the link.
+const MOST_HALVINGS: u32 = 24;
+
+/// Below pi / 2.
+const QUARTER: f64 = FRAC_PI_2 - 1e-12;
+
+/// What Lemma 1 says of the front product.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Front {
+    /// The rear handle goes forward with the front one.
+    Forward,
+    /// It goes backward.
+    Backward,
+    /// It may turn round.
+    Unknown,
+}
+
+/// The front product's sign, if the follower of every place of `front` is proved to be in `rear`.
+pub(super) fn follower_within(path: &ExactPath, front: &Spanned, rear: &Spanned, link: Interval) -> Option<Front> {
+    let (u, x) = (&front.capsule, &rear.capsule);
+    if !path.in_order(rear.span.1, front.span.0) || !u.product(x, true).is_positive() {
+        return None;
+    }
+    let product = u.product(x, false);
+    let square = link.square();
+    let beyond = |distance: Interval| square.is_below(distance);
+    let within = |distance: Interval| distance.is_below(square);
+    let apart = |one, other| norm_squared(minus(one, other));
+    let (sign, holds) = if product.is_positive() {
+        (Front::Forward, beyond(apart(front.first, rear.first)) && within(apart(front.last, rear.last)))
+    } else if product.is_negative() {
+        (Front::Backward, beyond(apart(front.last, rear.first)) && within(apart(front.first, rear.last)))
+    } else {
+        let first = beyond(front.capsule.distance_squared(rear.first));
+        (Front::Unknown, first && within(front.capsule.distance_squared(rear.last)))
+    };
+    let near = || {
+        path.turning(rear.span.0, front.span.1) < QUARTER
+            || nearer(path, front, Span(rear.span.1, front.span.1), link, MOST_HALVINGS)
+    };
+    (holds && near()).then_some(sign)
+}
+
+/// Whether every place of a stretch is proved to be of kind (a) or (b).
+pub(super) fn nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Interval, halvings: u32) -> bool {
+    let Span(first, last) = stretch;
+    if path.turning(first, front.span.1) < QUARTER {
+        return true;
+    }
+    let y = Capsule::new(path, stretch);
+    let growing = path.in_order(last, front.span.0) && front.capsule.product(&y, true).is_positive();
+    if growing || is_nearer(&y, front, link) {
+        return true;
+    }
+    let Some(middle) = path.between(first, last).filter(|_| halvings > 0) else { return false };
+    nearer(path, front, Span(first, middle), link, halvings - 1)
+        && nearer(path, front, Span(middle, last), link, halvings - 1)
+}
+
+/// Whether all places of a stretch are proved to be nearer than the link to all of `front`, in one piece: by Taylor's
+/// formula along the stretch.
+fn is_nearer(stretch: &Capsule, front: &Spanned, link: Interval) -> bool {
+    let Capsule { point, half, radius, .. } = front.capsule;
+    let spread = Interval::within((Interval::point(half) + Interval::point(radius)).hi);
+    stretch.distance_squared(point.map(|part| part + spread)).is_below(link.square())
+}
+
+/// Whether all places of a stretch are proved to be nearer than the link to all of `front`.
+pub(super) fn all_nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Interval, halvings: u32) -> bool {
+    if is_nearer(&Capsule::new(path, stretch), front, link) {
+        return true;
+    }
+    let Some(middle) = path.between(stretch.0, stretch.1).filter(|_| halvings > 0) else { return false };
+    all_nearer(path, front, Span(stretch.0, middle), link, halvings - 1)
+        && all_nearer(path, front, Span(middle, stretch.1), link, halvings - 1)
+}

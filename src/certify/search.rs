@@ -1,0 +1,462 @@
+//! The search: steps of the head from the start to the end of the motion, halved where their claims cannot be shown, and
+//! at each event that the ordinary search has found, the lines that show it. Only [`super`] uses it.
+
+use std::io;
+
+use super::boards::MovingBoard;
+use super::capsule::{Span, Spanned};
+use super::interval::Interval;
+use super::knot::{Knot, place, span};
+use super::lines::{Line, Links, Outcome, Status};
+use super::link::all_nearer;
+use super::path::{ExactPath, Place};
+use super::step::{Chain, Claim, Obstacle, Shown};
+use super::{CertifyError, Given};
+use crate::model::board::Board;
+use crate::model::root::golden_section_min;
+use crate::model::separation::overlap_centre;
+use crate::motion::event::{Event, EventKind};
+
+/// Seconds on each side of an event between which it is proved to be.
+const AROUND: f64 = 3e-10;
+
+/// Metres, as a share of the way, below which doubles tell no places apart.
+const LEAST: f64 = 7e-13;
+
+/// What a step that succeeded, and one that did not, do to the length of the next.
+const GROWTH: f64 = 1.3;
+const SHRINK: f64 = 0.5;
+
+/// How near an event, in links, a step that cannot be shown is taken to be in the way of the event's own proof.
+const NEAR: f64 = 1e-3;
+
+/// Places between the handles of a link at which a nearer follower is looked for, and how many times as far from the
+/// follower as the one before each is.
+const JUMP_SAMPLES: i32 = 400;
+const JUMP_RATIO: f64 = 1.05;
+
+/// Halvings of the stretch in which a link that locks has no follower any more.
+const LOCK_HALVINGS: u32 = 12;
+
+pub(super) struct Search<'a, 'w> {
+    given: Given<'a>,
+    chain: Chain<'a>,
+    write: &'w mut dyn FnMut(&Line) -> io::Result<()>,
+    /// Where the last step ended.
+    at: Knot,
+    links: Links,
+    /// Claims that steps still make.
+    moving: bool,
+    clear: bool,
+    /// Whether Lemma 4 may still be used.
+    covered: bool,
+    proofs: [Option<Status>; 4],
+    /// Metres of the next step that is tried.
+    step: f64,
+    steps: u64,
+}
+
+/// Why the search cannot go on.
+enum Halt {
+    Error(CertifyError),
+    /// At the place that it has come to.
+    Stuck(String),
+}
+
+impl From<io::Error> for Halt {
+    fn from(error: io::Error) -> Self {
+        Self::Error(CertifyError::Write(error))
+    }
+}
+
+const KINDS: [EventKind; 4] = [EventKind::Contact, EventKind::Stall, EventKind::Lock, EventKind::PathEnd];
+
+impl<'a, 'w> Search<'a, 'w> {
+    pub fn new(given: Given<'a>, write: &'w mut dyn FnMut(&Line) -> io::Result<()>) -> Self {
+        let exact = ExactPath::new(given.description);
+        let chain = Chain::new(given.path, exact, given.team);
+        // A motion that begins earlier passes through all that this one does.
+        let before = -LEAST * (1.0 + given.path.length());
+        let at = Knot::new(given.path, &chain.exact, before);
+        let step = 0.25 * given.team.shortest_link();
+        let (links, proofs) = (Links::All, [const { None }; 4]);
+        Self { given, chain, write, at, links, moving: true, clear: true, covered: true, proofs, step, steps: 0 }
+    }
+
+    /// Writes the certificate and returns what it proves.
+    pub fn run(mut self, progress: &mut dyn FnMut(f64)) -> Result<Vec<Outcome>, CertifyError> {
+        let (version, scene) = (env!("CARGO_PKG_VERSION"), self.given.scene);
+        (self.write)(&Line::Certificate { format: super::FORMAT, version, scene }).map_err(CertifyError::Write)?;
+        let stuck = match self.motion(progress) {
+            Ok(()) => None,
+            Err(Halt::Error(error)) => return Err(error),
+            Err(Halt::Stuck(why)) => Some(why),
+        };
+        let until = self.time(self.at.head).lo;
+        let outcomes = KINDS.map(|event| {
+            let found = self.proofs[event as usize].take();
+            let status = found.unwrap_or_else(|| match (&stuck, event) {
+                (Some(because), _) => Status::Undecided { time_lo: until, because: because.clone() },
+                (None, _) => Status::None,
+            });
+            Outcome { event, status }
+        });
+        for outcome in &outcomes {
+            (self.write)(&Line::Result(outcome.clone())).map_err(CertifyError::Write)?;
+        }
+        Ok(outcomes.into())
+    }
+
+    /// The whole motion, event by event.
+    fn motion(&mut self, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+        let end = self.given.events.last().map_or(self.given.path.length(), |event| event.travelled);
+        let mut progress = |at: f64| progress((at / end).clamp(0.0, 1.0));
+        for event in self.given.events {
+            match event.kind {
+                EventKind::Contact if event.travelled == 0.0 => self.overlap_at_start(event)?,
+                EventKind::PathEnd => {
+                    let beyond = self.path_end();
+                    self.go_to(event.travelled - self.around(), None, &mut progress)?;
+                    self.go_to_knot(&beyond, None, &mut progress)?;
+                    (self.write)(&Line::PathEnd)?;
+                    self.proofs[EventKind::PathEnd as usize] = Some(self.at_path_end());
+                }
+                kind => {
+                    self.go_to(event.travelled - self.around(), Some(event), &mut progress)?;
+                    match kind {
+                        EventKind::Contact => self.contact(event, &mut progress)?,
+                        EventKind::Stall => self.stall(event, &mut progress)?,
+                        _ => self.lock(event)?,
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Metres on each side of an event.
+    fn around(&self) -> f64 {
+        (AROUND * self.given.head_speed).min(1e-8).max(LEAST * (1.0 + self.given.path.length()))
+    }
+
+    /// Time at a place of the head, from below and above, and never below 0.
+    fn time(&self, place: Place) -> Interval {
+        let time = self.chain.exact.travelled(place).over(Interval::point(self.given.head_speed));
+        // Room for the rounding of a `lead_in` that the scene states otherwise.
+        let slack = 1e-14 * (1.0 + time.magnitude());
+        Interval { lo: (time.lo - slack).max(0.0), hi: (time.hi + slack).max(0.0) }
+    }
+
+    fn knot(&self, travelled: f64) -> Knot {
+        Knot::new(self.chain.path, &self.chain.exact, travelled)
+    }
+
+    /// A knot at the path's end or beyond it.
+    fn path_end(&self) -> Knot {
+        let length = self.given.path.length();
+        let end = place(self.given.path.param_at(length));
+        let beyond = self.chain.exact.moved(end, LEAST * (1.0 + length));
+        let inward = matches!(self.chain.exact.segments[beyond.0].curve, super::path::Curve::Inward { .. });
+        let head = if inward { Place(beyond.0, 0.0) } else { beyond };
+        Knot::at(head, length)
+    }
+
+    fn at_path_end(&self) -> Status {
+        let length = self.given.path.length();
+        let end = place(self.given.path.param_at(length));
+        let (before, after) = (self.chain.exact.moved(end, -LEAST * (1.0 + length)), self.at.head);
+        Status::Proved { time_lo: self.time(before).lo, time_hi: self.time(after).hi, bench_a: None, bench_b: None }
+    }
+
+    /// Places at which an event of doubtful digits is tried to be shown, from near to far.
+    fn beyond(&self, event: &Event) -> impl Iterator<Item = f64> + use<> {
+        let around = self.around().max(2.0 * (event.travelled - self.at.travelled));
+        let (at, most) = (event.travelled, NEAR * self.given.team.shortest_link());
+        (0..24)
+            .map(move |power| around * 2f64.powi(power))
+            .take_while(move |far| *far <= most.max(around))
+            .map(move |far| at + far)
+    }
+
+    /// See [`Search::go_to_knot`].
+    fn go_to(&mut self, travelled: f64, event: Option<&Event>, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+        if travelled <= self.at.travelled {
+            return Ok(());
+        }
+        let target = self.knot(travelled);
+        self.go_to_knot(&target, event, progress)
+    }
+
+    /// Goes in steps to a knot, or so near to an event that a step cannot be shown for its sake. A claim that cannot be
+    /// shown at any length of the step is given up.
+    fn go_to_knot(&mut self, target: &Knot, event: Option<&Event>, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+        let least = 0.01 * LEAST * (1.0 + self.given.path.length());
+        let longest = self.given.team.shortest_link();
+        while self.at.head != target.head {
+            let remaining = target.travelled - self.at.travelled;
+            let mut to =
+                if self.step >= 0.9 * remaining { target.clone() } else { self.knot(self.at.travelled + self.step) };
+            let claim = Claim { links: self.links, moving: self.moving, clear: self.clear };
+            match self.chain.show(&mut self.at, &mut to, claim) {
+                Ok(shown) => {
+                    self.accept(to, shown)?;
+                    self.step = (self.step * GROWTH).min(longest);
+                    progress(self.at.travelled);
+                }
+                Err(obstacle) if self.step.min(remaining) > least => {
+                    self.step = SHRINK * self.step.min(remaining);
+                    // Turns of handles behind the first are not followed by the links of boards 0 and 1 alone.
+                    if self.links == Links::Front && obstacle == Obstacle::Stall(1) && !self.moving {
+                        self.links = Links::All;
+                    }
+                }
+                Err(obstacle) => {
+                    let near = |event: &&Event| event.travelled - self.at.travelled < NEAR * longest;
+                    if event.filter(near).is_some_and(|event| obstacle.is_of(event.kind)) {
+                        return Ok(());
+                    }
+                    self.give_up(obstacle)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn accept(&mut self, to: Knot, shown: Shown) -> Result<(), Halt> {
+        let Shown { step, body_forward } = shown;
+        let exact = &self.chain.exact;
+        if self.chain.start.is_none() {
+            self.chain.start = step.spans.first().map(|span| span.1);
+        }
+        self.covered &= body_forward;
+        if !self.covered {
+            self.links = Links::All;
+        } else if let (Links::All, Some(start), Some(second)) = (step.links, self.chain.start, step.spans.get(1))
+            && exact.in_order(start, second.0)
+        {
+            self.links = Links::Front;
+        }
+        (self.write)(&Line::Step(step))?;
+        self.at = to;
+        self.steps += 1;
+        if self.steps > super::MOST_STEPS {
+            return Err(Halt::Stuck(format!("the search was given up after {} steps", self.steps)));
+        }
+        Ok(())
+    }
+
+    /// Drops a claim that cannot be shown here, or the whole search.
+    fn give_up(&mut self, obstacle: Obstacle) -> Result<(), Halt> {
+        let time_lo = self.time(self.at.head).lo;
+        match obstacle {
+            Obstacle::Pair(a, b) if self.clear => {
+                let because = format!("boards {a} and {b} come so near that doubles cannot tell whether they touch");
+                self.proofs[EventKind::Contact as usize] = Some(Status::Undecided { time_lo, because });
+                self.clear = false;
+                Ok(())
+            }
+            Obstacle::Stall(link) if self.moving => {
+                let because = format!("link {link} comes so near a stall that doubles cannot tell whether it does");
+                self.proofs[EventKind::Stall as usize] = Some(Status::Undecided { time_lo, because });
+                self.moving = false;
+                Ok(())
+            }
+            Obstacle::Stall(_) | Obstacle::Behind if self.links == Links::Front => {
+                self.links = Links::All;
+                self.covered = false;
+                Ok(())
+            }
+            Obstacle::Link(link) => Err(Halt::Stuck(format!("the handle behind link {link} cannot be enclosed there"))),
+            Obstacle::Stall(_) | Obstacle::Behind | Obstacle::Pair(..) => {
+                Err(Halt::Stuck(format!("a step cannot be shown there: {obstacle:?}")))
+            }
+        }
+    }
+
+    fn proved(&self, from: Place, to: Place, bench_a: Option<u32>, bench_b: Option<u32>) -> Status {
+        let [bench_a, bench_b] = [bench_a, bench_b].map(|bench| bench.map(|bench| bench as usize));
+        Status::Proved { time_lo: self.time(from).lo, time_hi: self.time(to).hi, bench_a, bench_b }
+    }
+
+    /// Boards that overlap before anything has moved.
+    fn overlap_at_start(&mut self, event: &Event) -> Result<(), Halt> {
+        let (from, mut to) = (self.at.clone(), self.knot(LEAST * (1.0 + self.given.path.length())));
+        self.clear = false;
+        let status = if self.touch(event, from, &mut to)? {
+            let [bench_a, bench_b] = [event.bench_a, event.bench_b].map(|bench| bench.map(|bench| bench as usize));
+            Status::Proved { time_lo: 0.0, time_hi: 0.0, bench_a, bench_b }
+        } else {
+            let because = "the boards that overlap from the start do so too little for doubles".to_owned();
+            Status::Undecided { time_lo: 0.0, because }
+        };
+        self.proofs[EventKind::Contact as usize] = Some(status);
+        Ok(())
+    }
+
+    /// Writes that two boards have a point in common with the head between two knots, if that can be shown.
+    fn touch(&mut self, event: &Event, mut from: Knot, to: &mut Knot) -> Result<bool, Halt> {
+        let benches = [event.bench_a, event.bench_b].map(|bench| bench.unwrap_or(0) as usize);
+        let Some(handles) = self.chain.spans(&mut from, to, benches[1] + 1) else { return Ok(false) };
+        let Some(point) = self.common_point(&handles, benches) else { return Ok(false) };
+        let spans = handles[1..].iter().map(|handle| handle.span).collect();
+        (self.write)(&Line::Contact { benches, from: from.head, to: to.head, spans, point })?;
+        Ok(true)
+    }
+
+    /// A point that is surely in both boards.
+    fn common_point(&self, handles: &[Spanned], benches: [usize; 2]) -> Option<[f64; 2]> {
+        let team = self.given.team;
+        let boards = benches.map(|bench| {
+            let [front, rear] = [bench, bench + 1].map(|handle| {
+                let [x, y] = handles[handle].capsule.point.map(Interval::middle);
+                crate::model::Point::new(x, y)
+            });
+            Board::from_handles(front, rear, team.hole_inset, team.width)
+        });
+        let point: [f64; 2] = overlap_centre(&boards[0], &boards[1]).into();
+        let holds = |board: MovingBoard| board.holds(point.map(Interval::point));
+        benches.iter().all(|bench| holds(self.chain.board(handles, *bench))).then_some(point)
+    }
+
+    fn contact(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+        if !self.clear {
+            return Ok(());
+        }
+        let earliest = self.at.head;
+        self.clear = false;
+        for travelled in self.beyond(event) {
+            self.go_to(travelled, None, progress)?;
+            let (from, mut to) = (self.at.clone(), self.at.clone());
+            if self.touch(event, from, &mut to)? {
+                let status = self.proved(earliest, self.at.head, event.bench_a, event.bench_b);
+                self.proofs[EventKind::Contact as usize] = Some(status);
+                return Ok(());
+            }
+        }
+        let because = "whether the boards that come so near do touch cannot be shown with doubles".to_owned();
+        let status = Status::Undecided { time_lo: self.time(earliest).lo, because };
+        self.proofs[EventKind::Contact as usize] = Some(status);
+        Ok(())
+    }
+
+    fn stall(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+        if !self.moving {
+            return Ok(());
+        }
+        let earliest = self.at.head;
+        let link = event.bench_a.unwrap_or(0) as usize;
+        self.moving = false;
+        if link > 0 {
+            self.links = Links::All;
+        }
+        for travelled in self.beyond(event) {
+            self.go_to(travelled, None, progress)?;
+            let (mut from, mut to) = (self.at.clone(), self.at.clone());
+            let handles = self.chain.spans(&mut from, &mut to, link + 1);
+            let stalled =
+                |handles: &Vec<Spanned>| handles[link].capsule.product(&handles[link + 1].capsule, false).is_negative();
+            if let Some(handles) = handles.filter(stalled) {
+                let (head, spans) = (self.at.head, handles[1..].iter().map(|handle| handle.span).collect());
+                (self.write)(&Line::Stall { link, from: head, to: head, spans })?;
+                self.proofs[EventKind::Stall as usize] = Some(self.proved(earliest, head, event.bench_a, None));
+                return Ok(());
+            }
+        }
+        let because = "whether the link that comes so near a stall does stall cannot be shown with doubles".to_owned();
+        self.proofs[EventKind::Stall as usize] = Some(Status::Undecided { time_lo: self.time(earliest).lo, because });
+        Ok(())
+    }
+
+    fn lock(&mut self, event: &Event) -> Result<(), Halt> {
+        let link = event.bench_a.unwrap_or(0) as usize;
+        for travelled in self.beyond(event) {
+            let mut to = self.knot(travelled);
+            let Some(handles) = self.chain.spans(&mut self.at, &mut to, link) else { continue };
+            let mut end = to.clone();
+            let Some(last) = self.chain.spans(&mut to, &mut end, link) else { continue };
+            let (window, jump) = match self.window(link, &handles[link], &last[link]) {
+                Some(window) => (Some(window), None),
+                None => (None, self.jump(link, &handles[link], &last[link])),
+            };
+            if window.is_none() && jump.is_none() {
+                continue;
+            }
+            let spans = |handles: &[Spanned]| handles[1..].iter().map(|handle| handle.span).collect();
+            let line = Line::Lock { link, to: to.head, spans: spans(&handles), last: spans(&last), window, jump };
+            (self.write)(&line)?;
+            self.proofs[EventKind::Lock as usize] = Some(self.proved(self.at.head, to.head, event.bench_a, None));
+            return Ok(());
+        }
+        Err(Halt::Stuck(format!("whether link {link} locks there cannot be shown with doubles")))
+    }
+
+    /// A place ahead of the follower of a link that is nearer than the link for all of `front`, and one ahead of that which
+    /// is further away for all of `last`.
+    fn jump(&mut self, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
+        let Chain { path, team, .. } = self.chain;
+        self.at.extend_to(link + 1, path, team).ok()?;
+        let rear = self.at.handles[link + 1].param;
+        let exact = &self.chain.exact;
+        let square = self.chain.links[link.min(1)].square();
+        let (from, to) = (path.travelled(rear), path.travelled(self.at.handles[link].param));
+        let origin = last.first.map(Interval::middle);
+        let distance = |travelled: f64| {
+            let at = path.point(path.param_at(travelled));
+            (at.x - origin[0]).hypot(at.y - origin[1])
+        };
+        // The furthest place ahead of the first that is nearer than its neighbours, however near to the follower it is.
+        let sampled = |k: i32| from + (to - from) * JUMP_RATIO.powi(k - JUMP_SAMPLES);
+        let falling = (1..JUMP_SAMPLES).find(|k| distance(sampled(*k)) > distance(sampled(k - 1)))?;
+        let peak = (falling..JUMP_SAMPLES).max_by(|j, k| distance(sampled(*j)).total_cmp(&distance(sampled(*k))))?;
+        let (_, top) = golden_section_min(|at| -distance(at), sampled(peak - 1), sampled(peak + 1));
+        let at = |travelled: f64| exact.moved(place(path.param_at(travelled)), 0.0);
+        let (between, beyond) = (at(sampled(falling - 1)), at(top));
+        let point = |place: Place| exact.curve(place).point(place.1);
+        let holds = exact.in_order(span(exact, rear, rear, 0.0).1, between)
+            && exact.in_order(between, beyond)
+            && exact.in_order(beyond, front.span.0)
+            && front.capsule.distance_squared(point(between)).is_below(square)
+            && square.is_below(last.capsule.distance_squared(point(beyond)));
+        holds.then_some(Span(between, beyond))
+    }
+
+    /// Places behind and ahead of the follower of a link that it cannot pass while the front is in `front`, and between
+    /// which there is none for any front in `last`.
+    fn window(&mut self, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
+        let Chain { path, team, .. } = self.chain;
+        self.at.extend_to(link + 1, path, team).ok()?;
+        let (before, rear) = (self.at.handles[link].param, self.at.handles[link + 1].param);
+        let origin = path.point(before);
+        // Where the distance is greatest: the rear product changes its sign some way behind the follower.
+        let product = |metres: f64| {
+            let place = path.param_at(path.travelled(rear) - metres);
+            path.tangent(place).dot(&(origin - path.point(place)))
+        };
+        let mut beyond = 1e-9 * team.link(link);
+        while product(beyond) > 0.0 {
+            beyond *= 2.0;
+            if beyond > team.link(link) {
+                return None;
+            }
+        }
+        let top = crate::model::root::bisect_predicate(|metres| product(metres) <= 0.0, 0.0, beyond);
+        let exact = &self.chain.exact;
+        let length = self.chain.links[link.min(1)];
+        let square = length.square();
+        let follower = span(exact, rear, rear, 0.0);
+        [2.0, 4.0, 16.0, 64.0].iter().find_map(|wider| {
+            let behind = path.param_at(path.travelled(rear) - top * (1.0 + wider));
+            let ahead = path.param_at(path.travelled(rear) + top * wider);
+            let window = Span(exact.moved(place(behind), 0.0), exact.moved(place(ahead), 0.0));
+            let near =
+                |place: Place| front.capsule.distance_squared(exact.curve(place).point(place.1)).is_below(square);
+            let holds = exact.in_order(window.0, follower.0)
+                && exact.in_order(follower.1, window.1)
+                && exact.in_order(window.1, front.span.0)
+                && near(window.0)
+                && near(window.1)
+                && all_nearer(exact, last, window, length, LOCK_HALVINGS);
+            holds.then_some(window)
+        })
+    }
+}

@@ -1,0 +1,222 @@
+//! Boards that are apart: Lemmas 2 and 3 of docs/proofs.md. Only `proof` uses it.
+//!
+//! In which direction two boards are apart is chosen by doubles; that they are is decided by intervals.
+
+use std::cell::OnceCell;
+
+use super::capsule::Capsule;
+use super::interval::{Interval, Vector};
+use super::scene::Team;
+
+/// Directions tried for every pair, best first, before it is given up.
+const MOST_TRIES: usize = 4;
+/// Metres that two boards must be apart by doubles in one of the eight fixed directions for that one to be tried first.
+const CLEARLY_APART: f64 = 1e-2;
+
+/// A direction.
+struct Axis {
+    n: Vector,
+    norm: Interval,
+}
+
+impl Axis {
+    fn new([x, y]: [f64; 2]) -> Self {
+        let n = Vector::new(x, y);
+        Self { norm: n.norm(), n }
+    }
+}
+
+/// The eight fixed directions, each opposite to the one four further.
+const COMPASS: [[f64; 2]; 8] =
+    [[1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [-1.0, 1.0], [-1.0, 0.0], [-1.0, -1.0], [0.0, -1.0], [1.0, -1.0]];
+
+/// A board, or a run of boards on one straight line, over the spans of its two handles.
+pub(super) struct Board<'a> {
+    front: &'a Capsule,
+    rear: &'a Capsule,
+    /// P_F - P_R.
+    middle: Vector,
+    /// l.
+    length: Interval,
+    /// e.
+    overhang: Interval,
+    half_width: Interval,
+    rough: Rough,
+    /// The greatest extent in each of the eight fixed directions.
+    compass: [OnceCell<Interval>; 8],
+}
+
+impl<'a> Board<'a> {
+    /// A board between its handles.
+    pub fn new(front: &'a Capsule, rear: &'a Capsule, length: Interval, team: &Team) -> Self {
+        let middle = front.point.minus(&rear.point);
+        let overhang = &team.hole_inset / &length;
+        let half_width = &team.width * Interval::new(0.5);
+        let rough = Rough::new(front, rear, length.rough(), overhang.rough(), half_width.rough());
+        Self { front, rear, middle, length, overhang, half_width, rough, compass: Default::default() }
+    }
+
+    /// H(n): at least the largest n . x over the board.
+    fn extent(&self, axis: &Axis) -> Interval {
+        let Axis { n, norm } = axis;
+        let projected = |capsule: &Capsule| {
+            let slack = n.dot(&capsule.tangent).abs() * &capsule.half + norm * &capsule.sag;
+            (n.dot(&capsule.point), slack)
+        };
+        let ((f, f_slack), (r, r_slack)) = (projected(self.front), projected(self.rear));
+        let slack = &f_slack + &r_slack;
+        // Beyond a handle the board reaches e (F - R) further, which is no longer than e l.
+        let longest = norm * &self.length;
+        let beyond = |towards: Interval| &self.overhang * (towards + &slack).min(&longest);
+        let ahead = &f + &f_slack + beyond(&f - &r);
+        let behind = &r + &r_slack + beyond(&r - &f);
+        let across = n.cross(&self.middle).abs()
+            + n.cross(&self.front.tangent).abs() * &self.front.half
+            + n.cross(&self.rear.tangent).abs() * &self.rear.half
+            + norm * (&self.front.sag + &self.rear.sag);
+        ahead.max(&behind) + &self.half_width * norm.min(&(across / &self.length))
+    }
+
+    fn compass_extent(&self, direction: usize) -> &Interval {
+        self.compass[direction].get_or_init(|| self.extent(&Axis::new(COMPASS[direction])))
+    }
+
+    /// Whether Lemma 2 shows the two boards to be apart.
+    pub fn is_apart_from(&self, other: &Self) -> bool {
+        let apart = |n: [f64; 2]| -self.rough.extent(n) - other.rough.extent([-n[0], -n[1]]);
+        let fixed = (0..8).map(|direction| (direction, apart(COMPASS[direction])));
+        let (direction, metres) =
+            fixed.fold((0, f64::NEG_INFINITY), |best, new| if new.1 > best.1 { new } else { best });
+        let opposite = (direction + 4) % 8;
+        if metres > CLEARLY_APART && (self.compass_extent(direction) + other.compass_extent(opposite)).is_negative() {
+            return true;
+        }
+        let mut axes: Vec<_> = self.rough.axes(&other.rough).into_iter().map(|n| (n, apart(n))).collect();
+        axes.sort_by(|a, b| b.1.total_cmp(&a.1));
+        axes.iter().take(MOST_TRIES).any(|(n, _)| {
+            let axis = Axis::new(*n);
+            let opposite = Axis { n: Vector { x: -&axis.n.x, y: -&axis.n.y }, norm: axis.norm.clone() };
+            (self.extent(&axis) + other.extent(&opposite)).is_negative()
+        })
+    }
+}
+
+/// The same board in doubles.
+struct Rough {
+    front: RoughCapsule,
+    rear: RoughCapsule,
+    length: f64,
+    overhang: f64,
+    half_width: f64,
+}
+
+struct RoughCapsule {
+    point: [f64; 2],
+    tangent: [f64; 2],
+    half: f64,
+    sag: f64,
+}
+
+impl RoughCapsule {
+    fn new(capsule: &Capsule) -> Self {
+        let rough = |vector: &Vector| [vector.x.rough(), vector.y.rough()];
+        let (half, sag) = (capsule.half.rough(), capsule.sag.rough());
+        Self { point: rough(&capsule.point), tangent: rough(&capsule.tangent), half, sag }
+    }
+
+    fn projected(&self, n: [f64; 2], norm: f64) -> (f64, f64) {
+        (dot(n, self.point), dot(n, self.tangent).abs() * self.half + norm * self.sag)
+    }
+}
+
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+impl Rough {
+    fn new(front: &Capsule, rear: &Capsule, length: f64, overhang: f64, half_width: f64) -> Self {
+        Self { front: RoughCapsule::new(front), rear: RoughCapsule::new(rear), length, overhang, half_width }
+    }
+
+    fn direction(&self) -> [f64; 2] {
+        let (front, rear) = (self.front.point, self.rear.point);
+        [(front[0] - rear[0]) / self.length, (front[1] - rear[1]) / self.length]
+    }
+
+    /// [`Board::extent`].
+    fn extent(&self, n: [f64; 2]) -> f64 {
+        let norm = n[0].hypot(n[1]);
+        let ((f, f_slack), (r, r_slack)) = (self.front.projected(n, norm), self.rear.projected(n, norm));
+        let beyond = |towards: f64| self.overhang * (towards + f_slack + r_slack).min(norm * self.length);
+        let (ahead, behind) = (f + f_slack + beyond(f - r), r + r_slack + beyond(r - f));
+        let across = cross(n, self.direction()).abs()
+            + (cross(n, self.front.tangent).abs() * self.front.half
+                + cross(n, self.rear.tangent).abs() * self.rear.half
+                + norm * (self.front.sag + self.rear.sag))
+                / self.length;
+        ahead.max(behind) + self.half_width * norm.min(across)
+    }
+
+    fn corners(&self) -> [[f64; 2]; 4] {
+        let (direction, rear) = (self.direction(), self.rear.point);
+        let at = |along: f64, across: f64| {
+            let along = along * self.length;
+            [
+                rear[0] + along * direction[0] - across * direction[1],
+                rear[1] + along * direction[1] + across * direction[0],
+            ]
+        };
+        let (e, v) = (self.overhang, self.half_width);
+        [at(-e, -v), at(-e, v), at(1.0 + e, -v), at(1.0 + e, v)]
+    }
+
+    /// Directions in which another board may be apart: the normals of all edges, and from the corner of one to the
+    /// nearest of the other.
+    fn axes(&self, other: &Self) -> [[f64; 2]; 9] {
+        let of_edges = |board: &Self| {
+            let [x, y] = board.direction();
+            [[x, y], [-y, x], [-x, -y], [y, -x]]
+        };
+        let (own, others) = (of_edges(self), of_edges(other));
+        let corners =
+            self.corners().into_iter().flat_map(|from| other.corners().map(|to| [to[0] - from[0], to[1] - from[1]]));
+        let nearest = corners.min_by(|a, b| dot(*a, *a).total_cmp(&dot(*b, *b))).unwrap_or([1.0, 0.0]);
+        let norm = nearest[0].hypot(nearest[1]);
+        let nearest = [nearest[0] / norm, nearest[1] / norm];
+        [own[0], own[1], own[2], own[3], others[0], others[1], others[2], others[3], nearest]
+    }
+}
+
+/// Lemma 3, *Ring*: whether boards whose handles are at most `reach` metres from the centre of the spiral are apart from
+/// all body boards whose handles are on it, at least `ring` from its centre.
+pub(super) fn is_inside_ring(team: &Team, reach: &Interval, ring: &Interval) -> bool {
+    let half_link = team.link(1) * Interval::new(0.5);
+    let half_width = &team.width * Interval::new(0.5);
+    if !half_link.is_below(ring) {
+        return false;
+    }
+    let inner = (ring.square() - half_link.square()).sqrt().min(&(ring - &team.hole_inset)) - &half_width;
+    let outer = reach + (team.hole_inset.square() + half_width.square()).sqrt();
+    outer.is_below(&inner)
+}
+
+/// Whether a point is in a board wherever its handles are in their spans (Lemma 5, *Contact*).
+pub(super) fn covers(board: &Board, point: &Vector) -> bool {
+    let all = |capsule: &Capsule| {
+        let along = capsule.tangent.scaled(&capsule.half.around_zero());
+        let sag = capsule.sag.around_zero();
+        capsule.point.plus(&along).plus(&Vector { x: sag.clone(), y: sag })
+    };
+    let (front, rear) = (all(board.front), all(board.rear));
+    let (to_point, link) = (point.minus(&rear), front.minus(&rear));
+    let squared = board.length.square();
+    let along = to_point.dot(&link);
+    let margin = &board.overhang * &squared;
+    (-&margin).is_at_most(&along)
+        && along.is_at_most(&(&squared + &margin))
+        && to_point.cross(&link).abs().is_at_most(&(&board.length * &board.half_width))
+}

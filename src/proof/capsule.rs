@@ -1,0 +1,83 @@
+//! Where the places of a span are, and what the front and rear products of two spans can be (docs/proofs.md,
+//! "Capsules"). Only `proof` uses it.
+
+use super::interval::{Interval, Vector};
+use super::path::{At, Path, Place, Span};
+
+/// All places of a span: p(x) = p(m) + tau h t(m) + e, |tau| <= 1, |e| <= sag; |t(x) - t(m)| <= turn.
+#[derive(Debug, Clone)]
+pub(super) struct Capsule {
+    pub span: Span,
+    /// p(m).
+    pub point: Vector,
+    /// t(m).
+    pub tangent: Vector,
+    /// h: at least the metres from m to either end.
+    pub half: Interval,
+    /// K: at least the curvature anywhere.
+    pub curvature: Interval,
+    /// K h^2 / 2.
+    pub sag: Interval,
+    /// K h.
+    pub turn: Interval,
+}
+
+impl Capsule {
+    /// The capsule of a span of places that are in order.
+    pub fn new(path: &Path, span: Span) -> Self {
+        let Span(lo, hi) = span;
+        let between = |place: Place| path.has(place) && path.in_order(lo, place) && path.in_order(place, hi);
+        let middle = Some(path.middle(lo, hi)).filter(|place| between(*place)).unwrap_or(lo);
+        let half = path.metres_bound(lo, middle).max(&path.metres_bound(middle, hi));
+        let curvature = path.curvature_bound(lo, hi);
+        let turn = (&curvature * &half).upper();
+        let sag = (&turn * &half * Interval::new(0.5)).upper();
+        let At { point, tangent } = path.at(middle);
+        Self { span, point, tangent, half, curvature, sag, turn }
+    }
+
+    /// The same places, `metres` further back on a line.
+    pub fn behind(&self, metres: &Interval) -> Self {
+        Self { point: self.point.minus(&self.tangent.scaled(metres)), ..self.clone() }
+    }
+}
+
+/// Two spans, of a front place u and a rear place x, and d = p(u) - p(x).
+pub(super) struct Pair<'a> {
+    pub front: &'a Capsule,
+    pub rear: &'a Capsule,
+    /// p(m_u) - p(m_x).
+    middle: Vector,
+    /// At least |d|.
+    pub distance: Interval,
+    /// At least the distance of d from p(m_u) - p(m_x) across both directions.
+    sag: Interval,
+    /// At least |t(m_u) . t(m_x)|.
+    pub along: Interval,
+}
+
+impl<'a> Pair<'a> {
+    pub fn new(front: &'a Capsule, rear: &'a Capsule) -> Self {
+        let middle = front.point.minus(&rear.point);
+        let distance = (middle.norm() + &front.half + &rear.half).upper();
+        let along = front.tangent.dot(&rear.tangent).abs();
+        Self { front, rear, middle, distance, sag: (&front.sag + &rear.sag).upper(), along }
+    }
+
+    /// t . d for all tangents t of `of`, which is one of the two; `other` is the other one.
+    fn product(&self, of: &Capsule, other: &Capsule) -> Interval {
+        // |t(m) . V| is h for the capsule's own V, since t(m) is a unit vector.
+        let slack = &of.half + &other.half * &self.along + &self.sag + &of.turn * &self.distance;
+        of.tangent.dot(&self.middle) + slack.around_zero()
+    }
+
+    /// The front product f(u, x) = t(u) . d.
+    pub fn front_product(&self) -> Interval {
+        self.product(self.front, self.rear)
+    }
+
+    /// The rear product g(u, x) = t(x) . d.
+    pub fn rear_product(&self) -> Interval {
+        self.product(self.rear, self.front)
+    }
+}

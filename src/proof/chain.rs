@@ -1,0 +1,60 @@
+//! The chain over the spans of its handles: Lemma 1 for each link that is listed. Only `proof` uses it.
+
+use super::capsule::Capsule;
+use super::interval::Interval;
+use super::link;
+use super::path::{Place, Span};
+use super::scene::Scene;
+
+/// Handles 0 (the head) to as many as are listed, each somewhere in its span while the head goes over its own.
+pub(super) struct Chain {
+    /// Of each handle.
+    pub capsules: Vec<Capsule>,
+    /// Of each link, the front product at its follower.
+    pub products: Vec<Interval>,
+}
+
+impl Chain {
+    /// Checks Lemma 1 for all links over the spans of the head and of the handles 1, 2, ...
+    ///
+    /// # Errors
+    /// What does not follow.
+    pub fn check(scene: &Scene, head: Span, spans: &[Span]) -> Result<Self, String> {
+        let (path, team) = (&scene.path, &scene.team);
+        if spans.len() > team.benches {
+            return Err(format!("{} spans, but there are only {} benches", spans.len(), team.benches));
+        }
+        let mut capsules = Vec::with_capacity(spans.len() + 1);
+        for (handle, span) in std::iter::once(&head).chain(spans).enumerate() {
+            span_is_one(scene, *span).map_err(|problem| format!("handle {handle}: {problem}"))?;
+            capsules.push(Capsule::new(path, *span));
+        }
+        let links = capsules.windows(2).enumerate().map(|(index, pair)| {
+            link::check(path, &pair[0], &pair[1], team.link(index))
+                .map_err(|problem| format!("link {index}: {problem} (Lemma 1)"))
+        });
+        let products = links.collect::<Result<_, _>>()?;
+        Ok(Self { capsules, products })
+    }
+
+    /// The handle that is listed last.
+    pub fn last(&self) -> usize {
+        self.capsules.len() - 1
+    }
+
+    /// Whether the last handle is on segment 0, a line: then so are all behind it (Lemma 3, *Line*).
+    pub fn ends_on_line(&self, scene: &Scene) -> bool {
+        let Span(_, latest) = self.capsules[self.last()].span;
+        latest.0 == 0 && scene.path.is_line(0)
+    }
+}
+
+/// Whether a span is one: two places strictly inside segments, in order.
+pub(super) fn span_is_one(scene: &Scene, Span(lo, hi): Span) -> Result<(), String> {
+    for Place(segment, coordinate) in [lo, hi] {
+        if !scene.path.has(Place(segment, coordinate)) {
+            return Err(format!("[{segment}, {coordinate}] is not inside a segment of the path"));
+        }
+    }
+    if scene.path.in_order(lo, hi) { Ok(()) } else { Err("the span's ends are not in order".to_owned()) }
+}

@@ -1,0 +1,103 @@
+//! Sine, cosine, logarithm and arc tangent of intervals, by their series with the remainder that Taylor's formula or a
+//! geometric series leaves. Only `proof` uses it.
+
+use std::sync::LazyLock;
+
+use super::interval::Interval;
+
+/// Terms of the series of sine and of cosine: the remainder is at most 0.8^29 / 29! < 2e-34.
+const TERMS: usize = 14;
+/// Terms of the series of arc tangent and of its hyperbolic twin: for |z| <= 0.34 the remainder is below 1e-42.
+const SLOW_TERMS: usize = 45;
+
+/// Half of pi.
+static QUARTER: LazyLock<Interval> = LazyLock::new(|| atan(&Interval::new(1.0)) * Interval::new(2.0));
+/// 1 / n! for n up to twice `TERMS` and one more.
+static INVERSE_FACTORIALS: LazyLock<Vec<Interval>> = LazyLock::new(|| {
+    let first = std::iter::once(Interval::new(1.0));
+    let rest = (1..=2 * TERMS + 1).scan(Interval::new(1.0), |last, n| {
+        *last = &*last / Interval::new(n as f64);
+        Some(last.clone())
+    });
+    first.chain(rest).collect()
+});
+static LN_2: LazyLock<Interval> = LazyLock::new(|| {
+    let third = Interval::new(1.0) / Interval::new(3.0);
+    odd_series(&third, 1.0) * Interval::new(2.0)
+});
+
+/// `turns` full turns in radians.
+pub(super) fn turns(turns: f64) -> Interval {
+    &*QUARTER * Interval::new(4.0) * Interval::new(turns)
+}
+
+/// A quarter of a turn in radians.
+pub(super) fn quarter_turn() -> &'static Interval {
+    &QUARTER
+}
+
+/// Sine and cosine.
+pub(super) fn sin_cos(angle: &Interval) -> (Interval, Interval) {
+    let quarters = (angle.rough() / std::f64::consts::FRAC_PI_2).round();
+    let rest = angle - &*QUARTER * Interval::new(quarters);
+    // Where so many quarters have been taken off that nothing is known of the rest, nothing is known of the values.
+    if !(quarters.abs() < 1e15 && rest.abs().is_below(&Interval::new(0.8))) {
+        let anything = Interval::new(1.0).around_zero();
+        return (anything.clone(), anything);
+    }
+    let (sine, cosine) = series(&rest);
+    match (quarters as i64).rem_euclid(4) {
+        0 => (sine, cosine),
+        1 => (cosine, -sine),
+        2 => (-sine, -cosine),
+        _ => (-cosine, sine),
+    }
+}
+
+/// Sine and cosine of an angle of at most 0.8. The remainder after the power n of Taylor's formula is at most
+/// |angle|^(n + 1) / (n + 1)!, since no derivative is greater than 1.
+fn series(angle: &Interval) -> (Interval, Interval) {
+    let square = -angle.square();
+    // Horner's scheme in -angle^2 from the last term, whose coefficient takes up the remainder: |angle| <= 1.
+    let sum = |first: usize| {
+        let last = first + 2 * TERMS;
+        (0..TERMS).rev().fold(INVERSE_FACTORIALS[last].around_zero(), |sum, term| {
+            sum * &square + &INVERSE_FACTORIALS[first + 2 * term]
+        })
+    };
+    (sum(1) * angle, sum(0))
+}
+
+/// z + s z^3 / 3 + z^5 / 5 + s z^7 / 7 + ..., s being `sign`: the arc tangent for -1, its hyperbolic twin for 1. What is
+/// left out is at most |z|^(2 n + 1) / (1 - z^2), n terms being taken.
+fn odd_series(z: &Interval, sign: f64) -> Interval {
+    if !z.abs().is_below(&Interval::new(0.34)) {
+        return Interval::new(0.0) / Interval::new(0.0);
+    }
+    let square = z.square() * Interval::new(sign);
+    // 1 / (1 - 0.34^2) < 2.
+    let rest = Interval::new(2.0).around_zero();
+    let sum = (0..SLOW_TERMS)
+        .rev()
+        .fold(rest, |sum, term| sum * &square + Interval::new(1.0) / Interval::new((2 * term + 1) as f64));
+    sum * z
+}
+
+/// The arc tangent of a number that is not negative: four times its angle is halved, and is then at most pi / 32.
+pub(super) fn atan(tangent: &Interval) -> Interval {
+    let one = Interval::new(1.0);
+    // tan(a / 2) = tan(a) / (1 + sqrt(1 + tan(a)^2)).
+    let halved = |t: Interval| &t / (&one + (&one + t.square()).sqrt());
+    let small = (0..4).fold(tangent.clone(), |t, _| halved(t));
+    odd_series(&small, -1.0) * Interval::new(16.0)
+}
+
+/// The natural logarithm of a positive number: ln(2^k y) = k ln 2 + 2 artanh((y - 1) / (y + 1)).
+pub(super) fn ln(number: &Interval) -> Interval {
+    let exponent = number.rough().log2().round().clamp(-1000.0, 1000.0);
+    // Two to the power of `-exponent`, bit by bit.
+    let y = number * Interval::new(f64::from_bits(((1023.0 - exponent) as u64) << 52));
+    let one = Interval::new(1.0);
+    let z = (&y - &one) / (&y + &one);
+    &*LN_2 * Interval::new(exponent) + odd_series(&z, 1.0) * Interval::new(2.0)
+}

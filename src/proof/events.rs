@@ -1,0 +1,196 @@
+//! Events that do happen: Lemma 5 of docs/proofs.md. Only `proof` uses it.
+
+use super::boards::{Board, covers};
+use super::chain::{Chain, span_is_one};
+use super::interval::{Interval, Vector};
+use super::link;
+use super::path::{Place, Span};
+use super::scene::Scene;
+use super::steps::Steps;
+
+/// How often the window of a lock is halved before it is given up.
+const MOST_HALVINGS: usize = 40;
+
+/// What has been shown to happen.
+#[derive(Default)]
+pub(super) struct Events {
+    /// The benches that overlap, and where the head is then; if that is before the start, they do at the start.
+    pub contact: Option<([usize; 2], Place)>,
+    /// The link that has stalled, and where the head is then; as above.
+    pub stall: Option<(usize, Place)>,
+    /// The end of the motion.
+    pub finish: Option<Finish>,
+}
+
+/// How the motion ends.
+pub(super) enum Finish {
+    /// The link whose follower is not continuous, and where the head is then.
+    Lock(usize, Place),
+    /// The path's end has been reached.
+    PathEnd,
+}
+
+/// How a lock shows.
+pub(super) enum LockShown {
+    /// In the end no place of this span around the follower is at the link's length any more.
+    Vanishes(Span),
+    /// In the end a place ahead of this span's end is at the link's length, and none could pass its beginning.
+    Jumps(Span),
+}
+
+/// That an event with the head at `to` is one of the motion: from its start to the path's end.
+fn check_is_in_motion(scene: &Scene, to: Place) -> Result<(), String> {
+    if !Interval::new(0.0).is_at_most(&scene.path.travelled(to)) {
+        return Err("the head has not come to the start".to_owned());
+    }
+    if scene.path.is_within(to) { Ok(()) } else { Err("the head is beyond the end of the path".to_owned()) }
+}
+
+impl Events {
+    /// Lemma 5, *Contact*.
+    ///
+    /// # Errors
+    /// What does not follow.
+    pub fn add_contact(
+        &mut self,
+        scene: &Scene,
+        steps: &Steps,
+        benches: [usize; 2],
+        head: Span,
+        spans: &[Span],
+        point: [f64; 2],
+    ) -> Result<(), String> {
+        if self.contact.is_some() {
+            return Err("a second contact".to_owned());
+        }
+        let [a, b] = benches;
+        if a.abs_diff(b) < 2 || a.max(b) >= spans.len() {
+            return Err(format!("benches {a} and {b} share a handle, or are not both listed"));
+        }
+        let chain = Chain::check(scene, head, spans)?;
+        let Span(from, to) = head;
+        check_is_in_motion(scene, to)?;
+        match steps.end {
+            Some(end) if end != to => return Err("it is not where the last step ended".to_owned()),
+            None if !scene.path.travelled(from).is_at_most(&Interval::new(0.0)) => {
+                return Err("no step comes before it, and it begins beyond the start".to_owned());
+            }
+            _ => {}
+        }
+        let point = Vector::new(point[0], point[1]);
+        for bench in benches {
+            let (front, rear) = (&chain.capsules[bench], &chain.capsules[bench + 1]);
+            let board = Board::new(front, rear, scene.team.link(bench).clone(), &scene.team);
+            if !covers(&board, &point) {
+                return Err(format!("the point may be outside bench {bench} (Lemma 5)"));
+            }
+        }
+        self.contact = Some((benches, from));
+        Ok(())
+    }
+
+    /// Lemma 5, *Stall*.
+    ///
+    /// # Errors
+    /// What does not follow.
+    pub fn add_stall(
+        &mut self,
+        scene: &Scene,
+        steps: &Steps,
+        link: usize,
+        head: Span,
+        spans: &[Span],
+    ) -> Result<(), String> {
+        if self.stall.is_some() {
+            return Err("a second stall".to_owned());
+        }
+        let chain = Chain::check(scene, head, spans)?;
+        check_is_in_motion(scene, head.1)?;
+        if steps.end != Some(head.1) {
+            return Err("it is not where the last step ended".to_owned());
+        }
+        // Otherwise the link may have stalled before the start.
+        let zero = Interval::new(0.0);
+        if !steps.moving_end.is_some_and(|end| zero.is_at_most(&scene.path.travelled(end))) {
+            return Err("no moving step has come to the start".to_owned());
+        }
+        if !chain.products.get(link).is_some_and(Interval::is_negative) {
+            return Err(format!("link {link} may not have stalled (Lemma 5)"));
+        }
+        self.stall = Some((link, head.0));
+        Ok(())
+    }
+
+    /// Lemma 5, *Lock*.
+    ///
+    /// # Errors
+    /// What does not follow.
+    pub fn add_lock(
+        &mut self,
+        scene: &Scene,
+        steps: &Steps,
+        (link, to): (usize, Place),
+        (spans, last): (&[Span], &[Span]),
+        shown: LockShown,
+    ) -> Result<(), String> {
+        let path = &scene.path;
+        check_is_in_motion(scene, to)?;
+        let (Some(from), Some(rear)) = (steps.end, steps.spans.get(link)) else {
+            return Err("the last step does not list the rear handle of the link".to_owned());
+        };
+        if !Interval::new(0.0).is_at_most(&path.travelled(from)) {
+            return Err("no step has come to the start".to_owned());
+        }
+        if spans.len() != link || last.len() != link {
+            return Err(format!("expected the spans of handles 1 to {link}, twice"));
+        }
+        let while_going = Chain::check(scene, Span(from, to), spans)?;
+        let at_end = Chain::check(scene, Span(to, to), last)?;
+        let (front, front_at_end) = (&while_going.capsules[link], &at_end.capsules[link]);
+        let squared = scene.team.link(link).square();
+        let is_before = |a: Place, b: Place| a != b && path.in_order(a, b);
+        let cannot_be_at = |place: Place| link::is_all_nearer(path, front, Span(place, place), &squared, 0);
+        match shown {
+            LockShown::Vanishes(window) => {
+                span_is_one(scene, window).map_err(|problem| format!("the window: {problem}"))?;
+                let Span(w1, w2) = window;
+                if !(is_before(w1, rear.0) && is_before(rear.1, w2) && path.in_order(w2, front.span.0)) {
+                    return Err("the window is not around the rear's span and behind the front's".to_owned());
+                }
+                if !(cannot_be_at(w1) && cannot_be_at(w2)) {
+                    return Err("an end of the window may be at the link's length (Lemma 5)".to_owned());
+                }
+                if !link::is_all_nearer(path, front_at_end, window, &squared, MOST_HALVINGS) {
+                    return Err("a place of the window may be at the link's length in the end (Lemma 5)".to_owned());
+                }
+            }
+            LockShown::Jumps(jump) => {
+                span_is_one(scene, jump).map_err(|problem| format!("the jump: {problem}"))?;
+                let Span(w, y) = jump;
+                if !(is_before(rear.1, w) && path.in_order(y, front_at_end.span.0)) {
+                    return Err("the jump is not between the rear's span and the front's".to_owned());
+                }
+                if !cannot_be_at(w) {
+                    return Err("where the jump begins may be at the link's length (Lemma 5)".to_owned());
+                }
+                if !link::is_farther(path, front_at_end, y, &squared) {
+                    return Err("where the jump ends may be too near in the end (Lemma 5)".to_owned());
+                }
+            }
+        }
+        self.finish = Some(Finish::Lock(link, to));
+        Ok(())
+    }
+
+    /// *Path end.*
+    ///
+    /// # Errors
+    /// What does not follow.
+    pub fn add_path_end(&mut self, scene: &Scene, steps: &Steps) -> Result<(), String> {
+        if !steps.end.is_some_and(|end| scene.path.is_at_end(end)) {
+            return Err("the last step did not come to the end of the path".to_owned());
+        }
+        self.finish = Some(Finish::PathEnd);
+        Ok(())
+    }
+}

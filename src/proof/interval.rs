@@ -1,0 +1,326 @@
+//! Real numbers between two binary numbers of 128 bits: the arithmetic of the checker. Only `proof` uses it.
+//!
+//! Every operation returns an interval that holds the result for all numbers of its operands: lower ends are rounded
+//! down, upper ends up. It rests on `+`, `-`, `*`, `/` and the comparisons of `astro-float` alone. What has no value (a
+//! division by an interval that holds 0, a root of what may be negative) is not a number, and so is all that is
+//! computed from it; no comparison with it is true.
+
+use std::borrow::Borrow;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use astro_float::RoundingMode::{Down, Up};
+use astro_float::{BigFloat, Sign};
+
+/// Bits of each end.
+pub(super) const BITS: usize = 128;
+
+/// All real numbers from `lo` to `hi`.
+#[derive(Debug, Clone)]
+pub(super) struct Interval {
+    lo: BigFloat,
+    hi: BigFloat,
+}
+
+/// Where an interval lies.
+#[derive(Clone, Copy, PartialEq)]
+enum Side {
+    NotNegative,
+    NotPositive,
+    Across,
+}
+
+impl Interval {
+    /// The interval of a single number, exactly; but for the numbers below 1e-307, which `astro-float` does not take over
+    /// right: they are held between the least that it does and its negative.
+    pub fn new(number: f64) -> Self {
+        if number.is_subnormal() {
+            return Self::new(f64::MIN_POSITIVE).around_zero();
+        }
+        let end = BigFloat::from_f64(number, BITS);
+        Self { lo: end.clone(), hi: end }
+    }
+
+    /// From one number to another.
+    #[cfg(test)]
+    pub fn between(lo: BigFloat, hi: BigFloat) -> Self {
+        Self { lo, hi }
+    }
+
+    /// Both ends.
+    #[cfg(test)]
+    pub fn ends(&self) -> (&BigFloat, &BigFloat) {
+        (&self.lo, &self.hi)
+    }
+
+    fn not_a_number() -> Self {
+        Self { lo: astro_float::NAN, hi: astro_float::NAN }
+    }
+
+    fn side(&self) -> Side {
+        if self.lo.is_zero() || self.lo.is_positive() {
+            Side::NotNegative
+        } else if self.hi.is_zero() || self.hi.is_negative() {
+            Side::NotPositive
+        } else {
+            Side::Across
+        }
+    }
+
+    fn is_not_a_number(&self) -> bool {
+        self.lo.is_nan() || self.hi.is_nan()
+    }
+
+    /// Whether every number here is less than every number there.
+    pub fn is_below(&self, other: &Self) -> bool {
+        self.hi < other.lo
+    }
+
+    /// Whether no number here is greater than any number there.
+    pub fn is_at_most(&self, other: &Self) -> bool {
+        self.hi <= other.lo
+    }
+
+    /// Whether every number is greater than 0.
+    pub fn is_positive(&self) -> bool {
+        !self.is_not_a_number() && self.lo.is_positive() && !self.lo.is_zero()
+    }
+
+    /// Whether every number is less than 0.
+    pub fn is_negative(&self) -> bool {
+        !self.is_not_a_number() && self.hi.is_negative() && !self.hi.is_zero()
+    }
+
+    /// Whether no number is less than 0.
+    pub fn is_not_negative(&self) -> bool {
+        !self.is_not_a_number() && self.side() == Side::NotNegative
+    }
+
+    /// The upper end alone.
+    pub fn upper(&self) -> Self {
+        Self { lo: self.hi.clone(), hi: self.hi.clone() }
+    }
+
+    /// All numbers from the negative of the upper end to it.
+    pub fn around_zero(&self) -> Self {
+        Self { lo: negative(&self.hi), hi: self.hi.clone() }
+    }
+
+    /// The greater of the two.
+    pub fn max(&self, other: &Self) -> Self {
+        Self { lo: greater(&self.lo, &other.lo), hi: greater(&self.hi, &other.hi) }
+    }
+
+    /// The smaller of the two.
+    pub fn min(&self, other: &Self) -> Self {
+        Self { lo: smaller(&self.lo, &other.lo), hi: smaller(&self.hi, &other.hi) }
+    }
+
+    /// The size without the sign.
+    pub fn abs(&self) -> Self {
+        match self.side() {
+            _ if self.is_not_a_number() => Self::not_a_number(),
+            Side::NotNegative => self.clone(),
+            Side::NotPositive => -self,
+            Side::Across => Self { lo: zero(), hi: greater(&negative(&self.lo), &self.hi) },
+        }
+    }
+
+    /// The square.
+    pub fn square(&self) -> Self {
+        let size = self.abs();
+        Self { lo: size.lo.mul(&size.lo, BITS, Down), hi: size.hi.mul(&size.hi, BITS, Up) }
+    }
+
+    /// The square root.
+    pub fn sqrt(&self) -> Self {
+        if !self.is_not_negative() {
+            return Self::not_a_number();
+        }
+        Self { lo: root(&self.lo).0, hi: root(&self.hi).1 }
+    }
+
+    /// A double near the middle, to choose by and never to prove by.
+    pub fn rough(&self) -> f64 {
+        let lo = rough(&self.lo);
+        lo + (rough(&self.hi) - lo) / 2.0
+    }
+}
+
+fn zero() -> BigFloat {
+    BigFloat::from_f64(0.0, BITS)
+}
+
+fn negative(number: &BigFloat) -> BigFloat {
+    number.clone().neg()
+}
+
+fn greater(a: &BigFloat, b: &BigFloat) -> BigFloat {
+    if a.is_nan() || b.is_nan() {
+        return astro_float::NAN;
+    }
+    if a < b { b.clone() } else { a.clone() }
+}
+
+fn smaller(a: &BigFloat, b: &BigFloat) -> BigFloat {
+    if a.is_nan() || b.is_nan() {
+        return astro_float::NAN;
+    }
+    if b < a { b.clone() } else { a.clone() }
+}
+
+/// Numbers below and above the root of a number that is not negative: whatever s > 0 is, the root lies between s and
+/// x / s. Near the root, one step of Newton's method brings the two together.
+fn root(x: &BigFloat) -> (BigFloat, BigFloat) {
+    if x.is_zero() {
+        return (zero(), zero());
+    }
+    let guess = rough(x).sqrt();
+    let guess = if guess.is_normal() { BigFloat::from_f64(guess, BITS) } else { x.sqrt(BITS, Down) };
+    let half = BigFloat::from_f64(0.5, BITS);
+    let s = x.div(&guess, BITS, Down).add(&guess, BITS, Down).mul(&half, BITS, Down);
+    if !s.is_positive() || s.is_zero() {
+        return (astro_float::NAN, astro_float::NAN);
+    }
+    (smaller(&s, &x.div(&s, BITS, Down)), greater(&s, &x.div(&s, BITS, Up)))
+}
+
+/// The double towards zero from a number.
+fn rough(number: &BigFloat) -> f64 {
+    let Some((words, _, sign, exponent, _)) = number.as_raw_parts() else { return f64::NAN };
+    let leading = words.last().copied().unwrap_or(0) >> 11;
+    // The number is 0.leading... times 2^exponent; two factors, since one alone may overflow.
+    let exponent = exponent.saturating_sub(53);
+    let half = exponent / 2;
+    let size = leading as f64 * 2f64.powi(half) * 2f64.powi(exponent - half);
+    if sign == Sign::Neg { -size } else { size }
+}
+
+impl Neg for &Interval {
+    type Output = Interval;
+    fn neg(self) -> Interval {
+        Interval { lo: negative(&self.hi), hi: negative(&self.lo) }
+    }
+}
+
+impl Neg for Interval {
+    type Output = Interval;
+    fn neg(self) -> Interval {
+        -&self
+    }
+}
+
+fn sum(a: &Interval, b: &Interval) -> Interval {
+    Interval { lo: a.lo.add(&b.lo, BITS, Down), hi: a.hi.add(&b.hi, BITS, Up) }
+}
+
+fn difference(a: &Interval, b: &Interval) -> Interval {
+    Interval { lo: a.lo.sub(&b.hi, BITS, Down), hi: a.hi.sub(&b.lo, BITS, Up) }
+}
+
+/// Which ends make the least and the greatest product follows from the signs.
+fn product(a: &Interval, b: &Interval) -> Interval {
+    use Side::{Across, NotNegative, NotPositive};
+    let of = |x: &BigFloat, y: &BigFloat, z: &BigFloat, w: &BigFloat| Interval {
+        lo: x.mul(y, BITS, Down),
+        hi: z.mul(w, BITS, Up),
+    };
+    match (a.side(), b.side()) {
+        (NotNegative, NotNegative) => of(&a.lo, &b.lo, &a.hi, &b.hi),
+        (NotPositive, NotPositive) => of(&a.hi, &b.hi, &a.lo, &b.lo),
+        (NotNegative, NotPositive) => of(&a.hi, &b.lo, &a.lo, &b.hi),
+        (NotPositive, NotNegative) => of(&a.lo, &b.hi, &a.hi, &b.lo),
+        (NotNegative, Across) => of(&a.hi, &b.lo, &a.hi, &b.hi),
+        (Across, NotNegative) => of(&a.lo, &b.hi, &a.hi, &b.hi),
+        (NotPositive, Across) => of(&a.lo, &b.hi, &a.lo, &b.lo),
+        (Across, NotPositive) => of(&a.hi, &b.lo, &a.lo, &b.lo),
+        (Across, Across) => {
+            let (one, other) = (of(&a.lo, &b.hi, &a.lo, &b.lo), of(&a.hi, &b.lo, &a.hi, &b.hi));
+            Interval { lo: smaller(&one.lo, &other.lo), hi: greater(&one.hi, &other.hi) }
+        }
+    }
+}
+
+fn quotient(a: &Interval, b: &Interval) -> Interval {
+    if b.is_negative() {
+        return quotient(&-a, &-b);
+    }
+    if !b.is_positive() || a.is_not_a_number() {
+        return Interval::not_a_number();
+    }
+    // The least quotient has the greatest divisor where the dividend is positive, else the least.
+    let least_by = if a.lo.is_negative() { &b.lo } else { &b.hi };
+    let greatest_by = if a.hi.is_negative() { &b.hi } else { &b.lo };
+    Interval { lo: a.lo.div(least_by, BITS, Down), hi: a.hi.div(greatest_by, BITS, Up) }
+}
+
+/// The operator between any two of `Interval` and `&Interval`.
+macro_rules! operator {
+    ($operator:ident, $method:ident, $computed:ident) => {
+        impl<I: Borrow<Interval>> $operator<I> for &Interval {
+            type Output = Interval;
+            fn $method(self, other: I) -> Interval {
+                $computed(self, other.borrow())
+            }
+        }
+        impl<I: Borrow<Interval>> $operator<I> for Interval {
+            type Output = Interval;
+            fn $method(self, other: I) -> Interval {
+                $computed(&self, other.borrow())
+            }
+        }
+    };
+}
+
+operator!(Add, add, sum);
+operator!(Sub, sub, difference);
+operator!(Mul, mul, product);
+operator!(Div, div, quotient);
+
+/// A vector of two intervals.
+#[derive(Debug, Clone)]
+pub(super) struct Vector {
+    pub x: Interval,
+    pub y: Interval,
+}
+
+impl Vector {
+    /// The vector of two numbers, exactly.
+    pub fn new(x: f64, y: f64) -> Self {
+        Self { x: Interval::new(x), y: Interval::new(y) }
+    }
+
+    /// The scalar product.
+    pub fn dot(&self, other: &Self) -> Interval {
+        &self.x * &other.x + &self.y * &other.y
+    }
+
+    /// The determinant of the two vectors as columns.
+    pub fn cross(&self, other: &Self) -> Interval {
+        &self.x * &other.y - &self.y * &other.x
+    }
+
+    /// The square of the length.
+    pub fn norm_squared(&self) -> Interval {
+        self.x.square() + self.y.square()
+    }
+
+    /// The length.
+    pub fn norm(&self) -> Interval {
+        self.norm_squared().sqrt()
+    }
+
+    /// The vector `factor` times as long.
+    pub fn scaled(&self, factor: &Interval) -> Self {
+        Self { x: &self.x * factor, y: &self.y * factor }
+    }
+
+    /// The sum.
+    pub fn plus(&self, other: &Self) -> Self {
+        Self { x: &self.x + &other.x, y: &self.y + &other.y }
+    }
+
+    /// The difference.
+    pub fn minus(&self, other: &Self) -> Self {
+        Self { x: &self.x - &other.x, y: &self.y - &other.y }
+    }
+}

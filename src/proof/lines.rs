@@ -1,0 +1,108 @@
+//! The lines of a certificate (docs/proofs.md, "The file"). Only `proof` uses it.
+
+use serde::{Deserialize, Serialize};
+
+use super::path::{Place, Span};
+
+/// A line.
+#[derive(Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub(super) enum Line {
+    Certificate {
+        format: u32,
+        version: String,
+        scene: String,
+    },
+    Step {
+        links: Links,
+        from: Place,
+        to: Place,
+        moving: bool,
+        clear: bool,
+        spans: Vec<Span>,
+    },
+    Contact {
+        benches: [usize; 2],
+        from: Place,
+        to: Place,
+        spans: Vec<Span>,
+        point: [f64; 2],
+    },
+    Stall {
+        link: usize,
+        from: Place,
+        to: Place,
+        spans: Vec<Span>,
+    },
+    Lock {
+        link: usize,
+        to: Place,
+        spans: Vec<Span>,
+        last: Vec<Span>,
+        #[serde(default)]
+        window: Option<Span>,
+        #[serde(default)]
+        jump: Option<Span>,
+    },
+    PathEnd {},
+    Result(Outcome),
+}
+
+/// Which links a step is about.
+#[derive(Deserialize, Clone, Copy, PartialEq)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Links {
+    All,
+    Front,
+}
+
+/// The kinds of events, in the order of the results.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EventKind {
+    /// Two boards that share no handle touch.
+    Contact,
+    /// The front product of a link comes to 0.
+    Stall,
+    /// A link's follower ceases to be continuous.
+    Lock,
+    /// The path ends.
+    PathEnd,
+}
+
+/// How much is proved of an event.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// It happens, for the first time, between two times.
+    Proved,
+    /// It does not happen before the motion ends, or before the lock could.
+    None,
+    /// It does not happen before a time.
+    Undecided,
+}
+
+/// What a certificate proves of one kind of event.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Outcome {
+    /// Which event.
+    pub event: EventKind,
+    /// How much of it.
+    pub status: Status,
+    /// Seconds before which it does not happen.
+    #[serde(default)]
+    pub time_lo: Option<f64>,
+    /// Seconds by which it has happened.
+    #[serde(default)]
+    pub time_hi: Option<f64>,
+    /// The bench of the link, or the first of two that overlap at `time_hi`.
+    #[serde(default)]
+    pub bench_a: Option<usize>,
+    /// The other one.
+    #[serde(default)]
+    pub bench_b: Option<usize>,
+    /// Why it is undecided, as whoever wrote the certificate says.
+    #[serde(default)]
+    pub because: Option<String>,
+}

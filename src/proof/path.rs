@@ -1,0 +1,332 @@
+//! The path of a certificate, in intervals: its curves, its places and their order, and bounds of length, curvature and
+//! turning between two places (docs/proofs.md, "Definitions" and "Capsules"). Only `proof` uses it.
+
+use std::cmp::Ordering;
+
+use serde::Deserialize;
+
+use super::elementary;
+use super::interval::{Interval, Vector};
+
+/// A place as the file has it: the segment, and the coordinate on it.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub(super) struct Place(pub usize, pub f64);
+
+/// A span as the file has it, the earlier end first.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub(super) struct Span(pub Place, pub Place);
+
+/// A curve by its coordinate.
+pub(super) enum Curve {
+    /// Towards the centre: the coordinate falls with travel. `a` is metres of radius per radian.
+    Inward { a: Interval },
+    /// Away from the centre, turned by half a turn.
+    Outward { a: Interval },
+    /// Coordinates are metres from `origin`.
+    Line { origin: Vector, direction: Vector },
+    /// Coordinates are radians from `origin`.
+    Arc { origin: Vector, direction: Vector, to_centre: Vector, radius: Interval },
+}
+
+/// A point of the path with the unit tangent in the direction of travel.
+#[derive(Debug, Clone)]
+pub(super) struct At {
+    pub point: Vector,
+    pub tangent: Vector,
+}
+
+impl Curve {
+    /// An arc that begins at `origin` with `direction`; `to_left` is 1 where its centre is on the left, else -1.
+    pub fn arc(origin: Vector, direction: Vector, to_left: Interval, radius: Interval) -> Self {
+        let to_centre = Vector { x: -(&direction.y * &to_left), y: &direction.x * &to_left };
+        Self::Arc { origin, direction, to_centre, radius }
+    }
+
+    /// Point and tangent at a coordinate.
+    pub fn at(&self, coordinate: &Interval) -> At {
+        match self {
+            Self::Inward { a } => spiral_at(a, coordinate),
+            Self::Outward { a } => {
+                let At { point, tangent } = spiral_at(a, coordinate);
+                // Turned by half a turn, and travelled the other way.
+                At { point: Vector { x: -point.x, y: -point.y }, tangent }
+            }
+            Self::Line { origin, direction } => {
+                At { point: origin.plus(&direction.scaled(coordinate)), tangent: direction.clone() }
+            }
+            Self::Arc { origin, direction, to_centre, radius } => {
+                let (sine, cosine) = elementary::sin_cos(coordinate);
+                let across = to_centre.scaled(&(Interval::new(1.0) - &cosine));
+                let chord = direction.scaled(&sine).plus(&across);
+                let tangent = direction.scaled(&cosine).plus(&to_centre.scaled(&sine));
+                At { point: origin.plus(&chord.scaled(radius)), tangent }
+            }
+        }
+    }
+
+    /// Metres of travel from one coordinate to another.
+    pub fn metres(&self, from: &Interval, to: &Interval) -> Interval {
+        match self {
+            Self::Inward { a } => spiral_metres(a, from) - spiral_metres(a, to),
+            Self::Outward { a } => spiral_metres(a, to) - spiral_metres(a, from),
+            Self::Line { .. } => to - from,
+            Self::Arc { radius, .. } => radius * (to - from),
+        }
+    }
+
+    /// At least the metres from one coordinate to a later one.
+    fn metres_bound(&self, from: &Interval, to: &Interval) -> Interval {
+        match self {
+            // A radian is a w metres long, most at the greater angle.
+            Self::Inward { a } => a * w(from) * (from - to),
+            Self::Outward { a } => a * w(to) * (to - from),
+            Self::Line { .. } | Self::Arc { .. } => self.metres(from, to),
+        }
+    }
+
+    /// At least the curvature anywhere from one coordinate to a later one.
+    fn curvature_bound(&self, from: &Interval, to: &Interval) -> Interval {
+        match self {
+            Self::Inward { a } => spiral_curvature(a, to),
+            Self::Outward { a } => spiral_curvature(a, from),
+            Self::Line { .. } => Interval::new(0.0),
+            Self::Arc { radius, .. } => Interval::new(1.0) / radius,
+        }
+    }
+
+    /// At least the radians by which the path turns from one coordinate to a later one.
+    fn turning_bound(&self, from: &Interval, to: &Interval) -> Interval {
+        let spiral = |outer: &Interval, inner: &Interval| {
+            let square = inner.square();
+            (outer - inner) * (&square + Interval::new(2.0)) / (square + Interval::new(1.0))
+        };
+        match self {
+            Self::Inward { .. } => spiral(from, to),
+            Self::Outward { .. } => spiral(to, from),
+            Self::Line { .. } => Interval::new(0.0),
+            Self::Arc { .. } => to - from,
+        }
+    }
+
+    /// A double near the metres per unit of the coordinate, negative where it falls with travel.
+    fn rough_speed(&self, coordinate: f64) -> f64 {
+        match self {
+            Self::Inward { a } => -a.rough() * coordinate.hypot(1.0),
+            Self::Outward { a } => a.rough() * coordinate.hypot(1.0),
+            Self::Line { .. } => 1.0,
+            Self::Arc { radius, .. } => radius.rough(),
+        }
+    }
+}
+
+fn w(theta: &Interval) -> Interval {
+    (theta.square() + Interval::new(1.0)).sqrt()
+}
+
+fn spiral_at(a: &Interval, theta: &Interval) -> At {
+    let (sine, cosine) = elementary::sin_cos(theta);
+    let w = w(theta);
+    let radius = a * theta;
+    let point = Vector { x: &cosine * &radius, y: &sine * &radius };
+    let tangent = Vector { x: (theta * &sine - &cosine) / &w, y: -(theta * &cosine + &sine) / &w };
+    At { point, tangent }
+}
+
+/// Metres from the centre: a / 2 (theta w + asinh theta).
+fn spiral_metres(a: &Interval, theta: &Interval) -> Interval {
+    let w = w(theta);
+    let asinh = elementary::ln(&(theta + &w));
+    a * Interval::new(0.5) * (theta * &w + asinh)
+}
+
+fn spiral_curvature(a: &Interval, theta: &Interval) -> Interval {
+    let square = theta.square();
+    let w_squared = &square + Interval::new(1.0);
+    (square + Interval::new(2.0)) / (a * &w_squared * w_squared.sqrt())
+}
+
+/// A curve with the coordinates at which it begins (none for the first segment) and ends (none for one that goes on).
+pub(super) struct Segment {
+    pub curve: Curve,
+    pub begin: Option<Interval>,
+    pub end: Option<Interval>,
+}
+
+/// Where a path ends.
+pub(super) enum PathEnd {
+    /// At a coordinate of its last segment.
+    Coordinate(Interval),
+    /// Where its length has been travelled.
+    Travelled,
+}
+
+/// The whole path.
+pub(super) struct Path {
+    segments: Vec<Segment>,
+    /// Metres from the start to where each segment begins; for the first, to where it ends.
+    travelled: Vec<Interval>,
+    path_end: PathEnd,
+    /// Metres from the start to the path's end.
+    pub length: Interval,
+}
+
+impl Path {
+    /// The path of its segments; the first ends `ahead` metres after the start.
+    pub fn new(segments: Vec<Segment>, ahead: Interval, path_end: PathEnd, length: Interval) -> Self {
+        let mut travelled = vec![ahead.clone()];
+        let mut so_far = ahead;
+        for segment in &segments[1..] {
+            travelled.push(so_far.clone());
+            if let (Some(begin), Some(end)) = (&segment.begin, &segment.end) {
+                so_far = so_far + segment.curve.metres(begin, end);
+            }
+        }
+        Self { segments, travelled, path_end, length }
+    }
+
+    /// Point and tangent of a place.
+    pub fn at(&self, place: Place) -> At {
+        self.segments[place.0].curve.at(&Interval::new(place.1))
+    }
+
+    /// Metres from the start; negative before it.
+    pub fn travelled(&self, place: Place) -> Interval {
+        let segment = &self.segments[place.0];
+        // The first segment is measured from its end, the others from their beginning.
+        let anchor = if place.0 == 0 { &segment.end } else { &segment.begin };
+        match anchor {
+            Some(anchor) => &self.travelled[place.0] + segment.curve.metres(anchor, &Interval::new(place.1)),
+            // A path has more than one segment, or its first one has an end.
+            None => Interval::new(0.0) / Interval::new(0.0),
+        }
+    }
+
+    /// Whether the place is certainly at the end of the path or beyond it.
+    pub fn is_at_end(&self, place: Place) -> bool {
+        match &self.path_end {
+            PathEnd::Coordinate(end) if place.0 + 1 == self.segments.len() => {
+                let at = Interval::new(place.1);
+                if self.falls(place.0) { at.is_at_most(end) } else { end.is_at_most(&at) }
+            }
+            PathEnd::Coordinate(_) => false,
+            PathEnd::Travelled => self.length.is_at_most(&self.travelled(place)),
+        }
+    }
+
+    /// Whether the place is certainly not beyond the end of the path.
+    pub fn is_within(&self, place: Place) -> bool {
+        match &self.path_end {
+            PathEnd::Coordinate(end) if place.0 + 1 == self.segments.len() => {
+                let at = Interval::new(place.1);
+                if self.falls(place.0) { end.is_at_most(&at) } else { at.is_at_most(end) }
+            }
+            PathEnd::Coordinate(_) => true,
+            PathEnd::Travelled => self.travelled(place).is_at_most(&self.length),
+        }
+    }
+
+    fn falls(&self, segment: usize) -> bool {
+        matches!(self.segments[segment].curve, Curve::Inward { .. })
+    }
+
+    /// Whether the place is one: a number strictly inside a segment. The centre of a spiral that is the whole path is
+    /// one as well: it is no junction.
+    pub fn has(&self, place: Place) -> bool {
+        let Some(segment) = self.segments.get(place.0).filter(|_| place.1.is_finite()) else { return false };
+        if self.segments.len() == 1 {
+            return place.1 >= 0.0;
+        }
+        let at = Interval::new(place.1);
+        let before = |a: &Interval, b: &Interval| if self.falls(place.0) { b.is_below(a) } else { a.is_below(b) };
+        segment.begin.as_ref().is_none_or(|begin| before(begin, &at))
+            && segment.end.as_ref().is_none_or(|end| before(&at, end))
+    }
+
+    /// The order of two places on the way.
+    pub fn order(&self, a: Place, b: Place) -> Ordering {
+        // Both are strictly inside their segments, and numbers.
+        let along = a.1.partial_cmp(&b.1).unwrap_or(Ordering::Equal);
+        a.0.cmp(&b.0).then(if self.falls(a.0) { along.reverse() } else { along })
+    }
+
+    /// Whether a is before b or the same.
+    pub fn in_order(&self, a: Place, b: Place) -> bool {
+        self.order(a, b) != Ordering::Greater
+    }
+
+    /// Whether the segment is a line.
+    pub fn is_line(&self, segment: usize) -> bool {
+        matches!(self.segments[segment].curve, Curve::Line { .. })
+    }
+
+    /// Metres from the centre at a place of an inward spiral.
+    pub fn spiral_radius(&self, place: Place) -> Option<Interval> {
+        match &self.segments[place.0].curve {
+            Curve::Inward { a } => Some(a * Interval::new(place.1)),
+            _ => None,
+        }
+    }
+
+    /// The parts of a span in each segment: its curve, and the coordinates at the ends.
+    fn parts(&self, from: Place, to: Place) -> impl Iterator<Item = (usize, Interval, Interval)> {
+        (from.0..=to.0).map(move |index| {
+            let nothing = || Interval::new(0.0) / Interval::new(0.0);
+            let segment = &self.segments[index];
+            let begin =
+                if index == from.0 { Interval::new(from.1) } else { segment.begin.clone().unwrap_or_else(nothing) };
+            let end = if index == to.0 { Interval::new(to.1) } else { segment.end.clone().unwrap_or_else(nothing) };
+            (index, begin, end)
+        })
+    }
+
+    /// At least the metres from one place to a later one.
+    pub fn metres_bound(&self, from: Place, to: Place) -> Interval {
+        let parts = self.parts(from, to);
+        parts
+            .map(|(index, begin, end)| self.segments[index].curve.metres_bound(&begin, &end))
+            .fold(Interval::new(0.0), |sum, part| sum + part)
+            .upper()
+    }
+
+    /// At least the curvature anywhere from one place to a later one.
+    pub fn curvature_bound(&self, from: Place, to: Place) -> Interval {
+        let parts = self.parts(from, to);
+        parts
+            .map(|(index, begin, end)| self.segments[index].curve.curvature_bound(&begin, &end))
+            .fold(Interval::new(0.0), |most, part| most.max(&part))
+            .upper()
+    }
+
+    /// At least the radians by which the path turns from one place to a later one.
+    pub fn turning_bound(&self, from: Place, to: Place) -> Interval {
+        let parts = self.parts(from, to);
+        parts
+            .map(|(index, begin, end)| self.segments[index].curve.turning_bound(&begin, &end))
+            .fold(Interval::new(0.0), |sum, part| sum + part)
+            .upper()
+    }
+
+    /// A place between two others, near the middle. Which one it is proves nothing: whoever uses it sees to that.
+    pub fn middle(&self, from: Place, to: Place) -> Place {
+        if from.0 == to.0 {
+            return Place(from.0, from.1 + (to.1 - from.1) / 2.0);
+        }
+        let rough: Vec<(usize, f64, f64, f64)> = self
+            .parts(from, to)
+            .map(|(index, begin, end)| {
+                let (begin, end) = (begin.rough(), end.rough());
+                let speed = self.segments[index].curve.rough_speed(begin + (end - begin) / 2.0);
+                (index, begin, speed, speed * (end - begin))
+            })
+            .collect();
+        let mut rest = rough.iter().map(|part| part.3).sum::<f64>() / 2.0;
+        for (index, begin, speed, metres) in rough {
+            let place = Place(index, begin + rest / speed);
+            if rest <= metres && self.has(place) && self.in_order(from, place) && self.in_order(place, to) {
+                return place;
+            }
+            rest = (rest - metres).max(0.0);
+        }
+        from
+    }
+}

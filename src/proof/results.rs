@@ -1,0 +1,95 @@
+//! Whether a result follows from the steps and the events. Only `proof` uses it.
+
+use super::events::{Events, Finish};
+use super::interval::Interval;
+use super::lines::{EventKind, Outcome, Status};
+use super::path::Place;
+use super::scene::Scene;
+use super::steps::Steps;
+
+/// The order in which results stand.
+const ORDER: [EventKind; 4] = [EventKind::Contact, EventKind::Stall, EventKind::Lock, EventKind::PathEnd];
+
+/// What is known of an event.
+struct Known {
+    /// Seconds before which it does not happen.
+    not_before: Interval,
+    /// Seconds by which it has happened, and the benches.
+    by: Option<(Interval, Option<usize>, Option<usize>)>,
+    /// Whether it does not happen before the motion ends.
+    never: bool,
+}
+
+/// Checks a result, `earlier` being those before it.
+///
+/// # Errors
+/// What does not follow.
+pub(super) fn check(
+    scene: &Scene,
+    steps: &Steps,
+    events: &Events,
+    outcome: &Outcome,
+    earlier: &[Outcome],
+) -> Result<(), String> {
+    let Some(expected) = ORDER.get(earlier.len()) else { return Err("a result too many".to_owned()) };
+    if outcome.event != *expected {
+        return Err("the results are not contact, stall, lock and path_end in this order".to_owned());
+    }
+    let known = known(scene, steps, events, *expected);
+    let Outcome { time_lo, time_hi, bench_a, bench_b, .. } = outcome;
+    let begins = |lo: f64| lo.is_finite() && Interval::new(lo).is_at_most(&known.not_before);
+    match (outcome.status, time_lo, time_hi) {
+        (Status::None, None, None) if known.never && bench_a.is_none() && bench_b.is_none() => Ok(()),
+        (Status::None, ..) => Err("that there is none does not follow".to_owned()),
+        (Status::Undecided, Some(lo), None) if begins(*lo) && bench_a.is_none() && bench_b.is_none() => Ok(()),
+        (Status::Undecided, ..) => Err("that it does not happen before time_lo does not follow".to_owned()),
+        (Status::Proved, Some(lo), Some(hi)) => {
+            let Some((by, a, b)) = known.by else { return Err("that it happens does not follow".to_owned()) };
+            if (a, b) != (*bench_a, *bench_b) {
+                return Err("the benches are not those of the event".to_owned());
+            }
+            if begins(*lo) && hi.is_finite() && by.is_at_most(&Interval::new(*hi)) {
+                Ok(())
+            } else {
+                Err("that it happens from time_lo to time_hi does not follow".to_owned())
+            }
+        }
+        (Status::Proved, ..) => Err("a time is missing".to_owned()),
+    }
+}
+
+fn known(scene: &Scene, steps: &Steps, events: &Events, event: EventKind) -> Known {
+    let zero = Interval::new(0.0);
+    let seconds = |place: Place| (scene.path.travelled(place) / &scene.head_speed).max(&zero);
+    let after = |place: Option<Place>| place.map_or_else(|| zero.clone(), seconds);
+    let finished = events.finish.is_some();
+    match event {
+        EventKind::Contact => Known {
+            not_before: after(steps.clear_end),
+            by: events.contact.map(|([a, b], to)| (seconds(to), Some(a), Some(b))),
+            never: finished && steps.all_clear,
+        },
+        EventKind::Stall => Known {
+            not_before: after(steps.moving_end),
+            by: events.stall.map(|(link, to)| (seconds(to), Some(link), None)),
+            never: finished && steps.all_moving,
+        },
+        EventKind::Lock => Known {
+            not_before: after(steps.end),
+            by: match events.finish {
+                Some(Finish::Lock(link, to)) => Some((seconds(to), Some(link), None)),
+                _ => None,
+            },
+            never: matches!(events.finish, Some(Finish::PathEnd)),
+        },
+        EventKind::PathEnd => {
+            let seconds = (&scene.path.length / &scene.head_speed).max(&zero);
+            let reached = matches!(events.finish, Some(Finish::PathEnd));
+            Known {
+                not_before: seconds.clone(),
+                by: reached.then_some((seconds, None, None)),
+                never: matches!(events.finish, Some(Finish::Lock(..))),
+            }
+        }
+    }
+}

@@ -1,0 +1,254 @@
+//! The scene of a certificate: from its text to the team, the path and the speed, in intervals that hold the real
+//! numbers that are meant. It reads only what a proof needs. Only `proof` uses it.
+
+use serde::Deserialize;
+
+use super::elementary;
+use super::interval::{Interval, Vector};
+use super::path::{Curve, Path, PathEnd, Segment};
+
+/// The greatest number of benches, and of pieces of a path.
+const MOST: usize = 1_000_000;
+
+/// What a certificate is about.
+pub(super) struct Scene {
+    pub team: Team,
+    pub path: Path,
+    /// Metres per second.
+    pub head_speed: Interval,
+}
+
+/// The benches.
+pub(super) struct Team {
+    pub benches: usize,
+    pub width: Interval,
+    pub hole_inset: Interval,
+    head_link: Interval,
+    body_link: Interval,
+}
+
+impl Team {
+    /// Metres between the two handles of a bench.
+    pub fn link(&self, bench: usize) -> &Interval {
+        if bench == 0 { &self.head_link } else { &self.body_link }
+    }
+
+    /// Metres of the links from bench `first` to bench `last` in one line.
+    pub fn links(&self, first: usize, last: usize) -> Interval {
+        self.link(first) + self.link(1) * Interval::new((last - first) as f64)
+    }
+}
+
+/// The fields of a scene that a proof needs; the others are about publishing it.
+#[derive(Deserialize)]
+struct Text {
+    team: TeamText,
+    path: PathText,
+    motion: MotionText,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TeamText {
+    benches: usize,
+    head_length: f64,
+    body_length: f64,
+    width: f64,
+    hole_inset: f64,
+}
+
+#[derive(Deserialize)]
+struct MotionText {
+    head_speed: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
+enum PathText {
+    Spiral {
+        pitch: f64,
+        start_turn: f64,
+    },
+    Turnaround {
+        pitch: f64,
+        turn_radius: f64,
+        arc_ratio: f64,
+        start_turn: Option<f64>,
+        lead_in: Option<f64>,
+        lead_out: Option<f64>,
+    },
+    Pieces {
+        #[serde(default)]
+        start: [f64; 2],
+        #[serde(default)]
+        heading_turns: f64,
+        pieces: Vec<PieceText>,
+    },
+}
+
+#[derive(Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
+enum PieceText {
+    Line { length: f64 },
+    Arc { radius: f64, side: Side, turns: Option<f64>, length: Option<f64> },
+}
+
+#[derive(Deserialize, Clone, Copy)]
+#[serde(rename_all = "lowercase")]
+enum Side {
+    Left,
+    Right,
+}
+
+fn positive(field: &str, number: f64) -> Result<Interval, String> {
+    if number.is_finite() && number > 0.0 {
+        Ok(Interval::new(number))
+    } else {
+        Err(format!("{field} is {number}, expected a positive number"))
+    }
+}
+
+fn finite(field: &str, number: f64) -> Result<Interval, String> {
+    if number.is_finite() { Ok(Interval::new(number)) } else { Err(format!("{field} is {number}, expected a number")) }
+}
+
+impl Scene {
+    /// Reads a scene.
+    ///
+    /// # Errors
+    /// A sentence for a text that is no scene.
+    pub fn read(text: &str) -> Result<Self, String> {
+        let text: Text = toml::from_str(text).map_err(|error| error.message().trim().replace('\n', ", "))?;
+        let team = text.team.read()?;
+        let path = match &text.path {
+            PathText::Spiral { pitch, start_turn } => spiral(*pitch, *start_turn)?,
+            PathText::Turnaround { .. } => turnaround(&text.path, &team)?,
+            PathText::Pieces { start, heading_turns, pieces } => route(*start, *heading_turns, pieces)?,
+        };
+        let head_speed = positive("motion.head_speed", text.motion.head_speed)?;
+        Ok(Self { team, path, head_speed })
+    }
+}
+
+impl TeamText {
+    fn read(&self) -> Result<Team, String> {
+        if self.benches == 0 || self.benches > MOST {
+            return Err(format!("team.benches is {}, expected from 1 to {MOST}", self.benches));
+        }
+        let hole_inset = positive("team.hole_inset", self.hole_inset)?;
+        let link = |field: &str, length: f64| {
+            let link = positive(field, length)? - Interval::new(2.0) * &hole_inset;
+            if link.is_positive() { Ok(link) } else { Err(format!("{field} leaves no bench between its holes")) }
+        };
+        Ok(Team {
+            benches: self.benches,
+            width: positive("team.width", self.width)?,
+            head_link: link("team.head_length", self.head_length)?,
+            body_link: link("team.body_length", self.body_length)?,
+            hole_inset,
+        })
+    }
+}
+
+/// The metres per radian of radius.
+fn growth(pitch: f64) -> Result<Interval, String> {
+    Ok(positive("path.pitch", pitch)? / elementary::turns(1.0))
+}
+
+fn spiral(pitch: f64, start_turn: f64) -> Result<Path, String> {
+    positive("path.start_turn", start_turn)?;
+    let inward = Segment { curve: Curve::Inward { a: growth(pitch)? }, begin: None, end: Some(Interval::new(0.0)) };
+    let start = elementary::turns(start_turn);
+    let length = inward.curve.metres(&start, &Interval::new(0.0));
+    Ok(Path::new(vec![inward], length.clone(), PathEnd::Coordinate(Interval::new(0.0)), length))
+}
+
+fn turnaround(text: &PathText, team: &Team) -> Result<Path, String> {
+    let PathText::Turnaround { pitch, turn_radius, arc_ratio, start_turn, lead_in, lead_out } = text else {
+        return Err("the path is no turnaround".to_owned());
+    };
+    let a = growth(*pitch)?;
+    let radius = positive("path.turn_radius", *turn_radius)?;
+    let ratio = positive("path.arc_ratio", *arc_ratio)?;
+    let turn = &radius / &a;
+    let inward = Curve::Inward { a: a.clone() };
+    let lead_in = match (lead_in, start_turn) {
+        (Some(metres), None) if *metres == 0.0 => Interval::new(0.0),
+        (Some(metres), None) => positive("path.lead_in", *metres)?,
+        (None, Some(turns)) => {
+            // 2 pi start_turn is not less than turn_radius / a: both sides over 2 pi, times the pitch.
+            let outside = radius.is_at_most(&(positive("path.start_turn", *turns)? * Interval::new(*pitch)));
+            if !outside {
+                return Err("path.start_turn is inside the turn".to_owned());
+            }
+            inward.metres(&elementary::turns(*turns), &turn)
+        }
+        _ => return Err("expected path.lead_in or path.start_turn, and not both".to_owned()),
+    };
+    let lead_out = match lead_out {
+        Some(metres) if *metres == 0.0 => Interval::new(0.0),
+        Some(metres) => positive("path.lead_out", *metres)?,
+        None => team.links(0, team.benches - 1),
+    };
+    let both = (radius.square() + a.square()).sqrt();
+    let second_radius = &both / (Interval::new(1.0) + &ratio);
+    let first_radius = &both - &second_radius;
+    let angle = elementary::atan(&turn) * Interval::new(2.0);
+    let at = inward.at(&turn);
+    let first = Curve::arc(at.point, at.tangent, Interval::new(-1.0), first_radius);
+    let middle = first.at(&angle);
+    let second = Curve::arc(middle.point, middle.tangent, Interval::new(1.0), second_radius);
+    let zero = || Some(Interval::new(0.0));
+    let length = &lead_in + &both * &angle + &lead_out;
+    let segments = vec![
+        Segment { curve: inward, begin: None, end: Some(turn.clone()) },
+        Segment { curve: first, begin: zero(), end: Some(angle.clone()) },
+        Segment { curve: second, begin: zero(), end: Some(angle) },
+        Segment { curve: Curve::Outward { a }, begin: Some(turn), end: None },
+    ];
+    Ok(Path::new(segments, lead_in, PathEnd::Travelled, length))
+}
+
+fn route(start: [f64; 2], heading_turns: f64, pieces: &[PieceText]) -> Result<Path, String> {
+    if pieces.is_empty() || pieces.len() > MOST {
+        return Err(format!("path.pieces has {} pieces, expected from 1 to {MOST}", pieces.len()));
+    }
+    finite("path.heading_turns", heading_turns)?;
+    let mut origin = Vector { x: finite("path.start", start[0])?, y: finite("path.start", start[1])? };
+    let (sine, cosine) = elementary::sin_cos(&elementary::turns(heading_turns));
+    let mut direction = Vector { x: cosine, y: sine };
+    let zero = || Interval::new(0.0);
+    let behind = Curve::Line { origin: origin.clone(), direction: direction.clone() };
+    let mut segments = vec![Segment { curve: behind, begin: None, end: Some(zero()) }];
+    let (mut length, mut end) = (zero(), zero());
+    for piece in pieces {
+        let curve = match piece {
+            PieceText::Line { length } => {
+                end = positive("path.pieces.length", *length)?;
+                Curve::Line { origin, direction }
+            }
+            PieceText::Arc { radius, side, turns, length } => {
+                let radius = positive("path.pieces.radius", *radius)?;
+                end = match (turns, length) {
+                    (Some(turns), None) => {
+                        positive("path.pieces.turns", *turns)?;
+                        elementary::turns(*turns)
+                    }
+                    (None, Some(length)) => positive("path.pieces.length", *length)? / &radius,
+                    _ => return Err("an arc has either turns or a length".to_owned()),
+                };
+                let to_left = Interval::new(if matches!(side, Side::Left) { 1.0 } else { -1.0 });
+                Curve::arc(origin, direction, to_left, radius)
+            }
+        };
+        length = length + curve.metres(&zero(), &end);
+        let at = curve.at(&end);
+        (origin, direction) = (at.point, at.tangent);
+        segments.push(Segment { curve, begin: Some(zero()), end: Some(end.clone()) });
+    }
+    // The last goes on beyond the path's end.
+    if let Some(last) = segments.last_mut() {
+        last.end = None;
+    }
+    Ok(Path::new(segments, zero(), PathEnd::Coordinate(end), length))
+}

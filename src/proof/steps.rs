@@ -1,0 +1,227 @@
+//! The steps of a certificate, and what follows from all of them so far: the rules of a step, Lemmas 3 and 4 of
+//! docs/proofs.md. Only `proof` uses it.
+
+use super::boards::{Board, is_inside_ring};
+use super::capsule::Capsule;
+use super::chain::{Chain, span_is_one};
+use super::interval::Interval;
+use super::lines::Links;
+use super::path::{Place, Span};
+use super::scene::Scene;
+
+/// A step as the file has it.
+pub(super) struct Step {
+    pub links: Links,
+    pub head: Span,
+    pub moving: bool,
+    pub clear: bool,
+    pub spans: Vec<Span>,
+}
+
+/// What follows from the steps so far.
+pub(super) struct Steps {
+    /// Where the head came to.
+    pub end: Option<Place>,
+    /// Where the last moving step, and the last clear one, came to.
+    pub moving_end: Option<Place>,
+    pub clear_end: Option<Place>,
+    /// Whether all steps were.
+    pub all_moving: bool,
+    pub all_clear: bool,
+    /// Spans of the last step.
+    pub spans: Vec<Span>,
+    /// Lemma 4: S is not beyond this place, the end of handle 1's span in the first step.
+    start_of_second: Option<Place>,
+    /// Lemma 4: whether handle 2 has come to S.
+    has_come: bool,
+    /// Lemma 4: whether f > 0 for all links but the head's in every step.
+    bodies_moving: bool,
+    /// Counts for whoever reads the result.
+    pub steps: u64,
+    pub links: u64,
+    pub pairs: u64,
+}
+
+impl Steps {
+    pub fn new() -> Self {
+        Self {
+            end: None,
+            moving_end: None,
+            clear_end: None,
+            all_moving: true,
+            all_clear: true,
+            spans: Vec::new(),
+            start_of_second: None,
+            has_come: false,
+            bodies_moving: true,
+            steps: 0,
+            links: 0,
+            pairs: 0,
+        }
+    }
+
+    /// Checks a step and adds what it proves.
+    ///
+    /// # Errors
+    /// What does not follow.
+    pub fn add(&mut self, scene: &Scene, step: Step) -> Result<(), String> {
+        let Step { links, head, moving, clear, spans } = step;
+        let Span(from, to) = head;
+        span_is_one(scene, head).map_err(|problem| format!("the head: {problem}"))?;
+        match self.end {
+            Some(end) if end != from => return Err("it does not begin where the one before ended".to_owned()),
+            Some(_) if from == to => return Err("it is empty".to_owned()),
+            None if !scene.path.travelled(from).is_at_most(&Interval::new(0.0)) => {
+                return Err("the first step begins beyond the start".to_owned());
+            }
+            _ => {}
+        }
+        let chain = Chain::check(scene, head, &spans)?;
+        let Some(first) = spans.first() else { return Err("no span is listed".to_owned()) };
+        let start_of_second = *self.start_of_second.get_or_insert(first.1);
+        match links {
+            Links::All => self.check_all(scene, &chain, start_of_second)?,
+            Links::Front => self.check_front(scene, &chain, start_of_second)?,
+        }
+        self.add_moving(moving, to, &chain)?;
+        self.add_clear(scene, links, clear, to, &chain)?;
+        self.steps += 1;
+        self.links += chain.products.len() as u64;
+        self.end = Some(to);
+        self.spans = spans;
+        Ok(())
+    }
+
+    /// That the step is about all links, and what Lemma 4 will need of it.
+    fn check_all(&mut self, scene: &Scene, chain: &Chain, start_of_second: Place) -> Result<(), String> {
+        if chain.last() < scene.team.benches && !chain.ends_on_line(scene) {
+            return Err("not all links are listed, and the last handle listed is not on a line without end".to_owned());
+        }
+        self.bodies_moving &= chain.products[1..].iter().all(Interval::is_positive);
+        let handle_2 = chain.capsules.get(2).map(|capsule| capsule.span.0);
+        let has_come = handle_2.is_some_and(|place| scene.path.in_order(start_of_second, place));
+        self.has_come |= has_come && self.bodies_moving;
+        Ok(())
+    }
+
+    /// Lemma 4 for the links that are not listed.
+    fn check_front(&mut self, scene: &Scene, chain: &Chain, start_of_second: Place) -> Result<(), String> {
+        if scene.team.benches == 1 {
+            return Ok(());
+        }
+        let Some(body) = chain.products.get(1) else { return Err("links 0 and 1 are not both listed".to_owned()) };
+        self.bodies_moving &= body.is_positive();
+        let is_ahead = scene.path.in_order(start_of_second, chain.capsules[1].span.0);
+        let problem = if !self.bodies_moving {
+            "a body link may not have moved forward"
+        } else if !self.has_come {
+            "handle 2 has not come to the start of handle 1 in a step about all links"
+        } else if !is_ahead {
+            "handle 1 may be behind its start"
+        } else {
+            return Ok(());
+        };
+        Err(format!("{problem} (Lemma 4)"))
+    }
+
+    fn add_moving(&mut self, moving: bool, to: Place, chain: &Chain) -> Result<(), String> {
+        if !moving {
+            self.all_moving = false;
+            return Ok(());
+        }
+        if !self.all_moving {
+            return Err("it is said to be moving after one that was not".to_owned());
+        }
+        if let Some(link) = chain.products.iter().position(|product| !product.is_positive()) {
+            return Err(format!("it is said to be moving, but link {link} may stall"));
+        }
+        self.moving_end = Some(to);
+        Ok(())
+    }
+
+    fn add_clear(&mut self, scene: &Scene, links: Links, clear: bool, to: Place, chain: &Chain) -> Result<(), String> {
+        if !clear {
+            self.all_clear = false;
+            return Ok(());
+        }
+        if !self.all_clear {
+            return Err("it is said to be clear after one that was not".to_owned());
+        }
+        self.pairs += check_clear(scene, links, chain)?;
+        self.clear_end = Some(to);
+        Ok(())
+    }
+}
+
+/// That no two boards touch that share no handle, or in a step about the front links, none that share none with board 0
+/// or 1. Returns the number of pairs.
+fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String> {
+    let team = &scene.team;
+    let boards: Vec<Board> = (chain.capsules.windows(2).enumerate())
+        .map(|(index, pair)| Board::new(&pair[0], &pair[1], team.link(index).clone(), team))
+        .collect();
+    let about = if links == Links::All { boards.len() } else { boards.len().min(2) };
+    let mut pairs = 0;
+    for a in 0..about {
+        for b in a + 2..boards.len() {
+            if !boards[a].is_apart_from(&boards[b]) {
+                return Err(format!("it is said to be clear, but benches {a} and {b} may touch (Lemma 2)"));
+            }
+            pairs += 1;
+        }
+    }
+    if chain.last() == team.benches {
+        return Ok(pairs);
+    }
+    if chain.ends_on_line(scene) {
+        check_line(scene, chain, &boards[..about])?;
+        return Ok(pairs + about as u64);
+    }
+    // Only a step about the front links comes here.
+    check_ring(scene, chain)?;
+    Ok(pairs + about as u64)
+}
+
+/// Lemma 3, *Line*: that the boards `about` are apart from those behind the last handle listed, all on one line, and
+/// these among themselves.
+fn check_line(scene: &Scene, chain: &Chain, about: &[Board]) -> Result<(), String> {
+    let team = &scene.team;
+    let last = chain.last();
+    if !(&team.hole_inset + &team.hole_inset).is_below(team.link(1)) {
+        return Err("it is said to be clear, but benches on a line touch (Lemma 3)".to_owned());
+    }
+    for (a, board) in about.iter().enumerate() {
+        // The first board of the run that shares no handle with this one.
+        let first = last.max(a + 2);
+        if first >= team.benches {
+            continue;
+        }
+        let length = team.links(first, team.benches - 1);
+        let front: Capsule = if first == last {
+            chain.capsules[last].clone()
+        } else {
+            chain.capsules[last].behind(&team.links(last, first - 1))
+        };
+        let rear = front.behind(&length);
+        if !board.is_apart_from(&Board::new(&front, &rear, length, team)) {
+            return Err(format!("it is said to be clear, but bench {a} may touch one on the line (Lemmas 2 and 3)"));
+        }
+    }
+    Ok(())
+}
+
+/// Lemma 3, *Ring*: that boards 0 and 1 are apart from all behind the last handle listed.
+fn check_ring(scene: &Scene, chain: &Chain) -> Result<(), String> {
+    let Span(_, latest) = chain.capsules[chain.last()].span;
+    let ring = scene.path.spiral_radius(latest).filter(|_| latest.0 == 0);
+    let ring =
+        ring.ok_or("it is said to be clear, but the last handle listed is not on segment 0, a line or spiral")?;
+    let reach = (chain.capsules.iter().take(3))
+        .map(|capsule| capsule.point.norm() + &capsule.half)
+        .fold(Interval::new(0.0), |most, metres| most.max(&metres));
+    if is_inside_ring(&scene.team, &reach, &ring) {
+        Ok(())
+    } else {
+        Err("it is said to be clear, but benches 0 and 1 may touch one that is not listed (Lemma 3)".to_owned())
+    }
+}
