@@ -21,7 +21,7 @@ use self::path::RawPath;
 use self::precision::Precision;
 pub use self::precision::SinglePrecision;
 use self::ros2::{RawRos2, Ros2Settings};
-pub use self::text::SceneText;
+pub use self::text::{SceneText, printable};
 use crate::model::team::Team;
 use crate::motion::{Method, Motion, MotionError};
 use crate::solve::Velocities;
@@ -36,7 +36,7 @@ const DEFAULT_END_HOLD: f64 = 5.0;
 
 /// Input that cannot be used, in one sentence that names the place and what was expected.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
+#[error("{}", printable(.0))]
 pub struct SceneError(String);
 
 /// The solvers that a scene can name.

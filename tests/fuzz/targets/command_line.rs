@@ -4,6 +4,8 @@
 #[allow(dead_code, unused_imports, reason = "the program's sources, of which its command line is used")]
 mod program;
 
+use std::sync::OnceLock;
+
 use clap::{CommandFactory, Parser};
 use fastrand::Rng;
 use program::CommandLine;
@@ -41,22 +43,39 @@ fn is_numeric(arguments: &[&str]) -> bool {
         && !arguments.windows(2).any(|pair| pair[0] == "--to" && !pair[1].starts_with(|c: char| c.is_ascii_digit()))
 }
 
-/// Every subcommand, and every option by its name.
-fn words() -> (Vec<String>, Vec<String>) {
-    let command = CommandLine::command();
-    let (mut names, mut options) = (Vec::new(), Vec::new());
-    let mut left = vec![command];
-    while let Some(command) = left.pop() {
-        options.extend(command.get_arguments().filter_map(|argument| Some(format!("--{}", argument.get_long()?))));
-        for subcommand in command.get_subcommands() {
-            names.push(subcommand.get_name().to_owned());
-            left.push(subcommand.clone());
+/// What command lines are made of.
+struct Words {
+    /// Every subcommand, a line each: `send` and `psn`.
+    commands: Vec<String>,
+    options: Vec<String>,
+    /// Each subcommand with each option of its own.
+    pairs: Vec<String>,
+}
+
+fn words() -> &'static Words {
+    static WORDS: OnceLock<Words> = OnceLock::new();
+    WORDS.get_or_init(|| {
+        let mut words = Words {
+            commands: Vec::new(),
+            options: ["-v", "-o", "-h", "-V", "--"].map(str::to_owned).to_vec(),
+            pairs: Vec::new(),
+        };
+        let mut left = vec![(String::new(), CommandLine::command())];
+        while let Some((path, command)) = left.pop() {
+            for argument in command.get_arguments().filter_map(clap::Arg::get_long) {
+                words.options.push(format!("--{argument}"));
+                words.pairs.push(format!("{path}--{argument}"));
+            }
+            for subcommand in command.get_subcommands() {
+                let path = format!("{path}{}\n", subcommand.get_name());
+                words.commands.push(path.trim_end().to_owned());
+                left.push((path, subcommand.clone()));
+            }
         }
-    }
-    options.extend(["-v", "-o", "-h", "-V", "--"].map(str::to_owned));
-    options.sort();
-    options.dedup();
-    (names, options)
+        words.options.sort();
+        words.options.dedup();
+        words
+    })
 }
 
 const VALUES: [&str; 22] = [
@@ -85,20 +104,19 @@ const VALUES: [&str; 22] = [
 ];
 
 fn seeds() -> Vec<Vec<u8>> {
-    let (names, options) = words();
-    let alone = names.iter().map(|name| name.clone().into_bytes());
-    let run = options.iter().flat_map(|option| names.iter().take(20).map(move |name| format!("{name}\n{option}\n60")));
-    alone.chain(run.map(String::into_bytes)).collect()
+    let Words { commands, pairs, .. } = words();
+    let values = VALUES.iter().chain(&NUMBERS);
+    let given = pairs.iter().flat_map(|pair| values.clone().map(move |value| format!("{pair}={value}")));
+    commands.iter().chain(pairs).cloned().chain(given).map(String::into_bytes).collect()
 }
 
 fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
-    static WORDS: std::sync::OnceLock<(Vec<String>, Vec<String>)> = std::sync::OnceLock::new();
-    let (names, options) = WORDS.get_or_init(words);
+    let Words { commands, options, .. } = words();
     let text = String::from_utf8_lossy(data).into_owned();
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     for _ in 0..1 + random.usize(..4) {
         let made = match random.u8(..6) {
-            0 => one(names, random).clone(),
+            0 => one(commands, random).clone(),
             1 | 2 => one(options, random).clone(),
             3 => (*one(&NUMBERS, random)).to_owned(),
             4 => format!("{}={}", one(options, random), one(&VALUES, random)),

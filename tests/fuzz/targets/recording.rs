@@ -34,11 +34,11 @@ fn run(data: &[u8]) {
     let file = folder.path().join("fuzz.mcap");
     std::fs::write(&file, data).expect("a file");
     match Recording::open(&file) {
-        Err(error) => assert!(!error.to_string().contains('\n'), "{error}"),
+        Err(error) => assert!(!error.to_string().contains(char::is_control), "{error:?}"),
         Ok(mut recording) => {
             for chunk in 0..recording.chunks() {
                 if let Err(error) = recording.read_chunk(chunk, &mut |_| ()) {
-                    assert!(!error.to_string().contains('\n'), "{error}");
+                    assert!(!error.to_string().contains(char::is_control), "{error:?}");
                 }
             }
             play(&file);
@@ -91,8 +91,10 @@ fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
 
 /// The file written again with other messages: its checks and its index are right.
 fn rewritten(data: &[u8], random: &mut Rng) -> Option<Vec<u8>> {
+    // The stream panics where lengths are damaged ("capacity overflow"); what is mended has right ones.
+    let (_, mended) = mend(data).ok()?;
     let mut messages = Vec::new();
-    for message in MessageStream::new(data).ok()? {
+    for message in MessageStream::new(&mended).ok()? {
         messages.push(message.ok()?);
     }
     if messages.is_empty() {
