@@ -161,7 +161,8 @@ fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
         1 => {
             let count = random.usize(..6);
             let headers: Vec<&str> = (0..count).map(|_| *one(&HEADERS, random)).collect();
-            request(*one(&PATHS, random), &headers)
+            let path = one(&PATHS, random);
+            request(path, &headers)
         }
         2 => renumbered(&String::from_utf8_lossy(data), random).into_bytes(),
         _ => {
