@@ -12,7 +12,7 @@ use commands::{CommandError, Common};
 /// on request, as ROS 2 topics.
 #[derive(Debug, Parser)]
 #[command(version, propagate_version = true, arg_required_else_help = true)]
-struct CommandLine {
+pub struct CommandLine {
     #[command(flatten)]
     common: Common,
     #[command(subcommand)]
@@ -20,7 +20,7 @@ struct CommandLine {
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
+pub enum Command {
     /// Publish a scene live
     Run(commands::run::RunArguments),
     /// Conduct a running publisher: pause, rate, seek, step, hold

@@ -71,6 +71,25 @@ pub enum MotionError {
 }
 
 /// A team on a path.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon::model::description::PathDescription;
+/// use bench_dragon::model::team::Team;
+/// use bench_dragon::motion::event::EventKind;
+/// use bench_dragon::motion::{Method, Motion};
+///
+/// let team = Team { benches: 20, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
+/// let path = PathDescription::Spiral { pitch: 0.55, start_turn: 16.0 };
+/// let motion = Motion::new(path, team, 1.0, Method::Newton)?;
+/// let timeline = motion.timeline(&mut |_| ());
+/// let contact = timeline.find(EventKind::Contact).unwrap();
+/// assert!((contact.time - 412.473_837_682).abs() < 1e-9);
+/// assert_eq!((contact.event.bench_a, contact.event.bench_b), (Some(0), Some(8)));
+/// assert_eq!(timeline.end().event.kind, EventKind::Lock);
+/// # Ok::<(), bench_dragon::motion::MotionError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
     description: PathDescription,

@@ -21,7 +21,7 @@ use self::path::RawPath;
 use self::precision::Precision;
 pub use self::precision::SinglePrecision;
 use self::ros2::{RawRos2, Ros2Settings};
-pub use self::text::SceneText;
+pub use self::text::{SceneText, printable};
 use crate::model::team::Team;
 use crate::motion::{Method, Motion, MotionError};
 use crate::solve::Velocities;
@@ -36,7 +36,7 @@ const DEFAULT_END_HOLD: f64 = 5.0;
 
 /// Input that cannot be used, in one sentence that names the place and what was expected.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
+#[error("{}", printable(.0))]
 pub struct SceneError(String);
 
 /// The solvers that a scene can name.
@@ -81,6 +81,21 @@ pub struct AlertRules {
 }
 
 /// A scene: what is danced, how exactly, and how it is published.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon::scene::{Scene, SceneText};
+///
+/// let twenty = SceneText::paper().text.replace("benches = 223", "benches = 20");
+/// let scene = Scene::parse(&twenty, "twenty.toml", "twenty")?;
+/// assert_eq!(scene.team().handles(), 21);
+/// // What cannot be used is named by file, line and field.
+/// let wrong = twenty.replace("pitch = 0.55", "pitch = 0");
+/// let error = Scene::parse(&wrong, "wrong.toml", "wrong").unwrap_err().to_string();
+/// assert!(error.starts_with("wrong.toml, line ") && error.contains("path.pitch is 0, expected"), "{error}");
+/// # Ok::<(), bench_dragon::scene::SceneError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     /// The scene's name; by default the stem of its file.

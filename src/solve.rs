@@ -60,6 +60,22 @@ pub enum Velocities {
 }
 
 /// A way to find the chain. Implementations own their scratch memory, so that solving allocates nothing.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon::scene::Scene;
+/// use bench_dragon::solve::{Chain, Velocities};
+///
+/// let scene = Scene::paper();
+/// let mut solver = scene.motion.solver(Velocities::Computed).solver;
+/// let mut chain = Chain::new(scene.team().handles());
+/// solver.solve(300.0, &mut chain)?;
+/// // The head of the paper's dragon after 300 s of true motion, and its speed.
+/// assert!((chain.x[0] - 4.420_274_064_106).abs() < 1e-9 && (chain.y[0] - 2.320_428_674_331).abs() < 1e-9);
+/// assert!((chain.speed[0] - 1.0).abs() < 1e-12);
+/// # Ok::<(), bench_dragon::linkage::NoFollower>(())
+/// ```
 pub trait Solver: Send {
     /// The name by which a scene selects this solver.
     fn name(&self) -> &'static str;

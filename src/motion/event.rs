@@ -29,6 +29,21 @@ impl EventKind {
 }
 
 /// Something that happens at one place of the head on the path, and so at one time.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon::motion::event::EventKind;
+/// use bench_dragon::scene::Scene;
+///
+/// let motion = Scene::paper().motion;
+/// let timeline = motion.timeline_without_contact();
+/// for timed in timeline.events() {
+///     println!("{}: {} s, after {} m", timed.event.kind.name(), timed.time, timed.event.travelled);
+/// }
+/// let kinds: Vec<_> = timeline.events().iter().map(|timed| timed.event.kind).collect();
+/// assert_eq!(kinds, [EventKind::Stall, EventKind::Lock]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
     /// What happens.

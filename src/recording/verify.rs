@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::lines::{FORMAT, Line, Seal, ShowLine};
 use crate::motion::Method;
-use crate::scene::{Accepted, Scene};
+use crate::scene::{Accepted, Scene, printable};
 use crate::solve::table::Instructions;
 use player::Player;
 
@@ -21,7 +21,7 @@ use player::Player;
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     /// The file is no log, or is damaged.
-    #[error("line {line}: {problem}")]
+    #[error("line {line}: {}", printable(.problem))]
     Line {
         /// The line, from 1.
         line: u64,

@@ -48,3 +48,12 @@ impl SceneText {
         Scene::parse(&self.text, &self.file, &self.stem)
     }
 }
+
+/// What a file holds, as it can stand in a sentence: line ends, and what would command a terminal, as escapes.
+pub fn printable(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for letter in text.chars() {
+        if letter.is_control() { shown.extend(letter.escape_default()) } else { shown.push(letter) }
+    }
+    shown
+}

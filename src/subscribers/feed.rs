@@ -72,6 +72,52 @@ pub enum FeedEvent<'a> {
 }
 
 /// The services of one name.
+///
+/// # Examples
+///
+/// A publisher and its subscriber, here in one process:
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use bench_dragon::live::{Outgoing, Publisher};
+/// use bench_dragon::scene::Scene;
+/// use bench_dragon::show::{Playback, Show};
+/// use bench_dragon::subscribers::connection::Wake;
+/// use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
+/// use bench_dragon::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
+/// use bench_dragon::wire::FrameHeader;
+/// use bench_dragon::wire::convert::stage;
+///
+/// let scene = Scene::paper();
+/// let mut show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene))?;
+/// let config = PublisherConfig {
+///     name: format!("feed_example_{}", std::process::id()),
+///     handles: scene.team().handles(),
+///     single_precision: None,
+///     queue: 4,
+///     subscribers: 1,
+///     alerts: true,
+///     cues: false,
+///     stage: stage(1, 0, &scene.motion, &show),
+/// };
+/// let mut publisher = SharedMemoryPublisher::open(&config)?;
+///
+/// let mut feed = Feed::new(&config.name, FeedOptions { wake: Wake::Never, frames: Frames::All })?;
+/// let mut received = 0;
+/// while received < 10 {
+///     let header = FrameHeader { run_id: 1, handles: 224, ..FrameHeader::default() };
+///     publisher.publish(Outgoing::new(&header, show.frame(received)))?;
+///     publisher.maintain();
+///     feed.poll(Duration::from_millis(1), &mut |event| {
+///         if let FeedEvent::Frame { handles, .. } = event {
+///             assert_eq!(handles.len(), 224);
+///             received += 1;
+///         }
+///     })?;
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Feed {
     subscription: Subscription,
     frames: Frames,

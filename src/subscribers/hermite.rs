@@ -31,6 +31,29 @@ impl Snapshot {
 }
 
 /// The latest frames of a stream, and what lies between them.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon::subscribers::hermite::HermiteReader;
+/// use bench_dragon::wire::{FrameHeader, HandlePose};
+///
+/// // Two frames, a second apart, of one handle that moves along x at 2 m/s.
+/// let mut reader = HermiteReader::new(4);
+/// for second in 0..2 {
+///     let header = FrameHeader {
+///         deadline_ns: second * 1_000_000_000,
+///         sim_time: second as f64,
+///         time_scale: 1.0,
+///         handles: 1,
+///         ..FrameHeader::default()
+///     };
+///     reader.push(&header, &[HandlePose { x: 2.0 * second as f64, vx: 2.0, ..HandlePose::default() }]);
+/// }
+/// let mut handles = Vec::new();
+/// assert_eq!(reader.at(250_000_000, &mut handles), Some(0.25));
+/// assert!((handles[0].x - 0.5).abs() < 1e-15);
+/// ```
 #[derive(Debug, Clone)]
 pub struct HermiteReader {
     frames: VecDeque<Snapshot>,

@@ -10,11 +10,13 @@
 //! is true of iceoryx2 alone stands in a paragraph that begins with "Over iceoryx2" and is left out of `msgs/msg`. A
 //! link to a constant or to an enum of `show::state` gives the ROS 2 message those constants.
 
+mod control;
 mod stage;
 
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+pub use control::*;
 pub use stage::*;
 
 /// The bench number that means "no bench".
@@ -23,6 +25,17 @@ pub const NO_BENCH: u32 = u32::MAX;
 /// Where one handle is and how it moves.
 ///
 /// Over iceoryx2 the payload of `<name>/poses` is a slice of these, the head first.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon::wire::HandlePose;
+///
+/// let head = HandlePose { x: 8.8, y: 0.0, heading: 1.58, vx: -0.01, vy: 1.0 };
+/// assert_eq!(size_of::<HandlePose>(), 40);
+/// let speed = head.vx.hypot(head.vy);
+/// assert!((speed - 1.0).abs() < 1e-4, "{speed} m/s");
+/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/HandlePose/1")]
 #[repr(C)]
@@ -66,6 +79,19 @@ pub struct HandlePose32 {
 /// What is true of a whole frame.
 ///
 /// Over iceoryx2 the user header of `<name>/poses` and `<name>/poses32`.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon::show::state::{FrameState, PlaybackState};
+/// use bench_dragon::wire::FrameHeader;
+///
+/// let header = FrameHeader { state: 2, playback: 3, sent_ns: 5_000, ..FrameHeader::default() };
+/// assert_eq!(header.frame_state(), Some(FrameState::Contact));
+/// assert_eq!(header.playback_state(), Some(PlaybackState::Ended));
+/// // A number that a later layout may have.
+/// assert_eq!(FrameHeader { state: 99, ..header }.frame_state(), None);
+/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/FrameHeader/2")]
 #[repr(C)]
@@ -113,6 +139,25 @@ pub struct FrameHeader {
 /// or approaching, the one that has happened otherwise.
 ///
 /// Over iceoryx2 the payload of `<name>/alerts`.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon::motion::event::EventKind;
+/// use bench_dragon::wire::CollisionAlert;
+///
+/// let alert = CollisionAlert {
+///     level: 1,
+///     event: 2,
+///     event_bench_a: 0,
+///     event_bench_b: 8,
+///     time_to_event: 5.5,
+///     ..CollisionAlert::default()
+/// };
+/// assert_eq!(alert.event_kind(), Some(EventKind::Contact));
+/// assert_eq!(alert.event_benches().collect::<Vec<_>>(), [0, 8]);
+/// assert_eq!(alert.nearest_benches().count(), 0);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/CollisionAlert/2")]
 #[repr(C)]
@@ -188,6 +233,16 @@ impl Default for CollisionAlert {
 const SCENE_NAME_BYTES: usize = 64;
 
 /// A name as UTF-8, cut at a character's end and padded with zeros. In JSON and ROS 2 a plain string.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon::wire::SceneName;
+///
+/// assert_eq!(SceneName::new("龙").as_str(), "龙");
+/// // At most 64 bytes, and no half letters.
+/// assert_eq!(SceneName::new(&"龙".repeat(30)).as_str().chars().count(), 21);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend)]
 #[repr(C)]
 pub struct SceneName([u8; SCENE_NAME_BYTES]);
@@ -232,6 +287,16 @@ impl<'de> Deserialize<'de> for SceneName {
 /// all durations are in nanoseconds.
 ///
 /// Over iceoryx2 the payload of `<name>/status`. Layout 2 added the unforeseen contacts and the unsolved frames.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon::wire::{LoopStatus, SceneName};
+///
+/// let status = LoopStatus { rate: 60.0, measured_rate: 59.9, scene: SceneName::new("paper"), ..LoopStatus::default() };
+/// let keeps_up = status.measured_rate > 0.99 * status.rate && status.skipped == 0;
+/// assert!(keeps_up, "{}", status.scene.as_str());
+/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/LoopStatus/2")]
 #[repr(C)]
@@ -296,67 +361,4 @@ pub struct LoopStatus {
     pub file_descriptors: u32,
     /// The scene's name.
     pub scene: SceneName,
-}
-
-/// A cue that the show has reached. Payload of `<name>/cues`.
-///
-/// Each is sent once, with the frame at or after it; a seek over cues sends none.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
-#[type_name("bench_dragon/Cue/1")]
-#[repr(C)]
-pub struct Cue {
-    /// The run, as in [`FrameHeader::run_id`].
-    pub run_id: u64,
-    /// The tick of the frame this cue goes with.
-    pub tick: u64,
-    /// CLOCK_REALTIME in nanoseconds of that frame.
-    pub stamp_ns: u64,
-    /// Simulated seconds of that frame.
-    pub sim_time: f64,
-    /// Simulated seconds at which the cue is.
-    pub cue_time: f64,
-    /// Its number, from 1 in the order of the cues' times.
-    pub number: u32,
-    /// 1 where the show waits there until the command `go`, else 0.
-    pub pauses: u32,
-    /// Its name.
-    pub name: SceneName,
-}
-
-/// A command to a running show. Request of `<name>/control`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
-#[type_name("bench_dragon/ControlRequest/1")]
-#[repr(C)]
-pub struct ControlRequest {
-    /// Any number of the client's; the response repeats it.
-    pub id: u64,
-    /// The value of a command that has one: simulated seconds per second, simulated seconds, or periods.
-    pub value: f64,
-    /// 0 state, 1 pause, 2 resume, 3 rate, 4 seek, 5 step, 6 restart, 7 hold, 8 release, 9 go.
-    pub command: u32,
-    /// Always 0.
-    pub reserved: u32,
-}
-
-/// What became of a command. Response of `<name>/control`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
-#[type_name("bench_dragon/ControlResponse/1")]
-#[repr(C)]
-pub struct ControlResponse {
-    /// That of the request.
-    pub id: u64,
-    /// The period at whose beginning the command was obeyed.
-    pub tick: u64,
-    /// Simulated seconds of that period.
-    pub sim_time: f64,
-    /// Simulated seconds per second, as in force.
-    pub time_scale: f64,
-    /// 0 done, 1 already so, 2 refused in this state, 3 value out of range, 4 not understood, 5 too many waiting.
-    pub code: u32,
-    /// Whether simulated time advances, as in [`FrameHeader::playback`].
-    pub playback: u32,
-    /// The latest cue passed, from 1; 0 where none has been.
-    pub cue: u32,
-    /// Always 0.
-    pub reserved: u32,
 }

@@ -1,4 +1,4 @@
-//! The contents of `src/wire/layouts.rs` and the file below it, `src/show/state.rs` and `src/motion/event.rs`, read from
+//! The contents of `src/wire/layouts.rs` and the files below it, `src/show/state.rs` and `src/motion/event.rs`, read from
 //! their text: layouts, constants, enums, and the doc comments on all of them.
 
 use std::collections::BTreeMap;
@@ -34,7 +34,7 @@ pub enum Kind {
     Array(Box<Kind>, u64),
 }
 
-/// The paragraphs of a doc comment.
+/// The paragraphs of a doc comment, without its examples, which are for Rust alone.
 pub type Docs = Vec<String>;
 
 pub struct Field {
@@ -83,8 +83,8 @@ pub struct Source {
 impl Source {
     /// Reads the sources of this checkout.
     pub fn read() -> Self {
-        let layouts: Vec<_> =
-            ["src/wire/layouts.rs", "src/wire/layouts/stage.rs"].into_iter().flat_map(items).collect();
+        let files = ["src/wire/layouts.rs", "src/wire/layouts/control.rs", "src/wire/layouts/stage.rs"];
+        let layouts: Vec<_> = files.into_iter().flat_map(items).collect();
         let (states, events) = (items("src/show/state.rs"), items("src/motion/event.rs"));
         let mut enums: Vec<_> = states.iter().filter_map(enumeration).collect();
         let mut kinds = events.iter().filter_map(enumeration).find(|item| item.name == "EventKind").unwrap();
@@ -161,7 +161,7 @@ fn docs(attributes: &[Attribute]) -> Docs {
         },
         _ => None,
     });
-    let lines: Vec<_> = lines.collect();
+    let lines: Vec<_> = lines.take_while(|line| line != "# Examples").collect();
     lines.split(String::is_empty).map(|paragraph| paragraph.join(" ")).filter(|text| !text.is_empty()).collect()
 }
 

@@ -15,8 +15,8 @@ use bench_dragon::subscribers::control::{refusal, standing};
 use bench_dragon::subscribers::feed::FeedEvent;
 use signal_hook::consts::{SIGCONT, SIGQUIT, SIGTSTP};
 
+use super::super::CommandError;
 use super::terminal::{Key, KeyMode};
-use crate::commands::CommandError;
 
 /// What `?` prints.
 const HELP: &str = "Keys: space pauses and resumes; left and right seek 5 s; [ and ] halve and double the rate; \

@@ -20,6 +20,7 @@ use serde::de::DeserializeOwned;
 use super::index::{Index, index, told};
 use super::recover::records_of_chunk;
 use crate::ros2_messages::{HandlePoses, Header, MessageType, Stamped, fields};
+use crate::scene::printable;
 use crate::scene::ros2::Topic;
 use crate::wire::{CollisionAlert, Cue, FrameHeader, LoopStatus, Stage};
 
@@ -47,10 +48,10 @@ pub enum ReadError {
     #[error("it has no topic {0}, expected a recording with the topics handles and stage")]
     NoTopic(&'static str),
     /// Frames of several publishers.
-    #[error("it has frames of several publishers ({0}), expected those of one")]
+    #[error("it has frames of several publishers ({}), expected those of one", printable(.0))]
     Publishers(String),
     /// The messages of a topic are of another type, or in another encoding.
-    #[error("its topic {topic} has {found}, expected {expected}")]
+    #[error("its topic {} has {}, expected {expected}", printable(.topic), printable(.found))]
     Type {
         /// The topic.
         topic: String,
@@ -60,7 +61,10 @@ pub enum ReadError {
         expected: String,
     },
     /// The type has the same name and other fields.
-    #[error("its topic {topic} has other fields than {of} of this version, expected a recording of the same version")]
+    #[error(
+        "its topic {} has other fields than {of} of this version, expected a recording of the same version",
+        printable(.topic)
+    )]
     Fields {
         /// The topic.
         topic: String,
@@ -71,7 +75,7 @@ pub enum ReadError {
     #[error("it has no frames")]
     NoFrames,
     /// A chunk or a message cannot be read.
-    #[error("it is damaged at byte {at} ({reason}): mend it with bench-dragon record --recover")]
+    #[error("it is damaged at byte {at} ({}): mend it with bench-dragon record --recover", printable(.reason))]
     Damaged {
         /// Where the chunk begins.
         at: u64,

@@ -95,6 +95,22 @@ pub struct StageCue {
 ///
 /// Over iceoryx2 the payload of `<name>/stage`. Layout 2 added the segments of the path, layout 3 gave them their name,
 /// layout 4 added the time line: the freeze time, the events and the cues.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon::motion::event::EventKind;
+/// use bench_dragon::scene::Scene;
+/// use bench_dragon::show::{Playback, Show};
+/// use bench_dragon::wire::convert::stage;
+///
+/// let scene = Scene::paper();
+/// let show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+/// let stage = stage(1, 0, &scene.motion, &show);
+/// assert_eq!((stage.benches, stage.path_in_use()[0].kind_name()), (223, "inward_spiral"));
+/// assert_eq!(stage.events_in_use()[0].kind(), Some(EventKind::Contact));
+/// assert!((stage.freeze_time - 412.473_837_682).abs() < 1e-9);
+/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/Stage/4")]
 #[repr(C)]

@@ -1,0 +1,135 @@
+//! Command lines, an argument a line: understood, or refused with a sentence and exit code 2. Nothing is carried out.
+
+#[path = "../../../src/main.rs"]
+#[allow(dead_code, unused_imports, reason = "the program's sources, of which its command line is used")]
+mod program;
+
+use std::sync::OnceLock;
+
+use clap::{CommandFactory, Parser};
+use fastrand::Rng;
+use program::CommandLine;
+
+use super::Target;
+use super::bytes::{NUMBERS, changed, one, renumbered};
+
+pub const TARGET: Target = Target { name: "command_line", run, seeds, mutate, cases: 4000 };
+
+/// Arguments of a case.
+const MOST_ARGUMENTS: usize = 40;
+
+fn run(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let arguments: Vec<&str> = text.lines().take(MOST_ARGUMENTS).collect();
+    // Names of hosts are looked up in the network.
+    if arguments.iter().any(|argument| argument.starts_with("--to") || *argument == "send") && !is_numeric(&arguments) {
+        return;
+    }
+    if let Err(error) = CommandLine::try_parse_from(["bench-dragon"].iter().chain(&arguments)) {
+        let shown = error.render().to_string();
+        assert!([0, 2].contains(&error.exit_code()) && !shown.is_empty(), "{arguments:?}: {shown}");
+        assert_eq!(error.exit_code() == 0, !error.use_stderr(), "{arguments:?}: {shown}");
+    }
+}
+
+/// Whether no argument that could be a host is a name.
+fn is_numeric(arguments: &[&str]) -> bool {
+    let is_host = |text: &&&str| text.contains(':') || text.contains("--to");
+    arguments
+        .iter()
+        .filter(is_host)
+        .all(|text| text.bytes().all(|byte| !byte.is_ascii_alphabetic() || b"to".contains(&byte)))
+        && arguments.iter().all(|text| !text.contains("--to") || *text == "--to")
+        && !arguments.windows(2).any(|pair| pair[0] == "--to" && !pair[1].starts_with(|c: char| c.is_ascii_digit()))
+}
+
+/// What command lines are made of.
+struct Words {
+    /// Every subcommand, a line each: `send` and `psn`.
+    commands: Vec<String>,
+    options: Vec<String>,
+    /// Each subcommand with each option of its own.
+    pairs: Vec<String>,
+}
+
+fn words() -> &'static Words {
+    static WORDS: OnceLock<Words> = OnceLock::new();
+    WORDS.get_or_init(|| {
+        let mut words = Words {
+            commands: Vec::new(),
+            options: ["-v", "-o", "-h", "-V", "--"].map(str::to_owned).to_vec(),
+            pairs: Vec::new(),
+        };
+        let mut left = vec![(String::new(), CommandLine::command())];
+        while let Some((path, command)) = left.pop() {
+            for argument in command.get_arguments().filter_map(clap::Arg::get_long) {
+                words.options.push(format!("--{argument}"));
+                words.pairs.push(format!("{path}--{argument}"));
+            }
+            for subcommand in command.get_subcommands() {
+                let path = format!("{path}{}\n", subcommand.get_name());
+                words.commands.push(path.trim_end().to_owned());
+                left.push((path, subcommand.clone()));
+            }
+        }
+        words.options.sort();
+        words.options.dedup();
+        words
+    })
+}
+
+const VALUES: [&str; 22] = [
+    "60",
+    "90s",
+    "8h",
+    "1e400h",
+    "s",
+    "",
+    "contact",
+    "0,60,contact",
+    "all",
+    "head,20-40",
+    "1,2,9",
+    "x,-y,z",
+    "dark",
+    "127.0.0.1:9464",
+    "10.0.0.5:7",
+    "https://show.example",
+    "frames/%05d.svg",
+    "1GB",
+    "\u{9f99}",
+    "-1",
+    "show.mcap",
+    "play",
+];
+
+fn seeds() -> Vec<Vec<u8>> {
+    let Words { commands, pairs, .. } = words();
+    let values = VALUES.iter().chain(&NUMBERS);
+    let given = pairs.iter().flat_map(|pair| values.clone().map(move |value| format!("{pair}={value}")));
+    commands.iter().chain(pairs).cloned().chain(given).map(String::into_bytes).collect()
+}
+
+fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
+    let Words { commands, options, .. } = words();
+    let text = String::from_utf8_lossy(data).into_owned();
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    for _ in 0..1 + random.usize(..4) {
+        let made = match random.u8(..6) {
+            0 => one(commands, random).clone(),
+            1 | 2 => one(options, random).clone(),
+            3 => (*one(&NUMBERS, random)).to_owned(),
+            4 => format!("{}={}", one(options, random), one(&VALUES, random)),
+            _ => (*one(&VALUES, random)).to_owned(),
+        };
+        let at = random.usize(..=lines.len());
+        match random.u8(..8) {
+            0 => return changed(text.as_bytes(), random),
+            1 => return renumbered(&text, random).into_bytes(),
+            2 if at < lines.len() => drop(lines.remove(at)),
+            3 if at < lines.len() => lines[at] = made,
+            _ => lines.insert(at, made),
+        }
+    }
+    lines.join("\n").into_bytes()
+}

@@ -1,0 +1,93 @@
+//! Environment variables, a line each (`ROS_DOMAIN_ID=7`), and names: honoured, or refused with a sentence that names them.
+
+use bench_dragon::transports::iceoryx2::service_name;
+use bench_dragon::transports::ros2::Mapping;
+use bench_dragon::transports::ros2::environment::{Network, Range, check_name, other_distribution};
+use fastrand::Rng;
+
+use super::Target;
+use super::bytes::{changed, one, renumbered};
+
+pub const TARGET: Target = Target { name: "environment", run, seeds, mutate, cases: 100_000 };
+
+const VARIABLES: [&str; 6] = [
+    "ROS_DOMAIN_ID",
+    "ROS_AUTOMATIC_DISCOVERY_RANGE",
+    "ROS_LOCALHOST_ONLY",
+    "ROS_STATIC_PEERS",
+    "ROS_DISTRO",
+    "RMW_IMPLEMENTATION",
+];
+const VALUES: [&str; 20] = [
+    "",
+    " ",
+    "0",
+    "1",
+    "42",
+    "232",
+    "233",
+    "65536",
+    "-1",
+    "+7",
+    "0x10",
+    "SUBNET",
+    "LOCALHOST",
+    "OFF",
+    "SYSTEM_DEFAULT",
+    "humble",
+    "jazzy",
+    "rmw_fastrtps_cpp",
+    "rmw_cyclonedds_cpp",
+    "\u{9f99}",
+];
+
+fn run(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let lines: Vec<(&str, &str)> = text.lines().filter_map(|line| line.split_once('=')).collect();
+    let variable = |name: &str| lines.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned());
+    let set = |name: &str| variable(name).filter(|value| !value.trim().is_empty());
+    match Network::of(variable) {
+        Ok(network) => {
+            let domain = set("ROS_DOMAIN_ID").map_or(Ok(0), |text| text.trim().parse::<i128>());
+            assert_eq!(domain, Ok(i128::from(network.domain)));
+            assert!(network.domain <= 232 && set("ROS_STATIC_PEERS").is_none(), "{network:?}");
+            // Whoever asks for this machine alone gets no more.
+            let alone = set("ROS_LOCALHOST_ONLY").is_some_and(|value| value.trim() == "1");
+            assert!(!alone || network.range == Range::Localhost, "{network:?}");
+            assert!(network.sentence().contains(&network.domain.to_string()));
+        }
+        Err(error) => {
+            let sentence = error.to_string();
+            assert!(VARIABLES.iter().any(|name| sentence.contains(name) && set(name).is_some()), "{sentence}");
+        }
+    }
+    let (_, warning) = Mapping::of(variable);
+    assert!(warning.is_none_or(|text| text.contains("RMW_IMPLEMENTATION")));
+    assert!(other_distribution(variable).is_none_or(|text| text.contains("ROS_DISTRO")));
+    // The rest of each line as a name.
+    for (_, name) in lines {
+        if check_name(name).is_ok() {
+            assert!(name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"_/".contains(&byte)), "{name}");
+            assert!(
+                !name.is_empty() && !name.starts_with('/') && !name.ends_with('/') && !name.contains("__"),
+                "{name}"
+            );
+        }
+        let _ = service_name(name, "poses");
+    }
+}
+
+fn seeds() -> Vec<Vec<u8>> {
+    let pairs = VARIABLES.iter().flat_map(|name| VALUES.iter().map(move |value| format!("{name}={value}\n")));
+    let all = VARIABLES.iter().zip(VALUES.iter().skip(2)).map(|(name, value)| format!("{name}={value}\n"));
+    pairs.chain([all.collect()]).map(String::into_bytes).collect()
+}
+
+fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
+    let text = String::from_utf8_lossy(data).into_owned();
+    match random.u8(..4) {
+        0 => changed(data, random),
+        1 => renumbered(&text, random).into_bytes(),
+        _ => format!("{}={}\n{text}", one(&VARIABLES, random), one(&VALUES, random)).into_bytes(),
+    }
+}

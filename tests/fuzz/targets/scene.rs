@@ -1,0 +1,198 @@
+//! A scene as text: it is refused with a sentence, or it is played and every frame is what is promised.
+
+use bench_dragon::model::curve::Side;
+use bench_dragon::motion::Method;
+use bench_dragon::scene::Scene;
+use bench_dragon::show::{Frame, Playback, Show};
+use bench_dragon::solve::Velocities;
+use bench_dragon::wire::convert::{Stamps, collision_alert, frame_header, stage};
+use bench_dragon::wire::sentence::{Figures, alert_sentence};
+use fastrand::Rng;
+
+use super::Target;
+use super::bytes::{changed, one, renumbered};
+
+pub const TARGET: Target = Target { name: "scene", run, seeds, mutate, cases: 500 };
+
+/// Benches of the largest team that is played, and links along the longest path: what is larger takes its time.
+const MOST_BENCHES: usize = 30;
+const MOST_LINKS: f64 = 400.0;
+/// Frames of a show.
+const FRAMES: u64 = 40;
+
+fn run(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    match Scene::parse(text, "fuzz.toml", "fuzz") {
+        Err(error) => {
+            let sentence = error.to_string();
+            assert!(sentence.starts_with("fuzz.toml"), "{sentence}");
+            assert!(!sentence.contains(char::is_control), "{sentence:?}");
+        }
+        Ok(scene) if is_small(&scene) => play(&scene),
+        Ok(_) => (),
+    }
+}
+
+/// Whether a scene is played within a moment.
+pub fn is_small(scene: &Scene) -> bool {
+    let team = scene.team();
+    let paper_steps = match scene.motion.method() {
+        Method::Paper(rules) => scene.motion.path().length() / scene.motion.head_speed() / rules.time_step,
+        _ => 0.0,
+    };
+    team.benches <= MOST_BENCHES
+        && scene.motion.path().length() + team.length() <= MOST_LINKS * team.shortest_link()
+        && paper_steps <= 1e6
+}
+
+fn play(scene: &Scene) {
+    let timeline = match scene.alerts {
+        Some(_) => scene.motion.timeline(&mut |_| ()),
+        None => scene.motion.timeline_without_contact(),
+    };
+    let is_searched = timeline.searched_until().is_none();
+    let stop = timeline.freeze(scene.stops_at_contact()).time;
+    assert!(timeline.events().iter().all(|timed| timed.time.is_finite()), "{timeline:?}");
+    // Once through the whole show and a little further, whatever its length.
+    let playback = Playback::of(scene);
+    let time_scale = (1.1 * stop * playback.rate / FRAMES as f64).clamp(1e-6, 1e6);
+    // A show that begins where it ends is refused.
+    let Ok(mut show) = Show::new(scene, timeline, Playback { time_scale, ..playback }) else { return };
+    let stage = stage(1, 0, &scene.motion, &show);
+    let sizes = [stage.hole_inset, stage.head_length, stage.body_length, stage.width, stage.freeze_time];
+    assert!(sizes.iter().all(|number| number.is_finite()), "{stage:?}");
+    let mut last = 0.0;
+    for tick in 0..FRAMES {
+        let frame = show.frame(tick);
+        let looped = std::mem::replace(&mut last, frame.sim_time) > frame.sim_time;
+        assert!(!looped || frame.epoch > 0, "time goes back at tick {tick}");
+        check(scene, frame, is_searched);
+        let header = frame_header(frame, Stamps { run_id: 1, sequence: tick, stamp_ns: 0, deadline_ns: 0 });
+        let figures = Figures::Shown { time_scale: frame.time_scale };
+        for alert in &frame.alerts {
+            let sentence = alert_sentence(&collision_alert(&header, alert), stage.benches, figures);
+            assert!(!sentence.contains("NaN") && !sentence.contains("inf"), "{sentence}");
+        }
+    }
+}
+
+/// What is promised of a frame.
+fn check(scene: &Scene, frame: &Frame, is_searched: bool) {
+    let (chain, team, tick) = (&frame.chain, scene.team(), frame.tick);
+    let finite = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
+    assert!(finite(&[frame.sim_time, frame.time_scale]), "tick {tick}: {} s", frame.sim_time);
+    assert!(finite(&chain.x) && finite(&chain.y) && finite(&chain.heading), "tick {tick}: {chain:?}");
+    let pi = std::f64::consts::PI;
+    assert!(chain.heading.iter().all(|heading| *heading > -pi - 1e-15 && *heading <= pi), "tick {tick}: {chain:?}");
+    // At a lock the speed of a handle has no bound.
+    let moves = scene.velocities == Velocities::Computed;
+    assert!(!moves || chain.vx.iter().chain(&chain.vy).all(|speed| !speed.is_nan()), "tick {tick}: {chain:?}");
+    if scene.alerts.is_some() && team.benches >= 3 {
+        assert!(frame.min_clearance.is_finite(), "tick {tick}: {} m", frame.min_clearance);
+    }
+    if matches!(scene.motion.method(), Method::Paper(_)) {
+        return;
+    }
+    assert!(!is_searched || frame.unsolved_frames == 0, "tick {tick}: unsolved at {} s", frame.sim_time);
+    assert!(!is_searched || frame.unforeseen_contacts == 0, "tick {tick}: a contact at {} s", frame.sim_time);
+    let furthest = chain.x.iter().zip(&chain.y).map(|(x, y)| x.hypot(*y)).fold(0.0, f64::max);
+    for bench in 0..team.benches {
+        let link = (chain.x[bench] - chain.x[bench + 1]).hypot(chain.y[bench] - chain.y[bench + 1]);
+        let ulp = furthest.next_up() - furthest;
+        let tolerance = 1e-12 * team.link(bench) + 4.0 * ulp + scene.motion.link_tolerance();
+        let off = (link - team.link(bench)).abs();
+        assert!(off <= tolerance, "tick {tick}, bench {bench}: off by {off:e} m, expected {tolerance:e}");
+    }
+}
+
+/// Scenes of each kind of path, small enough to be played.
+pub fn seeds() -> Vec<Vec<u8>> {
+    let team = |benches: u32| {
+        format!(
+            "[team]\nbenches = {benches}\nhead_length = 3.41\nbody_length = 2.20\nwidth = 0.30\nhole_inset = 0.275\n"
+        )
+    };
+    let spiral = "[path]\nkind = \"spiral\"\npitch = 0.9\nstart_turn = 4.0\n";
+    let turnaround =
+        "[path]\nkind = \"turnaround\"\npitch = 1.7\nturn_radius = 4.5\narc_ratio = 2\nlead_in = 10\nlead_out = 20\n";
+    let route = "[path]\nkind = \"pieces\"\nstart = [1.0, -2.0]\nheading_turns = 0.1\n[[path.pieces]]\nkind = \"line\"\n\
+                 length = 12.0\n[[path.pieces]]\nkind = \"arc\"\nradius = 3.0\nside = \"left\"\nturns = 0.5\n\
+                 [[path.pieces]]\nkind = \"line\"\nlength = 9.0\n";
+    let motion = "[motion]\nhead_speed = 1.0\non_contact = \"continue\"\n[alerts]\napproach_time = 3.0\n";
+    let cues = "[[cues]]\nname = \"near\"\nbefore = \"contact\"\nseconds = 2.0\n[[cues]]\nname = \"wait\"\nat = 3.0\n\
+                then = \"pause\"\n[publish]\nrate = 50.0\nprecision = \"f32\"\nevery = 3\n";
+    let paper = "[motion]\nhead_speed = 1.0\nsolver = \"paper\"\n[motion.paper]\ntime_step = 0.01\n[alerts]\n";
+    let newton = "[motion]\nhead_speed = 2.0\nsolver = \"newton\"\nat_end = \"loop\"\nend_hold = 0.1\n[alerts]\n";
+    [
+        team(12) + spiral + motion,
+        team(9) + turnaround + newton,
+        team(7) + route + motion + cues,
+        team(5) + spiral + paper,
+        team(3) + route + "[motion]\nhead_speed = 1.0\naccuracy = 1e-4\n",
+    ]
+    .map(String::into_bytes)
+    .to_vec()
+}
+
+/// Lines that a scene may have.
+const LINES: [&str; 24] = [
+    "on_contact = \"stop\"",
+    "on_contact = \"continue\"",
+    "at_end = \"loop\"",
+    "end_hold = 0",
+    "accuracy = 1e-6",
+    "solver = \"newton\"",
+    "solver = \"follower_table\"",
+    "solver = \"paper\"",
+    "[alerts]",
+    "[publish]",
+    "velocities = false",
+    "precision = \"f32\"",
+    "every = 2",
+    "[[cues]]",
+    "name = \"\u{9f99}\"",
+    "travelled = 3.0",
+    "before = \"lock\"",
+    "then = \"pause\"",
+    "[[path.pieces]]",
+    "kind = \"arc\"",
+    "side = \"right\"",
+    "[publish.ros2]",
+    "topics = [\"handles\"]",
+    "lead_in = 0",
+];
+
+pub fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
+    let Ok(text) = std::str::from_utf8(data) else { return changed(data, random) };
+    let mut text = text.to_owned();
+    for _ in 0..1 + random.usize(..3) {
+        match random.u8(..12) {
+            0 => return changed(text.as_bytes(), random),
+            1 | 2 => {
+                let mut lines: Vec<&str> = text.lines().collect();
+                let at = random.usize(..=lines.len());
+                match random.u8(..3) {
+                    0 => lines.insert(at, *one(&LINES, random)),
+                    1 if at < lines.len() => drop(lines.remove(at)),
+                    _ if at < lines.len() => lines.insert(random.usize(..=lines.len()), lines[at]),
+                    _ => (),
+                }
+                text = lines.join("\n") + "\n";
+            }
+            3 => text += &segment(random),
+            _ => text = renumbered(&text, random),
+        }
+    }
+    text.into_bytes()
+}
+
+/// One more segment of a route.
+fn segment(random: &mut Rng) -> String {
+    let size = 10f64.powf(3.0 * random.f64() - 1.5);
+    if random.bool() {
+        return format!("[[path.pieces]]\nkind = \"line\"\nlength = {size}\n");
+    }
+    let (side, turns) = (if random.bool() { Side::Left } else { Side::Right }, 1.2 * random.f64() + 1e-3);
+    let side = if side == Side::Left { "left" } else { "right" };
+    format!("[[path.pieces]]\nkind = \"arc\"\nradius = {size}\nside = \"{side}\"\nturns = {turns}\n")
+}
