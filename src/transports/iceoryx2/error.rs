@@ -6,6 +6,7 @@ use ::iceoryx2::service::builder::publish_subscribe::{
     PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
 };
 
+use super::MOST_PUBLISHERS;
 use super::memory::SHARED_MEMORY;
 use crate::transports::TransportError;
 
@@ -23,6 +24,12 @@ pub enum OpenError {
     /// Somebody publishes under this name already.
     #[error("another publisher is running under the name \"{0}\": stop it, or choose another name for this one")]
     AlreadyPublished(String),
+    /// A service has as many publishers as it admits.
+    #[error(
+        "\"{0}\" has {MOST_PUBLISHERS} publishers, which is as many as it admits, a tunnel to other machines included: end \
+         one of them, or choose another name"
+    )]
+    TooManyPublishers(String),
     /// The queues would not fit.
     #[error(
         "the queues of {queue} frames for {subscribers} subscribers need {needed} bytes of shared memory and \
@@ -93,9 +100,10 @@ impl From<OpenError> for TransportError {
         let sentence = error.to_string();
         match error {
             OpenError::Name { .. } => Self::IllegalName(sentence),
-            OpenError::AlreadyPublished(_) | OpenError::Incomplete(_) | OpenError::Incompatible(_) => {
-                Self::NameInUse(sentence)
-            }
+            OpenError::AlreadyPublished(_)
+            | OpenError::TooManyPublishers(_)
+            | OpenError::Incomplete(_)
+            | OpenError::Incompatible(_) => Self::NameInUse(sentence),
             _ => Self::Failed(sentence),
         }
     }
@@ -125,7 +133,9 @@ pub(super) fn service_error(service: &ServiceName, error: PublishSubscribeOpenOr
 
 pub(super) fn port_error(name: &str, service: &str, error: PublisherCreateError) -> OpenError {
     match error {
-        PublisherCreateError::ExceedsMaxSupportedPublishers => OpenError::AlreadyPublished(name.to_owned()),
+        PublisherCreateError::ExceedsMaxSupportedPublishers => {
+            OpenError::TooManyPublishers(format!("{name}/{service}"))
+        }
         other => failed(name, service, other),
     }
 }
