@@ -220,6 +220,11 @@ impl SharedMemoryPublisher {
             .open_or_create()
             .map_err(|error| match error {
                 EventOpenOrCreateError::EventOpenError(EventOpenError::HangsInCreation) => incomplete(name, "tick"),
+                // A tunnel that listens to it was started first.
+                EventOpenOrCreateError::EventOpenError(
+                    EventOpenError::DoesNotSupportRequestedAmountOfNodes
+                    | EventOpenError::DoesNotSupportRequestedAmountOfListeners,
+                ) => OpenError::OtherLimits(format!("{name}/tick")),
                 other => failed(name, "tick", other),
             })?;
         let tick = tick_service.notifier_builder().create().map_err(|error| failed(name, "tick", error))?;

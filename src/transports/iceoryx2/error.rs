@@ -74,6 +74,18 @@ pub enum OpenError {
          name"
     )]
     Incompatible(String),
+    /// A service of this name exists with other attributes.
+    #[error(
+        "the service \"{0}\" exists with other attributes: a tunnel brings it from another machine, or a subscriber keeps that \
+         of another scene open; end that, or choose another name"
+    )]
+    OtherAttributes(String),
+    /// A program has opened a service before its publisher, with limits of its own.
+    #[error(
+        "the service \"{0}\" exists with lower limits than this scene asks for: a program that was started before the show \
+         has made it, such as a tunnel that listens to it; start that after the show"
+    )]
+    OtherLimits(String),
     /// The service admits no more subscribers.
     #[error(
         "\"{service}\" has {most} subscribers, which is as many as its publisher admits (publish.subscribers in its \
@@ -103,7 +115,9 @@ impl From<OpenError> for TransportError {
             OpenError::AlreadyPublished(_)
             | OpenError::TooManyPublishers(_)
             | OpenError::Incomplete(_)
-            | OpenError::Incompatible(_) => Self::NameInUse(sentence),
+            | OpenError::Incompatible(_)
+            | OpenError::OtherAttributes(_)
+            | OpenError::OtherLimits(_) => Self::NameInUse(sentence),
             _ => Self::Failed(sentence),
         }
     }
@@ -113,6 +127,9 @@ pub(super) fn service_error(service: &ServiceName, error: PublishSubscribeOpenOr
     use PublishSubscribeOpenError as Open;
     if matches!(error, PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(Open::HangsInCreation)) {
         return OpenError::Incomplete(service.to_string());
+    }
+    if matches!(error, PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(Open::IncompatibleAttributes)) {
+        return OpenError::OtherAttributes(service.to_string());
     }
     let incompatible = match &error {
         PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(open) => !matches!(
