@@ -3,8 +3,10 @@
 
 mod processes;
 
+use std::path::Path;
 use std::process::{Command, Output};
 
+use processes::hosts::Hosts;
 use processes::{
     Process, can_run, json_lines, long, not_run, program, python, python_modules, scene_file, summary, text, unique,
     wait,
@@ -335,12 +337,7 @@ fn two_hosts_find_each_other_by_multicast_or_where_the_subscriber_names_the_publ
         Ok(hosts) => hosts,
         Err(why) => return not_run(&format!("two hosts need network namespaces (root and iproute2): {}", why.trim())),
     };
-    let on = |host: &str, command: &Command| {
-        let mut inside = Command::new("ip");
-        inside.args(["netns", "exec", &unique(host)]).arg(command.get_program()).args(command.get_args());
-        inside.current_dir(env!("CARGO_MANIFEST_DIR"));
-        inside
-    };
+    let on = |host: &str, command: &Command| hosts.on(host, Path::new(env!("CARGO_MANIFEST_DIR")), command);
     for (range, multicast, peers, expected) in [
         ("SUBNET", "on", "", true),
         ("LOCALHOST", "on", "", false),
@@ -361,53 +358,6 @@ fn two_hosts_find_each_other_by_multicast_or_where_the_subscriber_names_the_publ
         println!("{case}");
         assert_eq!(count > 20, expected, "{case}; {}", text(&output.stderr));
         summary(&publisher.output_within(30));
-    }
-}
-
-/// Two network namespaces joined by a cable, each with one address.
-struct Hosts {
-    ends: [String; 2],
-}
-
-impl Hosts {
-    /// Whether the cable carries multicast: "on" or "off".
-    fn set_multicast(&self, multicast: &str) {
-        for (host, end) in ["left", "right"].map(unique).iter().zip(&self.ends) {
-            ip(&format!("-n {host} link set {end} multicast {multicast}")).unwrap();
-        }
-    }
-
-    /// # Errors
-    /// The reason why this process may not make namespaces.
-    fn new() -> Result<Self, String> {
-        let ends = ["l", "r"].map(|side| format!("bd{side}{}", std::process::id()));
-        let hosts = Self { ends };
-        let ends = &hosts.ends;
-        let [left, right] = ["left", "right"].map(unique);
-        ip(&format!("netns add {left}"))?;
-        ip(&format!("netns add {right}"))?;
-        ip(&format!("link add {} netns {left} type veth peer name {} netns {right}", ends[0], ends[1]))?;
-        for (host, end, address) in [(&left, &ends[0], "10.77.0.1/24"), (&right, &ends[1], "10.77.0.2/24")] {
-            ip(&format!("-n {host} address add {address} dev {end}"))?;
-            ip(&format!("-n {host} link set lo up"))?;
-            ip(&format!("-n {host} link set {end} up multicast on"))?;
-            ip(&format!("-n {host} route add default dev {end}"))?;
-        }
-        Ok(hosts)
-    }
-}
-
-/// Runs `ip`.
-fn ip(arguments: &str) -> Result<(), String> {
-    let output = Command::new("ip").args(arguments.split_whitespace()).output().map_err(|error| error.to_string())?;
-    if output.status.success() { Ok(()) } else { Err(text(&output.stderr)) }
-}
-
-impl Drop for Hosts {
-    fn drop(&mut self) {
-        for host in ["left", "right"] {
-            let _ = Command::new("ip").args(["netns", "delete", &unique(host)]).output();
-        }
     }
 }
 

@@ -106,6 +106,7 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
                 printed = screen.print_event(&event);
             }
         })?;
+        monitor.clock(feed.shares_clock());
         printed?;
     }
     Ok(())
@@ -233,10 +234,14 @@ impl Screen<'_> {
         };
         let state = report.state().unwrap_or(FrameState::Moving);
         let style = self.style(state.severity());
-        let latency = report.latency.map_or("no frames".to_owned(), |latency| {
-            let us = |ns: u64| ns as f64 / 1000.0;
-            format!("p50 {:.1} p99 {:.1} max {:.1} us", us(latency.p50), us(latency.p99), us(latency.max))
-        });
+        let latency = match report.latency {
+            Some(Latency { p50, p99, max }) => {
+                let us = |ns: u64| ns as f64 / 1000.0;
+                format!("p50 {:.1} p99 {:.1} max {:.1} us", us(p50), us(p99), us(max))
+            }
+            None if !report.shares_clock => "unknown: the frames were sent by another machine's clock".to_owned(),
+            None => "no frames".to_owned(),
+        };
         let playback = header.playback_state().filter(|playback| *playback != PlaybackState::Playing);
         let playback = playback.map_or(String::new(), |playback| format!(" ({})", playback.name()));
         let silent = if report.presence == Presence::Silent { " (silent)" } else { "" };

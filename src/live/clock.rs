@@ -48,6 +48,16 @@ pub fn realtime_ns() -> u64 {
     now(ClockId::CLOCK_REALTIME)
 }
 
+/// Which CLOCK_MONOTONIC this process reads, as text: the start of the machine and the time namespace that it counts from.
+/// Moments of clocks with different names cannot be compared.
+pub fn monotonic_clock_name() -> String {
+    // Both are the same in every container of a machine, but in one that has a time namespace of its own. Where a sandbox has
+    // neither file, nothing distinguishes its processes.
+    let boot = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").unwrap_or_default();
+    let namespace = std::fs::read_link("/proc/self/ns/time").unwrap_or_default();
+    format!("{} {}", boot.trim(), namespace.display())
+}
+
 fn now(clock: ClockId) -> u64 {
     // Linux has both clocks, and neither call has another way to fail.
     clock_gettime(clock).map_or(0, |time| time.tv_sec() as u64 * 1_000_000_000 + time.tv_nsec() as u64)

@@ -1,8 +1,12 @@
 //! A subscriber's ends of a publisher's services: the thin layer over iceoryx2. In: a name. Out: what is in the queues.
 //!
-//! It keeps no time and no counts: when to open, read and let go is up to the [`feed`](super::feed), which calls it.
+//! It keeps no counts: when to open, read and let go is up to the [`feed`](super::feed), which calls it. In [`followed`], whose
+//! messages are read where a service has more than one publisher.
 
-use std::time::Duration;
+mod followed;
+
+use std::cell::{Cell, RefCell};
+use std::time::{Duration, Instant};
 
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::subscriber::Subscriber as Port;
@@ -11,10 +15,17 @@ use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError as 
 use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use crate::transports::iceoryx2::{OpenError, check_room_to_subscribe, node, reserve_pages, service_name, stale_files};
-use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+use crate::live::clock::monotonic_clock_name;
+use crate::transports::iceoryx2::{
+    CLOCK, OpenError, check_room_to_subscribe, node, reserve_pages, service_name, stale_files,
+};
+use crate::wire::{CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+use followed::{Followed, OfRun, Origin, publishers};
 
 type Receiver<Payload, Header> = Port<ipc::Service, Payload, Header>;
+
+/// How long publishers that have sent nothing are left alone before they are tried again.
+const BYSTANDER_INTERVAL: Duration = Duration::from_secs(5);
 
 /// A publisher's services, as far as they exist.
 pub struct Connection {
@@ -28,6 +39,7 @@ pub struct Connection {
     status_service: Option<PortFactory<ipc::Service, LoopStatus, ()>>,
     stage: Option<Receiver<Stage, ()>>,
     tick: Option<Listener<ipc::Service>>,
+    followed: Cell<Option<Followed>>,
 }
 
 /// A subscriber's node, with which it opens services.
@@ -35,6 +47,9 @@ pub struct Subscription {
     node: Node<ipc::Service>,
     name: String,
     wake: Wake,
+    /// Publishers that do not send, and since when that is known: the ends of tunnels to other machines. To hold on to their
+    /// services would keep the tunnel open.
+    bystanders: RefCell<(Instant, Vec<Origin>)>,
 }
 
 /// How a subscriber learns that a frame has come.
@@ -55,7 +70,8 @@ impl Subscription {
         service_name(name, "poses")?;
         check_room_to_subscribe()?;
         stale_files::spawn_reaper();
-        Ok(Self { node: node()?, name: name.to_owned(), wake })
+        let bystanders = RefCell::new((Instant::now(), Vec::new()));
+        Ok(Self { node: node()?, name: name.to_owned(), wake, bystanders })
     }
 
     /// Connects to the publisher, or `None` while there is none.
@@ -78,7 +94,7 @@ impl Subscription {
             }
         };
         // Other subscribers keep a service when its publisher has gone. One more would keep it from being made anew.
-        if poses_service.dynamic_config().number_of_publishers() == 0 {
+        if self.only_bystanders(&publishers(&poses_service)) {
             self.service::<CollisionAlert>("alerts")?;
             self.service::<Cue>("cues")?;
             self.service::<LoopStatus>("status")?;
@@ -104,9 +120,29 @@ impl Subscription {
             status_service: self.service("status")?,
             stage: self.receiver("stage")?,
             tick: self.listener(),
+            followed: Cell::new(None),
         };
         reserve_pages()?;
         Ok(Some(connection))
+    }
+
+    /// Lets go of a connection from which nothing more comes. Publishers that remain are not connected to again for a while.
+    pub fn leave(&self, connection: Connection) {
+        self.bystanders.replace((Instant::now(), publishers(&connection.poses_service)));
+    }
+
+    /// Whether there is nobody to connect to.
+    fn only_bystanders(&self, publishers: &[Origin]) -> bool {
+        let (since, bystanders) = &*self.bystanders.borrow();
+        publishers.is_empty()
+            || since.elapsed() < BYSTANDER_INTERVAL && publishers.iter().all(|it| bystanders.contains(it))
+    }
+
+    /// Whether a show of this name runs in this shared memory: only a show serves commands.
+    pub fn show_is_here(&self) -> bool {
+        let Ok(name) = service_name(&self.name, "control") else { return false };
+        let opened = self.node.service_builder(&name).request_response::<ControlRequest, ControlResponse>().open();
+        opened.is_ok_and(|service| service.dynamic_config().number_of_servers() > 0)
     }
 
     /// Opens what was not there when the connection was made: a publisher makes its services one after another, and
@@ -134,13 +170,18 @@ impl Subscription {
         if connection.missing() < missing { reserve_pages() } else { Ok(()) }
     }
 
-    /// Whether a publisher is there and alive. Cleans up after one that was killed.
+    /// Whether the publisher whose frames come is there and alive, or any where none have come. Cleans up after one that was
+    /// killed.
     pub fn publisher_is_alive(&self, connection: &Connection) -> bool {
         let _ = self.node.try_cleanup_dead_nodes();
-        // One that ends sends its last status after its last frame.
-        let status = connection.status_service.as_ref();
-        connection.poses_service.dynamic_config().number_of_publishers() > 0
-            || status.is_some_and(|status| status.dynamic_config().number_of_publishers() > 0)
+        let of_frames = publishers(&connection.poses_service);
+        let is_there = match connection.followed.get() {
+            Some(followed) => of_frames.contains(&followed.origin),
+            None => !of_frames.is_empty(),
+        };
+        // One that ends sends its last status after its last frame, from a node that has no frames.
+        let of_status = connection.status_service.as_ref().map_or_else(Vec::new, publishers);
+        is_there || of_status.iter().any(|status| of_frames.iter().all(|frames| frames.node != status.node))
     }
 
     /// A port of a service that may be absent: a scene can be without alerts.
@@ -195,15 +236,28 @@ impl Connection {
         }
     }
 
+    /// Whether the publisher of the frames reads the clock of this process, so that its moments of CLOCK_MONOTONIC can be
+    /// compared with those here.
+    pub fn shares_clock(&self) -> bool {
+        let clock = monotonic_clock_name();
+        self.poses_service
+            .attributes()
+            .iter()
+            .any(|it| it.key().to_string() == CLOCK && it.value().to_string() == clock)
+    }
+
     /// Hands the frames that have come to `each`, oldest first; how many there were. They are at most as many as the queue
     /// holds: a publisher that is faster than `each` would otherwise keep the caller here.
     pub fn frames(&self, mut each: impl FnMut(&FrameHeader, &[HandlePose])) -> usize {
-        let mut count = 0;
-        while count < self.poses.buffer_size()
+        let (mut count, mut received) = (0, 0);
+        while received < self.poses.buffer_size()
             && let Ok(Some(sample)) = self.poses.receive()
         {
-            each(sample.user_header(), sample.payload());
-            count += 1;
+            received += 1;
+            if self.follow(Origin::of(sample.header()), sample.user_header().run_id) {
+                each(sample.user_header(), sample.payload());
+                count += 1;
+            }
         }
         count
     }
@@ -212,14 +266,16 @@ impl Connection {
     pub fn newest_frame<Taken>(&self, take: impl FnOnce(&FrameHeader, &[HandlePose]) -> Taken) -> Option<Taken> {
         let mut newest = None;
         while let Ok(Some(sample)) = self.poses.receive() {
-            newest = Some(sample);
+            if self.follow(Origin::of(sample.header()), sample.user_header().run_id) {
+                newest = Some(sample);
+            }
         }
         newest.map(|sample| take(sample.user_header(), sample.payload()))
     }
 
     /// The next alert, if one has come.
     pub fn alert(&self) -> Option<CollisionAlert> {
-        next(self.alerts.as_ref())
+        self.next(self.alerts.as_ref())
     }
 
     /// Whether there is a service of cues to open.
@@ -229,20 +285,51 @@ impl Connection {
 
     /// The next cue, if one has come.
     pub fn cue(&self) -> Option<Cue> {
-        next(self.cues.as_ref())
+        self.next(self.cues.as_ref())
     }
 
     /// The next status, if one has come.
     pub fn status(&self) -> Option<LoopStatus> {
-        next(self.status.as_ref())
+        self.next(self.status.as_ref())
     }
 
     /// The next stage, if one has come.
     pub fn stage(&self) -> Option<Stage> {
-        next(self.stage.as_ref())
+        self.next(self.stage.as_ref())
     }
-}
 
-fn next<Message: ZeroCopySend + std::fmt::Debug + Copy>(port: Option<&Receiver<Message, ()>>) -> Option<Message> {
-    port?.receive().ok().flatten().map(|sample| *sample)
+    /// The next message that belongs to the frames that are followed.
+    fn next<Message: ZeroCopySend + std::fmt::Debug + Copy + OfRun>(
+        &self,
+        port: Option<&Receiver<Message, ()>>,
+    ) -> Option<Message> {
+        let port = port?;
+        while let Some(sample) = port.receive().ok().flatten() {
+            if self.admits(Origin::of(sample.header()), sample.run_id()) {
+                return Some(*sample);
+            }
+        }
+        None
+    }
+
+    /// Whether a frame is handed over. The first decides whose frames are from then on, until that publisher has gone.
+    fn follow(&self, origin: Origin, run_id: u64) -> bool {
+        let follows =
+            self.followed.get().is_none_or(|followed| followed.origin == origin || !self.is_listed(followed.origin));
+        if follows {
+            self.followed.set(Some(Followed { origin, run_id }));
+        }
+        follows
+    }
+
+    /// Whether a message is handed over: it comes from where the frames come from, or the next run begins with it.
+    fn admits(&self, origin: Origin, run_id: u64) -> bool {
+        self.followed.get().is_none_or(|followed| {
+            followed.origin.node == origin.node || followed.run_id == run_id || !self.is_listed(followed.origin)
+        })
+    }
+
+    fn is_listed(&self, origin: Origin) -> bool {
+        publishers(&self.poses_service).contains(&origin)
+    }
 }

@@ -16,7 +16,7 @@ use iceoryx2::service::port_factory::request_response;
 use crate::show::control::{Code, Command};
 use crate::show::state::PlaybackState;
 use crate::transports::iceoryx2::{OpenError, check_room_to_subscribe, node, service_name};
-use crate::wire::{ControlRequest, ControlResponse};
+use crate::wire::{ControlRequest, ControlResponse, FrameHeader, HandlePose};
 
 /// How often a response is looked for.
 const POLL_INTERVAL: Duration = Duration::from_micros(500);
@@ -37,6 +37,12 @@ pub enum ControlError {
     /// There is no publisher to conduct.
     #[error("nobody publishes under the name \"{0}\"")]
     NoPublisher(String),
+    /// Frames come, and no show is here that would take commands.
+    #[error(
+        "no show runs under the name \"{0}\" on this machine, and a tunnel that brings its frames from another carries no \
+         commands: conduct it there"
+    )]
+    Elsewhere(String),
     /// The publisher has ended or was killed before it answered.
     #[error("the publisher of \"{0}\" has ended without an answer")]
     Ended(String),
@@ -67,12 +73,15 @@ impl Controller {
     /// A controller of the publisher of `name`, which is there already.
     ///
     /// # Errors
-    /// [`ControlError::NoPublisher`], or [`ControlError::Open`] where the service cannot be used.
+    /// [`ControlError::NoPublisher`] or [`ControlError::Elsewhere`], or [`ControlError::Open`] where the service cannot be used.
     pub fn new(name: &str) -> Result<Self, ControlError> {
         let service = service_name(name, "control")?;
         check_room_to_subscribe()?;
         let node = node()?;
-        let no_publisher = || ControlError::NoPublisher(name.to_owned());
+        let no_publisher = || match has_frames(&node, name) {
+            true => ControlError::Elsewhere(name.to_owned()),
+            false => ControlError::NoPublisher(name.to_owned()),
+        };
         let opened = node.service_builder(&service).request_response::<ControlRequest, ControlResponse>().open();
         let opened = opened.map_err(|error| match error {
             Open::DoesNotExist | Open::HangsInCreation | Open::IsMarkedForDestruction => no_publisher(),
@@ -231,6 +240,13 @@ impl Vigil {
         }
         Ok(())
     }
+}
+
+/// Whether somebody can send frames under a name.
+fn has_frames(node: &Node<ipc::Service>, name: &str) -> bool {
+    let Ok(poses) = service_name(name, "poses") else { return false };
+    let builder = node.service_builder(&poses).publish_subscribe::<[HandlePose]>().user_header::<FrameHeader>();
+    builder.open().is_ok_and(|service| service.dynamic_config().number_of_publishers() > 0)
 }
 
 fn failed(name: &str, reason: String) -> OpenError {

@@ -20,6 +20,8 @@ use sequence::SequenceTracker;
 const CONNECT_INTERVAL: Duration = Duration::from_millis(20);
 /// How often services are opened that were not there yet.
 const OPEN_INTERVAL: Duration = Duration::from_millis(100);
+/// How long a publisher may send nothing at all where no show is: statuses and, over a tunnel, stages come once a second.
+const QUIET: Duration = Duration::from_millis(1500);
 
 /// Which of the frames that have come since the last poll are handed over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -129,10 +131,14 @@ pub struct Feed {
 /// A connection, and what is known of the publisher at its other end.
 struct Connected {
     connection: Connection,
+    shares_clock: bool,
     liveness: Liveness,
+    since: Instant,
     last_open: Instant,
     /// Whether anything has come.
     received: bool,
+    /// The run and the stamp of the latest stage: it comes again where there is a tunnel to other machines.
+    stage: Option<(u64, u64)>,
 }
 
 impl Feed {
@@ -178,11 +184,27 @@ impl Feed {
                 if connected.received {
                     handle(FeedEvent::Gone);
                 }
-                // Services are let go of, so that the next publisher can make them anew.
-                self.connected = None;
+                self.leave();
             }
         }
+        let is_quiet = |connected: &Connected| !connected.received && connected.since.elapsed() >= QUIET;
+        if self.connected.as_ref().is_some_and(is_quiet) && !self.subscription.show_is_here() {
+            self.leave();
+        }
         Ok(())
+    }
+
+    /// Whether the publisher's clock is that of this process, so that latencies can be computed; `None` while there is no
+    /// publisher.
+    pub fn shares_clock(&self) -> Option<bool> {
+        self.connected.as_ref().map(|connected| connected.shares_clock)
+    }
+
+    /// Lets go of the services, so that the next publisher can make them anew.
+    fn leave(&mut self) {
+        if let Some(connected) = self.connected.take() {
+            self.subscription.leave(connected.connection);
+        }
     }
 
     fn connect(&mut self, timeout: Duration) -> Result<(), OpenError> {
@@ -195,10 +217,13 @@ impl Feed {
         let now = Instant::now();
         self.next_connect = now + CONNECT_INTERVAL;
         self.connected = connection.map(|connection| Connected {
+            shares_clock: connection.shares_clock(),
             connection,
             liveness: Liveness::connected_at(now),
+            since: now,
             last_open: now,
             received: false,
+            stage: None,
         });
         Ok(())
     }
@@ -208,14 +233,17 @@ impl Connected {
     /// Hands over what is in the queues: the stage first, since it explains the frames, and frames before the alerts
     /// and cues that belong to them.
     fn receive(&mut self, frames: Frames, sequence: &mut SequenceTracker, handle: &mut dyn FnMut(FeedEvent<'_>)) {
-        let Self { connection, liveness, received, .. } = self;
+        let Self { connection, liveness, received, stage: latest_stage, .. } = self;
         let mut handle = |event: FeedEvent<'_>| {
             *received = true;
             handle(event);
         };
         while let Some(stage) = connection.stage() {
             connection.expect_cues(stage.cues > 0);
-            handle(FeedEvent::Stage(&stage));
+            let of = Some((stage.run_id, stage.stamp_ns));
+            if std::mem::replace(latest_stage, of) != of {
+                handle(FeedEvent::Stage(&stage));
+            }
         }
         let take_frame = |header: &FrameHeader, handles: &[HandlePose]| {
             let missed = sequence.advance(header.run_id, header.sequence).unwrap_or_else(|| {

@@ -46,8 +46,10 @@ pub struct IntervalReport {
     pub received: u64,
     /// Gaps in the sequence since the monitor started.
     pub missed: u64,
-    /// Latency in this interval; `None` if nothing came.
+    /// Latency in this interval; `None` if nothing came, or if it came from a machine with a clock of its own.
     pub latency: Option<Latency>,
+    /// Whether the publisher's clock is that of this process.
+    pub shares_clock: bool,
     /// The latest alert.
     pub alert: Option<CollisionAlert>,
     /// The latest status of the loop.
@@ -76,6 +78,7 @@ pub struct Monitor {
     received_in_interval: u64,
     latency: Histogram<u64>,
     interval_began: Instant,
+    shares_clock: bool,
     alert: Option<CollisionAlert>,
     status: Option<LoopStatus>,
 }
@@ -92,6 +95,7 @@ impl Default for Monitor {
             // 1 ns to an hour with three digits are bounds the constructor accepts.
             latency: Histogram::new_with_bounds(1, 3_600_000_000_000, 3).expect("valid bounds"),
             interval_began: Instant::now(),
+            shares_clock: true,
             alert: None,
             status: None,
         }
@@ -123,12 +127,21 @@ impl Monitor {
         }
     }
 
+    /// Takes in whether the publisher's clock is that of this process, as
+    /// [`Feed::shares_clock`](super::feed::Feed::shares_clock) has it; nothing changes where there is no publisher.
+    pub fn clock(&mut self, shares_clock: Option<bool>) {
+        self.shares_clock = shares_clock.unwrap_or(self.shares_clock);
+    }
+
     /// What has come since the last report, which begins a new interval.
     pub fn report(&mut self) -> IntervalReport {
         let elapsed = self.interval_began.elapsed().as_secs_f64();
         let at = |quantile| self.latency.value_at_quantile(quantile);
-        let latency =
-            (!self.latency.is_empty()).then(|| Latency { p50: at(0.5), p99: at(0.99), max: self.latency.max() });
+        let latency = (self.shares_clock && !self.latency.is_empty()).then(|| Latency {
+            p50: at(0.5),
+            p99: at(0.99),
+            max: self.latency.max(),
+        });
         let report = IntervalReport {
             presence: self.presence,
             header: self.header,
@@ -137,6 +150,7 @@ impl Monitor {
             received: self.received,
             missed: self.missed,
             latency,
+            shares_clock: self.shares_clock,
             alert: self.alert,
             status: self.status,
         };
@@ -165,6 +179,18 @@ mod tests {
         assert!(first.rate > 0.0);
         let second = monitor.report();
         assert_eq!((second.received, second.missed, second.rate, second.latency), (2, 4, 0.0, None));
+    }
+
+    #[test]
+    fn moments_of_another_machines_clock_make_no_latency() {
+        let mut monitor = Monitor::default();
+        let header = FrameHeader { sent_ns: 1000, ..FrameHeader::default() };
+        for (clock, has_latency) in [(None, true), (Some(false), false), (None, false), (Some(true), true)] {
+            monitor.clock(clock);
+            monitor.handle(&FeedEvent::Frame { header: &header, handles: &[], missed: 0 }, 3000);
+            let report = monitor.report();
+            assert_eq!((report.latency.is_some(), report.shares_clock), (has_latency, has_latency), "{clock:?}");
+        }
     }
 
     #[test]

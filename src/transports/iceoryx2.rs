@@ -3,6 +3,10 @@
 //! [`SharedMemoryPublisher`] lives on the loop's thread, [`StatusSender`] on the statistics thread; both are made there,
 //! since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/alerts`, `/status`,
 //! `/stage`, the event service `<name>/tick` and, where a scene asks for it, `<name>/poses32`.
+//!
+//! One show has a name: the service of commands, `<name>/control`, admits one server, and that is opened first. iceoryx2
+//! knows by a lock of the operating system whether its process lives, so that one that was killed is in nobody's way and one
+//! that is stopped still has the name. The other services admit a second publisher: what joins this machine to others.
 
 mod control;
 mod error;
@@ -31,10 +35,17 @@ use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, HandlePose32, Lo
 
 pub use error::OpenError;
 use error::{failed, incomplete, port_error, service_error};
+pub use frames::CLOCK;
 use frames::{FrameSender, FrameService};
 use memory::{check_room, default_queue};
 pub use memory::{check_room_to_subscribe, reserve_pages};
 
+/// Publishers that a service admits: the show's, and one that is the end of a tunnel to other machines, which opens a
+/// publisher and a subscriber of everything.
+pub const MOST_PUBLISHERS: usize = 2;
+/// How often the stage is sent again while there is a tunnel: it hands on what is sent, to the machines that are there at that
+/// moment, and keeps nothing for those that come later.
+const STAGE_INTERVAL: Duration = Duration::from_secs(1);
 /// Nodes that may have a service open at once beyond one a subscriber: the publisher's, and those that died and have
 /// not been cleaned up after yet.
 const SPARE_NODES: usize = 32;
@@ -168,7 +179,7 @@ pub struct SharedMemoryPublisher {
     poses_32: Option<(FrameSender<HandlePose32>, Decimation)>,
     alerts: Option<Sender<CollisionAlert, ()>>,
     cues: Option<Sender<Cue, ()>>,
-    stage: Sender<Stage, ()>,
+    stage: RepeatedStage,
     tick: Notifier<ipc::Service>,
     tick_service: event::PortFactory<ipc::Service>,
     // Dropped last: the ports above belong to it.
@@ -176,7 +187,8 @@ pub struct SharedMemoryPublisher {
 }
 
 impl SharedMemoryPublisher {
-    /// Opens the services and sends the stage. To be called on the thread that will publish.
+    /// Opens the services and sends the stage. To be called on the thread that will publish. Whoever calls it sees to it that
+    /// no other show has the name, as [`open`] does.
     ///
     /// # Errors
     /// [`OpenError`]: each names what is in the way and what to do.
@@ -197,10 +209,9 @@ impl SharedMemoryPublisher {
             Ok((FrameSender::open(&node, config, &described)?, decimation))
         };
         let poses_32 = config.decimation().map(open_32).transpose()?;
-        let alerts = if config.alerts { Some(sender(&node, name, "alerts", config.subscribers)?) } else { None };
-        let cues = if config.cues { Some(sender(&node, name, "cues", config.subscribers)?) } else { None };
-        let stage = sender(&node, name, "stage", config.subscribers)?;
-        stage.send_copy(config.stage).map_err(|error| failed(name, "stage", error))?;
+        let alerts = if config.alerts { Some(sender(&node, name, "alerts", config.subscribers)?.0) } else { None };
+        let cues = if config.cues { Some(sender(&node, name, "cues", config.subscribers)?.0) } else { None };
+        let stage = RepeatedStage::open(&node, config)?;
         let tick_service = node
             .service_builder(&service_name(name, "tick")?)
             .event()
@@ -209,6 +220,11 @@ impl SharedMemoryPublisher {
             .open_or_create()
             .map_err(|error| match error {
                 EventOpenOrCreateError::EventOpenError(EventOpenError::HangsInCreation) => incomplete(name, "tick"),
+                // A tunnel that listens to it was started first.
+                EventOpenOrCreateError::EventOpenError(
+                    EventOpenError::DoesNotSupportRequestedAmountOfNodes
+                    | EventOpenError::DoesNotSupportRequestedAmountOfListeners,
+                ) => OpenError::OtherLimits(format!("{name}/tick")),
                 other => failed(name, "tick", other),
             })?;
         let tick = tick_service.notifier_builder().create().map_err(|error| failed(name, "tick", error))?;
@@ -268,7 +284,7 @@ impl Publisher for SharedMemoryPublisher {
         if let Some(cues) = &self.cues {
             let _ = cues.update_connections();
         }
-        let _ = self.stage.update_connections();
+        self.stage.maintain();
         self.poses.update_connections();
         if let Some((port, _)) = &self.poses_32 {
             port.update_connections();
@@ -277,6 +293,32 @@ impl Publisher for SharedMemoryPublisher {
 
     fn subscribers(&self) -> u32 {
         self.poses.subscribers() + self.poses_32.as_ref().map_or(0, |(port, _)| port.subscribers())
+    }
+}
+
+/// The stage, sent once, and again and again while there is a tunnel.
+struct RepeatedStage {
+    stage: Stage,
+    port: Sender<Stage, ()>,
+    service: Service<Stage, ()>,
+    sent: Instant,
+}
+
+impl RepeatedStage {
+    fn open(node: &Node<ipc::Service>, config: &PublisherConfig) -> Result<Self, OpenError> {
+        let (port, service) = sender(node, &config.name, "stage", config.subscribers)?;
+        port.send_copy(config.stage).map_err(|error| failed(&config.name, "stage", error))?;
+        Ok(Self { stage: config.stage, port, service, sent: Instant::now() })
+    }
+
+    /// Lets late subscribers in, on this machine and on others.
+    fn maintain(&mut self) {
+        let _ = self.port.update_connections();
+        let has_tunnel = self.service.dynamic_config().number_of_publishers() > 1;
+        if has_tunnel && self.sent.elapsed() >= STAGE_INTERVAL {
+            self.sent = Instant::now();
+            let _ = self.port.send_copy(self.stage);
+        }
     }
 }
 
@@ -294,7 +336,7 @@ impl StatusSender {
     pub fn open(name: &str, subscribers: usize) -> Result<Self, OpenError> {
         retry_while_incomplete(|| {
             let node = node()?;
-            let status = sender(&node, name, "status", subscribers)?;
+            let (status, _) = sender(&node, name, "status", subscribers)?;
             reserve_pages()?;
             Ok(Self { status, _node: node })
         })
@@ -309,28 +351,31 @@ impl StatusPublisher for StatusSender {
     }
 }
 
-/// A port for messages that are sent seldom; the last one is kept for late subscribers.
+/// A port for messages that are sent seldom, and its service; the last one is kept for late subscribers.
 fn sender<Message: ZeroCopySend + std::fmt::Debug + Copy>(
     node: &Node<ipc::Service>,
     name: &str,
     service: &str,
     subscribers: usize,
-) -> Result<Sender<Message, ()>, OpenError> {
+) -> Result<(Sender<Message, ()>, Service<Message, ()>), OpenError> {
     let full_name = service_name(name, service)?;
-    node.service_builder(&full_name)
+    let opened = node
+        .service_builder(&full_name)
         .publish_subscribe::<Message>()
-        .max_publishers(1)
+        .max_publishers(MOST_PUBLISHERS)
         .max_subscribers(subscribers)
         .max_nodes(subscribers + SPARE_NODES)
         .subscriber_max_buffer_size(SMALL_QUEUE)
         .history_size(1)
         .enable_safe_overflow(true)
         .open_or_create()
-        .map_err(|error| service_error(&full_name, error))?
+        .map_err(|error| service_error(&full_name, error))?;
+    let port = opened
         .publisher_builder()
         .backpressure_strategy(BackpressureStrategy::DiscardData)
         .create()
-        .map_err(|error| port_error(name, service, error))
+        .map_err(|error| port_error(name, service, error))?;
+    Ok((port, opened))
 }
 
 /// Tries again while a service is incomplete: its maker is about to finish it, or was killed, and then its file is removed

@@ -91,6 +91,7 @@ fn open(name: &str) -> Result<Opened, OpenError> {
     let service = node
         .service_builder(&service_name(name, "control")?)
         .request_response::<ControlRequest, ControlResponse>()
+        // This is what keeps a second show from the name.
         .max_servers(1)
         .max_clients(MOST_CLIENTS)
         .max_nodes(MOST_CLIENTS + SPARE_NODES)

@@ -6,6 +6,7 @@ use ::iceoryx2::service::builder::publish_subscribe::{
     PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
 };
 
+use super::MOST_PUBLISHERS;
 use super::memory::SHARED_MEMORY;
 use crate::transports::TransportError;
 
@@ -23,6 +24,12 @@ pub enum OpenError {
     /// Somebody publishes under this name already.
     #[error("another publisher is running under the name \"{0}\": stop it, or choose another name for this one")]
     AlreadyPublished(String),
+    /// A service has as many publishers as it admits.
+    #[error(
+        "\"{0}\" has {MOST_PUBLISHERS} publishers, which is as many as it admits, a tunnel to other machines included: end \
+         one of them, or choose another name"
+    )]
+    TooManyPublishers(String),
     /// The queues would not fit.
     #[error(
         "the queues of {queue} frames for {subscribers} subscribers need {needed} bytes of shared memory and \
@@ -67,6 +74,18 @@ pub enum OpenError {
          name"
     )]
     Incompatible(String),
+    /// A service of this name exists with other attributes.
+    #[error(
+        "the service \"{0}\" exists with other attributes: a tunnel brings it from another machine, or a subscriber keeps that \
+         of another scene open; end that, or choose another name"
+    )]
+    OtherAttributes(String),
+    /// A program has opened a service before its publisher, with limits of its own.
+    #[error(
+        "the service \"{0}\" exists with lower limits than this scene asks for: a program that was started before the show \
+         has made it, such as a tunnel that listens to it; start that after the show"
+    )]
+    OtherLimits(String),
     /// The service admits no more subscribers.
     #[error(
         "\"{service}\" has {most} subscribers, which is as many as its publisher admits (publish.subscribers in its \
@@ -93,9 +112,12 @@ impl From<OpenError> for TransportError {
         let sentence = error.to_string();
         match error {
             OpenError::Name { .. } => Self::IllegalName(sentence),
-            OpenError::AlreadyPublished(_) | OpenError::Incomplete(_) | OpenError::Incompatible(_) => {
-                Self::NameInUse(sentence)
-            }
+            OpenError::AlreadyPublished(_)
+            | OpenError::TooManyPublishers(_)
+            | OpenError::Incomplete(_)
+            | OpenError::Incompatible(_)
+            | OpenError::OtherAttributes(_)
+            | OpenError::OtherLimits(_) => Self::NameInUse(sentence),
             _ => Self::Failed(sentence),
         }
     }
@@ -105,6 +127,9 @@ pub(super) fn service_error(service: &ServiceName, error: PublishSubscribeOpenOr
     use PublishSubscribeOpenError as Open;
     if matches!(error, PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(Open::HangsInCreation)) {
         return OpenError::Incomplete(service.to_string());
+    }
+    if matches!(error, PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(Open::IncompatibleAttributes)) {
+        return OpenError::OtherAttributes(service.to_string());
     }
     let incompatible = match &error {
         PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(open) => !matches!(
@@ -125,7 +150,9 @@ pub(super) fn service_error(service: &ServiceName, error: PublishSubscribeOpenOr
 
 pub(super) fn port_error(name: &str, service: &str, error: PublisherCreateError) -> OpenError {
     match error {
-        PublisherCreateError::ExceedsMaxSupportedPublishers => OpenError::AlreadyPublished(name.to_owned()),
+        PublisherCreateError::ExceedsMaxSupportedPublishers => {
+            OpenError::TooManyPublishers(format!("{name}/{service}"))
+        }
         other => failed(name, service, other),
     }
 }

@@ -11,12 +11,16 @@ use ::iceoryx2::service::attribute::{AttributeKey, AttributeValue};
 use ::iceoryx2::service::builder::publish_subscribe::{PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError};
 
 use super::error::{OpenError, failed, port_error, service_error};
-use super::{PublisherConfig, SPARE_NODES, Sender, Service, service_name};
-use crate::live::clock::monotonic_ns;
+use super::{MOST_PUBLISHERS, PublisherConfig, SPARE_NODES, Sender, Service, service_name};
+use crate::live::clock::{monotonic_clock_name, monotonic_ns};
 use crate::wire::FrameHeader;
 
 /// The attribute of a decimated service that states one handle in how many it has.
 const EVERY: &str = "every";
+
+/// The attribute of a service of frames that states which clock its publisher reads
+/// ([`monotonic_clock_name`]). What joins machines makes services without it.
+pub const CLOCK: &str = "clock";
 
 /// What distinguishes a service of frames from another.
 pub(super) struct FrameService {
@@ -92,7 +96,7 @@ fn open_service<Pose: ZeroCopySend + Debug + 'static>(
         node.service_builder(&full_name)
             .publish_subscribe::<[Pose]>()
             .user_header::<FrameHeader>()
-            .max_publishers(1)
+            .max_publishers(MOST_PUBLISHERS)
             .enable_safe_overflow(true)
     };
     let made = builder()
@@ -118,9 +122,14 @@ fn open_service<Pose: ZeroCopySend + Debug + 'static>(
 
 /// What a service has to have, as its attributes; where it is made, it gets them.
 fn attributes(described: &FrameService) -> Result<AttributeVerifier, String> {
-    let attributes = AttributeVerifier::new();
-    let Some(every) = described.every else { return Ok(attributes) };
-    let key = AttributeKey::try_from(EVERY).map_err(|error| format!("{error:?}"))?;
-    let value = AttributeValue::try_from(every.to_string().as_str()).map_err(|error| format!("{error:?}"))?;
-    attributes.require(&key, &value).map_err(|error| error.to_string())
+    let with = |attributes: AttributeVerifier, key: &str, value: String| {
+        let key = AttributeKey::try_from(key).map_err(|error| format!("{error:?}"))?;
+        let value = AttributeValue::try_from(value.as_str()).map_err(|error| format!("{error:?}"))?;
+        attributes.require(&key, &value).map_err(|error| error.to_string())
+    };
+    let attributes = with(AttributeVerifier::new(), CLOCK, monotonic_clock_name())?;
+    match described.every {
+        Some(every) => with(attributes, EVERY, every.to_string()),
+        None => Ok(attributes),
+    }
 }

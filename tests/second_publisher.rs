@@ -1,0 +1,96 @@
+//! One show has a name, and its services admit a second publisher: the end of a tunnel to other machines, here a program in
+//! Python. What subscribers of the show count is the show's alone, and its death is noticed though that publisher stays.
+//!
+//! Every wait has a deadline, and nothing asserts a speed.
+
+mod processes;
+
+use nix::sys::signal::Signal::{SIGCONT, SIGINT, SIGKILL, SIGSTOP, SIGTERM, SIGUSR1};
+use processes::{Lines, Place, Process, can_run, python, python_modules, summary, text};
+use serde_json::Value;
+
+fn object(line: &str) -> Value {
+    serde_json::from_str(line).unwrap()
+}
+
+/// The second publisher, once it has all its ports.
+fn second(place: &Place) -> (Process, Lines) {
+    let mut command = python();
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/python/second_publisher.py");
+    command.args([script, "--name", "bench_dragon"]).current_dir(place.folder());
+    let mut process = Process::start(&mut command);
+    let lines = process.lines();
+    assert_eq!(object(&lines.until("ready", 300))["third_refused"], true);
+    (process, lines)
+}
+
+fn show(place: &Place) -> Process {
+    Process::start(place.program().args(["run", "--json", "--rate", "100"]))
+}
+
+/// Starting a show here is refused because one is running.
+fn assert_refused(place: &Place, command: &[&str]) {
+    let output = Process::start(place.program().args(command)).output_within(300);
+    let printed = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{printed}");
+    assert!(printed.contains("another publisher is running under the name \"bench_dragon\""), "{printed}");
+    assert_eq!(printed.lines().count(), 1, "{printed}");
+}
+
+#[test]
+fn a_second_publisher_is_admitted_and_nothing_of_it_is_taken_for_the_show() {
+    if !can_run(python_modules(&["iceoryx2", "numpy"])) {
+        return;
+    }
+    let place = Place::new("second");
+    let mut monitor = Process::start(place.program().arg("watch"));
+    let monitored = monitor.lines();
+    let mut json = Process::start(place.program().args(["watch", "--json"]));
+    let json_lines = json.lines();
+    let mut observer = Process::start(place.program().arg("soak-subscriber"));
+    let observed = observer.lines();
+    let first = show(&place);
+    monitored.until("is running", 300);
+    observed.until("\"status\":{", 300);
+    let (peer, told) = second(&place);
+    // The stage is sent again while it is there, the same one.
+    let [one, other] = [(); 2].map(|()| object(&told.until("\"stage\"", 300)));
+    assert_eq!(one, other);
+    // Frames and alerts of another run are not the show's.
+    peer.signal(SIGUSR1);
+    (0..50).for_each(|_| drop(told.until("sent", 300)));
+    monitored.until("missed 0", 300);
+
+    // The name stays the show's: while it runs, while it is stopped, for whatever publishes.
+    assert_refused(&place, &["run"]);
+    first.signal(SIGSTOP);
+    assert_refused(&place, &["run", "--duration", "1"]);
+    let soaked = Process::start(place.program().args(["soak", "--duration", "1", "--rate", "100"])).output_within(300);
+    assert!(!soaked.status.success(), "{}", text(&soaked.stdout));
+    first.signal(SIGCONT);
+
+    // It is killed; the other publisher stays, silent, and holds no name.
+    peer.signal(SIGUSR1);
+    told.until("silent", 300);
+    first.signal(SIGKILL);
+    monitored.until("has ended", 300);
+    let last = show(&place);
+    monitored.until("is running", 300);
+    monitored.until("missed 0", 300);
+    last.signal(SIGINT);
+    let published = summary(&last.output_within(300));
+    monitored.until("has ended", 300);
+    [&json, &monitor, &observer, &peer].iter().for_each(|process| process.signal(SIGTERM));
+
+    let seen = object(observed.rest(300).last().unwrap());
+    let count = |key: &str| seen[key].as_u64().unwrap_or_else(|| panic!("no {key} in {seen}"));
+    assert_eq!([count("runs"), count("missed"), count("disordered"), count("wrong_links")], [2, 0, 0, 0], "{seen}");
+    assert_eq!(count("last_sequence") + 1, published["frames"].as_u64().unwrap(), "{seen}");
+    let printed = json_lines.rest(300);
+    let alerts = printed.iter().map(|line| object(line)).filter(|line| line["type"] == "alert");
+    let runs: Vec<Value> = alerts.map(|alert| alert["run_id"].clone()).collect();
+    assert!(runs.len() >= 2 && runs.iter().all(|run| run != "7"), "{runs:?}");
+    monitored.rest(300);
+    told.rest(300);
+    place.assert_clean();
+}
