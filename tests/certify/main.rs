@@ -40,7 +40,7 @@ fn certificate(text: &str) -> Vec<Value> {
     let mut lines = Vec::new();
     let mut write = |line: &Line| {
         lines.push(serde_json::to_value(line).unwrap());
-        Ok(())
+        Ok::<(), std::io::Error>(())
     };
     certify::certify(&scene.motion, &timeline, text, &mut write, &mut |_| {}).unwrap();
     lines
