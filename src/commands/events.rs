@@ -68,8 +68,8 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
             })?;
         } else {
             output.line(&sentence(&scene, timed))?;
-            if let Some(status) = status(event.kind) {
-                output.line(&proof_sentence(event.kind, status))?;
+            if let Some(status) = status(timed.event.kind) {
+                output.line(&proof_sentence(timed.event.kind, status))?;
             }
         }
     }

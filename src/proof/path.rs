@@ -17,6 +17,7 @@ pub(super) struct Place(pub usize, pub f64);
 pub(super) struct Span(pub Place, pub Place);
 
 /// A curve by its coordinate.
+#[expect(clippy::large_enum_variant, reason = "a path has few, and each is made once")]
 pub(super) enum Curve {
     /// Towards the centre: the coordinate falls with travel. `a` is metres of radius per radian.
     Inward { a: Interval },

@@ -27,7 +27,7 @@ fn scene_text(name: &str) -> String {
 /// What the ordinary search finds in a scene, of which only that is kept which a certificate is about.
 fn timeline(text: &str) -> Option<Timeline> {
     let mut table: toml::Table = text.parse().ok()?;
-    table.retain(|key, _| ["team", "path", "motion"].contains(&key.as_str()));
+    table.retain(|key, _| ["team", "path", "motion"].contains(&key));
     table["motion"].as_table_mut()?.retain(|key, _| key == "head_speed");
     let scene = Scene::parse(&toml::to_string(&table).ok()?, "scene.toml", "scene").ok()?;
     Some(scene.motion.timeline(&mut |_| {}))
@@ -40,7 +40,7 @@ fn certificate(text: &str) -> Vec<Value> {
     let mut lines = Vec::new();
     let mut write = |line: &Line| {
         lines.push(serde_json::to_value(line).unwrap());
-        Ok(())
+        Ok::<(), std::io::Error>(())
     };
     certify::certify(&scene.motion, &timeline, text, &mut write, &mut |_| {}).unwrap();
     lines
