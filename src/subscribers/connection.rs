@@ -237,10 +237,7 @@ impl Connection {
     /// compared with those here.
     pub fn shares_clock(&self) -> bool {
         let clock = monotonic_clock_name();
-        self.poses_service
-            .attributes()
-            .iter()
-            .any(|it| it.key().to_string() == CLOCK && it.value().to_string() == clock)
+        self.poses_service.attributes().iter().any(|it| it.key() == CLOCK && it.value() == clock.as_str())
     }
 
     /// Hands the frames that have come to `each`, oldest first; how many there were. They are at most as many as the queue
