@@ -1,6 +1,6 @@
 //! A subscriber's ends of a publisher's services: the thin layer over iceoryx2. In: a name. Out: what is in the queues.
 //!
-//! It keeps no counts: when to open, read and let go is up to the [`feed`](super::feed), which calls it. In [`followed`], whose
+//! It keeps no counts: when to open, read and let go is up to the [`feed`](super::feed), which calls it. In `followed`, whose
 //! messages are read where a service has more than one publisher.
 
 mod followed;
