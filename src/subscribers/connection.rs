@@ -1,6 +1,6 @@
 //! A subscriber's ends of a publisher's services: the thin layer over iceoryx2. In: a name. Out: what is in the queues.
 //!
-//! It keeps no counts: when to open, read and let go is up to the [`feed`](super::feed), which calls it. In [`followed`], whose
+//! It keeps no counts: when to open, read and let go is up to the [`feed`](super::feed), which calls it. In `followed`, whose
 //! messages are read where a service has more than one publisher.
 
 mod followed;
@@ -240,10 +240,7 @@ impl Connection {
     /// compared with those here.
     pub fn shares_clock(&self) -> bool {
         let clock = monotonic_clock_name();
-        self.poses_service
-            .attributes()
-            .iter()
-            .any(|it| it.key().to_string() == CLOCK && it.value().to_string() == clock)
+        self.poses_service.attributes().iter().any(|it| it.key() == CLOCK && it.value() == clock.as_str())
     }
 
     /// Hands the frames that have come to `each`, oldest first; how many there were. They are at most as many as the queue

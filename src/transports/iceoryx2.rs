@@ -172,6 +172,8 @@ impl Transport for Iceoryx2 {
 
 type Service<Payload, Header> = publish_subscribe::PortFactory<ipc::Service, Payload, Header>;
 type Sender<Payload, Header> = Port<ipc::Service, Payload, Header>;
+/// A port, and its service.
+type Opened<Message> = (Sender<Message, ()>, Service<Message, ()>);
 
 /// Publishes frames, alerts and the stage.
 pub struct SharedMemoryPublisher {
@@ -357,7 +359,7 @@ fn sender<Message: ZeroCopySend + std::fmt::Debug + Copy>(
     name: &str,
     service: &str,
     subscribers: usize,
-) -> Result<(Sender<Message, ()>, Service<Message, ()>), OpenError> {
+) -> Result<Opened<Message>, OpenError> {
     let full_name = service_name(name, service)?;
     let opened = node
         .service_builder(&full_name)
