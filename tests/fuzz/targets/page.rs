@@ -40,7 +40,7 @@ fn address() -> SocketAddr {
                 pages: Some(pages),
             };
             let stop = Arc::new(AtomicBool::new(false));
-            let served: Result<(), ViewError> = serve(&name, options, &stop, |Ready { address, token }| {
+            let served: Result<(), ViewError> = serve(std::slice::from_ref(&name), options, &stop, |Ready { address, token }| {
                 assert!(token.is_some(), "commands are behind a token");
                 let _ = sender.send(*address);
                 Ok(())
