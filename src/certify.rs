@@ -29,8 +29,8 @@ use crate::motion::Motion;
 use crate::motion::event::Event;
 use crate::motion::timeline::Timeline;
 
-/// Steps after which the search gives up.
-const MOST_STEPS: u64 = 50_000;
+/// Steps after which the search gives up where nothing else is requested: some minutes, and hundreds of megabytes.
+pub const MOST_STEPS: u64 = 400_000;
 
 /// Why there is no certificate.
 #[derive(Debug, thiserror::Error)]
@@ -49,10 +49,11 @@ pub(crate) struct Given<'a> {
     team: &'a Team,
     head_speed: f64,
     events: &'a [Event],
+    most_steps: u64,
 }
 
 /// Certifies the events of a motion. `scene` is the text that states it. Each line of the certificate is given to `write`;
-/// `progress` gets the share of the motion that is done, from 0 to 1.
+/// `progress` gets the share of the motion that is done, from 0 to 1. After `most_steps` the search gives up.
 ///
 /// # Errors
 /// [`CertifyError::Write`]
@@ -60,6 +61,7 @@ pub fn certify(
     motion: &Motion,
     timeline: &Timeline,
     scene: &str,
+    most_steps: u64,
     write: &mut dyn FnMut(&Line) -> io::Result<()>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Vec<Outcome>, CertifyError> {
@@ -71,6 +73,7 @@ pub fn certify(
         team: motion.team(),
         head_speed: motion.head_speed(),
         events: &events,
+        most_steps,
     };
     search::Search::new(given, write).run(progress)
 }

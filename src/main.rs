@@ -61,7 +61,7 @@ pub enum Command {
     #[command(hide = true)]
     SoakClient,
     /// Validate a scene and print what it would model
-    Check,
+    Check(commands::check::CheckArguments),
 }
 
 fn main() -> ExitCode {
@@ -88,7 +88,7 @@ fn main() -> ExitCode {
         Command::SoakSubscriber(arguments) => commands::soak::subscribe(&common, arguments),
         Command::SoakConductor(arguments) => commands::soak_conductor::conduct(&common, arguments),
         Command::SoakClient => commands::soak_conductor::client(&common),
-        Command::Check => commands::check::check(&common),
+        Command::Check(arguments) => commands::check::check(&common, arguments),
     });
     match done {
         Ok(()) | Err(CommandError::ClosedPipe) => ExitCode::SUCCESS,

@@ -195,6 +195,16 @@ impl Source<'_> {
         SceneError(format!("{}, line {}: {sentence}", self.file, self.line(offset)))
     }
 
+    /// A name, which is printed as it is.
+    fn printable(&self, field: &str, value: &Spanned<String>) -> Result<String, SceneError> {
+        let name = value.get_ref();
+        if name.chars().any(char::is_control) {
+            let sentence = format!("{field} has a control character in it, expected text of one line");
+            return Err(self.field_error(value, &sentence));
+        }
+        Ok(name.clone())
+    }
+
     fn check(&self, field: &str, value: &Spanned<f64>, accepted: Accepted) -> Result<f64, SceneError> {
         accepted.check(field, *value.get_ref()).map_err(|sentence| self.field_error(value, &sentence))
     }
@@ -282,7 +292,7 @@ impl RawScene {
             Some(name) if name.get_ref().trim().is_empty() => {
                 return Err(source.field_error(name, "name is empty, expected a name or no such field"));
             }
-            Some(name) => name.get_ref().clone(),
+            Some(name) => source.printable("name", name)?,
         };
         let rate =
             self.publish.rate.as_ref().map_or(Ok(60.0), |rate| source.check("publish.rate", rate, Accepted::RATE))?;

@@ -37,6 +37,7 @@ fn scenes_that_cannot_be_played() {
     let cases: &[(&str, &str, &[&str])] = &[
         ("name = \"paper\"", "name = ", &["line 2"]),
         ("name = \"paper\"", "name = \"\"", &["line 2", "name"]),
+        ("name = \"paper\"", "name = \"a\\u001bb\"", &["line 2", "name", "control character"]),
         ("name = \"paper\"", "name = 7", &["line 2", "name", "string"]),
         ("name = \"paper\"", "title = \"paper\"", &["line 2", "title", "unknown field"]),
         ("[team]", "[crew]", &["crew", "unknown field"]),

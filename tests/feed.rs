@@ -6,8 +6,14 @@ mod processes;
 
 use std::time::{Duration, Instant};
 
+use bench_dragon::live::{Outgoing, Publisher};
+use bench_dragon::scene::Scene;
+use bench_dragon::show::{Playback, Show};
 use bench_dragon::subscribers::connection::Wake;
 use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
+use bench_dragon::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
+use bench_dragon::wire::FrameHeader;
+use bench_dragon::wire::convert::stage;
 use nix::sys::signal::Signal::SIGKILL;
 use processes::{Process, program, summary, unique, wait};
 
@@ -111,4 +117,58 @@ fn the_newest_frame_is_one_a_poll_and_the_rest_is_counted() {
     assert_eq!(received + missed, last - first + 1, "{seen:?}");
     assert!(missed > received, "{seen:?}");
     drop(publisher);
+}
+
+/// Of two publishers the one that sends no frames was there first, and has a stage: nothing is taken for the show's before
+/// a frame has come, and the show's stage comes before that.
+#[test]
+fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {
+    let scene = Scene::paper();
+    let mut show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    let name = unique("beside");
+    let stages = [7, 8].map(|run_id| stage(run_id, 0, &scene.motion, &show));
+    let open = |stage| {
+        let config = PublisherConfig {
+            name: name.clone(),
+            handles: scene.team().handles(),
+            single_precision: None,
+            queue: 64,
+            subscribers: 2,
+            alerts: false,
+            cues: false,
+            stage,
+        };
+        SharedMemoryPublisher::open(&config).unwrap()
+    };
+    let [mut bystander, mut sender] = stages.map(open);
+    let mut feed = Feed::new(&name, FeedOptions { wake: Wake::Never, frames: Frames::All }).unwrap();
+    let mut runs = Vec::new();
+    let mut poll = |runs: &mut Vec<(&'static str, u64)>| {
+        let polled = feed.poll(Duration::from_millis(20), &mut |event| match event {
+            FeedEvent::Stage(stage) => runs.push(("stage", stage.run_id)),
+            FeedEvent::Started { run_id } => runs.push(("started", run_id)),
+            FeedEvent::Frame { header, .. } => runs.push(("frame", header.run_id)),
+            other => panic!("{other:?}"),
+        });
+        polled.unwrap();
+    };
+    for _ in 0..20 {
+        bystander.maintain();
+        sender.maintain();
+        poll(&mut runs);
+    }
+    assert_eq!(runs, []);
+    let deadline = Instant::now() + Duration::from_secs(300);
+    let mut sequence = 0;
+    while runs.len() < 10 {
+        assert!(Instant::now() < deadline, "{runs:?}");
+        let header = FrameHeader { run_id: 8, sequence, handles: 224, ..FrameHeader::default() };
+        sender.publish(Outgoing::new(&header, show.frame(sequence))).unwrap();
+        bystander.maintain();
+        sender.maintain();
+        poll(&mut runs);
+        sequence += 1;
+    }
+    assert_eq!(runs[..3], [("stage", 8), ("started", 8), ("frame", 8)]);
+    assert!(runs[3..].iter().all(|one| *one == ("frame", 8)), "{runs:?}");
 }

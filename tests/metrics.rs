@@ -142,7 +142,6 @@ fn an_address_in_use_is_a_sentence() {
     assert!(output.stdout.is_empty());
 }
 
-/// The dashboard asks for nothing that is not served, in the scene of the documents.
 #[test]
 fn a_foreign_name_for_this_machine_is_answered_nothing() {
     let mut server = Process::start(program("host").args(["metrics", "--json", "--listen", "127.0.0.1:0"]));
@@ -157,6 +156,7 @@ fn a_foreign_name_for_this_machine_is_answered_nothing() {
     }
 }
 
+/// The dashboard asks for nothing that is not served, in the scene of the documents.
 #[test]
 fn the_dashboard_shows_what_is_served() {
     let dashboard: Value = serde_json::from_str(include_str!("../docs/grafana/bench-dragon.json")).unwrap();

@@ -5,7 +5,7 @@ mod processes;
 
 use std::net::UdpSocket;
 use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
 use processes::{
@@ -111,7 +111,7 @@ fn free_port() -> u16 {
 }
 
 /// The second dragon comes late, ends and comes again; the first ends before the sender does. Every tracker of every frame of
-/// both is heard, under numbers that never change.
+/// both is heard, under numbers that never change. Each step waits for what the desk has heard, however long that takes.
 #[test]
 fn one_desk_hears_two_dragons_under_numbers_that_stay() {
     if !can_run(python_modules(&["iceoryx2", "numpy", "pypsn"])) {
@@ -121,7 +121,7 @@ fn one_desk_hears_two_dragons_under_numbers_that_stay() {
     let first = publisher(names[0], &["--start", "250", "--rate", "50"]);
     let port = free_port().to_string();
     let mut peer = python();
-    peer.args(["tests/python/psn_peer.py", "--port", &port, "--first-id", "11", "--id-step", "300"]);
+    peer.args(["tests/python/psn_peer.py", "--progress", "--port", &port, "--first-id", "11", "--id-step", "300"]);
     let mut peer = Process::start(peer.args(names.iter().flat_map(|name| ["--name".to_owned(), unique(name)])));
     let lines = peer.lines();
     lines.until("listening", DEADLINE);
@@ -138,20 +138,33 @@ fn one_desk_hears_two_dragons_under_numbers_that_stay() {
         process.signal(Signal::SIGTERM);
         summary(&process.output_within(DEADLINE));
     };
+    // Waits until the dragon at this place has stopped so often, and then been heard in so many frames.
+    let hears = |place: usize, stopped: u64, equal: u64| {
+        let deadline = Instant::now() + Duration::from_secs(DEADLINE);
+        loop {
+            let heard: Value = serde_json::from_str(&lines.until("\"progress\"", DEADLINE)).unwrap();
+            let [times, frames] = ["stopped", "equal"].map(|what| heard[what][place].as_u64().unwrap());
+            if times == stopped && frames >= equal {
+                return;
+            }
+            assert!(Instant::now() < deadline, "{}: {heard}, not {stopped} and {equal}", names[place]);
+        }
+    };
     team(names[0], 11);
-    wait(0.5);
+    hears(0, 0, 50);
     let second = publisher(names[1], &["--start", "100", "--rate", "60"]);
     team(names[1], 311);
-    wait(1.0);
+    hears(1, 0, 60);
     ended(second);
     let stopped = |name: &str| said.until(&format!("No frames come from \"{}\"", unique(name)), DEADLINE);
     stopped(names[1]);
     let second = publisher(names[1], &["--start", "300", "--rate", "60"]);
     said.until(&format!("Frames come from \"{}\" again", unique(names[1])), DEADLINE);
-    wait(0.5);
+    hears(1, 1, 60);
+    hears(0, 0, 150);
     ended(first);
     stopped(names[0]);
-    wait(0.5);
+    hears(0, 1, 0);
     sender.signal(Signal::SIGTERM);
     said.rest(DEADLINE);
     ended(second);

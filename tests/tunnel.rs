@@ -16,7 +16,7 @@ use processes::{Lines, Place, Process, can_run, long, not_run, python, python_mo
 use serde_json::Value;
 
 /// What the machine that gets the frames has to have in its config/iceoryx2.toml.
-const MIRROR: &str = "[defaults.publish-subscribe]\nsubscriber-max-buffer-size = 64\n";
+const MIRROR: &str = "[defaults.publish-subscribe]\nsubscriber-max-buffer-size = 64\nmax-subscribers = 16\n";
 
 fn object(line: &str) -> Value {
     serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}"))

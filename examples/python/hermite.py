@@ -6,10 +6,11 @@
 
 `header` has the fields of FrameHeader, `handles` is a structured array with x, y, heading, vx, vy (as `handles_of` in
 bench_dragon_messages.py gives it). Display a period of the stream behind the present, such as
-`time.monotonic_ns() - 1e9 / rate`, and the error falls with the fourth power of the frames' distance. Run as a program it
-subscribes and prints the head's place 20 times a second:
+`time.monotonic_ns() - 1e9 / rate`, and the error falls with the fourth power of the frames' distance. Frames that a
+tunnel brings from another machine have moments of that machine's clock: push these with the time of their arrival. Run
+as a program it subscribes and prints the head's place 20 times a second:
 
-    python3 examples/python/hermite.py [--name bench_dragon] [--seconds 10] [--delay 0.1]
+    python3 examples/python/hermite.py [--name bench_dragon] [--seconds 10] [--delay 0.1] [--other-machine]
 """
 
 import argparse
@@ -31,12 +32,16 @@ class HermiteReader:
         """Keeps the latest `keep` frames: a display that runs d seconds behind r frames a second needs d r + 2."""
         self._frames = collections.deque(maxlen=max(keep, 2))
 
-    def push(self, header, handles):
-        """Takes in the next frame, which is copied. Frames of another run are forgotten."""
+    def push(self, header, handles, arrival_ns=None):
+        """Takes in the next frame, which is copied. Frames of another run are forgotten.
+
+        `arrival_ns` of time.monotonic_ns() takes the place of the frame's own moment, for frames of another machine.
+        """
         if self._frames and self._frames[-1].run_id != header.run_id:
             self._frames.clear()
         fields = (getattr(header, field) for field in Frame._fields[:-1])
-        self._frames.append(Frame(*fields, np.array(handles)))
+        frame = Frame(*fields, np.array(handles))
+        self._frames.append(frame if arrival_ns is None else frame._replace(deadline_ns=arrival_ns))
 
     def at(self, monotonic_ns):
         """Simulated seconds and the handles at a moment of CLOCK_MONOTONIC; None where no frame has come.
@@ -112,11 +117,12 @@ def main():
     parser.add_argument("--name", default="bench_dragon")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--delay", type=float, default=0.1, help="seconds behind the present: a period and a little")
+    parser.add_argument("--other-machine", action="store_true", help="frames come by a tunnel: go by their arrival")
     arguments = parser.parse_args()
     reader = HermiteReader()
     for frame in frames(arguments.name, arguments.seconds):
         if frame is not None:
-            reader.push(*frame)
+            reader.push(*frame, time.monotonic_ns() if arguments.other_machine else None)
             continue
         shown = reader.at(time.monotonic_ns() - int(1e9 * arguments.delay))
         if shown is not None:

@@ -120,13 +120,18 @@ pub enum Status {
         time_lo: f64,
         /// Simulated seconds, at the latest.
         time_hi: f64,
-        /// The bench, counted from 0, or the first of two.
+        /// The bench, counted from 0, or the first of two, of which it is true at the latest time.
         bench_a: Option<usize>,
         /// The second bench.
         bench_b: Option<usize>,
     },
     /// There is none before the motion ends.
-    None,
+    None {
+        /// Simulated seconds: what is meant where a lock ends the motion, which happens after that. `None` where the path's
+        /// end does, and for the path's end itself.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        time_lo: Option<f64>,
+    },
     /// There is none before a time; beyond that nothing is known.
     Undecided {
         /// Simulated seconds.

@@ -93,11 +93,16 @@ impl<'a, 'w> Search<'a, 'w> {
             Err(Halt::Stuck(why)) => Some(why),
         };
         let until = self.time(self.at.head).lo;
+        let lock = match self.proofs[EventKind::Lock as usize] {
+            Some(Status::Proved { time_lo, .. }) => Some(time_lo),
+            _ => None,
+        };
         let outcomes = KINDS.map(|event| {
             let found = self.proofs[event as usize].take();
             let status = found.unwrap_or_else(|| match (&stuck, event) {
                 (Some(because), _) => Status::Undecided { time_lo: until, because: because.clone() },
-                (None, _) => Status::None,
+                (None, EventKind::PathEnd) => Status::None { time_lo: None },
+                (None, _) => Status::None { time_lo: lock },
             });
             Outcome { event, status }
         });
@@ -239,7 +244,7 @@ impl<'a, 'w> Search<'a, 'w> {
         (self.write)(&Line::Step(step))?;
         self.at = to;
         self.steps += 1;
-        if self.steps > super::MOST_STEPS {
+        if self.steps > self.given.most_steps {
             return Err(Halt::Stuck(format!("the search was given up after {} steps", self.steps)));
         }
         Ok(())

@@ -35,7 +35,11 @@ impl Random {
 
     fn interval(&mut self) -> Interval {
         let (one, other) = (self.number(), self.number());
-        if self.bits() % 4 == 0 { Interval::point(one) } else { Interval { lo: one.min(other), hi: one.max(other) } }
+        if self.bits().is_multiple_of(4) {
+            Interval::point(one)
+        } else {
+            Interval { lo: one.min(other), hi: one.max(other) }
+        }
     }
 }
 
@@ -55,8 +59,8 @@ fn a_million_operations_hold_what_192_bits_find() {
     for _ in 0..170_000 {
         let (a, b) = (random.interval(), random.interval());
         // The ends are where rounding could lose something; what is between them follows for operations that are monotone.
-        let x = if random.bits() % 2 == 0 { a.lo } else { a.hi };
-        let y = if random.bits() % 2 == 0 { b.lo } else { b.hi };
+        let x = if random.bits().is_multiple_of(2) { a.lo } else { a.hi };
+        let y = if random.bits().is_multiple_of(2) { b.lo } else { b.hi };
         let (p, q) = (exact(x), exact(y));
         let what = || format!("{a:?} {b:?}");
         assert_holds(a + b, &p.add(&q, BITS, ROUNDING), &what);

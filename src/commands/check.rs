@@ -1,5 +1,9 @@
 //! `check`: what a scene would model, what it leaves out, and which solver it would use and why.
 
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
 use bench_dragon::model::path::{OutlineKind, SegmentOutline};
 use bench_dragon::model::spiral::Direction;
 use bench_dragon::motion::Motion;
@@ -8,11 +12,21 @@ use bench_dragon::scene::{AtEnd, OnContact};
 use bench_dragon::solve::Velocities;
 
 use super::events::{least_clearance, sentence};
-use super::{CommandError, Common, Output, figure, number, search_timeline};
+use super::verify::certificate::proved_of;
+use super::{CommandError, Common, Output, figure, number, progress_bar, search_timeline};
+
+/// Arguments of `check`.
+#[derive(Debug, clap::Args)]
+pub struct CheckArguments {
+    /// A certificate of `events --certify` for this very scene: it is checked, and what it proves is printed
+    #[arg(long, value_name = "FILE")]
+    certificate: Option<PathBuf>,
+}
 
 /// Validates the scene and prints what it would do.
-pub fn check(common: &Common) -> Result<(), CommandError> {
-    let scene = common.load_scene()?;
+pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandError> {
+    let text = common.scene_text()?;
+    let scene = text.parse()?;
     let timeline = search_timeline(&scene, common);
     let mut output = Output::standard();
     let team = scene.team();
@@ -78,10 +92,27 @@ pub fn check(common: &Common) -> Result<(), CommandError> {
         output.line(&format!("  {}", sentence(&scene, timed)))?;
     }
     output.line(&format!("  {}", least_clearance(&scene, &timeline, common)))?;
+    if let Some(file) = &arguments.certificate {
+        output.line("  Proved of this scene, counting benches from 0:")?;
+        for sentence in proved(&text.text, file, common)? {
+            output.line(&format!("    {sentence}."))?;
+        }
+    }
     if timeline.find(EventKind::Contact).is_some_and(|contact| contact.time == 0.0) {
         log::warn!("boards overlap at the start of scene \"{}\": widen the pitch or narrow the boards", scene.name);
     }
     output.finish()
+}
+
+/// What a certificate proves of the scene with this text.
+fn proved(scene: &str, file: &Path, common: &Common) -> Result<Vec<String>, CommandError> {
+    let shown = file.display().to_string();
+    let opened = File::open(file)
+        .map_err(|error| CommandError::BadInput(format!("{shown}: {error}, expected a certificate to read")))?;
+    let bar = progress_bar(opened.metadata().map_or(0, |data| data.len()), common).with_message("checking");
+    let proved = proved_of(scene, &shown, BufReader::new(opened), &mut |bytes| bar.set_position(bytes));
+    bar.finish_and_clear();
+    proved
 }
 
 /// The path in words.

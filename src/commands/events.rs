@@ -3,7 +3,7 @@
 use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
-use bench_dragon::certify::{self, CertifyError, Outcome, Status};
+use bench_dragon::certify::{self, CertifyError, MOST_STEPS, Outcome, Status};
 use bench_dragon::motion::Method;
 use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
@@ -109,7 +109,7 @@ fn certified(
         writer.write_all(b"\n")
     };
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
-    let outcomes = certify::certify(&scene.motion, timeline, text, &mut write, &mut progress);
+    let outcomes = certify::certify(&scene.motion, timeline, text, MOST_STEPS, &mut write, &mut progress);
     bar.finish_and_clear();
     let outcomes = outcomes.and_then(|outcomes| Ok(writer.flush().map(|()| outcomes)?));
     outcomes.map_err(|CertifyError::Write(error)| CommandError::Failed(format!("{shown}: {error}")))
@@ -118,7 +118,7 @@ fn certified(
 fn enclosure(status: &Status) -> Enclosure {
     match *status {
         Status::Proved { time_lo, time_hi, .. } => Enclosure { time_lo: Some(time_lo), time_hi: Some(time_hi) },
-        Status::None | Status::Undecided { .. } => Enclosure { time_lo: None, time_hi: None },
+        Status::None { .. } | Status::Undecided { .. } => Enclosure { time_lo: None, time_hi: None },
     }
 }
 
@@ -129,7 +129,10 @@ fn proof_sentence(kind: EventKind, status: &Status) -> String {
         Status::Proved { time_lo, time_hi, .. } => {
             format!("           Proved: the first {name} is between t = {time_lo} s and {time_hi} s.")
         }
-        Status::None => "           Proved.".to_owned(),
+        Status::None { time_lo: None } => "           Proved.".to_owned(),
+        Status::None { time_lo: Some(time_lo) } => {
+            format!("           Proved up to t = {time_lo} s; the lock that ends the motion is later.")
+        }
         Status::Undecided { time_lo, because } => {
             format!("           Proved up to t = {time_lo} s that there is no {name}; not decided beyond: {because}.")
         }

@@ -1,6 +1,6 @@
 //! `verify`: plays the show of a log again and compares every bit, or checks a certificate of events.
 
-mod certificate;
+pub mod certificate;
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read};

@@ -134,6 +134,7 @@ impl Events {
         shown: LockShown,
     ) -> Result<(), String> {
         let path = &scene.path;
+        span_is_one(scene, Span(to, to))?;
         check_is_in_motion(scene, to)?;
         let (Some(from), Some(rear)) = (steps.end, steps.spans.get(link)) else {
             return Err("the last step does not list the rear handle of the link".to_owned());

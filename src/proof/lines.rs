@@ -76,7 +76,7 @@ pub enum EventKind {
 pub enum Status {
     /// It happens, for the first time, between two times.
     Proved,
-    /// It does not happen before the motion ends, or before the lock could.
+    /// It does not happen before the motion ends, or where a lock ends it, before `time_lo`.
     None,
     /// It does not happen before a time.
     Undecided,
@@ -96,7 +96,7 @@ pub struct Outcome {
     /// Seconds by which it has happened.
     #[serde(default)]
     pub time_hi: Option<f64>,
-    /// The bench of the link, or the first of two that overlap at `time_hi`.
+    /// The bench of a link that has stalled or locked at `time_hi`, or the first of two that overlap then.
     #[serde(default)]
     pub bench_a: Option<usize>,
     /// The other one.

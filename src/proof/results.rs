@@ -37,9 +37,17 @@ pub(super) fn check(
     }
     let known = known(scene, steps, events, *expected);
     let Outcome { time_lo, time_hi, bench_a, bench_b, .. } = outcome;
-    let begins = |lo: f64| lo.is_finite() && Interval::new(lo).is_at_most(&known.not_before);
+    let begins = |lo: f64| lo.is_finite() && lo >= 0.0 && Interval::new(lo).is_at_most(&known.not_before);
     match (outcome.status, time_lo, time_hi) {
-        (Status::None, None, None) if known.never && bench_a.is_none() && bench_b.is_none() => Ok(()),
+        (Status::None, lo, None) if known.never && bench_a.is_none() && bench_b.is_none() => {
+            // Between the last step and the lock nothing is known: there the claim has to say how far it goes.
+            let up_to_a_lock = matches!(events.finish, Some(Finish::Lock(..))) && *expected != EventKind::PathEnd;
+            match lo {
+                Some(lo) if up_to_a_lock && begins(*lo) => Ok(()),
+                None if !up_to_a_lock => Ok(()),
+                _ => Err("up to when there is none does not follow".to_owned()),
+            }
+        }
         (Status::None, ..) => Err("that there is none does not follow".to_owned()),
         (Status::Undecided, Some(lo), None) if begins(*lo) && bench_a.is_none() && bench_b.is_none() => Ok(()),
         (Status::Undecided, ..) => Err("that it does not happen before time_lo does not follow".to_owned()),

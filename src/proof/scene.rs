@@ -60,6 +60,7 @@ struct TeamText {
 #[derive(Deserialize)]
 struct MotionText {
     head_speed: f64,
+    solver: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -125,6 +126,9 @@ impl Scene {
             PathText::Turnaround { .. } => turnaround(&text.path, &team)?,
             PathText::Pieces { start, heading_turns, pieces } => route(*start, *heading_turns, pieces)?,
         };
+        if text.motion.solver.as_deref() == Some("paper") {
+            return Err("the scene names the solver \"paper\", whose motion is not the exact one".to_owned());
+        }
         let head_speed = positive("motion.head_speed", text.motion.head_speed)?;
         Ok(Self { team, path, head_speed })
     }

@@ -88,6 +88,7 @@ impl RawCue {
         if name.is_empty() {
             return Err(source.field_error(&self.name, "cues.name is empty, expected a name"));
         }
+        source.printable("cues.name", &self.name)?;
         let moment = match (&self.at, &self.before, &self.travelled) {
             (Some(at), None, None) => CueMoment::At(source.check("cues.at", at, Accepted::CUE)?),
             (None, Some(before), None) => self.before_event(before, source, alerts)?,

@@ -11,18 +11,20 @@ use std::time::{Duration, Instant};
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::subscriber::Subscriber as Port;
 use iceoryx2::prelude::*;
+use iceoryx2::sample::Sample;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError as Open;
 use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use crate::live::clock::monotonic_clock_name;
 use crate::transports::iceoryx2::{
-    CLOCK, OpenError, check_room_to_subscribe, node, reserve_pages, service_name, stale_files,
+    CLOCK, MOST_PUBLISHERS, OpenError, check_room_to_subscribe, node, reserve_pages, service_name, stale_files,
 };
 use crate::wire::{CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
 use followed::{Followed, OfRun, Origin, publishers};
 
 type Receiver<Payload, Header> = Port<ipc::Service, Payload, Header>;
+type PoseSample = Sample<ipc::Service, [HandlePose], FrameHeader>;
 
 /// How long publishers that have sent nothing are left alone before they are tried again.
 const BYSTANDER_INTERVAL: Duration = Duration::from_secs(5);
@@ -40,6 +42,12 @@ pub struct Connection {
     stage: Option<Receiver<Stage, ()>>,
     tick: Option<Listener<ipc::Service>>,
     followed: Cell<Option<Followed>>,
+    /// Whether another publisher is followed since that was last asked.
+    follows_another: Cell<bool>,
+    /// The frame that decided whom to follow, until it is handed over: what explains it goes before.
+    first: RefCell<Option<PoseSample>>,
+    /// The latest status of each publisher that came before it was known whom to follow.
+    held_statuses: RefCell<Vec<(Origin, LoopStatus)>>,
 }
 
 /// A subscriber's node, with which it opens services.
@@ -121,6 +129,9 @@ impl Subscription {
             stage: self.receiver("stage")?,
             tick: self.listener(),
             followed: Cell::new(None),
+            follows_another: Cell::new(false),
+            first: RefCell::new(None),
+            held_statuses: RefCell::new(Vec::new()),
         };
         reserve_pages()?;
         Ok(Some(connection))
@@ -236,11 +247,17 @@ impl Connection {
         }
     }
 
-    /// Whether the publisher of the frames reads the clock of this process, so that its moments of CLOCK_MONOTONIC can be
-    /// compared with those here.
-    pub fn shares_clock(&self) -> bool {
+    /// Whether the service names the clock of this process, so that moments of CLOCK_MONOTONIC in its frames can be
+    /// compared with those here. It tells of who made the service: a tunnel may use one that a show of this machine has
+    /// left.
+    pub fn names_clock(&self) -> bool {
         let clock = monotonic_clock_name();
         self.poses_service.attributes().iter().any(|it| it.key() == CLOCK && it.value() == clock.as_str())
+    }
+
+    /// Whether, since this was last asked, a frame has decided to follow a publisher, or another one than before.
+    pub fn follows_another(&self) -> bool {
+        self.follows_another.take()
     }
 
     /// Hands the frames that have come to `each`, oldest first; how many there were. They are at most as many as the queue
@@ -248,7 +265,7 @@ impl Connection {
     pub fn frames(&self, mut each: impl FnMut(&FrameHeader, &[HandlePose])) -> usize {
         let (mut count, mut received) = (0, 0);
         while received < self.poses.buffer_size()
-            && let Ok(Some(sample)) = self.poses.receive()
+            && let Some(sample) = self.next_frame()
         {
             received += 1;
             if self.follow(Origin::of(sample.header()), sample.user_header().run_id) {
@@ -262,7 +279,7 @@ impl Connection {
     /// Hands the newest frame to `take` and drops those before it; `None` where none has come.
     pub fn newest_frame<Taken>(&self, take: impl FnOnce(&FrameHeader, &[HandlePose]) -> Taken) -> Option<Taken> {
         let mut newest = None;
-        while let Ok(Some(sample)) = self.poses.receive() {
+        while let Some(sample) = self.next_frame() {
             if self.follow(Origin::of(sample.header()), sample.user_header().run_id) {
                 newest = Some(sample);
             }
@@ -287,7 +304,29 @@ impl Connection {
 
     /// The next status, if one has come.
     pub fn status(&self) -> Option<LoopStatus> {
-        self.next(self.status.as_ref())
+        if !self.is_decided() {
+            return None;
+        }
+        let held = self.held_statuses.take().into_iter().find(|(origin, status)| self.admits(*origin, status.run_id));
+        held.map(|(_, status)| status).or_else(|| self.next(self.status.as_ref()))
+    }
+
+    /// Takes in the statuses that come before a frame has decided whose are handed over; whether any came. A publisher
+    /// of few frames is known by them to be alive.
+    pub fn hold_statuses(&self) -> bool {
+        let Some(port) = self.status.as_ref().filter(|_| self.followed.get().is_none()) else { return false };
+        let mut held = self.held_statuses.borrow_mut();
+        let mut any = false;
+        while let Ok(Some(sample)) = port.receive() {
+            let origin = Origin::of(sample.header());
+            held.retain(|(known, _)| *known != origin);
+            if held.len() == MOST_PUBLISHERS {
+                held.remove(0);
+            }
+            held.push((origin, *sample));
+            any = true;
+        }
+        any
     }
 
     /// The next stage, if one has come.
@@ -295,12 +334,13 @@ impl Connection {
         self.next(self.stage.as_ref())
     }
 
-    /// The next message that belongs to the frames that are followed.
+    /// The next message that belongs to the frames that are followed. Before a frame has come, messages stay in their
+    /// queues: they could be of a publisher that sends no frames.
     fn next<Message: ZeroCopySend + std::fmt::Debug + Copy + OfRun>(
         &self,
         port: Option<&Receiver<Message, ()>>,
     ) -> Option<Message> {
-        let port = port?;
+        let port = port.filter(|_| self.is_decided())?;
         while let Some(sample) = port.receive().ok().flatten() {
             if self.admits(Origin::of(sample.header()), sample.run_id()) {
                 return Some(*sample);
@@ -309,19 +349,38 @@ impl Connection {
         None
     }
 
+    /// The next frame of any publisher, if one has come.
+    fn next_frame(&self) -> Option<PoseSample> {
+        self.first.take().or_else(|| self.poses.receive().ok().flatten())
+    }
+
+    /// Whether it is known whom to follow; if not, the next frame decides, where one has come. Every publisher sends
+    /// frames all the time, in pauses too.
+    fn is_decided(&self) -> bool {
+        if self.followed.get().is_none()
+            && let Some(sample) = self.next_frame()
+        {
+            self.follow(Origin::of(sample.header()), sample.user_header().run_id);
+            self.first.replace(Some(sample));
+        }
+        self.followed.get().is_some()
+    }
+
     /// Whether a frame is handed over. The first decides whose frames are from then on, until that publisher has gone.
     fn follow(&self, origin: Origin, run_id: u64) -> bool {
-        let follows =
-            self.followed.get().is_none_or(|followed| followed.origin == origin || !self.is_listed(followed.origin));
+        let latest = self.followed.get();
+        let is_same = latest.is_some_and(|followed| followed.origin == origin);
+        let follows = is_same || latest.is_none_or(|followed| !self.is_listed(followed.origin));
         if follows {
             self.followed.set(Some(Followed { origin, run_id }));
+            self.follows_another.set(self.follows_another.get() || !is_same);
         }
         follows
     }
 
     /// Whether a message is handed over: it comes from where the frames come from, or the next run begins with it.
     fn admits(&self, origin: Origin, run_id: u64) -> bool {
-        self.followed.get().is_none_or(|followed| {
+        self.followed.get().is_some_and(|followed| {
             followed.origin.node == origin.node || followed.run_id == run_id || !self.is_listed(followed.origin)
         })
     }

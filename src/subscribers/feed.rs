@@ -133,10 +133,11 @@ struct Connected {
     connection: Connection,
     shares_clock: bool,
     liveness: Liveness,
-    since: Instant,
     last_open: Instant,
-    /// Whether anything has come.
+    /// Whether anything has been handed over, which begins with a frame.
     received: bool,
+    /// Since when there has been no sign that any publisher sends, as long as nothing has been handed over.
+    quiet_since: Instant,
     /// The run and the stamp of the latest stage: it comes again where there is a tunnel to other machines.
     stage: Option<(u64, u64)>,
 }
@@ -157,8 +158,8 @@ impl Feed {
     }
 
     /// Waits until something comes, at most `timeout`, and hands all that has come to `handle`, but of frames at most as
-    /// many as the queue holds. Does what is due besides, so it is to be called again and again, a few times a second at least; it may return sooner and with
-    /// nothing.
+    /// many as the queue holds. Does what is due besides, so it is to be called again and again, a few times a second
+    /// at least; it may return sooner and with nothing.
     ///
     /// # Errors
     /// [`OpenError`] where the services exist and cannot be used. The feed has let go of them then, and the next call
@@ -167,6 +168,9 @@ impl Feed {
         let Some(connected) = &mut self.connected else { return self.connect(timeout) };
         connected.connection.wait(timeout.min(OPEN_INTERVAL));
         connected.receive(self.frames, &mut self.sequence, handle);
+        if connected.connection.follows_another() {
+            connected.shares_clock = shares_clock(&self.subscription, &connected.connection);
+        }
         if connected.last_open.elapsed() >= OPEN_INTERVAL {
             connected.last_open = Instant::now();
             if let Err(error) = self.subscription.open_missing_services(&mut connected.connection) {
@@ -187,15 +191,20 @@ impl Feed {
                 self.leave();
             }
         }
-        let is_quiet = |connected: &Connected| !connected.received && connected.since.elapsed() >= QUIET;
-        if self.connected.as_ref().is_some_and(is_quiet) && !self.subscription.show_is_here() {
-            self.leave();
+        let is_quiet = |connected: &&mut Connected| !connected.received && connected.quiet_since.elapsed() >= QUIET;
+        if let Some(connected) = self.connected.as_mut().filter(is_quiet) {
+            // A show that is stopped may stay so: to ask costs more than all else that is done here.
+            connected.quiet_since = Instant::now();
+            if !self.subscription.show_is_here() {
+                self.leave();
+            }
         }
         Ok(())
     }
 
     /// Whether the publisher's clock is that of this process, so that latencies can be computed; `None` while there is no
-    /// publisher.
+    /// publisher. Where another publisher's frames come, it holds for them when the poll that brings the first has
+    /// returned.
     pub fn shares_clock(&self) -> Option<bool> {
         self.connected.as_ref().map(|connected| connected.shares_clock)
     }
@@ -217,23 +226,32 @@ impl Feed {
         let now = Instant::now();
         self.next_connect = now + CONNECT_INTERVAL;
         self.connected = connection.map(|connection| Connected {
-            shares_clock: connection.shares_clock(),
+            shares_clock: shares_clock(&self.subscription, &connection),
             connection,
             liveness: Liveness::connected_at(now),
-            since: now,
             last_open: now,
             received: false,
+            quiet_since: now,
             stage: None,
         });
         Ok(())
     }
 }
 
+/// Whether frames are of this machine's clock: the service names it, and a show is here. Services can outlive the show
+/// that made them, and a tunnel then sends another machine's frames through them.
+fn shares_clock(subscription: &Subscription, connection: &Connection) -> bool {
+    connection.names_clock() && subscription.show_is_here()
+}
+
 impl Connected {
     /// Hands over what is in the queues: the stage first, since it explains the frames, and frames before the alerts
     /// and cues that belong to them.
     fn receive(&mut self, frames: Frames, sequence: &mut SequenceTracker, handle: &mut dyn FnMut(FeedEvent<'_>)) {
-        let Self { connection, liveness, received, stage: latest_stage, .. } = self;
+        let Self { connection, liveness, received, quiet_since, stage: latest_stage, .. } = self;
+        if connection.hold_statuses() {
+            *quiet_since = Instant::now();
+        }
         let mut handle = |event: FeedEvent<'_>| {
             *received = true;
             handle(event);

@@ -67,7 +67,9 @@ impl HermiteReader {
         Self { frames: VecDeque::with_capacity(keep.max(2)), keep: keep.max(2) }
     }
 
-    /// Takes in the next frame of a stream. Frames of another run are forgotten.
+    /// Takes in the next frame of a stream. Frames of another run are forgotten. A frame of another machine has a
+    /// `deadline_ns` of that machine's clock, which no moment here can be compared with: put the time of its arrival in
+    /// place of that.
     pub fn push(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
         if self.frames.back().is_some_and(|last| last.header.run_id != header.run_id) {
             self.frames.clear();

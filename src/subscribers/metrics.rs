@@ -1,8 +1,10 @@
-//! The figures of running publishers for Prometheus, over HTTP. In: the services of one name or several, one more subscriber of
-//! them. Out: text at `/metrics`, in which the label `name` tells them apart. Called by the command `metrics`.
+//! The figures of running publishers for Prometheus, over HTTP. In: the services of one name or several, one more
+//! subscriber of them. Out: text at `/metrics`, in which the label `name` tells them apart. Called by the command
+//! `metrics`.
 //!
-//! A [`Monitor`] for each publisher, on a thread of its own takes all that comes, since ports cannot leave the thread that made them; each
-//! request gets what it knows at that moment. In `families`, which figures; in `exposition`, the text.
+//! A [`Monitor`] for each publisher takes in all that comes, on one thread besides the server's, since ports cannot
+//! leave the thread that made them; each request gets what it knows at that moment. In `families`, which figures; in
+//! `exposition`, the text.
 
 pub mod exposition;
 pub mod families;

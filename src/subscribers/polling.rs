@@ -19,6 +19,9 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(200);
 pub trait Handler {
     /// Takes in what has come from a publisher, which is known by its place in the list of names, from 0.
     fn handle(&mut self, publisher: usize, event: FeedEvent<'_>);
+    /// Takes in whether the clock of a publisher that is there is that of this process, before its first frame comes
+    /// and again after each poll. Handlers that compare no moments need not know.
+    fn clock(&mut self, _publisher: usize, _shares_clock: bool) {}
     /// Does what is due, whether anything has come or not.
     fn polled(&mut self, now: Instant);
 }
@@ -34,7 +37,9 @@ struct Source {
 ///
 /// # Errors
 /// [`OpenError`] for a name that iceoryx2 cannot take, or where this process may not use the shared memory. Services that
-/// cannot be used later on are waited for, and keep no other waiting; the log names the reason once.
+/// cannot be used later on are waited for while the others are polled; the log names the reason once. All are polled by
+/// one thread: a service that hangs in its creation, since its publisher was killed at that moment, keeps the others
+/// waiting for as long as iceoryx2 waits for it, at each attempt until its files have been removed.
 pub fn poll_until(
     stop: &AtomicBool,
     names: &[String],
@@ -50,6 +55,9 @@ pub fn poll_until(
         std::thread::sleep(POLL_INTERVAL);
         for (publisher, source) in sources.iter_mut().enumerate().filter(|(_, source)| source.next <= Instant::now()) {
             let polled = source.feed.poll(Duration::ZERO, &mut |event| handler.handle(publisher, event));
+            if let Some(shares_clock) = source.feed.shares_clock() {
+                handler.clock(publisher, shares_clock);
+            }
             // The services may become usable while this continues: a program of another version ends, a subscriber leaves.
             let now = polled.err().map(|error| error.to_string());
             if now.is_some() {

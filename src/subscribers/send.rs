@@ -1,7 +1,8 @@
 //! What takes the dragon out of the machine: trackers for lighting desks ([`psn_sender`]), OSC messages ([`osc_sender`]).
 //!
-//! Each is a handler of one more subscriber of each publisher, in a process of its own. Here is what they have in common: which frames are due,
-//! and when frames have stopped. In: the events of a feed. Out: UDP datagrams. Called by the command `send`.
+//! Each is a handler of one more subscriber of each publisher, in a process of its own. Here is what they have in
+//! common: which frames are due, and when frames have stopped. In: the events of a feed. Out: UDP datagrams. Called by
+//! the command `send`.
 
 pub mod axes;
 pub mod network;

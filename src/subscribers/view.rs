@@ -54,6 +54,8 @@ struct Picture {
     /// The latest cues, each with its number among all that have come to this server, so that none is left out.
     cues: Arc<[(u64, Utf8Bytes)]>,
     frame: Bytes,
+    /// Whether frames are stamped by the clock of this machine; `None` while there is no publisher.
+    shares_clock: Option<bool>,
 }
 
 impl Picture {

@@ -190,7 +190,7 @@ pub struct SharedMemoryPublisher {
 
 impl SharedMemoryPublisher {
     /// Opens the services and sends the stage. To be called on the thread that will publish. Whoever calls it sees to it that
-    /// no other show has the name, as [`open`] does.
+    /// no other show has the name: within a run [`Transport::control`] does, which is called before.
     ///
     /// # Errors
     /// [`OpenError`]: each names what is in the way and what to do.

@@ -4,7 +4,6 @@
 //! `BENCH_DRAGON_LONG=1` makes a thousand changes in place of some dozens, and adds larger scenes.
 
 #[path = "../processes/mod.rs"]
-#[allow(dead_code)]
 mod processes;
 
 mod tampering;
@@ -42,7 +41,7 @@ fn certificate(text: &str) -> Vec<Value> {
         lines.push(serde_json::to_value(line).unwrap());
         Ok::<(), std::io::Error>(())
     };
-    certify::certify(&scene.motion, &timeline, text, &mut write, &mut |_| {}).unwrap();
+    certify::certify(&scene.motion, &timeline, text, certify::MOST_STEPS, &mut write, &mut |_| {}).unwrap();
     lines
 }
 
@@ -88,4 +87,48 @@ fn certificates_are_proofs() {
         assert!(decided >= least, "{name}: {:?}", proved.results);
         assert_eq!(proved.scene, text);
     }
+}
+
+/// What the program prints and its exit code.
+fn program(arguments: &[&str]) -> (String, String, Option<i32>) {
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(arguments).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (text(output.stdout), text(output.stderr), output.status.code())
+}
+
+/// The way of a certificate through the program: made, checked, refused where a digit was changed, printed for its own
+/// scene and for no other.
+#[test]
+fn the_program_makes_and_checks_certificates() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("proof.jsonl");
+    let (file, scene) = (file.to_str().unwrap(), "tests/scenes/missed_contact.toml");
+    let (lines, errors, code) = program(&["--scene", scene, "--json", "events", "--certify", file]);
+    assert_eq!((errors.as_str(), code), ("", Some(0)));
+    let events: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    for event in &events {
+        let [time, lo, hi] = ["time", "time_lo", "time_hi"].map(|key| event[key].as_f64().unwrap());
+        assert!(lo <= time && time <= hi && hi - lo < 1e-8, "{event}");
+    }
+    assert_eq!(events.len(), 3);
+    let (said, _, code) = program(&["verify", file]);
+    assert!(code == Some(0) && said.contains("contact: proved between 37.145313188"), "{said}");
+    let (said, _, code) = program(&["check", "--scene", scene, "--certificate", file]);
+    assert!(code == Some(0) && said.contains("lock: proved that there is none"), "{said}");
+    let (_, said, code) = program(&["check", "--scene", "config/school.toml", "--certificate", file]);
+    assert!(code == Some(2) && said.contains("another text"), "{said}");
+
+    let text = std::fs::read_to_string(file).unwrap();
+    std::fs::write(file, text.replace("\"time_hi\":37.1453", "\"time_hi\":37.1452")).unwrap();
+    let (_, said, code) = program(&["verify", file]);
+    assert!(code == Some(1) && said.contains("does not follow"), "{said}");
+    std::fs::write(file, &text[..text.len() / 2]).unwrap();
+    let (_, said, code) = program(&["check", "--scene", scene, "--certificate", file]);
+    assert!(code == Some(2) || code == Some(1), "{said}");
+
+    let exact = std::fs::read_to_string("config/school.toml").unwrap();
+    let paper = folder.path().join("paper.toml");
+    std::fs::write(&paper, exact.replace("head_speed = 1.0", "solver = \"paper\"\nhead_speed = 1.0")).unwrap();
+    let (_, said, code) = program(&["--scene", paper.to_str().unwrap(), "events", "--certify", file]);
+    assert!(code == Some(2) && said.contains("only exact motion can be certified"), "{said}");
 }

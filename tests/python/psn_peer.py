@@ -1,11 +1,14 @@
 """A lighting desk that checks what it hears: PosiStageNet as PyPI's pypsn decodes it, against the shared memory.
 
     psn_peer.py --name NAME... --port P [--group 236.10.10.10] [--axes x,up,y] [--first-id N] [--id-step N] [--npm FOLDER]
+                [--progress]
 
 Listens to UDP port P and subscribes to the publishers NAME, the first of which has to run already. Ends once no packet has
 come for two seconds after the first. A frame's trackers belong to the publishers by their numbers, STEP apart. Every frame was decoded whole, and each is held against the frame of the shared memory that has the
 same head, every tracker, to float32. Prints a line when it listens, and one with what it has seen. With --npm, the decoder
-of that folder (npm's @jwetzell/posistagenet) gets the same packets and has to see the same in them.
+of that folder (npm's @jwetzell/posistagenet) gets the same packets and has to see the same in them. With --progress, a line
+five times a second has for each publisher how often its trackers have `stopped`, and how many frames since then were `equal`,
+as far as the head's place tells.
 """
 
 import argparse
@@ -13,6 +16,7 @@ import base64
 import json
 import pathlib
 import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -117,14 +121,57 @@ def hold_against(trackers, memory, axes, first_id):
         assert {tracker.status for tracker in trackers} == {0.0}
         assert all(tuple(tracker.speed) == (0, 0, 0) for tracker in trackers), "it stands still"
         return "stopped"
-    # The head's place on the stage again.
-    place = dict(zip([axis.strip("-") for axis in axes.split(",")], trackers[0].pos))
-    sign = {axis.strip("-"): -1 if axis[0] == "-" else 1 for axis in axes.split(",")}
-    key = np.float32([place["x"] * sign["x"], place["y"] * sign["y"]]).tobytes()
+    key = head_key(trackers[0].pos, axes)
     if key not in memory.frames:
         return "unknown"
     compare(trackers, *memory.frames[key], axes, first_id)
     return "equal"
+
+
+def chunks(part):
+    """The chunks of a part of a PosiStageNet packet: the number of each, and what is in it."""
+    at = 0
+    while at + 4 <= len(part):
+        number, length = struct.unpack_from("<HH", part, at)
+        length &= 0x7FFF
+        yield number, part[at + 4 : at + 4 + length]
+        at += 4 + length
+
+
+class Progress:
+    """What has come so far, by the heads alone: to decode whole frames meanwhile would keep the memory waiting."""
+
+    def __init__(self, memories, axes, first_id, id_step):
+        self.memories, self.axes = memories, axes
+        self.places = {first_id + place * id_step: place for place in range(len(memories))}
+        self.stopped, self.heads, self.printed_at = [0] * len(memories), [[] for _ in memories], time.monotonic()
+
+    def take(self, packet):
+        [(kind, body)] = chunks(packet)
+        # The lists of trackers of a packet of positions.
+        lists = [part for number, part in chunks(body) if (kind, number) == (0x6755, 1)]
+        for number, part in (tracker for trackers in lists for tracker in chunks(trackers)):
+            if number in self.places:
+                self.take_head(self.places[number], dict(chunks(part)))
+        if time.monotonic() - self.printed_at > 0.2:
+            self.printed_at = time.monotonic()
+            # The memory may get a frame later than the network.
+            equal = [sum(head in memory.frames for head in heads) for memory, heads in zip(self.memories, self.heads)]
+            print(json.dumps({"type": "progress", "stopped": self.stopped, "equal": equal}), flush=True)
+
+    def take_head(self, place, fields):
+        if struct.unpack("<f", fields[3]) == (1.0,):
+            self.heads[place].append(head_key(struct.unpack("<fff", fields[0]), self.axes))
+        elif self.heads[place]:
+            self.stopped[place] += 1
+            self.heads[place] = []
+
+
+def head_key(position, axes):
+    """A head's place in a desk's axes, as the shared memory's frames are found by."""
+    place = dict(zip([axis.strip("-") for axis in axes.split(",")], position))
+    sign = {axis.strip("-"): -1 if axis[0] == "-" else 1 for axis in axes.split(",")}
+    return np.float32([place["x"] * sign["x"], place["y"] * sign["y"]]).tobytes()
 
 
 def decode_again(folder, packets, frames, names):
@@ -149,6 +196,7 @@ def main():
     parser.add_argument("--first-id", type=int, default=1)
     parser.add_argument("--id-step", type=int, default=1000)
     parser.add_argument("--npm")
+    parser.add_argument("--progress", action="store_true")
     arguments = parser.parse_args()
 
     memories = [Memory(name) for name in arguments.name]
@@ -159,10 +207,13 @@ def main():
     sock, packets = listen(arguments.port, arguments.group), []
     print(json.dumps({"type": "listening"}), flush=True)
     sock.settimeout(120)
+    progress = Progress(memories, arguments.axes, arguments.first_id, arguments.id_step) if arguments.progress else None
     try:
         while True:
             packets.append(sock.recv(65536))
             sock.settimeout(2)
+            if progress:
+                progress.take(packets[-1])
     except TimeoutError:
         assert packets, "nothing was sent"
     for memory in memories:

@@ -1,6 +1,9 @@
 //! What `verify` says of a certificate of events.
 
+use std::io::BufRead;
+
 use bench_dragon::proof::{EventKind, Outcome, Proved, Refused, Status};
+use bench_dragon::scene::printable;
 use serde::Serialize;
 use serde_json::json;
 
@@ -17,33 +20,57 @@ struct Verdict<'a> {
 /// Prints what a certificate proves, or why it proves nothing; `shown` is how sentences call the file.
 pub(super) fn print(common: &Common, shown: &str, checked: Result<Proved, Refused>) -> Result<(), CommandError> {
     let proved = match checked {
-        Ok(proved) => proved,
-        Err(Refused::DoesNotFollow { line, problem }) => {
-            if common.json {
-                let mut output = Output::standard();
-                output.json(&json!({"verdict": "refused", "line": line, "problem": problem}))?;
-                output.finish()?;
-            }
-            return Err(CommandError::Failed(format!("{shown}, line {line}: it does not follow: {problem}")));
+        Err(Refused::DoesNotFollow { line, problem }) if common.json => {
+            let mut output = Output::standard();
+            output.json(&json!({"verdict": "refused", "line": line, "problem": problem}))?;
+            output.finish()?;
+            return Err(refusal(shown, Refused::DoesNotFollow { line, problem }));
         }
-        Err(Refused::Form { line, problem }) => {
-            return Err(CommandError::BadInput(format!("{shown}, line {line}: {problem}")));
-        }
-        Err(Refused::Unreadable(error)) => {
-            return Err(CommandError::BadInput(format!("{shown}: {error}, expected a certificate to read")));
-        }
+        checked => checked.map_err(|refused| refusal(shown, refused))?,
     };
     let mut output = Output::standard();
     if common.json {
         output.json(&Verdict { verdict: "proved", proved: &proved })?;
         return output.finish();
     }
+    output.line(&format!("BLAKE3 of the scene's text: {}", blake3::hash(proved.scene.as_bytes())))?;
     for outcome in &proved.results {
         output.line(&sentence(outcome))?;
     }
     let Proved { steps, links, pairs, .. } = proved;
     output.line(&format!("{steps} steps, {links} links over spans and {pairs} pairs of boards were checked."))?;
     output.finish()
+}
+
+/// Checks that a certificate proves something of the scene with this very text; `shown` is how sentences call the file.
+/// Returns a sentence for each kind of event.
+pub fn proved_of(
+    scene: &str,
+    shown: &str,
+    lines: impl BufRead,
+    progress: &mut dyn FnMut(u64),
+) -> Result<Vec<String>, CommandError> {
+    let proved = bench_dragon::proof::verify(lines, progress).map_err(|refused| refusal(shown, refused))?;
+    if proved.scene != scene {
+        let sentence = format!("{shown} is the certificate of a scene with another text, expected one of this scene");
+        return Err(CommandError::BadInput(sentence));
+    }
+    Ok(proved.results.iter().map(sentence).collect())
+}
+
+/// Why a certificate proves nothing.
+fn refusal(shown: &str, refused: Refused) -> CommandError {
+    match refused {
+        Refused::DoesNotFollow { line, problem } => {
+            CommandError::Failed(format!("{shown}, line {line}: it does not follow: {}", printable(&problem)))
+        }
+        Refused::Form { line, problem } => {
+            CommandError::BadInput(format!("{shown}, line {line}: {}", printable(&problem)))
+        }
+        Refused::Unreadable(error) => {
+            CommandError::BadInput(format!("{shown}: {error}, expected a certificate to read"))
+        }
+    }
 }
 
 /// What is proved of an event, in a sentence.
@@ -60,11 +87,17 @@ fn sentence(outcome: &Outcome) -> String {
         (Status::Proved, Some(a), Some(b)) => {
             format!("{event}: proved between {lo} and {hi}, when benches {a} and {b} overlap")
         }
-        (Status::Proved, Some(a), None) => format!("{event}: proved between {lo} and {hi}, at bench {a}"),
+        (Status::Proved, Some(a), None) => {
+            format!("{event}: proved between {lo} and {hi}, when it is there at bench {a}")
+        }
         (Status::Proved, ..) => format!("{event}: proved between {lo} and {hi}"),
+        (Status::None, ..) if outcome.time_lo.is_some() => {
+            format!("{event}: proved that there is none before {lo}; the lock that ends the motion is later")
+        }
         (Status::None, ..) => format!("{event}: proved that there is none"),
         (Status::Undecided, ..) => {
-            let because = outcome.because.as_deref().map_or(String::new(), |because| format!(": {because}"));
+            let because =
+                outcome.because.as_deref().map_or(String::new(), |because| format!(": {}", printable(because)));
             format!("{event}: undecided, but not before {lo}{because}")
         }
     }

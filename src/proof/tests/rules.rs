@@ -235,3 +235,30 @@ fn events_outside_the_motion_are_refused() {
         "beyond the end",
     );
 }
+
+#[test]
+fn a_lock_at_no_place_is_refused() {
+    for place in [json!([9, 1.0]), json!([1, -1.0])] {
+        let mut lines = certificate();
+        lines.truncate(4);
+        lines.push(
+            json!({"type": "lock", "link": 0, "to": place, "spans": [], "last": [], "window": [[1, 0.5], [1, 0.6]]}),
+        );
+        assert!(matches!(check(&lines), Err(Refused::DoesNotFollow { .. })), "{place}");
+    }
+}
+
+#[test]
+fn a_time_below_zero_is_refused() {
+    let mut lines = certificate();
+    let last = lines.len() - 1;
+    lines[last]["time_lo"] = json!(-1.0);
+    assert!(check(&lines).is_err());
+}
+
+#[test]
+fn a_scene_of_the_papers_rules_is_refused() {
+    let mut lines = certificate();
+    lines[0]["scene"] = json!(SCENE.replace("head_speed", "solver = \"paper\"\nhead_speed"));
+    assert!(check(&lines).is_err());
+}

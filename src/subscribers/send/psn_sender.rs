@@ -10,7 +10,7 @@ use super::Pace;
 use super::axes::Axes;
 use super::network::Outlet;
 use super::psn::{MOST_PACKETS, TrackerName, data_frame, info_frame};
-use super::psn_source::{Source, made_ns};
+use super::psn_source::Source;
 use super::trackers::{Numbers, Selection};
 use crate::live::clock::monotonic_ns;
 use crate::subscribers::feed::FeedEvent;
@@ -137,15 +137,16 @@ impl<'a> PsnSender<'a> {
 
     /// Whether a frame goes out for this one. Several publishers have one count of intervals, on the clock that their deadlines
     /// have in common; that of one alone begins with its run.
-    fn is_due(&mut self, header: &FrameHeader) -> bool {
+    fn is_due(&mut self, header: &FrameHeader, made_ns: u64) -> bool {
         match &self.sources[..] {
             [_] => self.pace.is_due(header),
-            _ => self.pace.is_due(&FrameHeader { run_id: 0, deadline_ns: made_ns(header), ..*header }),
+            _ => self.pace.is_due(&FrameHeader { run_id: 0, deadline_ns: made_ns, ..*header }),
         }
     }
 
     fn take_frame(&mut self, publisher: usize, header: &FrameHeader, handles: &[HandlePose]) {
-        let is_due = self.is_due(header);
+        let Some(made_ns) = self.sources.get(publisher).map(|source| source.made_ns(header)) else { return };
+        let is_due = self.is_due(header, made_ns);
         let alone = self.sources.len() == 1;
         let Some(source) = self.sources.get_mut(publisher) else { return };
         // Of several, each frame goes out with the next that is due of any.
@@ -162,34 +163,38 @@ impl<'a> PsnSender<'a> {
             self.next_info = Instant::now();
             left_out.into_iter().for_each(|sentence| (self.notify)(publisher, Notice::LeftOut(sentence)));
         }
-        let timestamp_us = made_ns(header).saturating_sub(self.started_ns) / 1000;
+        let timestamp_us = made_ns.saturating_sub(self.started_ns) / 1000;
         let overtakes = source.take(header, handles, self.options.axes, timestamp_us);
         self.summary.passed_over += u64::from(overtakes);
         self.due |= is_due;
     }
 
-    /// Sends all trackers as they are, all packets back to back. Returns the number of packets.
+    /// Sends all trackers as they are, all packets back to back; nothing where there are none. Returns the number of
+    /// packets.
     fn send_trackers(&mut self) -> usize {
-        self.data_frame_id = next_frame_id(self.data_frame_id);
         let mut trackers = Vec::with_capacity(self.sources.iter().map(|source| source.trackers.len()).sum());
         for source in &mut self.sources {
             source.unsent = false;
             trackers.extend_from_slice(&source.trackers);
         }
+        if trackers.is_empty() {
+            return 0;
+        }
+        self.data_frame_id = next_frame_id(self.data_frame_id);
         let frame = data_frame(self.elapsed_us(), self.data_frame_id, &trackers);
         frame.packets.iter().for_each(|packet| self.outlet.send(packet));
-        if frame.trackers < trackers.len() {
-            // From the next frame on there is nothing to leave out.
-            let mut room = frame.trackers;
-            for (publisher, source) in self.sources.iter_mut().enumerate() {
-                if let Some(chosen) = source.truncate(room) {
-                    let sentence = format!(
-                        "only {room} of {chosen} handles are sent: a frame has {MOST_PACKETS} packets at most; --trackers \
-                         chooses others"
-                    );
-                    (self.notify)(publisher, Notice::LeftOut(sentence));
-                }
-                room -= source.trackers.len().min(room);
+        let mut room = frame.trackers;
+        for (publisher, source) in self.sources.iter_mut().enumerate() {
+            let (remaining, left_out) = source.fit(room);
+            room = remaining;
+            if let Some(left_out) = left_out {
+                let (chosen, of) = (source.trackers.len(), source.of());
+                let sent = chosen - left_out;
+                let sentence = format!(
+                    "only {sent} of {chosen} handles{of} are sent: a frame has {MOST_PACKETS} packets at most; \
+                     --trackers chooses others"
+                );
+                (self.notify)(publisher, Notice::LeftOut(sentence));
             }
         }
         frame.packets.len()
@@ -241,6 +246,12 @@ impl Handler for PsnSender<'_> {
         if let FeedEvent::Frame { header, handles, missed } = event {
             self.summary.passed_over += missed;
             self.take_frame(publisher, header, handles);
+        }
+    }
+
+    fn clock(&mut self, publisher: usize, shares_clock: bool) {
+        if let Some(source) = self.sources.get_mut(publisher) {
+            source.shares_clock = shares_clock;
         }
     }
 

@@ -1,7 +1,7 @@
 //! The trackers of one publisher: which handles, their names, where they are, whether frames come. In: frames. Out: trackers,
 //! which the [`sender`](super::psn_sender) puts into packets. Called by it alone.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::Arrivals;
 use super::axes::Axes;
@@ -11,20 +11,12 @@ use crate::live::clock::monotonic_ns;
 use crate::subscribers::feed::FeedEvent;
 use crate::wire::{FrameHeader, HandlePose};
 
-/// A frame that seems older than this was made on a machine with another clock.
-const OLDEST: Duration = Duration::from_secs(10);
-
-/// When a frame should have been made, CLOCK_MONOTONIC in ns of this machine; one of another machine counts as made now.
-pub(super) fn made_ns(header: &FrameHeader) -> u64 {
-    let now_ns = monotonic_ns();
-    let known = now_ns.checked_sub(header.deadline_ns).is_some_and(|age| u128::from(age) < OLDEST.as_nanos());
-    if known { header.deadline_ns } else { now_ns }
-}
-
 /// The trackers of one publisher.
 pub(super) struct Source {
     numbers: Numbers,
     arrivals: Arrivals,
+    /// Whether frames are of this machine's clock.
+    pub(super) shares_clock: bool,
     team: Option<Team>,
     /// Where they were in the latest frame that was taken.
     pub(super) trackers: Vec<Tracker>,
@@ -32,6 +24,8 @@ pub(super) struct Source {
     pub(super) unsent: bool,
     /// Whether desks have been told that frames have stopped.
     pub(super) stopped: bool,
+    /// How many of them the latest frame that was sent had room for.
+    sent: Option<usize>,
 }
 
 struct Team {
@@ -43,7 +37,27 @@ struct Team {
 
 impl Source {
     pub(super) fn new(numbers: Numbers) -> Self {
-        Self { numbers, arrivals: Arrivals::default(), team: None, trackers: Vec::new(), unsent: false, stopped: false }
+        Self {
+            numbers,
+            arrivals: Arrivals::default(),
+            shares_clock: true,
+            team: None,
+            trackers: Vec::new(),
+            unsent: false,
+            stopped: false,
+            sent: None,
+        }
+    }
+
+    /// When a frame should have been made, CLOCK_MONOTONIC in ns of this machine; one of another machine counts as made
+    /// now.
+    pub(super) fn made_ns(&self, header: &FrameHeader) -> u64 {
+        if self.shares_clock { header.deadline_ns } else { monotonic_ns() }
+    }
+
+    /// Whose trackers they are, for sentences, where several publishers send to one desk.
+    pub(super) fn of(&self) -> String {
+        self.numbers.of.as_ref().map_or(String::new(), |of| format!(" of \"{of}\""))
     }
 
     /// Whether there are trackers: a frame has come at some time.
@@ -51,9 +65,10 @@ impl Source {
         self.team.is_some()
     }
 
-    /// Names of the trackers; none before the first frame.
+    /// Names of the trackers for which a frame has room; none before the first frame.
     pub(super) fn names(&self) -> &[TrackerName] {
-        self.team.as_ref().map_or(&[], |team| &team.names)
+        let names: &[TrackerName] = self.team.as_ref().map_or(&[], |team| &team.names);
+        &names[..self.sent.unwrap_or(names.len()).min(names.len())]
     }
 
     /// Takes in an event for what it tells of arrivals.
@@ -75,7 +90,7 @@ impl Source {
         let mut sentences = Vec::new();
         let mut chosen = selection.of(handles);
         let names = self.numbers.trackers(&chosen, handles);
-        let of = self.numbers.of.as_ref().map_or(String::new(), |of| format!(" of \"{of}\""));
+        let of = self.of();
         if let Some(beyond) = selection.beyond(handles) {
             sentences.push(format!("there is no handle {beyond}{of}: the team has {handles}"));
         }
@@ -88,6 +103,7 @@ impl Source {
         }
         chosen.truncate(names.len());
         self.team = Some(Team { handles, chosen, names, announced: false });
+        self.sent = None;
         Some(sentences)
     }
 
@@ -122,22 +138,46 @@ impl Source {
         }
     }
 
-    /// Leaves out all but the first so many trackers from now on. How many were chosen, where that leaves some out.
-    pub(super) fn truncate(&mut self, most: usize) -> Option<usize> {
-        let chosen = self.trackers.len();
-        if let Some(team) = self.team.as_mut().filter(|_| chosen > most) {
-            team.chosen.truncate(most);
-            team.names.truncate(most);
-            self.trackers.truncate(most);
-            return Some(chosen);
-        }
-        None
+    /// Takes in that the frame which is sent has room for so many trackers, and returns for how many that leaves. How
+    /// many are left out, where that has changed and is not none.
+    pub(super) fn fit(&mut self, room: usize) -> (usize, Option<usize>) {
+        let sent = self.trackers.len().min(room);
+        let has_changed = self.sent.replace(sent) != Some(sent);
+        (room - sent, Some(self.trackers.len() - sent).filter(|left_out| has_changed && *left_out > 0))
     }
 
     /// The number of handles and the trackers, once for each team.
     pub(super) fn announce(&mut self) -> Option<(u32, Vec<TrackerName>)> {
         let team = self.team.as_mut().filter(|team| !team.announced)?;
         team.announced = true;
-        Some((team.handles, team.names.clone()))
+        let handles = team.handles;
+        Some((handles, self.names().to_vec()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cut_is_told_when_it_changes() {
+        let mut source = Source::new(Numbers::from(1));
+        source.meet(4, &Selection::all());
+        source.take(&FrameHeader::default(), &[HandlePose::default(); 4], Axes::default(), 0);
+        let cuts = [9, 3, 3, 2, 4, 3].map(|room| source.fit(room));
+        assert_eq!(cuts, [(5, None), (0, Some(1)), (0, None), (0, Some(2)), (0, None), (0, Some(1))]);
+        assert_eq!(source.names().len(), 3);
+        source.meet(2, &Selection::all());
+        assert_eq!(source.names().len(), 2);
+    }
+
+    #[test]
+    fn a_frame_of_another_machine_counts_as_made_now() {
+        let mut source = Source::new(Numbers::from(1));
+        let header = FrameHeader { deadline_ns: 7, ..FrameHeader::default() };
+        assert_eq!(source.made_ns(&header), 7);
+        source.shares_clock = false;
+        let before = monotonic_ns();
+        assert!(source.made_ns(&header) >= before);
     }
 }

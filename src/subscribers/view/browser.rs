@@ -54,7 +54,11 @@ pub(super) async fn serve(socket: WebSocket, channel: Channel, gap: Duration) {
                         answered = count.clamp(answered, sent);
                         continue;
                     }
-                    Message::Text(request) if request == "clock" => vec![text(wire::clock(monotonic_ns()))],
+                    Message::Text(request) if request == "clock" => {
+                        // Of frames that another machine's clock has stamped, this one tells nothing.
+                        let shares_clock = pictures.borrow().shares_clock == Some(true);
+                        vec![text(wire::clock(shares_clock.then(monotonic_ns)))]
+                    }
                     Message::Text(request) => visitor.receive(&request).map(text).into_iter().collect(),
                     _ => continue,
                 }

@@ -14,6 +14,8 @@ const SEEK_INTERVAL = 100;
 const PATIENCE = 2000;
 /** How long a sentence and a cue's name stay (ms). */
 const SENTENCE_TIME = 8000, CUE_TIME = 6000;
+/** Commands whose refusals are kept: more than a server leaves without an answer. */
+const KEPT_REFUSALS = 16;
 const RATES = [0.1, 0.25, 0.5, 1, 2, 4, 10];
 
 const BAR = `
@@ -63,6 +65,8 @@ export function conduct(dragons) {
   cue.setAttribute("role", "status");
   const streams = dragons.map(({ stream }) => stream), several = dragons.length > 1, nameOf = (stream) => dragons[streams.indexOf(stream)].name;
   const greeted = new Map(), allowed = new Map();
+  /** What was not sent or was refused, and why: of each of the last commands by its number a sentence for each stream. */
+  const refusals = new Map();
   /** The stream that is conducted, null for all; the commands so far, and the one whose refusal is shown. */
   let chosen = null, numbered = 0, refused = 0;
   let shownStages = [], rate = null, dragged = false, sentenceAt = 0, cueAt = 0;
@@ -81,18 +85,26 @@ export function conduct(dragons) {
     put(part("answer"), sentence);
     sentenceAt = performance.now();
   }
+  /** Adds what became of a command at one stream to what is known of the others: none hides another's. */
+  function refuse(id, stream, sentence) {
+    const sentences = refusals.get(id) ?? new Map();
+    refusals.set(id, sentences.set(stream, own(stream, sentence)));
+    report(streams.flatMap((one) => sentences.get(one) ?? []).join(" "));
+    refused = id;
+  }
   function command(name, value) {
     // A seek that waits goes before what was commanded after it; a hold does without.
     if (name === "hold") wanted = null;
     if (name !== "seek" && wanted !== null) sendWanted();
     // What is for all goes to those that are there; a hold, and its end, to every one: a refusal says where it did not arrive.
     const id = ++numbered, to = name === "hold" || name === "release" ? streams : there().length ? there() : targets();
-    const sent = to.filter((stream) => {
+    refusals.delete(id - KEPT_REFUSALS);
+    const unsent = to.filter((stream) => {
       // A show that is shorter than another one stands at its end.
       const within = name === "seek" && stream.stage ? Math.min(value, stream.stage.freeze_time) : value;
-      return stream.send({ command: name, value: within, id });
+      return !stream.send({ command: name, value: within, id });
     });
-    if (!sent.length) report(say("nothingSent"));
+    for (const stream of unsent) refuse(id, stream, say("nothingSent"));
     return id;
   }
   /** Of several, all pause where any plays. */
@@ -201,9 +213,9 @@ export function conduct(dragons) {
         sought = null;
       }
       if (message.sentence) {
-        report(own(stream, answerTo(message)));
-        refused = message.id;
-      } else if (message.code && message.id !== refused) put(part("answer"), "");
+        refuse(message.id, stream, answerTo(message));
+        // Of several, one may obey an earlier command after another was not reached by a later one.
+      } else if (message.code && (several ? message.id > refused : message.id !== refused)) put(part("answer"), "");
       sendSeek();
     }
     // A cue that passed before this page came is no news.

@@ -45,6 +45,10 @@ export class Dragon {
     /** The handles at the moment of the picture, and between which two frames they lie. */
     this.places = this.shown = null;
     this.path = this.run = this.team = this.epoch = null;
+    /** How long before the last pictures what they show was sent, ms; the frames a second, NaN until they have been counted. */
+    this.latency = [];
+    this.rate = NaN;
+    this.counted = 0;
     this.reach = 1;
     this.state = WAITING;
     this.sight = null;
@@ -111,6 +115,23 @@ export class Dragon {
     this.show?.update(now, this.places, this.epoch !== from.epoch, happened ? { x: alert?.event_x ?? this.places[0], y: alert?.event_y ?? this.places[1] } : null);
     this.epoch = from.epoch;
     return isOther;
+  }
+
+  /** A picture of it has just been drawn: measures how long before that what it shows was sent, where that is known. */
+  drawn() {
+    const { clock } = this.stream, { from, to, time } = this.shown;
+    if (clock === null) this.latency.length = 0;
+    if (clock === null || from === to) return;
+    const part = (time - from.time) / (to.time - from.time);
+    this.latency.push(performance.now() + clock - (from.sent + (to.sent - from.sent) * part));
+    if (this.latency.length > 600) this.latency.shift();
+  }
+
+  /** Counts the frames that have come since the last time, so many ms ago. */
+  count(passed) {
+    const { received } = this.stream;
+    this.rate = ((received - this.counted) * 1000) / passed;
+    this.counted = received;
   }
 
   /** Another run: another path and other speeds. */

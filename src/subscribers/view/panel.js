@@ -14,7 +14,8 @@ export function put(id, text) {
   if (element(id).textContent !== text) element(id).textContent = text;
 }
 
-let before = null, spokenAt = Infinity;
+/** Of each dragon that the header has been about: its state, and the mark of its countdown, which were spoken last. */
+const spokenOf = new Map();
 
 /**
  * The state, the sentence and the countdown of a situation: `state`, `alert`, `trouble` (why nothing comes, or null),
@@ -33,14 +34,17 @@ export function showSituation({ state, alert, trouble, silent, stale, of, second
   put("alert", of && sentence ? `${of}: ${sentence}` : sentence);
   put("now", capital(now));
   element("now").hidden = !now;
-  countdown(state, seconds, ahead);
+  if (!spokenOf.has(of)) spokenOf.set(of, { state: null, mark: Infinity });
+  const last = spokenOf.get(of), isNews = last.state !== state.name, own = (words) => (of ? `${of}: ${words}` : words);
+  countdown(state, seconds, ahead, last, own);
   if (trouble) put("spoken", say(trouble));
-  else if (changed && calm) put("spoken", say(before === null ? "dragonMoves" : "clearAgain"));
-  else if (changed && !state.happened) put("spoken", `${capital(say(state.name))}.`);
-  before = trouble ? null : state.name;
+  else if (isNews && calm) put("spoken", own(say(last.state === null ? "dragonMoves" : "clearAgain")));
+  else if (isNews && !state.happened) put("spoken", own(`${capital(say(state.name))}.`));
+  last.state = trouble ? null : state.name;
 }
 
-function countdown(state, seconds, ahead) {
+/** Shows the countdown, and speaks it at its marks. `last` is what was spoken last of this dragon, `own` says whose words are. */
+function countdown(state, seconds, ahead, last, own) {
   const counting = seconds > -1, near = counting && (state.severity !== "ok" || seconds < 10);
   const [number, unit] = counting ? remaining(Math.max(0, seconds)) : ["", ""];
   element("countdown").hidden = !counting;
@@ -54,8 +58,8 @@ function countdown(state, seconds, ahead) {
     element("left").append(Object.assign(document.createElement("small"), { textContent: unit }));
   }
   const mark = near ? ([10, 5, 3].findLast((mark) => seconds <= mark) ?? Infinity) : Infinity;
-  if (mark < spokenAt && state.severity !== "ok") put("spoken", say("seconds", { seconds: Math.ceil(seconds) }));
-  spokenAt = mark;
+  if (mark < last.mark && state.severity !== "ok") put("spoken", own(say("seconds", { seconds: Math.ceil(seconds) })));
+  last.mark = mark;
 }
 
 /** Clearance, speeds and time; empty where nothing comes. */

@@ -36,6 +36,10 @@ pub(super) fn read(mut feed: Feed, name: &str, sender: &watch::Sender<Picture>, 
             }
             changed = true;
         }
+        // Known as soon as the publisher is found, and thus no later than its stage.
+        let shares_clock = feed.shares_clock();
+        changed |= shares_clock != reader.picture.shares_clock;
+        reader.picture.shares_clock = shares_clock;
         if changed {
             sender.send_replace(reader.picture.clone());
         }

@@ -17,6 +17,8 @@ import { capital, nameOf, say, setLanguage, translate } from "./words.js";
 
 /** How often figures are shown, ms: oftener they could not be read. */
 const FIGURES_INTERVAL = 100;
+/** How much earlier, in seconds, the countdown of another dragon has to end for the header to change to that one. */
+const HEADER_LEAD = 1;
 
 const words = wordsOf(location.hash), root = document.documentElement, stillness = matchMedia("(prefers-reduced-motion: reduce)");
 setLanguage(words.lang);
@@ -38,7 +40,7 @@ let palette = paletteOf(canvas), chosen = -1, whose = dragons[0], selected = nul
  * it; `latency` and `ways` in ms since the frame was sent. Where there are several dragons it is of the first, and `dragons`
  * has the same of each.
  */
-const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, shown: null, range: null, marks: [], labels: [], latency: [], ways: dragons[0].stream.ways, played: sound.played, toPixel: (x, y) => camera.toPixel(x, y), dragons: [] };
+const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, shown: null, range: null, marks: [], labels: [], latency: dragons[0].latency, ways: dragons[0].stream.ways, played: sound.played, toPixel: (x, y) => camera.toPixel(x, y), dragons: [] };
 window.picture = picture;
 
 function fitCanvas() {
@@ -50,11 +52,18 @@ function fitCanvas() {
   last = null;
 }
 
-/** The dragon that needs to be looked at first: by what has happened, then by what is coming soonest; one that is there. */
+/** The dragon that the header is about. */
+let header = dragons[0];
+/**
+ * The dragon that needs to be looked at first: by what has happened, then by what is coming soonest; one that is there. Of
+ * two whose countdowns are nearly equal, the one that is in the header already stays there: it is read aloud.
+ */
 function foremost() {
   const rank = ({ sight, isThere }) => (sight.stale ? (isThere ? -1 : -2) : { ok: 0, warning: 1, error: 2 }[sight.state.severity] ?? 0);
   const soon = ({ sight }) => (sight.seconds > -1 ? sight.seconds : Infinity);
-  return dragons.reduce((best, one) => (rank(one) > rank(best) || (rank(one) === rank(best) && soon(one) < soon(best)) ? one : best));
+  const best = dragons.reduce((best, one) => (rank(one) > rank(best) || (rank(one) === rank(best) && soon(one) < soon(best)) ? one : best));
+  if (rank(best) > rank(header) || soon(best) + HEADER_LEAD < soon(header)) header = best;
+  return header;
 }
 
 function pass() {
@@ -93,11 +102,8 @@ function paint(there) {
   const labels = draw(context, camera, palette, { ground, dragons: scene, words: !words.nolabels });
   picture.drawn++;
   Object.assign(picture, { marks: there.flatMap(({ marks }) => marks), labels });
-  const { stream, shown } = there[0], { from, to } = shown;
-  if (stream.clock === null || from === to) return;
-  const part = (shown.time - from.time) / (to.time - from.time);
-  picture.latency.push(performance.now() + stream.clock - (from.sent + (to.sent - from.sent) * part));
-  if (picture.latency.length > 600) picture.latency.shift();
+  // One that has stopped is drawn again where another one moves, which says nothing about its frames.
+  for (const dragon of there) if (!several || !dragon.sight.stale) dragon.drawn();
 }
 
 /** The picture stays; what tests read of a publisher that is gone does not. */
@@ -120,7 +126,7 @@ function drawNothing() {
   if (!("transparent" in words)) context.fillRect(0, 0, canvas.width, canvas.height);
 }
 
-let figuresAt = 0, counted = { at: 0, received: 0 };
+let figuresAt = 0, countedAt = 0;
 function showText(now) {
   const first = foremost(), { sight } = first;
   showSituation({ ...sight, stale: dragons.every((one) => one.sight.stale), of: several ? first.name : null });
@@ -137,11 +143,13 @@ function showText(now) {
   showNames(stage, several ? publishers : null);
   showFigures({ clearance: newest.clearance, colours, time: stream.playback.time(now), scale: newest.scale });
   showBench(whose === shown ? chosen : -1, newest.handles);
-  if (now - counted.at < 1000) return;
-  const rate = ((picture.received - counted.received) * 1000) / (now - counted.at), late = picture.latency.slice(-60).sort((a, b) => a - b);
-  counted = { at: now, received: picture.received };
+  if (now - countedAt < 1000) return;
+  for (const dragon of dragons) dragon.count(now - countedAt);
+  countedAt = now;
+  // Of another machine's frames nobody knows when they were sent.
+  const { rate, latency } = shown, late = stream.clock === null ? [] : latency.slice(-60).sort((a, b) => a - b);
   const behind = late.length ? say("behind", { ms: late[late.length >> 1].toFixed(0) }) : "";
-  put("rate", dragons.every((one) => one.sight.stale) ? "" : say("frames", { rate: rate.toFixed(rate < 10 ? 1 : 0), behind }));
+  put("rate", shown.sight.stale ? "" : say("frames", { rate: rate.toFixed(rate < 10 ? 1 : 0), behind }));
 }
 
 // The user's hand.

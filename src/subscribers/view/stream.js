@@ -116,6 +116,7 @@ export class Stream {
     this.received = 0;
     /** How long the last frames were on their way, ms. */
     this.ways = [];
+    /** What the clock of the frames is ahead of this page's, ms; null while unknown, and always of another machine's frames. */
     this.clock = null;
     /** Called with each message that is no frame and no clock. */
     this.onmessage = null;
@@ -144,7 +145,7 @@ export class Stream {
       requested = performance.now();
       socket.send("clock");
     };
-    const requests = setInterval(requestClock, CLOCK_INTERVAL);
+    let requests = setInterval(requestClock, CLOCK_INTERVAL);
     socket.onclose = again;
     socket.onopen = () => {
       this.retry = 250;
@@ -158,17 +159,28 @@ export class Stream {
         // The shortest round trip bounds the offset between the two clocks best.
         const now = performance.now(), way = now - requested;
         requested = null;
-        if (way <= nearest) {
+        if (message.monotonic_ns === null) {
+          // No publisher, or one on another machine: what may have been measured of its frames so far was wrong.
+          [nearest, this.clock] = [Infinity, null];
+          this.ways.length = 0;
+        } else if (this.clock === null || way <= nearest) {
           nearest = way;
           this.clock = Number(message.monotonic_ns) / 1e6 - (now - way / 2);
         }
       } else this.handle(message);
+      if (message.type === "stage" && requested === null) {
+        // Another publisher may have another clock. The answer has as long as any other.
+        clearInterval(requests);
+        requests = setInterval(requestClock, CLOCK_INTERVAL);
+        requestClock();
+      }
     };
   }
 
-  /** What was shown last is kept until there is something newer to show. */
+  /** What was shown last is kept until there is something newer to show. The next frames may be of another clock. */
   lose(trouble) {
     this.trouble = trouble;
+    this.clock = null;
   }
 
   /** Sends a message; whether there is a server to send it to. */

@@ -105,9 +105,10 @@ pub(super) fn waiting(reason: Option<&str>) -> String {
     json!({"type": "waiting", "reason": reason}).to_string()
 }
 
-/// The response to `clock`: CLOCK_MONOTONIC, which frames are stamped with.
-pub(super) fn clock(monotonic_ns: u64) -> String {
-    json!({"type": "clock", "monotonic_ns": Exact(monotonic_ns)}).to_string()
+/// The response to `clock`: CLOCK_MONOTONIC, which frames are stamped with; `None` where they are stamped with another
+/// machine's, or none come.
+pub(super) fn clock(monotonic_ns: Option<u64>) -> String {
+    json!({"type": "clock", "monotonic_ns": monotonic_ns.map(Exact)}).to_string()
 }
 
 #[cfg(test)]
@@ -146,6 +147,14 @@ mod tests {
         let numbers: Vec<_> = bytes[72..].chunks(4).map(|four| f32::from_le_bytes(four.try_into().unwrap())).collect();
         assert_eq!(numbers[..8], [8.75, -1.5, 0.5, 3.0, -4.0, 8.75, -1.5, 0.5]);
         assert!(numbers[8].is_nan() && numbers[9] == -4.0);
+    }
+
+    #[test]
+    fn a_clock_that_is_not_the_frames_own_is_null() {
+        let known: Value = serde_json::from_str(&clock(Some(u64::MAX))).unwrap();
+        let unknown: Value = serde_json::from_str(&clock(None)).unwrap();
+        assert_eq!(known, json!({"type": "clock", "monotonic_ns": u64::MAX.to_string()}));
+        assert_eq!(unknown, json!({"type": "clock", "monotonic_ns": null}));
     }
 
     #[test]

@@ -12,9 +12,13 @@ use std::time::Duration;
 use ::iceoryx2::active_request::ActiveRequest;
 use ::iceoryx2::port::server::Server;
 use ::iceoryx2::prelude::*;
+use ::iceoryx2::service::builder::request_response::{
+    RequestResponseCreateError as Create, RequestResponseOpenError as Open,
+    RequestResponseOpenOrCreateError as OpenOrCreate,
+};
 use ::iceoryx2::service::port_factory::server::ServerCreateError;
 
-use super::error::{OpenError, failed};
+use super::error::{OpenError, failed, incomplete};
 use super::{SPARE_NODES, node, retry_while_incomplete, service_name};
 use crate::live::control::{Answer, Door, MOST_WAITING};
 use crate::show::control::{Code, Command};
@@ -97,7 +101,12 @@ fn open(name: &str) -> Result<Opened, OpenError> {
         .max_nodes(MOST_CLIENTS + SPARE_NODES)
         .max_active_requests_per_client(MOST_REQUESTS)
         .open_or_create()
-        .map_err(|error| failed(name, "control", error))?;
+        .map_err(|error| match error {
+            // A show that was killed while it made this.
+            OpenOrCreate::RequestResponseOpenError(Open::HangsInCreation)
+            | OpenOrCreate::RequestResponseCreateError(Create::HangsInCreation) => incomplete(name, "control"),
+            other => failed(name, "control", other),
+        })?;
     let server = service
         .server_builder()
         // A dead client must not stop the others.

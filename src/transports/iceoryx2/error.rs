@@ -76,8 +76,9 @@ pub enum OpenError {
     Incompatible(String),
     /// A service of this name exists with other attributes.
     #[error(
-        "the service \"{0}\" exists with other attributes: a tunnel brings it from another machine, or a subscriber keeps that \
-         of another scene open; end that, or choose another name"
+        "the service \"{0}\" exists with other attributes: a tunnel brings it from another machine, or a subscriber keeps \
+         that of another scene open (a program on another machine, through a tunnel, may keep it); end that, or choose \
+         another name"
     )]
     OtherAttributes(String),
     /// A program has opened a service before its publisher, with limits of its own.

@@ -40,11 +40,12 @@ fn address() -> SocketAddr {
                 pages: Some(pages),
             };
             let stop = Arc::new(AtomicBool::new(false));
-            let served: Result<(), ViewError> = serve(std::slice::from_ref(&name), options, &stop, |Ready { address, token }| {
-                assert!(token.is_some(), "commands are behind a token");
-                let _ = sender.send(*address);
-                Ok(())
-            });
+            let served: Result<(), ViewError> =
+                serve(std::slice::from_ref(&name), options, &stop, |Ready { address, token }| {
+                    assert!(token.is_some(), "commands are behind a token");
+                    let _ = sender.send(*address);
+                    Ok(())
+                });
             served.expect("the server runs until the process ends");
         });
         ready.recv().expect("the server starts")
