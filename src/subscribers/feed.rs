@@ -138,8 +138,10 @@ struct Connected {
     received: bool,
     /// Since when there has been no sign that any publisher sends, as long as nothing has been handed over.
     quiet_since: Instant,
-    /// The run and the stamp of the latest stage: it comes again where there is a tunnel to other machines.
+    /// What tells the latest stage, alert and cue from others: they come again where there is a tunnel to other machines.
     stage: Option<(u64, u64)>,
+    alert: Option<(u64, u64, u32)>,
+    cue: Option<(u64, u64, u32)>,
 }
 
 impl Feed {
@@ -233,6 +235,8 @@ impl Feed {
             received: false,
             quiet_since: now,
             stage: None,
+            alert: None,
+            cue: None,
         });
         Ok(())
     }
@@ -248,7 +252,16 @@ impl Connected {
     /// Hands over what is in the queues: the stage first, since it explains the frames, and frames before the alerts
     /// and cues that belong to them.
     fn receive(&mut self, frames: Frames, sequence: &mut SequenceTracker, handle: &mut dyn FnMut(FeedEvent<'_>)) {
-        let Self { connection, liveness, received, quiet_since, stage: latest_stage, .. } = self;
+        let Self {
+            connection,
+            liveness,
+            received,
+            quiet_since,
+            stage: latest_stage,
+            alert: latest_alert,
+            cue: latest_cue,
+            ..
+        } = self;
         if connection.hold_statuses() {
             *quiet_since = Instant::now();
         }
@@ -278,10 +291,16 @@ impl Connected {
             liveness.frame_at(Instant::now());
         }
         while let Some(alert) = connection.alert() {
-            handle(FeedEvent::Alert(&alert));
+            let of = Some((alert.run_id, alert.tick, alert.level));
+            if std::mem::replace(latest_alert, of) != of {
+                handle(FeedEvent::Alert(&alert));
+            }
         }
         while let Some(cue) = connection.cue() {
-            handle(FeedEvent::Cue(&cue));
+            let of = Some((cue.run_id, cue.tick, cue.number));
+            if std::mem::replace(latest_cue, of) != of {
+                handle(FeedEvent::Cue(&cue));
+            }
         }
         while let Some(status) = connection.status() {
             liveness.rate(status.rate);

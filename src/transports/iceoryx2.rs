@@ -18,6 +18,7 @@ use std::io::ErrorKind;
 use std::time::{Duration, Instant};
 
 use ::iceoryx2::config::Config;
+use ::iceoryx2::port::SendError;
 use ::iceoryx2::port::notifier::Notifier;
 use ::iceoryx2::port::publisher::Publisher as Port;
 use ::iceoryx2::port::update_connections::UpdateConnections;
@@ -43,9 +44,9 @@ pub use memory::{check_room_to_subscribe, reserve_pages};
 /// Publishers that a service admits: the show's, and one that is the end of a tunnel to other machines, which opens a
 /// publisher and a subscriber of everything.
 pub const MOST_PUBLISHERS: usize = 2;
-/// How often the stage is sent again while there is a tunnel: it hands on what is sent, to the machines that are there at that
-/// moment, and keeps nothing for those that come later.
-const STAGE_INTERVAL: Duration = Duration::from_secs(1);
+/// How often the stage, the latest alert and the latest cue are sent again while there is a tunnel: it hands on what is sent,
+/// to the machines that are there at that moment, and keeps nothing for those that come later.
+const REPEAT_INTERVAL: Duration = Duration::from_secs(1);
 /// Nodes that may have a service open at once beyond one a subscriber: the publisher's, and those that died and have
 /// not been cleaned up after yet.
 const SPARE_NODES: usize = 32;
@@ -179,9 +180,9 @@ type Opened<Message> = (Sender<Message, ()>, Service<Message, ()>);
 pub struct SharedMemoryPublisher {
     poses: FrameSender<HandlePose>,
     poses_32: Option<(FrameSender<HandlePose32>, Decimation)>,
-    alerts: Option<Sender<CollisionAlert, ()>>,
-    cues: Option<Sender<Cue, ()>>,
-    stage: RepeatedStage,
+    alerts: Option<Repeated<CollisionAlert>>,
+    cues: Option<Repeated<Cue>>,
+    stage: Repeated<Stage>,
     tick: Notifier<ipc::Service>,
     tick_service: event::PortFactory<ipc::Service>,
     // Dropped last: the ports above belong to it.
@@ -211,9 +212,10 @@ impl SharedMemoryPublisher {
             Ok((FrameSender::open(&node, config, &described)?, decimation))
         };
         let poses_32 = config.decimation().map(open_32).transpose()?;
-        let alerts = if config.alerts { Some(sender(&node, name, "alerts", config.subscribers)?.0) } else { None };
-        let cues = if config.cues { Some(sender(&node, name, "cues", config.subscribers)?.0) } else { None };
-        let stage = RepeatedStage::open(&node, config)?;
+        let alerts = config.alerts.then(|| Repeated::open(&node, config, "alerts")).transpose()?;
+        let cues = config.cues.then(|| Repeated::open(&node, config, "cues")).transpose()?;
+        let mut stage = Repeated::open(&node, config, "stage")?;
+        stage.send(config.stage).map_err(|error| failed(name, "stage", error))?;
         let tick_service = node
             .service_builder(&service_name(name, "tick")?)
             .event()
@@ -248,20 +250,14 @@ impl SharedMemoryPublisher {
         }
     }
 
-    fn send_cues(&self, outgoing: Outgoing<'_>) -> Result<(), String> {
-        let Some(port) = &self.cues else { return Ok(()) };
-        for cue in outgoing.cues() {
-            port.send_copy(cue).map_err(|error| error.to_string())?;
-        }
-        Ok(())
+    fn send_cues(&mut self, outgoing: Outgoing<'_>) -> Result<(), String> {
+        let Some(cues) = &mut self.cues else { return Ok(()) };
+        outgoing.cues().try_for_each(|cue| cues.send(cue)).map_err(|error| error.to_string())
     }
 
-    fn send_alerts(&self, outgoing: Outgoing<'_>) -> Result<(), String> {
-        let Some(port) = &self.alerts else { return Ok(()) };
-        for alert in outgoing.alerts() {
-            port.send_copy(alert).map_err(|error| error.to_string())?;
-        }
-        Ok(())
+    fn send_alerts(&mut self, outgoing: Outgoing<'_>) -> Result<(), String> {
+        let Some(alerts) = &mut self.alerts else { return Ok(()) };
+        outgoing.alerts().try_for_each(|alert| alerts.send(alert)).map_err(|error| error.to_string())
     }
 }
 
@@ -280,11 +276,11 @@ impl Publisher for SharedMemoryPublisher {
 
     fn maintain(&mut self) {
         // A late subscriber gets the history of a service only when its publisher looks for new connections.
-        if let Some(alerts) = &self.alerts {
-            let _ = alerts.update_connections();
+        if let Some(alerts) = &mut self.alerts {
+            alerts.maintain();
         }
-        if let Some(cues) = &self.cues {
-            let _ = cues.update_connections();
+        if let Some(cues) = &mut self.cues {
+            cues.maintain();
         }
         self.stage.maintain();
         self.poses.update_connections();
@@ -298,28 +294,31 @@ impl Publisher for SharedMemoryPublisher {
     }
 }
 
-/// The stage, sent once, and again and again while there is a tunnel.
-struct RepeatedStage {
-    stage: Stage,
-    port: Sender<Stage, ()>,
-    service: Service<Stage, ()>,
+/// Messages that hold until the next one: the latest is sent again and again while there is a tunnel.
+struct Repeated<Message: ZeroCopySend + std::fmt::Debug + Copy + 'static> {
+    latest: Option<Message>,
+    port: Sender<Message, ()>,
+    service: Service<Message, ()>,
     sent: Instant,
 }
 
-impl RepeatedStage {
-    fn open(node: &Node<ipc::Service>, config: &PublisherConfig) -> Result<Self, OpenError> {
-        let (port, service) = sender(node, &config.name, "stage", config.subscribers)?;
-        port.send_copy(config.stage).map_err(|error| failed(&config.name, "stage", error))?;
-        Ok(Self { stage: config.stage, port, service, sent: Instant::now() })
+impl<Message: ZeroCopySend + std::fmt::Debug + Copy + 'static> Repeated<Message> {
+    fn open(node: &Node<ipc::Service>, config: &PublisherConfig, service: &str) -> Result<Self, OpenError> {
+        let (port, service) = sender(node, &config.name, service, config.subscribers)?;
+        Ok(Self { latest: None, port, service, sent: Instant::now() })
+    }
+
+    fn send(&mut self, message: Message) -> Result<(), SendError> {
+        (self.latest, self.sent) = (Some(message), Instant::now());
+        self.port.send_copy(message).map(|_| ())
     }
 
     /// Lets late subscribers in, on this machine and on others.
     fn maintain(&mut self) {
         let _ = self.port.update_connections();
         let has_tunnel = self.service.dynamic_config().number_of_publishers() > 1;
-        if has_tunnel && self.sent.elapsed() >= STAGE_INTERVAL {
-            self.sent = Instant::now();
-            let _ = self.port.send_copy(self.stage);
+        if let Some(latest) = self.latest.filter(|_| has_tunnel && self.sent.elapsed() >= REPEAT_INTERVAL) {
+            let _ = self.send(latest);
         }
     }
 }
