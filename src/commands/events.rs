@@ -74,9 +74,13 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
         }
     }
     if !common.json {
+        let until = match timeline.searched_until() {
+            Some(time) => format!("up to t = {} s, where the search gave up", figure(time)),
+            None => "before the motion ends".to_owned(),
+        };
         for kind in [EventKind::Contact, EventKind::Stall] {
             if timeline.find(kind).is_none() {
-                output.line(&format!("There is no {} before the motion ends.", kind.name()))?;
+                output.line(&format!("There is no {} {}.", kind.name(), until))?;
                 if let Some(status) = status(kind) {
                     output.line(&proof_sentence(kind, status))?;
                 }

@@ -9,6 +9,8 @@
 //! the front cosine at its ends are compared. A lock is a proven jump, found to the last digit; all else is a graze.
 //! Jumps of less than some 1e-8 links and pairs of turns within one such stretch are below what doubles can resolve.
 
+use std::f64::consts::FRAC_PI_2;
+
 use crate::linkage::NoFollower;
 use crate::model::root::bisect_predicate;
 
@@ -29,6 +31,9 @@ pub(super) enum TraceEnd {
 
 /// What a bisection to the last digit costs, in links solved.
 const BISECTION_WORK: u64 = 64;
+
+/// What each link's length of a winding way costs, in links solved.
+const WINDING_WORK: f64 = 32.0;
 
 /// The longest step, in links: what the certificates allow.
 const LONGEST_STEP: f64 = 0.5;
@@ -139,8 +144,17 @@ impl<'a> LinkTrace<'a> {
     }
 
     fn configuration(&mut self, front: f64) -> Result<Configuration, NoFollower> {
-        self.work += 1;
-        self.link.configuration(front)
+        let configuration = self.link.configuration(front);
+        self.work += 1 + configuration.as_ref().map_or(0, |found| self.winding(found));
+        configuration
+    }
+
+    /// What a link costs besides, in links solved, whose handles have a winding way between them: the search for the rear
+    /// handle and the proof that it is the first go all of it, in small steps where places are nearly as far as the link.
+    fn winding(&self, at: &Configuration) -> u64 {
+        let links = (at.front - at.rear) / self.link.length;
+        // A path that bends by half a turn at most is no longer than pi / 2 links; not a number is 0.
+        (WINDING_WORK * (links - FRAC_PI_2).max(0.0)) as u64
     }
 
     /// Goes to a configuration and chooses the next step: twice as long as this one, if that was not cut short.
