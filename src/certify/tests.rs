@@ -100,12 +100,12 @@ fn elementary_functions_hold_what_192_bits_find() {
         let what = || format!("{angle}");
         assert_holds(sine, &exact(angle).sin(BITS, ROUNDING, &mut constants), &what);
         assert_holds(cosine, &exact(angle).cos(BITS, ROUNDING, &mut constants), &what);
-        assert!(angle.abs() > 1e8 || sine.hi - sine.lo < 1e-14 && cosine.hi - cosine.lo < 1e-14, "{angle}: {sine:?}");
+        assert!(angle.abs() > 1e8 || sine.hi - sine.lo < 2e-14 && cosine.hi - cosine.lo < 2e-14, "{angle}: {sine:?}");
         let positive = unit(&mut random) * size + f64::MIN_POSITIVE;
         let (x, what) = (Interval::point(positive), || format!("{positive}"));
         assert_holds(atan(x), &exact(positive).atan(BITS, ROUNDING, &mut constants), &what);
         assert_holds(ln(x), &exact(positive).ln(BITS, ROUNDING, &mut constants), &what);
         let (atan, ln) = (atan(x), ln(x));
-        assert!(atan.hi - atan.lo < 1e-14 && ln.hi - ln.lo < 1e-13, "{positive}: {atan:?} {ln:?}");
+        assert!(atan.hi - atan.lo < 4e-14 && ln.hi - ln.lo < 2e-13, "{positive}: {atan:?} {ln:?}");
     }
 }
