@@ -323,9 +323,7 @@ fn people_read_what_it_is_and_no_number_of_sixteen_digits() {
     let odd = odd.replacen("name = \"school\"", "name = 'a < b & \"c\" > d'", 1);
     let file = folder.path().join("odd.toml");
     std::fs::write(&file, &odd).unwrap();
-    let bell = folder.path().join("bell.toml");
-    std::fs::write(&bell, odd.replacen("'a < b & \"c\" > d'", "\"ding\\u0007dong\"", 1)).unwrap();
-    let [file, bell] = [&file, &bell].map(|file| file.to_str().unwrap().to_owned());
+    let file = file.to_str().unwrap().to_owned();
     // Every scene has a picture.
     let times = [("procession", "1"), ("tight", "stall"), ("wide", "lock"), ("ros2", "1"), ("long", "1")];
     for (name, time) in times {
@@ -338,7 +336,6 @@ fn people_read_what_it_is_and_no_number_of_sixteen_digits() {
         (scene_file("paper"), "contact", "paper at 412.474 s"),
         (scene_file("turnaround"), "path_end", "turnaround at 482.781 s"),
         (file, "0", "a < b & \"c\" > d at 0 s"),
-        (bell, "0", "dingdong at 0 s"),
     ] {
         let svg = answer(&["--scene", &scene, "draw", "--at", time]);
         let svg = Document::parse(&svg).unwrap();

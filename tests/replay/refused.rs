@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::path::Path;
+use std::process::Command;
 use std::sync::Arc;
 
 use bench_dragon::live::{Frames, Period};
@@ -64,19 +65,23 @@ fn what_cannot_be_played_is_refused_with_a_sentence() {
     }
     assert!(refusal(&at("nowhere"), &[]).0.contains("No such file"));
     assert!(refusal(folder.path(), &[]).0.contains("Is a directory"));
-    let options: [(&[&str], &str); 7] = [
+    let options: [(&[&str], &str); 6] = [
         (&["--start", "1e6"], "--start is 1000000 and the recording reaches 2"),
         (&["--start", "nan"], "--start is NaN"),
         (&["--rate", "0"], "--rate is 0, expected a number from 0.1 to 20000"),
         (&["--rate", "-5"], "--rate is -5"),
         (&["--time-scale", "0"], "--time-scale is 0"),
         (&["--time-scale", "1e5"], "the rate of the replay is 4000000, expected a number from 0.1 to 20000"),
-        (&["--name", "no//name", "--ros2"], "the name is"),
     ];
     for (arguments, expected) in options {
         let (sentence, _) = refusal(&file, arguments);
         assert!(sentence.contains(expected), "{arguments:?}: {sentence}");
     }
+    let mut illegal = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    illegal.args(["--name", "no//name", "replay", "--ros2"]).arg(&file);
+    let output = Process::start(&mut illegal).output_within(60);
+    let sentence = text(&output.stderr);
+    assert!(output.status.code() == Some(2) && sentence.contains("the name is"), "{sentence}");
 
     // Recordings of something else: changed messages, the sentence, and whether frames go out before it.
     let changed: [(&str, Change, &str, bool); 15] = [
