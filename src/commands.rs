@@ -244,13 +244,23 @@ pub fn shows_colour(stream: &impl io::IsTerminal) -> bool {
 }
 
 /// A flag that SIGINT, SIGTERM and SIGHUP set: the last where a terminal was closed, unless `nohup` has it ignored.
+///
+/// To be called before other threads are started: from then on these signals come to a thread that does nothing else.
+/// iceoryx2 takes a system call that a signal has interrupted for a failure.
 pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CommandError> {
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    use nix::sys::signal::{SigSet, Signal};
     let stop = Arc::new(AtomicBool::new(false));
-    let hangup = if is_ignored(SIGHUP) { None } else { Some(SIGHUP) };
-    for signal in [SIGINT, SIGTERM].into_iter().chain(hangup) {
-        signal_hook::flag::register(signal, Arc::clone(&stop))?;
+    let hangup = if is_ignored(Signal::SIGHUP as i32) { None } else { Some(Signal::SIGHUP) };
+    let signals: SigSet = [Signal::SIGINT, Signal::SIGTERM].into_iter().chain(hangup).collect();
+    for signal in signals.iter() {
+        signal_hook::flag::register(signal as i32, Arc::clone(&stop))?;
     }
+    std::thread::Builder::new().name("signals".to_owned()).spawn(|| {
+        loop {
+            nix::unistd::pause();
+        }
+    })?;
+    signals.thread_block().map_err(io::Error::from)?;
     Ok(stop)
 }
 

@@ -76,8 +76,8 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
     let mut topics = if arguments.topics.is_empty() { DEFAULT_TOPICS.to_vec() } else { arguments.topics.clone() };
     topics.sort_unstable();
     topics.dedup();
-    let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::Never, frames: Frames::All })?;
     let stop = stop_on_signals()?;
+    let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::Never, frames: Frames::All })?;
     // A file that may not grow is then a failed write, and no signal that ends the process.
     signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
     let config = RecorderConfig {

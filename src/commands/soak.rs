@@ -267,9 +267,9 @@ impl ReportFiles {
 /// Observes until a signal comes, an observation a second on standard output.
 pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result<(), CommandError> {
     end_with_parent()?;
+    let stop = stop_on_signals()?;
     let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::OnFrame, frames: Frames::All })?;
     let mut observer = Observer::new(common.load_scene()?.motion.link_tolerance());
-    let stop = stop_on_signals()?;
     let mut output = std::io::stdout().lock();
     let mut print = |observer: &mut Observer| -> Result<(), CommandError> {
         serde_json::to_writer(&mut output, &observer.observation()).map_err(std::io::Error::from)?;

@@ -66,9 +66,9 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
         (false, true) => Display::Terminal,
         (false, false) => Display::Lines,
     };
+    let stop = stop_on_signals()?;
     let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::OnFrame, frames: Frames::All })?;
     let mut monitor = Monitor::default();
-    let stop = stop_on_signals()?;
     let began = Instant::now();
     let over = |at: Instant| arguments.duration.is_some_and(|seconds| (at - began).as_secs_f64() >= seconds);
     let interval = Duration::from_secs(1);
