@@ -23,10 +23,13 @@ fn observer(place: &Place) -> (Process, Lines) {
     (process, lines)
 }
 
-/// What an observer has seen when it is stopped.
-fn observed((process, lines): &(Process, Lines)) -> Value {
+/// What an observer has seen when it is stopped, which must end it without an error.
+fn observed((process, lines): (Process, Lines)) -> Value {
     process.signal(SIGTERM);
-    serde_json::from_str(lines.rest(300).last().unwrap()).unwrap()
+    let last = lines.rest(300).pop().unwrap();
+    let output = process.output_within(300);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    serde_json::from_str(&last).unwrap()
 }
 
 fn number(value: &Value, key: &str) -> u64 {
@@ -76,7 +79,7 @@ fn killed_subscribers_take_nothing_with_them() {
     assert!(number(json_lines(&late).last().unwrap(), "received") > 0);
     publisher.signal(SIGINT);
     let summary = summary(&publisher.output_within(300));
-    assert_nothing_lost(&observed(&steady), &summary);
+    assert_nothing_lost(&observed(steady), &summary);
     // What was killed half way stays untouched for two seconds: it could be alive and slow.
     wait(2.5);
     Process::start(place.program().args(["watch", "--duration", "3"])).output_within(300);
@@ -109,7 +112,7 @@ fn subscribers_survive_killed_publishers() {
     last.signal(SIGINT);
     summary(&last.output_within(300));
     all_print("has ended");
-    let seen = observed(&steady);
+    let seen = observed(steady);
     assert_nothing_wrong(&seen);
     assert_eq!(number(&seen, "runs"), rounds + 1, "{seen}");
     for (monitor, lines) in monitors.iter().zip(&outputs) {
@@ -154,7 +157,7 @@ fn a_stepped_wall_clock_moves_the_stamps_and_nothing_else() {
     // An hour that counted would be 360,000 periods one way, and a run that does not end the other.
     assert_eq!(number(&summary, "frames") + number(&summary, "skipped"), 600, "{summary}");
     assert!(number(&summary, "skipped") < 300, "{summary}");
-    assert_nothing_lost(&observed(&steady), &summary);
+    assert_nothing_lost(&observed(steady), &summary);
     let lines = json_lines(&monitor.output_within(300));
     let latencies = lines.iter().filter_map(|line| line["latency_ns"]["max"].as_u64());
     assert!(latencies.max().is_some_and(|longest| longest < 3_000_000_000_000), "{lines:?}");
@@ -182,7 +185,7 @@ fn a_stopped_publisher_skips_whole_periods_and_catches_nothing_up() {
     let [skipped, overruns] = ["skipped", "overruns"].map(|key| number(&summary, key));
     assert!(skipped >= 498 && overruns >= 1 && overruns - 1 <= skipped - 498, "{summary}");
     assert!(number(&summary["wakeup_ns"], "max") > 4_900_000_000, "{summary}");
-    let seen = observed(&steady);
+    let seen = observed(steady);
     assert_nothing_lost(&seen, &summary);
     // Coordinated omission: all of the wait is in the latency since the deadline, though no frame was under way.
     let waited = number(&seen["total"]["since_deadline"], "max");
@@ -233,12 +236,12 @@ fn one_subscriber_too_many_is_told_the_limit_and_the_setting() {
             printed.contains(&format!("{limit} subscribers")) && printed.contains("publish.subscribers"),
             "{printed}"
         );
-        assert_nothing_wrong(&observed(&admitted.pop().unwrap()));
+        assert_nothing_wrong(&observed(admitted.pop().unwrap()));
         let next = watch();
         assert!(number(json_lines(&next).last().unwrap(), "received") > 0, "{}", text(&next.stderr));
         publisher.signal(SIGINT);
         let summary = summary(&publisher.output_within(300));
-        for subscriber in &admitted {
+        for subscriber in admitted {
             assert_nothing_lost(&observed(subscriber), &summary);
         }
         place.assert_clean();
