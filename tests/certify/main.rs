@@ -6,69 +6,22 @@
 #[path = "../processes/mod.rs"]
 mod processes;
 
+mod changes;
 mod tampering;
+mod truth;
 
-use bench_dragon::certify::{self, Line};
-use bench_dragon::motion::event::EventKind as Kind;
-use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::proof::{EventKind, Outcome, Proved, Refused, Status, verify};
-use bench_dragon::scene::Scene;
+use bench_dragon::proof::{Proved, Refused, Status, verify};
 use serde_json::Value;
-
-/// Seconds by which a time of the ordinary search may be beside the true one.
-const ERROR: f64 = 1e-9;
+use truth::{certificate, is_true, timeline};
 
 fn scene_text(name: &str) -> String {
     let config = format!("config/{name}.toml");
     std::fs::read_to_string(&config).or_else(|_| std::fs::read_to_string(format!("tests/scenes/{name}.toml"))).unwrap()
 }
 
-/// What the ordinary search finds in a scene, of which only that is kept which a certificate is about.
-fn timeline(text: &str) -> Option<Timeline> {
-    let mut table: toml::Table = text.parse().ok()?;
-    table.retain(|key, _| ["team", "path", "motion"].contains(&key));
-    table["motion"].as_table_mut()?.retain(|key, _| key == "head_speed");
-    let scene = Scene::parse(&toml::to_string(&table).ok()?, "scene.toml", "scene").ok()?;
-    Some(scene.motion.timeline(&mut |_| {}))
-}
-
-/// The lines of a scene's certificate.
-fn certificate(text: &str) -> Vec<Value> {
-    let scene = Scene::parse(text, "scene.toml", "scene").unwrap();
-    let timeline = scene.motion.timeline(&mut |_| {});
-    let mut lines = Vec::new();
-    let mut write = |line: &Line| {
-        lines.push(serde_json::to_value(line).unwrap());
-        Ok::<(), std::io::Error>(())
-    };
-    certify::certify(&scene.motion, &timeline, text, certify::MOST_STEPS, &mut write, &mut |_| {}).unwrap();
-    lines
-}
-
 fn check(lines: &[Value]) -> Result<Proved, Refused> {
     let text: String = lines.iter().map(|line| format!("{line}\n")).collect();
     verify(text.as_bytes(), &mut |_| {})
-}
-
-/// Whether what is claimed of an event is what the ordinary search found.
-fn is_true(outcome: &Outcome, timeline: &Timeline) -> bool {
-    let kind = match outcome.event {
-        EventKind::Contact => Kind::Contact,
-        EventKind::Stall => Kind::Stall,
-        EventKind::Lock => Kind::Lock,
-        EventKind::PathEnd => Kind::PathEnd,
-    };
-    let found = timeline.events().iter().find(|event| event.event.kind == kind).map(|event| event.time);
-    match (outcome.status, found, outcome.time_lo, outcome.time_hi) {
-        (Status::None, None, ..) => true,
-        (Status::Proved, Some(time), Some(lo), Some(hi)) => {
-            let error = ERROR * time.max(1.0);
-            lo <= time + error && time <= hi + error
-        }
-        (Status::Undecided, Some(time), Some(lo), _) => lo <= time + ERROR * time.max(1.0),
-        (Status::Undecided, None, ..) => true,
-        _ => false,
-    }
 }
 
 /// Certificates are accepted, decide what they can, and agree with the ordinary search.

@@ -153,6 +153,11 @@ fn log() {
 }
 
 #[test]
+fn certificate() {
+    fuzz("certificate");
+}
+
+#[test]
 fn environment() {
     fuzz("environment");
 }

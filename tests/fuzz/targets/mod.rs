@@ -5,6 +5,7 @@
 //! right: TOML, checks, lengths, masks.
 
 pub mod bytes;
+pub mod certificate;
 pub mod command_line;
 pub mod control;
 pub mod environment;
@@ -12,6 +13,11 @@ pub mod log;
 pub mod page;
 pub mod recording;
 pub mod scene;
+
+#[path = "../../certify/changes.rs"]
+mod changes;
+#[path = "../../certify/truth.rs"]
+mod truth;
 
 use fastrand::Rng;
 
@@ -30,12 +36,13 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 7] = [
+pub const TARGETS: [Target; 8] = [
     scene::TARGET,
     control::TARGET,
     page::TARGET,
     recording::TARGET,
     log::TARGET,
+    certificate::TARGET,
     environment::TARGET,
     command_line::TARGET,
 ];
