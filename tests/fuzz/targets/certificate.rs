@@ -21,10 +21,8 @@ fn run(data: &[u8]) {
         return;
     }
     match verify(data, &mut |_| ()) {
-        Err(refused) => {
-            let sentence = refused.to_string();
-            assert!(!sentence.is_empty() && !sentence.contains(char::is_control), "{sentence:?}");
-        }
+        // What the file holds may stand in the sentence: the command escapes it.
+        Err(refused) => assert!(!refused.to_string().is_empty(), "{refused:?}"),
         Ok(proved) => {
             assert_eq!(proved.results.len(), 4, "{:?}", proved.results);
             // What the program itself does not take as a scene, or would search for long, has no other judge.
