@@ -255,7 +255,10 @@ pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CommandError> {
     for signal in signals.iter() {
         signal_hook::flag::register(signal as i32, Arc::clone(&stop))?;
     }
-    std::thread::Builder::new().name("signals".to_owned()).spawn(|| {
+    std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
+        // The process that started this one may have them blocked, as `soak` has, and a mask is inherited.
+        // No panic: this fails for an unknown way to change the mask only.
+        signals.thread_unblock().unwrap();
         loop {
             nix::unistd::pause();
         }
