@@ -259,6 +259,7 @@ impl FollowerTable {
 
     /// The chain when the head has travelled so many metres, within the table.
     fn interpolate(&self, travelled: f64, chain: &mut Chain) {
+        debug_assert!(self.instructions.is_available(), "{}", self.instructions.name());
         match self.instructions {
             // SAFETY: a solver is only made with instructions that this processor was found to have.
             #[cfg(target_arch = "x86_64")]

@@ -1,0 +1,218 @@
+//! What is counted: the parts of a step of the loop, and steps of a certificate. [`run`] is called under callgrind;
+//! the test in `main.rs`, which starts it there, reads what it prints.
+
+use std::hint::black_box;
+
+use bench_dragon::certify::{Line, certify};
+use bench_dragon::live::control::{Door, Doors, door};
+use bench_dragon::live::{Outgoing, Publisher};
+use bench_dragon::motion::Method;
+use bench_dragon::motion::clearance::ClearanceMonitor;
+use bench_dragon::motion::timeline::Timeline;
+use bench_dragon::proof;
+use bench_dragon::scene::{Scene, SceneText};
+use bench_dragon::show::alerts::LevelTracker;
+use bench_dragon::show::control::Command;
+use bench_dragon::show::{Frame, Playback, Show};
+use bench_dragon::solve::selection;
+use bench_dragon::solve::table::{FollowerTable, Instructions};
+use bench_dragon::solve::{Chain, Solver, Velocities};
+use bench_dragon::subscribers::connection::{Connection, Subscription, Wake};
+use bench_dragon::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
+use bench_dragon::wire::convert::{Stamps, frame_header, stage};
+
+/// What stands before the name of the instructions that tables are read with.
+pub const WITH: &str = "instructions: ";
+/// What stands before the name of a part and the number of its calls.
+pub const PART: &str = "counted: ";
+/// Calls of a part of a step.
+const CALLS: u64 = 60;
+/// When the first call is, simulated seconds; they go on at 60 Hz.
+const START: f64 = 200.0;
+/// The same on the route, which is shorter.
+const ON_ROUTE: f64 = 100.0;
+/// Steps of the certificate.
+const STEPS: u64 = 20;
+const STAMPS: Stamps = Stamps { run_id: 1, sequence: 1, stamp_ns: 0, deadline_ns: 0 };
+
+/// Callgrind counts what this calls, and nothing else: its name is given to it.
+#[inline(never)]
+fn counted(call: &mut dyn FnMut(u64), number: u64) {
+    call(number);
+    // Makes this more than a jump to what it calls.
+    black_box(number);
+}
+
+/// At its end callgrind writes what it has counted, and begins anew.
+#[inline(never)]
+fn part_is_over(name: &str, calls: u64) {
+    println!("{PART}{calls} {name}");
+}
+
+/// Counts `call`, with `prepare` before each, which is not counted, and without the first, which may have more to do.
+fn part<T>(name: &str, on: &mut T, mut prepare: impl FnMut(&mut T, u64), mut call: impl FnMut(&mut T, u64)) {
+    for number in 0..=CALLS {
+        prepare(on, number);
+        match number {
+            0 => call(on, 0),
+            _ => counted(&mut |number| call(on, number), number),
+        }
+    }
+    part_is_over(name, CALLS);
+}
+
+/// Counts all parts. To make tables takes longest under callgrind: they are as few as can be.
+pub fn run() {
+    let paper = Scene::paper();
+    println!("{WITH}{}", paper.motion.instructions().name());
+    let Method::Accuracy(accuracy) = paper.motion.method() else { panic!("the paper's scene names a solver") };
+    let (path, team) = (paper.motion.path(), *paper.team());
+    let table = selection::cheapest(path, team, 1.0, Velocities::Computed, accuracy).unwrap().table;
+    let mut portable = table.for_frames().with_instructions(Instructions::Portable).unwrap();
+    frame("frame", &mut table.for_frames(), START, team.handles());
+    frame("frame, portable", &mut portable, START, team.handles());
+    let route = Scene::load("config/procession.toml".as_ref()).unwrap();
+    let mut solver = route.motion.solver(Velocities::Computed).solver;
+    frame("frame on a route, 60 benches", solver.as_mut(), ON_ROUTE, route.team().handles());
+    clearance(ClearanceMonitor::new(path, team, &table), table, team.handles());
+    // The contact would cost a search.
+    let timeline = paper.motion.timeline_without_contact();
+    step(&paper, &timeline);
+    certificate();
+}
+
+fn frame(name: &str, solver: &mut dyn Solver, start: f64, handles: usize) {
+    let mut chain = Chain::new(handles);
+    part(
+        name,
+        &mut chain,
+        |_, _| (),
+        |chain, number| solver.solve(start + number as f64 / 60.0, black_box(chain)).unwrap(),
+    );
+}
+
+/// Of a head that has gone as many metres as there are seconds.
+fn clearance(monitor: ClearanceMonitor, table: FollowerTable, handles: usize) {
+    let mut on = (table, Chain::new(handles), monitor);
+    let time = |number: u64| START + number as f64 / 60.0;
+    part(
+        "clearance",
+        &mut on,
+        |(solver, chain, _), number| solver.solve(time(number), chain).unwrap(),
+        |(_, chain, monitor), number| {
+            black_box(monitor.least_clearance(black_box(chain), time(number)));
+        },
+    );
+}
+
+/// What the loop works with, and a subscriber that takes what comes.
+struct Step {
+    show: Show,
+    timeline: Timeline,
+    rules: LevelTracker,
+    frame: Frame,
+    publisher: SharedMemoryPublisher,
+    connection: Connection,
+    doors: Doors,
+    door: Door,
+}
+
+impl Step {
+    fn new(scene: &Scene, timeline: &Timeline) -> Self {
+        let playback = Playback { start: START, ..Playback::of(scene) };
+        let mut show = Show::new(scene, timeline.clone(), playback).unwrap();
+        let name = format!("test_{}_instructions", std::process::id());
+        let config = PublisherConfig {
+            name: name.clone(),
+            handles: scene.team().handles(),
+            single_precision: None,
+            queue: 2,
+            subscribers: 1,
+            alerts: true,
+            cues: false,
+            stage: stage(1, 0, &scene.motion, &show),
+        };
+        let publisher = SharedMemoryPublisher::open(&config).unwrap();
+        let connection = Subscription::new(&name, Wake::Never).unwrap().connect().unwrap().unwrap();
+        let rules = LevelTracker::new(scene.alerts.unwrap(), playback.rate);
+        let frame = show.frame(0).clone();
+        let (port, door) = door();
+        Self {
+            show,
+            timeline: timeline.clone(),
+            rules,
+            frame,
+            publisher,
+            connection,
+            doors: Doors::new(vec![port]),
+            door,
+        }
+    }
+
+    fn publish(&mut self) {
+        let header = frame_header(&self.frame, STAMPS);
+        self.publisher.publish(Outgoing::new(&header, &self.frame)).unwrap();
+    }
+
+    /// What has come since the last time, as a subscriber takes it that is in time.
+    fn receive(&mut self, _: u64) {
+        self.frame.alerts.clear();
+        let frames = self.connection.frames(|header, handles| assert_eq!(header.handles as usize, handles.len()));
+        let alert = self.connection.alert();
+        black_box((frames, alert));
+    }
+
+    fn poll(&mut self, number: u64) {
+        self.doors.take_one(&mut self.show, number);
+        self.doors.finish_step(&mut self.show, number);
+    }
+}
+
+fn step(scene: &Scene, timeline: &Timeline) {
+    let on = &mut Step::new(scene, timeline);
+    on.frame.alerts.clear();
+    part("publish to one subscriber", on, Step::receive, |on, _| on.publish());
+    // Forgotten, a level is announced again.
+    part("alert: rules, and publish with it", on, Step::receive, |on, number| {
+        let Step { rules, timeline, frame, .. } = on;
+        rules.forget();
+        rules.update(number, frame.sim_time, true, timeline, None, &mut frame.alerts);
+        on.publish();
+    });
+    part("control poll", on, |_, _| (), Step::poll);
+    part(
+        "control poll with a command",
+        on,
+        |on, number| {
+            on.door.answer();
+            on.show.frame(number);
+            on.door.send(Command::Rate(1.0)).unwrap();
+        },
+        Step::poll,
+    );
+    part("whole step", on, Step::receive, |on, number| {
+        let tick = CALLS + number;
+        on.doors.take_one(&mut on.show, tick);
+        let frame = on.show.frame(tick);
+        let header = frame_header(frame, STAMPS);
+        on.publisher.publish(Outgoing::new(&header, frame)).unwrap();
+        on.doors.finish_step(&mut on.show, tick);
+    });
+}
+
+/// The first steps of a proof, and their check. A longer team's first step is the most of both: it compares all pairs.
+fn certificate() {
+    let text = SceneText::paper().text.replace("benches = 223 ", "benches = 20 ");
+    let motion = Scene::parse(&text, "paper.toml", "paper").unwrap().motion;
+    assert_eq!(motion.team().benches, 20);
+    let timeline = motion.timeline_without_contact();
+    let mut lines = Vec::new();
+    let mut search = |steps: u64| {
+        let mut write = |line: &Line| Ok(serde_json::to_writer(&mut lines, line).map(|()| lines.push(b'\n'))?);
+        certify(&motion, &timeline, &text, steps, &mut write, &mut |_| ()).unwrap();
+    };
+    counted(&mut search, STEPS);
+    part_is_over("certificate step, 20 benches", STEPS);
+    counted(&mut |_| drop(proof::verify(&lines[..], &mut |_| ()).unwrap()), STEPS);
+    part_is_over("check of a certificate of 20 steps, 20 benches", 1);
+}
