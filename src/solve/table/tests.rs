@@ -110,3 +110,29 @@ fn what_cannot_be_packed_is_refused() {
     let allowed = Allowed { place: 1e-9, heading: 1e-9, speed: 1e-7 };
     assert!(FollowerTable::formats().into_iter().all(|format| table.packed(format, allowed).is_none()));
 }
+
+/// So small that miri runs it too (`tests/run`), on each instruction set: the calls of code that needs one are the
+/// library's only unsafe code.
+#[test]
+fn a_small_table_is_read_as_exactly() {
+    let path = Path::route(Point::new(0.0, 0.0), 0.0).line(2.0).arc(Side::Left, 3.0, 0.1).line(2.0).build().unwrap();
+    let team = Team { benches: 2, ..TEAM };
+    let newton = Newton::new(path.clone(), team, 1.0, Velocities::Computed);
+    let tolerance = Tolerance { place: 1e-3, relative: f64::INFINITY, speed: 1e-2 };
+    let table = FollowerTable::with_tolerance(&path, team, 1.0, Velocities::Computed, tolerance).unwrap();
+    let allowed = Allowed { place: 1e-2, heading: 1e-2, speed: 1e-1 };
+    let packed = FollowerTable::formats().into_iter().filter_map(|format| table.packed(format, allowed));
+    let tables: Vec<FollowerTable> = packed.chain([table.clone()]).collect();
+    for instructions in Instructions::available() {
+        for (table, velocities) in tables.iter().zip([Velocities::Computed, Velocities::Omitted].into_iter().cycle()) {
+            let mut table = FollowerTable { velocities, instructions, ..table.clone() };
+            let (mut found, mut wanted) = (Chain::new(team.handles()), Chain::new(team.handles()));
+            table.solve(1.5, &mut found).unwrap();
+            newton.solve_at(1.5, &mut wanted).unwrap();
+            let [place, heading, _] = differences(&found, &wanted);
+            assert!(place < 2e-2 && heading < 2e-2, "{}: {place:e} {heading:e}", instructions.name());
+        }
+    }
+    // For miri's log.
+    println!("{:?}, {} tables", Instructions::available(), tables.len());
+}
