@@ -14,6 +14,7 @@ mod lines;
 mod link;
 mod path;
 mod search;
+pub mod speed;
 mod step;
 
 use std::io;

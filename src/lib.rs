@@ -8,11 +8,11 @@
 //! - [`motion`]: a team on a path: its solver, its events, its clearance.
 //! - [`scene`]: the file a user writes, checked and turned into the types above.
 //! - [`show`]: from a scene and a tick to one frame, deterministic.
+//! - [`certify`]: events and speeds with a proof; of events, as a certificate that other code can check.
 //! - [`plan`]: the least pitch and the greatest speed, for a choreographer.
 //! - [`wire`]: the memory layouts that go over the wire, and every conversion to them.
 //! - `ros2_messages` (features `cli`, `jazzy`, `humble`): the messages of ROS 2, on its network and in recordings.
 //! - `drawing` (feature `cli`): a moment of a motion as an SVG, and the colours of all pictures.
-//! - [`certify`]: events with a proof, as a certificate that other code can check.
 //! - [`live`]: the fixed-rate loop, its clock, its statistics.
 //! - [`transports`]: iceoryx2 shared memory and ROS 2 topics, as publishers of the loop.
 //! - `recording` (feature `cli`): the log of a run, the proof that it can be played again, and every message as MCAP.

@@ -10,17 +10,18 @@ use crate::model::board::Board;
 use crate::model::curve::Curve;
 use crate::model::double_double::DoubleDouble;
 use crate::model::path::Path;
-use crate::model::root::{bisect_predicate, golden_section_min};
+use crate::model::root::bisect_predicate;
 use crate::model::separation::signed_distance_board_board;
 use crate::model::spiral::{Direction, Spiral};
 use crate::model::team::Team;
 use crate::motion::contact::{ConservativeAdvancement, LeastClearance};
 use crate::motion::event::{Budget, EventKind};
 use crate::motion::singularities::Singularities;
-use crate::motion::timeline::Timeline;
-use crate::scene::{Accepted, Scene};
-use crate::solve::newton::Newton;
-use crate::solve::{Chain, Velocities};
+use crate::scene::Accepted;
+
+mod speed;
+
+pub use speed::{GreatestSpeed, greatest_speed};
 
 /// A question that has no answer, in one sentence.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -226,170 +227,5 @@ impl Trial {
         let parts = [((at - around).max(0.0), at), (at, (at + around).min(self.limit))];
         let nearest = parts.map(|(from, to)| advancement.minimum_of(pair, from, to));
         if nearest[0].0 <= nearest[1].0 { nearest[0] } else { nearest[1] }
-    }
-}
-
-/// The greatest speed of the head.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GreatestSpeed {
-    /// Metres per second.
-    pub value: f64,
-    /// Simulated seconds of the scene as it is written at which the fastest handle is fastest.
-    pub time: f64,
-    /// That handle, counted from 0.
-    pub handle: u32,
-    /// Its speed over the head's.
-    pub ratio: f64,
-}
-
-/// How densely the show is sampled for its fastest handle at most, as a share of the shortest link.
-const SPEED_STEP: f64 = 0.01;
-
-/// How much of a rear cosine a step may take: near its singular configuration, where that is 0, a link's rear handle is
-/// nearly as fast as the inverse of what is left.
-const SINGULAR_SHARE: f64 = 0.1;
-
-/// Peaks of the samples down to this share of the highest are refined: between two samples a speed grows by less.
-const PEAK_SHARE: f64 = 0.5;
-
-/// Links solved before the search for the fastest handle gives up: some ten seconds.
-const SPEED_BUDGET: u64 = 20_000_000;
-
-/// The greatest constant speed of the head at which no handle ever goes faster than `limit` metres per second, from the
-/// scene's start until its show freezes. `progress` is called now and then with the share of the work that is done, from
-/// 0 to 1.
-///
-/// A handle's speed over the head's depends on the head's place alone. It is sampled every hundredth of a link, and more
-/// densely where a link comes near its singular configuration, so that no speed can double between two samples; every
-/// peak that comes within half of the highest is followed to its top. That a handle has one peak between two samples is
-/// taken for granted, not proven.
-///
-/// # Errors
-/// A show that runs into a lock, near which speeds have no bound, and one that is too long to be searched.
-pub fn greatest_speed(
-    scene: &Scene,
-    timeline: &Timeline,
-    limit: f64,
-    progress: &mut dyn FnMut(f64),
-) -> Result<GreatestSpeed, PlanError> {
-    let freeze = timeline.freeze(scene.stops_at_contact());
-    if freeze.event.kind == EventKind::Lock {
-        return Err(PlanError(format!(
-            "the show runs into a lock at {:.9} s, and near it a handle goes faster than any limit",
-            freeze.time
-        )));
-    }
-    let motion = &scene.motion;
-    let newton = Newton::new(motion.path().clone(), *motion.team(), 1.0, Velocities::Computed);
-    let chain = Chain::new(motion.team().handles());
-    let to = freeze.event.travelled;
-    let mut search = Fastest {
-        newton,
-        chain,
-        team: *motion.team(),
-        max_curvature: motion.path().max_curvature_between(-motion.team().length(), to),
-    };
-    let Peak { ratio, travelled, handle } = search.highest(to, progress).map_err(|reached| {
-        let until = motion.time_at(reached.travelled);
-        PlanError(format!(
-            "the show is too long to be searched for its fastest handle: up to {until:.3} s of {:.3} s it was {:.6} times as fast \
-             as the head",
-            freeze.time, reached.ratio
-        ))
-    })?;
-    Ok(GreatestSpeed { value: limit / ratio, time: motion.time_at(travelled), handle: handle as u32, ratio })
-}
-
-/// A handle's speed over the head's, and where the head is.
-#[derive(Debug, Clone, Copy)]
-struct Peak {
-    ratio: f64,
-    travelled: f64,
-    handle: usize,
-}
-
-/// Speeds over the head's, anywhere on a path.
-struct Fastest {
-    newton: Newton,
-    chain: Chain,
-    team: Team,
-    /// The greatest curvature of the path where the team goes, 1/m.
-    max_curvature: f64,
-}
-
-impl Fastest {
-    /// The highest speed up to a distance of travel.
-    ///
-    /// # Errors
-    /// The highest so far where the budget is spent; its travel is how far the search came.
-    fn highest(&mut self, to: f64, progress: &mut dyn FnMut(f64)) -> Result<Peak, Peak> {
-        let mut samples = [self.sample(0.0); 3];
-        let mut best = samples[2];
-        let mut solved = 0;
-        while samples[2].travelled < to {
-            let next = (samples[2].travelled + self.step()).max(samples[2].travelled.next_up());
-            samples = [samples[1], samples[2], self.sample(next.min(to))];
-            let [before, middle, after] = samples;
-            if after.ratio > best.ratio {
-                best = after;
-            }
-            // Where nothing is faster than the head, there is no peak to follow.
-            let peak = middle.ratio >= before.ratio && middle.ratio >= after.ratio;
-            if peak && middle.ratio > (PEAK_SHARE * best.ratio).max(1.0) {
-                best = self.refined(samples, best);
-            }
-            solved += self.chain.handles() as u64;
-            if solved > SPEED_BUDGET {
-                return Err(Peak { travelled: after.travelled, ..best });
-            }
-            progress(after.travelled / to);
-        }
-        Ok(best)
-    }
-
-    /// How far the head may go from the latest sample to the next.
-    ///
-    /// A link of length L whose handles go at v and v' turns by at most (v + v') / L, the tangent at its rear handle by k
-    /// v', k being the greatest curvature; so the rear cosine changes by no more than both together.
-    fn step(&self) -> f64 {
-        let Chain { heading, speed, vx, vy, .. } = &self.chain;
-        let steps = (0..self.team.benches).map(|bench| {
-            let (sine, cosine) = heading[bench].sin_cos();
-            let (front, rear) = (speed[bench].abs(), speed[bench + 1].abs());
-            let rear_cosine = ((cosine * vx[bench + 1] + sine * vy[bench + 1]) / rear).abs();
-            SINGULAR_SHARE * rear_cosine / ((front + rear) / self.team.link(bench) + self.max_curvature * rear)
-        });
-        // A handle that stands still has no direction: the minimum passes over what is not a number.
-        steps.fold(SPEED_STEP * self.team.shortest_link(), f64::min)
-    }
-
-    /// The higher of `best` and the peaks of the handles that are fastest at three successive samples.
-    fn refined(&mut self, samples: [Peak; 3], best: Peak) -> Peak {
-        let [before, _, after] = samples.map(|sample| sample.travelled);
-        let mut handles = samples.map(|sample| sample.handle).to_vec();
-        handles.dedup();
-        handles.into_iter().fold(best, |best, handle| {
-            let (least, travelled) = golden_section_min(|at| -self.speed(handle, at), before, after);
-            if -least > best.ratio { Peak { ratio: -least, travelled, handle } } else { best }
-        })
-    }
-
-    /// The fastest handle with the head at one place; a place without a solution, which only the last digit before a lock
-    /// can be, has none.
-    fn sample(&mut self, travelled: f64) -> Peak {
-        let none = Peak { ratio: 0.0, travelled, handle: 0 };
-        if self.newton.solve_at(travelled, &mut self.chain).is_err() {
-            return none;
-        }
-        let speeds = self.chain.speed.iter().map(|speed| speed.abs()).zip(0..);
-        speeds.fold(
-            none,
-            |best, (ratio, handle)| if ratio > best.ratio { Peak { ratio, travelled, handle } } else { best },
-        )
-    }
-
-    fn speed(&mut self, handle: usize, travelled: f64) -> f64 {
-        let solved = self.newton.solve_at(travelled, &mut self.chain);
-        solved.map_or(0.0, |()| self.chain.speed[handle].abs())
     }
 }

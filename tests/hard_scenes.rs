@@ -157,7 +157,9 @@ fn a_plan_knows_that_a_scene_without_alerts_runs_into_its_lock() {
 fn the_fastest_handle_is_the_highest_peak() {
     let scene = scene("plan_speed_wrong");
     let plan = greatest_speed(&scene, &timeline(&scene), 1.0, &mut |_| ()).unwrap();
-    assert!((plan.ratio - 3828.99).abs() < 0.01 && (plan.time - 8.325).abs() < 1e-3, "{plan:?}");
+    assert!((plan.ratio - 3828.99).abs() < 0.1 && (plan.time - 8.325).abs() < 1e-3, "{plan:?}");
+    // So near a lock doubles enclose no step that holds the peak: there is no bound, and nothing is said to be proved.
+    assert!(!plan.proved && plan.value_lo == 0.0 && plan.value_hi < 1.0 / 3828.0, "{plan:?}");
 }
 
 /// N8: boards that touch with every pitch, and boards that overlap on a straight line.
@@ -188,7 +190,7 @@ fn long_scenes_end_or_say_how_far_they_came() {
         let (code, stdout, printed) = answer(&[&["--scene", scene.as_str()], arguments].concat());
         println!("{name} {arguments:?}: {code}\n{stdout}{printed}");
         assert!(!printed.contains("panicked"), "{name}: {printed}");
-        let explained = printed.contains("searched up to") || printed.contains("too long to be searched");
+        let explained = printed.contains("searched up to");
         assert!(code == 0 || (code == 2 && explained), "{name} {arguments:?}: {code} {printed}");
         assert!(!stdout.is_empty() || explained, "{name} {arguments:?} prints nothing");
     }

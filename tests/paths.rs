@@ -180,14 +180,15 @@ fn the_greatest_speed_of_the_turnaround_is_that_of_dense_sampling() {
     println!("{plan:?}");
     let mut chain = Chain::new(scene.team().handles());
     assert!(chain_at(&scene, plan.time, &mut chain));
-    assert!((chain.speed[plan.handle as usize] - plan.ratio).abs() < 1e-12);
+    assert!((chain.speed[plan.handle as usize] - plan.ratio).abs() < 1e-10);
     let mut sampled = 0f64;
     for k in 0..48_000 {
         assert!(chain_at(&scene, f64::from(k) * 0.01, &mut chain));
         sampled = chain.speed.iter().copied().fold(sampled, f64::max);
     }
-    assert!(plan.ratio >= sampled && plan.ratio < sampled + 1e-3, "{} {sampled}", plan.ratio);
-    assert!((plan.value * plan.ratio - 2.0).abs() < 1e-14);
+    let (least, most) = (2.0 / plan.value_hi, 2.0 / plan.value_lo);
+    assert!(most >= sampled && least < sampled + 1e-3, "{least} {most} {sampled}");
+    assert!((least..=most).contains(&plan.ratio));
     assert!(plan.time.fract() > 1e-3);
 }
 

@@ -12,7 +12,9 @@ pub struct Span(pub Place, pub Place);
 /// Points and tangents over a span.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Capsule {
-    /// The point of a place m of the span.
+    /// A place m of the span.
+    pub middle: Place,
+    /// Its point.
     pub point: Vector,
     /// The tangent there.
     pub tangent: Vector,
@@ -40,7 +42,7 @@ impl Capsule {
         let curvature = path.curvature(first, last);
         let radius = (Interval::point(curvature) * Interval::point(half).square() * 0.5).hi;
         let curve = path.curve(middle);
-        Self { point: curve.point(middle.1), tangent: curve.tangent(middle.1), half, radius, curvature }
+        Self { middle, point: curve.point(middle.1), tangent: curve.tangent(middle.1), half, radius, curvature }
     }
 
     /// How far n . x can be from n . point.
@@ -63,7 +65,7 @@ impl Capsule {
 
     /// The square of the distance of any place of the span from a point, by Taylor's formula.
     pub fn distance_squared(&self, x: Vector) -> Interval {
-        let Self { point, tangent, half, curvature, radius } = *self;
+        let Self { point, tangent, half, curvature, radius, .. } = *self;
         let between = minus(point, x);
         let most = norm(between) + Interval::point(half) + Interval::point(radius);
         let half = Interval::point(half);
@@ -74,19 +76,31 @@ impl Capsule {
 
     /// t . (u - x) over all u here and x there, t being the tangent at u, or at x.
     pub fn product(&self, other: &Self, at_other: bool) -> Interval {
-        let between = minus(self.point, other.point);
-        let (tangent, bend) = if at_other {
-            (other.tangent, Interval::point(other.curvature) * other.half)
-        } else {
-            (self.tangent, Interval::point(self.curvature) * self.half)
-        };
-        let along = |capsule: &Self| dot(tangent, capsule.tangent).abs() * capsule.half;
+        let at = if at_other { other } else { self };
+        self.component(other, at.tangent, at.turned())
+    }
+
+    /// n . (u - x) over all u here and x there, n being the unit normal to the left at u, or at x.
+    pub fn across(&self, other: &Self, at_other: bool) -> Interval {
+        let at = if at_other { other } else { self };
+        let [x, y] = at.tangent;
+        self.component(other, [-y, x], at.turned())
+    }
+
+    /// At least how far a tangent here is from that of the middle.
+    pub fn turned(&self) -> Interval {
+        Interval::point(self.curvature) * self.half
+    }
+
+    /// n . (u - x) over all u here and x there for all n no further than `turned` from a unit vector.
+    fn component(&self, other: &Self, unit: Vector, turned: Interval) -> Interval {
+        let along = |capsule: &Self| dot(unit, capsule.tangent).abs() * capsule.half;
         let off = along(self)
             + along(other)
             + Interval::point(self.radius)
             + Interval::point(other.radius)
-            + bend * self.most_apart(other);
-        dot(tangent, between) + Interval::within(off.hi)
+            + turned * self.most_apart(other);
+        dot(unit, minus(self.point, other.point)) + Interval::within(off.hi)
     }
 }
 

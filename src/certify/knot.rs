@@ -34,8 +34,7 @@ impl Knot {
     }
 
     pub fn at(head: Place, travelled: f64) -> Self {
-        let at = crate::model::curve::Coordinate { high: head.1, low: 0.0 };
-        let handle = Handle { param: Param { segment: head.0, at }, front_cosine: 1.0, rear_cosine: 1.0 };
+        let handle = Handle { param: param(head), front_cosine: 1.0, rear_cosine: 1.0 };
         Self { travelled, head, handles: vec![handle] }
     }
 
@@ -50,6 +49,11 @@ impl Knot {
         }
         Ok(())
     }
+}
+
+/// The parameter of a place.
+pub(super) fn param(place: Place) -> Param {
+    Param { segment: place.0, at: crate::model::curve::Coordinate { high: place.1, low: 0.0 } }
 }
 
 /// The place nearest to a parameter.

@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use super::elementary::{atan, ln, pi, sin_cos};
-use super::interval::{Interval, Vector, plus, scaled};
+use super::interval::{Interval, Vector, cross, plus, scaled};
 use crate::model::curve::Side;
 use crate::model::description::{PathDescription, RouteStep};
 
@@ -77,16 +77,36 @@ impl Curve {
         }
     }
 
-    /// The most that the curvature is between two coordinates, 1/m.
-    fn curvature(&self, one: f64, other: f64) -> f64 {
+    /// The curvatures between two coordinates, 1/m: positive to the left.
+    fn bend(&self, one: f64, other: f64) -> Interval {
+        let of_spiral = |a: Interval| {
+            let at = |theta: f64| {
+                let square = Interval::point(theta).square();
+                let w = (Interval::ONE + square).sqrt();
+                (square + Interval::point(2.0)).over(a * w * w.square())
+            };
+            Interval { lo: at(one.max(other)).lo.max(0.0), hi: at(one.min(other)).hi }
+        };
+        match *self {
+            Self::Inward { a } => -of_spiral(a),
+            Self::Outward { a } => of_spiral(a),
+            Self::Line { .. } => Interval::ZERO,
+            Self::Arc { direction, inward, radius, .. } => {
+                let bend = Interval::ONE.over(radius);
+                if cross(direction, inward).is_positive() { bend } else { -bend }
+            }
+        }
+    }
+
+    /// How fast that changes between two coordinates, 1/m per metre of travel: theta (theta^2 + 4) / (a^2 w^6) downwards.
+    fn bend_rate(&self, one: f64, other: f64) -> Interval {
         match *self {
             Self::Inward { a } | Self::Outward { a } => {
-                let square = Interval::point(one.min(other)).square();
-                let w = (Interval::ONE + square).sqrt();
-                (square + Interval::point(2.0)).over(a * w * w.square()).hi
+                let theta = Interval { lo: one.min(other), hi: one.max(other) };
+                let (square, w_square) = (theta.square(), Interval::ONE + theta.square());
+                -(theta * (square + Interval::point(4.0))).over((a * w_square).square() * w_square)
             }
-            Self::Line { .. } => 0.0,
-            Self::Arc { radius, .. } => Interval::ONE.over(radius).hi,
+            Self::Line { .. } | Self::Arc { .. } => Interval::ZERO,
         }
     }
 
@@ -284,13 +304,25 @@ impl ExactPath {
 
     /// At least the curvature anywhere between two places, 1/m.
     pub fn curvature(&self, x: Place, y: Place) -> f64 {
-        (x.0..=y.0).fold(0.0, |most: f64, segment| {
+        self.bend(x, y).magnitude()
+    }
+
+    /// The curvatures anywhere between two places, 1/m: positive to the left.
+    pub fn bend(&self, x: Place, y: Place) -> Interval {
+        let bends = (x.0..=y.0).map(|segment| {
             let Segment { curve, begin, end, .. } = &self.segments[segment];
             // What is outside the segment by rounding bends more, if anything.
             let from = if segment == x.0 { x.1 } else { begin.lo };
             let to = if segment == y.0 { y.1 } else { end.lo };
-            most.max(curve.curvature(from, to))
-        })
+            curve.bend(from, to)
+        });
+        let hull = |a: Interval, b: Interval| Interval { lo: a.lo.min(b.lo), hi: a.hi.max(b.hi) };
+        bends.reduce(hull).unwrap_or(Interval::ZERO)
+    }
+
+    /// How fast the curvature changes between two places of one segment, 1/m per metre; `None` if there are two.
+    pub fn bend_rate(&self, x: Place, y: Place) -> Option<Interval> {
+        (x.0 == y.0).then(|| self.curve(x).bend_rate(x.1, y.1))
     }
 
     /// Metres of travel of the head at a place.

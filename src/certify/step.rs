@@ -75,7 +75,7 @@ impl<'a> Chain<'a> {
         Self { path, exact, team, links, shape: Shape::new(team), start: None }
     }
 
-    fn link(&self, bench: usize) -> Interval {
+    pub fn link(&self, bench: usize) -> Interval {
         self.links[bench.min(1)]
     }
 
@@ -103,10 +103,20 @@ impl<'a> Chain<'a> {
 
     /// Handles 0 to `handle` between two knots, if Lemma 1 holds for every link between them.
     pub fn spans(&self, from: &mut Knot, to: &mut Knot, handle: usize) -> Option<Vec<Spanned>> {
+        self.spans_until(from, to, |handles| handles.len() > handle)
+    }
+
+    /// Handles from 0 on between two knots, until they are enough, if Lemma 1 holds for every link between them.
+    pub fn spans_until(
+        &self,
+        from: &mut Knot,
+        to: &mut Knot,
+        enough: impl Fn(&[Spanned]) -> bool,
+    ) -> Option<Vec<Spanned>> {
         let claim = Claim { links: Links::All, moving: false, clear: false };
         PADS.iter().find_map(|pads| {
             let mut listed = Listed::new(self, Span(from.head, to.head), *pads);
-            while listed.handles.len() <= handle {
+            while !enough(&listed.handles) {
                 listed.extend(from, to, claim).ok()?;
             }
             Some(listed.handles)

@@ -44,7 +44,10 @@ struct PitchLine {
 #[derive(Serialize)]
 struct SpeedLine {
     plan: &'static str,
+    status: &'static str,
     value: f64,
+    value_lo: f64,
+    value_hi: f64,
     time: f64,
     handle: u32,
     ratio: f64,
@@ -86,21 +89,29 @@ fn plan_speed(common: &Common, limit: f64) -> Result<(), CommandError> {
     let bar = progress_bar(1000, common).with_message("searching for the fastest handle");
     let found = greatest_speed(&scene, &timeline, limit, &mut |share| bar.set_position((1000.0 * share) as u64));
     bar.finish_and_clear();
-    let GreatestSpeed { value, time, handle, ratio } = found?;
+    let GreatestSpeed { value_lo, value_hi, time, handle, ratio, proved, steps } = found?;
     let mut output = Output::standard();
     if common.json {
-        output.json(&SpeedLine { plan: "speed", value, time, handle, ratio })?;
-    } else {
-        output.line(&format!(
-            "No handle is faster than {} m/s while the head moves at {value:.10} m/s.",
-            number(limit)
-        ))?;
-        output.line(&format!(
-            "The fastest is handle {} (counting from 1) at {ratio:.10} times the head's speed, at t = {time:.6} s of the \
-             scene as it is written.",
-            handle + 1
-        ))?;
+        let status = if proved { "proved" } else { "given_up" };
+        let value = value_lo;
+        output.json(&SpeedLine { plan: "speed", status, value, value_lo, value_hi, time, handle, ratio })?;
+        return output.finish();
     }
+    let limit = number(limit);
+    output.line(&format!("No handle is faster than {limit} m/s while the head moves at {value_lo:.10} m/s."))?;
+    output.line(&format!(
+        "The fastest is handle {} (counting from 1) at {ratio:.10} times the head's speed, at t = {time:.6} s of the \
+         scene as it is written.",
+        handle + 1
+    ))?;
+    output.line(&if proved {
+        format!("Proved in {steps} steps of the head: the greatest such speed is from {value_lo} to {value_hi} m/s.")
+    } else {
+        format!(
+            "Not decided: the search was given up after {steps} steps of the head. What is proved: the greatest such \
+             speed is from {value_lo} to {value_hi} m/s."
+        )
+    })?;
     output.finish()
 }
 
