@@ -7,12 +7,16 @@
 
 mod boards;
 mod capsule;
+mod carriers;
+mod clearance;
 mod elementary;
 mod interval;
 mod knot;
 mod lines;
 mod link;
 mod path;
+pub(crate) mod pitch;
+mod relative;
 mod search;
 pub mod speed;
 mod step;
@@ -20,6 +24,7 @@ mod step;
 use std::io;
 
 pub use capsule::Span;
+pub use clearance::{ClearanceEnclosure, MOST_CLEARANCE_STEPS, enclose_least_clearance};
 pub use lines::{FORMAT, Line, Links, Outcome, Status, Step};
 pub use path::Place;
 

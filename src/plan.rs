@@ -3,7 +3,11 @@
 //!
 //! In: a team or a scene. Out: one number with where it is decided. The `plan` command prints them.
 
+mod enclosure;
+
 use std::f64::consts::TAU;
+
+pub use enclosure::{PitchEnclosure, enclose_least_pitch};
 
 use crate::model::Point;
 use crate::model::board::Board;

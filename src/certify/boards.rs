@@ -71,13 +71,20 @@ impl Shape {
 }
 
 impl MovingBoard {
-    /// Whether two boards are proved to be apart.
-    pub fn is_apart_from(&self, other: &Self) -> bool {
+    /// Whether two boards are proved to be further apart than `metres`, not below 0, by the circles about them.
+    pub fn is_further_than(&self, metres: f64, other: &Self) -> bool {
         let between = [self.centre[0] - other.centre[0], self.centre[1] - other.centre[1]];
         let apart = norm_squared(between.map(Interval::point));
-        if (Interval::point(self.radius) + Interval::point(other.radius)).square().is_below(apart) {
+        let reach = Interval::point(self.radius) + Interval::point(other.radius) + Interval::point(metres);
+        reach.square().is_below(apart)
+    }
+
+    /// Whether two boards are proved to be apart.
+    pub fn is_apart_from(&self, other: &Self) -> bool {
+        if self.is_further_than(0.0, other) {
             return true;
         }
+        let between = [self.centre[0] - other.centre[0], self.centre[1] - other.centre[1]];
         let normal = |[x, y]: [f64; 2]| [-y, x];
         let axes = [between, normal(self.direction), normal(other.direction), self.direction, other.direction];
         axes.iter().any(|axis| self.is_separated(other, axis.map(Interval::point)))

@@ -149,9 +149,7 @@ impl ExactPath {
             PathDescription::Spiral { pitch, start_turn } => {
                 let a = Interval::point(*pitch).over(pi() * 2.0);
                 let length = spiral_length(a, pi() * 2.0 * *start_turn);
-                let begin = Interval::point(FAR);
-                let curve = Curve::Inward { a };
-                Self { segments: vec![Segment { curve, begin, end: Interval::ZERO, travelled: length }] }
+                Self::inward(a, length)
             }
             PathDescription::Turnaround { pitch, turn_radius, arc_ratio, lead_in, lead_out: _ } => {
                 let a = Interval::point(*pitch).over(pi() * 2.0);
@@ -191,6 +189,12 @@ impl ExactPath {
                 route([start.x, start.y].map(Interval::point), *heading_turns, steps)
             }
         }
+    }
+
+    /// An inward spiral alone, of `a` metres per radian, whose end at the centre the head reaches after so many metres.
+    pub fn inward(a: Interval, travelled: Interval) -> Self {
+        let (curve, begin) = (Curve::Inward { a }, Interval::point(FAR));
+        Self { segments: vec![Segment { curve, begin, end: Interval::ZERO, travelled }] }
     }
 
     /// The segment of a place.

@@ -3,7 +3,6 @@
 
 use std::io;
 
-use super::boards::MovingBoard;
 use super::capsule::{Span, Spanned};
 use super::interval::Interval;
 use super::knot::{Knot, place, span};
@@ -12,16 +11,15 @@ use super::link::all_nearer;
 use super::path::{ExactPath, Place};
 use super::step::{Chain, Claim, Obstacle, Shown};
 use super::{CertifyError, Given};
-use crate::model::board::Board;
+use crate::model::path::Path;
 use crate::model::root::golden_section_min;
-use crate::model::separation::overlap_centre;
 use crate::motion::event::{Event, EventKind};
 
 /// Seconds on each side of an event between which it is proved to be.
 const AROUND: f64 = 3e-10;
 
 /// Metres, as a share of the way, below which doubles tell no places apart.
-const LEAST: f64 = 7e-13;
+pub(super) const LEAST: f64 = 7e-13;
 
 /// What a step that succeeded, and one that did not, do to the length of the next.
 const GROWTH: f64 = 1.3;
@@ -120,7 +118,7 @@ impl<'a, 'w> Search<'a, 'w> {
             match event.kind {
                 EventKind::Contact if event.travelled == 0.0 => self.overlap_at_start(event)?,
                 EventKind::PathEnd => {
-                    let beyond = self.path_end();
+                    let beyond = path_end(&self.chain.exact, self.given.path);
                     self.go_to(event.travelled - self.around(), None, &mut progress)?;
                     self.go_to_knot(&beyond, None, &mut progress)?;
                     (self.write)(&Line::PathEnd)?;
@@ -154,16 +152,6 @@ impl<'a, 'w> Search<'a, 'w> {
 
     fn knot(&self, travelled: f64) -> Knot {
         Knot::new(self.chain.path, &self.chain.exact, travelled)
-    }
-
-    /// A knot at the path's end or beyond it.
-    fn path_end(&self) -> Knot {
-        let length = self.given.path.length();
-        let end = place(self.given.path.param_at(length));
-        let beyond = self.chain.exact.moved(end, LEAST * (1.0 + length));
-        let inward = matches!(self.chain.exact.segments[beyond.0].curve, super::path::Curve::Inward { .. });
-        let head = if inward { Place(beyond.0, 0.0) } else { beyond };
-        Knot::at(head, length)
     }
 
     fn at_path_end(&self) -> Status {
@@ -302,25 +290,10 @@ impl<'a, 'w> Search<'a, 'w> {
     fn touch(&mut self, event: &Event, mut from: Knot, to: &mut Knot) -> Result<bool, Halt> {
         let benches = [event.bench_a, event.bench_b].map(|bench| bench.unwrap_or(0) as usize);
         let Some(handles) = self.chain.spans(&mut from, to, benches[1] + 1) else { return Ok(false) };
-        let Some(point) = self.common_point(&handles, benches) else { return Ok(false) };
+        let Some(point) = self.chain.common_point(&handles, benches) else { return Ok(false) };
         let spans = handles[1..].iter().map(|handle| handle.span).collect();
         (self.write)(&Line::Contact { benches, from: from.head, to: to.head, spans, point })?;
         Ok(true)
-    }
-
-    /// A point that is surely in both boards.
-    fn common_point(&self, handles: &[Spanned], benches: [usize; 2]) -> Option<[f64; 2]> {
-        let team = self.given.team;
-        let boards = benches.map(|bench| {
-            let [front, rear] = [bench, bench + 1].map(|handle| {
-                let [x, y] = handles[handle].capsule.point.map(Interval::middle);
-                crate::model::Point::new(x, y)
-            });
-            Board::from_handles(front, rear, team.hole_inset, team.width)
-        });
-        let point: [f64; 2] = overlap_centre(&boards[0], &boards[1]).into();
-        let holds = |board: MovingBoard| board.holds(point.map(Interval::point));
-        benches.iter().all(|bench| holds(self.chain.board(handles, *bench))).then_some(point)
     }
 
     fn contact(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
@@ -464,4 +437,14 @@ impl<'a, 'w> Search<'a, 'w> {
             holds.then_some(window)
         })
     }
+}
+
+/// A knot at the path's end or beyond it.
+pub(super) fn path_end(exact: &ExactPath, path: &Path) -> Knot {
+    let length = path.length();
+    let end = place(path.param_at(length));
+    let beyond = exact.moved(end, LEAST * (1.0 + length));
+    let inward = matches!(exact.segments[beyond.0].curve, super::path::Curve::Inward { .. });
+    let head = if inward { Place(beyond.0, 0.0) } else { beyond };
+    Knot::at(head, length)
 }

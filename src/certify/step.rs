@@ -7,7 +7,10 @@ use super::knot::{Knot, span};
 use super::lines::{Links, Step};
 use super::link::{Front, follower_within};
 use super::path::{Curve, ExactPath, Place};
+use crate::model::Point;
+use crate::model::board::Board;
 use crate::model::path::Path;
+use crate::model::separation::overlap_centre;
 use crate::model::team::Team;
 use crate::motion::event::EventKind;
 
@@ -66,7 +69,7 @@ pub(super) struct Chain<'a> {
 const PAD: f64 = 64.0 * f64::EPSILON;
 
 /// How many times that is tried, in turn.
-const PADS: [f64; 3] = [1.0, 16.0, 256.0];
+pub(super) const PADS: [f64; 3] = [1.0, 16.0, 256.0];
 
 impl<'a> Chain<'a> {
     pub fn new(path: &'a Path, exact: ExactPath, team: &'a Team) -> Self {
@@ -75,6 +78,7 @@ impl<'a> Chain<'a> {
         Self { path, exact, team, links, shape: Shape::new(team), start: None }
     }
 
+    /// Metres between the handles of a bench.
     pub fn link(&self, bench: usize) -> Interval {
         self.links[bench.min(1)]
     }
@@ -123,6 +127,21 @@ impl<'a> Chain<'a> {
         })
     }
 
+    /// A point that is surely in both boards.
+    pub fn common_point(&self, handles: &[Spanned], benches: [usize; 2]) -> Option<[f64; 2]> {
+        let (inset, width) = (self.shape.inset.middle(), 2.0 * self.shape.half_width.middle());
+        let boards = benches.map(|bench| {
+            let [front, rear] = [bench, bench + 1].map(|handle| {
+                let [x, y] = handles[handle].capsule.point.map(Interval::middle);
+                Point::new(x, y)
+            });
+            Board::from_handles(front, rear, inset, width)
+        });
+        let point: [f64; 2] = overlap_centre(&boards[0], &boards[1]).into();
+        let holds = |bench: &usize| self.board(handles, *bench).holds(point.map(Interval::point));
+        benches.iter().all(holds).then_some(point)
+    }
+
     /// The board of a bench over listed handles.
     pub fn board(&self, handles: &[Spanned], bench: usize) -> MovingBoard {
         self.shape.board(handles[bench].capsule, handles[bench + 1].capsule, self.link(bench))
@@ -130,22 +149,23 @@ impl<'a> Chain<'a> {
 }
 
 /// The handles of a step that have been enclosed.
-struct Listed<'c, 'a> {
+pub(super) struct Listed<'c, 'a> {
     chain: &'c Chain<'a>,
-    handles: Vec<Spanned>,
+    pub handles: Vec<Spanned>,
     pad: f64,
     pads: f64,
-    body_forward: bool,
+    /// Whether every link behind the head's surely goes forward.
+    pub body_forward: bool,
 }
 
 impl<'c, 'a> Listed<'c, 'a> {
-    fn new(chain: &'c Chain<'a>, head: Span, pads: f64) -> Self {
+    pub fn new(chain: &'c Chain<'a>, head: Span, pads: f64) -> Self {
         let handles = vec![Spanned::new(&chain.exact, head)];
         Self { chain, handles, pad: 0.0, pads, body_forward: true }
     }
 
     /// Whether a handle is on a straight line without a beginning.
-    fn is_on_line(&self, handle: usize) -> bool {
+    pub fn is_on_line(&self, handle: usize) -> bool {
         let Chain { exact, .. } = self.chain;
         self.handles[handle].span.1.0 == 0 && matches!(exact.segments[0].curve, Curve::Line { .. })
     }
@@ -160,9 +180,14 @@ impl<'c, 'a> Listed<'c, 'a> {
     }
 
     fn ring_holds(&self, board: usize, from_handle: usize) -> bool {
+        self.is_beyond(0.0, &self.chain.board(&self.handles, board), from_handle)
+    }
+
+    /// Whether all boards whose handles are this one or behind it are further than `metres` from one further in.
+    pub fn is_beyond(&self, metres: f64, inner: &MovingBoard, from_handle: usize) -> bool {
         let Chain { shape, links, .. } = self.chain;
-        let outermost = shape.outermost(&self.chain.board(&self.handles, board));
-        shape.innermost(self.ring(from_handle), links[1]) > outermost
+        shape.innermost(self.ring(from_handle), links[1])
+            > (Interval::point(shape.outermost(inner)) + Interval::point(metres)).hi
     }
 
     /// Whether the handles that are listed are all that the claim needs.
@@ -181,7 +206,7 @@ impl<'c, 'a> Listed<'c, 'a> {
     }
 
     /// Encloses one handle more.
-    fn extend(&mut self, from: &mut Knot, to: &mut Knot, claim: Claim) -> Result<(), Obstacle> {
+    pub fn extend(&mut self, from: &mut Knot, to: &mut Knot, claim: Claim) -> Result<(), Obstacle> {
         let Chain { path, exact, team, start, .. } = self.chain;
         let link = self.handles.len() - 1;
         let solved = from.extend_to(link + 1, path, team).and_then(|()| to.extend_to(link + 1, path, team));
@@ -262,7 +287,7 @@ impl<'c, 'a> Listed<'c, 'a> {
     }
 
     /// The boards from `first` to the last, all on the line on which the last listed handle is.
-    fn straight_run(&self, first: usize) -> MovingBoard {
+    pub fn straight_run(&self, first: usize) -> MovingBoard {
         let (chain, listed) = (self.chain, self.handles.len() - 1);
         let link = chain.links[1];
         let back = |handles: usize| moved_back(&self.handles[listed].capsule, link * handles as f64);

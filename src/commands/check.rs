@@ -4,14 +4,17 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
+use bench_dragon::certify::{ClearanceEnclosure, MOST_CLEARANCE_STEPS, enclose_least_clearance};
 use bench_dragon::model::path::{OutlineKind, SegmentOutline};
 use bench_dragon::model::spiral::Direction;
-use bench_dragon::motion::Motion;
 use bench_dragon::motion::event::EventKind;
-use bench_dragon::scene::{AtEnd, OnContact};
+use bench_dragon::motion::timeline::{TimedClearance, TimedEvent};
+use bench_dragon::motion::{Method, Motion};
+use bench_dragon::scene::{AtEnd, OnContact, Scene};
 use bench_dragon::solve::Velocities;
+use serde::Serialize;
 
-use super::events::{least_clearance, sentence};
+use super::events::{find_least_clearance, least_clearance, sentence};
 use super::verify::certificate::proved_of;
 use super::{CommandError, Common, Output, figure, number, progress_bar, search_timeline};
 
@@ -21,6 +24,24 @@ pub struct CheckArguments {
     /// A certificate of `events --certify` for this very scene: it is checked, and what it proves is printed
     #[arg(long, value_name = "FILE")]
     certificate: Option<PathBuf>,
+    /// Prove the least clearance of the show: enclose it within a nanometre, rounding included. Seconds to minutes; with
+    /// --json, print that alone
+    #[arg(long)]
+    prove: bool,
+}
+
+/// The line of `check --prove --json`.
+#[derive(Serialize)]
+struct ClearanceLine {
+    least_clearance: Option<f64>,
+    least_clearance_lo: Option<f64>,
+    least_clearance_hi: Option<f64>,
+    least_clearance_status: &'static str,
+    /// Simulated seconds up to which that is proved, where it is not to the end of the show.
+    proved_until: Option<f64>,
+    time: Option<f64>,
+    bench_a: Option<usize>,
+    bench_b: Option<usize>,
 }
 
 /// Validates the scene and prints what it would do.
@@ -29,6 +50,12 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     let scene = text.parse()?;
     let timeline = search_timeline(&scene, common);
     let mut output = Output::standard();
+    if arguments.prove && common.json {
+        let (found, freeze) = find_least_clearance(&scene, &timeline, common);
+        let enclosure = enclosed(&scene, found, freeze, common)?;
+        output.json(&clearance_line(&scene, found, enclosure))?;
+        return output.finish();
+    }
     let team = scene.team();
     output.line(&format!("Scene \"{}\" is valid.", scene.name))?;
     output.line(&format!(
@@ -91,7 +118,12 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     for timed in timeline.events() {
         output.line(&format!("  {}", sentence(&scene, timed)))?;
     }
-    output.line(&format!("  {}", least_clearance(&scene, &timeline, common)))?;
+    let (found, freeze) = find_least_clearance(&scene, &timeline, common);
+    output.line(&format!("  {}", least_clearance(&scene, found)))?;
+    if arguments.prove {
+        let enclosure = enclosed(&scene, found, freeze, common)?;
+        output.line(&format!("  {}", proof_sentence(&scene, enclosure)))?;
+    }
     if let Some(file) = &arguments.certificate {
         output.line("  Proved of this scene, counting benches from 0:")?;
         for sentence in proved(&text.text, file, common)? {
@@ -102,6 +134,62 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         log::warn!("boards overlap at the start of scene \"{}\": widen the pitch or narrow the boards", scene.name);
     }
     output.finish()
+}
+
+/// The least clearance between two numbers, if it can be proved.
+fn enclosed(
+    scene: &Scene,
+    found: Option<TimedClearance>,
+    freeze: &TimedEvent,
+    common: &Common,
+) -> Result<Option<ClearanceEnclosure>, CommandError> {
+    if matches!(scene.motion.method(), Method::Paper(_)) {
+        let sentence = "the scene names the solver \"paper\", whose head is too fast: only of exact motion can the least \
+                        clearance be proved, expected motion.accuracy or another solver";
+        return Err(CommandError::BadInput(sentence.to_owned()));
+    }
+    let bar = progress_bar(1000, common).with_message("proving the least clearance");
+    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+    let enclosure = found.and_then(|found| {
+        enclose_least_clearance(&scene.motion, freeze, &found.least, MOST_CLEARANCE_STEPS, &mut progress)
+    });
+    bar.finish_and_clear();
+    Ok(enclosure)
+}
+
+/// What was proved of the least clearance, for people.
+fn proof_sentence(scene: &Scene, enclosure: Option<ClearanceEnclosure>) -> String {
+    let Some(ClearanceEnclosure { lo, hi, until, .. }) = enclosure else {
+        return "Nothing of it could be proved.".to_owned();
+    };
+    match until {
+        None => format!("Proved: it is between {lo} m and {hi} m."),
+        Some(until) => {
+            let until = scene.motion.time_at(until);
+            format!("Proved up to t = {until} s that it is between {lo} m and {hi} m; not decided beyond.")
+        }
+    }
+}
+
+fn clearance_line(
+    scene: &Scene,
+    found: Option<TimedClearance>,
+    enclosure: Option<ClearanceEnclosure>,
+) -> ClearanceLine {
+    ClearanceLine {
+        least_clearance: found.map(|found| found.least.value),
+        least_clearance_lo: enclosure.map(|enclosure| enclosure.lo),
+        least_clearance_hi: enclosure.map(|enclosure| enclosure.hi),
+        least_clearance_status: match enclosure {
+            Some(ClearanceEnclosure { until: None, .. }) => "proved",
+            Some(_) => "given up",
+            None => "searched",
+        },
+        proved_until: enclosure.and_then(|enclosure| enclosure.until).map(|until| scene.motion.time_at(until)),
+        time: enclosure.map(|enclosure| scene.motion.time_at(enclosure.travelled)),
+        bench_a: enclosure.map(|enclosure| enclosure.bench_a),
+        bench_b: enclosure.map(|enclosure| enclosure.bench_b),
+    }
 }
 
 /// What a certificate proves of the scene with this text.

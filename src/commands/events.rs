@@ -86,7 +86,7 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
                 }
             }
         }
-        output.line(&least_clearance(&scene, &timeline, common))?;
+        output.line(&least_clearance(&scene, find_least_clearance(&scene, &timeline, common).0))?;
     }
     output.finish()
 }
@@ -160,13 +160,22 @@ pub fn sentence(scene: &Scene, timed: &TimedEvent) -> String {
         .replace("path (counting from 1)", "path")
 }
 
-/// The least clearance of the whole show, for people.
-pub fn least_clearance(scene: &Scene, timeline: &Timeline, common: &Common) -> String {
+/// The least clearance of the whole show, and the event at which the show freezes.
+pub fn find_least_clearance<'t>(
+    scene: &Scene,
+    timeline: &'t Timeline,
+    common: &Common,
+) -> (Option<TimedClearance>, &'t TimedEvent) {
     let bar = progress_bar(1000, common).with_message("searching for the least clearance");
     let freeze = timeline.freeze(scene.stops_at_contact());
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
     let found = scene.motion.least_clearance(timeline, freeze, &mut progress);
     bar.finish_and_clear();
+    (found, freeze)
+}
+
+/// The least clearance of the whole show, for people.
+pub fn least_clearance(scene: &Scene, found: Option<TimedClearance>) -> String {
     let Some(TimedClearance { least, time, searched_until }) = found else {
         return "The least clearance of the show is not computed: there are no two benches that could meet, or the search gave up.".to_owned();
     };

@@ -1,6 +1,8 @@
 //! `plan`: answers for a choreographer, with where they are decided.
 
-use bench_dragon::plan::{GreatestSpeed, LeastPitch, PlanError, greatest_speed, least_pitch};
+use bench_dragon::plan::{
+    GreatestSpeed, LeastPitch, PitchEnclosure, PlanError, enclose_least_pitch, greatest_speed, least_pitch,
+};
 use bench_dragon::scene::Accepted;
 use serde::Serialize;
 
@@ -21,6 +23,9 @@ enum Question {
         /// Metres from the centre that the front handle of the head is to reach
         #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
         reach_radius: f64,
+        /// Prove it: enclose it within a nanometre, rounding included; some seconds
+        #[arg(long)]
+        prove: bool,
     },
     /// The greatest constant speed of the head at which no handle of the show is ever faster than a limit
     Speed {
@@ -38,6 +43,16 @@ struct PitchLine {
     bench_a: u32,
     bench_b: u32,
     head_radius: f64,
+    #[serde(flatten)]
+    enclosure: Option<PitchProof>,
+}
+
+/// What `--prove` adds to it.
+#[derive(Serialize)]
+struct PitchProof {
+    value_lo: f64,
+    value_hi: Option<f64>,
+    status: &'static str,
 }
 
 /// The line of `plan speed --json`.
@@ -56,21 +71,34 @@ struct SpeedLine {
 /// Answers the question.
 pub fn plan(common: &Common, arguments: &PlanArguments) -> Result<(), CommandError> {
     match arguments.question {
-        Question::Pitch { reach_radius } => plan_pitch(common, reach_radius),
+        Question::Pitch { reach_radius, prove } => plan_pitch(common, reach_radius, prove),
         Question::Speed { max_handle_speed } => plan_speed(common, max_handle_speed),
     }
 }
 
-fn plan_pitch(common: &Common, radius: f64) -> Result<(), CommandError> {
+fn plan_pitch(common: &Common, radius: f64, prove: bool) -> Result<(), CommandError> {
     Accepted::LENGTH.check("--reach-radius", radius).map_err(CommandError::BadInput)?;
     let scene = common.load_scene()?;
     let bar = progress_bar(1000, common).with_message("searching for the pitch");
     let found = least_pitch(scene.team(), radius, &mut |share| bar.set_position((1000.0 * share) as u64));
     bar.finish_and_clear();
-    let LeastPitch { value, bench_a, bench_b, head_radius } = found?;
+    let found = found?;
+    let enclosure = prove.then(|| {
+        let bar = progress_bar(1000, common).with_message("proving the pitch");
+        let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+        let enclosure = enclose_least_pitch(scene.team(), radius, &found, &mut progress);
+        bar.finish_and_clear();
+        enclosure
+    });
+    let LeastPitch { value, bench_a, bench_b, head_radius } = found;
     let mut output = Output::standard();
     if common.json {
-        output.json(&PitchLine { plan: "pitch", value, bench_a, bench_b, head_radius })?;
+        let enclosure = enclosure.map(|enclosure| PitchProof {
+            value_lo: enclosure.lo,
+            value_hi: enclosure.hi,
+            status: if enclosure.is_complete() { "proved" } else { "given up" },
+        });
+        output.json(&PitchLine { plan: "pitch", value, bench_a, bench_b, head_radius, enclosure })?;
     } else {
         output.line(&format!("The head reaches {radius} m with any pitch above {value:.10} m per turn."))?;
         output.line(&format!(
@@ -78,8 +106,22 @@ fn plan_pitch(common: &Common, radius: f64) -> Result<(), CommandError> {
             bench_name(&scene, bench_a),
             bench_name(&scene, bench_b)
         ))?;
+        if let Some(enclosure) = enclosure {
+            output.line(&proof_sentence(&enclosure))?;
+        }
     }
     output.finish()
+}
+
+/// What was proved of a pitch, for people.
+fn proof_sentence(PitchEnclosure { lo, hi, from, .. }: &PitchEnclosure) -> String {
+    let below = format!("with every pitch from {from} m to {lo} m two boards overlap before, or a link locks");
+    match hi {
+        Some(hi) => {
+            format!("Proved, the head coming from three turns further out: with {hi} m no two boards touch; {below}.")
+        }
+        None => format!("Proved, the head coming from three turns further out: {below}. Not decided beyond."),
+    }
 }
 
 fn plan_speed(common: &Common, limit: f64) -> Result<(), CommandError> {

@@ -1,0 +1,90 @@
+//! The handles and boards of a step of the head, enclosed by Lemma 1 and moving together by Lemma 6 of `docs/proofs.md`. Only
+//! [`super::clearance`] uses it.
+
+use super::capsule::Span;
+use super::knot::{Knot, place};
+use super::lines::Links;
+use super::path::{Curve, Place};
+use super::relative::{Carried, Moving, When};
+use super::step::{Chain, Claim, Listed, Obstacle};
+
+/// The knots of a step.
+pub(super) struct Knots<'k> {
+    pub from: &'k mut Knot,
+    pub middle: &'k mut Knot,
+    pub to: &'k mut Knot,
+}
+
+/// The same knots for as long as they are lent.
+pub(super) fn knots_of<'k>(from: &'k mut Knot, middle: &'k mut Knot, to: &'k mut Knot) -> Knots<'k> {
+    Knots { from, middle, to }
+}
+
+/// The handles of a step, and how they move.
+pub(super) struct Carriers<'c, 'a> {
+    chain: &'c Chain<'a>,
+    pub listed: Listed<'c, 'a>,
+    moving: Vec<Moving>,
+    /// Where the head is in the middle.
+    pub at: Place,
+    half_step: f64,
+}
+
+impl<'c, 'a> Carriers<'c, 'a> {
+    pub fn new(chain: &'c Chain<'a>, Knots { from, middle, to }: &Knots, pads: f64) -> Self {
+        let exact = &chain.exact;
+        let listed = Listed::new(chain, Span(from.head, to.head), pads);
+        // Rounding may put the middle outside the two; any place between them will do.
+        let inside = exact.in_order(from.head, middle.head) && exact.in_order(middle.head, to.head);
+        let at = if inside { middle.head } else { from.head };
+        let half_step = exact.length(from.head, at).max(exact.length(at, to.head));
+        let moving = vec![Moving::head(exact, &listed.handles[0], at, half_step)];
+        Self { chain, listed, moving, at, half_step }
+    }
+
+    /// Encloses one handle more.
+    pub fn extend(&mut self, Knots { from, middle, to }: Knots, links: Links) -> Result<(), Obstacle> {
+        let Chain { path, exact, team, .. } = self.chain;
+        let link = self.listed.handles.len() - 1;
+        self.listed.extend(from, to, Claim { links, moving: false, clear: false })?;
+        middle.extend_to(link + 1, path, team).map_err(|_| Obstacle::Link(link))?;
+        let at = place(middle.handles[link + 1].param);
+        let spans = (&self.listed.handles[link], &self.listed.handles[link + 1]);
+        let length = self.chain.link(link);
+        let follower = self.moving[link].follower(exact, spans, at, length, self.half_step);
+        self.moving.push(follower.ok_or(Obstacle::Link(link))?);
+        Ok(())
+    }
+
+    /// The board of a bench.
+    pub fn board(&self, bench: usize) -> Carried {
+        let (front, rear, link) = (self.moving[bench], self.moving[bench + 1], self.chain.link(bench));
+        Carried::new(&self.chain.shape, front, rear, link, self.half_step)
+    }
+
+    /// Whether two boards stay further apart than `threshold`.
+    pub fn are_apart(&self, [a, b]: [usize; 2], threshold: f64) -> bool {
+        let when = if self.are_on_one_circle(a, b) { When::Middle } else { When::Always };
+        self.board(a).is_further_than(threshold, &self.board(b), when)
+    }
+
+    /// Whether all handles from those of one board to those of another stay on one arc: then the boards keep their
+    /// distance.
+    fn are_on_one_circle(&self, a: usize, b: usize) -> bool {
+        let handles = &self.listed.handles;
+        let (first, last) = (handles[a].span, handles[b + 1].span);
+        let segment = first.0.0;
+        let same = [first.0, first.1, last.0, last.1].iter().all(|place| place.0 == segment);
+        same && matches!(self.chain.exact.segments[segment].curve, Curve::Arc { .. })
+    }
+
+    /// The boards from `first` to the last, all on the line on which the last listed handle is.
+    pub fn straight_run(&self, first: usize) -> Carried {
+        let last = self.moving.len() - 1;
+        let link = self.chain.links[1];
+        let back = |handles: usize| self.moving[last].moved_back(link * handles as f64);
+        let benches = self.chain.team.benches;
+        let length = link * (benches - first) as f64;
+        Carried::new(&self.chain.shape, back(first - last), back(benches - last), length, self.half_step)
+    }
+}
