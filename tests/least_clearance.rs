@@ -130,7 +130,7 @@ fn the_least_pitch_to_4_5_m_is_enclosed_to_a_nanometre() {
     assert!(from == 0.15 && lo <= LEAST_PITCH && LEAST_PITCH <= hi && hi - lo <= 1e-9, "{enclosure:?}");
     // The brute force, where the two boards touch: apart with the upper pitch, overlapping with the lower one.
     let least = |pitch: f64| {
-        let text = config("paper").replace("pitch = 0.55", &format!("pitch = {pitch}"));
+        let text = config("paper").replace("pitch = 0.55", &format!("pitch = {pitch}")).replace("= 223", "= 21");
         let (team, path) = scenes::read(&text);
         let scene = Scene::parse(&text, "test", "test").unwrap();
         let along = scene.motion.path();
