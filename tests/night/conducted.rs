@@ -1,7 +1,7 @@
 //! The show as the design promises it: periods counted one by one, commands obeyed as the table of commands says.
 //!
-//! Shares nothing with the show's own clock, which computes each period from the beginning of its stretch, but the formula
-//! of the contract: sim0 + rate * (tick - tick0) / frame rate, a new (sim0, tick0, rate) at each command.
+//! Shares nothing with the show's own clock, which computes each period from the beginning of its stretch, but the
+//! formula of the contract: sim0 + rate * (tick - tick0) / frame rate, a new (sim0, tick0, rate) at each command.
 
 use bench_dragon::show::control::{Code, Command};
 use bench_dragon::show::state::PlaybackState;

@@ -1,4 +1,5 @@
-//! Commands: one a period, in turn of the doors and in order at each; every one answered once; what is too much refused.
+//! Commands: one a period, in turn of the doors and in order at each; every one answered once; what is too much
+//! refused.
 
 use std::collections::VecDeque;
 

@@ -1,7 +1,7 @@
 //! Judges a night: what the loop does against models of the design's promises. The first that is broken ends the test.
 //!
-//! In: what passes the edges, which are the frames' source, the fake shared memory, the doors and the statistics. None of
-//! the models calls what it judges.
+//! In: what passes the edges, which are the frames' source, the fake shared memory, the doors and the statistics. None
+//! of the models calls what it judges.
 
 use std::cell::RefCell;
 use std::rc::Rc;

@@ -1,6 +1,7 @@
-//! Bad nights: the loop, the show, the doors for commands, the statistics and a transport's queue, on simulated time and
-//! under a simulated scheduler, from one seed. Late wake-ups, stalls, a wall clock that is set, slow and dying subscribers,
-//! floods of commands, a shared memory that is full; and the promises of the design, which hold all the same.
+//! Bad nights: the loop, the show, the doors for commands, the statistics and a transport's queue, on simulated time
+//! and under a simulated scheduler, from one seed. Late wake-ups, stalls, a wall clock that is set, slow and dying
+//! subscribers, floods of commands, a shared memory that is full; and the promises of the design, which hold all the
+//! same.
 //!
 //! `BENCH_DRAGON_NIGHTS=hours` simulates so many, `BENCH_DRAGON_NIGHT=seed` one night, with its last events.
 

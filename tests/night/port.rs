@@ -1,5 +1,5 @@
-//! In place of the shared memory: queues that drop the oldest frame for a subscriber that is behind, as iceoryx2's do with
-//! safe overflow, history of one alert, new subscribers let in by maintenance, and a memory that can be full.
+//! In place of the shared memory: queues that drop the oldest frame for a subscriber that is behind, as iceoryx2's do
+//! with safe overflow, history of one alert, new subscribers let in by maintenance, and a memory that can be full.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;

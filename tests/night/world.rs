@@ -1,7 +1,8 @@
-//! Simulated time and the scheduler: the loop runs until it sleeps or spends time; then all that is due runs, in order of
-//! time, each as late as the seed has it.
+//! Simulated time and the scheduler: the loop runs until it sleeps or spends time; then all that is due runs, in order
+//! of time, each as late as the seed has it.
 //!
-//! [`World`] is the loop's [`Clock`]. Whatever runs beside the loop is an [`Actor`]: one step of a thread or of a process.
+//! [`World`] is the loop's [`Clock`]. Whatever runs beside the loop is an [`Actor`]: one step of a thread or of a
+//! process.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
