@@ -28,12 +28,17 @@ const POLL_INTERVAL_NS: u64 = 20_000_000;
 
 /// The queues between the loop and this thread.
 pub fn queues() -> (super::Reports, Inbox) {
-    let (mut samples, mut sample_inbox) = rtrb::RingBuffer::new(QUEUED_SAMPLES);
+    queues_of(QUEUED_SAMPLES, QUEUED_ANNOUNCEMENTS)
+}
+
+/// Queues that hold so many samples, and so many alerts and cues.
+pub fn queues_of(samples: usize, announcements: usize) -> (super::Reports, Inbox) {
+    let (mut samples, mut sample_inbox) = rtrb::RingBuffer::new(samples);
     // Each page of this memory is written here once: otherwise the loop's thread would be the first to touch it, and for
     // minutes a soak test would take that for growth.
     while samples.push(Sample::NOTHING).is_ok() {}
     while sample_inbox.pop().is_ok() {}
-    let (announcements, announcement_inbox) = rtrb::RingBuffer::new(QUEUED_ANNOUNCEMENTS);
+    let (announcements, announcement_inbox) = rtrb::RingBuffer::new(announcements);
     let reports = super::Reports { samples, announcements };
     (reports, Inbox { samples: sample_inbox, announcements: announcement_inbox })
 }
@@ -80,32 +85,64 @@ pub struct Run<'a> {
     pub record: Box<dyn FnMut(&Sample) + 'a>,
 }
 
+/// What the statistics thread does, without its waiting and without what only the operating system knows: a simulated
+/// scheduler can call it in that thread's place.
+pub struct Collector<'a> {
+    inbox: Inbox,
+    run: Run<'a>,
+    accumulator: Accumulator,
+}
+
+impl<'a> Collector<'a> {
+    /// Nothing collected yet, at `now_ns` of CLOCK_MONOTONIC.
+    pub fn new(inbox: Inbox, run: Run<'a>, now_ns: u64) -> Self {
+        let accumulator = Accumulator::new(run.run_id, run.rate, run.scene, now_ns);
+        Self { inbox, run, accumulator }
+    }
+
+    /// Empties the queues.
+    pub fn take(&mut self) {
+        while let Ok(announcement) = self.inbox.announcements.pop() {
+            (self.run.announce)(&announcement);
+        }
+        while let Ok(sample) = self.inbox.samples.pop() {
+            self.accumulator.record(&sample);
+            (self.run.record)(&sample);
+        }
+    }
+
+    /// Sends the status where one is due, or the run is `ending`. `complete` adds the stamp and what else is not of the
+    /// run.
+    pub fn report(&mut self, now_ns: u64, ending: bool, complete: impl FnOnce(LoopStatus) -> LoopStatus) {
+        let Self { accumulator, run, .. } = self;
+        let status = if ending { accumulator.status(now_ns) } else { accumulator.status_if_due(now_ns) };
+        if let Some(status) = status.map(complete) {
+            run.sinks.iter_mut().for_each(|sink| sink.publish_status(&status));
+        }
+    }
+
+    /// What is known of the run.
+    pub fn summary(&self) -> Summary {
+        self.accumulator.summary()
+    }
+}
+
 /// Collects until `done` is set and the queues are empty.
-pub fn collect<C: Clock>(clock: &C, mut inbox: Inbox, mut run: Run, done: &AtomicBool) -> Summary {
-    let mut accumulator = Accumulator::new(run.run_id, run.rate, run.scene, clock.monotonic_ns());
+pub fn collect<C: Clock>(clock: &C, inbox: Inbox, run: Run, done: &AtomicBool) -> Summary {
+    let mut collector = Collector::new(inbox, run, clock.monotonic_ns());
     loop {
         // Read before the queues are emptied: what was pushed before it was set is then still seen.
         let ending = done.load(Ordering::Acquire);
-        while let Ok(announcement) = inbox.announcements.pop() {
-            (run.announce)(&announcement);
-        }
-        while let Ok(sample) = inbox.samples.pop() {
-            accumulator.record(&sample);
-            (run.record)(&sample);
-        }
+        collector.take();
         let now_ns = clock.monotonic_ns();
-        let status = if ending { accumulator.status(now_ns) } else { accumulator.status_if_due(now_ns) };
-        if let Some(status) = status {
-            let status = LoopStatus {
-                stamp_ns: clock.realtime_ns(),
-                resident_bytes: resident_bytes(),
-                file_descriptors: file_descriptors(),
-                ..status
-            };
-            run.sinks.iter_mut().for_each(|sink| sink.publish_status(&status));
-        }
+        collector.report(now_ns, ending, |status| LoopStatus {
+            stamp_ns: clock.realtime_ns(),
+            resident_bytes: resident_bytes(),
+            file_descriptors: file_descriptors(),
+            ..status
+        });
         if ending {
-            return accumulator.summary();
+            return collector.summary();
         }
         clock.sleep_until(now_ns + POLL_INTERVAL_NS);
     }

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use crate::live::clock::{monotonic_ns, sleep_until};
+use crate::live::clock::{Clock, SystemClock, monotonic_ns};
 use crate::live::{Deliveries, Outgoing, PublishError, Publisher, StatusPublisher};
 use crate::wire::convert::handle_poses;
 use crate::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus};
@@ -110,8 +110,17 @@ pub struct BackgroundThread {
     handle: Option<JoinHandle<()>>,
 }
 
+/// What the thread does, without its waiting: a simulated scheduler can call it in the thread's place.
+pub struct Worker<S> {
+    sink: S,
+    inbox: Inbox,
+    period_ns: u64,
+    /// Frames that had found the queue full when it was emptied last.
+    rejected_before: u64,
+}
+
 /// The thread's ends of the queues.
-struct Inbox {
+pub struct Inbox {
     free: Producer<Box<Snapshot>>,
     filled: Consumer<Box<Snapshot>>,
     alerts: Consumer<CollisionAlert>,
@@ -139,6 +148,29 @@ pub fn start<S: Sink, E: Send + 'static>(
     config: BackgroundConfig,
     open: impl FnOnce() -> Result<S, E> + Send + 'static,
 ) -> Result<(BackgroundPublisher, BackgroundStatus, BackgroundThread), BackgroundError<E>> {
+    let (publisher, status, inbox) = queues(config);
+    let shared = Arc::clone(&inbox.shared);
+    let (opened, opening) = mpsc::channel();
+    let thread = move || match open() {
+        Ok(sink) => {
+            let _ = opened.send(Ok(()));
+            Worker::new(sink, inbox, config.rate).serve(&SystemClock);
+        }
+        Err(error) => drop(opened.send(Err(error))),
+    };
+    let handle = std::thread::Builder::new().name(config.name.to_owned()).spawn(thread);
+    let handle = handle.map_err(|error| BackgroundError::Thread(error.to_string()))?;
+    let thread = BackgroundThread { shared, handle: Some(handle) };
+    match opening.recv() {
+        Ok(opened) => opened?,
+        // It panicked, which it has printed.
+        Err(_) => return Err(BackgroundError::Thread("it ended early".to_owned())),
+    }
+    Ok((publisher, status, thread))
+}
+
+/// The loop's end, the statistics thread's, and the thread's ends of the queues between them.
+pub fn queues(config: BackgroundConfig) -> (BackgroundPublisher, BackgroundStatus, Inbox) {
     let depth = queue_depth(config.handles, config.rate);
     // Besides those in the queue one is being filled and one is being sent.
     let (mut free_producer, free) = RingBuffer::new(depth + 2);
@@ -161,26 +193,9 @@ pub fn start<S: Sink, E: Send + 'static>(
         status: status_receiver,
         shared: Arc::clone(&shared),
     };
-    let (opened, opening) = mpsc::channel();
-    let period_ns = (1e9 / config.rate) as u64;
-    let thread = move || match open() {
-        Ok(sink) => {
-            let _ = opened.send(Ok(()));
-            serve(sink, period_ns, inbox);
-        }
-        Err(error) => drop(opened.send(Err(error))),
-    };
-    let handle = std::thread::Builder::new().name(config.name.to_owned()).spawn(thread);
-    let handle = handle.map_err(|error| BackgroundError::Thread(error.to_string()))?;
-    let thread = BackgroundThread { shared: Arc::clone(&shared), handle: Some(handle) };
-    match opening.recv() {
-        Ok(opened) => opened?,
-        // It panicked, which it has printed.
-        Err(_) => return Err(BackgroundError::Thread("it ended early".to_owned())),
-    }
     let share = config.rate / config.loop_rate;
     let publisher = BackgroundPublisher { share, latest_slot: None, free, filled, alerts, cues, shared };
-    Ok((publisher, BackgroundStatus(status), thread))
+    (publisher, BackgroundStatus(status), inbox)
 }
 
 fn queue_depth(handles: usize, rate: f64) -> usize {
@@ -189,15 +204,31 @@ fn queue_depth(handles: usize, rate: f64) -> usize {
     ((rate * QUEUED_SECONDS) as usize).clamp(least, most).min(affordable.max(least))
 }
 
-/// Sends what the queues bring until the thread is to stop.
-fn serve(mut sink: impl Sink, period_ns: u64, mut inbox: Inbox) {
-    let Shared { stop, rejected, frames, skipped, discarded } = &*inbox.shared;
-    let mut rejected_before = 0;
-    let mut poll_at = 0;
-    loop {
-        // Read before the queues are emptied: what was put there before it was set is then still sent.
-        let ending = stop.load(Ordering::Acquire);
-        sleep_until(poll_at);
+impl<S: Sink> Worker<S> {
+    /// What sends `rate` frames per second, at most, with this sink.
+    pub fn new(sink: S, inbox: Inbox, rate: f64) -> Self {
+        Self { sink, inbox, period_ns: (1e9 / rate) as u64, rejected_before: 0 }
+    }
+
+    /// Sends what the queues bring until the thread is to stop.
+    fn serve(mut self, clock: &impl Clock) {
+        let mut poll_at = 0;
+        loop {
+            // Read before the queues are emptied: what was put there before it was set is then still sent.
+            let ending = self.inbox.shared.stop.load(Ordering::Acquire);
+            clock.sleep_until(poll_at);
+            poll_at = self.send(clock);
+            if ending {
+                std::thread::sleep(self.sink.linger());
+                return;
+            }
+        }
+    }
+
+    /// Sends what the queues have brought; when there will be something next, CLOCK_MONOTONIC in nanoseconds.
+    pub fn send(&mut self, clock: &impl Clock) -> u64 {
+        let Self { sink, inbox, period_ns, rejected_before } = self;
+        let Shared { rejected, frames, skipped, discarded, .. } = &*inbox.shared;
         sink.attend();
         while let Ok(alert) = inbox.alerts.pop() {
             sink.alert(alert);
@@ -206,8 +237,7 @@ fn serve(mut sink: impl Sink, period_ns: u64, mut inbox: Inbox) {
             sink.cue(cue);
         }
         let rejected_now = rejected.load(Ordering::Relaxed);
-        let newest_only = rejected_now > rejected_before;
-        rejected_before = rejected_now;
+        let newest_only = std::mem::replace(rejected_before, rejected_now) < rejected_now;
         let mut deadline_ns = None;
         while let Ok(snapshot) = inbox.filled.pop() {
             if newest_only && !inbox.filled.is_empty() {
@@ -224,16 +254,25 @@ fn serve(mut sink: impl Sink, period_ns: u64, mut inbox: Inbox) {
             sink.status(&status);
         }
         discarded.store(sink.discarded(), Ordering::Relaxed);
-        if ending {
-            std::thread::sleep(sink.linger());
-            return;
-        }
-        let now = monotonic_ns();
-        poll_at = match deadline_ns {
-            Some(deadline_ns) => (deadline_ns + period_ns + FIRST_POLL_NS).max(now),
+        let now = clock.monotonic_ns();
+        let poll_at = match deadline_ns {
+            Some(deadline_ns) => (deadline_ns + *period_ns + FIRST_POLL_NS).max(now),
             None => now + POLL_INTERVAL_NS,
         };
-        poll_at = poll_at.min(now + LONGEST_SLEEP_NS);
+        poll_at.min(now + LONGEST_SLEEP_NS)
+    }
+
+    /// What has been done with the frames of the loop so far.
+    pub fn deliveries(&self) -> Deliveries {
+        self.inbox.shared.deliveries()
+    }
+}
+
+impl Shared {
+    fn deliveries(&self) -> Deliveries {
+        let [rejected, frames, skipped, discarded] =
+            [&self.rejected, &self.frames, &self.skipped, &self.discarded].map(|count| count.load(Ordering::Relaxed));
+        Deliveries { frames, skipped: skipped + rejected, discarded }
     }
 }
 
@@ -291,10 +330,7 @@ impl BackgroundThread {
     /// Ends the thread once it has sent what is queued; what it has done.
     pub fn finish(mut self) -> Deliveries {
         self.join();
-        let Shared { rejected, frames, skipped, discarded, .. } = &*self.shared;
-        let [rejected, frames, skipped, discarded] =
-            [rejected, frames, skipped, discarded].map(|count| count.load(Ordering::Relaxed));
-        Deliveries { frames, skipped: skipped + rejected, discarded }
+        self.shared.deliveries()
     }
 
     fn join(&mut self) {

@@ -1,0 +1,300 @@
+//! Who lives beside the loop: the statistics thread, the thread of a transport, those who command, those who subscribe,
+//! and what sets the wall clock or stops the show.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::time::{Duration, Instant};
+
+use bench_dragon::live::StatusPublisher;
+use bench_dragon::live::control::{Door, MOST_WAITING};
+use bench_dragon::live::statistics::Collector;
+use bench_dragon::show::control::Command;
+use bench_dragon::subscribers::feed::liveness::{Change, Liveness};
+use bench_dragon::subscribers::feed::sequence::SequenceTracker;
+use bench_dragon::transports::background::Worker;
+use bench_dragon::wire::LoopStatus;
+
+use crate::behind::{Behind, Network};
+use crate::collected::Collected;
+use crate::judge::Judge;
+use crate::port::{Receiver, Receivers};
+use crate::world::{Actor, SECOND_NS, World, same};
+
+/// When an actor is due that never acts again.
+const NEVER: u64 = u64::MAX;
+
+/// The statistics thread.
+pub struct Statistics {
+    pub collector: Rc<RefCell<Collector<'static>>>,
+    pub collected: Rc<RefCell<Collected>>,
+    pub every_ns: u64,
+}
+
+impl Actor for Statistics {
+    fn step(&mut self, world: &World) -> u64 {
+        let mut collector = self.collector.borrow_mut();
+        collector.take();
+        self.collected.borrow().emptied();
+        collector.report(world.now_ns(), false, |status| LoopStatus { stamp_ns: world.now_ns(), ..status });
+        self.collected.borrow().reported(world.now_ns());
+        let mut random = world.random.borrow_mut();
+        // Now and then it does not run for long: then samples are lost.
+        let late_ns =
+            if random.once_in(50) { random.below(200 * self.every_ns) } else { random.below(self.every_ns / 4) };
+        world.now_ns() + self.every_ns + late_ns
+    }
+}
+
+/// Where its status goes; the stamp is the moment at which it was made.
+pub struct Statuses(pub Rc<RefCell<Collected>>);
+
+impl StatusPublisher for Statuses {
+    fn publish_status(&mut self, status: &LoopStatus) {
+        self.0.borrow_mut().status(status, status.stamp_ns);
+    }
+}
+
+/// The thread of a transport.
+pub struct Background {
+    pub worker: Rc<RefCell<Worker<Network>>>,
+    pub behind: Rc<RefCell<Behind>>,
+    pub period_ns: u64,
+}
+
+impl Actor for Background {
+    fn step(&mut self, world: &World) -> u64 {
+        let mut worker = self.worker.borrow_mut();
+        let poll_at = worker.send(&Frozen(world));
+        self.behind.borrow_mut().emptied(worker.deliveries());
+        let mut random = world.random.borrow_mut();
+        // Its network blocks; at a low rate it looks less often than every 50 ms, so that a night costs less.
+        let blocked_ns = match random.below(40) {
+            0 => random.below(40 * self.period_ns),
+            1 => random.below(2 * SECOND_NS),
+            _ => random.below(self.period_ns / 4 + 1),
+        };
+        poll_at.max(world.now_ns() + 1) + blocked_ns
+    }
+}
+
+/// The clock as a step sees it that takes no time.
+struct Frozen<'a>(&'a World);
+
+impl bench_dragon::live::clock::Clock for Frozen<'_> {
+    fn monotonic_ns(&self) -> u64 {
+        self.0.now_ns()
+    }
+
+    fn realtime_ns(&self) -> u64 {
+        self.0.realtime()
+    }
+
+    fn sleep_until(&self, _deadline_ns: u64) {
+        unreachable!("a step does not sleep");
+    }
+}
+
+/// Who sends commands through one door: one now and then, several in one period, a flood.
+pub struct Controller {
+    pub number: usize,
+    pub door: Rc<RefCell<Door>>,
+    pub judge: Rc<RefCell<Judge>>,
+    /// Between two commands, on average.
+    pub pause_ns: f64,
+    /// The end of the show, simulated seconds.
+    pub end: f64,
+    /// Never takes an answer again.
+    pub is_dead: bool,
+}
+
+impl Controller {
+    pub fn take_answers(&self) {
+        let mut door = self.door.borrow_mut();
+        while let Some(answer) = door.answer() {
+            self.judge.borrow_mut().entrance.taken(self.number, &answer);
+        }
+    }
+
+    fn command(&self, world: &World) -> Command {
+        let mut random = world.random.borrow_mut();
+        match random.below(20) {
+            0 | 1 => Command::State,
+            2 => Command::Pause,
+            3..=5 => Command::Resume,
+            6 => {
+                Command::Rate(random.pick(&[1.0, 1.0, 0.5, 2.0, 0.25, 3.7, 1e-6, 60.0, 1e6, 0.0, -1.0, 2e6, f64::NAN]))
+            }
+            7 => Command::Rate(random.magnitude(0.01, 100.0)),
+            8 | 9 => Command::Seek(random.share() * self.end),
+            10 => Command::Seek(random.pick(&[0.0, self.end, self.end.next_up(), -1e-9, f64::NAN, f64::INFINITY])),
+            11 | 12 => Command::Step(1 + random.below(4)),
+            13 => Command::Step(random.magnitude(1.0, 1e15) as u64),
+            14 => Command::Restart,
+            15 => Command::Hold,
+            16 | 17 => Command::Release,
+            _ => Command::Go,
+        }
+    }
+}
+
+impl Actor for Controller {
+    fn step(&mut self, world: &World) -> u64 {
+        let (takes, count) = {
+            let mut random = world.random.borrow_mut();
+            self.is_dead |= random.once_in(2000);
+            let count = match random.below(40) {
+                0 => 100 + random.below(100),
+                1..=4 => random.below(6),
+                _ => 1,
+            };
+            (!self.is_dead && !random.once_in(4), count)
+        };
+        if takes {
+            self.take_answers();
+        }
+        for _ in 0..count {
+            let command = self.command(world);
+            let result = self.door.borrow_mut().send(command);
+            self.judge.borrow_mut().entrance.sent(self.number, command, result);
+        }
+        if self.is_dead && self.door.borrow().waiting() >= MOST_WAITING {
+            return NEVER;
+        }
+        world.now_ns() + 1 + (2.0 * self.pause_ns * world.random.borrow_mut().share()) as u64
+    }
+}
+
+/// A process that subscribes: at its own pace, with stalls, until it dies; then another comes.
+pub struct Subscriber {
+    pub receivers: Rc<Receivers>,
+    pub receiver: Rc<RefCell<Receiver>>,
+    pub tracker: SequenceTracker,
+    pub liveness: Liveness,
+    /// The beginning of simulated time.
+    pub origin: Instant,
+    pub depth: usize,
+    pub rate: f64,
+    pub every_ns: u64,
+    pub first: Option<u64>,
+    pub received: u64,
+    pub missed: u64,
+    pub latest_ns: u64,
+    /// Once in so many steps it dies.
+    pub lives: u64,
+}
+
+impl Subscriber {
+    pub fn new(receivers: &Rc<Receivers>, origin: Instant, depth: usize, rate: f64, every_ns: u64, lives: u64) -> Self {
+        let receiver = receivers.add(Receiver::new(depth));
+        let mut liveness = Liveness::connected_at(origin);
+        liveness.rate(rate);
+        Self {
+            receivers: Rc::clone(receivers),
+            receiver,
+            tracker: SequenceTracker::default(),
+            liveness,
+            origin,
+            depth,
+            rate,
+            every_ns,
+            first: None,
+            received: 0,
+            missed: 0,
+            latest_ns: 0,
+            lives,
+        }
+    }
+
+    fn instant(&self, world: &World) -> Instant {
+        self.origin + Duration::from_nanos(world.now_ns())
+    }
+
+    /// Reads all that has come, and knows exactly what it has missed.
+    pub fn read(&mut self, world: &World) {
+        let now = self.instant(world);
+        let mut receiver = self.receiver.borrow_mut();
+        let before = self.received;
+        for header in receiver.frames.drain(..) {
+            self.first.get_or_insert(header.sequence);
+            self.missed += self.tracker.advance(header.run_id, header.sequence).unwrap_or(0);
+            self.received += 1;
+        }
+        if self.received > before {
+            self.liveness.frame_at(now);
+            self.latest_ns = world.now_ns();
+        }
+        same("frames received and lost", self.received + receiver.lost, receiver.offered);
+        // What was lost before the first that it received is no gap.
+        let not_seen = self.first.zip(receiver.first).map_or(0, |(seen, put)| seen - put);
+        same("frames missed", self.missed, receiver.lost - not_seen);
+    }
+
+    /// Whether the publisher is there; it is.
+    fn test(&mut self, world: &World) {
+        let now = self.instant(world);
+        match self.liveness.test(now, || true) {
+            Some(Change::Gone) => panic!("a publisher that lives is taken for dead"),
+            Some(Change::Silent) => {
+                let quiet_s = (world.now_ns() - self.latest_ns) as f64 / 1e9;
+                assert!(quiet_s >= f64::max(0.5, 3.0 / self.rate) - 1e-6, "silent after {quiet_s} s");
+            }
+            None => (),
+        }
+    }
+
+    /// The publisher has ended: this is noticed.
+    pub fn outlive(&mut self, world: &World) {
+        self.read(world);
+        let later = self.instant(world) + Duration::from_secs(1);
+        same("a publisher that has ended", self.liveness.test(later, || false), Some(Change::Gone));
+    }
+}
+
+impl Actor for Rc<RefCell<Subscriber>> {
+    fn step(&mut self, world: &World) -> u64 {
+        let mut this = self.borrow_mut();
+        if world.random.borrow_mut().once_in(this.lives) {
+            let lost = this.receiver.borrow().lost;
+            world.note("a subscriber dies", [0.0; 2]);
+            let mut tally = world.tally.borrow_mut();
+            (tally.deaths, tally.subscribers, tally.frames_lost) =
+                (tally.deaths + 1, tally.subscribers + 1, tally.frames_lost + lost);
+            this.receiver.borrow_mut().is_dead = true;
+            let Subscriber { depth, rate, every_ns, lives, .. } = *this;
+            let next = Subscriber::new(&this.receivers, this.origin, depth, rate, every_ns, lives);
+            *this = next;
+        } else {
+            this.read(world);
+            this.test(world);
+        }
+        let mut random = world.random.borrow_mut();
+        let stall_ns = if random.once_in(100) { random.below(200 * this.every_ns) } else { 0 };
+        world.now_ns() + this.every_ns / 2 + 1 + random.below(this.every_ns) + stall_ns
+    }
+}
+
+/// What sets the wall clock: a leap of a second, or by days.
+pub struct WallClock {
+    pub every_ns: f64,
+}
+
+impl Actor for WallClock {
+    fn step(&mut self, world: &World) -> u64 {
+        let mut random = world.random.borrow_mut();
+        let seconds = random.pick(&[1i64, -1, 3600, -3600, 86_400, -86_400, 7, -7]);
+        let wait = 1 + (self.every_ns * 2.0 * random.share()) as u64;
+        drop(random);
+        world.step_realtime(seconds * SECOND_NS as i64);
+        world.now_ns() + wait
+    }
+}
+
+/// A signal that stops the show.
+pub struct Stopper;
+
+impl Actor for Stopper {
+    fn step(&mut self, world: &World) -> u64 {
+        world.set_stop();
+        NEVER
+    }
+}

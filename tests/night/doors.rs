@@ -1,0 +1,130 @@
+//! Commands: one a period, in turn of the doors and in order at each; every one answered once; what is too much
+//! refused.
+
+use std::collections::VecDeque;
+
+use bench_dragon::live::control::Answer;
+use bench_dragon::show::Outcome;
+use bench_dragon::show::control::{Code, Command};
+
+use crate::world::same;
+
+/// Commands of one door that may have no answer yet: the promise of the queue.
+const MOST_WAITING: usize = 64;
+
+/// What is known of one door.
+#[derive(Default)]
+struct AtDoor {
+    sent: u64,
+    waiting: VecDeque<(u64, Command)>,
+    /// Answers that the loop has given, in order, and that were not taken yet.
+    given: VecDeque<(u64, Outcome)>,
+    taken: u64,
+    refused: u64,
+}
+
+impl AtDoor {
+    /// Commands that were let in and whose answer was not taken.
+    fn open(&self) -> usize {
+        (self.sent - self.taken) as usize
+    }
+}
+
+/// All doors, as the loop has to see them.
+pub struct Entrance {
+    doors: Vec<AtDoor>,
+    next: usize,
+    /// The period in which a command was obeyed last.
+    obeyed: Option<u64>,
+    /// The command that is obeyed now, with its door.
+    present: Option<(usize, u64)>,
+    /// The step that is not over, with its door.
+    step: Option<(usize, u64)>,
+    answer: Option<(usize, u64, Outcome)>,
+}
+
+impl Entrance {
+    pub fn new(doors: usize) -> Self {
+        let doors = (0..doors).map(|_| AtDoor::default()).collect();
+        Self { doors, next: 0, obeyed: None, present: None, step: None, answer: None }
+    }
+
+    /// A command was sent at a door.
+    pub fn sent(&mut self, door: usize, command: Command, result: Result<u64, Code>) {
+        let at = &mut self.doors[door];
+        if at.open() >= MOST_WAITING {
+            same("a command too many", result, Err(Code::TooMany));
+            at.refused += 1;
+        } else {
+            at.sent += 1;
+            same("the number of a command", result, Ok(at.sent));
+            at.waiting.push_back((at.sent, command));
+        }
+    }
+
+    /// A command is obeyed at the beginning of the period `tick`.
+    pub fn obeyed(&mut self, tick: u64, command: Command) {
+        assert!(self.obeyed < Some(tick), "a second command in the period {tick}");
+        self.obeyed = Some(tick);
+        let doors = self.doors.len();
+        let turn = (0..doors).map(|turn| (self.next + turn) % doors).find(|door| !self.doors[*door].waiting.is_empty());
+        let door = turn.expect("a command that nobody has sent");
+        let (ticket, expected) = self.doors[door].waiting.pop_front().expect("one waits");
+        // A value that is no number is not equal to itself.
+        same("the command", format!("{command:?}"), format!("{expected:?}"));
+        self.next = (door + 1) % doors;
+        self.present = Some((door, ticket));
+    }
+
+    /// What the show said of it; `None` for a step that has begun.
+    pub fn answered(&mut self, outcome: Option<Outcome>) {
+        let (door, ticket) = self.present.take().expect("a command");
+        match outcome {
+            Some(outcome) => self.answer = Some((door, ticket, outcome)),
+            None => {
+                assert!(self.step.is_none(), "the step before was never answered");
+                self.step = Some((door, ticket));
+            }
+        }
+    }
+
+    /// A step is over, or was broken off.
+    pub fn step_is_over(&mut self, outcome: Outcome) {
+        let (door, ticket) = self.step.take().expect("a step");
+        self.doors[door].given.push_back((ticket, outcome));
+    }
+
+    /// The command of this period has been dealt with, and what it broke off.
+    pub fn settle(&mut self) {
+        if let Some((door, ticket, outcome)) = self.answer.take() {
+            self.doors[door].given.push_back((ticket, outcome));
+        }
+    }
+
+    /// The frame of the period `tick` is about to be computed: nobody may be waiting in vain.
+    pub fn frame_begins(&mut self, tick: u64) {
+        self.settle();
+        let in_vain = self.obeyed != Some(tick) && self.doors.iter().any(|door| !door.waiting.is_empty());
+        assert!(!in_vain, "a command waits and none is obeyed in the period {tick}");
+    }
+
+    /// An answer was taken at a door.
+    pub fn taken(&mut self, door: usize, answer: &Answer) {
+        let at = &mut self.doors[door];
+        at.taken += 1;
+        same("the answer", Some((answer.ticket, answer.outcome)), at.given.pop_front());
+    }
+
+    /// All answers that there are have been taken, and the loop has ended.
+    pub fn ended(&self) {
+        let open: usize = self.doors.iter().map(AtDoor::open).sum();
+        let waiting: usize = self.doors.iter().map(|door| door.waiting.len()).sum();
+        let step = usize::from(self.step.is_some());
+        same("commands without an answer", open, waiting + step);
+    }
+
+    /// Commands that were let in, and those for which there was no room.
+    pub fn totals(&self) -> (u64, u64) {
+        (self.doors.iter().map(|door| door.sent).sum(), self.doors.iter().map(|door| door.refused).sum())
+    }
+}

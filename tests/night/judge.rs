@@ -1,0 +1,214 @@
+//! Judges a night: what the loop does against models of the design's promises. The first that is broken ends the test.
+//!
+//! In: what passes the edges, which are the frames' source, the fake shared memory, the doors and the statistics. None
+//! of the models calls what it judges.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use bench_dragon::live::{Frames, Outgoing, Period};
+use bench_dragon::show::control::Command;
+use bench_dragon::show::state::{FrameState, Level};
+use bench_dragon::show::{Outcome, Show};
+use bench_dragon::wire::FrameHeader;
+
+use crate::behind::Behind;
+use crate::collected::{Announced, Collected, Expected};
+use crate::conducted::Conducted;
+use crate::doors::Entrance;
+use crate::levels::Levels;
+use crate::pace::Pace;
+use crate::world::{World, same};
+
+/// Alerts or cues: the period, and the level or the number.
+type Numbered = Vec<(u64, u32)>;
+
+pub struct Judge {
+    pub run_id: u64,
+    pub pace: Pace,
+    pub show: Conducted,
+    pub levels: Option<Levels>,
+    /// Every event, in order: the state follows from it.
+    pub events: Vec<(f64, FrameState)>,
+    pub entrance: Entrance,
+    pub collected: Rc<RefCell<Collected>>,
+    pub behind: Option<Rc<RefCell<Behind>>>,
+    /// Of the frame before.
+    epoch: u32,
+    shows_played: u64,
+    /// Of the present frame: when it began, at the latest and at the earliest, and when it was sent.
+    began_ns: (u64, u64),
+    sent_ns: u64,
+    sample: Option<(FrameHeader, Vec<Announced>)>,
+    /// Where its head is, its alerts and its cues, on their way to a transport's queue.
+    queued: Option<(f64, Numbered, Numbered)>,
+}
+
+impl Judge {
+    pub fn new(
+        run_id: u64,
+        show: Conducted,
+        levels: Option<Levels>,
+        events: Vec<(f64, FrameState)>,
+        doors: usize,
+        collected: Rc<RefCell<Collected>>,
+        behind: Option<Rc<RefCell<Behind>>>,
+    ) -> Self {
+        Self {
+            run_id,
+            pace: Pace::new(show.rate),
+            show,
+            levels,
+            events,
+            entrance: Entrance::new(doors),
+            collected,
+            behind,
+            epoch: 0,
+            shows_played: 0,
+            began_ns: (0, 0),
+            sent_ns: 0,
+            sample: None,
+            queued: None,
+        }
+    }
+
+    fn frame_begins(&mut self, world: &World, tick: u64) {
+        self.began_ns = (world.awake_ns.get(), world.now_ns());
+        self.pace.frame_begins(world, tick);
+        // What a command breaks off is answered before the command is.
+        same("a step that a command broke off", self.show.step_outcome, None);
+        self.entrance.frame_begins(tick);
+        self.show.count_to(tick);
+    }
+
+    /// A frame goes out, complete but for the moment of sending.
+    pub fn frame_goes_out(&mut self, world: &World, outgoing: Outgoing<'_>) {
+        let header = outgoing.header;
+        world.note("frame", [header.tick as f64, header.sim_time]);
+        self.pace.frame_goes_out(world, header, self.run_id);
+        let Self { show, .. } = self;
+        same("the time", header.sim_time.to_bits(), show.sim_time().to_bits());
+        same("the time scale", header.time_scale, show.time_scale());
+        same("playback", header.playback_state(), Some(show.playback()));
+        same("the epoch and the cue", (header.epoch, header.cue), (show.epoch, show.passed as u32));
+        let cues: Numbered = outgoing.cues().map(|cue| (cue.tick, cue.number)).collect();
+        let reached = show.take_reached(self.shows_played);
+        same("cues", &cues, &reached.iter().map(|cue| (header.tick, *cue as u32 + 1)).collect());
+        let alerts: Numbered = outgoing.alerts().map(|alert| (alert.tick, alert.level)).collect();
+        same("alerts", &alerts, &self.expected_alerts(header));
+        self.check_state(header);
+        (self.epoch, self.shows_played) = (self.show.epoch, self.show.shows_played);
+        let mut tally = world.tally.borrow_mut();
+        (tally.alerts, tally.cues) = (tally.alerts + alerts.len() as u64, tally.cues + cues.len() as u64);
+        self.queued = Some((outgoing.frame.chain.x[0], alerts.clone(), cues.clone()));
+        let of = |what, list: Numbered| list.into_iter().map(move |(tick, number)| (tick, what, number));
+        self.sample = Some((*header, of("alert", alerts).chain(of("cue", cues)).collect()));
+    }
+
+    fn expected_alerts(&mut self, header: &FrameHeader) -> Numbered {
+        let anew = std::mem::take(&mut self.show.jumped_by_command);
+        let Some(levels) = &mut self.levels else { return Vec::new() };
+        let expected = levels.expected(header, header.epoch != self.epoch, anew);
+        expected.into_iter().map(|level| (header.tick, level as u32)).collect()
+    }
+
+    /// The latest event passed, or else the level.
+    fn check_state(&self, header: &FrameHeader) {
+        let passed = self.events.iter().rfind(|(time, _)| *time <= header.sim_time);
+        let near = self.levels.as_ref().is_some_and(|levels| levels.current() == Some(Level::Approaching));
+        let expected = match passed {
+            Some((_, state)) => *state,
+            None if near => FrameState::Approaching,
+            None => FrameState::Moving,
+        };
+        same("the state", header.frame_state(), Some(expected));
+    }
+
+    /// The shared memory has the frame, and the next transport gets it.
+    pub fn frame_was_sent(&mut self, world: &World, header: &FrameHeader) {
+        self.sent_ns = world.now_ns();
+        let (x, alerts, cues) = self.queued.take().expect("a frame");
+        if let Some(behind) = &self.behind {
+            behind.borrow_mut().published(header, x, &alerts, &cues);
+        }
+    }
+
+    /// A new subscriber gets the alert that is kept.
+    pub fn late_subscriber(&self, level: Option<u32>) {
+        let now = self.levels.as_ref().and_then(Levels::current).map(|level| level as u32);
+        same("the level that a late subscriber gets", level, now);
+    }
+
+    /// Every transport has taken the frame, and the loop makes its sample.
+    pub fn frame_is_out(&mut self, world: &World, subscribers: u32) {
+        self.pace.frame_is_out();
+        let (header, announcements) = self.sample.take().expect("a frame");
+        let Pace { frames, skipped, overruns, lateness_ns, .. } = self.pace;
+        let sample = Expected {
+            tick: header.tick,
+            sim_time: header.sim_time,
+            frames,
+            skipped,
+            overruns,
+            shows_played: self.shows_played,
+            subscribers,
+            lateness_ns,
+            step_ns: (self.sent_ns - self.began_ns.1, world.now_ns() - self.began_ns.0),
+        };
+        self.collected.borrow_mut().frame(sample, announcements);
+    }
+
+    fn command(&mut self, tick: u64, command: Command) -> Option<bench_dragon::show::control::Code> {
+        self.entrance.obeyed(tick, command);
+        self.show.count_to(tick);
+        self.show.obey(command)
+    }
+
+    fn assert_outcome(&self, tick: u64, outcome: &Outcome) {
+        let Self { show, .. } = self;
+        same("the tick of an answer", outcome.tick, tick);
+        same("the time of an answer", outcome.sim_time.to_bits(), show.sim_time().to_bits());
+        same("its rates", (outcome.time_scale, outcome.playing_rate), (show.time_scale(), show.playing_rate()));
+        same("its playback and cue", (outcome.playback, outcome.cue), (show.playback(), show.passed as u32));
+    }
+}
+
+/// The real show, between the loop and the judge.
+pub struct Judged {
+    pub show: Show,
+    pub world: Rc<World>,
+    pub judge: Rc<RefCell<Judge>>,
+}
+
+impl Frames for Judged {
+    fn frame(&mut self, tick: u64) -> Period<'_> {
+        self.judge.borrow_mut().frame_begins(&self.world, tick);
+        self.world.spend(self.world.cost_ns());
+        self.show.frame(tick).into()
+    }
+
+    fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
+        let (number, value) = command.number_and_value();
+        self.world.note("command", [f64::from(number), value]);
+        let expected = self.judge.borrow_mut().command(tick, command);
+        let outcome = self.show.command(tick, command);
+        let mut judge = self.judge.borrow_mut();
+        same("the answer to a command", outcome.map(|outcome| outcome.code), expected);
+        outcome.iter().for_each(|outcome| judge.assert_outcome(tick, outcome));
+        judge.entrance.answered(outcome);
+        outcome
+    }
+
+    fn finished_step(&mut self, tick: u64) -> Option<Outcome> {
+        let outcome = self.show.finished_step(tick);
+        let mut judge = self.judge.borrow_mut();
+        judge.show.count_to(tick);
+        let expected = judge.show.step_outcome.take();
+        same("the end of a step", outcome.map(|outcome| outcome.code), expected);
+        if let Some(outcome) = outcome {
+            judge.assert_outcome(tick, &outcome);
+            judge.entrance.step_is_over(outcome);
+        }
+        outcome
+    }
+}

@@ -1,0 +1,119 @@
+//! Bad nights: the loop, the show, the doors for commands, the statistics and a transport's queue, on simulated time
+//! and under a simulated scheduler, from one seed. Late wake-ups, stalls, a wall clock that is set, slow and dying
+//! subscribers, floods of commands, a shared memory that is full; and the promises of the design, which hold all the
+//! same.
+//!
+//! `BENCH_DRAGON_NIGHTS=hours` simulates so many, `BENCH_DRAGON_NIGHT=seed` one night, with its last events.
+
+mod actors;
+mod behind;
+mod collected;
+mod conducted;
+mod doors;
+mod judge;
+mod levels;
+mod night;
+mod pace;
+mod plan;
+mod port;
+mod random;
+mod tally;
+mod world;
+
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::rc::Rc;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Instant;
+
+use plan::{Plan, Stage};
+use random::Random;
+use tally::Tally;
+use world::Trace;
+
+/// Seeds of nights that once failed.
+const KEPT: &str = include_str!("seeds.txt");
+const HOURS: f64 = 10_000.0;
+const LONG_HOURS: f64 = 1_000_000.0;
+/// Where the seeds of the long run begin, so that it repeats none of the short one.
+const LONG_SEEDS: u64 = 1 << 32;
+
+/// One night has failed: nobody begins another.
+static HAS_FAILED: AtomicBool = AtomicBool::new(false);
+
+/// Plays the night of a seed; where it fails, how to play it again.
+fn play(seed: u64, stages: &[Stage]) -> Tally {
+    let trace = Rc::new(Trace::default());
+    let played = catch_unwind(AssertUnwindSafe(|| night::play(seed, stages, &trace)));
+    played.unwrap_or_else(|failure| {
+        HAS_FAILED.store(true, Ordering::Relaxed);
+        let plan = Plan::draw(&mut Random::new(seed), stages);
+        eprintln!("the night of seed {seed} failed: {plan:?}; its last events:");
+        trace.print();
+        eprintln!(
+            "again: BENCH_DRAGON_NIGHT={seed} cargo test --release --test night; keep it in tests/night/seeds.txt"
+        );
+        resume_unwind(failure)
+    })
+}
+
+fn number<T: std::str::FromStr>(variable: &str) -> Option<T> {
+    let text = std::env::var(variable).ok()?;
+    Some(text.parse().unwrap_or_else(|_| panic!("{variable} is no number: {text}")))
+}
+
+#[test]
+fn the_promises_hold_in_every_night() {
+    let stages = Stage::all();
+    if let Some(seed) = number("BENCH_DRAGON_NIGHT") {
+        println!("{}", play(seed, &stages));
+        return;
+    }
+    for seed in KEPT.lines().filter(|line| !line.starts_with('#')) {
+        let seed = seed.split_whitespace().next().and_then(|seed| seed.parse().ok()).expect("a seed a line");
+        play(seed, &stages);
+    }
+    let long = std::env::var_os("BENCH_DRAGON_LONG").is_some();
+    let hours = number("BENCH_DRAGON_NIGHTS").unwrap_or(if long { LONG_HOURS } else { HOURS });
+    let first = if hours > HOURS { LONG_SEEDS } else { 0 };
+    println!("{}", play_for(hours, first));
+}
+
+/// Plays nights on every core until so many hours are simulated.
+fn play_for(hours: f64, first: u64) -> Tally {
+    let (next, began) = (AtomicU64::new(first), Instant::now());
+    let so_far = Mutex::new((Tally::default(), Instant::now()));
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..cores {
+            scope.spawn(|| {
+                let stages = Stage::all();
+                loop {
+                    let seed = next.fetch_add(1, Ordering::Relaxed);
+                    let night = play(seed, &stages);
+                    let mut so_far = so_far.lock().expect("no night failed");
+                    let (total, printed) = &mut *so_far;
+                    total.add(&night);
+                    if printed.elapsed().as_secs() >= 60 {
+                        *printed = Instant::now();
+                        eprintln!("{:.0} s, up to seed {seed}: {total}", began.elapsed().as_secs_f64());
+                    }
+                    if total.hours() >= hours || HAS_FAILED.load(Ordering::Relaxed) {
+                        return;
+                    }
+                }
+            });
+        }
+    });
+    so_far.into_inner().expect("no night failed").0
+}
+
+/// What a night does depends on its seed alone.
+#[test]
+fn a_seed_is_a_night() {
+    let stages = Stage::all();
+    for seed in 0..6 {
+        let [first, again] = [(); 2].map(|()| format!("{:?}", play(seed, &stages)));
+        assert_eq!(first, again);
+    }
+}

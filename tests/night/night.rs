@@ -1,0 +1,220 @@
+//! One night: everybody is put in place, the real loop runs, and the accounts are settled.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::time::Instant;
+
+use bench_dragon::live::control::{Door, Doors, door};
+use bench_dragon::live::statistics::{Collector, Run, queues_of};
+use bench_dragon::live::{Counts, End, LoopOptions, Publisher, StatusPublisher, run_loop};
+use bench_dragon::scene::AtEnd;
+use bench_dragon::show::{Playback, Show};
+use bench_dragon::transports::background::{self, BackgroundConfig, Worker};
+
+use crate::actors::{Background, Controller, Statistics, Statuses, Stopper, Subscriber, WallClock};
+use crate::behind::{Behind, Network};
+use crate::collected::Collected;
+use crate::conducted::{Conducted, CueAt};
+use crate::judge::{Judge, Judged};
+use crate::levels::Levels;
+use crate::plan::{Plan, Stage};
+use crate::port::{FULL, Receivers, SharedMemory};
+use crate::random::Random;
+use crate::tally::Tally;
+use crate::world::{Trace, World, same};
+
+/// A queue's judge, and the thread at its other end.
+type Thread = (Rc<RefCell<Behind>>, Rc<RefCell<Worker<Network>>>);
+
+/// Everybody but the loop.
+struct Cast {
+    world: Rc<World>,
+    judge: Rc<RefCell<Judge>>,
+    collected: Rc<RefCell<Collected>>,
+    collector: Rc<RefCell<Collector<'static>>>,
+    thread: Option<Thread>,
+    doors: Vec<Rc<RefCell<Door>>>,
+    subscribers: Vec<Rc<RefCell<Subscriber>>>,
+}
+
+/// Plays the night of a seed.
+pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
+    let mut random = Random::new(seed);
+    let plan = Plan::draw(&mut random, stages);
+    let stage = &stages[plan.stage];
+    let world = Rc::new(World::new(&plan, random, Rc::clone(trace)));
+    let show = Show::new(&stage.scene, stage.timeline.clone(), plan.playback).expect("a show");
+    let (reports, inbox) = queues_of(plan.queues.0, plan.queues.1);
+    let collected = Rc::new(RefCell::new(Collected::new(plan.queues.0, plan.queues.1, plan.begin_ns)));
+
+    let mut publishers: Vec<Box<dyn Publisher>> = Vec::new();
+    let mut sinks: Vec<Box<dyn StatusPublisher>> = vec![Box::new(Statuses(Rc::clone(&collected)))];
+    let thread = plan.background_rate.map(|rate| thread(&plan, stage, rate, &mut publishers, &mut sinks));
+    let run_id = seed ^ 0x5eed;
+    let judge = judge(&plan, stage, &show, run_id, &collected, thread.as_ref());
+    let judge = Rc::new(RefCell::new(judge));
+    let [announced, sampled] = [(); 2].map(|()| Rc::clone(&collected));
+    let run = Run {
+        run_id,
+        rate: plan.rate,
+        scene: "night",
+        sinks,
+        announce: Box::new(move |announcement| announced.borrow_mut().announcement(announcement)),
+        record: Box::new(move |sample| sampled.borrow_mut().sample(sample)),
+    };
+    let collector = Rc::new(RefCell::new(Collector::new(inbox, run, plan.begin_ns)));
+
+    let receivers = Rc::<Receivers>::default();
+    let origin = Instant::now();
+    let reader = |reader: &crate::plan::Reader| {
+        let of = (reader.depth, plan.rate, reader.every_ns, reader.lives);
+        Rc::new(RefCell::new(Subscriber::new(&receivers, origin, of.0, of.1, of.2, of.3)))
+    };
+    let subscribers: Vec<_> = plan.readers.iter().map(reader).collect();
+    let (ports, doors): (Vec<_>, Vec<_>) =
+        plan.doors.iter().map(|_| door()).map(|(port, door)| (port, Rc::new(RefCell::new(door)))).unzip();
+    let shared_memory = SharedMemory {
+        world: Rc::clone(&world),
+        judge: Rc::clone(&judge),
+        receivers,
+        room: plan.room,
+        level: None,
+        quiet_maintenance: 1000,
+        maintained: None,
+    };
+    // First, so that a full memory is seen before the others have the frame.
+    publishers.insert(0, Box::new(shared_memory));
+    let cast = Cast { world, judge, collected, collector, thread, doors, subscribers };
+    cast.enter(&plan, stage);
+
+    let mut frames = Judged { show, world: Rc::clone(&cast.world), judge: Rc::clone(&cast.judge) };
+    let options = LoopOptions { run_id, rate: plan.rate, periods: plan.periods };
+    let mut doors = Doors::new(ports);
+    let World { stop, .. } = &*cast.world;
+    let result = run_loop(&*cast.world, &mut frames, &mut doors, &mut publishers, options, reports, stop);
+    let counts = match result {
+        Ok(counts) => counts,
+        Err((counts, error)) => {
+            same("the failure", (error.0.as_str(), counts.end), (FULL, End::Error));
+            counts
+        }
+    };
+    cast.settle(&plan, &counts)
+}
+
+/// A transport with a thread of its own: its ends go to the loop and to the statistics.
+fn thread(
+    plan: &Plan,
+    stage: &Stage,
+    rate: f64,
+    publishers: &mut Vec<Box<dyn Publisher>>,
+    sinks: &mut Vec<Box<dyn StatusPublisher>>,
+) -> Thread {
+    let cues = stage.scene.cues.len();
+    let handles = stage.scene.team().handles();
+    let config = BackgroundConfig { name: "night", handles, cues, loop_rate: plan.rate, rate };
+    let (publisher, status, inbox) = background::queues(config);
+    publishers.push(Box::new(publisher));
+    sinks.push(Box::new(status));
+    let behind = Rc::new(RefCell::new(Behind::new(plan.rate, rate, cues)));
+    let worker = Worker::new(Network(Rc::clone(&behind)), inbox, rate);
+    (behind, Rc::new(RefCell::new(worker)))
+}
+
+fn judge(
+    plan: &Plan,
+    stage: &Stage,
+    show: &Show,
+    run_id: u64,
+    collected: &Rc<RefCell<Collected>>,
+    thread: Option<&Thread>,
+) -> Judge {
+    let Playback { rate, start, at_end, end_hold, paused, time_scale, .. } = plan.playback;
+    let cues = show.cues().iter().map(|cue| CueAt { time: cue.time, pauses: cue.pauses }).collect();
+    let end_hold = (at_end == AtEnd::Loop).then(|| (end_hold * rate).round() as u64);
+    let conducted =
+        Conducted::new(rate, start, stage.freeze(&plan.playback), end_hold, cues, paused).at_rate(time_scale);
+    let levels = stage.rules().map(|rules| Levels::new(rules, rate));
+    let behind = thread.map(|(behind, _)| Rc::clone(behind));
+    Judge::new(run_id, conducted, levels, stage.events(), plan.doors.len(), Rc::clone(collected), behind)
+}
+
+impl Cast {
+    /// Everybody takes their place.
+    fn enter(&self, plan: &Plan, stage: &Stage) {
+        let Self { world, .. } = self;
+        let soon = |ns: u64| plan.begin_ns + 1 + world.random.borrow_mut().below(ns);
+        let statistics = Statistics {
+            collector: Rc::clone(&self.collector),
+            collected: Rc::clone(&self.collected),
+            every_ns: plan.statistics_every_ns,
+        };
+        world.add(Box::new(statistics), soon(plan.statistics_every_ns));
+        if let (Some((behind, worker)), Some(rate)) = (&self.thread, plan.background_rate) {
+            let period_ns = (1e9 / rate) as u64;
+            let thread = Background { worker: Rc::clone(worker), behind: Rc::clone(behind), period_ns };
+            world.add(Box::new(thread), soon(period_ns));
+        }
+        for (number, (pause_ns, door)) in plan.doors.iter().zip(&self.doors).enumerate() {
+            let controller = Controller {
+                number,
+                door: Rc::clone(door),
+                judge: Rc::clone(&self.judge),
+                pause_ns: *pause_ns,
+                end: stage.freeze(&plan.playback),
+                is_dead: false,
+            };
+            world.add(Box::new(controller), soon(*pause_ns as u64 + 1));
+        }
+        for subscriber in &self.subscribers {
+            let every_ns = subscriber.borrow().every_ns;
+            world.add(Box::new(Rc::clone(subscriber)), soon(every_ns));
+        }
+        let every_ns = plan.wall_clock_every_ns;
+        world.add(Box::new(WallClock { every_ns }), soon(every_ns as u64 + 1));
+        if let Some(stop_ns) = plan.stop_ns {
+            world.add(Box::new(Stopper), stop_ns);
+        }
+    }
+
+    /// The loop has ended: what is on its way arrives, and everything adds up.
+    fn settle(self, plan: &Plan, counts: &Counts) -> Tally {
+        let Self { world, judge, collected, collector, thread, doors, subscribers } = self;
+        judge.borrow_mut().pace.ended(&world, counts, plan.periods);
+        let mut last = collector.borrow_mut();
+        last.take();
+        let now_ns = world.now_ns();
+        last.report(now_ns, true, |status| bench_dragon::wire::LoopStatus { stamp_ns: now_ns, ..status });
+        collected.borrow().ended(&last.summary(), counts.frames);
+        if let Some((behind, worker)) = thread {
+            worker.borrow_mut().send(&*world);
+            behind.borrow_mut().emptied(worker.borrow().deliveries());
+        }
+        for (number, door) in doors.iter().enumerate() {
+            while let Some(answer) = door.borrow_mut().answer() {
+                judge.borrow_mut().entrance.taken(number, &answer);
+            }
+        }
+        judge.borrow().entrance.ended();
+        let mut lost = 0;
+        for subscriber in &subscribers {
+            subscriber.borrow_mut().outlive(&world);
+            lost += subscriber.borrow().receiver.borrow().lost;
+        }
+        let (commands, too_many) = judge.borrow().entrance.totals();
+        let tally = *world.tally.borrow();
+        Tally {
+            nights: 1,
+            simulated_ns: u128::from(now_ns - plan.begin_ns),
+            frames: counts.frames,
+            skipped: counts.skipped,
+            commands,
+            too_many,
+            samples_lost: collected.borrow().lost,
+            frames_lost: tally.frames_lost + lost,
+            subscribers: tally.subscribers + subscribers.len() as u64,
+            stops: u64::from(counts.end == End::Signal),
+            ..tally
+        }
+    }
+}
