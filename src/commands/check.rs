@@ -163,6 +163,7 @@ fn proof_sentence(scene: &Scene, enclosure: Option<ClearanceEnclosure>) -> Strin
         return "Nothing of it could be proved.".to_owned();
     };
     match until {
+        None if lo == hi => format!("Proved: it is {lo} m."),
         None => format!("Proved: it is between {lo} m and {hi} m."),
         Some(until) => {
             let until = scene.motion.time_at(until);

@@ -8,9 +8,6 @@ use super::path::{Place, Span};
 use super::scene::Scene;
 use super::steps::Steps;
 
-/// How often the window of a lock is halved before it is given up.
-const MOST_HALVINGS: usize = 40;
-
 /// What has been shown to happen.
 #[derive(Default)]
 pub(super) struct Events {
@@ -150,7 +147,7 @@ impl Events {
         let (front, front_at_end) = (&while_going.capsules[link], &at_end.capsules[link]);
         let squared = scene.team.link(link).square();
         let is_before = |a: Place, b: Place| a != b && path.in_order(a, b);
-        let cannot_be_at = |place: Place| link::is_all_nearer(path, front, Span(place, place), &squared, 0);
+        let cannot_be_at = |place: Place| link::is_all_nearer(path, front, Span(place, place), &squared, &mut 1);
         match shown {
             LockShown::Vanishes(window) => {
                 span_is_one(scene, window).map_err(|problem| format!("the window: {problem}"))?;
@@ -161,7 +158,8 @@ impl Events {
                 if !(cannot_be_at(w1) && cannot_be_at(w2)) {
                     return Err("an end of the window may be at the link's length (Lemma 5)".to_owned());
                 }
-                if !link::is_all_nearer(path, front_at_end, window, &squared, MOST_HALVINGS) {
+                let mut stretches = link::MOST_STRETCHES;
+                if !link::is_all_nearer(path, front_at_end, window, &squared, &mut stretches) {
                     return Err("a place of the window may be at the link's length in the end (Lemma 5)".to_owned());
                 }
             }

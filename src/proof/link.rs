@@ -5,8 +5,9 @@ use super::elementary;
 use super::interval::{Interval, Vector};
 use super::path::{Path, Place, Span};
 
-/// How often a stretch of the path between a link's handles is halved before *nearer* is given up.
-const MOST_HALVINGS: usize = 40;
+/// Stretches of the path that are looked at for one link before *nearer* is given up: some seconds. A certificate that was
+/// written by the search needs a few.
+pub(super) const MOST_STRETCHES: usize = 100_000;
 
 /// Checks Lemma 1: for each place of `front` the follower lies in `rear` and is continuous. Returns the front product.
 ///
@@ -37,7 +38,8 @@ pub(super) fn check(path: &Path, front: &Capsule, rear: &Capsule, link: &Interva
     if !shortest.is_below(&squared) {
         return Err("the latest place of the rear may be too far".to_owned());
     }
-    if is_nearer(path, front, Span(x2, u2), &squared, MOST_HALVINGS) {
+    let mut stretches = MOST_STRETCHES;
+    if is_nearer(path, front, Span(x2, u2), &squared, &mut stretches) {
         Ok(product)
     } else {
         Err("a place between the handles may be at the link's length".to_owned())
@@ -71,19 +73,24 @@ fn is_stretch_nearer(pair: &Pair, squared: &Interval) -> bool {
     (over_front(front, &rear.point) + slack(rear, &slope, distance)).is_below(squared)
 }
 
-/// Whether D < l^2 for all places of the front and all of the span, which is halved up to `halvings` times.
-pub(super) fn is_all_nearer(path: &Path, front: &Capsule, span: Span, squared: &Interval, halvings: usize) -> bool {
+/// Whether D < l^2 for all places of the front and all of the span, which is halved until so many stretches have been
+/// looked at.
+pub(super) fn is_all_nearer(path: &Path, front: &Capsule, span: Span, squared: &Interval, left: &mut usize) -> bool {
+    if !is_one_left(left) {
+        return false;
+    }
     let stretch = Capsule::new(path, span);
     is_stretch_nearer(&Pair::new(front, &stretch), squared)
-        || halvings > 0
-            && halves(path, span).is_some_and(|halves| {
-                halves.into_iter().all(|half| is_all_nearer(path, front, half, squared, halvings - 1))
-            })
+        || halves(path, span)
+            .is_some_and(|halves| halves.into_iter().all(|half| is_all_nearer(path, front, half, squared, left)))
 }
 
 /// *Nearer*: whether D < l^2 for all u of the front and all places of the span up to u, where that is known of the
 /// span's beginning.
-fn is_nearer(path: &Path, front: &Capsule, span: Span, squared: &Interval, halvings: usize) -> bool {
+fn is_nearer(path: &Path, front: &Capsule, span: Span, squared: &Interval, left: &mut usize) -> bool {
+    if !is_one_left(left) {
+        return false;
+    }
     // (a) from here on, all at once.
     if path.turning_bound(span.0, front.span.1).is_below(elementary::quarter_turn()) {
         return true;
@@ -93,10 +100,15 @@ fn is_nearer(path: &Path, front: &Capsule, span: Span, squared: &Interval, halvi
     // (b), or (a).
     is_stretch_nearer(&pair, squared)
         || pair.rear_product().is_positive()
-        || halvings > 0
-            && halves(path, span).is_some_and(|halves| {
-                halves.into_iter().all(|half| is_nearer(path, front, half, squared, halvings - 1))
-            })
+        || halves(path, span)
+            .is_some_and(|halves| halves.into_iter().all(|half| is_nearer(path, front, half, squared, left)))
+}
+
+/// Takes one of the stretches that may still be looked at; false where there is none.
+fn is_one_left(left: &mut usize) -> bool {
+    let is_one = *left > 0;
+    *left = left.saturating_sub(1);
+    is_one
 }
 
 /// A span in two.

@@ -244,3 +244,21 @@ fn boards_inside_a_ring() {
     }
     assert!(!is_inside_ring(team, &Interval::new(-10.0), &Interval::new(0.8)));
 }
+
+/// *Nearer* ends where it is true by so little that the stretches would have to be shorter than anybody can wait for.
+#[test]
+fn what_is_nearer_by_almost_nothing_is_given_up() {
+    // Half a circle about the origin, then half of one that leads to the origin.
+    let scene = scene(
+        "kind = \"pieces\"\nstart = [0.0, -1.0]\npieces = [{ kind = \"arc\", radius = 1.0, side = \"left\", turns = 0.5 }, \
+         { kind = \"arc\", radius = 0.5, side = \"left\", turns = 0.5 }]",
+    );
+    let path = &scene.path;
+    let end = Place(2, std::f64::consts::PI - 1e-12);
+    let (front, arc) = (Capsule::new(path, Span(end, end)), Span(Place(1, 0.1), Place(1, 3.0)));
+    for (beyond, is_seen) in [(1e-2, true), (1e-12, false)] {
+        let (link, mut left) = (Interval::new(1.0 + beyond), link::MOST_STRETCHES);
+        assert_eq!(link::is_all_nearer(path, &front, arc, &link.square(), &mut left), is_seen, "{beyond}");
+        assert_eq!(left == 0, !is_seen, "{left} stretches are left");
+    }
+}
