@@ -37,6 +37,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anstyle::AnsiColor;
+use bench_dragon::motion::Method;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::scene::{Scene, SceneError, SceneText};
 use bench_dragon::show::state::Severity;
@@ -241,6 +242,16 @@ pub fn warn_of_gap(timeline: &Timeline) {
 /// Whether a stream is a terminal whose user has not switched colour off (`NO_COLOR`, see no-color.org).
 pub fn shows_colour(stream: &impl io::IsTerminal) -> bool {
     stream.is_terminal() && !anstyle_query::no_color()
+}
+
+/// Refuses a scene whose solver is the paper's, of whose motion nothing can be proved.
+pub fn expect_exact_motion(scene: &Scene) -> Result<(), CommandError> {
+    if !matches!(scene.motion.method(), Method::Paper(_)) {
+        return Ok(());
+    }
+    let sentence = "the scene names the solver \"paper\", whose head is too fast: only exact motion can be certified, \
+                    expected motion.accuracy or another solver";
+    Err(CommandError::BadInput(sentence.to_owned()))
 }
 
 /// A flag that SIGINT, SIGTERM and SIGHUP set: the last where a terminal was closed, unless `nohup` has it ignored.

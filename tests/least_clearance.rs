@@ -126,7 +126,7 @@ fn the_least_pitch_to_4_5_m_is_enclosed_to_a_nanometre() {
     let enclosure = enclose_least_pitch(scene.team(), 4.5, &found, &mut |_| ());
     println!("{enclosure:?}");
     let PitchEnclosure { lo, hi, from, .. } = enclosure;
-    let hi = hi.unwrap();
+    let (lo, hi) = lo.zip(hi).unwrap();
     assert!(from == 0.15 && lo <= LEAST_PITCH && LEAST_PITCH <= hi && hi - lo <= 1e-9, "{enclosure:?}");
     // The brute force, where the two boards touch: apart with the upper pitch, overlapping with the lower one.
     let least = |pitch: f64| {

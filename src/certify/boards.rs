@@ -73,8 +73,8 @@ impl Shape {
 impl MovingBoard {
     /// Whether two boards are proved to be further apart than `metres`, not below 0, by the circles about them.
     pub fn is_further_than(&self, metres: f64, other: &Self) -> bool {
-        let between = [self.centre[0] - other.centre[0], self.centre[1] - other.centre[1]];
-        let apart = norm_squared(between.map(Interval::point));
+        let between = [0, 1].map(|axis| Interval::point(self.centre[axis]) - Interval::point(other.centre[axis]));
+        let apart = norm_squared(between);
         let reach = Interval::point(self.radius) + Interval::point(other.radius) + Interval::point(metres);
         reach.square().is_below(apart)
     }

@@ -43,7 +43,7 @@ pub const MOST_CLEARANCE_STEPS: u64 = 100_000;
 pub struct ClearanceEnclosure {
     /// Metres: no two boards that share no handle are nearer, from the start up to `until`.
     pub lo: f64,
-    /// Metres: two boards are no further apart than this, at one place before.
+    /// Metres: two boards are no further apart than this, at one place of the show.
     pub hi: f64,
     /// Metres of travel of the head at that place, nearly.
     pub travelled: f64,
@@ -82,9 +82,13 @@ pub fn enclose_least_clearance(
         }
         EventKind::Stall | EventKind::Lock => {
             let end = event.travelled - BEFORE_LOCK.max(slack);
+            if end <= 0.0 {
+                return None;
+            }
             let target = Knot::new(path, &chain.exact, end);
+            let reached = chain.exact.travelled(target.head).lo;
             let enclosure = Descent::new(chain, end, most_steps).least(hint, &target, progress)?;
-            Some(ClearanceEnclosure { until: enclosure.until.or(Some(end)), ..enclosure })
+            Some(ClearanceEnclosure { until: enclosure.until.or(Some(reached)), ..enclosure })
         }
     }
 }

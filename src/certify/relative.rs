@@ -99,7 +99,8 @@ impl Moving {
         half_step: f64,
     ) -> Option<Self> {
         let (front, rear) = spans;
-        if !(path.in_order(rear.span.0, place) && path.in_order(place, rear.span.1)) {
+        let is_in_span = path.in_order(rear.span.0, place) && path.in_order(place, rear.span.1);
+        if !(is_in_span && path.is_inside(place)) {
             return None;
         }
         let product = front.capsule.product(&rear.capsule, false);

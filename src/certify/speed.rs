@@ -12,7 +12,7 @@ use std::collections::BinaryHeap;
 use self::step::{Bounds, Speeds};
 use super::interval::Interval;
 use super::knot::{Knot, place};
-use super::path::ExactPath;
+use super::path::{ExactPath, Place};
 use super::step::Chain;
 use crate::motion::Motion;
 
@@ -99,8 +99,11 @@ impl Search<'_> {
         // The head itself.
         let mut best =
             GreatestRatio { lo: 1.0, hi: 1.0, handle: 0, travelled: 0.0, ratio: 1.0, proved: false, steps: 0 };
-        let whole = Step { upper: f64::INFINITY, from: -self.least, to: self.end + self.least };
-        let mut open = BinaryHeap::from([whole]);
+        let exact = &self.speeds.chain.exact;
+        let from = self.beyond(0.0, -1.0, |place| exact.travelled(place).hi <= 0.0);
+        let to = self.beyond(self.end, 1.0, |place| exact.travelled(place).lo >= self.end);
+        let Some((from, to)) = from.zip(to) else { return GreatestRatio { hi: f64::INFINITY, ..best } };
+        let mut open = BinaryHeap::from([Step { upper: f64::INFINITY, from, to }]);
         let (mut settled, mut handles) = (1.0f64, 0);
         let enough = |best: &GreatestRatio, upper: f64| upper <= best.lo * (1.0 + tolerance);
         while let Some(Step { upper, from, to }) = open.pop() {
@@ -131,6 +134,12 @@ impl Search<'_> {
             progress((wide.ln() / tolerance.ln()).clamp(0.0, 1.0));
         }
         GreatestRatio { hi: settled, proved: true, ..best }
+    }
+
+    /// Metres of travel a little to one side, of whose place it is sure.
+    fn beyond(&self, travelled: f64, side: f64, is_beyond: impl Fn(Place) -> bool) -> Option<f64> {
+        let mut others = (0..40).map(|power| travelled + side * self.least * 2f64.powi(power));
+        others.find(|other| is_beyond(self.knot(*other).head))
     }
 
     fn bounds(&self, from: f64, to: f64) -> Option<Bounds> {

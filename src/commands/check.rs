@@ -7,16 +7,16 @@ use std::path::{Path, PathBuf};
 use bench_dragon::certify::{ClearanceEnclosure, MOST_CLEARANCE_STEPS, enclose_least_clearance};
 use bench_dragon::model::path::{OutlineKind, SegmentOutline};
 use bench_dragon::model::spiral::Direction;
+use bench_dragon::motion::Motion;
 use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent};
-use bench_dragon::motion::{Method, Motion};
 use bench_dragon::scene::{AtEnd, OnContact, Scene};
 use bench_dragon::solve::Velocities;
 use serde::Serialize;
 
 use super::events::{find_least_clearance, least_clearance, sentence};
 use super::verify::certificate::proved_of;
-use super::{CommandError, Common, Output, figure, number, progress_bar, search_timeline};
+use super::{CommandError, Common, Output, expect_exact_motion, figure, number, progress_bar, search_timeline};
 
 /// Arguments of `check`.
 #[derive(Debug, clap::Args)]
@@ -143,11 +143,7 @@ fn enclosed(
     freeze: &TimedEvent,
     common: &Common,
 ) -> Result<Option<ClearanceEnclosure>, CommandError> {
-    if matches!(scene.motion.method(), Method::Paper(_)) {
-        let sentence = "the scene names the solver \"paper\", whose head is too fast: only of exact motion can the least \
-                        clearance be proved, expected motion.accuracy or another solver";
-        return Err(CommandError::BadInput(sentence.to_owned()));
-    }
+    expect_exact_motion(scene)?;
     let bar = progress_bar(1000, common).with_message("proving the least clearance");
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
     let enclosure = found.and_then(|found| {
@@ -159,15 +155,19 @@ fn enclosed(
 
 /// What was proved of the least clearance, for people.
 fn proof_sentence(scene: &Scene, enclosure: Option<ClearanceEnclosure>) -> String {
-    let Some(ClearanceEnclosure { lo, hi, until, .. }) = enclosure else {
+    let Some(ClearanceEnclosure { lo, hi, until, travelled, .. }) = enclosure else {
         return "Nothing of it could be proved.".to_owned();
     };
     match until {
         None if lo == hi => format!("Proved: it is {lo} m."),
         None => format!("Proved: it is between {lo} m and {hi} m."),
         Some(until) => {
-            let until = scene.motion.time_at(until);
-            format!("Proved up to t = {until} s that it is between {lo} m and {hi} m; not decided beyond.")
+            let [until, at] = [until, travelled].map(|travelled| scene.motion.time_at(travelled));
+            format!(
+                "Proved: up to t = {} s no two boards are nearer than {lo} m; at t = {at} s two are no further apart than \
+                 {hi} m. Not decided beyond.",
+                until.next_down()
+            )
         }
     }
 }
@@ -183,10 +183,12 @@ fn clearance_line(
         least_clearance_hi: enclosure.map(|enclosure| enclosure.hi),
         least_clearance_status: match enclosure {
             Some(ClearanceEnclosure { until: None, .. }) => "proved",
-            Some(_) => "given up",
+            Some(_) => "given_up",
             None => "searched",
         },
-        proved_until: enclosure.and_then(|enclosure| enclosure.until).map(|until| scene.motion.time_at(until)),
+        proved_until: enclosure
+            .and_then(|enclosure| enclosure.until)
+            .map(|until| scene.motion.time_at(until).next_down()),
         time: enclosure.map(|enclosure| scene.motion.time_at(enclosure.travelled)),
         bench_a: enclosure.map(|enclosure| enclosure.bench_a),
         bench_b: enclosure.map(|enclosure| enclosure.bench_b),

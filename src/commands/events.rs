@@ -4,13 +4,12 @@ use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use bench_dragon::certify::{self, CertifyError, MOST_STEPS, Outcome, Status};
-use bench_dragon::motion::Method;
 use bench_dragon::motion::event::EventKind;
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
 use bench_dragon::scene::Scene;
 use serde::Serialize;
 
-use super::{CommandError, Common, Output, figure, progress_bar, search_timeline};
+use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar, search_timeline};
 
 /// Arguments of `events`.
 #[derive(Debug, clap::Args)]
@@ -99,11 +98,7 @@ fn certified(
     file: &Path,
     common: &Common,
 ) -> Result<Vec<Outcome>, CommandError> {
-    if matches!(scene.motion.method(), Method::Paper(_)) {
-        let sentence = "the scene names the solver \"paper\", whose head is too fast: only exact motion can be certified, \
-                        expected motion.accuracy or another solver";
-        return Err(CommandError::BadInput(sentence.to_owned()));
-    }
+    expect_exact_motion(scene)?;
     let shown = file.display();
     let refused = |error| CommandError::BadInput(format!("{shown}: {error}, expected a file to write"));
     let mut writer = BufWriter::new(std::fs::File::create(file).map_err(refused)?);

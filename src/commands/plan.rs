@@ -7,7 +7,7 @@ use bench_dragon::scene::Accepted;
 use serde::Serialize;
 
 use super::events::bench_name;
-use super::{CommandError, Common, Output, number, progress_bar, search_timeline};
+use super::{CommandError, Common, Output, expect_exact_motion, number, progress_bar, search_timeline};
 
 /// Arguments of `plan`.
 #[derive(Debug, clap::Args)]
@@ -50,7 +50,7 @@ struct PitchLine {
 /// What `--prove` adds to it.
 #[derive(Serialize)]
 struct PitchProof {
-    value_lo: f64,
+    value_lo: Option<f64>,
     value_hi: Option<f64>,
     status: &'static str,
 }
@@ -96,11 +96,11 @@ fn plan_pitch(common: &Common, radius: f64, prove: bool) -> Result<(), CommandEr
         let enclosure = enclosure.map(|enclosure| PitchProof {
             value_lo: enclosure.lo,
             value_hi: enclosure.hi,
-            status: if enclosure.is_complete() { "proved" } else { "given up" },
+            status: if enclosure.is_complete() { "proved" } else { "given_up" },
         });
         output.json(&PitchLine { plan: "pitch", value, bench_a, bench_b, head_radius, enclosure })?;
     } else {
-        output.line(&format!("The head reaches {radius} m with any pitch above {value:.10} m per turn."))?;
+        output.line(&format!("The least pitch with which the head reaches {radius} m is {value:.10} m per turn."))?;
         output.line(&format!(
             "At that pitch {} and {} (counting from 1) just touch, the head being {head_radius:.6} m from the centre.",
             bench_name(&scene, bench_a),
@@ -113,20 +113,25 @@ fn plan_pitch(common: &Common, radius: f64, prove: bool) -> Result<(), CommandEr
     output.finish()
 }
 
+/// Where the head begins whose way is proved.
+const COMING: &str = "the head coming from three turns outside the radius, or outside a link's length";
+
 /// What was proved of a pitch, for people.
 fn proof_sentence(PitchEnclosure { lo, hi, from, .. }: &PitchEnclosure) -> String {
-    let below = format!("with every pitch from {from} m to {lo} m two boards overlap before, or a link locks");
-    match hi {
-        Some(hi) => {
-            format!("Proved, the head coming from three turns further out: with {hi} m no two boards touch; {below}.")
-        }
-        None => format!("Proved, the head coming from three turns further out: {below}. Not decided beyond."),
+    let below =
+        lo.map(|lo| format!("with every pitch from {from} m to {lo} m two boards overlap before, or a link locks"));
+    let above = hi.map(|hi| format!("with {hi} m no two boards touch"));
+    match (above, below) {
+        (Some(above), Some(below)) => format!("Proved, {COMING}: {above}; {below}."),
+        (None, Some(one)) | (Some(one), None) => format!("Proved, {COMING}: {one}. No more could be proved."),
+        (None, None) => "Nothing of it could be proved.".to_owned(),
     }
 }
 
 fn plan_speed(common: &Common, limit: f64) -> Result<(), CommandError> {
     Accepted::SPEED.check("--max-handle-speed", limit).map_err(CommandError::BadInput)?;
     let scene = common.load_scene()?;
+    expect_exact_motion(&scene)?;
     let timeline = search_timeline(&scene, common);
     let bar = progress_bar(1000, common).with_message("searching for the fastest handle");
     let found = greatest_speed(&scene, &timeline, limit, &mut |share| bar.set_position((1000.0 * share) as u64));
@@ -140,9 +145,9 @@ fn plan_speed(common: &Common, limit: f64) -> Result<(), CommandError> {
         return output.finish();
     }
     let limit = number(limit);
-    output.line(&format!("No handle is faster than {limit} m/s while the head moves at {value_lo:.10} m/s."))?;
+    output.line(&format!("No handle is faster than {limit} m/s while the head moves at {value_lo} m/s."))?;
     output.line(&format!(
-        "The fastest is handle {} (counting from 1) at {ratio:.10} times the head's speed, at t = {time:.6} s of the \
+        "The fastest found is handle {} (counting from 1) at {ratio:.10} times the head's speed, at t = {time:.6} s of the \
          scene as it is written.",
         handle + 1
     ))?;

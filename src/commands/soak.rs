@@ -21,6 +21,7 @@ use bench_dragon::subscribers::soak::report::{Machine, Report, SCHEMA, Subscribe
 use bench_dragon::subscribers::soak::verdict::{Limits, Verdict};
 use bench_dragon::transports::iceoryx2;
 use indicatif::ProgressBar;
+use nix::sys::signal::{SigSet, Signal};
 
 use super::realtime_scheduling::RealtimeScheduling;
 use super::{CommandError, Common, Output, progress_bar, stop_on_signals, wall_seconds};
@@ -295,7 +296,10 @@ pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result
 
 /// Has this process killed when the one that started it ends, so that nothing is left behind.
 pub fn end_with_parent() -> Result<(), CommandError> {
-    let set = nix::sys::prctl::set_pdeathsig(nix::sys::signal::Signal::SIGTERM);
+    // The soak test has these blocked, and a mask is inherited: until `stop_on_signals` they end this process at once.
+    let signals = SigSet::from_iter([Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP]);
+    signals.thread_unblock().map_err(std::io::Error::from)?;
+    let set = nix::sys::prctl::set_pdeathsig(Signal::SIGTERM);
     set.map_err(|error| CommandError::Failed(format!("the end of the parent cannot be watched: {error}")))?;
     // A parent that ended before that sends no signal any more.
     if nix::unistd::getppid().as_raw() == 1 {

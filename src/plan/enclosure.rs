@@ -15,8 +15,9 @@ use crate::scene::Accepted;
 /// outside the longest link, where that is more).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PitchEnclosure {
-    /// Metres per turn: with every pitch from `from` up to this two boards overlap, or a link locks, before the radius is reached.
-    pub lo: f64,
+    /// Metres per turn: with every pitch from `from` up to this two boards overlap, or a link locks, before the radius is
+    /// reached; `None` where that cannot be shown of any.
+    pub lo: Option<f64>,
     /// Metres per turn: with this pitch no two boards touch and no link locks before; `None` where that cannot be shown.
     pub hi: Option<f64>,
     /// Metres per turn: the least pitch that is looked at, half of the boards' width.
@@ -28,7 +29,7 @@ pub struct PitchEnclosure {
 impl PitchEnclosure {
     /// Whether every pitch but those within a nanometre is decided.
     pub fn is_complete(&self) -> bool {
-        self.hi.is_some_and(|hi| hi - self.lo <= 1e-9)
+        self.lo.zip(self.hi).is_some_and(|(lo, hi)| hi - lo <= 1e-9)
     }
 }
 
@@ -69,7 +70,7 @@ pub fn enclose_least_pitch(
     let hi = found.value + BESIDE;
     let start_turn = radius.max(team.longest_link()) / hi + TURNS_BEFORE;
     let hi = reaches(team, hi, start_turn, radius, MOST_STEPS).then_some(hi);
-    PitchEnclosure { lo, hi, from, intervals }
+    PitchEnclosure { lo: (intervals > 0).then_some(lo), hi, from, intervals }
 }
 
 /// The pitch up to which boards are proved to overlap with every one, and in how many intervals.

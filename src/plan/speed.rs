@@ -52,11 +52,12 @@ pub fn greatest_speed(
     let freeze = timeline.freeze(scene.stops_at_contact());
     if freeze.event.kind == EventKind::Lock {
         return Err(PlanError(format!(
-            "the show runs into a lock at {:.9} s, and near it a handle goes faster than any limit",
+            "the show runs into a lock at {:.9} s: near it a handle goes faster than any limit, or jumps",
             freeze.time
         )));
     }
-    let tolerance = TOLERANCE / limit.clamp(1.0, LARGE);
+    // A little less: the two speeds are rounded away from each other.
+    let tolerance = 0.999 * TOLERANCE / limit.clamp(1.0, LARGE);
     let found = greatest_ratio(&scene.motion, freeze.event.travelled, tolerance, progress);
     let GreatestRatio { handle, travelled, ratio, proved, steps, .. } = found;
     let (value_lo, value_hi) = found.divide(limit);

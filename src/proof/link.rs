@@ -5,8 +5,8 @@ use super::elementary;
 use super::interval::{Interval, Vector};
 use super::path::{Path, Place, Span};
 
-/// Stretches of the path that are looked at for one link before *nearer* is given up: some seconds. A certificate that was
-/// written by the search needs a few.
+/// Stretches of the path that are tested for one link before it is refused that all its places are nearer: some seconds.
+/// A certificate that the search has written needs a few.
 pub(super) const MOST_STRETCHES: usize = 100_000;
 
 /// Checks Lemma 1: for each place of `front` the follower lies in `rear` and is continuous. Returns the front product.

@@ -84,4 +84,8 @@ fn the_program_makes_and_checks_certificates() {
     std::fs::write(&paper, exact.replace("head_speed = 1.0", "solver = \"paper\"\nhead_speed = 1.0")).unwrap();
     let (_, said, code) = program(&["--scene", paper.to_str().unwrap(), "events", "--certify", file]);
     assert!(code == Some(2) && said.contains("only exact motion can be certified"), "{said}");
+    for question in [&["check", "--prove"][..], &["plan", "speed", "--max-handle-speed", "2"]] {
+        let (_, said, code) = program(&[&["--scene", paper.to_str().unwrap()], question].concat());
+        assert!(code == Some(2) && said.contains("only exact motion can be certified"), "{question:?} {said}");
+    }
 }

@@ -39,8 +39,9 @@ pub const NOT_HERE: &[Line] = &[
 pub const LOOKED_UP: &[Line] =
     &[("cargo test", "a test, which tests/run runs"), ("cargo bench", "measures for minutes")];
 
-/// Run where this program is there.
-pub const NEEDS: &[Line] = &[("curl", "promtool"), ("ffmpeg", "ffmpeg"), ("for svg in", "rsvg-convert")];
+/// Run where these programs are there.
+pub const NEEDS: &[Line] =
+    &[("curl", "curl promtool"), ("ffmpeg", "ffmpeg rsvg-convert"), ("for svg in", "rsvg-convert")];
 
 /// Run with `BENCH_DRAGON_LONG=1`.
 pub const LONG: &[Line] = &[

@@ -71,7 +71,9 @@ fn judge(printed: &Printed) -> Verdict {
         return Verdict::LookedUp;
     }
     match line_for(text, NEEDS) {
-        Some((_, program)) if !is_installed(program) => return Verdict::NotRun(format!("{program} is not here")),
+        Some((_, programs)) if !programs.split(' ').all(is_installed) => {
+            return Verdict::NotRun(format!("needs {programs}, not all of which are here"));
+        }
         _ => (),
     }
     match line_for(text, LONG) {

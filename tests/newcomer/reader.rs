@@ -151,12 +151,32 @@ fn resident_kind(command: &str) -> Option<String> {
     }
 }
 
-/// The files of the repository as they are, without what is ignored.
+/// The files of the repository as they are, without what is ignored; all but what is built, where there is no repository.
+fn files(root: &Path) -> Vec<String> {
+    // The checkout may belong to another user, as in a container.
+    let list = ["-c", "safe.directory=*", "ls-files", "-z", "--cached", "--others", "--exclude-standard"];
+    match Command::new("git").args(list).current_dir(root).output() {
+        Ok(output) if output.status.success() => {
+            text(&output.stdout).split_terminator('\0').map(str::to_owned).collect()
+        }
+        _ => files_below(root, ""),
+    }
+}
+
+fn files_below(root: &Path, folder: &str) -> Vec<String> {
+    let entries = std::fs::read_dir(root.join(folder)).unwrap().flatten();
+    let names = entries.map(|entry| (entry.file_name().into_string().unwrap(), entry.path().is_dir()));
+    let below = |(name, is_folder): (String, bool)| match is_folder {
+        true if ["target", ".venv", ".git"].contains(&name.as_str()) => Vec::new(),
+        true => files_below(root, &format!("{folder}{name}/")),
+        false => vec![format!("{folder}{name}")],
+    };
+    names.flat_map(below).collect()
+}
+
 fn check_out(root: &Path, checkout: &Path) {
-    let list = ["ls-files", "-z", "--cached", "--others", "--exclude-standard"];
-    let output = Command::new("git").args(list).current_dir(root).output().unwrap();
-    assert!(output.status.success(), "git: {}", text(&output.stderr));
-    for name in text(&output.stdout).split_terminator('\0') {
+    for name in files(root) {
+        let name = name.as_str();
         let copy = checkout.join(name);
         std::fs::create_dir_all(copy.parent().unwrap()).unwrap();
         // A file that was deleted is still listed.

@@ -23,8 +23,12 @@ pub struct Terminal {
 impl Terminal {
     pub fn open(command: &str, folder: &Path, output: PathBuf, path: &str) -> Self {
         let file = File::create(&output).unwrap();
-        let mut bash = Command::new("bash");
-        bash.args(["-c", command]).current_dir(folder).env("PATH", path).env("PYTHONUNBUFFERED", "1");
+        // Whoever has started this may have Ctrl-C ignored.
+        let mut bash = Command::new("env");
+        bash.args(["--default-signal=INT", "bash", "-o", "pipefail", "-c", command])
+            .current_dir(folder)
+            .env("PATH", path)
+            .env("PYTHONUNBUFFERED", "1");
         bash.env("PIP_NO_INDEX", "1").env("PIP_DISABLE_PIP_VERSION_CHECK", "1").env("PIP_ROOT_USER_ACTION", "ignore");
         // The answers to these are the tests' own.
         bash.env_remove("BENCH_DRAGON_LONG").env_remove("RUST_LOG").process_group(0);

@@ -73,7 +73,7 @@ fn the_promises_hold_in_every_night() {
         let seed = seed.split_whitespace().next().and_then(|seed| seed.parse().ok()).expect("a seed a line");
         play(seed, &stages);
     }
-    let long = std::env::var_os("BENCH_DRAGON_LONG").is_some();
+    let long = std::env::var("BENCH_DRAGON_LONG").is_ok_and(|value| value == "1");
     let hours = number("BENCH_DRAGON_NIGHTS").unwrap_or(if long { LONG_HOURS } else { HOURS });
     let first = if hours > HOURS { LONG_SEEDS } else { 0 };
     println!("{}", play_for(hours, first));

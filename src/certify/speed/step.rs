@@ -54,6 +54,10 @@ pub(super) struct Speeds<'a> {
 impl Speeds<'_> {
     /// The bounds over the step from one place of the head to another, if they can be enclosed.
     pub fn over(&self, from: &mut Knot, middle: &mut Knot, to: &mut Knot) -> Option<Bounds> {
+        let exact = &self.chain.exact;
+        if !(exact.in_order(from.head, middle.head) && exact.in_order(middle.head, to.head)) {
+            return None;
+        }
         let wide = self.chain.spans_until(from, to, |handles| self.is_enough(handles))?;
         let mut same = middle.clone();
         let thin = self.chain.spans_until(middle, &mut same, |handles| handles.len() >= wide.len())?;
@@ -62,7 +66,6 @@ impl Speeds<'_> {
             |one: (usize, Interval), other: (usize, Interval)| if other.1.lo > one.1.lo { other } else { one };
         let speeds = samples.iter().map(|sample| sample.speed.abs()).enumerate();
         let (fastest, speed) = speeds.reduce(greatest)?;
-        let exact = &self.chain.exact;
         let half = exact.length(from.head, middle.head).max(exact.length(middle.head, to.head));
         let upper = self.greatest(&wide, &samples, half).unwrap_or(f64::INFINITY);
         let handles = (thin.len() + wide.len()) as u64;
@@ -191,9 +194,13 @@ impl Speeds<'_> {
             let rate = front.rate * ratio + front.ratio.square() * rate;
             let ratio = intersection(front.ratio * ratio, rear.speed + Interval::within(half) * rate)?;
             front = Speed { ratio, rate };
+            // Also where it is not a number.
+            if !ratio.magnitude().is_finite() {
+                return None;
+            }
             greatest = greatest.max(ratio.magnitude());
         }
-        (!greatest.is_nan()).then_some(greatest)
+        Some(greatest)
     }
 }
 

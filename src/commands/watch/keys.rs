@@ -4,6 +4,7 @@
 //! here waits for an answer.
 
 use std::collections::VecDeque;
+use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
@@ -13,6 +14,7 @@ use bench_dragon::show::control::Command;
 use bench_dragon::subscribers::control::conductor::{Action, Conducted, Conductor};
 use bench_dragon::subscribers::control::{refusal, standing};
 use bench_dragon::subscribers::feed::FeedEvent;
+use nix::sys::signal::{SigSet, Signal};
 use signal_hook::consts::{SIGCONT, SIGQUIT, SIGTSTP};
 
 use super::super::CommandError;
@@ -63,13 +65,17 @@ impl Keyboard {
     /// # Errors
     /// The system's, where it has no thread or signal handler left.
     pub fn new(name: &str, stop: &Arc<AtomicBool>) -> Result<Self, CommandError> {
-        let (sender, answers) = channel();
-        // Nobody waits for an answer any more where the keyboard has gone.
-        let conductor = Conductor::start(name, move |(), conducted| drop(sender.send(conducted)))?;
         let [suspend, resumed] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
         for (signal, flag) in [(SIGQUIT, stop), (SIGTSTP, &suspend), (SIGCONT, &resumed)] {
             signal_hook::flag::register(signal, Arc::clone(flag))?;
         }
+        // They too come to the thread of `stop_on_signals`.
+        SigSet::from_iter([Signal::SIGQUIT, Signal::SIGTSTP, Signal::SIGCONT])
+            .thread_block()
+            .map_err(io::Error::from)?;
+        let (sender, answers) = channel();
+        // Nobody waits for an answer any more where the keyboard has gone.
+        let conductor = Conductor::start(name, move |(), conducted| drop(sender.send(conducted)))?;
         let (waiting, unanswered, end) = (VecDeque::new(), 0, f64::INFINITY);
         let mode = KeyMode::enter();
         Ok(Self {
