@@ -39,6 +39,11 @@ impl Pace {
         }
     }
 
+    /// The loop's first look at its clock is where its periods begin.
+    fn begin(&mut self, world: &World) {
+        self.begin_ns = world.first_read_ns.get().expect("the loop has read its clock");
+    }
+
     /// start + tick / rate.
     fn deadline(&self, tick: u64) -> f64 {
         self.begin_ns as f64 + tick as f64 / self.rate * 1e9
@@ -57,7 +62,7 @@ impl Pace {
 
     /// A frame of the period `tick` is about to be computed.
     pub fn frame_begins(&mut self, world: &World, tick: u64) {
-        self.begin_ns = world.first_read_ns.get().expect("the loop has read its clock");
+        self.begin(world);
         assert!(tick >= self.next_tick, "period {tick}, where {} or a later one is due", self.next_tick);
         let (now, awake) = (world.now_ns() as f64, world.awake_ns.get() as f64);
         let (begins, ends) = (self.deadline(tick), self.deadline(tick + 1));
@@ -87,6 +92,8 @@ impl Pace {
 
     /// The loop has ended.
     pub fn ended(&mut self, world: &World, counts: &Counts, periods: Option<u64>) {
+        // A loop that is stopped at once has had no frame.
+        self.begin(world);
         let elapsed = counts.frames + counts.skipped;
         same("the frames", counts.frames, self.frames);
         let now = world.now_ns() as f64;
