@@ -3,7 +3,7 @@
 //! subscribers, floods of commands, a shared memory that is full; and the promises of the design, which hold all the
 //! same.
 //!
-//! `BENCH_DRAGON_NIGHTS=hours` simulates so many, `BENCH_DRAGON_NIGHT=seed` one night, with its last events.
+//! `BENCH_DRAGON_NIGHT_HOURS=hours` simulates so many, `BENCH_DRAGON_NIGHT=seed` one night, with its last events.
 
 mod actors;
 mod behind;
@@ -20,6 +20,7 @@ mod random;
 mod tally;
 mod world;
 
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::rc::Rc;
 use std::sync::Mutex;
@@ -74,15 +75,43 @@ fn the_promises_hold_in_every_night() {
         play(seed, &stages);
     }
     let long = std::env::var("BENCH_DRAGON_LONG").is_ok_and(|value| value == "1");
-    let hours = number("BENCH_DRAGON_NIGHTS").unwrap_or(if long { LONG_HOURS } else { HOURS });
+    let hours = number("BENCH_DRAGON_NIGHT_HOURS").unwrap_or(if long { LONG_HOURS } else { HOURS });
     let first = if hours > HOURS { LONG_SEEDS } else { 0 };
-    println!("{}", play_for(hours, first));
+    let total = play_for(hours, first);
+    println!("{total}");
+    if hours >= HOURS {
+        assert!(total.has_everything(), "something never happened in all these nights: {total:?}");
+    }
+}
+
+/// Nights that are over, counted in the order of their seeds, so that the sum is the same on every machine.
+struct Played {
+    /// The sum of all nights before `counted`.
+    total: Tally,
+    counted: u64,
+    /// Those behind it that were over sooner.
+    waiting: BTreeMap<u64, Tally>,
+    printed: Instant,
+}
+
+impl Played {
+    /// Counts a night, and those that waited for it, until there are `hours`.
+    fn count(&mut self, seed: u64, night: Tally, hours: f64) {
+        self.waiting.insert(seed, night);
+        while self.total.hours() < hours
+            && let Some(night) = self.waiting.remove(&self.counted)
+        {
+            self.total.add(&night);
+            self.counted += 1;
+        }
+    }
 }
 
 /// Plays nights on every core until so many hours are simulated.
 fn play_for(hours: f64, first: u64) -> Tally {
     let (next, began) = (AtomicU64::new(first), Instant::now());
-    let so_far = Mutex::new((Tally::default(), Instant::now()));
+    let played =
+        Mutex::new(Played { total: Tally::default(), counted: first, waiting: BTreeMap::new(), printed: began });
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     std::thread::scope(|scope| {
         for _ in 0..cores {
@@ -91,21 +120,21 @@ fn play_for(hours: f64, first: u64) -> Tally {
                 loop {
                     let seed = next.fetch_add(1, Ordering::Relaxed);
                     let night = play(seed, &stages);
-                    let mut so_far = so_far.lock().expect("no night failed");
-                    let (total, printed) = &mut *so_far;
-                    total.add(&night);
-                    if printed.elapsed().as_secs() >= 60 {
-                        *printed = Instant::now();
-                        eprintln!("{:.0} s, up to seed {seed}: {total}", began.elapsed().as_secs_f64());
+                    let mut played = played.lock().expect("no night failed");
+                    played.count(seed, night, hours);
+                    if played.printed.elapsed().as_secs() >= 60 {
+                        played.printed = Instant::now();
+                        let Played { counted, total, .. } = &*played;
+                        eprintln!("{:.0} s, before seed {counted}: {total}", began.elapsed().as_secs_f64());
                     }
-                    if total.hours() >= hours || HAS_FAILED.load(Ordering::Relaxed) {
+                    if played.total.hours() >= hours || HAS_FAILED.load(Ordering::Relaxed) {
                         return;
                     }
                 }
             });
         }
     });
-    so_far.into_inner().expect("no night failed").0
+    played.into_inner().expect("no night failed").total
 }
 
 /// What a night does depends on its seed alone.

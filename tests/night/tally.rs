@@ -50,6 +50,16 @@ impl Tally {
         self.stops += other.stops;
     }
 
+    /// Whether all that can happen has happened.
+    pub fn has_everything(&self) -> bool {
+        let Self { nights, simulated_ns, stalled_ns, frames, skipped, delays, stalls, commands, too_many, .. } = *self;
+        let Self { alerts, cues, clock_steps, samples_lost, frames_lost, .. } = *self;
+        let Self { subscribers, deaths, failed_publishers, stops, .. } = *self;
+        let counts = [nights, frames, skipped, delays, stalls, commands, too_many, alerts, cues, clock_steps];
+        let others = [samples_lost, frames_lost, subscribers, deaths, failed_publishers, stops];
+        simulated_ns > stalled_ns && stalled_ns > 0 && counts.iter().chain(&others).all(|count| *count > 0)
+    }
+
     pub fn hours(&self) -> f64 {
         hours(self.simulated_ns)
     }
