@@ -85,10 +85,15 @@ impl<'a> Chain<'a> {
 
     /// Shows a claim over the step between two knots, or tells what stands in the way.
     pub fn show(&self, from: &mut Knot, to: &mut Knot, claim: Claim) -> Result<Shown, Obstacle> {
-        self.show_with(from, to, claim, PADS[0]).or_else(|first| {
-            let mut wider = PADS[1..].iter().filter(|_| matches!(first, Obstacle::Link(_)));
-            wider.find_map(|pads| self.show_with(from, to, claim, *pads).ok()).ok_or(first)
-        })
+        let mut unlinked = None;
+        for pads in PADS {
+            match self.show_with(from, to, claim, pads) {
+                // Where spans that are wider are long enough for the links, it is something else that stands in the way.
+                Err(Obstacle::Link(link)) => unlinked = unlinked.or(Some(link)),
+                other => return other,
+            }
+        }
+        Err(Obstacle::Link(unlinked.unwrap_or(0)))
     }
 
     fn show_with(&self, from: &mut Knot, to: &mut Knot, claim: Claim, pads: f64) -> Result<Shown, Obstacle> {
