@@ -14,6 +14,7 @@ mod interval;
 mod knot;
 mod lines;
 mod link;
+mod lock;
 mod path;
 pub(crate) mod pitch;
 mod relative;

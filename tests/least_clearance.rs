@@ -68,8 +68,10 @@ fn compared(text: &str, samples: u32, most_steps: u64) -> Option<ClearanceEnclos
         assert!(lo <= there + ROUNDING, "{there} {enclosure:?}");
     }
     let end = until.unwrap_or(freeze.event.travelled);
-    for k in 0..samples {
-        let at = end * f64::from(k) / f64::from(samples);
+    // Near the end too, where a lock comes suddenly.
+    let moments = (0..samples).map(|k| end * f64::from(k) / f64::from(samples));
+    let last = (4..12).map(|power| (end - 10f64.powi(-power)).max(0.0));
+    for at in moments.chain(last) {
         let least = least_distance(&team, &chain.pose(at), hi.max(0.0) + 0.1);
         assert!(least >= lo - ROUNDING, "{least} after {at} m: {enclosure:?}");
     }
@@ -95,15 +97,13 @@ fn the_least_clearance_of_the_procession_is_enclosed_to_a_nanometre() {
 }
 
 #[test]
-fn a_show_that_ends_with_a_lock_is_enclosed_up_to_it() {
-    let school = config("school").replace("on_contact = \"stop\"", "on_contact = \"continue\"");
-    let continued = if school.contains("\"continue\"") {
-        school
-    } else {
-        school.replace("[motion]", "[motion]\non_contact = \"continue\"")
-    };
-    let enclosure = compared(&continued, 40, 20_000).unwrap();
-    assert!(enclosure.hi < 0.0 && enclosure.until.is_some(), "{enclosure:?}");
+fn shows_that_end_with_a_lock_are_enclosed_up_to_it() {
+    // Boards that overlap and do not freeze the show; a lock in a spiral; locks where a nearer place takes the handle.
+    for file in ["scenes/noalerts", "../config/wide", "scenes/tailoff", "scenes/stall_missed", "scenes/pieces_59"] {
+        let text = std::fs::read_to_string(format!("tests/{file}.toml")).unwrap();
+        let enclosure = compared(&text, 40, 20_000).unwrap();
+        assert_eq!(enclosure.until, None, "{file}: {enclosure:?}");
+    }
 }
 
 #[test]
@@ -116,7 +116,7 @@ fn random_shows_are_no_nearer_than_is_proved() {
         proved += usize::from(enclosure.until.is_none());
     }
     println!("{proved} of {tried} proved to the end");
-    assert!(tried >= 10 && proved >= 2, "{proved} of {tried}");
+    assert!(tried >= 20 && proved >= 14, "{proved} of {tried}");
 }
 
 #[test]

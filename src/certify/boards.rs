@@ -3,6 +3,9 @@
 
 use super::capsule::Capsule;
 use super::interval::{Interval, Vector, cross, dot, minus, norm, norm_squared};
+use crate::model::Point;
+use crate::model::board::Board;
+use crate::model::separation::closest_points_board_board;
 use crate::model::team::Team;
 
 /// What boards are like, in intervals.
@@ -81,16 +84,33 @@ impl MovingBoard {
 
     /// Whether two boards are proved to be apart.
     pub fn is_apart_from(&self, other: &Self) -> bool {
-        if self.is_further_than(0.0, other) {
+        self.is_apart_by(0.0, other)
+    }
+
+    /// Whether two boards are proved to be further apart than `metres`; below 0: to overlap less deeply.
+    pub fn is_apart_by(&self, metres: f64, other: &Self) -> bool {
+        if self.is_further_than(metres.max(0.0), other) {
             return true;
         }
         let between = [self.centre[0] - other.centre[0], self.centre[1] - other.centre[1]];
         let normal = |[x, y]: [f64; 2]| [-y, x];
         let axes = [between, normal(self.direction), normal(other.direction), self.direction, other.direction];
-        axes.iter().any(|axis| self.is_separated(other, axis.map(Interval::point)))
+        let is_separated = |axis: [f64; 2]| self.is_separated(metres, other, axis.map(Interval::point));
+        axes.into_iter().any(is_separated) || metres > 0.0 && is_separated(self.towards(other))
     }
 
-    fn is_separated(&self, other: &Self, axis: Vector) -> bool {
+    /// From this board to the nearest point of another, by the middles of their capsules.
+    fn towards(&self, other: &Self) -> [f64; 2] {
+        let [one, other] = [self, other].map(|board| {
+            let [front, rear] =
+                [board.front, board.rear].map(|capsule| Point::from(capsule.point.map(Interval::middle)));
+            Board::from_handles(front, rear, (board.share * board.link).middle(), 2.0 * board.half_width.middle())
+        });
+        let (from, to) = closest_points_board_board(&one, &other);
+        (to - from).into()
+    }
+
+    fn is_separated(&self, metres: f64, other: &Self, axis: Vector) -> bool {
         let towards = if dot(axis, minus(other.front.point, self.front.point)).middle()
             + dot(axis, minus(other.rear.point, self.rear.point)).middle()
             >= 0.0
@@ -100,8 +120,9 @@ impl MovingBoard {
             axis.map(std::ops::Neg::neg)
         };
         let back = towards.map(std::ops::Neg::neg);
-        let length = norm(towards).hi;
-        (self.support(towards, length) + other.support(back, length)).is_negative()
+        let size = norm(towards);
+        let (length, gap) = (size.hi, size * metres);
+        (self.support(towards, length) + other.support(back, length) + gap).is_negative()
     }
 
     /// The largest n . x, from above.

@@ -2,7 +2,7 @@
 //! at which two are as near. Only [`super`] uses it. Lemma 6 of `docs/proofs.md`.
 
 use super::boards::MovingBoard;
-use super::capsule::Span;
+use super::capsule::{Span, Spanned};
 use super::carriers::{Carriers, Knots, knots_of};
 use super::interval::Interval;
 use super::knot::Knot;
@@ -10,7 +10,7 @@ use super::lines::Links;
 use super::path::{Curve, ExactPath, Place};
 use super::relative::When;
 use super::search::{LEAST, path_end};
-use super::step::{Chain, Obstacle, PADS};
+use super::step::{Chain, Claim, Listed, Obstacle, PADS};
 use crate::motion::Motion;
 use crate::motion::contact::LeastClearance;
 use crate::motion::event::{Event, EventKind};
@@ -29,8 +29,9 @@ const LEAST_STEP: f64 = 1e-14;
 /// Metres, as a share of the way, by which the show's end may be off by rounding.
 const END_SLACK: f64 = 1e-13;
 
-/// Metres before a lock to which a show is searched that ends with it.
-const BEFORE_LOCK: f64 = 1e-9;
+/// Metres before a lock to which a show is searched that ends with it, in turn: the nearer, the less the handle that is lost
+/// can still move.
+const BEFORE_LOCK: [f64; 3] = [1e-9, 3e-11, 1e-12];
 
 /// How far behind a contact, in links, boards are expected to overlap surely.
 const TOUCH: f64 = 1e-3;
@@ -59,8 +60,8 @@ pub struct ClearanceEnclosure {
 
 /// Encloses the least clearance of all pairs of boards which share no handle, from the start until the show freezes at
 /// `freeze`: within a nanometre, unless the search gives up after `most_steps`. `hint` is what the ordinary search has
-/// found, which only tells where to look. A show that ends with a lock is searched up to a little before it. `progress` gets
-/// the share of the way that is done, from 0 to 1. `None` where not even the hint can be shown.
+/// found, which only tells where to look. `progress` gets the share of the way that is done, from 0 to 1. `None` where not
+/// even the hint can be shown.
 pub fn enclose_least_clearance(
     motion: &Motion,
     freeze: &TimedEvent,
@@ -81,14 +82,8 @@ pub fn enclose_least_clearance(
             Descent::new(chain, event.travelled - slack, most_steps).least(hint, &target, progress)
         }
         EventKind::Stall | EventKind::Lock => {
-            let end = event.travelled - BEFORE_LOCK.max(slack);
-            if end <= 0.0 {
-                return None;
-            }
-            let target = Knot::new(path, &chain.exact, end);
-            let reached = chain.exact.travelled(target.head).lo;
-            let enclosure = Descent::new(chain, end, most_steps).least(hint, &target, progress)?;
-            Some(ClearanceEnclosure { until: enclosure.until.or(Some(reached)), ..enclosure })
+            let end = event.travelled - slack.max(BEFORE_LOCK[0]);
+            (end > 0.0).then(|| Descent::new(chain, end, most_steps).least_until_lock(event, hint, progress))?
         }
     }
 }
@@ -161,14 +156,83 @@ impl<'a> Descent<'a> {
         target: &Knot,
         progress: &mut dyn FnMut(f64),
     ) -> Option<ClearanceEnclosure> {
+        let until = self.descend(hint, target, progress)?;
+        Some(self.enclosed(self.upper?, until))
+    }
+
+    /// The least clearance of a show that ends with a lock.
+    fn least_until_lock(
+        mut self,
+        lock: &Event,
+        hint: &LeastClearance,
+        progress: &mut dyn FnMut(f64),
+    ) -> Option<ClearanceEnclosure> {
+        let target = self.knot(self.end);
+        if let Some(until) = self.descend(hint, &target, progress)? {
+            return Some(self.enclosed(self.upper?, Some(until)));
+        }
+        let is_shown = BEFORE_LOCK.iter().any(|before| {
+            let target = self.knot(lock.travelled - before);
+            // As near as can be shown.
+            let _ = self.at.travelled < target.travelled && self.go_to(&target, progress).is_some();
+            self.stays_to_lock(lock)
+        });
+        let until = (!is_shown).then(|| self.travelled());
+        Some(self.enclosed(self.upper?, until))
+    }
+
+    /// Goes to `target`, or returns how far it came; `None` where nothing is known of the hint.
+    fn descend(&mut self, hint: &LeastClearance, target: &Knot, progress: &mut dyn FnMut(f64)) -> Option<Option<f64>> {
         let end = self.end;
         let inside = |travelled: Interval| travelled.lo >= 0.0 && travelled.hi <= end;
         let side = if hint.travelled < 0.5 * end { 1.0 } else { -1.0 };
         let knot = self.beside(hint.travelled.clamp(0.0, end), side, inside)?;
         let benches = [hint.bench_a, hint.bench_b].map(|bench| bench as usize);
         self.upper = Some(self.upper_between(knot.clone(), knot, benches)?);
-        let until = self.go_to(target, progress);
-        Some(self.enclosed(self.upper?, until))
+        Some(self.go_to(target, progress))
+    }
+
+    /// Whether no two boards are nearer than the least that is known from here to a lock: the handle that is lost there stays
+    /// until then between two places that it cannot pass, and those behind it follow.
+    fn stays_to_lock(&mut self, lock: &Event) -> bool {
+        let link = lock.bench_a.unwrap_or(0) as usize;
+        let most = TOUCH * self.chain.team.shortest_link();
+        let least = 2.0 * (lock.travelled - self.at.travelled).max(BEFORE_LOCK[2]);
+        (0..40).map(|power| least * 2f64.powi(power)).take_while(|beyond| *beyond < most).any(|beyond| {
+            let mut to = self.knot(lock.travelled + beyond);
+            let (chain, at, mut end) = (&self.chain, &mut self.at, to.clone());
+            let Some(mut handles) = chain.spans(at, &mut to, link) else { return false };
+            let Some(last) = chain.spans(&mut to, &mut end, link) else { return false };
+            let Some(window) = chain.until_lock(at, link, &handles[link], &last[link]) else { return false };
+            handles.push(Spanned::new(&chain.exact, window));
+            PADS.iter().any(|pads| self.are_apart_behind(handles.clone(), window, *pads))
+        })
+    }
+
+    /// Whether all boards are apart while the last of some handles is anywhere in a window, and those before it in their
+    /// spans.
+    fn are_apart_behind(&self, handles: Vec<Spanned>, window: Span, pads: f64) -> bool {
+        let chain = &self.chain;
+        let [mut from, mut to] = [window.0, window.1].map(|place| {
+            let mut knot = Knot::at(place, self.at.travelled);
+            knot.handles = vec![knot.handles[0]; handles.len()];
+            knot
+        });
+        // Lemma 4, where it is handle 1 that is lost.
+        let is_covered = handles.len() == 2 && chain.start.is_some_and(|start| chain.exact.in_order(start, window.0));
+        let links = if is_covered { self.links } else { Links::All };
+        let mut listed = Listed::behind(chain, handles, pads);
+        while listed.handles.len() <= chain.team.benches && !self.is_enough(&listed, links) {
+            if listed.extend(&mut from, &mut to, Claim { links, moving: false, clear: false }).is_err() {
+                return false;
+            }
+        }
+        self.boards_are_apart(&listed, None, links).is_ok()
+    }
+
+    /// Metres of travel up to which the search has come.
+    fn travelled(&self) -> f64 {
+        self.chain.exact.travelled(self.at.head).lo.max(0.0)
     }
 
     /// Whether no two boards touch, and no link locks, from the start to `target`.
@@ -262,7 +326,7 @@ impl<'a> Descent<'a> {
                 Err(_) => true,
             };
             if given_up || self.steps > self.most_steps {
-                return Some(self.chain.exact.travelled(self.at.head).lo.max(0.0));
+                return Some(self.travelled());
             }
         }
         None
@@ -316,12 +380,13 @@ impl<'a> Descent<'a> {
 
     fn show_with(&self, knots: &mut Knots, pads: f64) -> Result<(bool, Span, Option<Span>), Refused> {
         let mut carriers = Carriers::new(&self.chain, knots, pads);
-        while carriers.listed.handles.len() <= self.chain.team.benches && !self.is_enough(&carriers) {
+        while carriers.listed.handles.len() <= self.chain.team.benches && !self.is_enough(&carriers.listed, self.links)
+        {
             let knots = knots_of(knots.from, knots.middle, knots.to);
             carriers.extend(knots, self.links).map_err(|obstacle| Refused { obstacle, nearer: None })?;
         }
         if self.looks_at_boards() {
-            self.boards_are_apart(&carriers).map_err(|benches| {
+            self.boards_are_apart(&carriers.listed, Some(&carriers), self.links).map_err(|benches| {
                 let [one, other] = benches.map(|bench| carriers.board(bench.min(carriers.listed.handles.len() - 2)));
                 let travelled = self.chain.exact.travelled(carriers.at);
                 let inside =
@@ -341,14 +406,13 @@ impl<'a> Descent<'a> {
     }
 
     /// Whether the handles that are listed are all that a step needs.
-    fn is_enough(&self, carriers: &Carriers) -> bool {
-        let listed = &carriers.listed;
+    fn is_enough(&self, listed: &Listed, links: Links) -> bool {
         let last = listed.handles.len() - 1;
         if last < 2 {
             return false;
         }
         let chain = &self.chain;
-        match self.links {
+        match links {
             Links::Front if !self.looks_at_boards() => true,
             Links::Front if matches!(chain.exact.segments[0].curve, Curve::Inward { .. }) => [0, 1]
                 .iter()
@@ -359,14 +423,17 @@ impl<'a> Descent<'a> {
 
     /// Shows that no two boards come as near as the least that is known, all of them or those with board 0 or 1; or two
     /// of which it cannot be shown.
-    fn boards_are_apart(&self, carriers: &Carriers) -> Result<(), [usize; 2]> {
+    fn boards_are_apart(&self, listed: &Listed, carriers: Option<&Carriers>, links: Links) -> Result<(), [usize; 2]> {
         let (chain, benches, threshold) = (&self.chain, self.chain.team.benches, self.threshold());
-        let listed = &carriers.listed;
         let count = listed.handles.len() - 1;
         let boards: Vec<_> = (0..count).map(|bench| chain.board(&listed.handles, bench)).collect();
         let is_spiral = matches!(chain.exact.segments[0].curve, Curve::Inward { .. });
-        let firsts = if self.links == Links::All { count } else { count.min(2) };
+        let firsts = if links == Links::All { count } else { count.min(2) };
         let far = threshold.max(0.0);
+        let are_apart = |[a, b]: [usize; 2]| match carriers {
+            Some(carriers) => carriers.are_apart([a, b], threshold),
+            None => boards[a].is_apart_by(threshold, &boards[b]),
+        };
         for (a, board) in boards[..firsts].iter().enumerate() {
             let mut beyond = false;
             for (b, other) in boards.iter().enumerate().skip(a + 2) {
@@ -374,29 +441,40 @@ impl<'a> Descent<'a> {
                 if beyond {
                     break;
                 }
-                if !board.is_further_than(far, other) && !carriers.are_apart([a, b], threshold) {
+                if !board.is_further_than(far, other) && !are_apart([a, b]) {
                     return Err([a, b]);
                 }
             }
             let next = count.max(a + 2);
-            if next < benches && !beyond && !self.is_apart_from_rest((a, board), carriers, next) {
+            if next < benches && !beyond && !self.is_apart_from_rest((a, board), listed, carriers, next) {
                 return Err([a, next]);
             }
         }
         let spare = (chain.links[1] - chain.shape.inset * 2.0).lo;
-        if self.links == Links::All && !is_spiral && count < benches && spare <= threshold {
+        if links == Links::All && !is_spiral && count < benches && spare <= threshold {
             return Err([count, count + 2]);
         }
         Ok(())
     }
 
     /// Whether a board is apart from those from `next` on, which are not listed.
-    fn is_apart_from_rest(&self, (a, board): (usize, &MovingBoard), carriers: &Carriers, next: usize) -> bool {
-        let (listed, threshold) = (&carriers.listed, self.threshold());
+    fn is_apart_from_rest(
+        &self,
+        (a, board): (usize, &MovingBoard),
+        listed: &Listed,
+        carriers: Option<&Carriers>,
+        next: usize,
+    ) -> bool {
+        let threshold = self.threshold();
         if matches!(self.chain.exact.segments[0].curve, Curve::Inward { .. }) {
             return listed.is_beyond(threshold.max(0.0), board, listed.handles.len() - 1);
         }
         board.is_further_than(threshold.max(0.0), &listed.straight_run(next))
-            || carriers.board(a).is_further_than(threshold, &carriers.straight_run(next), When::Always)
+            || match carriers {
+                Some(carriers) => {
+                    carriers.board(a).is_further_than(threshold, &carriers.straight_run(next), When::Always)
+                }
+                None => board.is_apart_by(threshold, &listed.straight_run(next)),
+            }
     }
 }

@@ -25,6 +25,15 @@ pub(super) enum Front {
 
 /// The front product's sign, if the follower of every place of `front` is proved to be in `rear`.
 pub(super) fn follower_within(path: &ExactPath, front: &Spanned, rear: &Spanned, link: Interval) -> Option<Front> {
+    let sign = one_place_within(path, front, rear, link)?;
+    let near = path.turning(rear.span.0, front.span.1) < QUARTER
+        || nearer(path, front, Span(rear.span.1, front.span.1), link, MOST_HALVINGS);
+    near.then_some(sign)
+}
+
+/// The front product's sign, if for every place of `front` exactly one place of `rear`, neither of its ends, is proved to be
+/// at the distance: the follower, unless a nearer place is.
+pub(super) fn one_place_within(path: &ExactPath, front: &Spanned, rear: &Spanned, link: Interval) -> Option<Front> {
     let (u, x) = (&front.capsule, &rear.capsule);
     if !path.in_order(rear.span.1, front.span.0) || !u.product(x, true).is_positive() {
         return None;
@@ -42,11 +51,7 @@ pub(super) fn follower_within(path: &ExactPath, front: &Spanned, rear: &Spanned,
         let first = beyond(front.capsule.distance_squared(rear.first));
         (Front::Unknown, first && within(front.capsule.distance_squared(rear.last)))
     };
-    let near = || {
-        path.turning(rear.span.0, front.span.1) < QUARTER
-            || nearer(path, front, Span(rear.span.1, front.span.1), link, MOST_HALVINGS)
-    };
-    (holds && near()).then_some(sign)
+    holds.then_some(sign)
 }
 
 /// Whether every place of a stretch is proved to be of kind (a) or (b).

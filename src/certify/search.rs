@@ -3,16 +3,14 @@
 
 use std::io;
 
-use super::capsule::{Span, Spanned};
+use super::capsule::Spanned;
 use super::interval::Interval;
-use super::knot::{Knot, place, span};
+use super::knot::{Knot, place};
 use super::lines::{Line, Links, Outcome, Status};
-use super::link::all_nearer;
 use super::path::{ExactPath, Place};
 use super::step::{Chain, Claim, Obstacle, Shown};
 use super::{CertifyError, Given};
 use crate::model::path::Path;
-use crate::model::root::golden_section_min;
 use crate::motion::event::{Event, EventKind};
 
 /// Seconds on each side of an event between which it is proved to be.
@@ -27,14 +25,6 @@ const SHRINK: f64 = 0.5;
 
 /// How near an event, in links, a step that cannot be shown is taken to be in the way of the event's own proof.
 const NEAR: f64 = 1e-3;
-
-/// Places between the handles of a link at which a nearer follower is looked for, and how many times as far from the
-/// follower as the one before each is.
-const JUMP_SAMPLES: i32 = 400;
-const JUMP_RATIO: f64 = 1.05;
-
-/// Halvings of the stretch in which a link that locks has no follower any more.
-const LOCK_HALVINGS: u32 = 12;
 
 pub(super) struct Search<'a, 'w> {
     given: Given<'a>,
@@ -352,9 +342,9 @@ impl<'a, 'w> Search<'a, 'w> {
             let Some(handles) = self.chain.spans(&mut self.at, &mut to, link) else { continue };
             let mut end = to.clone();
             let Some(last) = self.chain.spans(&mut to, &mut end, link) else { continue };
-            let (window, jump) = match self.window(link, &handles[link], &last[link]) {
+            let (window, jump) = match self.chain.lock_window(&mut self.at, link, &handles[link], &last[link]) {
                 Some(window) => (Some(window), None),
-                None => (None, self.jump(link, &handles[link], &last[link])),
+                None => (None, self.chain.lock_jump(&mut self.at, link, &handles[link], &last[link])),
             };
             if window.is_none() && jump.is_none() {
                 continue;
@@ -366,76 +356,6 @@ impl<'a, 'w> Search<'a, 'w> {
             return Ok(());
         }
         Err(Halt::Stuck(format!("whether link {link} locks there cannot be shown with doubles")))
-    }
-
-    /// A place ahead of the follower of a link that is nearer than the link for all of `front`, and one ahead of that which
-    /// is further away for all of `last`.
-    fn jump(&mut self, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
-        let Chain { path, team, .. } = self.chain;
-        self.at.extend_to(link + 1, path, team).ok()?;
-        let rear = self.at.handles[link + 1].param;
-        let exact = &self.chain.exact;
-        let square = self.chain.links[link.min(1)].square();
-        let (from, to) = (path.travelled(rear), path.travelled(self.at.handles[link].param));
-        let origin = last.first.map(Interval::middle);
-        let distance = |travelled: f64| {
-            let at = path.point(path.param_at(travelled));
-            (at.x - origin[0]).hypot(at.y - origin[1])
-        };
-        // The furthest place ahead of the first that is nearer than its neighbours, however near to the follower it is.
-        let sampled = |k: i32| from + (to - from) * JUMP_RATIO.powi(k - JUMP_SAMPLES);
-        let falling = (1..JUMP_SAMPLES).find(|k| distance(sampled(*k)) > distance(sampled(k - 1)))?;
-        let peak = (falling..JUMP_SAMPLES).max_by(|j, k| distance(sampled(*j)).total_cmp(&distance(sampled(*k))))?;
-        let (_, top) = golden_section_min(|at| -distance(at), sampled(peak - 1), sampled(peak + 1));
-        let at = |travelled: f64| exact.moved(place(path.param_at(travelled)), 0.0);
-        let (between, beyond) = (at(sampled(falling - 1)), at(top));
-        let point = |place: Place| exact.curve(place).point(place.1);
-        let holds = exact.in_order(span(exact, rear, rear, 0.0).1, between)
-            && exact.in_order(between, beyond)
-            && exact.in_order(beyond, front.span.0)
-            && front.capsule.distance_squared(point(between)).is_below(square)
-            && square.is_below(last.capsule.distance_squared(point(beyond)));
-        holds.then_some(Span(between, beyond))
-    }
-
-    /// Places behind and ahead of the follower of a link that it cannot pass while the front is in `front`, and between
-    /// which there is none for any front in `last`.
-    fn window(&mut self, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
-        let Chain { path, team, .. } = self.chain;
-        self.at.extend_to(link + 1, path, team).ok()?;
-        let (before, rear) = (self.at.handles[link].param, self.at.handles[link + 1].param);
-        let origin = path.point(before);
-        // Where the distance is greatest: the rear product changes its sign some way behind the follower.
-        let product = |metres: f64| {
-            let place = path.param_at(path.travelled(rear) - metres);
-            path.tangent(place).dot(&(origin - path.point(place)))
-        };
-        let mut beyond = 1e-9 * team.link(link);
-        while product(beyond) > 0.0 {
-            beyond *= 2.0;
-            if beyond > team.link(link) {
-                return None;
-            }
-        }
-        let top = crate::model::root::bisect_predicate(|metres| product(metres) <= 0.0, 0.0, beyond);
-        let exact = &self.chain.exact;
-        let length = self.chain.links[link.min(1)];
-        let square = length.square();
-        let follower = span(exact, rear, rear, 0.0);
-        [2.0, 4.0, 16.0, 64.0].iter().find_map(|wider| {
-            let behind = path.param_at(path.travelled(rear) - top * (1.0 + wider));
-            let ahead = path.param_at(path.travelled(rear) + top * wider);
-            let window = Span(exact.moved(place(behind), 0.0), exact.moved(place(ahead), 0.0));
-            let near =
-                |place: Place| front.capsule.distance_squared(exact.curve(place).point(place.1)).is_below(square);
-            let holds = exact.in_order(window.0, follower.0)
-                && exact.in_order(follower.1, window.1)
-                && exact.in_order(window.1, front.span.0)
-                && near(window.0)
-                && near(window.1)
-                && all_nearer(exact, last, window, length, LOCK_HALVINGS);
-            holds.then_some(window)
-        })
     }
 }
 

@@ -169,6 +169,11 @@ impl<'c, 'a> Listed<'c, 'a> {
         Self { chain, handles, pad: 0.0, pads, body_forward: true }
     }
 
+    /// Goes on behind handles that are enclosed already, the last of them in exactly the span between two knots.
+    pub fn behind(chain: &'c Chain<'a>, handles: Vec<Spanned>, pads: f64) -> Self {
+        Self { chain, handles, pad: 0.0, pads, body_forward: true }
+    }
+
     /// Whether a handle is on a straight line without a beginning.
     pub fn is_on_line(&self, handle: usize) -> bool {
         let Chain { exact, .. } = self.chain;

@@ -166,7 +166,7 @@ fn proof_sentence(scene: &Scene, enclosure: Option<ClearanceEnclosure>) -> Strin
             format!(
                 "Proved: up to t = {} s no two boards are nearer than {lo} m; at t = {at} s two are no further apart than \
                  {hi} m. Not decided beyond.",
-                until.next_down()
+                until.next_down().max(0.0)
             )
         }
     }
@@ -188,7 +188,7 @@ fn clearance_line(
         },
         proved_until: enclosure
             .and_then(|enclosure| enclosure.until)
-            .map(|until| scene.motion.time_at(until).next_down()),
+            .map(|until| scene.motion.time_at(until).next_down().max(0.0)),
         time: enclosure.map(|enclosure| scene.motion.time_at(enclosure.travelled)),
         bench_a: enclosure.map(|enclosure| enclosure.bench_a),
         bench_b: enclosure.map(|enclosure| enclosure.bench_b),
