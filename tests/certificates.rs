@@ -161,7 +161,7 @@ fn boards_that_pass_within_micrometres_are_told_from_boards_that_touch() {
     // The least pitch with which the head comes to 4.5 m: a little below, two boards touch outside, a little above they
     // pass, and touch further in.
     let team = *Scene::paper().team();
-    let least = bench_dragon::plan::least_pitch(&team, 4.5, &mut |_| ()).unwrap().value;
+    let least = bench_dragon::plan::least_pitch(&team, 4.5, &mut |_| ()).unwrap().value_lo;
     let contact = |pitch: f64| {
         let scene = pitched(pitch);
         let (outcomes, timeline) = outcomes(&scene, MOST_STEPS);

@@ -1,4 +1,4 @@
-//! The proved enclosure of a show's least clearance against poses of the brute force that `tests/judge` has, with distances
+//! The proved enclosures of a show's least clearance and of the least pitch against poses of the brute force that `tests/judge` has, with distances
 //! by parry2d.
 
 #[path = "judge/chain.rs"]
@@ -15,7 +15,7 @@ mod links;
 mod scenes;
 
 use bench_dragon::certify::{ClearanceEnclosure, enclose_least_clearance};
-use bench_dragon::plan::{PitchEnclosure, enclose_least_pitch, least_pitch};
+use bench_dragon::plan::{LeastPitch, Overlap, least_pitch};
 use bench_dragon::scene::Scene;
 use parry2d_f64::math::Pose as At;
 use parry2d_f64::query;
@@ -119,31 +119,97 @@ fn random_shows_are_no_nearer_than_is_proved() {
     assert!(tried >= 20 && proved >= 14, "{proved} of {tried}");
 }
 
+/// The least pitch of the team of a scene, held against the brute force: where the two boards overlap with `value_lo`, and
+/// all boards near the head, densely on the last turns, with `value_hi`.
+fn least_pitch_compared(text: &str, radius: f64) -> LeastPitch {
+    let scene = Scene::parse(text, "test", "test").unwrap();
+    let plan = least_pitch(scene.team(), radius, &mut |_| ()).unwrap();
+    println!("{plan:?}");
+    let (lo, hi) = (plan.value_lo, plan.value_hi.unwrap());
+    assert!(plan.proved && plan.from == 0.5 * scene.team().width && hi - lo <= 1e-9, "{plan:?}");
+    let Overlap { bench_a, bench_b, head_radius } = plan.overlap.unwrap();
+    let longest = scene.team().longest_link();
+    let least = |pitch: f64, sampled: bool| {
+        let turns = radius.max(longest) / pitch + 3.0;
+        let mut scene: toml::Table = text.parse().unwrap();
+        let path = scene["path"].as_table_mut().unwrap();
+        path.insert("pitch".into(), pitch.into());
+        path.insert("start_turn".into(), turns.into());
+        let benches =
+            scene["team"]["benches"].as_integer().unwrap().min(if sampled { 60 } else { i64::from(bench_b) + 1 });
+        scene["team"].as_table_mut().unwrap().insert("benches".into(), benches.into());
+        let text = toml::to_string(&scene).unwrap();
+        let (team, path) = scenes::read(&text);
+        let along = bench_dragon::model::path::Path::spiral(pitch, turns);
+        let travelled =
+            |radius: f64| along.length() - bench_dragon::model::path::Path::spiral(pitch, radius / pitch).length();
+        let chain = chain::Chain::new(&path, &team);
+        if sampled {
+            let end = travelled(radius);
+            let moments = (0..=600).map(|k| end * f64::from(k) / 600.0);
+            return moments.map(|at| least_distance(&team, &chain.pose(at), 0.0)).fold(f64::INFINITY, f64::min);
+        }
+        let (touch, end) = (travelled(head_radius), travelled(radius));
+        let moments = (-400..=400).map(|k| (touch + 1e-5 * f64::from(k)).min(end));
+        let pair = [bench_a as usize, bench_b as usize];
+        moments.map(|at| distance(&team, &chain.pose(at), pair)).fold(f64::INFINITY, f64::min)
+    };
+    let (below, above, all) = (least(lo - 1e-6, false), least(hi + 1e-8, false), least(hi + 1e-8, true));
+    println!("{below} {above} {all}");
+    assert!(below == 0.0 && above > 0.0 && all > 0.0, "{below} {above} {all} {plan:?}");
+    plan
+}
+
 #[test]
 fn the_least_pitch_to_4_5_m_is_enclosed_to_a_nanometre() {
-    let scene = Scene::parse(&config("paper"), "test", "test").unwrap();
-    let found = least_pitch(scene.team(), 4.5, &mut |_| ()).unwrap();
-    let enclosure = enclose_least_pitch(scene.team(), 4.5, &found, &mut |_| ());
-    println!("{enclosure:?}");
-    let PitchEnclosure { lo, hi, from, .. } = enclosure;
-    let (lo, hi) = lo.zip(hi).unwrap();
-    assert!(from == 0.15 && lo <= LEAST_PITCH && LEAST_PITCH <= hi && hi - lo <= 1e-9, "{enclosure:?}");
-    // The brute force, where the two boards touch: apart with the upper pitch, overlapping with the lower one.
-    let least = |pitch: f64| {
-        let text = config("paper").replace("pitch = 0.55", &format!("pitch = {pitch}")).replace("= 223", "= 21");
-        let (team, path) = scenes::read(&text);
-        let scene = Scene::parse(&text, "test", "test").unwrap();
-        let along = scene.motion.path();
-        let chain = chain::Chain::new(&path, &team);
-        let radius = |at: f64| along.point(along.param_at(at)).coords.norm();
-        let (mut outside, mut inside) = (0.0, along.length());
-        for _ in 0..80 {
-            let middle = 0.5 * (outside + inside);
-            if radius(middle) > found.head_radius { outside = middle } else { inside = middle }
-        }
-        let moments = (-400..=400).map(|k| outside + 1e-5 * f64::from(k));
-        let gaps = moments.map(|at| distance(&team, &chain.pose(at), [found.bench_a as usize, found.bench_b as usize]));
-        gaps.fold(f64::INFINITY, f64::min)
+    let plan = least_pitch_compared(&config("paper"), 4.5);
+    assert!(plan.value_lo <= LEAST_PITCH && LEAST_PITCH <= plan.value_hi.unwrap(), "{plan:?}");
+}
+
+#[test]
+fn least_pitches_of_other_teams_and_radii_are_those_of_the_brute_force() {
+    // Benches, lengths of the boards, width, inset, radius. Boards that touch a turn apart, at the radius and outside, pairs
+    // (0, k) and (1, k); wide boards that touch the next but one; a radius below half a link.
+    let teams = [
+        (20, 0.52, 0.57, 0.054, 0.135, 0.18),
+        (20, 0.67, 0.4, 0.15, 0.05, 0.9),
+        (300, 2.2, 2.2, 1.98, 0.275, 1.65),
+        (60, 1.1, 1.1, 0.5, 0.05, 1.0),
+        (5000, 1.8, 1.1, 0.5, 0.05, 3.0),
+        (5000, 0.25, 0.4, 0.36, 0.05, 0.09),
+    ];
+    for (benches, head, body, width, inset, radius) in teams {
+        let text = format!(
+            "[team]\nbenches = {benches}\nhead_length = {head}\nbody_length = {body}\nwidth = {width}\n\
+             hole_inset = {inset}\n[path]\nkind = \"spiral\"\npitch = 1.0\nstart_turn = 12\n[motion]\nhead_speed = 1.0\n"
+        );
+        least_pitch_compared(&text, radius);
+    }
+}
+
+#[test]
+fn a_link_that_locks_with_any_less_is_proved_too() {
+    // The head's link is more than twice the radius.
+    let team = bench_dragon::model::team::Team {
+        benches: 8,
+        head_length: 0.542,
+        body_length: 0.33,
+        width: 0.15,
+        hole_inset: 0.015,
     };
-    assert!(least(hi + 1e-8) > 0.0 && least(lo - 1e-8) == 0.0);
+    let plan = least_pitch(&team, 0.18, &mut |_| ()).unwrap();
+    println!("{plan:?}");
+    let (lo, hi) = (plan.value_lo, plan.value_hi.unwrap());
+    assert!(plan.proved && plan.overlap.is_none() && hi - lo <= 1e-9, "{plan:?}");
+    // Points of the spiral at which the head's rear handle may be: the first peak of the distance from the radius.
+    let peak = |pitch: f64| {
+        let (a, link) = (pitch / std::f64::consts::TAU, 0.512);
+        let theta = 0.18 / a;
+        let distance = |delta: f64| {
+            let (one, other) = (a * theta, a * (theta + delta));
+            (one * one + other * other - 2.0 * one * other * delta.cos()).sqrt()
+        };
+        (0..=470_000).map(|k| distance(1e-5 * f64::from(k))).fold(0.0, f64::max) - link
+    };
+    assert!(peak(lo - 1e-6) < 0.0 && peak(hi + 1e-6) > 0.0, "{} {}", peak(lo - 1e-6), peak(hi + 1e-6));
 }

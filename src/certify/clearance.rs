@@ -235,10 +235,24 @@ impl<'a> Descent<'a> {
         self.chain.exact.travelled(self.at.head).lo.max(0.0)
     }
 
+    /// The same steps on an inward spiral alone, where it is known that no two boards touch and no link locks with the head,
+    /// or with the front handle of any other link, at the first place or further out: then the first two links are enough
+    /// from there on ("The least pitch" in `docs/proofs.md`).
+    pub fn after_all_further_out(mut self) -> Self {
+        self.links = Links::Front;
+        self.chain.start = Some(Place(0, f64::INFINITY));
+        self
+    }
+
+    /// Where the head is.
+    pub fn head(&self) -> Place {
+        self.at.head
+    }
+
     /// Whether no two boards touch, and no link locks, from the start to `target`.
-    pub fn stays_clear_to(mut self, target: &Knot) -> bool {
+    pub fn stays_clear_to(mut self, target: &Knot, progress: &mut dyn FnMut(f64)) -> bool {
         self.floor = Some(0.0);
-        self.go_to(target, &mut |_| ()).is_none()
+        self.go_to(target, progress).is_none()
     }
 
     /// The least clearance of a show that is frozen from its start.

@@ -1,17 +1,20 @@
-//! Teams on spirals of all pitches between two: boards that overlap with each of them, and a pitch with which none touch. Only
-//! [`super`] uses it; [`crate::plan`] calls what it exports. "The least pitch" in `docs/proofs.md`.
+//! Teams on inward spirals: boards that overlap with each of the pitches between two, and a pitch with which none touch, from
+//! however far the head comes. Only [`super`] uses it; [`crate::plan`] calls what it exports. "The least pitch" and Lemma 8 in
+//! `docs/proofs.md`.
 //!
 //! With the spiral's a = pitch / 2 pi as the unit of length every spiral is the same, and the team's lengths are intervals.
+
+mod far;
 
 use super::boards::Shape;
 use super::capsule::Span;
 use super::clearance::Descent;
-use super::elementary::pi;
+use super::elementary::{pi, sin_cos};
 use super::interval::Interval;
 use super::knot::Knot;
 use super::lines::Links;
 use super::path::{ExactPath, Place};
-use super::step::{Chain, Claim, Listed, PADS};
+use super::step::{Chain, Claim, Listed, PADS, links_of};
 use crate::model::description::PathDescription;
 use crate::model::path::Path;
 use crate::model::team::Team;
@@ -37,13 +40,9 @@ impl Pitches<'_> {
         Interval { lo: self.from, hi: self.to }.over(pi() * 2.0)
     }
 
-    /// Whether with each of them the head is further than `radius` metres from the centre, but by less than `turns` turns
-    /// further than `outer` metres are.
-    pub fn are_between(&self, radius: f64, outer: f64, turns: f64) -> bool {
-        let a = self.radius_per_radian();
-        let theta = Interval::point(self.theta);
-        let begin = Interval::point(outer).over(a) + pi() * 2.0 * turns;
-        Interval::point(radius).over(a).is_below(theta) && theta.is_below(begin)
+    /// Whether with each of them the head is further than `radius` metres from the centre.
+    pub fn are_outside(&self, radius: f64) -> bool {
+        Interval::point(radius).over(self.radius_per_radian()).is_below(Interval::point(self.theta))
     }
 
     /// Whether with each of them the two boards are proved to overlap.
@@ -75,14 +74,73 @@ impl Pitches<'_> {
     }
 }
 
-/// Whether it is proved that a team whose head starts on turn `start_turn` of an inward spiral has no two boards that touch
-/// and no link that locks until its front handle is `radius` metres from the centre.
-pub(crate) fn reaches(team: &Team, pitch: f64, start_turn: f64, radius: f64, most_steps: u64) -> bool {
+/// Pieces of three quarters of a turn that are looked at for a lock.
+const MOST_PIECES: u32 = 10_000;
+
+/// Whether it is proved that the head's link locks before the head, coming from far outside, is `radius` metres from the
+/// centre, with every pitch from one to another.
+pub(crate) fn head_locks(team: &Team, (from, to): (f64, f64), radius: f64) -> bool {
+    let radians = |metres: Interval, pitch: f64| metres.over(Interval::point(pitch).over(pi() * 2.0));
+    let theta = Interval::point(radians(Interval::point(radius), from).hi);
+    let square = radians(links_of(team)[0], to).square();
+    // The greatest of D = theta^2 + (theta + delta)^2 - 2 theta (theta + delta) cos delta over pieces, by Taylor's formula.
+    let mut pieces = vec![(0.0, 1.5 * pi().hi)];
+    let mut looked_at = 0;
+    while let Some((first, last)) = pieces.pop() {
+        looked_at += 1;
+        let middle = 0.5 * first + 0.5 * last;
+        if looked_at > MOST_PIECES || middle <= first || middle >= last {
+            return false;
+        }
+        let (sine, cosine) = sin_cos(middle);
+        let rear = theta + Interval::point(middle);
+        let both = theta * rear * 2.0;
+        let at = theta.square() + rear.square() - both * cosine;
+        let slope = (rear - theta * cosine) * 2.0 + both * sine;
+        // D'' = 2 + 4 theta sin delta + 2 theta (theta + delta) cos delta.
+        let most = Interval::point(2.0) + theta * 4.0 + theta * (theta + Interval::point(last)) * 2.0;
+        let half =
+            (Interval::point(last) - Interval::point(middle)).max(Interval::point(middle) - Interval::point(first));
+        let above = slope.abs() * half + most * half.square() * 0.5;
+        if !(at + above).is_below(square) {
+            if !at.is_below(square) {
+                return false;
+            }
+            pieces.extend([(first, middle), (middle, last)]);
+        }
+    }
+    Interval::ONE.is_below(theta)
+}
+
+/// Metres from the centre beyond which no two boards touch and no link locks, wherever further out the head is: little more
+/// than the least for which Lemma 8 shows that, if not below `radius`. `None` where it shows it of none that is sensible.
+pub(crate) fn clear_beyond(team: &Team, pitch: f64, radius: f64) -> Option<f64> {
+    far::least_radius(team, pitch, radius)
+}
+
+/// Turns from which on no steps are tried: what a scene may have.
+const MOST_TURNS: f64 = 1e7;
+
+/// Whether it is proved that a team whose head comes in on a spiral of this pitch, from however far, has no two boards that
+/// touch and no link that locks until its front handle is `radius` metres from the centre. `progress` gets the share of the
+/// way that is done.
+pub(crate) fn reaches(team: &Team, pitch: f64, radius: f64, most_steps: u64, progress: &mut dyn FnMut(f64)) -> bool {
+    let Some(begin) = clear_beyond(team, pitch, radius) else { return false };
+    if begin <= radius {
+        return true;
+    }
+    // The head begins a little further out, or by rounding a little less so: that is looked at below.
+    let start_turn = begin * (1.0 + 1e-9) / pitch;
+    if start_turn > MOST_TURNS {
+        return false;
+    }
     let description = PathDescription::Spiral { pitch, start_turn };
     let path = Path::spiral(pitch, start_turn);
     let exact = ExactPath::new(&description);
-    let theta = Interval::point(radius).over(Interval::point(pitch).over(pi() * 2.0)).lo;
+    let a = Interval::point(pitch).over(pi() * 2.0);
+    let theta = Interval::point(radius).over(a).lo;
     let end = Knot::at(Place(0, theta), exact.travelled(Place(0, theta)).middle());
     let travelled = end.travelled;
-    Descent::new(Chain::new(&path, exact, team), travelled, most_steps).stays_clear_to(&end)
+    let descent = Descent::new(Chain::new(&path, exact, team), travelled, most_steps).after_all_further_out();
+    begin <= (a * descent.head().1).lo && descent.stays_clear_to(&end, progress)
 }

@@ -71,11 +71,14 @@ const PAD: f64 = 64.0 * f64::EPSILON;
 /// How many times that is tried, in turn.
 pub(super) const PADS: [f64; 3] = [1.0, 16.0, 256.0];
 
+/// Metres between the handles of the head's bench, and of every other.
+pub(super) fn links_of(team: &Team) -> [Interval; 2] {
+    [team.head_length, team.body_length].map(|length| Interval::point(length) - Interval::point(team.hole_inset) * 2.0)
+}
+
 impl<'a> Chain<'a> {
     pub fn new(path: &'a Path, exact: ExactPath, team: &'a Team) -> Self {
-        let link = |length: f64| Interval::point(length) - Interval::point(team.hole_inset) * 2.0;
-        let links = [link(team.head_length), link(team.body_length)];
-        Self { path, exact, team, links, shape: Shape::new(team), start: None }
+        Self { path, exact, team, links: links_of(team), shape: Shape::new(team), start: None }
     }
 
     /// Metres between the handles of a bench.

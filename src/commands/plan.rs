@@ -1,8 +1,6 @@
 //! `plan`: answers for a choreographer, with where they are decided.
 
-use bench_dragon::plan::{
-    GreatestSpeed, LeastPitch, PitchEnclosure, PlanError, enclose_least_pitch, greatest_speed, least_pitch,
-};
+use bench_dragon::plan::{GreatestSpeed, LeastPitch, Overlap, PlanError, greatest_speed, least_pitch};
 use bench_dragon::scene::Accepted;
 use serde::Serialize;
 
@@ -23,9 +21,6 @@ enum Question {
         /// Metres from the centre that the front handle of the head is to reach
         #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
         reach_radius: f64,
-        /// Prove it: enclose it within a nanometre, rounding included; some seconds
-        #[arg(long)]
-        prove: bool,
     },
     /// The greatest constant speed of the head at which no handle of the show is ever faster than a limit
     Speed {
@@ -39,20 +34,13 @@ enum Question {
 #[derive(Serialize)]
 struct PitchLine {
     plan: &'static str,
-    value: f64,
-    bench_a: u32,
-    bench_b: u32,
-    head_radius: f64,
-    #[serde(flatten)]
-    enclosure: Option<PitchProof>,
-}
-
-/// What `--prove` adds to it.
-#[derive(Serialize)]
-struct PitchProof {
-    value_lo: Option<f64>,
-    value_hi: Option<f64>,
     status: &'static str,
+    value: Option<f64>,
+    value_lo: f64,
+    value_hi: Option<f64>,
+    bench_a: Option<u32>,
+    bench_b: Option<u32>,
+    head_radius: Option<f64>,
 }
 
 /// The line of `plan speed --json`.
@@ -71,61 +59,56 @@ struct SpeedLine {
 /// Answers the question.
 pub fn plan(common: &Common, arguments: &PlanArguments) -> Result<(), CommandError> {
     match arguments.question {
-        Question::Pitch { reach_radius, prove } => plan_pitch(common, reach_radius, prove),
+        Question::Pitch { reach_radius } => plan_pitch(common, reach_radius),
         Question::Speed { max_handle_speed } => plan_speed(common, max_handle_speed),
     }
 }
 
-fn plan_pitch(common: &Common, radius: f64, prove: bool) -> Result<(), CommandError> {
+fn plan_pitch(common: &Common, radius: f64) -> Result<(), CommandError> {
     Accepted::LENGTH.check("--reach-radius", radius).map_err(CommandError::BadInput)?;
     let scene = common.load_scene()?;
     let bar = progress_bar(1000, common).with_message("searching for the pitch");
     let found = least_pitch(scene.team(), radius, &mut |share| bar.set_position((1000.0 * share) as u64));
     bar.finish_and_clear();
-    let found = found?;
-    let enclosure = prove.then(|| {
-        let bar = progress_bar(1000, common).with_message("proving the pitch");
-        let mut progress = |share| bar.set_position((1000.0 * share) as u64);
-        let enclosure = enclose_least_pitch(scene.team(), radius, &found, &mut progress);
-        bar.finish_and_clear();
-        enclosure
-    });
-    let LeastPitch { value, bench_a, bench_b, head_radius } = found;
+    let LeastPitch { value_lo, value_hi, from, overlap, proved, intervals } = found?;
     let mut output = Output::standard();
     if common.json {
-        let enclosure = enclosure.map(|enclosure| PitchProof {
-            value_lo: enclosure.lo,
-            value_hi: enclosure.hi,
-            status: if enclosure.is_complete() { "proved" } else { "given_up" },
-        });
-        output.json(&PitchLine { plan: "pitch", value, bench_a, bench_b, head_radius, enclosure })?;
-    } else {
-        output.line(&format!("The least pitch with which the head reaches {radius} m is {value:.10} m per turn."))?;
+        let status = if proved { "proved" } else { "given_up" };
+        let (bench_a, bench_b) = (overlap.map(|overlap| overlap.bench_a), overlap.map(|overlap| overlap.bench_b));
+        let (value, head_radius) = (value_hi, overlap.map(|overlap| overlap.head_radius));
+        output.json(&PitchLine { plan: "pitch", status, value, value_lo, value_hi, bench_a, bench_b, head_radius })?;
+        return output.finish();
+    }
+    if let Some(value_hi) = value_hi {
         output.line(&format!(
-            "At that pitch {} and {} (counting from 1) just touch, the head being {head_radius:.6} m from the centre.",
+            "With a pitch of {value_hi} m the head reaches {radius} m, and no two boards touch before."
+        ))?;
+    }
+    if let Some(Overlap { bench_a, bench_b, head_radius }) = overlap {
+        output.line(&format!(
+            "With {value_lo} m {} and {} (counting from 1) overlap, the head being {head_radius:.6} m from the centre.",
             bench_name(&scene, bench_a),
             bench_name(&scene, bench_b)
         ))?;
-        if let Some(enclosure) = enclosure {
-            output.line(&proof_sentence(&enclosure))?;
-        }
     }
+    let blocked = format!(
+        "with every pitch from {from} m to {value_lo} m two boards overlap, or a link locks, before {radius} m"
+    );
+    let searched = format!("the search was given up after {intervals} intervals of pitches");
+    output.line(&match value_hi {
+        Some(value_hi) if proved => format!(
+            "Proved in {intervals} intervals of pitches: the least such pitch is from {value_lo} to {value_hi} m. Pitches below \
+             {from} m are not looked at, and of those above {value_hi} m nothing is claimed."
+        ),
+        Some(value_hi) if intervals > 0 => format!(
+            "Not decided to a nanometre: {searched}. What is proved: the least such pitch is from {value_lo} to {value_hi} m. \
+             Pitches below {from} m are not looked at."
+        ),
+        Some(_) => "Not decided: it could not be proved that no smaller pitch will do.".to_owned(),
+        None if intervals > 0 => format!("Not decided: {searched}. What is proved: {blocked}."),
+        None => "Not decided: the search was given up, and nothing is proved.".to_owned(),
+    })?;
     output.finish()
-}
-
-/// Where the head begins whose way is proved.
-const COMING: &str = "the head coming from three turns outside the radius, or outside a link's length";
-
-/// What was proved of a pitch, for people.
-fn proof_sentence(PitchEnclosure { lo, hi, from, .. }: &PitchEnclosure) -> String {
-    let below =
-        lo.map(|lo| format!("with every pitch from {from} m to {lo} m two boards overlap before, or a link locks"));
-    let above = hi.map(|hi| format!("with {hi} m no two boards touch"));
-    match (above, below) {
-        (Some(above), Some(below)) => format!("Proved, {COMING}: {above}; {below}."),
-        (None, Some(one)) | (Some(one), None) => format!("Proved, {COMING}: {one}. No more could be proved."),
-        (None, None) => "Nothing of it could be proved.".to_owned(),
-    }
 }
 
 fn plan_speed(common: &Common, limit: f64) -> Result<(), CommandError> {

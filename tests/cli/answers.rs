@@ -35,18 +35,25 @@ fn plan_pitch_has_its_keys_for_every_team_and_the_bits_of_the_library() {
     for scene in teams {
         let line = scene.answer(&[&["--json"], &PLAN_PITCH[..]].concat());
         let plan: Value = serde_json::from_str(&line).unwrap();
-        assert_keys(&plan, &["plan", "value", "bench_a", "bench_b", "head_radius"]);
-        assert_eq!(plan["plan"], "pitch");
+        let keys = ["plan", "status", "value", "value_lo", "value_hi", "bench_a", "bench_b", "head_radius"];
+        assert_keys(&plan, &keys);
+        assert_eq!((&plan["plan"], &plan["status"]), (&"pitch".into(), &"proved".into()), "{}", scene.name);
         let [a, b] = ["bench_a", "bench_b"].map(|key| plan[key].as_u64().unwrap() as usize);
         assert!(a + 1 < b && b < scene.benches(), "{}: {plan}", scene.name);
-        assert!(plan["head_radius"].as_f64().unwrap() >= REACH, "{}: {plan}", scene.name);
+        let [value, value_lo, value_hi, _, _, radius] = numbers(&line)[..] else { panic!("{line}") };
+        assert!(same_bits(value, value_hi) && value_lo < value_hi && value_hi - value_lo <= 1e-9, "{plan}");
+        assert!(radius >= REACH, "{}: {plan}", scene.name);
         if scene.name == "school" {
             let known = least_pitch(scene.load().team(), REACH, &mut |_| ()).unwrap();
-            let [value, .., radius] = numbers(&line)[..] else { panic!("{line}") };
-            assert!(same_bits(value, known.value) && same_bits(radius, known.head_radius), "{line} {known:?}");
+            let overlap = known.overlap.unwrap();
+            let bounds =
+                [(value_lo, known.value_lo), (value_hi, known.value_hi.unwrap()), (radius, overlap.head_radius)];
+            assert!(bounds.into_iter().all(|(printed, known)| same_bits(printed, known)), "{line} {known:?}");
             let printed = scene.answer(&PLAN_PITCH);
-            assert!(printed.contains("4.5 m") && printed.contains(&format!("{value:.10} m per turn")), "{printed}");
+            assert!(printed.contains("4.5 m") && printed.contains(&format!("a pitch of {value} m")), "{printed}");
             assert!(printed.contains(&format!("bench {}", b + 1)) && printed.contains("counting from 1"), "{printed}");
+            assert!(printed.contains(&format!("from {value_lo} to {value_hi} m")), "{printed}");
+            assert!(printed.contains("Proved"), "{printed}");
         }
     }
 }
