@@ -236,7 +236,7 @@ fn publish_over_iceoryx2(bencher: Bencher) {
         subscribers: 8,
         alerts: true,
         cues: false,
-        stage: stage(1, 0, &scene.motion, &show),
+        stage: stage(1, 0, [0; 32], &scene.motion, &show),
     };
     let mut publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");
     let frame = show.frame(0);

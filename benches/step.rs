@@ -161,7 +161,7 @@ fn publisher_and_subscriber(name: &str, scene: &Scene, show: &Show) -> (SharedMe
         subscribers: 1,
         alerts: true,
         cues: false,
-        stage: stage(1, 0, &scene.motion, show),
+        stage: stage(1, 0, [0; 32], &scene.motion, show),
     };
     let publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");
     let subscription = Subscription::new(name, Wake::Never).expect("the publisher has taken this name");

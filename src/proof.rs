@@ -1,5 +1,5 @@
-//! The checker of certificates of events: what docs/proofs.md says of a file, and nothing else. `bench-dragon verify` is
-//! its only caller.
+//! The checker of certificates of events: what docs/proofs.md says of a file, and nothing else. `verify`,
+//! `check --certificate` and `view --certificate` call it.
 //!
 //! In: the lines of a certificate. Out: what it proves, or the first line that does not follow. It uses no other room:
 //! no geometry, no parsing and no solver of the program, only that page, which it has in common with the search.
@@ -76,6 +76,16 @@ pub enum Refused {
     },
 }
 
+/// The text of the scene that a certificate is about, from its first line. Nothing else of it is checked.
+///
+/// # Errors
+/// [`Refused::Form`] for a line that is not the first of a certificate.
+pub fn scene_of(first_line: &[u8]) -> Result<String, Refused> {
+    let form = |problem: String| Refused::Form { line: 1, problem };
+    let parsed = serde_json::from_slice(first_line).map_err(|error| form(error.to_string()))?;
+    Ok(Checker::begin(parsed).map_err(form)?.proved.scene)
+}
+
 /// Checks a certificate. `progress` is told how many bytes have been read.
 ///
 /// # Errors
@@ -94,13 +104,7 @@ pub fn verify(mut lines: impl BufRead, progress: &mut dyn FnMut(u64)) -> Result<
         progress(bytes);
         let parsed: Line = serde_json::from_slice(&text).map_err(|error| form(error.to_string()))?;
         match (&mut checker, parsed) {
-            (None, Line::Certificate { format, version, scene }) => {
-                if format != FORMAT {
-                    return Err(form(format!("a certificate of format {format}, expected {FORMAT}")));
-                }
-                checker = Some(Checker::new(scene, version).map_err(form)?);
-            }
-            (None, _) => return Err(form("the first line is not that of a certificate".to_owned())),
+            (None, first) => checker = Some(Checker::begin(first).map_err(form)?),
             (Some(checker), parsed) => {
                 checker.add(parsed).map_err(|problem| Refused::DoesNotFollow { line, problem })?;
             }
@@ -122,7 +126,13 @@ struct Checker {
 }
 
 impl Checker {
-    fn new(text: String, version: String) -> Result<Self, String> {
+    fn begin(first: Line) -> Result<Self, String> {
+        let Line::Certificate { format, version, scene: text } = first else {
+            return Err("the first line is not that of a certificate".to_owned());
+        };
+        if format != FORMAT {
+            return Err(format!("a certificate of format {format}, expected {FORMAT}"));
+        }
         let scene = Scene::read(&text).map_err(|problem| format!("the scene: {problem}"))?;
         let proved = Proved { scene: text, version, results: Vec::new(), steps: 0, links: 0, pairs: 0 };
         Ok(Self { scene, steps: Steps::new(), events: Events::default(), proved })

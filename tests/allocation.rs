@@ -107,7 +107,7 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     let timeline = scene.motion.timeline(&mut |_| ());
     let show = Show::new(&scene, timeline, playback).unwrap();
     let name = format!("test_{}_allocation", std::process::id());
-    let config = TransportConfig::of(&name, &scene, 500.0, stage(1, 0, &scene.motion, &show));
+    let config = TransportConfig::of(&name, &scene, 500.0, stage(1, 0, [0; 32], &scene.motion, &show));
     let mut transports = transports::open(&config).unwrap();
     #[cfg(feature = "ros2")]
     {

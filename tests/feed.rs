@@ -126,7 +126,7 @@ fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {
     let scene = Scene::paper();
     let mut show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
     let name = unique("beside");
-    let stages = [7, 8].map(|run_id| stage(run_id, 0, &scene.motion, &show));
+    let stages = [7, 8].map(|run_id| stage(run_id, 0, [0; 32], &scene.motion, &show));
     let open = |stage| {
         let config = PublisherConfig {
             name: name.clone(),

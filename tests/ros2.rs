@@ -117,6 +117,8 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs
     assert_eq!(stages[0]["benches"], 223);
     assert_eq!(stages[0]["segments"], 1);
     assert_eq!(stages[0]["path"][0]["kind"], 2);
+    let scene_hash = blake3::hash(&std::fs::read(&scene).unwrap());
+    assert_eq!(stages[0]["scene_hash"], serde_json::json!(scene_hash.as_bytes()));
     assert_eq!(stages[0]["header"]["frame_id"], "stage");
 
     let handles = messages(&lines, "handles");

@@ -88,7 +88,7 @@ fn stage_of(path: &str) -> Stage {
     let scene = scene(path, 1.0, "");
     let scene = Scene { motion: scene.motion.with_method(Method::Newton).unwrap(), ..scene };
     let show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
-    stage(1, 2, &scene.motion, &show)
+    stage(1, 2, [0; 32], &scene.motion, &show)
 }
 
 /// Metres from the centre at which a spiral ends, by the numbers of its message alone.

@@ -443,10 +443,10 @@ class Stage(_Message):
     first segment begins, on the same spiral or line.
 
     Over iceoryx2 the payload of `<name>/stage`. Layout 2 added the segments of the path, layout 3 gave them their name,
-    layout 4 added the time line: the freeze time, the events and the cues.
+    layout 4 added the time line: the freeze time, the events and the cues, layout 5 the hash of the scene's text.
     """
 
-    LAYOUT = 4
+    LAYOUT = 5
     _fields_ = [
         # The run, as `FrameHeader.run_id`.
         ("run_id", ctypes.c_uint64),
@@ -474,6 +474,9 @@ class Stage(_Message):
         ("events", ctypes.c_uint32),
         # The number of cues in the show; the first 32 of them are listed.
         ("cues", ctypes.c_uint32),
+        # BLAKE3 of the scene's text, as `verify` prints it of a certificate: what is proved of that text is true of
+        # this show. All zero where it is not known.
+        ("scene_hash", ctypes.c_uint8 * 32),
         # The segments of the path in the order of travel; those not in use are zero.
         ("path", StageSegment * 32),
         # The events in order of time; those not in use are zero. Those after the freeze time are not reached.

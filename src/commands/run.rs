@@ -132,7 +132,8 @@ struct RunSession<'a> {
 impl RunSession<'_> {
     /// Opens what is published to, publishes, and prints the summary.
     fn run(&self, mut show: Show, stop: &AtomicBool) -> Result<(), CommandError> {
-        let stage = convert::stage(self.run_id, realtime_ns(), &self.scene.motion, &show);
+        let scene_hash = *blake3::hash(self.text.text.as_bytes()).as_bytes();
+        let stage = convert::stage(self.run_id, realtime_ns(), scene_hash, &self.scene.motion, &show);
         let config = TransportConfig::of(self.common.name(), self.scene, self.playback.rate, stage);
         let (mut transports, doors) = open_transports(&config)?;
         // The last of them: what reaches the log has been published.

@@ -2,11 +2,17 @@
 
 use std::io::ErrorKind;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use bench_dragon::subscribers::view::{AllowedOrigin, Ready, ViewError, ViewOptions, serve};
+use bench_dragon::proof::{Proved, Refused};
+use bench_dragon::subscribers::view::{
+    AllowedOrigin, Certificate, Proofs, Ready, ViewError, ViewOptions, hash_of, serve,
+};
 use serde::Serialize;
+use serde_json::json;
 
+use super::verify::certificate::reason;
 use super::{CommandError, Common, Output, stop_on_signals};
 
 /// Arguments of `view`.
@@ -27,6 +33,10 @@ pub struct ViewArguments {
     /// Serve the files of this folder below /pages/, for a page of one's own
     #[arg(long, value_name = "DIR")]
     pages: Option<PathBuf>,
+    /// A certificate of `events --certify`: it is checked while the page is served, and where a publisher shows that very
+    /// scene, the page says what is proved of its events; may be repeated
+    #[arg(long, value_name = "FILE")]
+    certificate: Vec<PathBuf>,
 }
 
 /// What `view --json` prints once browsers can connect.
@@ -43,9 +53,68 @@ struct ReadyLine {
 /// Serves the picture until a signal comes.
 pub fn view(common: &Common, arguments: &ViewArguments) -> Result<(), CommandError> {
     let stop = stop_on_signals()?;
-    let ViewArguments { port, listen, control, allow_origin, pages } = arguments.clone();
-    let options = ViewOptions { address: SocketAddr::new(listen, port), control, origins: allow_origin, pages };
-    serve(&common.names, options, &stop, |ready| announce(common, arguments, ready))
+    let ViewArguments { port, listen, control, allow_origin, pages, certificate } = arguments.clone();
+    let certificates = certificate.iter().map(|file| opened(file)).collect::<Result<Vec<_>, _>>()?;
+    let proofs = Arc::new(Proofs::expected(&certificates));
+    let address = SocketAddr::new(listen, port);
+    let options = ViewOptions { address, control, origins: allow_origin, pages, proofs: Arc::clone(&proofs) };
+    serve(&common.names, options, &stop, |ready| {
+        announce(common, arguments, ready)?;
+        check_in_background(certificates, proofs, common.json)
+    })
+}
+
+fn opened(file: &Path) -> Result<Certificate, CommandError> {
+    Certificate::open(file).map_err(|refused| {
+        let expected = match refused {
+            Refused::Unreadable(_) => "",
+            _ => ": expected a certificate as events --certify writes it",
+        };
+        CommandError::BadInput(reason(&file.display().to_string(), &refused) + expected)
+    })
+}
+
+/// Checks certificates one after another on a thread of its own, which ends with the process.
+fn check_in_background(certificates: Vec<Certificate>, proofs: Arc<Proofs>, json: bool) -> Result<(), CommandError> {
+    if certificates.is_empty() {
+        return Ok(());
+    }
+    std::thread::Builder::new().name("certificates".to_owned()).spawn(move || {
+        for certificate in certificates {
+            let shown = certificate.file().display().to_string();
+            let checked = certificate.check();
+            checked.iter().for_each(|proved| proofs.add(proved));
+            // Whoever read the output has gone; the page is still there.
+            let _ = report(&shown, checked, json);
+        }
+    })?;
+    Ok(())
+}
+
+/// Says what became of a certificate.
+fn report(shown: &str, checked: Result<Proved, Refused>, json: bool) -> Result<(), CommandError> {
+    let mut output = Output::standard();
+    match checked {
+        Ok(proved) => {
+            let scene = hash_of(&proved.scene).map(|byte| format!("{byte:02x}")).concat();
+            if json {
+                output
+                    .json(&json!({"type": "certificate", "file": shown, "verdict": "proved", "scene_hash": scene}))?;
+            } else {
+                output
+                    .line(&format!("{shown} proves what it says, of the scene whose text has the BLAKE3 {scene}."))?;
+            }
+        }
+        Err(refused) => {
+            let sentence = reason(shown, &refused);
+            log::error!("{sentence}: nothing is proved by this certificate");
+            if json {
+                let problem = json!({"type": "certificate", "file": shown, "verdict": "refused", "problem": sentence});
+                output.json(&problem)?;
+            }
+        }
+    }
+    output.finish()
 }
 
 fn announce(common: &Common, arguments: &ViewArguments, ready: &Ready) -> Result<(), CommandError> {

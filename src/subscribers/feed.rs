@@ -101,7 +101,7 @@ pub enum FeedEvent<'a> {
 ///     subscribers: 1,
 ///     alerts: true,
 ///     cues: false,
-///     stage: stage(1, 0, &scene.motion, &show),
+///     stage: stage(1, 0, [0; 32], &scene.motion, &show),
 /// };
 /// let mut publisher = SharedMemoryPublisher::open(&config)?;
 ///

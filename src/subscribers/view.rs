@@ -4,9 +4,10 @@
 //! Called by the `view` command. `reader` reads a publisher's shared memory on a thread of its own, since ports cannot leave
 //! the thread that made them, and hands the newest picture over; `browser` sends it to one browser at that one's pace, over
 //! one WebSocket for each publisher; `wire` is its layout on the way. `origin` is who may connect, `gate` who may command,
-//! and how.
+//! and how; `certificates` is what is proved of which scene.
 
 mod browser;
+mod certificates;
 mod gate;
 pub(in crate::subscribers) mod origin;
 mod reader;
@@ -34,6 +35,7 @@ use super::connection::Wake;
 use super::feed::{Feed, FeedOptions, Frames};
 use super::http::Listening;
 use crate::transports::iceoryx2::{OpenError, service_name};
+pub use certificates::{Certificate, Proofs, SceneHash, hash_of};
 use gate::Gate;
 pub use gate::Token;
 use origin::Admission;
@@ -91,6 +93,8 @@ pub struct ViewOptions {
     pub origins: Vec<AllowedOrigin>,
     /// A folder that is served below `/pages/`.
     pub pages: Option<PathBuf>,
+    /// What is proved of which scenes; it may grow while pages are served.
+    pub proofs: Arc<Proofs>,
 }
 
 /// What browsers need to connect.
@@ -142,7 +146,7 @@ pub fn serve<Refused: From<ViewError>>(
     stop: &Arc<AtomicBool>,
     ready: impl FnOnce(&Ready) -> Result<(), Refused>,
 ) -> Result<(), Refused> {
-    let ViewOptions { address, control, origins, pages } = options;
+    let ViewOptions { address, control, origins, pages, proofs } = options;
     names.iter().try_for_each(|name| service_name(name, "poses").map(drop)).map_err(ViewError::from)?;
     if let Some(folder) = &pages {
         std::fs::read_dir(folder).map_err(|source| ViewError::Pages { folder: folder.clone(), source })?;
@@ -160,9 +164,9 @@ pub fn serve<Refused: From<ViewError>>(
     for (name, gate) in names.iter().zip(gates) {
         let (sender, pictures) = watch::channel(Picture::default());
         channels.push(Channel { name: name.clone(), pictures, gate });
-        let (name, stop) = (name.clone(), Arc::clone(stop));
+        let (name, proofs, stop) = (name.clone(), Arc::clone(&proofs), Arc::clone(stop));
         readers.push(std::thread::spawn(move || {
-            let read = Feed::new(&name, FEED).map(|feed| reader::read(feed, &name, &sender, &stop));
+            let read = Feed::new(&name, FEED).map(|feed| reader::read(feed, &name, &proofs, &sender, &stop));
             stop.store(true, Ordering::Relaxed);
             read
         }));

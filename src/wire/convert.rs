@@ -15,8 +15,8 @@ use crate::solve::Chain;
 
 use super::layouts::{
     CollisionAlert, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32, MOST_CUES, MOST_EVENTS, MOST_SEGMENTS,
-    NO_BENCH, SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, SceneName, Stage, StageCue,
-    StageEvent, StageSegment,
+    NO_BENCH, SCENE_HASH_BYTES, SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, SceneName,
+    Stage, StageCue, StageEvent, StageSegment,
 };
 
 /// A route of the most steps, and the line on which its team stands, fit into a stage.
@@ -173,8 +173,9 @@ pub fn control_response(id: u64, outcome: &Outcome) -> ControlResponse {
     ControlResponse { id, tick, sim_time, time_scale, code, playback, cue, reserved: 0 }
 }
 
-/// The stage of a motion, and the time line of the show that plays it.
-pub fn stage(run_id: u64, stamp_ns: u64, motion: &Motion, show: &Show) -> Stage {
+/// The stage of a motion, and the time line of the show that plays it. `scene_hash` is BLAKE3 of the scene's text, zeros
+/// where there is none.
+pub fn stage(run_id: u64, stamp_ns: u64, scene_hash: [u8; SCENE_HASH_BYTES], motion: &Motion, show: &Show) -> Stage {
     let team = motion.team();
     let mut path = [StageSegment::default(); MOST_SEGMENTS];
     let (mut segments, mut pitch, mut start_turn) = (0, f64::NAN, f64::NAN);
@@ -209,6 +210,7 @@ pub fn stage(run_id: u64, stamp_ns: u64, motion: &Motion, show: &Show) -> Stage 
         segments,
         events: events.len().min(MOST_EVENTS) as u32,
         cues: show.cues().len() as u32,
+        scene_hash,
         path,
         timeline,
         cue_list,

@@ -100,6 +100,8 @@ pub struct StageObject {
     body_length: f64,
     width: f64,
     benches: u32,
+    /// In hexadecimal digits.
+    scene_hash: Option<String>,
     path: Vec<SegmentObject>,
     freeze_time: f64,
     events: Vec<EventObject>,
@@ -161,6 +163,7 @@ impl From<&Stage> for StageObject {
             body_length,
             width,
             benches,
+            scene_hash: stage.scene_hash_digits(),
             path: stage.path_in_use().iter().map(segment).collect(),
             freeze_time,
             events: stage.events_in_use().iter().map(event).collect(),

@@ -130,7 +130,7 @@ impl Step {
             subscribers: 1,
             alerts: true,
             cues: false,
-            stage: stage(1, 0, &scene.motion, &show),
+            stage: stage(1, 0, [0; 32], &scene.motion, &show),
         };
         let publisher = SharedMemoryPublisher::open(&config).unwrap();
         let connection = Subscription::new(&name, Wake::Never).unwrap().connect().unwrap().unwrap();

@@ -168,6 +168,7 @@ fn ros(format: &Format) -> String {
         Format::F32 => "float32".to_owned(),
         Format::U64 => "uint64".to_owned(),
         Format::U32 => "uint32".to_owned(),
+        Format::U8 => "uint8".to_owned(),
         Format::Str => "string".to_owned(),
         Format::TypeName(name) if name == "Header" => "std_msgs/Header".to_owned(),
         Format::TypeName(name) => name.clone(),
@@ -294,11 +295,14 @@ import ctypes, json, sys
 sys.path.insert(0, "examples/python")
 import bench_dragon_messages as m
 
-WORDS = {ctypes.c_double: "float64", ctypes.c_float: "float32", ctypes.c_uint64: "uint64", ctypes.c_uint32: "uint32"}
+WORDS = {ctypes.c_double: "float64", ctypes.c_float: "float32", ctypes.c_uint64: "uint64", ctypes.c_uint32: "uint32",
+         ctypes.c_uint8: "uint8"}
 
 def word(of):
     if issubclass(of, ctypes.Array):
-        return "string" if of._type_ is ctypes.c_uint8 else f"{word(of._type_)}[{of._length_}]"
+        # A text is as long as no array of other bytes is.
+        is_text = of._type_ is ctypes.c_uint8 and of._length_ == 64
+        return "string" if is_text else f"{word(of._type_)}[{of._length_}]"
     return WORDS.get(of) or of.__name__
 
 def layout(of):

@@ -97,6 +97,8 @@ def show_paints_nothing_but_the_picture():
         page.goto("about:blank")
         page.goto(f"{url}#show,transparent,nolabels")
         drawn(page)
+        # What was dimmed before the first frame takes a moment to be whole.
+        until(page, "getComputedStyle(document.getElementById('stage')).opacity === '1'", "a picture that is not dimmed")
         pixels, (x, y) = shot(page, omit_background=True), at(page, *((handles[100] + handles[101]) / 2)).astype(int)
         assert (pixels[[2, 2, -3, -3], [2, -3, 2, -3], 3] == 0).all(), "a transparent picture has a ground"
         assert pixels[y, x, 3] == 255, "a board is transparent"

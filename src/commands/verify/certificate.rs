@@ -13,6 +13,7 @@ use super::super::{CommandError, Common, Output};
 #[derive(Serialize)]
 struct Verdict<'a> {
     verdict: &'static str,
+    scene_hash: String,
     #[serde(flatten)]
     proved: &'a Proved,
 }
@@ -29,11 +30,12 @@ pub(super) fn print(common: &Common, shown: &str, checked: Result<Proved, Refuse
         checked => checked.map_err(|refused| refusal(shown, refused))?,
     };
     let mut output = Output::standard();
+    let scene_hash = blake3::hash(proved.scene.as_bytes()).to_string();
     if common.json {
-        output.json(&Verdict { verdict: "proved", proved: &proved })?;
+        output.json(&Verdict { verdict: "proved", scene_hash, proved: &proved })?;
         return output.finish();
     }
-    output.line(&format!("BLAKE3 of the scene's text: {}", blake3::hash(proved.scene.as_bytes())))?;
+    output.line(&format!("BLAKE3 of the scene's text: {scene_hash}"))?;
     for outcome in &proved.results {
         output.line(&sentence(outcome))?;
     }
@@ -60,16 +62,21 @@ pub fn proved_of(
 
 /// Why a certificate proves nothing.
 fn refusal(shown: &str, refused: Refused) -> CommandError {
+    let sentence = reason(shown, &refused);
+    match refused {
+        Refused::DoesNotFollow { .. } => CommandError::Failed(sentence),
+        Refused::Form { .. } | Refused::Unreadable(_) => CommandError::BadInput(sentence),
+    }
+}
+
+/// The same in a sentence.
+pub fn reason(shown: &str, refused: &Refused) -> String {
     match refused {
         Refused::DoesNotFollow { line, problem } => {
-            CommandError::Failed(format!("{shown}, line {line}: it does not follow: {}", printable(&problem)))
+            format!("{shown}, line {line}: it does not follow: {}", printable(problem))
         }
-        Refused::Form { line, problem } => {
-            CommandError::BadInput(format!("{shown}, line {line}: {}", printable(&problem)))
-        }
-        Refused::Unreadable(error) => {
-            CommandError::BadInput(format!("{shown}: {error}, expected a certificate to read"))
-        }
+        Refused::Form { line, problem } => format!("{shown}, line {line}: {}", printable(problem)),
+        Refused::Unreadable(error) => format!("{shown}: {error}, expected a certificate to read"),
     }
 }
 

@@ -136,7 +136,7 @@ export class Dragon {
 
   /** Another run: another path and other speeds. */
   begin(stage, newest) {
-    const look = JSON.stringify({ ...stage, run_id: null, scene: null }), isOther = this.team !== null && this.team !== look;
+    const look = JSON.stringify({ ...stage, run_id: null, scene: null, scene_hash: null, proved: null }), isOther = this.team !== null && this.team !== look;
     [this.team, this.run] = [look, newest.run];
     this.colours.clear();
     return isOther;

@@ -1,7 +1,7 @@
 // The panel beside the picture: the state, the countdown, the sentence, the figures. Reads what it is given; draws nothing.
 
 import { STRIDE, speedOf } from "./hermite.js";
-import { capital, remaining, say, sentenceOf } from "./words.js";
+import { capital, proofOf, remaining, say, sentenceOf } from "./words.js";
 
 /** By severity; the list of the states, with the severity of each, comes with the stage. */
 export const SIGNS = { ok: "○", warning: "△", error: "✖" };
@@ -76,6 +76,19 @@ export function showFigures({ clearance, colours, time, scale }) {
   showScale(colours);
   const rate = scale === 1 ? "" : say("rate", { rate: +scale.toPrecision(3) });
   put("time", say("time", { time: time.toFixed(1), rate }));
+}
+
+let provedStage = null;
+/** What is proved of the events of a stage, a line for each, those that the show cannot come to by themselves; nothing where there is no stage, or no certificate of its scene. */
+export function showProofs(stage) {
+  if (provedStage === stage) return;
+  provedStage = stage;
+  const lines = (stage?.proved ?? []).map((outcome) => proofOf(outcome, stage.freeze_time)).filter(({ text }) => text);
+  for (const id of ["proofs", "beyond"]) {
+    const own = lines.filter(({ canCome }) => canCome === (id === "proofs"));
+    element(id).hidden = !own.length;
+    element(id).replaceChildren(...own.map(({ text }) => Object.assign(document.createElement("li"), { textContent: text })));
+  }
 }
 
 let scaleShown = "";

@@ -1,12 +1,14 @@
 //! Reads the shared memory and keeps the newest picture. In: the events of a [`feed`](crate::subscribers::feed). Out:
 //! a [`Picture`] in a channel. Called by the server, on a thread of its own.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use tokio::sync::watch;
 
-use super::{Picture, wire};
+use super::{Picture, Proofs, SceneHash, wire};
+use crate::proof::Outcome;
 use crate::subscribers::feed::{Feed, FeedEvent};
 use crate::wire::{LoopStatus, Stage};
 
@@ -19,14 +21,16 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(200);
 const KEPT_CUES: usize = 16;
 
 /// Keeps the picture up to date until `stop` is set, through any number of publishers of a name.
-pub(super) fn read(mut feed: Feed, name: &str, sender: &watch::Sender<Picture>, stop: &AtomicBool) {
+pub(super) fn read(mut feed: Feed, name: &str, proofs: &Proofs, sender: &watch::Sender<Picture>, stop: &AtomicBool) {
     let (picture, publisher) = (Picture::waiting(None), name.to_owned());
-    let mut reader = Reader { picture, publisher, stage: None, status: None, cues: 0 };
+    let mut reader =
+        Reader { picture, publisher, proofs, stage: None, proved: None, unproved: None, status: None, cues: 0 };
     let mut reason: Option<String> = None;
     sender.send_replace(reader.picture.clone());
     while !stop.load(Ordering::Relaxed) {
         let mut changed = false;
         let polled = feed.poll(POLL_INTERVAL, &mut |event| changed |= reader.handle(event));
+        changed |= reader.look_for_proof();
         // The services may become usable while this continues: a program of another version ends, a subscriber leaves.
         let now = polled.err().map(|error| error.to_string());
         if now != reason {
@@ -51,24 +55,31 @@ pub(super) fn read(mut feed: Feed, name: &str, sender: &watch::Sender<Picture>, 
 }
 
 /// The newest of everything, as far as it has come.
-struct Reader {
+struct Reader<'a> {
     picture: Picture,
     /// The publisher's name.
     publisher: String,
+    proofs: &'a Proofs,
     stage: Option<Stage>,
+    /// What is proved of the scene of that stage.
+    proved: Option<Arc<[Outcome]>>,
+    /// The scene of which it has been said that no certificate is its own.
+    unproved: Option<SceneHash>,
     /// Of the run whose status came last: it alone holds the scene's name.
     status: Option<LoopStatus>,
     /// Cues that have come so far.
     cues: u64,
 }
 
-impl Reader {
+impl Reader<'_> {
     /// Takes in an event; whether the picture has changed.
     fn handle(&mut self, event: FeedEvent<'_>) -> bool {
         match event {
             FeedEvent::Stage(stage) => {
                 self.stage = Some(*stage);
+                self.proved = self.proofs.of(&stage.scene_hash);
                 self.describe();
+                self.warn_of_another_scene();
             }
             FeedEvent::Alert(alert) => {
                 let benches = self.stage.map_or(0, |stage| stage.benches);
@@ -82,7 +93,7 @@ impl Reader {
             FeedEvent::Frame { header, handles, .. } => self.picture.frame = wire::frame(header, handles).into(),
             FeedEvent::Gone => {
                 self.picture = Picture::waiting(None);
-                (self.stage, self.status) = (None, None);
+                (self.stage, self.proved, self.status) = (None, None, None);
                 return true;
             }
             // The page counts the time since the latest frame by itself.
@@ -99,10 +110,36 @@ impl Reader {
         true
     }
 
+    /// Takes up what has been proved of the scene since its stage came; whether that changes the picture.
+    fn look_for_proof(&mut self) -> bool {
+        let Some(stage) = self.stage.as_ref().filter(|_| self.proved.is_none()) else { return false };
+        self.proved = self.proofs.of(&stage.scene_hash);
+        if self.proved.is_some() {
+            self.describe();
+        }
+        self.proved.is_some()
+    }
+
+    /// Says once of a scene that the certificates are of others.
+    fn warn_of_another_scene(&mut self) {
+        let Some(stage) = self.stage.as_ref().filter(|stage| self.proofs.are_of_others(&stage.scene_hash)) else {
+            return;
+        };
+        if self.unproved.replace(stage.scene_hash) != Some(stage.scene_hash) {
+            log::warn!(
+                "\"{}\" shows a scene with another text than that of any certificate (BLAKE3 {}): its page says nothing \
+                 of proofs",
+                self.publisher,
+                stage.scene_hash_digits().as_deref().unwrap_or("not known")
+            );
+        }
+    }
+
     /// Says what the stage is, with the scene's name once it is known.
     fn describe(&mut self) {
         let Some(stage) = &self.stage else { return };
         let status = self.status.as_ref().filter(|status| status.run_id == stage.run_id);
-        self.picture.stage = wire::stage(stage, &self.publisher, status.map(|status| status.scene.as_str())).into();
+        let scene = status.map(|status| status.scene.as_str());
+        self.picture.stage = wire::stage(stage, &self.publisher, scene, self.proved.as_deref()).into();
     }
 }

@@ -9,7 +9,7 @@ import { Dragon } from "./dragon.js";
 import { Ground, draw } from "./drawing.js";
 import { attach } from "./hands.js";
 import { identityOf, paletteOf } from "./palette.js";
-import { element, put, showBench, showFigures, showNames, showSituation } from "./panel.js";
+import { element, put, showBench, showFigures, showNames, showProofs, showSituation } from "./panel.js";
 import { publishers } from "./publishers.js";
 import { Roster } from "./roster.js";
 import { Sound } from "./sound.js";
@@ -136,8 +136,10 @@ function showText(now) {
   const empty = words.show && !notices.length && sight.trouble;
   element("notice").hidden = !(notices.length || empty) || "nolabels" in words;
   put("notice", notices.length ? notices.join("\n") : empty ? capital(say(sight.trouble)) : "");
-  // The rest changes too often to be read at every pass.
   const shown = selected ?? first, { newest, stage, colours, stream } = shown;
+  // A picture that stays is no longer of a scene that is known to be played.
+  showProofs(shown.isThere && !shown.sight.trouble ? stage : null);
+  // The rest changes too often to be read at every pass.
   if (!shown.isThere || now - figuresAt < FIGURES_INTERVAL) return;
   figuresAt = now;
   showNames(stage, several ? publishers : null);

@@ -24,6 +24,7 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use crate::proof::Outcome;
 use crate::show::state::{FrameState, Level, Severity};
 use crate::wire::json::{AlertObject, CueObject, Exact, StageObject};
 use crate::wire::sentence::{Figures, alert_sentence, state_sentence};
@@ -54,8 +55,8 @@ pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
     bytes
 }
 
-/// The stage, the name of its publisher and, once it is known, that of its scene.
-pub(super) fn stage(stage: &Stage, publisher: &str, scene: Option<&str>) -> String {
+/// The stage, the name of its publisher and, once they are known, that of its scene and what is proved of its events.
+pub(super) fn stage(stage: &Stage, publisher: &str, scene: Option<&str>, proved: Option<&[Outcome]>) -> String {
     #[derive(Serialize)]
     struct StageMessage<'a> {
         r#type: &'static str,
@@ -63,10 +64,11 @@ pub(super) fn stage(stage: &Stage, publisher: &str, scene: Option<&str>) -> Stri
         scene: Option<&'a str>,
         #[serde(flatten)]
         stage: StageObject,
+        proved: Option<&'a [Outcome]>,
         states: [Value; FrameState::ALL.len()],
     }
     let (stage, states) = (StageObject::from(stage), FrameState::ALL.map(state));
-    json!(StageMessage { r#type: "stage", publisher, scene, stage, states }).to_string()
+    json!(StageMessage { r#type: "stage", publisher, scene, stage, proved, states }).to_string()
 }
 
 /// A cue that the show has reached.
@@ -159,8 +161,9 @@ mod tests {
 
     #[test]
     fn the_states_stand_in_the_order_of_their_numbers() {
-        let json: Value = serde_json::from_str(&stage(&Stage::default(), "dragon", Some("paper"))).unwrap();
+        let json: Value = serde_json::from_str(&stage(&Stage::default(), "dragon", Some("paper"), None)).unwrap();
         assert_eq!((&json["publisher"], &json["scene"]), (&"dragon".into(), &"paper".into()));
+        assert!(json["scene_hash"].is_null() && json["proved"].is_null(), "{json}");
         let states = json["states"].as_array().unwrap();
         assert_eq!(states.len(), FrameState::ALL.len());
         for (state, number) in FrameState::ALL.into_iter().zip(0..) {

@@ -42,6 +42,14 @@ const WORDS = {
   path_end: ["path end", "路径终点"],
   unknown: ["unknown", "未知"],
 
+  // What a certificate proves.
+  proofs: ["Proved by a certificate", "由证书证明"],
+  provedBetween: ["{kind}: proved, first at {lo} to {hi} s{beyond}", "{kind}：已证明，首次在 {lo} 至 {hi} 秒{beyond}"],
+  provedNone: ["{kind}: proved, none", "{kind}：已证明，不会发生"],
+  provedNoneBefore: ["{kind}: proved, none before {lo} s; the lock is later", "{kind}：已证明，{lo} 秒之前不会发生；锁死在此之后"],
+  provedUpTo: ["{kind}: proved up to {lo} s, none so far; then undecided", "{kind}：已证明至 {lo} 秒，此前不会发生；之后未定"],
+  beyondShow: [", after the show", "（演出之后）"],
+
   // Benches.
   one: ["bench {number}", "第 {number} 节板凳"],
   head: ["HEAD", "龙头"],
@@ -98,7 +106,8 @@ const WORDS = {
   rateInForce: ["Speed", "倍速"],
   timeLine: ["Time of the show", "演出时间"],
   showTime: ["{time} s", "{time} 秒"],
-  eventMark: ["{kind}, {time} s", "{kind}，{time} 秒"],
+  eventMark: ["{kind}, {time} s{proved}", "{kind}，{time} 秒{proved}"],
+  markProved: [", proved", "，已证明"],
   cueMark: ["cue \"{name}\", {time} s{waits}", "提示点“{name}”，{time} 秒{waits}"],
   waitsThere: [", waits there", "，在此等待"],
   waitingForGo: [" (waiting for go)", "（等待继续）"],
@@ -171,6 +180,26 @@ export function remaining(seconds) {
 export function benchesOf(pair) {
   const [a, b] = pair.map((bench) => bench + 1);
   return b === undefined ? say("number", { a }) : say("numbers", { a, b });
+}
+
+/** Seconds to the nanosecond, rounded up or down by `step`: what is between two times is between those that are shown. */
+function outward(seconds, step) {
+  const near = Number(seconds.toFixed(9)), isInside = step > 0 ? near < seconds : near > seconds;
+  return (isInside ? near + step : near).toFixed(9);
+}
+
+/** What is proved of an event, in a show that ends at `freeze`: `text`, empty for what this page does not know, and whether the show `canCome` to it, or could have. */
+export function proofOf({ event, status, time_lo, time_hi }, freeze) {
+  const kind = capital(say(event)), lo = time_lo === null ? null : outward(time_lo, -1e-9);
+  const isBeyond = lo !== null && time_lo > freeze;
+  if (status === "proved") {
+    const beyond = isBeyond ? say("beyondShow") : "";
+    return { text: say("provedBetween", { kind, lo, hi: outward(time_hi, 1e-9), beyond }), canCome: !isBeyond };
+  }
+  if (status === "undecided") return { text: say("provedUpTo", { kind, lo }), canCome: true };
+  // That a path does not end says no more than that its lock comes first.
+  if (status === "none") return { text: lo === null ? say("provedNone", { kind }) : say("provedNoneBefore", { kind, lo }), canCome: event !== "path_end" };
+  return { text: "", canCome: false };
 }
 
 /** A bench's name on the picture. */

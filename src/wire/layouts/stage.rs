@@ -60,6 +60,9 @@ pub const MOST_EVENTS: usize = 4;
 /// The most cues that a [`Stage`] has room for.
 pub const MOST_CUES: usize = 32;
 
+/// Bytes of the hash of a scene's text.
+pub const SCENE_HASH_BYTES: usize = 32;
+
 /// An event of the show in a [`Stage`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/StageEvent/4")]
@@ -94,7 +97,7 @@ pub struct StageCue {
 /// first segment begins, on the same spiral or line.
 ///
 /// Over iceoryx2 the payload of `<name>/stage`. Layout 2 added the segments of the path, layout 3 gave them their name,
-/// layout 4 added the time line: the freeze time, the events and the cues.
+/// layout 4 added the time line: the freeze time, the events and the cues, layout 5 the hash of the scene's text.
 ///
 /// # Examples
 ///
@@ -106,13 +109,13 @@ pub struct StageCue {
 ///
 /// let scene = Scene::paper();
 /// let show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
-/// let stage = stage(1, 0, &scene.motion, &show);
+/// let stage = stage(1, 0, [0; 32], &scene.motion, &show);
 /// assert_eq!((stage.benches, stage.path_in_use()[0].kind_name()), (223, "inward_spiral"));
 /// assert_eq!(stage.events_in_use()[0].kind(), Some(EventKind::Contact));
 /// assert!((stage.freeze_time - 412.473_837_682).abs() < 1e-9);
 /// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
-#[type_name("bench_dragon/Stage/4")]
+#[type_name("bench_dragon/Stage/5")]
 #[repr(C)]
 pub struct Stage {
     /// The run, as [`FrameHeader::run_id`](super::FrameHeader::run_id).
@@ -141,6 +144,9 @@ pub struct Stage {
     pub events: u32,
     /// The number of cues in the show; the first [`MOST_CUES`] of them are listed.
     pub cues: u32,
+    /// BLAKE3 of the scene's text, as `verify` prints it of a certificate: what is proved of that text is true of this
+    /// show. All zero where it is not known.
+    pub scene_hash: [u8; SCENE_HASH_BYTES],
     /// The segments of the path in the order of travel; those not in use are zero.
     pub path: [StageSegment; MOST_SEGMENTS],
     /// The events in order of time; those not in use are zero. Those after the freeze time are not reached.
@@ -153,6 +159,12 @@ impl Stage {
     /// The segments of the path that are in use.
     pub fn path_in_use(&self) -> &[StageSegment] {
         &self.path[..(self.segments as usize).min(MOST_SEGMENTS)]
+    }
+
+    /// The hash of the scene's text in hexadecimal digits; `None` where it is not known.
+    pub fn scene_hash_digits(&self) -> Option<String> {
+        let is_known = self.scene_hash.iter().any(|byte| *byte != 0);
+        is_known.then(|| self.scene_hash.iter().map(|byte| format!("{byte:02x}")).collect())
     }
 
     /// The events that are in use.

@@ -38,6 +38,7 @@ fn address() -> SocketAddr {
                 control: true,
                 origins: vec!["https://show.example".parse().expect("an origin")],
                 pages: Some(pages),
+                proofs: Arc::default(),
             };
             let stop = Arc::new(AtomicBool::new(false));
             let served: Result<(), ViewError> =

@@ -58,7 +58,7 @@ fn play(scene: &Scene) {
     let time_scale = (1.1 * stop * playback.rate / FRAMES as f64).clamp(1e-6, 1e6);
     // A show that begins where it ends is refused.
     let Ok(mut show) = Show::new(scene, timeline, Playback { time_scale, ..playback }) else { return };
-    let stage = stage(1, 0, &scene.motion, &show);
+    let stage = stage(1, 0, [0; 32], &scene.motion, &show);
     let sizes = [stage.hole_inset, stage.head_length, stage.body_length, stage.width, stage.freeze_time];
     assert!(sizes.iter().all(|number| number.is_finite()), "{stage:?}");
     let mut last = 0.0;

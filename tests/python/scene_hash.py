@@ -1,0 +1,50 @@
+"""Reads the hash of a scene's text out of a publisher's stage, knowing its name, its size and where the hash lies.
+
+    scene_hash.py --name NAME --scene FILE
+
+Prints a JSON line: the hash that the stage has, and BLAKE3 of the file as computed here.
+"""
+
+import argparse
+import json
+import pathlib
+import time
+
+import blake3
+import iceoryx2 as iox2
+from by_design import opaque
+
+# Nine numbers of eight bytes and four of four stand before it.
+HASH = slice(9 * 8 + 4 * 4, 9 * 8 + 4 * 4 + 32)
+SIZE = HASH.stop + 32 * 64 + 4 * 16 + 32 * 80
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--name", required=True)
+    parser.add_argument("--scene", required=True)
+    arguments = parser.parse_args()
+    iox2.set_log_level(iox2.LogLevel.Fatal)
+    node = iox2.NodeBuilder.new().signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
+    service = node.service_builder(iox2.ServiceName.new(f"{arguments.name}/stage"))
+    service = service.publish_subscribe(opaque("Stage", 5, SIZE))
+    deadline = time.monotonic() + 60
+    while True:
+        try:
+            stages = service.open().subscriber_builder().create()
+            break
+        except iox2.PublishSubscribeOpenError as error:
+            if "DoesNotExist" not in str(error) or time.monotonic() > deadline:
+                raise
+            time.sleep(0.02)
+    while (sample := stages.receive()) is None:
+        assert time.monotonic() < deadline, "no stage came"
+        time.sleep(0.02)
+    published = bytes(sample.payload().contents)[HASH].hex()
+    sample.delete()
+    computed = blake3.blake3(pathlib.Path(arguments.scene).read_bytes()).hexdigest()
+    print(json.dumps({"published": published, "computed": computed}))
+
+
+if __name__ == "__main__":
+    main()
