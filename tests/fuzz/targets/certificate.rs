@@ -13,11 +13,11 @@ use serde_json::{Value, json};
 use super::Target;
 use super::bytes::{changed, renumbered};
 use super::changes::change;
-use super::scene::is_small;
+use super::scene::is_quick;
 use super::truth::{certificate, is_true, scene, timeline};
 
 pub const TARGET: Target =
-    Target { name: "certificate", run, seeds, mutate, cases: 1500, hung: Duration::from_secs(45) };
+    Target { name: "certificate", run, seeds, mutate, cases: 1500, hung: Duration::from_secs(30) };
 
 /// Bytes of the longest certificate that is checked: some hundred steps of a small team.
 const MOST_BYTES: usize = 200_000;
@@ -74,7 +74,7 @@ fn timeline_of(text: &str) -> Option<Timeline> {
         known.clear();
     }
     if !known.contains_key(text) {
-        let found = if scene(text).is_some_and(|scene| is_small(&scene)) { timeline(text) } else { None };
+        let found = if scene(text).is_some_and(|scene| is_quick(&scene)) { timeline(text) } else { None };
         known.insert(text.to_owned(), found);
     }
     known.get(text).cloned().flatten()

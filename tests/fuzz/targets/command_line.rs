@@ -16,7 +16,7 @@ use super::Target;
 use super::bytes::{NUMBERS, changed, one, renumbered};
 
 pub const TARGET: Target =
-    Target { name: "command_line", run, seeds, mutate, cases: 4000, hung: Duration::from_secs(10) };
+    Target { name: "command_line", run, seeds, mutate, cases: 4000, hung: Duration::from_secs(5) };
 
 /// Arguments of a case.
 const MOST_ARGUMENTS: usize = 40;

@@ -11,7 +11,7 @@ use super::Target;
 use super::bytes::{changed, one, renumbered};
 
 pub const TARGET: Target =
-    Target { name: "environment", run, seeds, mutate, cases: 100_000, hung: Duration::from_secs(10) };
+    Target { name: "environment", run, seeds, mutate, cases: 100_000, hung: Duration::from_secs(5) };
 
 const VARIABLES: [&str; 6] = [
     "ROS_DOMAIN_ID",
