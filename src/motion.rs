@@ -379,10 +379,18 @@ impl Motion {
         found.end.unwrap_or(Event { kind: path_end, travelled, bench_a: None, bench_b: None, place: None })
     }
 
+    /// The time of an event. That of a lock is never past the lock when it is multiplied by the speed again: there handles
+    /// would have jumped.
+    fn time_of(&self, event: &Event) -> f64 {
+        let time = self.time_at(event.travelled);
+        let is_past = event.kind == EventKind::Lock && self.travelled_at(time) > event.travelled;
+        if is_past { time.next_down() } else { time }
+    }
+
     /// The events with their times, and the time up to which they are all there are.
     fn timed(&self, events: Vec<Event>, searched_until: f64) -> Timeline {
         let end = events.iter().fold(0.0, |end: f64, event| end.max(event.travelled));
-        let timed = events.into_iter().map(|event| TimedEvent { event, time: self.time_at(event.travelled) }).collect();
+        let timed = events.into_iter().map(|event| TimedEvent { event, time: self.time_of(&event) }).collect();
         Timeline::new(timed, (searched_until < end).then(|| self.time_at(searched_until)))
     }
 }

@@ -22,6 +22,7 @@ use self::precision::Precision;
 pub use self::precision::SinglePrecision;
 use self::ros2::{RawRos2, Ros2Settings};
 pub use self::text::{SceneText, printable};
+use crate::model::description::PathDescription;
 use crate::model::team::Team;
 use crate::motion::{Method, Motion, MotionError};
 use crate::solve::Velocities;
@@ -246,10 +247,18 @@ struct RawMotion {
     head_speed: Spanned<f64>,
     accuracy: Option<Spanned<f64>>,
     solver: Option<Spanned<SolverName>>,
-    paper: Option<Spanned<PaperRules>>,
+    paper: Option<Spanned<RawPaper>>,
     on_contact: Option<OnContact>,
     at_end: Option<AtEnd>,
     end_hold: Option<Spanned<f64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPaper {
+    time_step: Option<Spanned<f64>>,
+    difference_interval: Option<Spanned<f64>>,
+    bisection_tolerance: Option<Spanned<f64>>,
 }
 
 #[derive(Deserialize)]
@@ -278,6 +287,11 @@ impl RawScene {
         let description = self.path.validated(source, &team)?;
         let head_speed = source.check("motion.head_speed", &self.motion.head_speed, Accepted::SPEED)?;
         let method = self.motion.method(source)?;
+        if let (Method::Paper(rules), PathDescription::Spiral { pitch, start_turn }) = (method, &description)
+            && path::is_folded_after(*pitch, *start_turn, head_speed * rules.time_step, &team)
+        {
+            return Err(self.motion.first_step_error(source, rules.time_step));
+        }
         let motion = Motion::new(description, team, head_speed, method).map_err(|error| {
             match (&error, &self.motion.solver) {
                 (MotionError::PaperElsewhere, Some(given)) => source.field_error(
@@ -352,6 +366,16 @@ impl RawTeam {
 }
 
 impl RawMotion {
+    /// The paper's rules are one step ahead of the time: the first frame is where the first step ends.
+    fn first_step_error(&self, source: &Source, time_step: f64) -> SceneError {
+        let sentence = format!(
+            "motion.paper.time_step is {time_step}, after which the head is so near the centre that a bench is folded back \
+             on itself, expected a shorter one"
+        );
+        let given = self.paper.as_ref().and_then(|paper| paper.get_ref().time_step.as_ref());
+        source.field_error(given.unwrap_or(&self.head_speed), &sentence)
+    }
+
     fn method(&self, source: &Source) -> Result<Method, SceneError> {
         let solver = self.solver.as_ref().map(|solver| *solver.get_ref());
         if let (Some(paper), true) = (&self.paper, solver != Some(SolverName::Paper)) {
@@ -374,16 +398,18 @@ impl RawMotion {
     }
 
     fn paper_rules(&self, source: &Source) -> Result<PaperRules, SceneError> {
-        let Some(paper) = &self.paper else { return Ok(PaperRules::default()) };
-        let rules = *paper.get_ref();
-        for (field, number) in [
-            ("motion.paper.time_step", rules.time_step),
-            ("motion.paper.difference_interval", rules.difference_interval),
-            ("motion.paper.bisection_tolerance", rules.bisection_tolerance),
-        ] {
-            Accepted::PAPER_RULE.check(field, number).map_err(|sentence| source.field_error(paper, &sentence))?;
-        }
-        Ok(rules)
+        let usual = PaperRules::default();
+        let Some(paper) = &self.paper else { return Ok(usual) };
+        let RawPaper { time_step, difference_interval, bisection_tolerance } = paper.get_ref();
+        let number = |field: &str, value: &Option<Spanned<f64>>, usual| {
+            let field = format!("motion.paper.{field}");
+            value.as_ref().map_or(Ok(usual), |value| source.check(&field, value, Accepted::PAPER_RULE))
+        };
+        Ok(PaperRules {
+            time_step: number("time_step", time_step, usual.time_step)?,
+            difference_interval: number("difference_interval", difference_interval, usual.difference_interval)?,
+            bisection_tolerance: number("bisection_tolerance", bisection_tolerance, usual.bisection_tolerance)?,
+        })
     }
 }
 

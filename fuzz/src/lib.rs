@@ -14,7 +14,9 @@ macro_rules! fuzz {
     ($target:ident) => {
         use $crate::libfuzzer_sys::{fuzz_mutator, fuzz_target};
 
-        fuzz_target!(|data: &[u8]| ($crate::targets::$target::TARGET.run)(data));
+        fuzz_target!(|data: &[u8]| {
+            ($crate::targets::$target::TARGET.run)(data);
+        });
         fuzz_mutator!(|data: &mut [u8], size: usize, most: usize, seed: u32| {
             $crate::mutated(&$crate::targets::$target::TARGET, data, size, most, seed)
         });

@@ -1,6 +1,8 @@
 //! What the bits of a frame depend on besides the program: the processor's instructions and the system's elementary
 //! functions. The log names both, and `verify` compares them with its own.
 
+use std::sync::OnceLock;
+
 use serde::{Deserialize, Serialize};
 
 use crate::scene::Scene;
@@ -30,7 +32,7 @@ impl Arithmetic {
         Self {
             architecture: std::env::consts::ARCH.to_owned(),
             instructions: scene.motion.instructions().name().to_owned(),
-            elementary_functions: elementary_functions(),
+            elementary_functions: elementary_functions().to_owned(),
         }
     }
 
@@ -43,8 +45,13 @@ impl Arithmetic {
     }
 }
 
-/// A fingerprint of the elementary functions that solvers and searches call.
-fn elementary_functions() -> String {
+/// A fingerprint of the elementary functions that solvers and searches call. They are the same as long as a process lives.
+fn elementary_functions() -> &'static str {
+    static FINGERPRINT: OnceLock<String> = OnceLock::new();
+    FINGERPRINT.get_or_init(fingerprint)
+}
+
+fn fingerprint() -> String {
     let mut hasher = blake3::Hasher::new();
     for k in 1..=ARGUMENTS {
         // Spread over nine magnitudes, with digits in all places.

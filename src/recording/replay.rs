@@ -33,6 +33,8 @@ const QUEUED_FRAMES: usize = 4;
 const QUEUED_BYTES: usize = 64_000_000;
 /// How often the thread looks for room in the queue.
 const ROOM_INTERVAL: Duration = Duration::from_millis(2);
+/// How often it is looked for the first frame: once a replay.
+const FIRST_INTERVAL: Duration = Duration::from_micros(100);
 
 /// When the frames go out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -160,7 +162,7 @@ impl Prepared {
             shared: Arc::clone(&shared),
         };
         while replay.next.is_none() && !replay.filled.is_abandoned() {
-            std::thread::sleep(ROOM_INTERVAL);
+            std::thread::sleep(FIRST_INTERVAL);
             replay.next = replay.filled.pop().ok();
         }
         Ok((replay, ReplayThread { shared, handle }))

@@ -107,15 +107,15 @@ pub fn verify(log: impl BufRead, file: &str, progress: &mut dyn FnMut(u64)) -> R
         None => return Err(VerifyError::Line { line: 1, problem: "the file is empty, expected a log".to_owned() }),
     };
     let mut player = player(&show, file, &lines)?;
-    let mut complete = false;
+    let (mut complete, mut ended) = (false, false);
     while player.difference().is_none() {
         let Some(line) = lines.next()? else { break };
-        if complete {
+        if ended {
             return Err(lines.error("it stands behind the end of the log"));
         }
         match line {
             Line::Show(_) => return Err(lines.error("a second show, expected one a log")),
-            Line::End { .. } | Line::Stopped { .. } => complete = matches!(line, Line::End { .. }),
+            Line::End { .. } | Line::Stopped { .. } => (complete, ended) = (matches!(line, Line::End { .. }), true),
             _ => {}
         }
         player.line(lines.number, &line).map_err(|problem| lines.error(&problem))?;

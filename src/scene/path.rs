@@ -264,6 +264,14 @@ impl RawStep {
     }
 }
 
+/// Whether one Euler step of the paper's rules, of so many metres, ends where a bench is folded back on itself, or at the
+/// centre.
+pub(super) fn is_folded_after(pitch: f64, start_turn: f64, metres: f64, team: &Team) -> bool {
+    let start = TAU * start_turn;
+    let theta = start - metres * TAU / (pitch * start);
+    theta.is_nan() || theta <= 0.0 || least_legal_start(pitch, theta / TAU, team).is_some()
+}
+
 /// Where a start is illegal, the least number of turns that is not, rounded up to nine decimals.
 ///
 /// Only the first link of each length can be at or inside its fold: all others of that length are further out.

@@ -15,8 +15,7 @@ use crate::model::spiral::Spiral;
 use crate::model::team::Team;
 
 /// The numbers the paper chose, which a scene may change.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PaperRules {
     /// Seconds of one Euler step of the head.
     pub time_step: f64,

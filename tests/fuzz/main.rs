@@ -14,13 +14,14 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Once, mpsc};
-use std::time::Duration;
 
 use fastrand::Rng;
 use targets::{TARGETS, Target};
 
-/// After so long a case has hung. A search for events may take all of its limit of work, on a machine that is busy.
-const HUNG: Duration = Duration::from_secs(1200);
+/// One case in so many begins with an input that was kept: those are larger, and slow.
+const KEPT: u32 = 64;
+/// Inputs of the cases that are changed further, for each to begin with.
+const CHANGES_KEPT: usize = 3;
 
 /// The name of the threads that run cases.
 const CASES: &str = "cases";
@@ -57,16 +58,18 @@ fn setting(name: &str) -> Option<u64> {
     std::env::var(name).ok().map(|value| value.parse().unwrap_or_else(|_| panic!("{name} is {value}")))
 }
 
-/// Runs an input; what went wrong, where something did.
-fn failure(target: &Target, input: &[u8]) -> Option<String> {
+/// Runs an input: whether it got in, or what went wrong.
+fn outcome(target: &Target, input: &[u8]) -> Result<bool, String> {
     let before = PANICS.load(Ordering::SeqCst);
     let said = |panic: Box<dyn Any + Send>| match panic.downcast::<String>() {
         Ok(text) => *text,
         Err(panic) => panic.downcast_ref::<&str>().copied().unwrap_or("a panic").to_owned(),
     };
     let run = catch_unwind(AssertUnwindSafe(|| (target.run)(input)));
-    let elsewhere = || (PANICS.load(Ordering::SeqCst) != before).then(|| "another thread panicked".to_owned());
-    run.err().map(said).or_else(elsewhere)
+    match run {
+        Ok(_) if PANICS.load(Ordering::SeqCst) != before => Err("another thread panicked".to_owned()),
+        run => run.map_err(said),
+    }
 }
 
 /// Where an input that fails is left.
@@ -83,48 +86,52 @@ fn fuzz(name: &str) {
     let times = if processes::long() { 100 } else { 1 };
     let cases = setting("BENCH_DRAGON_FUZZ_CASES").unwrap_or(times * target.cases);
     let mut random = Rng::with_seed(setting("BENCH_DRAGON_FUZZ_SEED").unwrap_or(1));
-    let corpus = kept(name);
-    let mut inputs: Vec<Vec<u8>> = corpus.iter().map(|(_, input)| input.clone()).chain((target.seeds)()).collect();
-    assert!(!inputs.is_empty(), "nothing to begin with");
-    let began_with = inputs.len();
+    let corpus: Vec<Vec<u8>> = kept(name).into_iter().map(|(_, input)| input).collect();
+    let seeds = (target.seeds)();
     let (next, cases_to_run) = mpsc::sync_channel::<Vec<u8>>(0);
     let (done, results) = mpsc::channel();
     let worker = std::thread::Builder::new().name(CASES.to_owned()).spawn(move || {
         for input in cases_to_run {
-            let _ = done.send(failure(target, &input));
+            let _ = done.send(outcome(target, &input));
         }
     });
     let worker = worker.unwrap();
-    let run = |input: Vec<u8>| {
-        next.send(input.clone()).unwrap();
-        let failed = match results.recv_timeout(HUNG) {
-            Ok(failed) => failed,
-            Err(_) => Some(format!("no end within {HUNG:?}")),
-        };
-        if let Some(why) = failed {
-            panic!("{name}: {} fails: {why}", written(target, &input).display());
+    let run = |input: &[u8]| {
+        next.send(input.to_vec()).unwrap();
+        match results.recv_timeout(target.hung) {
+            Ok(Ok(got_in)) => got_in,
+            Ok(Err(why)) => panic!("{name}: {} fails: {why}", written(target, input).display()),
+            Err(_) => panic!("{name}: {} fails: no end within {:?}", written(target, input).display(), target.hung),
         }
     };
-    for input in inputs.clone() {
+    for input in corpus.iter().chain(&seeds) {
         run(input);
     }
+    let mut got_in = 0;
+    let mut inputs = seeds.clone();
     for _ in 0..cases {
-        let from = &inputs[random.usize(..inputs.len())];
+        let from_kept = inputs.is_empty() || !corpus.is_empty() && random.u32(..KEPT) == 0;
+        let from =
+            if from_kept { &corpus[random.usize(..corpus.len())] } else { &inputs[random.usize(..inputs.len())] };
         let input = (target.mutate)(from, &mut random);
-        run(input.clone());
-        // Changes of changes, too: a tenth stands in for what there was.
-        if random.u8(..10) == 0 {
-            if inputs.len() < 4 * began_with {
+        let is_in = run(&input);
+        got_in += u64::from(is_in);
+        // Changes of changes, too, of those that get in: what is refused at once leads nowhere.
+        if is_in && !from_kept && random.u8(..10) == 0 {
+            if inputs.len() < CHANGES_KEPT * seeds.len() {
                 inputs.push(input);
             } else {
-                let at = random.usize(began_with..inputs.len());
+                let at = random.usize(seeds.len()..inputs.len());
                 inputs[at] = input;
             }
         }
     }
     drop(next);
     worker.join().unwrap();
-    println!("{name}: {} files of the corpus, {began_with} inputs to begin with, {cases} changed ones", corpus.len());
+    let (kept, seeds) = (corpus.len(), seeds.len());
+    println!(
+        "{name}: {kept} files of the corpus, {seeds} inputs to begin with, {cases} changed ones, of which {got_in} got in"
+    );
 }
 
 #[test]

@@ -5,30 +5,82 @@
 mod program;
 
 use std::sync::OnceLock;
+use std::time::Duration;
 
-use clap::{CommandFactory, Parser};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, FromArgMatches};
 use fastrand::Rng;
 use program::CommandLine;
 
 use super::Target;
 use super::bytes::{NUMBERS, changed, one, renumbered};
 
-pub const TARGET: Target = Target { name: "command_line", run, seeds, mutate, cases: 4000 };
+pub const TARGET: Target =
+    Target { name: "command_line", run, seeds, mutate, cases: 4000, hung: Duration::from_secs(5) };
 
 /// Arguments of a case.
 const MOST_ARGUMENTS: usize = 40;
 
-fn run(data: &[u8]) {
-    let Ok(text) = std::str::from_utf8(data) else { return };
+fn run(data: &[u8]) -> bool {
+    let Ok(text) = std::str::from_utf8(data) else { return false };
     let arguments: Vec<&str> = text.lines().take(MOST_ARGUMENTS).collect();
     // Names of hosts are looked up in the network.
     if arguments.iter().any(|argument| argument.starts_with("--to") || *argument == "send") && !is_numeric(&arguments) {
-        return;
+        return false;
     }
-    if let Err(error) = CommandLine::try_parse_from(["bench-dragon"].iter().chain(&arguments)) {
-        let shown = error.render().to_string();
-        assert!([0, 2].contains(&error.exit_code()) && !shown.is_empty(), "{arguments:?}: {shown}");
-        assert_eq!(error.exit_code() == 0, !error.use_stderr(), "{arguments:?}: {shown}");
+    match CommandLine::command().try_get_matches_from(["bench-dragon"].iter().chain(&arguments)) {
+        Ok(matches) => {
+            assert!(CommandLine::from_arg_matches(&matches).is_ok(), "{arguments:?}");
+            check_values(&matches);
+            true
+        }
+        Err(error) => {
+            check_refusal(&error, &arguments);
+            false
+        }
+    }
+}
+
+/// Numbers that a person gives to an option, wherever it stands: its name, from, to.
+const RANGES: [(&str, f64, f64); 7] = [
+    ("duration", 5e-324, 1e9),
+    ("realtime", 1.0, 99.0),
+    ("ttl", 1.0, 255.0),
+    ("display_rate", 5e-324, f64::MAX),
+    ("width", 1.0, 1e5),
+    ("height", 1.0, 1e5),
+    ("max_skipped", 0.0, 1.0),
+];
+
+/// That what was accepted is within its range, and a time what it says.
+fn check_values(matches: &clap::ArgMatches) {
+    if let Some((_, of)) = matches.subcommand() {
+        check_values(of);
+    }
+    for (name, least, greatest) in RANGES {
+        let Ok(Some(mut raw)) = matches.try_get_raw(name) else { continue };
+        let Some(text) = raw.next_back().and_then(|raw| raw.to_str()) else { continue };
+        let text = text.trim();
+        let units = [("s", 1.0), ("m", 60.0), ("h", 3600.0), ("px", 1.0), ("mm", 1.0), ("%", 0.01), ("", 1.0)];
+        let number =
+            units.iter().find_map(|(unit, factor)| Some(text.strip_suffix(unit)?.trim().parse::<f64>().ok()? * factor));
+        let number = number.unwrap_or_else(|| panic!("--{name} takes {text:?}"));
+        assert!(number >= least && number <= greatest, "--{name} takes {text}");
+        if let ("duration", Ok(Some(seconds))) = (name, matches.try_get_one::<f64>(name)) {
+            assert_eq!(*seconds, number, "--duration {text}");
+        }
+    }
+}
+
+fn check_refusal(error: &clap::Error, arguments: &[&str]) {
+    let shown = error.render().to_string();
+    assert!([0, 2].contains(&error.exit_code()) && !shown.is_empty(), "{arguments:?}: {shown}");
+    assert_eq!(error.exit_code() == 0, !error.use_stderr(), "{arguments:?}: {shown}");
+    if error.kind() == ErrorKind::ValueValidation {
+        // Which value of what, and what is wrong with it.
+        let reason = shown.split_once(">': ").or_else(|| shown.split_once("': ")).map(|(_, reason)| reason.trim());
+        let is_one = reason.is_some_and(|reason| !reason.is_empty() && !reason.starts_with("For more"));
+        assert!(is_one, "{arguments:?}: {shown}");
     }
 }
 
@@ -78,7 +130,11 @@ fn words() -> &'static Words {
     })
 }
 
-const VALUES: [&str; 22] = [
+const VALUES: [&str; 26] = [
+    "40-20",
+    "1-4294967295",
+    "5m",
+    "1.5m",
     "60",
     "90s",
     "8h",

@@ -11,15 +11,16 @@ use std::time::Duration;
 
 use bench_dragon::subscribers::view::{Ready, ViewError, ViewOptions, serve};
 use fastrand::Rng;
+use serde_json::Value;
 
 use super::Target;
-use super::bytes::{changed, one, renumbered};
+use super::bytes::{NUMBERS, changed, one, renumbered};
 
-pub const TARGET: Target = Target { name: "page", run, seeds, mutate, cases: 8000 };
+pub const TARGET: Target = Target { name: "page", run, seeds, mutate, cases: 8000, hung: Duration::from_secs(40) };
 
 const SECRET: &str = "this file is not to be served";
 /// Seconds after which a server that neither answers nor hangs up has hung.
-const HUNG: Duration = Duration::from_secs(60);
+const HUNG: Duration = Duration::from_secs(30);
 
 /// The server, for as long as the process lives.
 fn address() -> SocketAddr {
@@ -53,7 +54,7 @@ fn address() -> SocketAddr {
     })
 }
 
-fn run(data: &[u8]) {
+fn run(data: &[u8]) -> bool {
     let mut connection = TcpStream::connect(address()).expect("the server listens");
     connection.set_read_timeout(Some(HUNG)).expect("a timeout");
     // A server that hangs up early takes no more.
@@ -67,9 +68,81 @@ fn run(data: &[u8]) {
     assert!(text.is_empty() || text.starts_with("HTTP/1."), "{text}");
     assert!(!text.starts_with("HTTP/1.1 5") && !text.starts_with("HTTP/1.0 5"), "{text}");
     assert!(!text.contains(SECRET), "{text}");
+    if text.starts_with("HTTP/1.1 101") {
+        check_upgraded(data, &answer);
+    }
     // Without the token nobody commands.
     assert!(!text.contains("\"allowed\":true") && !text.contains("\"code\":\"done\""), "{text}");
+    true
 }
+
+/// What is promised of a connection that became a WebSocket.
+fn check_upgraded(data: &[u8], answer: &[u8]) {
+    let end = |bytes: &[u8]| bytes.windows(4).position(|four| four == b"\r\n\r\n").map_or(bytes.len(), |at| at + 4);
+    let (head, sent) = data.split_at(end(data));
+    let head = String::from_utf8_lossy(head).into_owned();
+    let origin = head.lines().find(|line| line.starts_with("Origin: "));
+    assert!(!origin.is_some_and(|line| FOREIGN.contains(&line)), "let in: {head}");
+    // What the request itself has for a body is no message, and a line end by itself may end the head earlier.
+    let has_own_end = head.lines().count() != head.split("\r\n").count() - 1 || head.replace("\r\n", "").contains('\r');
+    if has_own_end || head.contains("Transfer-Encoding") || head.contains("Content-Length") {
+        return;
+    }
+    let answers: Vec<Value> = (frames(&answer[end(answer)..]).into_iter().filter(|frame| frame.0 == 0x81))
+        .map(|(_, text)| serde_json::from_slice(&text).unwrap_or_else(|error| panic!("{error} in {text:?}")))
+        .filter(|json: &Value| ["control", "answer", "clock"].contains(&json["type"].as_str().unwrap_or_default()))
+        .collect();
+    // Of what breaks the rules of WebSockets somewhere nothing more is asked.
+    let frames = frames(sent);
+    let whole: usize = frames.iter().map(|(_, text)| text.len() + if text.len() < 126 { 6 } else { 8 }).sum();
+    let is_regular = |(first, text): &(u8, Vec<u8>)| match first {
+        0x81 => text.len() <= 1024 && std::str::from_utf8(text).is_ok(),
+        0x89 | 0x8a => text.len() < 126,
+        _ => false,
+    };
+    if whole != sent.len() || !frames.iter().all(is_regular) {
+        return;
+    }
+    let asked: Vec<Vec<u8>> = frames.into_iter().filter(|frame| frame.0 == 0x81).map(|frame| frame.1).collect();
+    // Whether this one may command comes first, unasked.
+    assert_eq!(answers.len(), asked.len() + 1, "{answers:?} to {}", String::from_utf8_lossy(sent));
+    for (asked, answer) in asked.iter().zip(&answers[1..]) {
+        assert_eq!(asked == b"clock", answer["type"] == "clock", "{answer}");
+        let Ok(Value::Object(asked)) = serde_json::from_slice(asked) else { continue };
+        let is_command = asked.get("command").is_some_and(Value::is_string)
+            && asked.get("value").is_none_or(|value| value.is_null() || value.is_number())
+            && asked.keys().all(|key| ["command", "value", "id"].contains(&key.as_str()));
+        if is_command {
+            let id = asked.get("id").unwrap_or(&Value::Null);
+            assert_eq!(&answer["id"], id, "{answer}");
+            assert!(answer["sentence"].as_str().is_some_and(|sentence| !sentence.is_empty()), "{answer}");
+        }
+    }
+}
+
+/// The WebSocket's frames in some bytes, as far as they are whole: the first byte and the content of each.
+fn frames(mut bytes: &[u8]) -> Vec<(u8, Vec<u8>)> {
+    let mut frames = Vec::new();
+    while let Some(([first, length], rest)) = bytes.split_first_chunk() {
+        let (length, rest, mask) = match (length & 0x7f, length >> 7) {
+            (126, mask) => match rest.split_first_chunk() {
+                Some((length, rest)) => (usize::from(u16::from_be_bytes(*length)), rest, mask),
+                None => break,
+            },
+            (127, _) => break,
+            (length, mask) => (usize::from(length), rest, mask),
+        };
+        let Some((key, rest)) = rest.split_at_checked(if mask == 1 { 4 } else { 0 }) else { break };
+        let Some((content, rest)) = rest.split_at_checked(length) else { break };
+        let unmasked = content.iter().zip((0..).map(|at: usize| key.get(at % 4).copied().unwrap_or(0)));
+        frames.push((*first, unmasked.map(|(byte, key)| byte ^ key).collect()));
+        bytes = rest;
+    }
+    frames
+}
+
+/// Of whom nobody is let in.
+const FOREIGN: [&str; 2] = ["Origin: null", "Origin: http://evil.example"];
 
 const PATHS: [&str; 16] = [
     "/",
@@ -111,7 +184,10 @@ const HEADERS: [&str; 18] = [
     "If-Modified-Since: \u{9f99}",
 ];
 
-const MESSAGES: [&str; 12] = [
+const MESSAGES: [&str; 15] = [
+    "{\"command\":\"go\",\"id\":9007199254740993}",
+    "{\"command\":\"a\\\"b\\n\",\"id\":1}",
+    "{\"command\":\"state\",\"id\":\"\\u2028\\\"\"}",
     "clock",
     "{\"command\":\"pause\"}",
     "{\"command\":\"seek\",\"value\":400,\"id\":7}",
@@ -132,7 +208,12 @@ fn request(path: &str, headers: &[&str]) -> Vec<u8> {
 
 /// A handshake that is accepted.
 fn handshake() -> Vec<u8> {
-    request("/frames?rate=30", &["Host: localhost", HEADERS[9], HEADERS[10], HEADERS[11], HEADERS[12]])
+    handshake_with("/frames?rate=30", "X: y")
+}
+
+/// One with another path, and one header that may change that.
+fn handshake_with(path: &str, header: &str) -> Vec<u8> {
+    request(path, &[header, "Host: localhost", HEADERS[9], HEADERS[10], HEADERS[11], HEADERS[12]])
 }
 
 /// A WebSocket frame of a client, masked with zeros.
@@ -158,8 +239,14 @@ fn seeds() -> Vec<Vec<u8>> {
 }
 
 fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
-    match random.u8(..5) {
+    match random.u8(..6) {
         0 => changed(data, random),
+        5 => {
+            let path = format!("/frames?rate={}", one(&NUMBERS, random));
+            let path = if random.bool() { &path } else { "/frames" };
+            [handshake_with(path, HEADERS[random.usize(..HEADERS.len())]), frame(1, one(&MESSAGES, random).as_bytes())]
+                .concat()
+        }
         1 => {
             let count = random.usize(..6);
             let headers: Vec<&str> = (0..count).map(|_| *one(&HEADERS, random)).collect();

@@ -1,5 +1,7 @@
 //! A scene as text: it is refused with a sentence, or it is played and every frame is what is promised.
 
+use std::time::Duration;
+
 use bench_dragon::model::curve::Side;
 use bench_dragon::motion::Method;
 use bench_dragon::scene::Scene;
@@ -12,37 +14,109 @@ use fastrand::Rng;
 use super::Target;
 use super::bytes::{changed, one, renumbered};
 
-pub const TARGET: Target = Target { name: "scene", run, seeds, mutate, cases: 500 };
+pub const TARGET: Target = Target { name: "scene", run, seeds, mutate, cases: 5000, hung: Duration::from_secs(45) };
 
 /// Benches of the largest team that is played, and links along the longest path: what is larger takes its time.
 const MOST_BENCHES: usize = 30;
 const MOST_LINKS: f64 = 400.0;
+/// Steps of the paper's rules.
+const MOST_PAPER_STEPS: f64 = 1e5;
 /// Frames of a show.
 const FRAMES: u64 = 40;
 
-fn run(data: &[u8]) {
-    let Ok(text) = std::str::from_utf8(data) else { return };
+fn run(data: &[u8]) -> bool {
+    let Ok(text) = std::str::from_utf8(data) else { return false };
     match Scene::parse(text, "fuzz.toml", "fuzz") {
         Err(error) => {
             let sentence = error.to_string();
             assert!(sentence.starts_with("fuzz.toml"), "{sentence}");
             assert!(!sentence.contains(char::is_control), "{sentence:?}");
+            // Lines are counted from 1.
+            let line = sentence.strip_prefix("fuzz.toml, line ").and_then(|rest| rest.split(':').next());
+            let line: Option<usize> = line.map(|line| line.parse().expect("the number of a line"));
+            assert!(line.is_none_or(|line| (1..=text.lines().count() + 1).contains(&line)), "{sentence}");
+            check_named_line(text, &sentence, line);
+            false
         }
-        Ok(scene) if is_small(&scene) => play(&scene),
-        Ok(_) => (),
+        Ok(scene) => {
+            check_ranges(text);
+            if is_small(&scene) {
+                play(&scene);
+            }
+            true
+        }
+    }
+}
+
+/// That a sentence about a field's number names a line on which both stand.
+fn check_named_line(text: &str, sentence: &str, line: Option<usize>) {
+    let named = sentence.split_once(": ").and_then(|(_, rest)| rest.split_once(" is "));
+    let Some((field, rest)) = named.filter(|_| sentence.contains(", expected a number from")) else { return };
+    let line = line.expect("a number has its line");
+    let on_it = text.split('\n').nth(line - 1).unwrap_or_default();
+    let field = field.rsplit('.').next().unwrap_or_default();
+    let number = rest.split(", expected").next().and_then(|number| number.parse::<f64>().ok());
+    assert!(number.is_some() && on_it.contains(field), "{sentence} of {on_it:?}");
+}
+
+/// Numbers of a scene and what is accepted, by docs/design.md and the README: a table, a field, from, to.
+const RANGES: [(&str, &str, f64, f64); 17] = [
+    ("team", "benches", 1.0, 1e6),
+    ("team", "head_length", 1e-3, 1e4),
+    ("team", "body_length", 1e-3, 1e4),
+    ("team", "width", 1e-3, 1e4),
+    ("team", "hole_inset", 1e-3, 1e4),
+    ("path", "pitch", 1e-3, 1e4),
+    ("path", "start_turn", 0.0, 1e7),
+    ("path", "turn_radius", 1e-3, 1e4),
+    ("motion", "head_speed", 1e-9, 1e6),
+    ("motion", "accuracy", 1e-18, 1e3),
+    ("motion", "end_hold", 0.0, 1e6),
+    ("alerts", "approach_time", 0.0, 1e9),
+    ("alerts", "approach_clearance", 0.0, 1e9),
+    ("publish", "rate", 0.1, 20_000.0),
+    ("publish.ros2", "rate", 0.1, 20_000.0),
+    ("publish", "every", 1.0, 1e6),
+    ("publish", "queue", 1.0, 1e6),
+];
+
+/// That a scene which was not refused is within the ranges.
+fn check_ranges(text: &str) {
+    // A whole number that no i64 holds is no number here, and was read as one that no range holds.
+    let Ok(scene) = text.parse::<toml::Table>() else { return };
+    let number = |value: &toml::Value| value.as_float().or_else(|| value.as_integer().map(|number| number as f64));
+    for (table, field, least, greatest) in RANGES {
+        let mut names = table.split('.');
+        let of = names.next().and_then(|name| scene.get(name));
+        let of = names.fold(of, |of, name| of.and_then(|of| of.get(name)));
+        let number = of.and_then(|table| table.get(field)).and_then(number);
+        assert!(number.is_none_or(|number| number >= least && number <= greatest), "{table}.{field} is {number:?}");
+    }
+    let pieces = scene["path"].get("pieces").and_then(|pieces| pieces.as_array());
+    for length in pieces.into_iter().flatten().filter_map(|piece| number(piece.get("length")?)) {
+        assert!((1e-3..=1e9).contains(&length), "a piece of {length} m");
     }
 }
 
 /// Whether a scene is played within a moment.
 pub fn is_small(scene: &Scene) -> bool {
+    is_within(scene, MOST_BENCHES, MOST_LINKS)
+}
+
+/// Whether that takes no more than a few milliseconds.
+pub fn is_quick(scene: &Scene) -> bool {
+    is_within(scene, 8, 40.0)
+}
+
+fn is_within(scene: &Scene, benches: usize, links: f64) -> bool {
     let team = scene.team();
     let paper_steps = match scene.motion.method() {
         Method::Paper(rules) => scene.motion.path().length() / scene.motion.head_speed() / rules.time_step,
         _ => 0.0,
     };
-    team.benches <= MOST_BENCHES
-        && scene.motion.path().length() + team.length() <= MOST_LINKS * team.shortest_link()
-        && paper_steps <= 1e6
+    team.benches <= benches
+        && scene.motion.path().length() + team.length() <= links * team.shortest_link()
+        && paper_steps <= MOST_PAPER_STEPS
 }
 
 fn play(scene: &Scene) {
@@ -105,30 +179,46 @@ fn check(scene: &Scene, frame: &Frame, is_searched: bool) {
     }
 }
 
-/// Scenes of each kind of path, small enough to be played.
+/// Scenes of each kind of path, most of them very small: what a case costs is the search for events, and the table of a
+/// solver or of the clearance where there is one.
 pub fn seeds() -> Vec<Vec<u8>> {
     let team = |benches: u32| {
         format!(
             "[team]\nbenches = {benches}\nhead_length = 3.41\nbody_length = 2.20\nwidth = 0.30\nhole_inset = 0.275\n"
         )
     };
-    let spiral = "[path]\nkind = \"spiral\"\npitch = 0.9\nstart_turn = 4.0\n";
+    let spiral = "[path]\nkind = \"spiral\"\npitch = 0.9\nstart_turn = 2.0\n";
     let turnaround =
-        "[path]\nkind = \"turnaround\"\npitch = 1.7\nturn_radius = 4.5\narc_ratio = 2\nlead_in = 10\nlead_out = 20\n";
+        "[path]\nkind = \"turnaround\"\npitch = 1.7\nturn_radius = 4.5\narc_ratio = 2\nlead_in = 2\nlead_out = 3\n";
+    let line = "[path]\nkind = \"pieces\"\n[[path.pieces]]\nkind = \"line\"\nlength = 4.0\n";
     let route = "[path]\nkind = \"pieces\"\nstart = [1.0, -2.0]\nheading_turns = 0.1\n[[path.pieces]]\nkind = \"line\"\n\
-                 length = 12.0\n[[path.pieces]]\nkind = \"arc\"\nradius = 3.0\nside = \"left\"\nturns = 0.5\n\
-                 [[path.pieces]]\nkind = \"line\"\nlength = 9.0\n";
-    let motion = "[motion]\nhead_speed = 1.0\non_contact = \"continue\"\n[alerts]\napproach_time = 3.0\n";
-    let cues = "[[cues]]\nname = \"near\"\nbefore = \"contact\"\nseconds = 2.0\n[[cues]]\nname = \"wait\"\nat = 3.0\n\
+                 length = 2.0\n[[path.pieces]]\nkind = \"arc\"\nradius = 3.0\nside = \"left\"\nturns = 0.3\n\
+                 [[path.pieces]]\nkind = \"line\"\nlength = 3.0\n";
+    let newton = "[motion]\nhead_speed = 1.0\nsolver = \"newton\"\n";
+    let looping = "at_end = \"loop\"\nend_hold = 0.1\n";
+    let cues = "[[cues]]\nname = \"near\"\nbefore = \"path_end\"\nseconds = 0.5\n[[cues]]\nname = \"wait\"\nat = 1.0\n\
                 then = \"pause\"\n[publish]\nrate = 50.0\nprecision = \"f32\"\nevery = 3\n";
-    let paper = "[motion]\nhead_speed = 1.0\nsolver = \"paper\"\n[motion.paper]\ntime_step = 0.01\n[alerts]\n";
-    let newton = "[motion]\nhead_speed = 2.0\nsolver = \"newton\"\nat_end = \"loop\"\nend_hold = 0.1\n[alerts]\n";
+    let settings = "[publish]\nrate = 60.0\nqueue = 64\nvelocities = false\n[publish.ros2]\nrate = 30.0\n\
+                    topics = [\"handles\"]\n";
+    let alerts = "on_contact = \"continue\"\n[alerts]\napproach_time = 3.0\napproach_clearance = 0.05\n";
+    let paper = "[motion]\nhead_speed = 1.0\nsolver = \"paper\"\n[motion.paper]\ntime_step = 0.05\n";
     [
-        team(12) + spiral + motion,
-        team(9) + turnaround + newton,
-        team(7) + route + motion + cues,
-        team(5) + spiral + paper,
-        team(3) + route + "[motion]\nhead_speed = 1.0\naccuracy = 1e-4\n",
+        team(1) + line + newton,
+        team(2) + line + newton + looping,
+        team(3) + line + newton + cues,
+        team(2) + line + newton + settings,
+        team(1) + line + newton + settings,
+        team(1) + spiral + newton + cues,
+        team(2) + spiral + newton + looping,
+        team(4) + spiral + newton,
+        team(1) + turnaround + newton,
+        team(2) + turnaround + newton + looping,
+        team(2) + route + newton + cues,
+        team(4) + route + newton,
+        team(2) + line + newton + alerts,
+        team(4) + route + newton + alerts,
+        team(2) + spiral + paper,
+        team(2) + line + "[motion]\nhead_speed = 1.0\naccuracy = 1e-4\n",
     ]
     .map(String::into_bytes)
     .to_vec()
