@@ -92,10 +92,11 @@ fn sentence(outcome: &Outcome) -> String {
     let (lo, hi) = (seconds(outcome.time_lo), seconds(outcome.time_hi));
     match (outcome.status, outcome.bench_a, outcome.bench_b) {
         (Status::Proved, Some(a), Some(b)) => {
-            format!("{event}: proved between {lo} and {hi}, when benches {a} and {b} overlap")
+            let (a, b) = (a + 1, b + 1);
+            format!("{event}: proved between {lo} and {hi}, when benches {a} and {b} (counting from 1) overlap")
         }
         (Status::Proved, Some(a), None) => {
-            format!("{event}: proved between {lo} and {hi}, when it is there at bench {a}")
+            format!("{event}: proved between {lo} and {hi}, when it is there at bench {} (counting from 1)", a + 1)
         }
         (Status::Proved, ..) => format!("{event}: proved between {lo} and {hi}"),
         (Status::None, ..) if outcome.time_lo.is_some() => {
