@@ -60,18 +60,19 @@ impl Chain<'_> {
     /// Where the follower of a link stays while the front is in `front`, until it is lost, if the link is lost with the front
     /// in `last`, at the end of that.
     pub fn until_lock(&self, at: &mut Knot, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
-        let window = self.lock_window(at, link, front, last).or_else(|| {
-            self.lock_jump(at, link, front, last)?;
-            let rear = at.handles[link + 1];
-            let reach = self.exact.length(front.span.0, front.span.1) / rear.rear_cosine.max(1e-12);
-            [2.0, 16.0, 256.0].iter().find_map(|wider| {
-                let rear = Spanned::new(&self.exact, span(&self.exact, rear.param, rear.param, reach * wider));
-                one_place_within(&self.exact, front, &rear, self.link(link)).map(|_| rear.span)
-            })
-        })?;
+        let exact = &self.exact;
         let begins = self.spans(&mut at.clone(), &mut at.clone(), link + 1)?[link + 1].span;
-        let holds = self.exact.in_order(window.0, begins.0) && self.exact.in_order(begins.1, window.1);
-        holds.then_some(window)
+        let window = self.lock_window(at, link, front, last).or_else(|| {
+            let jump = self.lock_jump(at, link, front, last)?;
+            let rear = at.handles[link + 1];
+            let reach = exact.length(front.span.0, front.span.1) / rear.rear_cosine.max(1e-12);
+            let around = |wider: &f64| {
+                let rear = Spanned::new(exact, span(exact, rear.param, rear.param, reach * wider));
+                one_place_within(exact, front, &rear, self.link(link)).map(|_| rear.span)
+            };
+            exact.in_order(begins.1, jump.0).then(|| [2.0, 16.0, 256.0].iter().find_map(around))?
+        })?;
+        (exact.in_order(window.0, begins.0) && exact.in_order(begins.1, window.1)).then_some(window)
     }
 
     /// A place ahead of the follower of a link that is nearer than the link for all of `front`, and one ahead of that which

@@ -48,6 +48,9 @@ impl Pitches<'_> {
     /// Whether with each of them the two boards are proved to overlap.
     pub fn all_overlap(&self) -> bool {
         let Self { team, from, to, theta, benches } = *self;
+        if benches[0] + 2 > benches[1] || benches[1] >= team.benches {
+            return false;
+        }
         let a = self.radius_per_radian();
         // The path and the team serve to guess where handles are.
         let [wide, narrow] = [from, to].map(|pitch| Path::spiral(pitch, theta / std::f64::consts::TAU));

@@ -233,13 +233,20 @@ impl<'a, 'w> Search<'a, 'w> {
         let time_lo = self.time(self.at.head).lo;
         match obstacle {
             Obstacle::Pair(a, b) if self.clear => {
-                let because = format!("boards {a} and {b} come so near that doubles cannot tell whether they touch");
+                let because = format!(
+                    "benches {} and {} (counting from 1) come so near that doubles cannot tell whether they touch",
+                    a + 1,
+                    b + 1
+                );
                 self.proofs[EventKind::Contact as usize] = Some(Status::Undecided { time_lo, because });
                 self.clear = false;
                 Ok(())
             }
             Obstacle::Stall(link) if self.moving => {
-                let because = format!("link {link} comes so near a stall that doubles cannot tell whether it does");
+                let because = format!(
+                    "bench {} (counting from 1) comes so near a stall that doubles cannot tell whether it does",
+                    link + 1
+                );
                 self.proofs[EventKind::Stall as usize] = Some(Status::Undecided { time_lo, because });
                 self.moving = false;
                 Ok(())
@@ -249,7 +256,10 @@ impl<'a, 'w> Search<'a, 'w> {
                 self.covered = false;
                 Ok(())
             }
-            Obstacle::Link(link) => Err(Halt::Stuck(format!("the handle behind link {link} cannot be enclosed there"))),
+            Obstacle::Link(link) => Err(Halt::Stuck(format!(
+                "the rear handle of bench {} (counting from 1) cannot be enclosed there",
+                link + 1
+            ))),
             Obstacle::Stall(_) | Obstacle::Behind | Obstacle::Pair(..) => {
                 Err(Halt::Stuck(format!("a step cannot be shown there: {obstacle:?}")))
             }
@@ -355,7 +365,10 @@ impl<'a, 'w> Search<'a, 'w> {
             self.proofs[EventKind::Lock as usize] = Some(self.proved(self.at.head, to.head, event.bench_a, None));
             return Ok(());
         }
-        Err(Halt::Stuck(format!("whether link {link} locks there cannot be shown with doubles")))
+        Err(Halt::Stuck(format!(
+            "whether bench {} (counting from 1) locks there cannot be shown with doubles",
+            link + 1
+        )))
     }
 }
 

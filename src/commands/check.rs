@@ -125,7 +125,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         output.line(&format!("  {}", proof_sentence(&scene, enclosure)))?;
     }
     if let Some(file) = &arguments.certificate {
-        output.line("  Proved of this scene, counting benches from 0:")?;
+        output.line("  Proved of this scene:")?;
         for sentence in proved(&text.text, file, common)? {
             output.line(&format!("    {sentence}."))?;
         }

@@ -36,7 +36,9 @@ struct PitchLine {
     plan: &'static str,
     status: &'static str,
     value: Option<f64>,
-    value_lo: f64,
+    /// The least pitch that was looked at.
+    from: f64,
+    value_lo: Option<f64>,
     value_hi: Option<f64>,
     bench_a: Option<u32>,
     bench_b: Option<u32>,
@@ -76,12 +78,23 @@ fn plan_pitch(common: &Common, radius: f64) -> Result<(), CommandError> {
         let status = if proved { "proved" } else { "given_up" };
         let (bench_a, bench_b) = (overlap.map(|overlap| overlap.bench_a), overlap.map(|overlap| overlap.bench_b));
         let (value, head_radius) = (value_hi, overlap.map(|overlap| overlap.head_radius));
-        output.json(&PitchLine { plan: "pitch", status, value, value_lo, value_hi, bench_a, bench_b, head_radius })?;
+        let value_lo = (intervals > 0).then_some(value_lo);
+        output.json(&PitchLine {
+            plan: "pitch",
+            status,
+            value,
+            from,
+            value_lo,
+            value_hi,
+            bench_a,
+            bench_b,
+            head_radius,
+        })?;
         return output.finish();
     }
     if let Some(value_hi) = value_hi {
         output.line(&format!(
-            "With a pitch of {value_hi} m the head reaches {radius} m, and no two boards touch before."
+            "With a pitch of {value_hi} m the head reaches {radius} m, and no two boards that share no handle touch before."
         ))?;
     }
     if let Some(Overlap { bench_a, bench_b, head_radius }) = overlap {

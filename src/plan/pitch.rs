@@ -21,7 +21,7 @@ pub struct LeastPitch {
     pub value_lo: f64,
     /// Metres per turn: with this pitch the radius is reached. `None` where that is shown of none.
     pub value_hi: Option<f64>,
-    /// Metres per turn: the least pitch that is looked at, half of the boards' width.
+    /// Metres per turn: the least pitch that is looked at, half of the boards' width or, where that is more, a millimetre.
     pub from: f64,
     /// Two boards that overlap with pitches up to `value_lo`; `None` where a link locks, or nothing is shown.
     pub overlap: Option<Overlap>,
@@ -92,7 +92,7 @@ fn decided(
             team.link(1)
         )));
     }
-    let mut blocked = Blocked { team, radius, pitch: from, locks: false, deepest: None, intervals: 0 };
+    let mut blocked = Blocked { team, radius, pitch: from, locks: false, deepest: None, shown: None, intervals: 0 };
     let reaches = |pitch: f64, progress: &mut dyn FnMut(f64)| reaches(team, pitch, radius, MOST_STEPS, progress);
     let mut value_hi = None;
     let mut next = from;
@@ -101,8 +101,8 @@ fn decided(
         let proposed = propose(next, greatest, &mut |pitch| progress(0.3 * (1.0 - (-0.3 * pitch / from).exp())));
         if proposed == Some(from) && reaches(from, progress) {
             return Err(PlanError(format!(
-                "the team reaches {radius} m with a pitch of {from} m already, the least that is looked at (half of its \
-                 boards' width): it is too short to meet itself before"
+                "the team reaches {radius} m with a pitch of {from} m already, the least that is looked at: it is too \
+                 short to meet itself before"
             )));
         }
         let target = proposed.map_or(greatest, |pitch| pitch - BESIDE);
@@ -127,8 +127,7 @@ fn decided(
         }
         next = upper;
     }
-    let Blocked { pitch: value_lo, intervals, .. } = blocked;
-    let overlap = blocked.deepest.filter(|_| intervals > 0 && !blocked.locks).map(|deepest| deepest.overlap());
+    let Blocked { pitch: value_lo, intervals, shown: overlap, .. } = blocked;
     let proved = intervals > 0 && value_hi.is_some_and(|value_hi| value_hi - value_lo <= 1e-9);
     Ok(LeastPitch { value_lo, value_hi, from, overlap, proved, intervals })
 }
@@ -141,13 +140,6 @@ struct Deepest {
     head_radius: f64,
 }
 
-impl Deepest {
-    fn overlap(&self) -> Overlap {
-        let Self { pair: (bench_a, bench_b), head_radius, .. } = *self;
-        Overlap { bench_a, bench_b, head_radius }
-    }
-}
-
 /// Pitches with which boards are proved to overlap.
 struct Blocked<'a> {
     team: &'a Team,
@@ -158,6 +150,8 @@ struct Blocked<'a> {
     locks: bool,
     /// The boards last found.
     deepest: Option<Deepest>,
+    /// Those that were shown to overlap with the last pitch, where it was not a lock.
+    shown: Option<Overlap>,
     intervals: u64,
 }
 
@@ -179,7 +173,12 @@ impl Blocked<'_> {
                     break;
                 }
             }
-            self.pitch = (self.pitch + width).min(to);
+            let next = (self.pitch + width).min(to);
+            self.shown = self.deepest.filter(|_| !self.locks).map(|Deepest { pair, head_radius, .. }| {
+                // The polar angle is that for all pitches of the interval.
+                Overlap { bench_a: pair.0, bench_b: pair.1, head_radius: head_radius * next / self.pitch }
+            });
+            self.pitch = next;
             width *= GROWTH;
             self.intervals += 1;
             progress(((self.pitch - from) / (to - from)).clamp(0.0, 1.0));

@@ -12,7 +12,7 @@
 use std::time::{Duration, Instant};
 
 use super::newton::Newton;
-use super::table::{Allowed, FollowerTable, Instructions, Tolerance};
+use super::table::{Allowed, EXACT_ACCURACY, FollowerTable, Instructions, Tolerance};
 use super::{Chain, Solver, Velocities};
 use crate::model::path::Path;
 use crate::model::team::Team;
@@ -126,10 +126,10 @@ pub fn cheapest_with(
         }
     }
     let selection = select(rows);
-    if selection.meets() || tolerance == Tolerance::EXACT {
-        return Some(selection);
-    }
-    Some(select(make(Tolerance::EXACT)?))
+    let selection =
+        if selection.meets() || tolerance == Tolerance::EXACT { selection } else { select(make(Tolerance::EXACT)?) };
+    // One that is off by more than every table promises is no table.
+    (selection.error <= selection.allowed.max(EXACT_ACCURACY)).then_some(selection)
 }
 
 /// How exact the rows of a table have to be for a requested accuracy.

@@ -122,7 +122,7 @@ pub struct FollowerTable {
 }
 
 /// Metres that the frames of a table as exact as doubles allow are off at most, on any path but the farthest.
-const EXACT_ACCURACY: f64 = 1e-9;
+pub(crate) const EXACT_ACCURACY: f64 = 1e-9;
 
 impl FollowerTable {
     /// A solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve, as exact as

@@ -13,6 +13,7 @@ pub(in crate::subscribers) mod origin;
 mod reader;
 mod wire;
 
+use std::io;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -180,12 +181,25 @@ pub fn serve<Refused: From<ViewError>>(
     Ok(read.map_err(ViewError::from)?)
 }
 
+/// A file of the user's folder; a name that no file can have is that of none.
+async fn own_file<B>(found: impl Future<Output = io::Result<Response<B>>>) -> Response
+where
+    Response<B>: IntoResponse,
+{
+    match found.await {
+        Ok(file) => file.into_response(),
+        Err(error) if error.kind() == io::ErrorKind::InvalidFilename => StatusCode::NOT_FOUND.into_response(),
+        Err(_) => StatusCode::INTERNAL_SERVER_ERROR.into_response(),
+    }
+}
+
 fn router(server: Server, pages: Option<&Path>) -> Router {
     let file = |kind, text| get(move || async move { served(kind, text) });
     let names = publishers_module(&server.channels);
     let mut router = Router::new();
     if let Some(folder) = pages {
-        let own = Router::new().fallback_service(ServeDir::new(folder));
+        let mut files = ServeDir::new(folder);
+        let own = Router::new().fallback(move |request: Request| own_file(files.try_call(request)));
         let own = own.layer(from_fn_with_state(server.clone(), own_page));
         router = router.nest("/pages/", own).route("/pages", get(|| async { Redirect::permanent("/pages/") }));
     }

@@ -297,6 +297,9 @@ impl<'a> HeadBuilder<'a> {
         for (exact, beta) in exact.iter_mut().zip(NODES).skip(1) {
             *exact = at(beta)?;
         }
+        if !self.has_rows(&exact) {
+            return None;
+        }
         let centre = exact[NODES.len() / 2];
         let data = exact.map(|exact| self.data(exact, centre));
         let mut coefficients = [[0.0; QUANTITIES]; COEFFICIENTS];
@@ -317,6 +320,17 @@ impl<'a> HeadBuilder<'a> {
             *coefficient += value;
         }
         Some((piece, error))
+    }
+
+    /// Whether there are rows for the last handle all along a piece. A stall pushes the team back, past its first place too.
+    fn has_rows(&self, exact: &[Exact; NODES.len()]) -> bool {
+        let (first, last) = (exact[0], exact[NODES.len() - 1]);
+        let moved = exact.map(|exact| exact.alpha.minus(first.alpha));
+        let (least, most) = (moved.into_iter().fold(0.0, f64::min), moved.into_iter().fold(0.0, f64::max));
+        // Where alpha turns round, the greatest is between two nodes.
+        let turns = most > last.alpha.minus(first.alpha).max(0.0);
+        let furthest = first.alpha.plus(if turns { most + 0.1 * (most - least) } else { most });
+        furthest.row + self.team.benches <= self.rows.rows()
     }
 
     /// What the rounding of the travel alone does to places and speeds, as a part of what is promised: near a lock,

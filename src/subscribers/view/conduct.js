@@ -52,8 +52,8 @@ function takeToken() {
 }
 const token = takeToken();
 
-/** Whether a certificate of this very scene proves when an event happens. */
-const isProved = (stage, event) => Boolean(stage.proved?.some((outcome) => outcome.event === event && outcome.status === "proved"));
+/** Whether a certificate of this very scene proves that an event happens when it is announced. */
+const isProved = (stage, { event, time }) => Boolean(stage.proved?.some((outcome) => outcome.event === event && outcome.status === "proved" && outcome.time_lo <= time && time <= outcome.time_hi));
 
 /** Whether commands have somebody to obey them. */
 const isThere = ({ playback, stage, trouble }) => Boolean(playback.newest && stage && trouble === null);
@@ -144,7 +144,7 @@ export function conduct(dragons) {
     const marksOf = (stream) => {
       const { stage } = stream, by = (text) => (all.length > 1 ? own(stream, text) : text);
       return [
-        ...stage.events.filter(({ time }) => time <= stage.freeze_time).map(({ event, time }) => ({ kind: event, text: by(say("eventMark", { kind: say(event), time: time.toFixed(3), proved: isProved(stage, event) ? say("markProved") : "" })), time })),
+        ...stage.events.filter(({ time }) => time <= stage.freeze_time).map(({ event, time }) => ({ kind: event, text: by(say("eventMark", { kind: say(event), time: time.toFixed(3), proved: isProved(stage, { event, time }) ? say("markProved") : "" })), time })),
         ...stage.cues.map(({ name, time, pauses }) => ({ kind: "cue", text: by(say("cueMark", { name, time: time.toFixed(3), waits: pauses ? say("waitsThere") : "" })), time })),
       ];
     };

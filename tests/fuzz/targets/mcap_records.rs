@@ -96,6 +96,10 @@ pub fn parsed(data: &[u8]) -> Option<Vec<Record>> {
 /// those before the first chunk. `None` for any other file.
 pub fn messages(data: &[u8]) -> Option<Vec<Known>> {
     let records = parsed(data)?;
+    // No record has this opcode.
+    if records.iter().any(|record| record.opcode == 0) {
+        return None;
+    }
     let mut messages = Vec::new();
     let mut in_chunks = false;
     for record in &records {
