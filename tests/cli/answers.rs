@@ -35,14 +35,14 @@ fn plan_pitch_has_its_keys_for_every_team_and_the_bits_of_the_library() {
     for scene in teams {
         let line = scene.answer(&[&["--json"], &PLAN_PITCH[..]].concat());
         let plan: Value = serde_json::from_str(&line).unwrap();
-        let keys = ["plan", "status", "value", "value_lo", "value_hi", "bench_a", "bench_b", "head_radius"];
+        let keys = ["plan", "status", "value", "from", "value_lo", "value_hi", "bench_a", "bench_b", "head_radius"];
         assert_keys(&plan, &keys);
         assert_eq!((&plan["plan"], &plan["status"]), (&"pitch".into(), &"proved".into()), "{}", scene.name);
         let [a, b] = ["bench_a", "bench_b"].map(|key| plan[key].as_u64().unwrap() as usize);
         assert!(a + 1 < b && b < scene.benches(), "{}: {plan}", scene.name);
-        let [value, value_lo, value_hi, _, _, radius] = numbers(&line)[..] else { panic!("{line}") };
+        let [value, from, value_lo, value_hi, _, _, radius] = numbers(&line)[..] else { panic!("{line}") };
         assert!(same_bits(value, value_hi) && value_lo < value_hi && value_hi - value_lo <= 1e-9, "{plan}");
-        assert!(radius >= REACH, "{}: {plan}", scene.name);
+        assert!(radius >= REACH && from < value_lo, "{}: {plan}", scene.name);
         if scene.name == "school" {
             let known = least_pitch(scene.load().team(), REACH, &mut |_| ()).unwrap();
             let overlap = known.overlap.unwrap();
