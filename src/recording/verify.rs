@@ -109,7 +109,12 @@ pub fn verify(log: impl BufRead, file: &str, progress: &mut dyn FnMut(u64)) -> R
     let mut player = player(&show, file, &lines)?;
     let (mut complete, mut ended) = (false, false);
     while player.difference().is_none() {
-        let Some(line) = lines.next()? else { break };
+        let Some(line) = lines.next()? else {
+            if ended && lines.cut {
+                return Err(lines.error("it stands behind the end of the log"));
+            }
+            break;
+        };
         if ended {
             return Err(lines.error("it stands behind the end of the log"));
         }

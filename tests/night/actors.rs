@@ -78,7 +78,7 @@ impl Actor for Background {
 }
 
 /// The clock as a step sees it that takes no time.
-struct Frozen<'a>(&'a World);
+pub struct Frozen<'a>(pub &'a World);
 
 impl bench_dragon::live::clock::Clock for Frozen<'_> {
     fn monotonic_ns(&self) -> u64 {

@@ -11,7 +11,7 @@ use bench_dragon::scene::AtEnd;
 use bench_dragon::show::{Playback, Show};
 use bench_dragon::transports::background::{self, BackgroundConfig, Worker};
 
-use crate::actors::{Background, Controller, Statistics, Statuses, Stopper, Subscriber, WallClock};
+use crate::actors::{Background, Controller, Frozen, Statistics, Statuses, Stopper, Subscriber, WallClock};
 use crate::behind::{Behind, Network};
 use crate::collected::Collected;
 use crate::conducted::{Conducted, CueAt};
@@ -187,7 +187,8 @@ impl Cast {
         last.report(now_ns, true, |status| bench_dragon::wire::LoopStatus { stamp_ns: now_ns, ..status });
         collected.borrow().ended(&last.summary(), counts.frames);
         if let Some((behind, worker)) = thread {
-            worker.borrow_mut().send(&*world);
+            // Nobody else runs now.
+            worker.borrow_mut().send(&Frozen(&world));
             behind.borrow_mut().emptied(worker.borrow().deliveries());
         }
         for (number, door) in doors.iter().enumerate() {
