@@ -110,14 +110,15 @@ fn suite(transport: &str, modules: &[&str]) {
     ready.until("ready", 300);
     let first = publisher(&name, 60);
     // The debug build makes its tables for seconds: the late one waits for what the early one has got.
-    ready.until("frame", 300);
+    let beginning = ready.all_until("frame", 300);
     wait(1.5);
     let late = Process::start(&mut peer(transport, &name, 2)).output_within(300);
     first.signal(SIGINT);
     let summary_of_first = summary(&first.output_within(300));
     let summary_of_second = summary(&publisher(&name, 5).output_within(300));
     early.signal(SIGTERM);
-    let lines: Vec<Value> = ready.rest(300).iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let lines = beginning.into_iter().chain(ready.rest(300));
+    let lines: Vec<Value> = lines.map(|line| serde_json::from_str(&line).unwrap()).collect();
 
     // Shared memory leaves nothing out; a transport with a queue of its own reports what it did.
     let summaries = [&summary_of_first, &summary_of_second];

@@ -96,14 +96,21 @@ impl Process {
 pub struct Lines(Receiver<String>);
 
 impl Lines {
-    /// The next line that contains `what`, which has to come within `seconds`.
+    /// The next line that contains `what`, which has to come within `seconds`; the lines before it are gone.
     pub fn until(&self, what: &str, seconds: u64) -> String {
+        // The last line of those is the one.
+        self.all_until(what, seconds).pop().unwrap()
+    }
+
+    /// The lines up to the next one that contains `what`, which has to come within `seconds`, and that one.
+    pub fn all_until(&self, what: &str, seconds: u64) -> Vec<String> {
         let deadline = Instant::now() + Duration::from_secs(seconds);
+        let mut lines = Vec::new();
         loop {
             let left = deadline.saturating_duration_since(Instant::now());
-            let line = self.0.recv_timeout(left).unwrap_or_else(|_| panic!("no \"{what}\" within {seconds} s"));
-            if line.contains(what) {
-                return line;
+            lines.push(self.0.recv_timeout(left).unwrap_or_else(|_| panic!("no \"{what}\" within {seconds} s")));
+            if lines.last().is_some_and(|line| line.contains(what)) {
+                return lines;
             }
         }
     }
