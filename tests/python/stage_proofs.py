@@ -83,6 +83,9 @@ class View:
     def warnings(self):
         return [line for line in self.logged if "WARN" in line]
 
+    def errors(self):
+        return [line for line in self.logged if "ERROR" in line]
+
 
 @contextlib.contextmanager
 def view(*arguments, others=()):
@@ -185,7 +188,9 @@ def nothing_of_another_scene():
             verdict = shown.checked()
             assert verdict["verdict"] == "refused" and f"line {at + 1}: it does not follow" in verdict["problem"], verdict
             kept_from(page, "a certificate with a changed number")
-            errors = [line for line in shown.logged if "ERROR" in line]
+            # The two outputs are read by a thread each.
+            shown.until(lambda it: it.errors(), "the log's line on it")
+            errors = shown.errors()
             assert len(errors) == 1 and f"line {at + 1}: it does not follow" in errors[0], shown.logged
         assert not complaints, complaints
 
