@@ -17,6 +17,7 @@ pub const ATTACHMENT: u8 = 9;
 const STATISTICS: u8 = 11;
 const METADATA: u8 = 12;
 const DATA_END: u8 = 15;
+const DATA_END_BYTES: usize = 4;
 
 /// Bytes of a message before its data: channel, sequence, two times.
 const MESSAGE_HEAD: usize = 22;
@@ -86,7 +87,10 @@ fn inner(body: &[u8]) -> Option<Vec<Record>> {
 /// The records of a file before its index; `None` where it does not begin as one.
 pub fn parsed(data: &[u8]) -> Option<Vec<Record>> {
     let (mut records, _) = records(data.strip_prefix(MAGIC)?);
-    if let Some(end) = records.iter().position(|record| record.opcode == DATA_END) {
+    // One of another length is damaged, and ends nothing.
+    if let Some(end) =
+        records.iter().position(|record| record.opcode == DATA_END && record.body.len() == DATA_END_BYTES)
+    {
         records.truncate(end);
     }
     Some(records)
@@ -225,7 +229,7 @@ pub fn written(records: &[Record], wrong: Wrong) -> Vec<u8> {
     if wrong == Wrong::NoEnd {
         return file;
     }
-    put(&mut file, DATA_END, &[0; 4]);
+    put(&mut file, DATA_END, &[0; DATA_END_BYTES]);
     let summary = file.len() as u64;
     for ((opcode, _), body) in &kinds {
         put(&mut file, *opcode, body);
