@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # A newcomer on a fresh Debian 12: installs it into a folder, clones this repository there as an ordinary user, runs the
-# first commands of README.md and a subscriber in Python, then tests/newcomer. To be run by hand, as root.
+# first commands of README.md and a subscriber in Python, then tests/run from an empty target folder, which is timed. To be
+# run by hand, as root.
 # The Rust toolchain and what cargo has downloaded are this machine's; all else comes from Debian and PyPI.
 set -euo pipefail
 [ $# = 1 ] && [ "$(id -u)" = 0 ] || { echo "usage, as root: $0 FOLDER" >&2; exit 2; }
@@ -21,10 +22,10 @@ inside() { # USER COMMAND
     CARGO_HOME=/home/newcomer/.cargo bash -euo pipefail -c "cd /home/newcomer; $2"
 }
 
-# A clone and a build take git and a C compiler; the rest is for Python and the tests.
+# A clone and a build take git and a C compiler, the subscriber Python; what the tests need tests/run installs.
 chroot "$folder" apt-get update --quiet=2
 chroot "$folder" apt-get install --quiet=2 --yes --no-install-recommends \
-  git ca-certificates gcc libc6-dev python3 python3-venv iproute2
+  git ca-certificates gcc libc6-dev python3 python3-venv
 # Authorities that this machine trusts, of a proxy perhaps.
 cp -L /etc/ssl/certs/ca-certificates.crt "$folder/etc/ssl/certs/"
 chroot "$folder" id newcomer >/dev/null 2>&1 || chroot "$folder" useradd --create-home newcomer
@@ -45,8 +46,6 @@ inside newcomer 'cd bench-dragon && python3 -m venv .venv && source .venv/bin/ac
   ~/.cargo/bin/bench-dragon run --duration 60 >/dev/null & publisher=$!
   python3 examples/python/subscribe.py --seconds 5 >heads.txt && grep "224 handles" heads.txt
   kill -INT $publisher && wait $publisher'
-inside newcomer 'cd bench-dragon && .venv/bin/pip install --quiet -r tests/requirements.txt
-  cargo build --quiet --release --examples'
-# Networks for the pages need root, whom git does not let into the folder of another user.
+# Some tests make networks, which takes root, whom git does not let into the folder of another user.
 inside root 'git config --global --replace-all safe.directory /home/newcomer/bench-dragon && cd bench-dragon
-  BENCH_DRAGON_PYTHON=$PWD/.venv/bin/python BENCH_DRAGON_REQUIRE_ALL=1 cargo test --release --test newcomer'
+  rm -rf target && time tests/run'
