@@ -21,10 +21,12 @@ pub fn increasing_root(function: impl Fn(f64) -> (f64, f64), low: f64, high: f64
             high = x;
         }
         let newton = x - value / slope;
-        let next = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
+        let is_within = newton >= low && newton <= high;
+        let next = if is_within { newton } else { 0.5 * (low + high) };
         let step = (next - x).abs();
-        // The second test ends the jitter of the last digits where the function is nearly flat.
-        if step <= f64::EPSILON * x.abs() || (step < 1e-10 * x.abs() && step > 0.5 * last_step) {
+        // The second test ends the jitter of the last digits where the function is nearly flat. Halvings are no jitter:
+        // where the root is the bracket's end but for a rounding, nothing else comes.
+        if step <= f64::EPSILON * x.abs() || (is_within && step < 1e-10 * x.abs() && step > 0.5 * last_step) {
             return next;
         }
         last_step = step;
@@ -97,6 +99,17 @@ mod tests {
     fn increasing_root_ends_on_a_flat_root() {
         let root = increasing_root(|x| ((x - 1.0).powi(3), 3.0 * (x - 1.0).powi(2)), 0.0, 5.0, 4.0);
         assert!((root - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn increasing_root_finds_one_that_rounds_to_the_end_of_its_bracket() {
+        // The last link of a spiral whose head is at the centre: (a d)^2 = link^2.
+        let (link, pitch) = (2.86f64, 5.482_192_864_127_96);
+        let a = pitch / std::f64::consts::TAU;
+        for high in [link / a, (link / a).next_down(), (link / a).next_up()] {
+            let root = increasing_root(|d| ((a * d) * (a * d) - link * link, 2.0 * a * a * d), 0.0, high, 2.0);
+            assert!((root * a / link - 1.0).abs() < 1e-15, "{root} of {high}");
+        }
     }
 
     #[test]
