@@ -250,7 +250,7 @@ impl Motion {
 
     fn chosen_table(&self, table: FollowerTable, why: &str) -> Choice {
         let valid = if table.valid_until() * self.head_speed < self.path.length() {
-            format!(" up to {:.1} s, then newton", table.valid_until())
+            format!(" up to {:.3} s, then newton", table.valid_until())
         } else {
             String::new()
         };

@@ -2,16 +2,16 @@
 //! every scene at hand and on random ones, and with the processor's other rounding modes. `verify` checks the same
 //! certificates with code of its own: tests/certify.
 
-#[path = "judge/chain.rs"]
+#[path = "oracle/chain.rs"]
 #[allow(dead_code, reason = "the generator of scenes reads them with it")]
 mod chain;
-#[path = "judge/geometry.rs"]
+#[path = "oracle/geometry.rs"]
 #[allow(dead_code, reason = "the generator of scenes reads them with it")]
 mod geometry;
-#[path = "judge/links.rs"]
+#[path = "oracle/links.rs"]
 #[allow(dead_code, reason = "the generator of scenes reads them with it")]
 mod links;
-#[path = "judge/scenes.rs"]
+#[path = "oracle/scenes.rs"]
 #[allow(dead_code, reason = "scenes are only made here, not read")]
 mod scenes;
 

@@ -1,4 +1,4 @@
-//! Events against figures computed with 50 digits. `tests/judge` compares them with brute force on random scenes.
+//! Events against figures computed with 50 digits. `tests/oracle` compares them with brute force on random scenes.
 
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
 use bench_dragon::motion::event::EventKind;

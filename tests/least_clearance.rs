@@ -1,16 +1,16 @@
-//! The proved enclosures of a show's least clearance and of the least pitch against poses of the brute force that `tests/judge` has, with distances
+//! The proved enclosures of a show's least clearance and of the least pitch against poses of the brute force that `tests/oracle` has, with distances
 //! by parry2d.
 
-#[path = "judge/chain.rs"]
+#[path = "oracle/chain.rs"]
 #[allow(dead_code, reason = "only poses are used")]
 mod chain;
-#[path = "judge/geometry.rs"]
+#[path = "oracle/geometry.rs"]
 #[allow(dead_code, reason = "only poses are used")]
 mod geometry;
-#[path = "judge/links.rs"]
+#[path = "oracle/links.rs"]
 #[allow(dead_code, reason = "only poses are used")]
 mod links;
-#[path = "judge/scenes.rs"]
+#[path = "oracle/scenes.rs"]
 #[allow(dead_code, reason = "some families are enough")]
 mod scenes;
 

@@ -46,7 +46,7 @@ const OK: u8 = 0;
 const WARN: u8 = 1;
 const ERROR: u8 = 2;
 
-/// What a second of the loop is judged by, besides its status.
+/// What the diagnostics of a second of the loop need besides its status.
 #[derive(Debug, Clone, Copy)]
 pub struct LoopSecond<'a> {
     /// The status one second before; one that is the same where that is not known.
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_second_alone_is_judged_by_the_limits_of_the_scene() {
+    fn the_limits_of_the_scene_hold_for_the_last_second_alone() {
         let status = |skipped| LoopStatus { rate: 60.0, skipped, ..LoopStatus::default() };
         let default = DiagnosticLimits::default();
         let told = |before, now| level(status(before), status(now), default, [5, 5]);

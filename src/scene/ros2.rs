@@ -163,7 +163,7 @@ pub struct Ros2Settings {
     pub topics: BTreeMap<Topic, Qos>,
     /// Whether there are services that conduct the show.
     pub control: bool,
-    /// What the diagnostics judge by.
+    /// The limits of the diagnostics.
     pub diagnostics: DiagnosticLimits,
 }
 

@@ -11,7 +11,7 @@ use super::{check, processes, scene_text};
 fn what_is_changed_is_refused_or_true() {
     let changes = if processes::long() { 1000 } else { 60 };
     let mut random = Rng::with_seed(1);
-    let (mut refused, mut accepted, mut unjudged) = (0, 0, 0);
+    let (mut refused, mut accepted, mut undecided) = (0, 0, 0);
     let scenes = ["missed_contact", "tailoff", "alertloop", "pieces_46", "tight_158"];
     for name in scenes {
         let original = certificate(&scene_text(name));
@@ -27,7 +27,7 @@ fn what_is_changed_is_refused_or_true() {
             accepted += 1;
             // A scene that the program does not take (the checker does not hold a direction to one turn, say).
             let Some(timeline) = timeline(&proved.scene) else {
-                unjudged += 1;
+                undecided += 1;
                 continue;
             };
             for outcome in &proved.results {
@@ -37,5 +37,5 @@ fn what_is_changed_is_refused_or_true() {
     }
     processes::aloud(&format!("{refused} changes refused, {accepted} accepted and true"));
     assert!(refused > changes / 2, "{refused}");
-    assert!(unjudged <= changes / 20, "{unjudged}");
+    assert!(undecided <= changes / 20, "{undecided}");
 }

@@ -12,6 +12,8 @@ folder=$(realpath -m "$1")
 
 [ -e "$folder/etc/debian_version" ] || debootstrap --variant=minbase bookworm "$folder"
 mkdir -p "$folder/opt/rust"
+# Its root is a mount, as everywhere: tests make mounts of their own.
+mount --bind "$folder" "$folder"
 mount -t proc proc "$folder/proc"
 mount --rbind /dev "$folder/dev"
 mount --bind -o ro "$(cd "$repository" && rustc --print sysroot)" "$folder/opt/rust"

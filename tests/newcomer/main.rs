@@ -59,7 +59,7 @@ fn is_installed(program: &str) -> bool {
     std::env::split_paths(&reader::programs_path()).any(|folder| folder.join(program).exists())
 }
 
-fn judge(printed: &Printed) -> Verdict {
+fn verdict(printed: &Printed) -> Verdict {
     let text = &printed.text;
     if is_mention(printed) {
         return Verdict::Run(format!("{text} --help"));
@@ -90,7 +90,7 @@ fn read(root: &Path, page: &str, sections: &[Section]) -> Vec<String> {
     let mut failures = Vec::new();
     for section in sections {
         for printed in &section.commands {
-            let outcome = match judge(printed) {
+            let outcome = match verdict(printed) {
                 Verdict::Run(command) => reader.get_or_insert_with(|| Reader::new(root, page)).run(&command),
                 Verdict::LookedUp => targets::look_up(root, &printed.text),
                 Verdict::NotRun(_) => Ok(()),
@@ -106,7 +106,7 @@ fn read(root: &Path, page: &str, sections: &[Section]) -> Vec<String> {
 fn report(commands: &[&Printed]) {
     let (mut run, mut looked_up, mut not_run) = (0, 0, Vec::new());
     for printed in commands {
-        match judge(printed) {
+        match verdict(printed) {
             Verdict::Run(command) if command == printed.text => run += 1,
             Verdict::Run(command) => {
                 run += 1;

@@ -16,7 +16,7 @@ use bench_dragon::wire::LoopStatus;
 
 use crate::behind::{Behind, Network};
 use crate::collected::Collected;
-use crate::judge::Judge;
+use crate::oracle::Oracle;
 use crate::port::{Receiver, Receivers};
 use crate::world::{Actor, SECOND_NS, World, same};
 
@@ -98,7 +98,7 @@ impl bench_dragon::live::clock::Clock for Frozen<'_> {
 pub struct Controller {
     pub number: usize,
     pub door: Rc<RefCell<Door>>,
-    pub judge: Rc<RefCell<Judge>>,
+    pub oracle: Rc<RefCell<Oracle>>,
     /// Between two commands, on average.
     pub pause_ns: f64,
     /// The end of the show, simulated seconds.
@@ -111,7 +111,7 @@ impl Controller {
     pub fn take_answers(&self) {
         let mut door = self.door.borrow_mut();
         while let Some(answer) = door.answer() {
-            self.judge.borrow_mut().entrance.taken(self.number, &answer);
+            self.oracle.borrow_mut().entrance.taken(self.number, &answer);
         }
     }
 
@@ -155,7 +155,7 @@ impl Actor for Controller {
         for _ in 0..count {
             let command = self.command(world);
             let result = self.door.borrow_mut().send(command);
-            self.judge.borrow_mut().entrance.sent(self.number, command, result);
+            self.oracle.borrow_mut().entrance.sent(self.number, command, result);
         }
         if self.is_dead && self.door.borrow().waiting() >= MOST_WAITING {
             return NEVER;

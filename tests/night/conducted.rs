@@ -1,4 +1,4 @@
-//! The show as the design promises it: periods counted one by one, commands obeyed as the table of commands says.
+//! The show as the design promises it: periods counted one by one, commands executed as the table of commands says.
 //!
 //! Shares nothing with the show's own clock, which computes each period from the beginning of its stretch, but the
 //! formula of the contract: sim0 + rate * (tick - tick0) / frame rate, a new (sim0, tick0, rate) at each command.
@@ -187,7 +187,7 @@ impl Conducted {
     }
 
     /// Obeys a command at the beginning of the present period; `None` for a step that has begun.
-    pub fn obey(&mut self, command: Command) -> Option<Code> {
+    pub fn execute(&mut self, command: Command) -> Option<Code> {
         let (now, held) = (self.sim_time(), self.mode == Mode::Held);
         let code = match command {
             Command::State => Code::Done,

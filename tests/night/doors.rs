@@ -34,9 +34,9 @@ impl AtDoor {
 pub struct Entrance {
     doors: Vec<AtDoor>,
     next: usize,
-    /// The period in which a command was obeyed last.
-    obeyed: Option<u64>,
-    /// The command that is obeyed now, with its door.
+    /// The period in which a command was executed last.
+    executed: Option<u64>,
+    /// The command that is executed now, with its door.
     present: Option<(usize, u64)>,
     /// The step that is not over, with its door.
     step: Option<(usize, u64)>,
@@ -46,7 +46,7 @@ pub struct Entrance {
 impl Entrance {
     pub fn new(doors: usize) -> Self {
         let doors = (0..doors).map(|_| AtDoor::default()).collect();
-        Self { doors, next: 0, obeyed: None, present: None, step: None, answer: None }
+        Self { doors, next: 0, executed: None, present: None, step: None, answer: None }
     }
 
     /// A command was sent at a door.
@@ -62,10 +62,10 @@ impl Entrance {
         }
     }
 
-    /// A command is obeyed at the beginning of the period `tick`.
-    pub fn obeyed(&mut self, tick: u64, command: Command) {
-        assert!(self.obeyed < Some(tick), "a second command in the period {tick}");
-        self.obeyed = Some(tick);
+    /// A command is executed at the beginning of the period `tick`.
+    pub fn executed(&mut self, tick: u64, command: Command) {
+        assert!(self.executed < Some(tick), "a second command in the period {tick}");
+        self.executed = Some(tick);
         let doors = self.doors.len();
         let turn = (0..doors).map(|turn| (self.next + turn) % doors).find(|door| !self.doors[*door].waiting.is_empty());
         let door = turn.expect("a command that nobody has sent");
@@ -104,8 +104,8 @@ impl Entrance {
     /// The frame of the period `tick` is about to be computed: nobody may be waiting in vain.
     pub fn frame_begins(&mut self, tick: u64) {
         self.settle();
-        let in_vain = self.obeyed != Some(tick) && self.doors.iter().any(|door| !door.waiting.is_empty());
-        assert!(!in_vain, "a command waits and none is obeyed in the period {tick}");
+        let in_vain = self.executed != Some(tick) && self.doors.iter().any(|door| !door.waiting.is_empty());
+        assert!(!in_vain, "a command waits and none is executed in the period {tick}");
     }
 
     /// An answer was taken at a door.

@@ -15,8 +15,8 @@ pub struct Rules {
 pub struct Levels {
     rules: Rules,
     rate: f64,
-    /// The level that subscribers were told last, and the period of the change.
-    told: Option<(Level, u64)>,
+    /// The level that subscribers were sent last, and the period of the change.
+    announced: Option<(Level, u64)>,
     /// Seconds of the countdown since then.
     counted: u64,
     /// The time of the last frame of this epoch.
@@ -27,18 +27,18 @@ pub struct Levels {
 
 impl Levels {
     pub fn new(rules: Rules, rate: f64) -> Self {
-        Self { rules, rate, told: None, counted: 0, before: None, apart_since: None }
+        Self { rules, rate, announced: None, counted: 0, before: None, apart_since: None }
     }
 
     /// The level that a late subscriber is to get.
     pub fn current(&self) -> Option<Level> {
-        self.told.map(|(level, _)| level)
+        self.announced.map(|(level, _)| level)
     }
 
     /// The levels of the alerts that are to go with a frame. `new_epoch`: time has jumped; `anew`: a command did that.
     pub fn expected(&mut self, header: &FrameHeader, new_epoch: bool, anew: bool) -> Vec<Level> {
         if anew {
-            self.told = None;
+            self.announced = None;
         }
         if new_epoch || anew {
             (self.before, self.apart_since) = (None, None);
@@ -71,7 +71,7 @@ impl Levels {
     fn change(&mut self, level: Level, tick: u64) -> bool {
         let changed = self.current() != Some(level);
         if changed {
-            (self.told, self.counted) = (Some((level, tick)), 0);
+            (self.announced, self.counted) = (Some((level, tick)), 0);
         }
         changed
     }
@@ -94,7 +94,7 @@ impl Levels {
 
     /// Whether a second of wall time more has passed since the level changed.
     fn counts_down(&mut self, header: &FrameHeader) -> bool {
-        let since = self.told.map_or(0, |(_, tick)| header.tick - tick);
+        let since = self.announced.map_or(0, |(_, tick)| header.tick - tick);
         let seconds = (since as f64 / self.rate).floor() as u64;
         std::mem::replace(&mut self.counted, seconds) < seconds
     }

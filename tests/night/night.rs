@@ -15,21 +15,21 @@ use crate::actors::{Background, Controller, Frozen, Statistics, Statuses, Stoppe
 use crate::behind::{Behind, Network};
 use crate::collected::Collected;
 use crate::conducted::{Conducted, CueAt};
-use crate::judge::{Judge, Judged};
 use crate::levels::Levels;
+use crate::oracle::{Checked, Oracle};
 use crate::plan::{Plan, Stage};
 use crate::port::{FULL, Receivers, SharedMemory};
 use crate::random::Random;
 use crate::tally::Tally;
 use crate::world::{Trace, World, same};
 
-/// A queue's judge, and the thread at its other end.
+/// A queue's oracle, and the thread at its other end.
 type Thread = (Rc<RefCell<Behind>>, Rc<RefCell<Worker<Network>>>);
 
 /// Everybody but the loop.
 struct Cast {
     world: Rc<World>,
-    judge: Rc<RefCell<Judge>>,
+    oracle: Rc<RefCell<Oracle>>,
     collected: Rc<RefCell<Collected>>,
     collector: Rc<RefCell<Collector<'static>>>,
     thread: Option<Thread>,
@@ -51,8 +51,8 @@ pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
     let mut sinks: Vec<Box<dyn StatusPublisher>> = vec![Box::new(Statuses(Rc::clone(&collected)))];
     let thread = plan.background_rate.map(|rate| thread(&plan, stage, rate, &mut publishers, &mut sinks));
     let run_id = seed ^ 0x5eed;
-    let judge = judge(&plan, stage, &show, run_id, &collected, thread.as_ref());
-    let judge = Rc::new(RefCell::new(judge));
+    let oracle = oracle(&plan, stage, &show, run_id, &collected, thread.as_ref());
+    let oracle = Rc::new(RefCell::new(oracle));
     let [announced, sampled] = [(); 2].map(|()| Rc::clone(&collected));
     let run = Run {
         run_id,
@@ -75,7 +75,7 @@ pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
         plan.doors.iter().map(|_| door()).map(|(port, door)| (port, Rc::new(RefCell::new(door)))).unzip();
     let shared_memory = SharedMemory {
         world: Rc::clone(&world),
-        judge: Rc::clone(&judge),
+        oracle: Rc::clone(&oracle),
         receivers,
         room: plan.room,
         level: None,
@@ -84,10 +84,10 @@ pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
     };
     // First, so that a full memory is seen before the others have the frame.
     publishers.insert(0, Box::new(shared_memory));
-    let cast = Cast { world, judge, collected, collector, thread, doors, subscribers };
+    let cast = Cast { world, oracle, collected, collector, thread, doors, subscribers };
     cast.enter(&plan, stage);
 
-    let mut frames = Judged { show, world: Rc::clone(&cast.world), judge: Rc::clone(&cast.judge) };
+    let mut frames = Checked { show, world: Rc::clone(&cast.world), oracle: Rc::clone(&cast.oracle) };
     let options = LoopOptions { run_id, rate: plan.rate, periods: plan.periods };
     let mut doors = Doors::new(ports);
     let World { stop, .. } = &*cast.world;
@@ -121,14 +121,14 @@ fn thread(
     (behind, Rc::new(RefCell::new(worker)))
 }
 
-fn judge(
+fn oracle(
     plan: &Plan,
     stage: &Stage,
     show: &Show,
     run_id: u64,
     collected: &Rc<RefCell<Collected>>,
     thread: Option<&Thread>,
-) -> Judge {
+) -> Oracle {
     let Playback { rate, start, at_end, end_hold, paused, time_scale, .. } = plan.playback;
     let cues = show.cues().iter().map(|cue| CueAt { time: cue.time, pauses: cue.pauses }).collect();
     let end_hold = (at_end == AtEnd::Loop).then(|| (end_hold * rate).round() as u64);
@@ -136,7 +136,7 @@ fn judge(
         Conducted::new(rate, start, stage.freeze(&plan.playback), end_hold, cues, paused).at_rate(time_scale);
     let levels = stage.rules().map(|rules| Levels::new(rules, rate));
     let behind = thread.map(|(behind, _)| Rc::clone(behind));
-    Judge::new(run_id, conducted, levels, stage.events(), plan.doors.len(), Rc::clone(collected), behind)
+    Oracle::new(run_id, conducted, levels, stage.events(), plan.doors.len(), Rc::clone(collected), behind)
 }
 
 impl Cast {
@@ -159,7 +159,7 @@ impl Cast {
             let controller = Controller {
                 number,
                 door: Rc::clone(door),
-                judge: Rc::clone(&self.judge),
+                oracle: Rc::clone(&self.oracle),
                 pause_ns: *pause_ns,
                 end: stage.freeze(&plan.playback),
                 is_dead: false,
@@ -179,8 +179,8 @@ impl Cast {
 
     /// The loop has ended: what is on its way arrives, and everything adds up.
     fn settle(self, plan: &Plan, counts: &Counts) -> Tally {
-        let Self { world, judge, collected, collector, thread, doors, subscribers } = self;
-        judge.borrow_mut().pace.ended(&world, counts, plan.periods);
+        let Self { world, oracle, collected, collector, thread, doors, subscribers } = self;
+        oracle.borrow_mut().pace.ended(&world, counts, plan.periods);
         let mut last = collector.borrow_mut();
         last.take();
         let now_ns = world.now_ns();
@@ -193,16 +193,16 @@ impl Cast {
         }
         for (number, door) in doors.iter().enumerate() {
             while let Some(answer) = door.borrow_mut().answer() {
-                judge.borrow_mut().entrance.taken(number, &answer);
+                oracle.borrow_mut().entrance.taken(number, &answer);
             }
         }
-        judge.borrow().entrance.ended();
+        oracle.borrow().entrance.ended();
         let mut lost = 0;
         for subscriber in &subscribers {
             subscriber.borrow_mut().outlive(&world);
             lost += subscriber.borrow().receiver.borrow().lost;
         }
-        let (commands, too_many) = judge.borrow().entrance.totals();
+        let (commands, too_many) = oracle.borrow().entrance.totals();
         let tally = *world.tally.borrow();
         Tally {
             nights: 1,

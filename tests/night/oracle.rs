@@ -1,7 +1,7 @@
-//! Judges a night: what the loop does against models of the design's promises. The first that is broken ends the test.
+//! The oracle of a night: what the loop does against models of the design's promises. The first that is broken ends the test.
 //!
 //! In: what passes the edges, which are the frames' source, the fake shared memory, the doors and the statistics. None
-//! of the models calls what it judges.
+//! of the models calls what it checks.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -23,7 +23,7 @@ use crate::world::{World, same};
 /// Alerts or cues: the period, and the level or the number.
 type Numbered = Vec<(u64, u32)>;
 
-pub struct Judge {
+pub struct Oracle {
     pub run_id: u64,
     pub pace: Pace,
     pub show: Conducted,
@@ -44,7 +44,7 @@ pub struct Judge {
     queued: Option<(f64, Numbered, Numbered)>,
 }
 
-impl Judge {
+impl Oracle {
     pub fn new(
         run_id: u64,
         show: Conducted,
@@ -159,9 +159,9 @@ impl Judge {
     }
 
     fn command(&mut self, tick: u64, command: Command) -> Option<bench_dragon::show::control::Code> {
-        self.entrance.obeyed(tick, command);
+        self.entrance.executed(tick, command);
         self.show.count_to(tick);
-        self.show.obey(command)
+        self.show.execute(command)
     }
 
     fn assert_outcome(&self, tick: u64, outcome: &Outcome) {
@@ -173,16 +173,16 @@ impl Judge {
     }
 }
 
-/// The real show, between the loop and the judge.
-pub struct Judged {
+/// The real show, between the loop and the oracle.
+pub struct Checked {
     pub show: Show,
     pub world: Rc<World>,
-    pub judge: Rc<RefCell<Judge>>,
+    pub oracle: Rc<RefCell<Oracle>>,
 }
 
-impl Frames for Judged {
+impl Frames for Checked {
     fn frame(&mut self, tick: u64) -> Period<'_> {
-        self.judge.borrow_mut().frame_begins(&self.world, tick);
+        self.oracle.borrow_mut().frame_begins(&self.world, tick);
         self.world.spend(self.world.cost_ns());
         self.show.frame(tick).into()
     }
@@ -190,24 +190,24 @@ impl Frames for Judged {
     fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
         let (number, value) = command.number_and_value();
         self.world.note("command", [f64::from(number), value]);
-        let expected = self.judge.borrow_mut().command(tick, command);
+        let expected = self.oracle.borrow_mut().command(tick, command);
         let outcome = self.show.command(tick, command);
-        let mut judge = self.judge.borrow_mut();
+        let mut oracle = self.oracle.borrow_mut();
         same("the answer to a command", outcome.map(|outcome| outcome.code), expected);
-        outcome.iter().for_each(|outcome| judge.assert_outcome(tick, outcome));
-        judge.entrance.answered(outcome);
+        outcome.iter().for_each(|outcome| oracle.assert_outcome(tick, outcome));
+        oracle.entrance.answered(outcome);
         outcome
     }
 
     fn finished_step(&mut self, tick: u64) -> Option<Outcome> {
         let outcome = self.show.finished_step(tick);
-        let mut judge = self.judge.borrow_mut();
-        judge.show.count_to(tick);
-        let expected = judge.show.step_outcome.take();
+        let mut oracle = self.oracle.borrow_mut();
+        oracle.show.count_to(tick);
+        let expected = oracle.show.step_outcome.take();
         same("the end of a step", outcome.map(|outcome| outcome.code), expected);
         if let Some(outcome) = outcome {
-            judge.assert_outcome(tick, &outcome);
-            judge.entrance.step_is_over(outcome);
+            oracle.assert_outcome(tick, &outcome);
+            oracle.entrance.step_is_over(outcome);
         }
         outcome
     }

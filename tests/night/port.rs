@@ -8,7 +8,7 @@ use std::rc::Rc;
 use bench_dragon::live::{Outgoing, PublishError, Publisher};
 use bench_dragon::wire::FrameHeader;
 
-use crate::judge::Judge;
+use crate::oracle::Oracle;
 use crate::world::{SECOND_NS, World};
 
 /// One subscriber's queue.
@@ -60,7 +60,7 @@ impl Receivers {
 
 pub struct SharedMemory {
     pub world: Rc<World>,
-    pub judge: Rc<RefCell<Judge>>,
+    pub oracle: Rc<RefCell<Oracle>>,
     pub receivers: Rc<Receivers>,
     /// Frames until the memory is full.
     pub room: u64,
@@ -83,7 +83,7 @@ impl SharedMemory {
             let mut receiver = receiver.borrow_mut();
             if !receiver.is_connected {
                 receiver.is_connected = true;
-                self.judge.borrow().late_subscriber(self.level);
+                self.oracle.borrow().late_subscriber(self.level);
             }
             !receiver.is_dead
         });
@@ -92,14 +92,14 @@ impl SharedMemory {
 
 impl Publisher for SharedMemory {
     fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
-        let Self { world, judge, room, .. } = self;
+        let Self { world, oracle, room, .. } = self;
         if *room == 0 {
             world.note("the shared memory is full", [0.0; 2]);
             world.tally.borrow_mut().failed_publishers += 1;
             return Err(PublishError(FULL.to_owned()));
         }
         *room -= 1;
-        judge.borrow_mut().frame_goes_out(world, outgoing);
+        oracle.borrow_mut().frame_goes_out(world, outgoing);
         self.level = outgoing.alerts().last().map(|alert| alert.level).or(self.level);
         world.spend(world.cost_ns());
         let header = FrameHeader { sent_ns: world.now_ns(), ..*outgoing.header };
@@ -109,7 +109,7 @@ impl Publisher for SharedMemory {
                 receiver.put(&header);
             }
         }
-        judge.borrow_mut().frame_was_sent(world, outgoing.header);
+        oracle.borrow_mut().frame_was_sent(world, outgoing.header);
         Ok(())
     }
 
@@ -137,7 +137,7 @@ impl Publisher for SharedMemory {
     fn subscribers(&self) -> u32 {
         let count =
             self.receivers.list.borrow().iter().filter(|receiver| receiver.borrow().is_connected).count() as u32;
-        self.judge.borrow_mut().frame_is_out(&self.world, count);
+        self.oracle.borrow_mut().frame_is_out(&self.world, count);
         count
     }
 }

@@ -1,8 +1,8 @@
 //! An independent check of a scene's events: its own paths, followers, boards and searches, and random scenes on which
 //! the program has to agree with it. It shares no code with the library; only [`program_events`] calls that.
 //!
-//! `BENCH_DRAGON_JUDGE_SEED` and `BENCH_DRAGON_JUDGE_SCENES` choose other scenes and how many, `BENCH_DRAGON_LONG` runs
-//! 10,000, `BENCH_DRAGON_JUDGE_FILE` checks the scene in a file.
+//! `BENCH_DRAGON_ORACLE_SEED` and `BENCH_DRAGON_ORACLE_SCENES` choose other scenes and how many, `BENCH_DRAGON_LONG` runs
+//! 10,000, `BENCH_DRAGON_ORACLE_FILE` checks the scene in a file.
 
 mod chain;
 mod comparison;
@@ -35,7 +35,7 @@ struct Event {
 fn program_events(scene_toml: &str) -> Result<Vec<Event>, String> {
     use bench_dragon::motion::timeline::TimedEvent;
     use bench_dragon::scene::Scene;
-    let scene = Scene::parse(scene_toml, "judge", "judge").map_err(|error| error.to_string())?;
+    let scene = Scene::parse(scene_toml, "oracle", "oracle").map_err(|error| error.to_string())?;
     let timeline = scene.motion.timeline(&mut |_| ());
     assert_eq!(timeline.searched_until(), None, "the program's search gave up");
     let event = |timed: &TimedEvent| Event {
@@ -121,15 +121,15 @@ fn number_from(variable: &str) -> Option<u64> {
 
 #[test]
 fn the_program_agrees_with_brute_force() {
-    if let Ok(file) = std::env::var("BENCH_DRAGON_JUDGE_FILE") {
+    if let Ok(file) = std::env::var("BENCH_DRAGON_ORACLE_FILE") {
         let found = compare(&std::fs::read_to_string(file).unwrap()).expect("the program refuses the scene");
         println!("ambiguous: {:?}", found.ambiguous);
         assert!(found.failures.is_empty(), "{}", found.failures.join("\n"));
         return;
     }
-    let seed = number_from("BENCH_DRAGON_JUDGE_SEED").unwrap_or(1);
+    let seed = number_from("BENCH_DRAGON_ORACLE_SEED").unwrap_or(1);
     let long = std::env::var_os("BENCH_DRAGON_LONG").is_some();
-    let scenes = number_from("BENCH_DRAGON_JUDGE_SCENES").unwrap_or(if long { 10_000 } else { 200 }) as usize;
+    let scenes = number_from("BENCH_DRAGON_ORACLE_SCENES").unwrap_or(if long { 10_000 } else { 200 }) as usize;
     let (next, tally) = (AtomicUsize::new(0), Mutex::new(Tally::default()));
     std::thread::scope(|scope| {
         for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
@@ -197,7 +197,7 @@ fn assert_near(found: f64, known: f64, tolerance: f64) {
 
 /// Figures of the paper's scene, computed with 50 digits.
 #[test]
-fn the_judge_knows_the_paper_scene() {
+fn the_oracle_knows_the_paper_scene() {
     let scene = team(223, 3.41, 2.2, 0.3, 0.275).replace("\"pieces\"", "\"spiral\"\npitch = 0.55\nstart_turn = 16");
     let verdict = verdict_of(&scene);
     let contact = verdict.contact.unwrap().unwrap();
@@ -210,7 +210,7 @@ fn the_judge_knows_the_paper_scene() {
 
 /// Figures that another brute force found, with 113 bits.
 #[test]
-fn the_judge_finds_what_another_judge_found() {
+fn the_oracle_finds_what_another_oracle_found() {
     let stall_of = |scene: String| verdict_of(&scene).stall.unwrap().0;
     let missed = team(20, 3.41, 2.2, 0.3, 0.275) + &route(&[[5.0, 0.0], [0.03, 0.5], [20.0, 0.0]]);
     assert_near(stall_of(missed), 5.047441916962, 1e-11);

@@ -285,16 +285,16 @@ fn frames(path: &Path, places: &[f64]) -> Vec<f64> {
     places.iter().flat_map(|place| [0.0, 5e-5, 1e-3, 1.0 / 60.0].map(|by| place * path.length() + by)).collect()
 }
 
-/// Runs a judge, which returns how much it judged, on random cases; returns the sum.
-fn sum_over_cases<S: Strategy>(cases: u32, strategy: S, judge: impl Fn(S::Value) -> usize) -> usize {
-    let judged = Cell::new(0);
+/// Runs a check, which returns how many it did, on random cases; returns the sum.
+fn sum_over_cases<S: Strategy>(cases: u32, strategy: S, check: impl Fn(S::Value) -> usize) -> usize {
+    let checked = Cell::new(0);
     let config = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(cases) };
     let result = TestRunner::new(config).run(&strategy, |case| {
-        judged.set(judged.get() + judge(case));
+        checked.set(checked.get() + check(case));
         Ok(())
     });
     result.unwrap_or_else(|failure| panic!("{failure}"));
-    judged.get()
+    checked.get()
 }
 
 #[test]

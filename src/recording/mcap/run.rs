@@ -59,7 +59,7 @@ pub(super) struct Run {
     pub alert: Option<CollisionAlert>,
     pub cue: Option<Cue>,
     pub status: Option<LoopStatus>,
-    /// The latest status that the run's diagnostics have judged, one without a skip before the first; `None` where it is not
+    /// The latest status that the run's diagnostics are of, one without a skip before the first; `None` where it is not
     /// known what was before.
     pub diagnosed: Option<LoopStatus>,
     /// Messages so far of what is not sent with every frame.

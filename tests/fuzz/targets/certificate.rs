@@ -39,7 +39,7 @@ fn run(data: &[u8]) -> bool {
         Ok(proved) => {
             assert_eq!(proved.results.len(), 4, "{:?}", proved.results);
             check_steps(data, [proved.steps, proved.links]);
-            // What the program itself does not take as a scene, or would search for long, has no other judge.
+            // What the program itself does not take as a scene, or would search for long, has no other check.
             let Some(timeline) = timeline_of(&proved.scene) else { return true };
             for outcome in &proved.results {
                 assert!(is_true(outcome, &timeline), "accepted, but not true: {outcome:?}");
