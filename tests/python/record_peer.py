@@ -194,7 +194,9 @@ class Comparison:
         values = {pair.key: pair.value for pair in loop.values}
         assert int(values["skipped periods"]) == status.skipped, where
         before = self.seldom["status"][index - 1].skipped if index else 0
-        assert loop.level == (1 if status.skipped > before else 0), (where, loop.level)
+        # A tenth of a second's periods is an error, by default.
+        skipped, error = status.skipped - before, max(2, math.ceil(0.1 * status.rate))
+        assert loop.level == (2 if skipped >= error else 1 if skipped > 0 else 0), (where, loop.level, skipped)
         values = {pair.key: pair.value for pair in dragon.values}
         assert values["sim_time (s)"] == f"{status.sim_time:.3f}", where
 
