@@ -5,6 +5,7 @@
 # The Rust toolchain and what cargo has downloaded are this machine's; all else comes from Debian and PyPI.
 set -euo pipefail
 [ $# = 1 ] && [ "$(id -u)" = 0 ] || { echo "usage, as root: $0 FOLDER" >&2; exit 2; }
+command -v rustc >/dev/null || { echo "rustc is not in the PATH here: sudo env PATH=\"\$PATH\" $0 $1" >&2; exit 2; }
 # Mounts of its own, which are gone when it ends.
 [ -n "${NEWCOMER_MOUNTS:-}" ] || NEWCOMER_MOUNTS=1 exec unshare --mount --propagation private "$0" "$@"
 repository=$(cd "$(dirname "$0")/../.." && pwd)
