@@ -268,7 +268,7 @@ fn files_are_split_by_size_by_time_and_by_run() {
     // Somebody else's.
     std::fs::write(folder.path().join("size-2.mcap"), "kept").unwrap();
     let recorders = [
-        recorder(name, &by_size, &["--split", "2MB"]),
+        recorder(name, &by_size, &["--split", "1MB"]),
         recorder(name, &by_time, &["--split", "2s", "--topics", "handles,stage"]),
     ];
     for _ in 0..2 {
@@ -287,7 +287,7 @@ fn files_are_split_by_size_by_time_and_by_run() {
         let mut sequences = Vec::new();
         for file in files(summary) {
             let bytes = std::fs::read(&file).unwrap();
-            assert!(bytes.len() <= 2_000_000 || topics == 2, "{}: {} bytes", file.display(), bytes.len());
+            assert!(bytes.len() <= 1_000_000 || topics == 2, "{}: {} bytes", file.display(), bytes.len());
             let entries = entries(&bytes);
             let first = entries.iter().find(|entry| entry.0.ends_with("/stage"));
             assert!(first.is_some(), "{} has no stage", file.display());
