@@ -26,6 +26,8 @@ const SUMMARY_OFFSET_BYTES: usize = 17;
 const MESSAGE_INDEX_ENTRY_BYTES: usize = 16;
 /// Records from here on are no part of MCAP; each program may have its own.
 const FIRST_PRIVATE: u8 = 0x80;
+/// Bytes of a chunk's record besides the name of its compression and its records.
+const CHUNK_BYTES: usize = 40;
 /// Bytes of an attachment's record besides its two names and its data.
 const ATTACHMENT_BYTES: usize = 36;
 
@@ -99,7 +101,8 @@ pub fn recover(input: impl Read, length: u64, output: impl Write) -> Result<Reco
     }
     let writer = made.create(NoSeek::new(output))?;
     let (schemas, channels) = (BTreeMap::new(), BTreeMap::new());
-    let mut mender = Mender { writer, schemas, channels, lost_chunk: false, recovered: Recovered::default() };
+    let recovered = Recovered::default();
+    let mut mender = Mender { writer, schemas, channels, has_chunks: false, lost_chunk: false, recovered };
     let mut in_index = false;
     while let Some(found) = opcode {
         match (found, input.body.len()) {
@@ -164,6 +167,8 @@ struct Mender<Output: Write> {
     /// repeated in it.
     schemas: BTreeMap<u16, Schema<'static>>,
     channels: BTreeMap<u16, Known>,
+    /// Whether there was a chunk, be it damaged: messages stand in chunks then.
+    has_chunks: bool,
     /// Whether the indexes that come now are of a chunk that was left out.
     lost_chunk: bool,
     recovered: Recovered,
@@ -179,6 +184,7 @@ struct Known {
 impl<Output: Write> Mender<Output> {
     /// Keeps a whole record of the file.
     fn keep(&mut self, opcode: u8, body: &[u8]) -> Result<(), RecoverError> {
+        self.has_chunks |= opcode == op::CHUNK && is_chunk(body);
         let kept = match opcode {
             // All of it is read before any of it is kept: its check comes last.
             op::CHUNK => match records_of_chunk(body) {
@@ -222,7 +228,7 @@ impl<Output: Write> Mender<Output> {
     fn is_possible(&self, opcode: u8, body: &[u8]) -> bool {
         match opcode {
             // A file has chunks or has none.
-            op::MESSAGE => self.recovered.chunks == 0,
+            op::MESSAGE => !self.has_chunks,
             op::MESSAGE_INDEX => message_index_entries(body).is_some(),
             op::ATTACHMENT => is_attachment(body),
             op::SUMMARY_OFFSET => body.len() == SUMMARY_OFFSET_BYTES,
@@ -320,6 +326,14 @@ pub(super) fn records_of_chunk(body: &[u8]) -> Result<Vec<Record<'static>>, Mcap
         }
     }
     Ok(records)
+}
+
+/// Whether the lengths in a chunk's record can be true: where the opcode of another record is damaged they are not.
+fn is_chunk(body: &[u8]) -> bool {
+    match parse_record(op::CHUNK, body) {
+        Ok(Record::Chunk { header, data }) => CHUNK_BYTES + header.compression.len() + data.len() == body.len(),
+        _ => false,
+    }
 }
 
 /// How many messages a record lists, if it is such a list.
