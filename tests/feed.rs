@@ -100,6 +100,41 @@ fn a_publisher_restarted_between_two_polls_is_a_new_run() {
     }
 }
 
+/// One that comes when the feed is about to find that the one before has gone, 200 ms after its last frame, is followed from
+/// its first frames on.
+#[test]
+fn a_publisher_that_is_started_again_at_any_moment_is_followed_at_once() {
+    const RATE: u64 = 100;
+    let mut feed = Feed::new(&unique("again"), FeedOptions { wake: Wake::OnFrame, frames: Frames::All }).unwrap();
+    let mut seen = Vec::new();
+    let delays = [0, 40, 80, 120, 160, 200, 250, 400].map(Duration::from_millis);
+    for delay in delays {
+        let publisher = publisher("again", &["--rate", &RATE.to_string(), "--duration", "2"]);
+        let ending = std::thread::spawn(move || publisher.output_within(300));
+        while !ending.is_finished() {
+            poll(&mut feed, &mut seen);
+        }
+        assert!(ending.join().unwrap().status.success());
+        let ended = Instant::now();
+        while ended.elapsed() < delay {
+            poll(&mut feed, &mut seen);
+        }
+    }
+    poll_until(&mut feed, &mut seen, |seen| seen.last() == Some(&Seen::Gone));
+    assert_eq!(runs(&seen).len(), delays.len(), "{seen:?}");
+    for run in runs(&seen) {
+        let (first, last, received, missed) = span(&seen, run);
+        assert_eq!((received, missed), (last - first + 1, 0), "{seen:?}");
+        // Half of it, however slowly it began: it was ignored for seconds.
+        assert!(first < RATE, "{first}: {seen:?}");
+    }
+    let of_frame = |one: &Seen| if let Seen::Frame { run_id, .. } = one { Some(*run_id) } else { None };
+    for (at, _) in seen.iter().enumerate().filter(|(_, one)| **one == Seen::Gone) {
+        let before = seen[..at].iter().rev().find_map(of_frame);
+        assert!(seen[at..].iter().find_map(of_frame).is_none_or(|after| Some(after) != before), "{seen:?}");
+    }
+}
+
 #[test]
 fn the_newest_frame_is_one_a_poll_and_the_rest_is_counted() {
     let mut feed = Feed::new(&unique("newest"), FeedOptions { wake: Wake::Never, frames: Frames::Newest }).unwrap();

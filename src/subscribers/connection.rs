@@ -137,9 +137,13 @@ impl Subscription {
         Ok(Some(connection))
     }
 
-    /// Lets go of a connection from which nothing more comes. Publishers that remain are not connected to again for a while.
+    /// Lets go of a connection from which nothing more comes. Publishers that remain are not connected to again for a while,
+    /// unless a show is here: then one of them may be the next show's, which is about to send.
     pub fn leave(&self, connection: Connection) {
-        self.bystanders.replace((Instant::now(), publishers(&connection.poses_service)));
+        let remaining = publishers(&connection.poses_service);
+        // In this order: a show serves commands before it has a publisher.
+        let bystanders = if self.show_is_here() { Vec::new() } else { remaining };
+        self.bystanders.replace((Instant::now(), bystanders));
     }
 
     /// Whether there is nobody to connect to.

@@ -185,12 +185,15 @@ impl Feed {
             None => (),
             Some(Change::Silent) => handle(FeedEvent::Silent),
             Some(Change::Gone) => {
-                // What it sent between the reading above and its end is still in the queues.
+                // What it sent between the reading above and its end is still in the queues, perhaps before what the next
+                // publisher sends.
                 connected.receive(self.frames, &mut self.sequence, handle);
-                if connected.received {
-                    handle(FeedEvent::Gone);
+                if !self.subscription.publisher_is_alive(&connected.connection) {
+                    if connected.received {
+                        handle(FeedEvent::Gone);
+                    }
+                    self.leave();
                 }
-                self.leave();
             }
         }
         let is_quiet = |connected: &&mut Connected| !connected.received && connected.quiet_since.elapsed() >= QUIET;
