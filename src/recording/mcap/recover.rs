@@ -184,11 +184,17 @@ struct Known {
 impl<Output: Write> Mender<Output> {
     /// Keeps a whole record of the file.
     fn keep(&mut self, opcode: u8, body: &[u8]) -> Result<(), RecoverError> {
-        self.has_chunks |= opcode == op::CHUNK && is_chunk(body);
+        self.has_chunks |= match opcode {
+            op::CHUNK => is_chunk(body),
+            // What it lists is in a chunk, whatever became of that.
+            op::MESSAGE_INDEX => message_index_entries(body).is_some(),
+            _ => false,
+        };
         let kept = match opcode {
             // All of it is read before any of it is kept: its check comes last.
             op::CHUNK => match records_of_chunk(body) {
                 Ok(records) => {
+                    self.has_chunks = true;
                     self.recovered.chunks += 1;
                     records.into_iter().try_for_each(|record| self.keep_record(record))?;
                     self.writer.flush()?;
@@ -232,6 +238,7 @@ impl<Output: Write> Mender<Output> {
             op::MESSAGE_INDEX => message_index_entries(body).is_some(),
             op::ATTACHMENT => is_attachment(body),
             op::SUMMARY_OFFSET => body.len() == SUMMARY_OFFSET_BYTES,
+            op::DATA_END => body.len() == DATA_END_BYTES,
             op::FOOTER => body.len() == FOOTER_BYTES,
             op::HEADER..=op::DATA_END => true,
             _ => false,
