@@ -47,7 +47,7 @@ inside newcomer 'cd bench-dragon && cargo install --quiet --path . --locked && c
 inside newcomer 'cd bench-dragon && python3 -m venv .venv && source .venv/bin/activate
   pip install --quiet iceoryx2==0.10.0 numpy
   ~/.cargo/bin/bench-dragon run --duration 60 >/dev/null & publisher=$!
-  python3 examples/python/subscribe.py --seconds 5 >heads.txt && grep "224 handles" heads.txt
+  python3 examples/python/subscribe.py --seconds 5 >../heads.txt && grep "224 handles" ../heads.txt
   kill -INT $publisher && wait $publisher'
 # Some tests make networks, which takes root, whom git does not let into the folder of another user.
 inside root 'git config --global --replace-all safe.directory /home/newcomer/bench-dragon && cd bench-dragon
