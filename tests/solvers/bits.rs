@@ -23,6 +23,7 @@ fn hash_of_frames(subject: &Subject, solver: &mut dyn Solver) -> u64 {
 fn frames_have_the_bits_they_had() {
     let golden: &[(&str, &str, u64)] = &GOLDEN;
     let fma = cfg!(all(target_arch = "x86_64", target_os = "linux")) && Instructions::available().len() > 1;
+    let mut changed = Vec::new();
     for name in ["paper", "turnaround", "procession"] {
         let subject = Subject::scene(name);
         for (who, mut solver) in subject.solvers().into_iter().chain(subject.selected()) {
@@ -31,11 +32,13 @@ fn frames_have_the_bits_they_had() {
             println!("    (\"{name}\", \"{who}\", {hash:#018x}),");
             let known = golden.iter().find(|(scene, solver, _)| (*scene, *solver) == (name, who.as_str()));
             match known {
-                Some((.., known)) if fma => assert_eq!(hash, *known, "{who} on {name}"),
+                Some((.., known)) if fma && hash != *known => changed.push(format!("{who} on {name}: {hash:#018x}")),
+                Some(_) if fma => (),
                 _ => println!("{who} on {name}: no hash to compare with on this machine"),
             }
         }
     }
+    assert!(changed.is_empty(), "{changed:#?}");
 }
 
 const GOLDEN: [(&str, &str, u64); 21] = [
@@ -47,17 +50,17 @@ const GOLDEN: [(&str, &str, u64); 21] = [
     ("paper", "1e-9 m (AVX2 and FMA)", 0xdc2349c7e9223e97),
     ("paper", "1e-9 m (portable)", 0x6aa81313a8f8c036),
     ("turnaround", "newton", 0x724bcfbf23324f3b),
-    ("turnaround", "follower_table (AVX-512)", 0x3143c365033aebb4),
-    ("turnaround", "follower_table (AVX2 and FMA)", 0x3143c365033aebb4),
-    ("turnaround", "follower_table (portable)", 0x02d2fa78c99b3990),
-    ("turnaround", "1e-9 m (AVX-512)", 0xc3a262ad2188a2c1),
-    ("turnaround", "1e-9 m (AVX2 and FMA)", 0xc3a262ad2188a2c1),
-    ("turnaround", "1e-9 m (portable)", 0xcb8c31538d957dc8),
+    ("turnaround", "follower_table (AVX-512)", 0x7478717edd3f28c4),
+    ("turnaround", "follower_table (AVX2 and FMA)", 0x7478717edd3f28c4),
+    ("turnaround", "follower_table (portable)", 0x8b25ce06c65f45e9),
+    ("turnaround", "1e-9 m (AVX-512)", 0x70553f6bb55ae972),
+    ("turnaround", "1e-9 m (AVX2 and FMA)", 0x70553f6bb55ae972),
+    ("turnaround", "1e-9 m (portable)", 0x1788a9d39814a016),
     ("procession", "newton", 0xd7c900bb92e96ee7),
-    ("procession", "follower_table (AVX-512)", 0x580192ef8b8d08e0),
-    ("procession", "follower_table (AVX2 and FMA)", 0x580192ef8b8d08e0),
-    ("procession", "follower_table (portable)", 0xc3c5ce95d5a83fbc),
-    ("procession", "1e-9 m (AVX-512)", 0xb9ed1e808c559be7),
-    ("procession", "1e-9 m (AVX2 and FMA)", 0xb9ed1e808c559be7),
-    ("procession", "1e-9 m (portable)", 0x0fc7c8b2c00119bb),
+    ("procession", "follower_table (AVX-512)", 0xce3d84815e6f8797),
+    ("procession", "follower_table (AVX2 and FMA)", 0xce3d84815e6f8797),
+    ("procession", "follower_table (portable)", 0x6029dbd3606f2ecc),
+    ("procession", "1e-9 m (AVX-512)", 0x0e5f54089f88d327),
+    ("procession", "1e-9 m (AVX2 and FMA)", 0x0e5f54089f88d327),
+    ("procession", "1e-9 m (portable)", 0x25015a7824636a3a),
 ];
