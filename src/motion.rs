@@ -191,11 +191,14 @@ impl Motion {
         instructions.is_available().then_some(Self { instructions, ..self })
     }
 
-    /// Metres by which the links of this motion's frames may be off, besides rounding.
+    /// Metres by which the links of this motion's frames may be off, besides 1e-12 of their length and the rounding of the
+    /// handles' coordinates.
     pub fn link_tolerance(&self) -> f64 {
+        // Both ends of a link may be off by the rounding of a product and of a sum, in both coordinates.
+        let rounding = 4.0 * f64::EPSILON * self.path.largest_summand(self.team.length());
         match self.method {
-            Method::Accuracy(accuracy) => selection::link_tolerance(&self.team, accuracy),
-            _ => 0.0,
+            Method::Accuracy(accuracy) => selection::link_tolerance(&self.team, accuracy) + rounding,
+            _ => rounding,
         }
     }
 

@@ -254,6 +254,20 @@ impl Path {
         rest + between + self.segment(to).arc_length(self.segments[to.segment].anchor, to.at)
     }
 
+    /// Metres: the largest number to which the points of lines and arcs are added up, for handles up to `behind` metres behind
+    /// the start. Points that lie nearer to the origin of coordinates are rounded as that number is.
+    pub fn largest_summand(&self, behind: f64) -> f64 {
+        let of = |placed: &Placed| {
+            let length = placed.end - placed.begin.max(-behind);
+            match placed.segment {
+                Segment::Line(line) => line.origin.coords.amax(),
+                Segment::Arc(arc) => arc.origin.coords.amax().max(length.min(2.0 * arc.radius)),
+                Segment::Spiral(_) => 0.0,
+            }
+        };
+        self.segments.iter().map(of).fold(0.0, f64::max)
+    }
+
     /// The greatest curvature from one distance of travel to another, 1/m: the tangent turns by no more per metre.
     pub fn max_curvature_between(&self, from: f64, to: f64) -> f64 {
         let met = self.segments.iter().filter(|placed| placed.begin <= to && placed.end >= from);

@@ -81,8 +81,13 @@ fn a_byte_that_is_wrong_costs_messages_and_invents_none() {
     for round in 0..400 {
         // Every other file was cut before its end, and every fourth byte is in the first chunk.
         let length = if round % 2 == 0 { bytes.len() } else { last_end };
-        let from = if round % 4 < 2 { record_of(first_end - 1) } else { 8 };
-        let at = random.usize(from..if round % 4 < 2 { first_end } else { length });
+        let first = record_of(first_end - 1);
+        // First each byte before the messages of the first chunk, with its lengths and its check.
+        let at = match round {
+            0..40 => first + 9 + round,
+            _ if round % 4 < 2 => random.usize(first..first_end),
+            _ => random.usize(8..length),
+        };
         let mut wrong = bytes[..length].to_vec();
         wrong[at] ^= 1 << random.u32(0..8);
         let (counts, output) = recovered(&wrong).unwrap();
@@ -105,10 +110,13 @@ fn a_byte_that_is_wrong_costs_messages_and_invents_none() {
         damaged += u64::from(counts.damaged > 0);
     }
     assert!(damaged > 200, "{damaged} of 400 were noticed in a chunk");
-    // No record of MCAP, in place of the second chunk.
-    let mut wrong = bytes.clone();
-    wrong[record_of(chunks[1].0 - 1)] = 0x16;
-    let (counts, _) = recovered(&wrong).unwrap();
-    let lost = chunks[1].1.len() as u64;
-    assert_eq!((counts.damaged, counts.lost_messages, counts.messages), (1, lost, all.len() as u64 - lost));
+    // No record of MCAP, in place of the second chunk; a message, in place of the first.
+    for (chunk, opcode) in [(1, 0x16), (0, 0x05)] {
+        let mut wrong = bytes.clone();
+        wrong[record_of(chunks[chunk].0 - 1)] = opcode;
+        let (counts, _) = recovered(&wrong).unwrap();
+        let lost = chunks[chunk].1.len() as u64;
+        let expected = (1, lost, 0, all.len() as u64 - lost);
+        assert_eq!((counts.damaged, counts.lost_messages, counts.unknown, counts.messages), expected, "{opcode}");
+    }
 }

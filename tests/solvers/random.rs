@@ -48,15 +48,48 @@ fn routes() -> impl Strategy<Value = Subject> {
     )
 }
 
+/// Routes whose first segment is up to 1,000 km long and ends at the origin of coordinates, at times about its end.
+fn routes_from_afar() -> impl Strategy<Value = (Subject, f64)> {
+    (magnitude(1e3, 1e6), 0.0..1.0f64, 0.0..0.8f64, 1usize..12, 0.3..3.0f64, 0.0..1.0f64).prop_map(
+        |(far, heading_turns, bend, benches, link, share)| {
+            let (sine, cosine) = (TAU * heading_turns).sin_cos();
+            let (start, size) = (Point::new(-far * cosine, -far * sine), 5.0 * link);
+            // A bend so wide that it takes the team to the origin, or a line that does.
+            let first = if bend < 0.4 {
+                RouteStep::Line { length: far }
+            } else {
+                RouteStep::Arc { side: Side::Left, radius: 0.5 * far, turns: 0.5 }
+            };
+            // The half circle begins square to the way to its end.
+            let heading_turns = if bend < 0.4 { heading_turns } else { heading_turns - 0.25 };
+            let length = if bend < 0.4 { far } else { PI * 0.5 * far };
+            let last = RouteStep::Arc { side: Side::Right, radius: size, turns: 0.1 + bend / 2.0 };
+            let description = PathDescription::Route { start, heading_turns, steps: vec![first, last] };
+            let team =
+                Team { benches, head_length: 1.5 * link + 0.1, body_length: link + 0.1, width: 0.1, hole_inset: 0.05 };
+            let subject = Subject::new(description, team, 1.0);
+            let time = (length + (2.0 * share - 1.0) * (benches + 2) as f64 * link).min(subject.end);
+            (subject, time)
+        },
+    )
+}
+
+/// A subject at a time of its first 99.5 %.
+fn at_some_time(subjects: impl Strategy<Value = Subject>) -> impl Strategy<Value = (Subject, f64)> {
+    (subjects, 0.0..0.995f64).prop_map(|(subject, share)| {
+        let time = share * subject.end;
+        (subject, time)
+    })
+}
+
 /// Random subjects: every solver at a random time, the velocities as central differences, and how often a table served.
-fn random_subjects(subjects: impl Strategy<Value = Subject>, least_share_of_tables: f64) {
+fn random_subjects(cases: u32, subjects: impl Strategy<Value = (Subject, f64)>, least_share_of_tables: f64) {
     let long = std::env::var("BENCH_DRAGON_LONG").is_ok_and(|value| value == "1");
-    let config = Config { cases: if long { 100_000 } else { 300 }, failure_persistence: None, ..Config::default() };
-    let (cases, tables, compared) = (config.cases, Cell::new(0), Cell::new(0u64));
-    let case = (subjects, 0.0..0.995f64);
+    let cases = if long { cases * 1000 / 3 } else { cases };
+    let config = Config { cases, failure_persistence: None, ..Config::default() };
+    let (tables, compared) = (Cell::new(0), Cell::new(0u64));
     TestRunner::new(config)
-        .run(&case, |(subject, share)| {
-            let time = share * subject.end;
+        .run(&subjects, |(subject, time)| {
             let mut reference = subject.reference();
             let handles = subject.motion.team().handles();
             let (mut chain, mut safe) = (Chain::new(handles), Chain::new(handles));
@@ -79,10 +112,15 @@ fn random_subjects(subjects: impl Strategy<Value = Subject>, least_share_of_tabl
 
 #[test]
 fn random_spirals_keep_the_promise() {
-    random_subjects(spirals(), 0.1);
+    random_subjects(300, at_some_time(spirals()), 0.1);
 }
 
 #[test]
 fn random_routes_keep_the_promise() {
-    random_subjects(routes(), 0.5);
+    random_subjects(300, at_some_time(routes()), 0.5);
+}
+
+#[test]
+fn routes_that_come_from_afar_keep_the_promise() {
+    random_subjects(60, routes_from_afar(), 0.2);
 }

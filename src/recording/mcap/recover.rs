@@ -102,7 +102,8 @@ pub fn recover(input: impl Read, length: u64, output: impl Write) -> Result<Reco
     let writer = made.create(NoSeek::new(output))?;
     let (schemas, channels) = (BTreeMap::new(), BTreeMap::new());
     let recovered = Recovered::default();
-    let mut mender = Mender { writer, schemas, channels, has_chunks: false, lost_chunk: false, recovered };
+    let (has_chunks, held, lost_chunk) = (false, None, false);
+    let mut mender = Mender { writer, schemas, channels, has_chunks, held, lost_chunk, recovered };
     let mut in_index = false;
     while let Some(found) = opcode {
         match (found, input.body.len()) {
@@ -169,6 +170,8 @@ struct Mender<Output: Write> {
     channels: BTreeMap<u16, Known>,
     /// Whether there was a chunk, be it damaged: messages stand in chunks then.
     has_chunks: bool,
+    /// The last message outside of chunks: not kept before it is known that no index follows.
+    held: Option<Record<'static>>,
     /// Whether the indexes that come now are of a chunk that was left out.
     lost_chunk: bool,
     recovered: Recovered,
@@ -184,12 +187,18 @@ struct Known {
 impl<Output: Write> Mender<Output> {
     /// Keeps a whole record of the file.
     fn keep(&mut self, opcode: u8, body: &[u8]) -> Result<(), RecoverError> {
-        self.has_chunks |= match opcode {
-            op::CHUNK => is_chunk(body),
-            // What it lists is in a chunk, whatever became of that.
-            op::MESSAGE_INDEX => message_index_entries(body).is_some(),
-            _ => false,
-        };
+        // What it lists is in a chunk, whatever became of that.
+        let is_index = opcode == op::MESSAGE_INDEX && message_index_entries(body).is_some();
+        self.has_chunks |= is_index || opcode == op::CHUNK && is_chunk(body);
+        match self.held.take() {
+            // It was the chunk, of which the opcode is damaged.
+            Some(_) if is_index => {
+                self.recovered.damaged += 1;
+                self.lost_chunk = true;
+            }
+            Some(message) => self.keep_record(message)?,
+            None => (),
+        }
         let kept = match opcode {
             // All of it is read before any of it is kept: its check comes last.
             op::CHUNK => match records_of_chunk(body) {
@@ -211,6 +220,10 @@ impl<Output: Write> Mender<Output> {
             }
             _ if !self.is_possible(opcode, body) => false,
             _ => match parse_record(opcode, body) {
+                Ok(message @ Record::Message { .. }) => {
+                    self.held = Some(message.into_owned());
+                    true
+                }
                 Ok(record) => {
                     self.keep_record(record)?;
                     true
@@ -302,6 +315,9 @@ impl<Output: Write> Mender<Output> {
 
     /// Ends the mended file, with the channels that have no message.
     fn finish(mut self) -> Result<Recovered, RecoverError> {
+        if let Some(message) = self.held.take() {
+            self.keep_record(message)?;
+        }
         let ids: Vec<u16> = self.channels.keys().copied().collect();
         for id in ids {
             self.channel(id)?;
