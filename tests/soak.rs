@@ -253,8 +253,9 @@ fn a_show_that_somebody_else_conducts_too_fails() {
     let checks = checks(&report);
     assert_eq!(checks["jumps of simulated time too many or too few"], (false, 1.0));
     assert!(checks["answers that the command table does not allow"].1 >= 1.0, "{checks:?}");
-    let fault = report["conducted"]["faults"][0].as_str().unwrap();
-    assert!(fault.contains("expected"), "{fault}");
+    // The seek may have come in the very period in which a step ended, whose frame then contradicts its answer.
+    let faults = report["conducted"]["faults"].as_array().unwrap();
+    assert!(faults.iter().any(|fault| fault.as_str().unwrap().contains("expected")), "{faults:?}");
     // The stream itself is in order: each frame follows from the one before.
     assert_eq!(checks["frames that disobey the commands"], (true, 0.0));
 }
