@@ -85,22 +85,23 @@ fn check_upgraded(data: &[u8], answer: &[u8]) {
     assert!(!origin.is_some_and(|line| FOREIGN.contains(&line)), "let in: {head}");
     // What the request itself has for a body is no message, and a line end by itself may end the head earlier.
     let has_own_end = head.lines().count() != head.split("\r\n").count() - 1 || head.replace("\r\n", "").contains('\r');
-    if has_own_end || head.contains("Transfer-Encoding") || head.contains("Content-Length") {
+    let head = head.to_ascii_lowercase();
+    if has_own_end || head.contains("transfer-encoding") || head.contains("content-length") {
         return;
     }
-    let answers: Vec<Value> = (frames(&answer[end(answer)..]).into_iter().filter(|frame| frame.0 == 0x81))
+    let (received, _) = frames(&answer[end(answer)..], false);
+    let answers: Vec<Value> = (received.into_iter().filter(|frame| frame.0 == 0x81))
         .map(|(_, text)| serde_json::from_slice(&text).unwrap_or_else(|error| panic!("{error} in {text:?}")))
         .filter(|json: &Value| ["control", "answer", "clock"].contains(&json["type"].as_str().unwrap_or_default()))
         .collect();
     // Of what breaks the rules of WebSockets somewhere nothing more is asked.
-    let frames = frames(sent);
-    let whole: usize = frames.iter().map(|(_, text)| text.len() + if text.len() < 126 { 6 } else { 8 }).sum();
+    let (frames, rest) = frames(sent, true);
     let is_regular = |(first, text): &(u8, Vec<u8>)| match first {
         0x81 => text.len() <= 1024 && std::str::from_utf8(text).is_ok(),
         0x89 | 0x8a => text.len() < 126,
         _ => false,
     };
-    if whole != sent.len() || !frames.iter().all(is_regular) {
+    if !rest.is_empty() || !frames.iter().all(is_regular) {
         return;
     }
     let asked: Vec<Vec<u8>> = frames.into_iter().filter(|frame| frame.0 == 0x81).map(|frame| frame.1).collect();
@@ -108,8 +109,12 @@ fn check_upgraded(data: &[u8], answer: &[u8]) {
     assert_eq!(answers.len(), asked.len() + 1, "{answers:?} to {}", String::from_utf8_lossy(sent));
     for (asked, answer) in asked.iter().zip(&answers[1..]) {
         assert_eq!(asked == b"clock", answer["type"] == "clock", "{answer}");
-        let Ok(Value::Object(asked)) = serde_json::from_slice(asked) else { continue };
-        let is_command = asked.get("command").is_some_and(Value::is_string)
+        let text = String::from_utf8_lossy(asked);
+        let Ok(Value::Object(asked)) = serde_json::from_str(&text) else { continue };
+        // Of what has a name twice no more is asked.
+        let is_once = |name: &&str| text.matches(&format!("\"{name}\"")).count() <= 1;
+        let is_command = ["command", "value", "id"].iter().all(is_once)
+            && asked.get("command").is_some_and(Value::is_string)
             && asked.get("value").is_none_or(|value| value.is_null() || value.is_number())
             && asked.keys().all(|key| ["command", "value", "id"].contains(&key.as_str()));
         if is_command {
@@ -120,25 +125,29 @@ fn check_upgraded(data: &[u8], answer: &[u8]) {
     }
 }
 
-/// The WebSocket's frames in some bytes, as far as they are whole: the first byte and the content of each.
-fn frames(mut bytes: &[u8]) -> Vec<(u8, Vec<u8>)> {
+/// The WebSocket's frames that some bytes begin with, masked as a client's or not as a server's: the first byte and the content
+/// of each; and the bytes behind them.
+fn frames(mut bytes: &[u8], masked: bool) -> (Vec<(u8, Vec<u8>)>, &[u8]) {
     let mut frames = Vec::new();
     while let Some(([first, length], rest)) = bytes.split_first_chunk() {
-        let (length, rest, mask) = match (length & 0x7f, length >> 7) {
-            (126, mask) => match rest.split_first_chunk() {
-                Some((length, rest)) => (usize::from(u16::from_be_bytes(*length)), rest, mask),
+        if (length & 0x80 != 0) != masked {
+            break;
+        }
+        let (length, rest) = match length & 0x7f {
+            126 => match rest.split_first_chunk() {
+                Some((length, rest)) => (usize::from(u16::from_be_bytes(*length)), rest),
                 None => break,
             },
-            (127, _) => break,
-            (length, mask) => (usize::from(length), rest, mask),
+            127 => break,
+            length => (usize::from(length), rest),
         };
-        let Some((key, rest)) = rest.split_at_checked(if mask == 1 { 4 } else { 0 }) else { break };
+        let Some((key, rest)) = rest.split_at_checked(if masked { 4 } else { 0 }) else { break };
         let Some((content, rest)) = rest.split_at_checked(length) else { break };
         let unmasked = content.iter().zip((0..).map(|at: usize| key.get(at % 4).copied().unwrap_or(0)));
         frames.push((*first, unmasked.map(|(byte, key)| byte ^ key).collect()));
         bytes = rest;
     }
-    frames
+    (frames, bytes)
 }
 
 /// Of whom nobody is let in.
