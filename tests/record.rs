@@ -301,6 +301,29 @@ fn files_are_split_by_size_by_time_and_by_run() {
     }
 }
 
+/// A stage that comes after the first frames is waited for: without it nothing can be replayed.
+#[test]
+fn the_shortest_recording_has_its_stage() {
+    let (name, folder) = ("record_short", tempfile::tempdir().unwrap());
+    let scene = scene(folder.path(), "school", "");
+    let publisher = publisher(name, &scene, &["--rate", "200"]);
+    let mut recorded = 0;
+    for round in 0..12 {
+        let file = folder.path().join(format!("{round}.mcap"));
+        // Until it has begun to record there is nothing in it.
+        let seconds = (0.05 + 0.02 * f64::from(round)).to_string();
+        let output = recorder(name, &file, &["--duration", &seconds]).output_within(60);
+        if output.status.success() {
+            let entries = entries(&std::fs::read(&file).unwrap());
+            assert!(entries.iter().any(|entry| entry.0.ends_with("/stage")), "{seconds} s: {}", entries.len());
+            recorded += 1;
+        }
+    }
+    assert!(recorded >= 6, "{recorded} of 12 recorders were quick enough");
+    publisher.signal(Signal::SIGINT);
+    publisher.output_within(60);
+}
+
 #[test]
 fn a_thousand_frames_a_second_are_recorded_without_a_gap() {
     let (name, folder) = ("record_fast", tempfile::tempdir().unwrap());

@@ -27,6 +27,8 @@ const UNREAD_FRAMES: f64 = 2.0;
 const POLL_INTERVAL: (Duration, Duration) = (Duration::from_millis(1), Duration::from_millis(20));
 /// How often the terminal shows how far it is.
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(200);
+/// How long a stage may come after its first frame: a publisher notices within a second who has joined.
+const STAGE_TIMEOUT: Duration = Duration::from_secs(2);
 /// The smallest file that a recording is split into.
 const LEAST_SPLIT: u64 = 1_000_000;
 
@@ -106,7 +108,8 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
     }
 }
 
-/// Passes on what comes until it is over or the thread has ended.
+/// Passes on what comes until it is over or the thread has ended. Without its stage a recording cannot be replayed: where
+/// that follows its first frames, as it does for one who joins, it is waited for.
 fn follow(
     feed: &mut Feed,
     queue: &RecordQueue,
@@ -118,13 +121,20 @@ fn follow(
     let began = Instant::now();
     let (shortest, longest) = POLL_INTERVAL;
     let (mut interval, mut shown) = (shortest, began);
+    let (mut first_frame, mut has_stage) = (None, false);
     let over =
         || over() || thread.has_ended() || duration.is_some_and(|seconds| began.elapsed().as_secs_f64() >= seconds);
-    while !over() {
+    let waits_for_stage = |first: Option<Instant>| first.is_some_and(|first| first.elapsed() < STAGE_TIMEOUT);
+    while !over() || !has_stage && waits_for_stage(first_frame) && !thread.has_ended() {
         feed.poll(interval, &mut |event| {
-            if let FeedEvent::Status(status) = event {
-                let seconds = Duration::try_from_secs_f64(UNREAD_FRAMES / status.rate);
-                interval = seconds.unwrap_or(longest).clamp(shortest, longest);
+            match event {
+                FeedEvent::Frame { .. } => drop(first_frame.get_or_insert_with(Instant::now)),
+                FeedEvent::Stage(_) => has_stage = true,
+                FeedEvent::Status(status) => {
+                    let seconds = Duration::try_from_secs_f64(UNREAD_FRAMES / status.rate);
+                    interval = seconds.unwrap_or(longest).clamp(shortest, longest);
+                }
+                _ => (),
             }
             queue.handle(&event, over);
         })?;
