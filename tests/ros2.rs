@@ -275,17 +275,18 @@ fn a_reliable_subscriber_that_stops_reading_holds_nobody_up() {
         text_of_scene.lines().filter(|line| !line.starts_with("approach_")).collect::<Vec<_>>().join("\n");
     std::fs::write(&scene, format!("{without_alerts}\n[publish.ros2]\ntopics = [\"handles\"]\n")).unwrap();
     let mut run = program("stopped");
-    let publisher = Process::start(run.args(["--scene", scene.to_str().unwrap(), "run", "--json", "--duration", "14"]));
-    wait(1.0);
-    let stopped = Process::start(&mut peer("stopped", "60", &["handles"]));
-    wait(3.0);
+    let publisher = Process::start(run.args(["--scene", scene.to_str().unwrap(), "run", "--json", "--duration", "20"]));
+    let mut stopped = Process::start(&mut peer("stopped", "60", &["handles"]));
+    let lines = stopped.lines();
+    // Its first message.
+    lines.until("handles", 60);
     stopped.signal(nix::sys::signal::Signal::SIGSTOP);
-    let output = publisher.output_within(40);
+    let output = publisher.output_within(60);
     stopped.signal(nix::sys::signal::Signal::SIGKILL);
     let printed = text(&output.stderr);
     let summary = summary(&output);
     let number = |value: &Value| value.as_u64().unwrap();
-    assert_eq!(number(&summary["frames"]) + number(&summary["skipped"]), 840, "{summary}");
+    assert_eq!(number(&summary["frames"]) + number(&summary["skipped"]), 1200, "{summary}");
     assert!(number(&summary["ros2"]["discarded"]) > 0, "{summary}");
     assert_eq!(printed.matches("discarded").count(), 1, "not printed once: {printed}");
 }
