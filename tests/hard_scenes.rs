@@ -96,6 +96,31 @@ fn a_contact_past_a_stall_is_found() {
     }
 }
 
+/// A nearer place of the path comes within a link's reach, and its rear handle would jump by metres: the motion ends before it
+/// does. The last digits of the place decided otherwise for frames than for the lock, and boards touched where nothing was.
+#[test]
+fn no_handle_jumps_before_the_motion_ends() {
+    for (name, time) in [("jump_route", 22.83133633290738), ("jump_uturn", 31.446068153243733)] {
+        let scene = scene(name);
+        let timeline = timeline(&scene);
+        assert_eq!(event(&timeline, Contact), None, "{name}");
+        let (lock, ..) = event(&timeline, Lock).unwrap_or_else(|| panic!("{name}: no lock"));
+        assert!((lock - time).abs() < 1e-12, "{name}: {lock}");
+        let (newton, handles) = (newton(&scene), scene.team().handles());
+        let (mut before, mut last) = (Chain::new(handles), Chain::new(handles));
+        let to = timeline.end().event.travelled;
+        newton.solve_at(to - 1e-6, &mut before).unwrap();
+        // And at the last digits before.
+        for digits in 0..200 {
+            newton.solve_at(to - f64::from(digits) * (to.next_up() - to), &mut last).unwrap();
+            for handle in 0..handles {
+                let way = (last.x[handle] - before.x[handle]).hypot(last.y[handle] - before.y[handle]);
+                assert!(way < 1e-4, "{name}: handle {handle} goes {way} m in {digits} digits before the lock");
+            }
+        }
+    }
+}
+
 /// N4: a lock is a lock however small the jump.
 #[test]
 fn a_lock_with_a_jump_of_millimetres_is_a_lock() {

@@ -20,13 +20,21 @@ mod inward;
 mod trace;
 
 use crate::model::Point;
-use crate::model::path::Path;
+use crate::model::path::{Param, Path};
 use crate::model::root::bisect_predicate;
 use crate::model::team::Team;
 
 use super::event::{Budget, Event, EventKind};
 use certificate::{Configuration, Link};
 use trace::{LinkTrace, TraceEnd};
+
+/// In the last digits before a lock: in so many rounding may make a handle jump, so many more are safe, and before so many none
+/// has jumped.
+const JUMP_DIGITS: u32 = 256;
+const SAFE_DIGITS: u32 = 32;
+const UNTOUCHED_DIGITS: u32 = 1024;
+/// How far a handle goes that jumps, in links: on those digits it goes less towards any other lock.
+const JUMP: f64 = 0.05;
 
 /// The singular configurations of a motion, up to the one that ends it.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,9 +108,15 @@ impl Search<'_> {
             Some((body.end(), reached.next_down().max(0.0)))
         });
         let (end, searched_until) = match (body_limit, self.head.end()) {
-            (Some((Some(TraceEnd::Lock), at)), _) => (Some(self.event(EventKind::Lock, at, 1)), at),
+            (Some((Some(TraceEnd::Lock), at)), _) => {
+                let at = self.before_jump(at, 1);
+                (Some(self.event(EventKind::Lock, at, 1)), at)
+            }
             (Some((_, at)), _) => (None, at),
-            (None, Some(TraceEnd::Lock)) => (Some(self.event(EventKind::Lock, limit, 0)), limit),
+            (None, Some(TraceEnd::Lock)) => {
+                let at = self.before_jump(limit, 0);
+                (Some(self.event(EventKind::Lock, at, 0)), at)
+            }
             (None, Some(TraceEnd::PathEnd)) => {
                 let kind = EventKind::PathEnd;
                 (Some(Event { kind, travelled: limit, bench_a: None, bench_b: None, place: None }), limit)
@@ -198,16 +212,34 @@ impl Search<'_> {
         Event { kind, travelled, bench_a: Some(link as u32), bench_b: None, place }
     }
 
+    /// The place of a lock, or one some digits before it. Where a nearer place of the path comes within the link's reach its rear
+    /// handle jumps there, and frames, which round otherwise than this search, may have jumped some digits earlier.
+    fn before_jump(&self, travelled: f64, link: usize) -> f64 {
+        let length = self.team.link(link);
+        let place = |digits: u32| travelled - f64::from(digits) * f64::EPSILON * (travelled + length);
+        let rear = |digits: u32| self.rear(place(digits), link).map(|rear| self.path.travelled(rear));
+        // Where digits are as large as that, frames show nothing else than jumps.
+        let is_fine = travelled - place(UNTOUCHED_DIGITS) < 1e-6 * length && place(UNTOUCHED_DIGITS) >= 0.0;
+        let Some(before) = rear(UNTOUCHED_DIGITS).filter(|_| is_fine) else { return travelled };
+        let has_jumped = |digits: &u32| rear(*digits).is_some_and(|rear| rear > before + JUMP * length);
+        // From the first on, since rounding is not monotone.
+        let first = (0..JUMP_DIGITS).rev().find(has_jumped);
+        first.map_or(travelled, |digits| place(digits + SAFE_DIGITS))
+    }
+
     /// The rear handle of a link; where rounding leaves none in the last digits, at the last place before.
     fn rear_point(&self, travelled: f64, link: usize) -> Option<Point> {
-        let point = |travelled: f64| {
-            let head = self.path.param_at(travelled);
-            let follower = |front, link| crate::linkage::follower(self.path, front, self.team.link(link));
-            (0..=link).try_fold(head, follower).ok().map(|rear| self.path.point(rear))
-        };
         let digit = f64::EPSILON * (travelled + self.team.link(link));
         let earlier = (0..40).map(|power| travelled - digit * f64::from(power).exp2());
-        [travelled].into_iter().chain(earlier).take_while(|at| *at >= 0.0).find_map(point)
+        let places = [travelled].into_iter().chain(earlier).take_while(|at| *at >= 0.0);
+        places.into_iter().find_map(|at| self.rear(at, link)).map(|rear| self.path.point(rear))
+    }
+
+    /// The rear handle of a link as frames have it.
+    fn rear(&self, travelled: f64, link: usize) -> Option<Param> {
+        let head = self.path.param_at(travelled);
+        let follower = |front, link| crate::linkage::follower(self.path, front, self.team.link(link));
+        (0..=link).try_fold(head, follower).ok()
     }
 }
 
