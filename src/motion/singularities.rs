@@ -231,8 +231,8 @@ impl Search<'_> {
     fn rear_point(&self, travelled: f64, link: usize) -> Option<Point> {
         let digit = f64::EPSILON * (travelled + self.team.link(link));
         let earlier = (0..40).map(|power| travelled - digit * f64::from(power).exp2());
-        let places = [travelled].into_iter().chain(earlier).take_while(|at| *at >= 0.0);
-        places.into_iter().find_map(|at| self.rear(at, link)).map(|rear| self.path.point(rear))
+        let mut places = [travelled].into_iter().chain(earlier).take_while(|at| *at >= 0.0);
+        places.find_map(|at| self.rear(at, link)).map(|rear| self.path.point(rear))
     }
 
     /// The rear handle of a link as frames have it.
