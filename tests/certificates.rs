@@ -170,10 +170,11 @@ fn pitched(pitch: f64) -> Scene {
 
 #[test]
 fn boards_that_pass_within_micrometres_are_told_from_boards_that_touch() {
-    // The least pitch with which the head comes to 4.5 m: a little below, two boards touch outside, a little above they
+    // The least pitch with which the head comes to a radius: a little below, two boards touch outside, a little above they
     // pass, and touch further in.
+    const REACH: f64 = 2.0;
     let team = *Scene::paper().team();
-    let least = bench_dragon::plan::least_pitch(&team, 4.5, &mut |_| ()).unwrap().value_lo;
+    let least = bench_dragon::plan::least_pitch(&team, REACH, &mut |_| ()).unwrap().value_lo;
     let contact = |pitch: f64| {
         let scene = pitched(pitch);
         let (outcomes, timeline) = outcomes(&scene, MOST_STEPS);
@@ -188,7 +189,7 @@ fn boards_that_pass_within_micrometres_are_told_from_boards_that_touch() {
     for microns in if long { vec![0.3, 1.0, 10.0, 100.0] } else { vec![1.0] } {
         let (touching, _) = contact(least - 1e-6 * microns);
         let (passing, _) = contact(least + 1e-6 * microns);
-        assert!(touching > 4.5 && passing < 4.5, "{microns} um: {touching} m and {passing} m");
+        assert!(touching > REACH && passing < REACH, "{microns} um: {touching} m and {passing} m");
     }
 }
 

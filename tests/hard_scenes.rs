@@ -18,7 +18,7 @@ use bench_dragon::scene::Scene;
 use bench_dragon::show::{Playback, Show};
 use bench_dragon::solve::newton::Newton;
 use bench_dragon::solve::{Chain, Velocities};
-use processes::Process;
+use processes::{Process, aloud};
 
 fn scene(name: &str) -> Scene {
     Scene::load(&std::path::Path::new("tests/scenes").join(format!("{name}.toml"))).unwrap()
@@ -192,6 +192,10 @@ fn the_fastest_handle_is_the_highest_peak() {
 fn a_pitch_that_does_not_exist_is_refused_and_one_that_cannot_be_decided_is_not_stated() {
     let error = least_pitch(scene("pp_16").team(), 4.5, &mut |_| ()).unwrap_err().to_string();
     assert!(error.contains("no pitch"), "{error}");
+    if !processes::long() {
+        aloud("a pitch that cannot be decided: not without BENCH_DRAGON_LONG=1, it takes a minute");
+        return;
+    }
     // With the pitch of the scene, 2.4 m, boards touch (by brute force, as with all others up to 24 m).
     let plan = least_pitch(scene("plan_pitch_wrong").team(), 1.2, &mut |_| ()).unwrap();
     println!("{plan:?}");

@@ -10,9 +10,9 @@ use crate::events::time_of;
 use crate::processes::{Process, aloud, can_run, long, python, python_modules, text};
 use crate::scenes::{DEADLINE, SceneFile, assert_keys, numbers, same_bits, scenes};
 
-const REACH: f64 = 4.5;
+const REACH: f64 = 2.0;
 const LIMIT: f64 = 2.0;
-const PLAN_PITCH: [&str; 4] = ["plan", "pitch", "--reach-radius", "4.5"];
+const PLAN_PITCH: [&str; 4] = ["plan", "pitch", "--reach-radius", "2"];
 const PLAN_SPEED: [&str; 4] = ["plan", "speed", "--max-handle-speed", "2"];
 
 /// The scenes without those that have the same tables as one before them.
@@ -50,7 +50,7 @@ fn plan_pitch_has_its_keys_for_every_team_and_the_bits_of_the_library() {
                 [(value_lo, known.value_lo), (value_hi, known.value_hi.unwrap()), (radius, overlap.head_radius)];
             assert!(bounds.into_iter().all(|(printed, known)| same_bits(printed, known)), "{line} {known:?}");
             let printed = scene.answer(&PLAN_PITCH);
-            assert!(printed.contains("4.5 m") && printed.contains(&format!("a pitch of {value} m")), "{printed}");
+            assert!(printed.contains("2 m") && printed.contains(&format!("a pitch of {value} m")), "{printed}");
             assert!(printed.contains(&format!("bench {}", b + 1)) && printed.contains("counting from 1"), "{printed}");
             assert!(printed.contains(&format!("from {value_lo} to {value_hi} m")), "{printed}");
             assert!(printed.contains("Proved"), "{printed}");

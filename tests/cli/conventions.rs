@@ -14,7 +14,7 @@ const COMMANDS: [&[&str]; 9] = [
     &["solve", "--at", "0,1"],
     &["solve", "--at", "0,1", "--json"],
     &["draw"],
-    &["plan", "pitch", "--reach-radius", "4.5"],
+    &["plan", "pitch", "--reach-radius", "1"],
     &["plan", "speed", "--max-handle-speed", "2"],
     &["run", "--json", "--duration", "0.5"],
 ];

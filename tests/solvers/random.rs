@@ -112,7 +112,7 @@ fn random_subjects(cases: u32, subjects: impl Strategy<Value = (Subject, f64)>, 
 
 #[test]
 fn random_spirals_keep_the_promise() {
-    random_subjects(150, at_some_time(spirals()), 0.1);
+    random_subjects(60, at_some_time(spirals()), 0.1);
 }
 
 #[test]

@@ -285,10 +285,15 @@ fn frames(path: &Path, places: &[f64]) -> Vec<f64> {
     places.iter().flat_map(|place| [0.0, 5e-5, 1e-3, 1.0 / 60.0].map(|by| place * path.length() + by)).collect()
 }
 
+/// So many random cases, or ten times as many where the tests that take minutes are requested.
+fn count(cases: usize) -> usize {
+    if std::env::var_os("BENCH_DRAGON_LONG").is_some() { 10 * cases } else { cases }
+}
+
 /// Runs a check, which returns how many it did, on random cases; returns the sum.
-fn sum_over_cases<S: Strategy>(cases: u32, strategy: S, check: impl Fn(S::Value) -> usize) -> usize {
+fn sum_over_cases<S: Strategy>(cases: usize, strategy: S, check: impl Fn(S::Value) -> usize) -> usize {
     let checked = Cell::new(0);
-    let config = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(cases) };
+    let config = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(cases as u32) };
     let result = TestRunner::new(config).run(&strategy, |case| {
         checked.set(checked.get() + check(case));
         Ok(())
@@ -299,19 +304,19 @@ fn sum_over_cases<S: Strategy>(cases: u32, strategy: S, check: impl Fn(S::Value)
 
 #[test]
 fn the_same_as_all_pairs_on_random_spirals() {
-    let cases = (any_team(), 0.05..3.0f64, 2.0..25.0f64, prop::collection::vec(0.0..1.0f64, 6));
-    let compared = sum_over_cases(300, cases, |(team, pitch, turns, places)| {
+    let (count, cases) = (count(60), (any_team(), 0.05..3.0f64, 2.0..25.0f64, prop::collection::vec(0.0..1.0f64, 6)));
+    let compared = sum_over_cases(count, cases, |(team, pitch, turns, places)| {
         let path = Path::spiral(pitch, turns);
         agree(team, &path, &frames(&path, &places)).0
     });
-    assert!(compared > 300 * 24 / 2, "{compared} frames of random spirals");
+    assert!(compared > count * 24 / 2, "{compared} frames of random spirals");
 }
 
 #[test]
 fn the_same_as_all_pairs_on_random_paths() {
-    let cases = (any_team(), any_lanes(), prop::collection::vec(0.0..1.0f64, 6));
-    let compared = sum_over_cases(300, cases, |(team, path, places)| agree(team, &path, &frames(&path, &places)).0);
-    assert!(compared > 300 * 24 / 2, "{compared} frames on random paths");
+    let (count, cases) = (count(100), (any_team(), any_lanes(), prop::collection::vec(0.0..1.0f64, 6)));
+    let compared = sum_over_cases(count, cases, |(team, path, places)| agree(team, &path, &frames(&path, &places)).0);
+    assert!(compared > count * 24 / 2, "{compared} frames on random paths");
 }
 
 #[test]
