@@ -331,6 +331,7 @@ impl<Output: Write> Mender<Output> {
 pub(super) fn records_of_chunk(body: &[u8]) -> Result<Vec<Record<'static>>, McapError> {
     let mut head = vec![op::CHUNK];
     head.extend((body.len() as u64).to_le_bytes());
+    let mut left = head.len() + body.len();
     let mut chunk = head.as_slice().chain(body);
     let options = LinearReaderOptions::default().with_skip_start_magic(true).with_skip_end_magic(true);
     let options = options.with_validate_chunk_crcs(true).with_record_length_limit(MOST_RECORD_BYTES as usize);
@@ -339,7 +340,9 @@ pub(super) fn records_of_chunk(body: &[u8]) -> Result<Vec<Record<'static>>, Mcap
     while let Some(event) = reader.next_event() {
         match event? {
             LinearReadEvent::ReadRequest(need) => {
-                let read = chunk.read(reader.insert(need))?;
+                // Of a compressed chunk it asks for 128 kB at a time, and clears room for what it is promised.
+                let read = chunk.read(reader.insert(need.min(left)))?;
+                left -= read;
                 reader.notify_read(read);
             }
             LinearReadEvent::Record { data, opcode: opcode @ (op::SCHEMA | op::CHANNEL | op::MESSAGE) } => {
