@@ -234,9 +234,12 @@ pub fn python() -> Command {
     command
 }
 
+/// An example, which cargo builds with all tests and not with one file of them.
 pub fn example(name: &str) -> Command {
     let target = std::env::current_exe().unwrap();
-    Command::new(target.ancestors().nth(2).unwrap().join("examples").join(name))
+    let file = target.ancestors().nth(2).unwrap().join("examples").join(name);
+    assert!(file.exists(), "{} is not there: `cargo build --release --examples` builds it", file.display());
+    Command::new(file)
 }
 
 pub fn text(bytes: &[u8]) -> String {
