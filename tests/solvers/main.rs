@@ -3,7 +3,7 @@
 //!
 //! The promise: for the pose at the given double `time`, the error is at most max(accuracy, 8 eps (r + distance
 //! travelled)), and links hold to 1e-12 link + 4 ulp(r) and the rounding of the numbers that a segment is made of.
-//! `BENCH_DRAGON_LONG=1` runs 100,000 random scenes of each kind.
+//! `BENCH_DRAGON_LONG=1` runs 10,000 random scenes of each kind.
 
 mod bits;
 mod random;
