@@ -86,7 +86,7 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs
         "--start",
         "412",
         "--duration",
-        "17",
+        "23",
     ]));
     // The contact is half a second after the start; ten seconds later somebody comes.
     wait(10.5);
@@ -99,7 +99,8 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs
         "handles",
         "poses",
     ];
-    let output = Process::start(&mut peer("late", "4", &topics)).output_within(40);
+    // On a busy machine four seconds were too few for one of the two that come late.
+    let output = Process::start(&mut peer("late", "10", &topics)).output_within(40);
     let lines = json_lines(&output);
     assert!(!lines.is_empty(), "{}", text(&output.stderr));
 
