@@ -50,7 +50,10 @@ fn plan_pitch_has_its_keys_for_every_team_and_the_bits_of_the_library() {
                 [(value_lo, known.value_lo), (value_hi, known.value_hi.unwrap()), (radius, overlap.head_radius)];
             assert!(bounds.into_iter().all(|(printed, known)| same_bits(printed, known)), "{line} {known:?}");
             let printed = scene.answer(&PLAN_PITCH);
-            assert!(printed.contains("2 m") && printed.contains(&format!("a pitch of {value} m")), "{printed}");
+            assert!(
+                printed.contains("reaches 2 m,") && printed.contains(&format!("a pitch of {value} m")),
+                "{printed}"
+            );
             assert!(printed.contains(&format!("bench {}", b + 1)) && printed.contains("counting from 1"), "{printed}");
             assert!(printed.contains(&format!("from {value_lo} to {value_hi} m")), "{printed}");
             assert!(printed.contains("Proved"), "{printed}");
