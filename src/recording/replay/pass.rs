@@ -55,7 +55,8 @@ impl Start {
     /// The first frame at or after so many simulated seconds; that of the file for `None`.
     pub fn find(recording: &mut Recording, seconds: Option<f64>) -> Result<Self, ReadError> {
         let [first, _] = recording.contents().ends;
-        let mut start = Self { chunk: 0, tick: first.tick, sim_time: first.sim_time, alert: None, cue: None };
+        // Not the first one's tick: where the index is wrong about a chunk, there is a frame before it.
+        let mut start = Self { chunk: 0, tick: 0, sim_time: first.sim_time, alert: None, cue: None };
         let Some(seconds) = seconds else { return Ok(start) };
         let mut pass = Pass::new(&start);
         let mut end = f64::NEG_INFINITY;
