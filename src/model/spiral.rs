@@ -4,6 +4,7 @@
 //! positions that are nearly the same.
 
 use std::f64::consts::{PI, TAU};
+use std::sync::LazyLock;
 
 use super::curve::{Coordinate, Curve};
 use super::double_double::DoubleDouble;
@@ -152,17 +153,28 @@ impl Spiral {
     /// at most one theta has it equal to the link.
     pub fn fold(&self, link: f64) -> Option<f64> {
         let ratio = link / self.radius_per_radian.high;
-        let chord = |theta: f64, d: f64| d.hypot(2.0 * (theta * (theta + d)).sqrt() * (0.5 * d).sin());
-        let reaches = |theta: f64| first_chord_maximum(theta).is_some_and(|d| chord(theta, d) >= ratio);
-        // Below theta = 1/4 the chord never shrinks; at theta = 1 it does.
-        let least = bisect_predicate(|theta| first_chord_maximum(theta).is_some(), 0.25, 1.0);
-        if reaches(least) {
+        // How much the square of the first maximum exceeds that of the link, over a^2, and its slope: at the maximum, that by
+        // theta alone.
+        let excess = |theta: f64| match first_chord_maximum(theta) {
+            Some(d) => {
+                let square = (0.5 * d).sin().powi(2);
+                let chord_square = d * d + 4.0 * theta * (theta + d) * square;
+                (chord_square - ratio * ratio, 4.0 * (2.0 * theta + d) * square)
+            }
+            None => (f64::NEG_INFINITY, 0.0),
+        };
+        let least = *LEAST_WITH_MAXIMUM;
+        if excess(least).0 >= 0.0 {
             return None;
         }
         // At radius link / 2 the chord of half a turn is longer than the link.
-        Some(bisect_predicate(reaches, least, (0.5 * ratio).max(1.0)))
+        Some(increasing_root(excess, least, (0.5 * ratio).max(1.0), 0.5 * (ratio - PI)))
     }
 }
+
+/// The least theta from which the chord stops growing: below 1/4 it never does, from 1 it does.
+static LEAST_WITH_MAXIMUM: LazyLock<f64> =
+    LazyLock::new(|| bisect_predicate(|theta| first_chord_maximum(theta).is_some(), 0.25, 1.0));
 
 /// The angle d at which the chord from theta to theta + d first stops growing, in (pi, 2 pi), or `None` where it
 /// grows for ever. Depends on theta alone.
@@ -223,5 +235,43 @@ impl Curve for Spiral {
             Direction::Inward => self.inward(from, metres),
             Direction::Outward => self.inward(from, -metres),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The chords from `theta` on a spiral of radius theta to all places up to a turn outward, in small steps: the greatest
+    /// before they first shrink, or `None` where they grow all the time.
+    fn greatest_before_shrinking(theta: f64) -> Option<f64> {
+        let place = |phi: f64| Point::new(phi * phi.cos(), phi * phi.sin());
+        let chords: Vec<f64> =
+            (0..=200_000).map(|k| (place(theta + TAU * f64::from(k) / 200_000.0) - place(theta)).norm()).collect();
+        chords.windows(2).find(|pair| pair[1] < pair[0]).map(|pair| pair[0])
+    }
+
+    #[test]
+    fn a_link_locks_at_the_fold_where_the_chord_is_no_longer_than_it_before_it_shrinks() {
+        for ratio in [5.784, 6.4, 10.0, 26.0, 80.0, 1000.0] {
+            let fold = Spiral::new(TAU, Direction::Inward).fold(ratio).unwrap();
+            let chord = greatest_before_shrinking(fold).unwrap();
+            assert!((chord / ratio - 1.0).abs() < 1e-8, "{chord} at the fold {fold} of {ratio}");
+            assert_eq!(Spiral::new(2.0 * TAU, Direction::Inward).fold(2.0 * ratio), Some(fold));
+        }
+    }
+
+    #[test]
+    fn a_link_too_short_to_lock_has_no_fold() {
+        let links = [0.1, 1.0, 4.0, 5.783];
+        for link in links {
+            assert_eq!(Spiral::new(TAU, Direction::Inward).fold(link), None, "{link}");
+        }
+        let maxima: Vec<f64> = (0..=40).filter_map(|k| greatest_before_shrinking(0.025 * f64::from(k))).collect();
+        assert!(
+            !maxima.is_empty() && maxima.iter().all(|maximum| links.iter().all(|link| link < maximum)),
+            "{maxima:?}"
+        );
+        assert!(Spiral::new(TAU, Direction::Inward).fold(5.784).is_some());
     }
 }
