@@ -27,6 +27,8 @@ const KINDS: [EventKind; 4] = [EventKind::Contact, EventKind::Stall, EventKind::
 
 /// Steps for scenes of which some are given up: of those that are decided none takes as many.
 const STEPS: u64 = 30_000;
+/// Steps for scenes that are given up after hours as well: what is said until then is to be true.
+const STEPS_IN_VAIN: u64 = 1000;
 
 /// The outcomes of a scene, contact first, and the ordinary events.
 fn outcomes(scene: &Scene, most_steps: u64) -> (Vec<Outcome>, Timeline) {
@@ -115,10 +117,12 @@ fn every_scene_of_the_repository_agrees() {
             {
                 continue;
             }
-            let (outcomes, timeline) = outcomes(&Scene::load(&file).unwrap(), STEPS);
+            let is_given_up = given_up.contains(&name.as_str());
+            let most_steps = if is_given_up { STEPS_IN_VAIN } else { STEPS };
+            let (outcomes, timeline) = outcomes(&Scene::load(&file).unwrap(), most_steps);
             let (wrong, undecided) = compared(&outcomes, &timeline);
             assert!(wrong.is_empty(), "{name}: {}", wrong.join("\n"));
-            if !given_up.contains(&name.as_str()) {
+            if !is_given_up {
                 assert_eq!(undecided, 0, "{name}: {outcomes:?}");
                 decided += 1;
             }
