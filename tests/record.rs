@@ -308,9 +308,9 @@ fn the_shortest_recording_has_its_stage() {
     let scene = scene(folder.path(), "school", "");
     let publisher = publisher(name, &scene, &["--rate", "200"]);
     let mut recorded = 0;
-    for round in 0..12 {
+    // How long the shortest is depends on the machine: until a recorder has begun there is nothing in its file.
+    for round in 0.. {
         let file = folder.path().join(format!("{round}.mcap"));
-        // Until it has begun to record there is nothing in it.
         let seconds = (0.05 + 0.02 * f64::from(round)).to_string();
         let output = recorder(name, &file, &["--duration", &seconds]).output_within(60);
         if output.status.success() {
@@ -318,8 +318,11 @@ fn the_shortest_recording_has_its_stage() {
             assert!(entries.iter().any(|entry| entry.0.ends_with("/stage")), "{seconds} s: {}", entries.len());
             recorded += 1;
         }
+        if recorded == 6 {
+            break;
+        }
+        assert!(round < 100, "{recorded} recorders of {round} recorded something: {}", text(&output.stderr));
     }
-    assert!(recorded >= 6, "{recorded} of 12 recorders were quick enough");
     publisher.signal(Signal::SIGINT);
     publisher.output_within(60);
 }

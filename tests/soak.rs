@@ -334,29 +334,39 @@ fn what_cannot_be_is_refused_before_it_starts() {
 
 #[test]
 fn the_status_comes_once_a_second_and_adds_up() {
-    let publisher =
-        Process::start(program("status").args(["run", "--json", "--rate", "50", "--start", "300", "--duration", "6"]));
+    let publisher = Process::start(program("status").args(["run", "--json", "--rate", "50", "--start", "300"]));
     let mut feed = Feed::new(&unique("status"), FeedOptions { wake: Wake::OnFrame, frames: Frames::All }).unwrap();
     let mut statuses: Vec<LoopStatus> = Vec::new();
     let mut frames = Vec::new();
-    let end = Instant::now() + Duration::from_secs(60);
-    let mut gone = false;
-    while !gone && Instant::now() < end {
+    let end = Instant::now() + Duration::from_secs(120);
+    let (mut gone, mut all_missed) = (false, 0);
+    while !gone {
+        assert!(Instant::now() < end, "{} statuses", statuses.len());
+        let before = statuses.len();
         let polled = feed.poll(Duration::from_millis(50), &mut |event| match event {
-            FeedEvent::Frame { header, .. } => frames.push((header.sequence, header.tick, header.run_id)),
+            FeedEvent::Frame { header, missed, .. } => {
+                frames.push((header.sequence, header.tick, header.run_id));
+                all_missed += missed;
+            }
             FeedEvent::Status(status) => statuses.push(*status),
             FeedEvent::Gone => gone = true,
             _ => (),
         });
         polled.unwrap();
+        if before < 6 && statuses.len() >= 6 {
+            publisher.signal(SIGINT);
+        }
     }
     let summary = summary(&publisher.output_within(20));
-    // Six full seconds have passed and the last status is the end's.
-    assert!((5..=8).contains(&statuses.len()), "{}", statuses.len());
+    // One for every second between the first and the last, which is the end's; a machine that stops for a moment delays one.
+    let [first, last] = [&statuses[0], statuses.last().unwrap()];
+    let seconds = (last.tick - first.tick) as f64 / 50.0;
+    assert!((statuses.len() as f64 - 1.0 - seconds).abs() < 2.0, "{} in {seconds} s", statuses.len());
     for status in &statuses {
         assert_eq!((status.scene.as_str(), status.rate), ("paper", 50.0));
         assert_eq!(status.sequence + 1 + status.skipped, status.tick + 1, "{status:?}");
-        assert!(frames.contains(&(status.sequence, status.tick, status.run_id)), "{status:?}");
+        let is_of_a_frame = frames.contains(&(status.sequence, status.tick, status.run_id));
+        assert!(is_of_a_frame || all_missed > 0, "{status:?}");
         assert_eq!(status.sim_time, 300.0 + status.tick as f64 / 50.0);
         assert!(status.measured_rate > 0.0 && status.overruns <= status.skipped);
         let [late, step] = [
@@ -375,6 +385,5 @@ fn the_status_comes_once_a_second_and_adds_up() {
     }
     assert!(statuses.windows(2).all(|pair| pair[0].tick < pair[1].tick && pair[0].stamp_ns < pair[1].stamp_ns));
     assert!(statuses[1..].iter().all(|status| status.subscribers == 1), "{statuses:?}");
-    let last = statuses.last().unwrap();
     assert_eq!((last.sequence + 1, last.skipped), (number(&summary, "frames"), number(&summary, "skipped")));
 }

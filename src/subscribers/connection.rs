@@ -8,6 +8,7 @@ mod followed;
 use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant};
 
+use iceoryx2::identifiers::UniqueNodeId;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::subscriber::Subscriber as Port;
 use iceoryx2::prelude::*;
@@ -44,6 +45,8 @@ pub struct Connection {
     followed: Cell<Option<Followed>>,
     /// Whether another publisher is followed since that was last asked.
     follows_another: Cell<bool>,
+    /// Whether another publisher has sent frames since the latest of the one that is followed.
+    passes_over: Cell<bool>,
     /// The frame that decided whom to follow, until it is handed over: what explains it goes before.
     first: RefCell<Option<PoseSample>>,
     /// The latest status of each publisher that came before it was known whom to follow.
@@ -130,6 +133,7 @@ impl Subscription {
             tick: self.listener(),
             followed: Cell::new(None),
             follows_another: Cell::new(false),
+            passes_over: Cell::new(false),
             first: RefCell::new(None),
             held_statuses: RefCell::new(Vec::new()),
         };
@@ -155,9 +159,30 @@ impl Subscription {
 
     /// Whether a show of this name runs in this shared memory: only a show serves commands.
     pub fn show_is_here(&self) -> bool {
-        let Ok(name) = service_name(&self.name, "control") else { return false };
+        !self.shows_here().is_empty()
+    }
+
+    /// The nodes with which shows of this name serve commands.
+    fn shows_here(&self) -> Vec<UniqueNodeId> {
+        let mut nodes = Vec::new();
+        let Ok(name) = service_name(&self.name, "control") else { return nodes };
         let opened = self.node.service_builder(&name).request_response::<ControlRequest, ControlResponse>().open();
-        opened.is_ok_and(|service| service.dynamic_config().number_of_servers() > 0)
+        if let Ok(service) = opened {
+            service.dynamic_config().list_servers(|server| {
+                nodes.push(server.node_id);
+                CallbackProgression::Continue
+            });
+        }
+        nodes
+    }
+
+    /// Whether frames are passed over that a show here may send, in favour of those of another process: the end of a tunnel
+    /// that was followed while no show was here.
+    pub fn passes_over_the_show(&self, connection: &Connection) -> bool {
+        let Some(followed) = connection.followed.get().filter(|_| connection.passes_over.get()) else { return false };
+        let process = |node: &UniqueNodeId| node.pid::<ipc::Service>().ok();
+        let shows = self.shows_here();
+        !shows.is_empty() && shows.iter().all(|show| process(show) != process(&followed.origin.node))
     }
 
     /// Opens what was not there when the connection was made: a publisher makes its services one after another, and
@@ -370,14 +395,18 @@ impl Connection {
         self.followed.get().is_some()
     }
 
-    /// Whether a frame is handed over. The first decides whose frames are from then on, until that publisher has gone.
+    /// Whether a frame is handed over. The first decides whose frames are from then on, until that publisher has gone or
+    /// the connection is left.
     fn follow(&self, origin: Origin, run_id: u64) -> bool {
         let latest = self.followed.get();
         let is_same = latest.is_some_and(|followed| followed.origin == origin);
         let follows = is_same || latest.is_none_or(|followed| !self.is_listed(followed.origin));
         if follows {
             self.followed.set(Some(Followed { origin, run_id }));
+            self.passes_over.set(false);
             self.follows_another.set(self.follows_another.get() || !is_same);
+        } else {
+            self.passes_over.set(true);
         }
         follows
     }

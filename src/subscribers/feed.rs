@@ -69,7 +69,8 @@ pub enum FeedEvent<'a> {
     Status(&'a LoopStatus),
     /// The publisher is alive and has stopped sending. The next frame ends that.
     Silent,
-    /// The publisher has ended or died, and all that it sent has been handed over.
+    /// The publisher has ended or died, and all that it sent has been handed over; or it is the silent end of a tunnel and
+    /// a show has begun on this machine.
     Gone,
 }
 
@@ -180,15 +181,17 @@ impl Feed {
                 return Err(error);
             }
         }
-        let is_alive = || self.subscription.publisher_is_alive(&connected.connection);
-        match connected.liveness.test(Instant::now(), is_alive) {
+        let is_alive = |connection: &Connection| {
+            self.subscription.publisher_is_alive(connection) && !self.subscription.passes_over_the_show(connection)
+        };
+        match connected.liveness.test(Instant::now(), || is_alive(&connected.connection)) {
             None => (),
             Some(Change::Silent) => handle(FeedEvent::Silent),
             Some(Change::Gone) => {
                 // What it sent between the reading above and its end is still in the queues, perhaps before what the next
                 // publisher sends.
                 connected.receive(self.frames, &mut self.sequence, handle);
-                if !self.subscription.publisher_is_alive(&connected.connection) {
+                if !is_alive(&connected.connection) {
                     if connected.received {
                         handle(FeedEvent::Gone);
                     }
