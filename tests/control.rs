@@ -19,13 +19,18 @@ use serde_json::Value;
 fn publisher(name: &str, arguments: &[&str]) -> Process {
     let process = Process::start(program(name).args(["run", "--json"]).args(arguments));
     // The service of the loop's status is the last to appear.
+    let mut refusal = String::new();
     for _ in 0..300 {
-        if control(name, &["state"]).0 == 0 {
+        let (code, _, sentence) = control(name, &["state"]);
+        if code == 0 {
             return process;
         }
+        refusal = sentence;
         wait(0.1);
     }
-    panic!("no publisher: {}", text(&process.output_within(1).stderr).lines().last().unwrap_or_default());
+    // One that runs has to be ended before it can be asked what it printed.
+    process.signal(nix::sys::signal::Signal::SIGINT);
+    panic!("{refusal}; the publisher: {}", text(&process.output_within(20).stderr));
 }
 
 /// Exit code, the response as printed, and the sentence on standard error.

@@ -28,7 +28,9 @@ fn publisher(name: &str, rmw: &str, arguments: &[&str]) -> Process {
         }
         wait(0.1);
     }
-    panic!("no publisher: {}", text(&process.output_within(1).stderr));
+    // One that runs has to be ended before it can be asked what it printed.
+    process.signal(nix::sys::signal::Signal::SIGINT);
+    panic!("no publisher: {}", text(&process.output_within(20).stderr));
 }
 
 const CYCLONE: &str = "rmw_cyclonedds_cpp";
