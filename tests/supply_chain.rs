@@ -6,7 +6,7 @@ mod processes;
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
 
-use processes::{Process, unique};
+use processes::{Process, copy_program, unique};
 use serde_json::Value;
 use spdx::{Expression, ParseMode};
 use toml::Table;
@@ -109,7 +109,7 @@ fn no_crate_is_there_twice_but_those_that_are_listed() {
 fn the_program_needs_nothing_besides_itself() {
     let folder = tempfile::tempdir().unwrap();
     let program = folder.path().join("bench-dragon");
-    std::fs::copy(env!("CARGO_BIN_EXE_bench-dragon"), &program).unwrap();
+    copy_program(&program);
     // What is compiled in as a place of this repository would be looked for at run time; source lines of panics are not.
     let name = unique("installed");
     let run = |arguments: &[&str]| {

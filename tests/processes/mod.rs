@@ -160,7 +160,7 @@ impl Place {
     pub fn as_nobody(&self, arguments: &[&str]) -> Output {
         let copy = self.folder().join("bench-dragon");
         if !copy.exists() {
-            std::fs::copy(env!("CARGO_BIN_EXE_bench-dragon"), &copy).unwrap();
+            copy_program(&copy);
             std::fs::set_permissions(self.folder(), std::fs::Permissions::from_mode(0o755)).unwrap();
         }
         let mut command = Command::new("setpriv");
@@ -214,6 +214,13 @@ fn reading(pipe: Option<impl Read>) -> impl FnOnce() -> Vec<u8> {
         }
         bytes
     }
+}
+
+/// Copies the program. Another process does: what other threads start meanwhile would hold a file that is open here for
+/// writing, and then it could not be started.
+pub fn copy_program(to: &Path) {
+    let copied = Command::new("cp").arg(env!("CARGO_BIN_EXE_bench-dragon")).arg(to).status().unwrap();
+    assert!(copied.success());
 }
 
 /// The program with a service name that no other test has.
