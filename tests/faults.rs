@@ -8,6 +8,7 @@ mod processes;
 use std::collections::BTreeSet;
 use std::os::unix::fs::MetadataExt;
 use std::os::unix::process::ExitStatusExt;
+use std::path::PathBuf;
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
@@ -148,11 +149,38 @@ fn files_of_dead_runs_are_gone_after_the_next() {
     place.assert_clean();
 }
 
+/// The library of this name, which changes what a process sees of the machine.
+fn preloaded(name: &str) -> PathBuf {
+    let library = std::env::current_exe().unwrap().ancestors().nth(2).unwrap().join(format!("examples/lib{name}.so"));
+    assert!(library.exists(), "cargo build --release --examples makes {}", library.display());
+    library
+}
+
+#[test]
+fn a_show_that_starts_on_a_slow_disk_is_found() {
+    let place = Place::new("slow_disk");
+    let mut slow = place.program();
+    let show = ["run", "--json", "--rate", "100", "--duration", "30"];
+    let publisher = Process::start(slow.env("LD_PRELOAD", preloaded("slow_disk")).args(show));
+    // Each of these looks, when it starts, for what killed processes left.
+    let answers = || place.program().args(["--json", "control", "state"]).output().unwrap().status.success();
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while !answers() {
+        assert!(Instant::now() < deadline, "nobody finds the show");
+        wait(0.1);
+    }
+    let steady = observer(&place);
+    steady.1.until("\"status\":{", 300);
+    publisher.signal(SIGINT);
+    let summary = summary(&publisher.output_within(300));
+    assert_nothing_lost(&observed(steady), &summary);
+    place.assert_clean();
+}
+
 #[test]
 fn a_stepped_wall_clock_moves_the_stamps_and_nothing_else() {
     let place = Place::new("clock");
-    let library = std::env::current_exe().unwrap().ancestors().nth(2).unwrap().join("examples/libstepped_clock.so");
-    assert!(library.exists(), "cargo build --release --examples makes {}", library.display());
+    let library = preloaded("stepped_clock");
     let stepped = |arguments: &[&str]| Process::start(place.program().env("LD_PRELOAD", &library).args(arguments));
     let alert_every_second = ["--start", "405", "--time-scale", "0.1"];
     let publisher =

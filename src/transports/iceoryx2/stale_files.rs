@@ -6,11 +6,12 @@
 //! - among the services: every later attempt to open that service fails.
 //!
 //! Whoever makes a node calls [`remove_unfinished_files`] before, and [`spawn_reaper`] on a thread that is not real-time.
-//! Whether a file is unfinished shows in its mode, which its maker sets last.
+//! Whether a file is unfinished shows in its mode, which its maker sets last. One that is still being made is left alone,
+//! however long that takes: on a busy disk it takes seconds, since iceoryx2 has files of nodes and services synced.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 use std::time::{Duration, Instant};
@@ -24,7 +25,7 @@ use super::memory::SHARED_MEMORY;
 const UNFINISHED: u32 = 0o600;
 /// The mode of an unfinished file in shared memory.
 const UNFINISHED_MEMORY: u32 = 0o200;
-/// Making a file takes less than a thousandth of this.
+/// How long a file has to have been unfinished. Making one in memory takes less than a thousandth of this.
 const LONGEST_MAKING: Duration = Duration::from_secs(2);
 /// How often [`spawn_reaper`] looks.
 const INTERVAL: Duration = Duration::from_millis(500);
@@ -55,7 +56,7 @@ pub fn remove_unfinished_files() {
         match nodes.get(id.as_ref()) {
             Some(Life::Dead) => remove_all(with_mode(folder, UNFINISHED)),
             // Killed before it was listed: nobody else knows of it.
-            None if is_old(folder) => {
+            None if is_old(folder) && !entries(folder).iter().any(|file| is_being_written(file)) => {
                 let monitor = format!("{}{id}.", config.global.prefix);
                 let its_own =
                     |file: &&PathBuf| file.file_name().is_some_and(|name| name.to_string_lossy().starts_with(&monitor));
@@ -93,7 +94,9 @@ fn remove_what_stays_unfinished(seen: &mut BTreeMap<PathBuf, Instant>) {
     seen.retain(|file, _| unfinished.contains(file));
     let (now, mut old) = (Instant::now(), Vec::new());
     for file in unfinished {
-        if now - *seen.entry(file.clone()).or_insert(now) >= LONGEST_MAKING {
+        let since = *seen.entry(file.clone()).or_insert(now);
+        // Memory is never synced, and who waits for it to be finished may have it open for writing too.
+        if now - since >= LONGEST_MAKING && (file.starts_with(SHARED_MEMORY) || !is_being_written(&file)) {
             old.push(file);
         }
     }
@@ -111,6 +114,17 @@ fn with_mode(folder: &Path, mode: u32) -> Vec<PathBuf> {
     entries(folder).into_iter().filter(has_mode).collect()
 }
 
+/// Whether a process has a file open for writing, as its maker has until it is finished; others open it to read. Processes
+/// of other users are not seen, unless by root.
+fn is_being_written(file: &Path) -> bool {
+    let identity = |file: &Path| file.metadata().map(|of| (of.dev(), of.ino())).ok();
+    let Some(file) = identity(file) else { return false };
+    // A link there has the permissions that the file was opened with.
+    let writable = |open: &PathBuf| open.symlink_metadata().is_ok_and(|link| link.mode() & 0o200 != 0);
+    let open_files = entries(Path::new("/proc")).into_iter().flat_map(|process| entries(&process.join("fd")));
+    open_files.filter(writable).any(|open| identity(&open) == Some(file))
+}
+
 fn remove_all(files: Vec<PathBuf>) {
     // Somebody else may have been quicker.
     files.iter().for_each(|file| drop(fs::remove_file(file)));
@@ -126,6 +140,23 @@ fn is_old(folder: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_node_that_is_not_listed_yet_stays_while_somebody_makes_it() {
+        // This makes the folder of all nodes, as iceoryx2 has it.
+        let _node = super::super::node().unwrap();
+        let nodes = Config::global_config().global.node_dir().to_string();
+        let folder = Path::new(&nodes).join(format!("test_{}", std::process::id()));
+        fs::create_dir(&folder).unwrap();
+        let details = fs::File::create(folder.join("details")).unwrap();
+        let long_ago = std::time::SystemTime::now() - 2 * LONGEST_MAKING;
+        fs::File::open(&folder).unwrap().set_modified(long_ago).unwrap();
+        remove_unfinished_files();
+        assert!(folder.join("details").exists());
+        drop(details);
+        remove_unfinished_files();
+        assert!(!folder.exists());
+    }
 
     #[test]
     fn only_what_stays_unfinished_is_removed() {
