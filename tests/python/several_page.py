@@ -189,9 +189,9 @@ def one_dies_alone():
                 until(page, "document.getElementById('notice').hidden", "no notice")
                 time.sleep(0.5)
                 assert abs(light(page, handles)[B] - before[B]) < 0.02, "it is dimmed still"
+            assert not complaints, complaints
         until(page, "document.body.dataset.stale === 'true'", "the server's death")
         port = int(url.rstrip("/").rsplit(":", 1)[1])
-        assert not complaints, complaints
         with server(port=port), publisher(A, ["run", "--quiet", "--json", "--start", "406", "--rate", "20"]), publisher(B, STILL_B):
             until(page, "picture.dragons.every((one) => one.head !== null)", "the server's return")
             until(page, "document.body.dataset.level === 'contact'", "the contact")
