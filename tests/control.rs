@@ -150,8 +150,12 @@ fn a_show_waits_for_go_at_its_start_and_at_its_cues() {
     let state = done(name, &["state"]);
     assert_eq!((&state["playback"], &state["sim_time"], &state["cue"]), (&"paused".into(), &0.0.into(), &0.into()));
     done(name, &["go"]);
-    wait(1.0);
-    let state = done(name, &["state"]);
+    let deadline = Instant::now() + PATIENCE;
+    let mut state = done(name, &["state"]);
+    while state["cue"] != 2 && Instant::now() < deadline {
+        wait(0.1);
+        state = done(name, &["state"]);
+    }
     assert_eq!((&state["playback"], &state["sim_time"], &state["cue"]), (&"paused".into(), &0.5.into(), &2.into()));
     done(name, &["go"]);
     let (code, line, sentence) = control(name, &["go"]);
