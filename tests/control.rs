@@ -11,8 +11,8 @@ use bench_dragon::show::state::PlaybackState;
 use bench_dragon::subscribers::control::Controller;
 use bench_dragon::wire::ControlResponse;
 use processes::{
-    Place, Process, can_run, example, json_lines, program, python, python_modules, root, scene_file, summary, text,
-    unique, wait,
+    LONG_QUEUE, Place, Process, can_run, example, json_lines, program, python, python_modules, root, scene_file,
+    summary, text, unique, wait,
 };
 use serde_json::Value;
 
@@ -119,7 +119,9 @@ fn a_flood_and_killed_clients_cost_the_stream_nothing() {
         return;
     }
     let name = "flooded";
-    let publisher = publisher(name, &["--rate", "100", "--duration", "12"]);
+    let scene = scene_file(name, &[("[publish]", &format!("[publish]\n{LONG_QUEUE}"))]);
+    let scene = scene.to_str().unwrap();
+    let publisher = publisher(name, &["--scene", scene, "--rate", "100", "--duration", "12"]);
     let watch = Process::start(program(name).args(["watch", "--json", "--duration", "6"]));
     for _ in 0..2 {
         let mut flood = Process::start(&mut peer(name, "flood"));

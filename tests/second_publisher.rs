@@ -6,7 +6,7 @@
 mod processes;
 
 use nix::sys::signal::Signal::{SIGCONT, SIGINT, SIGKILL, SIGSTOP, SIGTERM, SIGUSR1};
-use processes::{Lines, Place, Process, can_run, python, python_modules, summary, text};
+use processes::{LONG_QUEUE, Lines, Place, Process, can_run, python, python_modules, summary, text};
 use serde_json::Value;
 
 fn object(line: &str) -> Value {
@@ -25,7 +25,8 @@ fn second(place: &Place) -> (Process, Lines) {
 }
 
 fn show(place: &Place) -> Process {
-    Process::start(place.program().args(["run", "--json", "--rate", "100"]))
+    let scene = place.scene_publishing(LONG_QUEUE);
+    Process::start(place.program().args(["run", "--json", "--rate", "100", "--scene"]).arg(scene))
 }
 
 /// Starting a show here is refused because one is running.

@@ -16,12 +16,13 @@ use nix::unistd::Pid;
 use serde_json::Value;
 
 use processes::{
-    Place, Process, aloud, can_run, json_lines, long, program, python, python_modules, scene_file, summary, text,
-    unique, wait,
+    LONG_QUEUE, Place, Process, aloud, can_run, json_lines, long, program, python, python_modules, scene_file, summary,
+    text, unique, wait,
 };
 
-/// Limits that any machine keeps.
-const ANY_SPEED: [&str; 6] = ["--max-skipped", "100%", "--max-lateness-p999", "3600s", "--max-rss-growth", "1MB"];
+/// Limits that any machine keeps. A subscriber that is not run for a while leaves frames in its queue, whose memory the
+/// publisher then touches for the first time: 9 to 13 kB for each of up to 1000.
+const ANY_SPEED: [&str; 6] = ["--max-skipped", "100%", "--max-lateness-p999", "3600s", "--max-rss-growth", "20MB"];
 
 fn number(value: &Value, key: &str) -> u64 {
     value[key].as_u64().unwrap_or_else(|| panic!("no {key} in {value}"))
@@ -38,6 +39,8 @@ fn checks(report: &Value) -> BTreeMap<&str, (bool, f64)> {
 fn twenty_seconds_pass_with_nothing_missed() {
     let place = Place::new("soak");
     let mut soak = place.program();
+    // A subscriber that keeps up and that the machine does not run for up to a second loses nothing.
+    soak.arg("--scene").arg(place.scene_publishing("queue = 250"));
     soak.args(["soak", "--json", "--duration", "20s", "--rate", "250", "--report", "report"]);
     soak.args(["--subscribers", "3", "--slow", "1", "--flaky", "1"]).args(ANY_SPEED);
     let output = Process::start(&mut soak).output_within(90);
@@ -65,8 +68,8 @@ fn twenty_seconds_pass_with_nothing_missed() {
                 assert!((frames..=frames + skipped).contains(&(number(seen, "last_tick") + 1)), "{subscriber}");
                 assert!(number(seen, "received") > 4000, "{subscriber}");
             }
-            // 1.5 s at 250 Hz are more than a queue of 64 holds.
-            "slow" => assert!(number(seen, "missed") > 1000, "{subscriber}"),
+            // A read every 1.5 s, and a queue that lasts one: a third of all is missed.
+            "slow" => assert!(number(seen, "missed") > 500, "{subscriber}"),
             _ => assert!(number(subscriber, "incarnations") >= 3, "{subscriber}"),
         }
     }
@@ -128,7 +131,7 @@ fn assert_is_whole_page(page: &str, subscribers: usize) {
 #[test]
 fn a_scene_of_weak_accuracy_passes_with_the_links_it_promises() {
     let place = Place::new("weak");
-    let scene = scene_file("weak", &[("accuracy = 1e-9", "accuracy = 1e-5")]);
+    let scene = scene_file("weak", &[("accuracy = 1e-9", "accuracy = 1e-5"), ("velocities = true", LONG_QUEUE)]);
     let mut soak = place.program();
     soak.args(["--scene", scene.to_str().unwrap(), "soak", "--json", "--duration", "3s", "--subscribers", "1"]);
     let output = Process::start(soak.args(ANY_SPEED)).output_within(90);
@@ -153,8 +156,9 @@ fn until_publishing(place: &Place) {
 fn a_broken_limit_fails_even_when_interrupted() {
     let place = Place::new("broken");
     let mut soak = place.program();
+    soak.arg("--scene").arg(place.scene_publishing(LONG_QUEUE));
     soak.args(["soak", "--json", "--duration", "8h", "--rate", "100", "--subscribers", "1"]);
-    soak.args(["--max-skipped", "100%", "--max-lateness-p999", "1ns"]);
+    soak.args(["--max-skipped", "100%", "--max-lateness-p999", "1ns", "--max-rss-growth", "20MB"]);
     let soak = Process::start(&mut soak);
     until_publishing(&place);
     wait(3.0);
@@ -171,24 +175,16 @@ fn a_broken_limit_fails_even_when_interrupted() {
     place.assert_clean();
 }
 
-/// A scene of the paper whose subscribers may fall behind by so many frames.
-fn scene_with_queue(name: &str, queue: usize) -> std::path::PathBuf {
-    scene_file(name, &[("[publish]", &format!("[publish]\nqueue = {queue}"))])
-}
-
 /// Eight seconds, or ten minutes where long tests are requested.
 #[test]
 fn a_conducted_show_obeys_while_clients_are_killed() {
     let place = Place::new("conducted");
     let (duration, rate, commands) = if long() { ("10m", "1000", 5000) } else { ("8s", "200", 40) };
-    let scene = scene_with_queue("conducted", 1000);
+    let scene = place.scene_publishing("queue = 1000");
     let mut soak = place.program();
     soak.args(["--scene", scene.to_str().unwrap(), "soak", "--json", "--duration", duration, "--rate", rate]);
     soak.args(["--conduct", "7", "--flaky-clients", "2", "--subscribers", "2", "--report", "report"]);
-    // A subscriber that the machine does not run for a while leaves frames in its queue, whose memory the publisher then
-    // touches for the first time: 9 kB for each of 1000.
-    soak.args(&ANY_SPEED[..4]).args(["--max-rss-growth", "20MB"]);
-    let output = Process::start(&mut soak).output_within(if long() { 800 } else { 150 });
+    let output = Process::start(soak.args(ANY_SPEED)).output_within(if long() { 800 } else { 150 });
     assert!(output.status.success(), "{} {}", text(&output.stderr), text(&output.stdout));
     if long() {
         aloud(&text(&output.stdout));
@@ -225,7 +221,7 @@ fn a_conducted_show_obeys_while_clients_are_killed() {
 #[test]
 fn a_show_that_somebody_else_conducts_too_fails() {
     let place = Place::new("meddled");
-    let scene = scene_with_queue("meddled", 1000);
+    let scene = place.scene_publishing("queue = 1000");
     let mut soak = place.program();
     soak.args(["--scene", scene.to_str().unwrap(), "soak", "--json", "--duration", "8h", "--rate", "100"]);
     let soak = Process::start(soak.args(["--conduct", "1", "--subscribers", "1"]).args(ANY_SPEED));
