@@ -16,7 +16,7 @@ import sys
 import threading
 import time
 
-from playwright.sync_api import sync_playwright
+from chromium import browser as chromium
 
 # Nothing here may wait for ever; an alarm still lets everything that was started be ended.
 WATCHDOG = 300
@@ -52,12 +52,6 @@ def state():
     """How the show stands, or None while nobody publishes."""
     asked = subprocess.run([PROGRAM, "--name", NAME, "--json", "control", "state"], capture_output=True)
     return json.loads(asked.stdout) if asked.returncode == 0 else None
-
-
-@contextlib.contextmanager
-def chromium():
-    with sync_playwright() as playwright, playwright.chromium.launch(executable_path="/usr/bin/chromium") as browser:
-        yield browser
 
 
 def opened(browser, url):

@@ -22,7 +22,8 @@ import threading
 import time
 
 import numpy
-from playwright.sync_api import sync_playwright
+
+import chromium
 
 TRUTH = pathlib.Path(__file__).resolve().parents[1] / "truth" / "paper_scene_exact.csv"
 CONTACT = 412.473837682115
@@ -57,12 +58,12 @@ def server(port=0):
 @contextlib.contextmanager
 def browser(**context):
     """A page of a Chromium of its own, and a list of everything it complains about."""
-    with sync_playwright() as playwright, playwright.chromium.launch(executable_path="/usr/bin/chromium") as chromium:
-        yield opened(chromium, **context)
+    with chromium.browser() as running:
+        yield opened(running, **context)
 
 
-def opened(chromium, **context):
-    page = chromium.new_context(**{"viewport": {"width": 1280, "height": 720}, "color_scheme": "light", **context}).new_page()
+def opened(running, **context):
+    page = running.new_context(**{"viewport": {"width": 1280, "height": 720}, "color_scheme": "light", **context}).new_page()
     complaints = []
     page.on("console", lambda message: message.type == "error" and complaints.append(message.text))
     page.on("pageerror", lambda error: complaints.append(str(error)))
@@ -352,11 +353,10 @@ def five_at_once():
     with contextlib.ExitStack() as stack:
         url = stack.enter_context(server())
         stack.enter_context(publisher("--start", "100"))
-        playwright = stack.enter_context(sync_playwright())
+        browsers = stack.enter_context(chromium.browsers())
         views = []
         for _ in range(5):
-            chromium = stack.enter_context(playwright.chromium.launch(executable_path="/usr/bin/chromium"))
-            views.append(opened(chromium, viewport={"width": 480, "height": 360}))
+            views.append(opened(stack.enter_context(browsers.launch(executable_path=chromium.PROGRAM)), viewport={"width": 480, "height": 360}))
         for page, _ in views:
             page.goto(url)
         for page, _ in views:

@@ -12,8 +12,8 @@ import tempfile
 import threading
 
 import numpy
-from playwright.sync_api import sync_playwright
 
+import chromium
 from stage_picture import BODY_LENGTH, HEAD_LENGTH, browser, drawn, opened, play, publisher, server, started, until, words
 from stage_show import at, luminance, projection, shot, spread
 
@@ -93,10 +93,10 @@ def kiosk_shows_no_buttons():
     """As `chromium --kiosk` shows it: in a window of its own, not in full screen by the button."""
     with server() as url, started("view", "--json", "--port", "0", "--control") as conducted, publisher(*APPROACH), tempfile.TemporaryDirectory() as profile:
         conduct = re.search(r"http://[^\"]+", conducted.stdout.readline()).group()
-        with sync_playwright() as playwright:
+        with chromium.browsers() as browsers:
             arguments = ["--kiosk", "--window-size=1280,800"]
-            with playwright.chromium.launch_persistent_context(profile, executable_path="/usr/bin/chromium", no_viewport=True, args=arguments) as chromium:
-                page = chromium.pages[0]
+            with browsers.launch_persistent_context(profile, executable_path=chromium.PROGRAM, no_viewport=True, args=arguments) as kiosk:
+                page = kiosk.pages[0]
                 for address in (url, conduct):
                     approaching(page, address, "dark,follow")
                     time_line = "document.getElementById('conduct').hidden || getComputedStyle(document.getElementById('conduct')).opacity === '0'"
