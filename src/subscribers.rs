@@ -11,6 +11,8 @@ pub mod hermite;
 #[cfg(feature = "cli")]
 mod http;
 #[cfg(feature = "cli")]
+pub mod keys;
+#[cfg(feature = "cli")]
 pub mod metrics;
 pub mod monitor;
 pub mod polling;

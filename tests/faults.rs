@@ -195,13 +195,14 @@ fn a_stepped_wall_clock_moves_the_stamps_and_nothing_else() {
     let scene = place.scene_publishing(LONG_QUEUE);
     let show = ["run", "--json", "--rate", "100", "--duration", "6", "--scene", scene.to_str().unwrap()];
     let publisher = stepped(&[&show[..], &alert_every_second].concat());
-    let monitor = stepped(&["watch", "--json", "--duration", "5"]);
+    let monitor = stepped(&["watch", "--json"]);
     let steady = observer(&place);
     let summary = summary(&publisher.output_within(300));
     // An hour that counted would be 360,000 periods one way, and a run that does not end the other.
     assert_eq!(number(&summary, "frames") + number(&summary, "skipped"), 600, "{summary}");
     assert!(number(&summary, "skipped") < 300, "{summary}");
     assert_nothing_lost(&observed(steady), &summary);
+    monitor.signal(SIGTERM);
     let lines = json_lines(&monitor.output_within(300));
     let latencies = lines.iter().filter_map(|line| line["latency_ns"]["max"].as_u64());
     assert!(latencies.max().is_some_and(|longest| longest < 3_000_000_000_000), "{lines:?}");

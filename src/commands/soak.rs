@@ -14,11 +14,12 @@ use bench_dragon::subscribers::feed::{Feed, FeedOptions, Frames};
 use bench_dragon::subscribers::soak::figures;
 use bench_dragon::subscribers::soak::fleet::{Fleet, FleetError};
 use bench_dragon::subscribers::soak::history::History;
+use bench_dragon::subscribers::soak::limits::{Limits, bytes, nanoseconds, share};
 use bench_dragon::subscribers::soak::member::Role;
 use bench_dragon::subscribers::soak::observer::Observer;
 use bench_dragon::subscribers::soak::processes::{ConductPlan, Plan};
 use bench_dragon::subscribers::soak::report::{Machine, Report, SCHEMA, SubscriberReport};
-use bench_dragon::subscribers::soak::verdict::{Limits, Verdict};
+use bench_dragon::subscribers::soak::verdict::Verdict;
 use bench_dragon::transports::iceoryx2;
 use indicatif::ProgressBar;
 use nix::sys::signal::{SigSet, Signal};
@@ -311,51 +312,4 @@ pub fn end_with_parent() -> Result<(), CommandError> {
 /// The seed of random commands.
 fn seed(text: &str) -> Result<u64, String> {
     text.trim().parse().map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
-}
-
-/// A share as a person writes it: `0.01%`, `0.0001`.
-fn share(text: &str) -> Result<f64, String> {
-    let (digits, unit) = text.trim().strip_suffix('%').map_or((text.trim(), 1.0), |digits| (digits, 0.01));
-    let share = digits.trim().parse::<f64>().map_or(f64::NAN, |number| number * unit);
-    if (0.0..=1.0).contains(&share) { Ok(share) } else { Err("expected a share such as 0.01% or 0.0001".to_owned()) }
-}
-
-/// A short time as a person writes it: `500ns`, `200us`, `1.5ms`, `1s`. Nanoseconds.
-fn nanoseconds(text: &str) -> Result<u64, String> {
-    // The seconds come last: every other unit ends with their letter.
-    let units = [("ns", 1.0), ("us", 1e3), ("ms", 1e6), ("s", 1e9)];
-    quantity(text, &units).ok_or_else(|| "expected a time with its unit such as 200us or 1ms".to_owned())
-}
-
-/// A size as a person writes it: `800B`, `500kB`, `1MB`, `2GB`. Bytes.
-fn bytes(text: &str) -> Result<u64, String> {
-    let units = [("kB", 1e3), ("MB", 1e6), ("GB", 1e9), ("B", 1.0)];
-    quantity(text, &units).ok_or_else(|| "expected a size with its unit such as 500kB or 1MB".to_owned())
-}
-
-fn quantity(text: &str, units: &[(&str, f64)]) -> Option<u64> {
-    let (digits, unit) = units.iter().find_map(|(name, unit)| Some((text.trim().strip_suffix(name)?, unit)))?;
-    let value = digits.trim().parse::<f64>().ok()? * unit;
-    (0.0..=1e18).contains(&value).then_some(value as u64)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn limits_are_read_as_people_write_them() {
-        assert_eq!(
-            (nanoseconds("200us"), nanoseconds("1.5ms"), nanoseconds("2 s")),
-            (Ok(200_000), Ok(1_500_000), Ok(2_000_000_000))
-        );
-        assert_eq!((bytes("1MB"), bytes("500kB"), bytes("0B")), (Ok(1_000_000), Ok(500_000), Ok(0)));
-        assert_eq!((share("0.01%"), share("0.5")), (Ok(0.0001), Ok(0.5)));
-        for wrong in ["", "200", "us", "-1us", "nan%", "101%", "1XB"] {
-            assert!(nanoseconds(wrong).is_err() && bytes(wrong).is_err(), "{wrong}");
-        }
-        for wrong in ["", "-1", "nan%", "101%", "x"] {
-            assert!(share(wrong).is_err(), "{wrong}");
-        }
-    }
 }

@@ -14,11 +14,12 @@ use bench_dragon::show::control::Command;
 use bench_dragon::subscribers::control::conductor::{Action, Conducted, Conductor};
 use bench_dragon::subscribers::control::{refusal, standing};
 use bench_dragon::subscribers::feed::FeedEvent;
+use bench_dragon::subscribers::keys::Key;
 use nix::sys::signal::{SigSet, Signal};
 use signal_hook::consts::{SIGCONT, SIGQUIT, SIGTSTP};
 
 use super::super::CommandError;
-use super::terminal::{Key, KeyMode};
+use super::terminal::KeyMode;
 
 /// What `?` prints.
 const HELP: &str = "Keys: space pauses and resumes; left and right seek 5 s; [ and ] halve and double the rate; \

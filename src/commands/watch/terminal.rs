@@ -1,8 +1,7 @@
 //! The terminal while keys are read: each key at once and without an echo, and as it was before on every way out.
 //!
 //! Keys are read here and not by crossterm, whose reader waits for the rest of a sequence of which a part has come, and
-//! for ever at the end of input: the display must go on. A sequence whose rest does not come is no sequence: somebody has
-//! pressed Escape.
+//! for ever at the end of input: the display must go on.
 //!
 //! Signals of the terminal (Ctrl-C) and the end of lines stay as they are. Called by `watch`, and by the handler that
 //! ends the program where shared memory is full.
@@ -13,6 +12,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use bench_dragon::subscribers::keys::{Key, keys_of};
 use nix::libc;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::{LocalFlags, SetArg, SpecialCharacterIndices, Termios, tcgetattr, tcsetattr};
@@ -25,17 +25,6 @@ const SEQUENCE_TIMEOUT: Duration = Duration::from_millis(100);
 static BEFORE: OnceLock<libc::termios> = OnceLock::new();
 /// Whether they have been changed.
 static CHANGED: AtomicBool = AtomicBool::new(false);
-
-/// A key of those that `watch` knows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Key {
-    /// One that has a letter or a sign.
-    Char(char),
-    /// The arrow to the left.
-    Left,
-    /// The arrow to the right.
-    Right,
-}
 
 /// A terminal that hands over each key at once, until this is dropped.
 pub struct KeyMode {
@@ -95,39 +84,6 @@ impl KeyMode {
     }
 }
 
-/// The keys that a terminal has sent these bytes for, and how many bytes they are; the rest is the beginning of another.
-/// Where nothing more belongs to them, no beginning is: then an Escape without a whole sequence behind it was a key.
-fn keys_of(bytes: &[u8], is_over: bool) -> (Vec<Key>, usize) {
-    const ESCAPE: u8 = 0x1b;
-    let (mut keys, mut at) = (Vec::new(), 0);
-    while at < bytes.len() {
-        let sequence = match bytes[at..] {
-            [ESCAPE] => None,
-            // Escape, [ or O, parameters, and a letter that tells which key it is.
-            [ESCAPE, b'[' | b'O', ref rest @ ..] => rest.iter().position(|byte| (0x40..=0x7e).contains(byte)),
-            [byte, ..] => {
-                keys.extend((b' '..=b'~').contains(&byte).then_some(Key::Char(byte.into())));
-                at += 1;
-                continue;
-            }
-            [] => break,
-        };
-        match sequence {
-            Some(end) => {
-                match (end, bytes[at + 2 + end]) {
-                    (0, b'C') => keys.push(Key::Right),
-                    (0, b'D') => keys.push(Key::Left),
-                    _ => (),
-                }
-                at += 3 + end;
-            }
-            None if is_over => at += 1,
-            None => break,
-        }
-    }
-    (keys, at)
-}
-
 impl Drop for KeyMode {
     fn drop(&mut self) {
         restore();
@@ -140,29 +96,5 @@ pub fn restore() {
         && let Some(before) = BEFORE.get()
     {
         let _ = tcsetattr(stdin(), SetArg::TCSANOW, &Termios::from(*before));
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn keys_are_whole_whatever_comes_in_one_piece() {
-        let (keys, used) = keys_of(b" \x1b[C\x1bOD]\x1b[1;5C\xc3\xa9h", false);
-        assert_eq!(keys, [Key::Char(' '), Key::Right, Key::Left, Key::Char(']'), Key::Char('h')]);
-        assert_eq!(used, 17);
-        for (beginning, complete) in [(&b"."[..], 1), (b".\x1b", 1), (b".\x1b[", 1), (b".\x1b[1;", 1)] {
-            assert_eq!(keys_of(beginning, false), (vec![Key::Char('.')], complete));
-        }
-    }
-
-    #[test]
-    fn a_sequence_whose_rest_does_not_come_is_keys() {
-        let char = |letters: &str| letters.chars().map(Key::Char).collect::<Vec<_>>();
-        for (bytes, letters) in [(&b"\x1b"[..], ""), (b".\x1b[", ".["), (b"\x1b\x1b[1;", "[1;")] {
-            assert_eq!(keys_of(bytes, true), (char(letters), bytes.len()));
-        }
-        assert_eq!(keys_of(b"\x1b[D\x1b", true), (vec![Key::Left], 4));
     }
 }

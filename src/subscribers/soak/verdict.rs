@@ -5,25 +5,13 @@ use serde::Serialize;
 use super::conduct::Conducted;
 use super::conducting::Conducting;
 use super::fleet::Fleet;
+use super::limits::Limits;
 use super::member::{Member, Role};
 use super::observation::Observation;
 use crate::live::statistics::RunSummary;
 
 /// A deadline may be this far from first deadline + tick / rate: both are rounded to whole nanoseconds.
 const ROUNDING_NS: f64 = 2.0;
-
-/// What a user sets.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
-    /// Frames that a steady subscriber may miss.
-    pub missed: u64,
-    /// The share of periods that may be skipped, 0 to 1.
-    pub skipped_share: f64,
-    /// Wake-up lateness: 99.9th percentile, ns.
-    pub lateness_p999_ns: u64,
-    /// Growth of the publisher's resident memory after the first minute, bytes.
-    pub resident_growth_bytes: u64,
-}
 
 /// How a value is to be written for people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
