@@ -361,7 +361,7 @@ pub fn scene_file(name: &str, replacements: &[(&str, &str)]) -> PathBuf {
         assert!(scene.contains(from));
         scene = scene.replace(from, to);
     }
-    let file = std::env::temp_dir().join(format!("{}.toml", unique(name)));
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{}.toml", unique(name)));
     std::fs::write(&file, scene).unwrap();
     file
 }

@@ -4,6 +4,7 @@ show that ended long ago, and with 5,000 benches. Same browser and arguments as 
     stage_places.py SCENARIO PROGRAM NAME
 """
 
+import contextlib
 import http.server
 import math
 import pathlib
@@ -148,13 +149,20 @@ def frozen_before_it_was_seen():
         assert not complaints, complaints
 
 
+@contextlib.contextmanager
+def long_scene():
+    """config/long.toml with the safe solver, as a file."""
+    text = pathlib.Path("config/long.toml").read_text(encoding="utf-8")
+    with tempfile.NamedTemporaryFile("w", encoding="utf-8", suffix=".toml") as file:
+        file.write(text.replace("head_speed = 1.0", 'solver = "newton"\nhead_speed = 1.0'))
+        file.flush()
+        yield file.name
+
+
 def five_thousand_boards_are_drawn():
     """Each where a chain on the spiral, computed here, has it; nothing between the turns."""
-    scene = pathlib.Path(tempfile.mkdtemp()) / "long.toml"
-    text = pathlib.Path("config/long.toml").read_text(encoding="utf-8")
-    scene.write_text(text.replace("head_speed = 1.0", 'solver = "newton"\nhead_speed = 1.0'), encoding="utf-8")
     middles, links = chain(100.0)
-    with server() as url, publisher("--scene", str(scene), "--start", "100", "--time-scale", "1e-6", "--rate", "5"), browser(viewport={"width": 1920, "height": 1080}) as (page, complaints):
+    with long_scene() as scene, server() as url, publisher("--scene", scene, "--start", "100", "--time-scale", "1e-6", "--rate", "5"), browser(viewport={"width": 1920, "height": 1080}) as (page, complaints):
         for address in ("", "show,nolabels"):
             page.goto("about:blank")
             page.goto(f"{url}#{address}")

@@ -5,6 +5,7 @@
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpStream};
+use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock, mpsc};
 use std::time::Duration;
@@ -26,9 +27,10 @@ const HUNG: Duration = Duration::from_secs(30);
 fn address() -> SocketAddr {
     static ADDRESS: OnceLock<SocketAddr> = OnceLock::new();
     *ADDRESS.get_or_init(|| {
-        let folder = tempfile::tempdir().expect("a folder").keep();
+        // One for all runs: nobody is left who could remove one of this run.
+        let folder = option_env!("CARGO_TARGET_TMPDIR").map_or_else(std::env::temp_dir, PathBuf::from).join("fuzz_page");
         let pages = folder.join("pages");
-        std::fs::create_dir(&pages).expect("a folder");
+        std::fs::create_dir_all(&pages).expect("a folder");
         std::fs::write(folder.join("secret.txt"), SECRET).expect("a file");
         std::fs::write(pages.join("own.html"), "a page of one's own").expect("a file");
         let (sender, ready) = mpsc::channel();
