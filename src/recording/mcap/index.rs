@@ -53,7 +53,8 @@ pub(super) fn index(file: &mut File, length: u64) -> Result<Index, ReadError> {
     let mut bytes = Vec::new();
     file.seek(SeekFrom::Start(begins))?;
     file.read_to_end(&mut bytes)?;
-    let options = LinearReaderOptions::default().with_skip_start_magic(true);
+    // A chunk has no place here: it is not looked into.
+    let options = LinearReaderOptions::default().with_skip_start_magic(true).with_emit_chunks(true);
     let options = options.with_validate_summary_section_crc(true).with_record_length_limit(bytes.len());
     let (mut reader, mut left) = (LinearReader::new_with_options(options), bytes.as_slice());
     let (mut index, mut known, mut ids) = (Index::default(), ChannelAccumulator::default(), Vec::new());

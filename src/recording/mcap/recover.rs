@@ -329,6 +329,9 @@ impl<Output: Write> Mender<Output> {
 
 /// The schemas, channels and messages of a chunk.
 pub(super) fn records_of_chunk(body: &[u8]) -> Result<Vec<Record<'static>>, McapError> {
+    if !is_filled(body)? {
+        return Err(McapError::UnexpectedEoc);
+    }
     let mut head = vec![op::CHUNK];
     head.extend((body.len() as u64).to_le_bytes());
     let mut left = head.len() + body.len();
@@ -352,6 +355,19 @@ pub(super) fn records_of_chunk(body: &[u8]) -> Result<Vec<Record<'static>>, Mcap
         }
     }
     Ok(records)
+}
+
+/// Whether the last record of a chunk without compression ends where the chunk does: mcap 0.26.0 subtracts the records'
+/// lengths from the chunk's unchecked. What decompresses any other chunk finds its end.
+fn is_filled(body: &[u8]) -> Result<bool, McapError> {
+    let Record::Chunk { header, data } = parse_record(op::CHUNK, body)? else { return Ok(false) };
+    let mut left = if header.compression.is_empty() { &*data } else { &[] };
+    while let Some(([_, length @ ..], rest)) = left.split_first_chunk::<9>() {
+        let length = usize::try_from(u64::from_le_bytes(*length)).unwrap_or(usize::MAX);
+        let Some((_, rest)) = rest.split_at_checked(length) else { return Ok(false) };
+        left = rest;
+    }
+    Ok(left.is_empty())
 }
 
 /// Whether the lengths in a chunk's record can be true: where the opcode of another record is damaged they are not.

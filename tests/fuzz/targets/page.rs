@@ -28,7 +28,8 @@ fn address() -> SocketAddr {
     static ADDRESS: OnceLock<SocketAddr> = OnceLock::new();
     *ADDRESS.get_or_init(|| {
         // One for all runs: nobody is left who could remove one of this run.
-        let folder = option_env!("CARGO_TARGET_TMPDIR").map_or_else(std::env::temp_dir, PathBuf::from).join("fuzz_page");
+        let folder =
+            option_env!("CARGO_TARGET_TMPDIR").map_or_else(std::env::temp_dir, PathBuf::from).join("fuzz_page");
         let pages = folder.join("pages");
         std::fs::create_dir_all(&pages).expect("a folder");
         std::fs::write(folder.join("secret.txt"), SECRET).expect("a file");
@@ -80,18 +81,17 @@ fn run(data: &[u8]) -> bool {
 
 /// What is promised of a connection that became a WebSocket.
 fn check_upgraded(data: &[u8], answer: &[u8]) {
-    let end = |bytes: &[u8]| bytes.windows(4).position(|four| four == b"\r\n\r\n").map_or(bytes.len(), |at| at + 4);
-    let (head, sent) = data.split_at(end(data));
+    let (head, sent) = data.split_at(head_end(data));
     let head = String::from_utf8_lossy(head).into_owned();
     let origin = head.lines().find(|line| line.starts_with("Origin: "));
     assert!(!origin.is_some_and(|line| FOREIGN.contains(&line)), "let in: {head}");
-    // What the request itself has for a body is no message, and a line end by itself may end the head earlier.
+    // What the request itself has for a body is no message; of lines that end otherwise nothing more is asked.
     let has_own_end = head.lines().count() != head.split("\r\n").count() - 1 || head.replace("\r\n", "").contains('\r');
     let head = head.to_ascii_lowercase();
     if has_own_end || head.contains("transfer-encoding") || head.contains("content-length") {
         return;
     }
-    let (received, _) = frames(&answer[end(answer)..], false);
+    let (received, _) = frames(&answer[head_end(answer)..], false);
     let answers: Vec<Value> = (received.into_iter().filter(|frame| frame.0 == 0x81))
         .map(|(_, text)| serde_json::from_slice(&text).unwrap_or_else(|error| panic!("{error} in {text:?}")))
         .filter(|json: &Value| ["control", "answer", "clock"].contains(&json["type"].as_str().unwrap_or_default()))
@@ -125,6 +125,13 @@ fn check_upgraded(data: &[u8], answer: &[u8]) {
             assert!(answer["sentence"].as_str().is_some_and(|sentence| !sentence.is_empty()), "{answer}");
         }
     }
+}
+
+/// Where the head of a request or an answer ends: behind the first empty line, of which the carriage return may be missing.
+fn head_end(bytes: &[u8]) -> usize {
+    let after =
+        |line_end: &[u8]| bytes.windows(line_end.len()).position(|some| some == line_end).map(|at| at + line_end.len());
+    [after(b"\n\n"), after(b"\n\r\n")].into_iter().flatten().min().unwrap_or(bytes.len())
 }
 
 /// The WebSocket's frames that some bytes begin with, masked as a client's or not as a server's: the first byte and the content
