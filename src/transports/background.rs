@@ -35,7 +35,7 @@ const LONGEST_SLEEP_NS: u64 = 50_000_000;
 
 /// What a transport does with what comes, on the thread. It is made there and dropped there.
 pub trait Sink {
-    /// Does what is due besides sending: before each look into the queues, every 50 ms at least.
+    /// Does what is due besides sending: before each frame, and every 50 ms at least.
     fn attend(&mut self) {}
 
     /// Sends a frame.
@@ -115,7 +115,7 @@ pub struct Worker<S> {
     sink: S,
     inbox: Inbox,
     period_ns: u64,
-    /// Frames that had found the queue full when it was emptied last.
+    /// Frames that had found the queue full when the last frame was taken from it.
     rejected_before: u64,
 }
 
@@ -225,10 +225,27 @@ impl<S: Sink> Worker<S> {
         }
     }
 
-    /// Sends what the queues have brought; when there will be something next, CLOCK_MONOTONIC in nanoseconds.
+    /// Sends what the queues have brought; when there will be something next, CLOCK_MONOTONIC in nanoseconds. A sink that
+    /// takes longer over a frame than the next one takes to come is here for ever: all else is looked after between two frames.
     pub fn send(&mut self, clock: &impl Clock) -> u64 {
-        let Self { sink, inbox, period_ns, rejected_before } = self;
-        let Shared { rejected, frames, skipped, discarded, .. } = &*inbox.shared;
+        let mut deadline_ns = None;
+        loop {
+            self.send_seldom();
+            let Some(sent_ns) = self.send_frame() else { break };
+            deadline_ns = Some(sent_ns);
+        }
+        let period_ns = self.period_ns;
+        let now = clock.monotonic_ns();
+        let poll_at = match deadline_ns {
+            Some(deadline_ns) => (deadline_ns + period_ns + FIRST_POLL_NS).max(now),
+            None => now + POLL_INTERVAL_NS,
+        };
+        poll_at.min(now + LONGEST_SLEEP_NS)
+    }
+
+    /// Does what is due besides frames, and sends what comes seldom.
+    fn send_seldom(&mut self) {
+        let Self { sink, inbox, .. } = self;
         sink.attend();
         while let Ok(alert) = inbox.alerts.pop() {
             sink.alert(alert);
@@ -236,30 +253,30 @@ impl<S: Sink> Worker<S> {
         while let Ok(cue) = inbox.cues.pop() {
             sink.cue(cue);
         }
-        let rejected_now = rejected.load(Ordering::Relaxed);
-        let newest_only = std::mem::replace(rejected_before, rejected_now) < rejected_now;
-        let mut deadline_ns = None;
-        while let Ok(snapshot) = inbox.filled.pop() {
-            if newest_only && !inbox.filled.is_empty() {
-                skipped.fetch_add(1, Ordering::Relaxed);
-            } else {
-                sink.frame(&snapshot.header, &snapshot.handles);
-                frames.fetch_add(1, Ordering::Relaxed);
-            }
-            deadline_ns = Some(snapshot.header.deadline_ns);
-            // The ring has a place for every snapshot there is.
-            let _ = inbox.free.push(snapshot);
-        }
         while let Ok(status) = inbox.status.try_recv() {
             sink.status(&status);
         }
-        discarded.store(sink.discarded(), Ordering::Relaxed);
-        let now = clock.monotonic_ns();
-        let poll_at = match deadline_ns {
-            Some(deadline_ns) => (deadline_ns + *period_ns + FIRST_POLL_NS).max(now),
-            None => now + POLL_INTERVAL_NS,
-        };
-        poll_at.min(now + LONGEST_SLEEP_NS)
+        inbox.shared.discarded.store(sink.discarded(), Ordering::Relaxed);
+    }
+
+    /// Sends the next frame in the queue, or the newest where one has found the queue full since the last; its deadline,
+    /// CLOCK_MONOTONIC in nanoseconds, or nothing where there is none.
+    fn send_frame(&mut self) -> Option<u64> {
+        let Self { sink, inbox, rejected_before, .. } = self;
+        let Shared { rejected, frames, skipped, .. } = &*inbox.shared;
+        let rejected_now = rejected.load(Ordering::Relaxed);
+        let newest_only = std::mem::replace(rejected_before, rejected_now) < rejected_now;
+        let mut snapshot = inbox.filled.pop().ok()?;
+        while newest_only && let Ok(newer) = inbox.filled.pop() {
+            skipped.fetch_add(1, Ordering::Relaxed);
+            // The ring has a place for every snapshot there is.
+            let _ = inbox.free.push(std::mem::replace(&mut snapshot, newer));
+        }
+        sink.frame(&snapshot.header, &snapshot.handles);
+        frames.fetch_add(1, Ordering::Relaxed);
+        let deadline_ns = snapshot.header.deadline_ns;
+        let _ = inbox.free.push(snapshot);
+        Some(deadline_ns)
     }
 
     /// What has been done with the frames of the loop so far.

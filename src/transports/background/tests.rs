@@ -1,5 +1,7 @@
 //! The queue, the thread and the rate divider, with a sink that a test can hold up.
 
+use std::cell::RefCell;
+use std::rc::Rc;
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
@@ -120,6 +122,77 @@ fn a_sink_that_is_held_up_costs_frames_and_never_the_loop() {
     let last =
         sent.iter().filter_map(|sent| if let Sent::Frame { tick, .. } = sent { Some(tick) } else { None }).last();
     assert_eq!(last, Some(10 * depth));
+}
+
+/// A sink so slow that two frames, an alert with every tenth, and a status come while it sends one.
+struct Overloaded {
+    loop_end: BackgroundPublisher,
+    statuses: BackgroundStatus,
+    next: u64,
+    sent: Rc<RefCell<Vec<Sent>>>,
+}
+
+impl Sink for Overloaded {
+    fn frame(&mut self, header: &FrameHeader, _handles: &[HandlePose]) {
+        self.sent.borrow_mut().push(Sent::Frame { tick: header.tick, x: vec![] });
+        for tick in (self.next..1000).take(2) {
+            publish(&mut self.loop_end, tick, usize::from(tick % 10 == 0));
+            self.statuses.publish_status(&LoopStatus { tick, ..LoopStatus::default() });
+            self.next += 1;
+        }
+    }
+
+    fn alert(&mut self, alert: CollisionAlert) {
+        self.sent.borrow_mut().push(Sent::Alert { tick: alert.tick });
+    }
+
+    fn cue(&mut self, _cue: Cue) {}
+
+    fn status(&mut self, status: &LoopStatus) {
+        self.sent.borrow_mut().push(Sent::Status { tick: status.tick });
+    }
+
+    fn discarded(&self) -> u64 {
+        0
+    }
+
+    fn linger(&self) -> Duration {
+        Duration::ZERO
+    }
+}
+
+#[test]
+fn a_sink_that_never_catches_up_keeps_nothing_but_frames_waiting() {
+    let config = BackgroundConfig { name: "test", handles: HANDLES, cues: 0, loop_rate: 60.0, rate: 60.0 };
+    let (mut loop_end, statuses, inbox) = queues(config);
+    let sent = Rc::default();
+    publish(&mut loop_end, 0, 1);
+    let sink = Overloaded { loop_end, statuses, next: 1, sent: Rc::clone(&sent) };
+    let mut worker = Worker::new(sink, inbox, 60.0);
+    worker.send(&SystemClock);
+    let sent = sent.borrow();
+    let depth = queue_depth(HANDLES, 60.0) as u64;
+    let (mut came, mut frames) = (1, 0);
+    for (at, sent) in sent.iter().enumerate() {
+        match sent {
+            Sent::Frame { tick, .. } => {
+                frames += 1;
+                // What had come by then: no frame is older than the queue is deep.
+                assert!(tick + depth + 2 >= came, "frame {tick} when {came} had come");
+                came = (came + 2).min(1000);
+            }
+            // Before the next frame, of which two come at once.
+            Sent::Alert { tick } | Sent::Status { tick } => {
+                assert!(tick + 2 >= came, "{sent:?} at {at}, {came} had come")
+            }
+            Sent::Cue { .. } => unreachable!(),
+        }
+    }
+    let seldom = |of: fn(&Sent) -> bool| sent.iter().filter(|sent| of(sent)).count();
+    assert_eq!(seldom(|sent| matches!(sent, Sent::Alert { .. })), 100);
+    assert_eq!(seldom(|sent| matches!(sent, Sent::Status { .. })), 999);
+    assert_eq!(worker.deliveries(), Deliveries { frames, skipped: 1000 - frames, discarded: 0 });
+    assert!(frames < 600, "{frames} of 1000");
 }
 
 #[test]
