@@ -59,7 +59,7 @@ pub enum Command {
     SoakConductor(commands::soak_conductor::SoakConductorArguments),
     /// What soak --conduct starts to kill it
     #[command(hide = true)]
-    SoakClient,
+    SoakClient(commands::soak_conductor::SoakClientArguments),
     /// Validate a scene and print what it would model
     Check(commands::check::CheckArguments),
 }
@@ -87,7 +87,7 @@ fn main() -> ExitCode {
         Command::Soak(arguments) => commands::soak::soak(&common, arguments),
         Command::SoakSubscriber(arguments) => commands::soak::subscribe(&common, arguments),
         Command::SoakConductor(arguments) => commands::soak_conductor::conduct(&common, arguments),
-        Command::SoakClient => commands::soak_conductor::client(&common),
+        Command::SoakClient(arguments) => commands::soak_conductor::client(&common, arguments),
         Command::Check(arguments) => commands::check::check(&common, arguments),
     });
     match done {

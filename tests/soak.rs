@@ -10,14 +10,14 @@ use std::time::{Duration, Instant};
 use bench_dragon::subscribers::connection::Wake;
 use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
 use bench_dragon::wire::LoopStatus;
-use nix::sys::signal::Signal::{SIGINT, SIGKILL};
-use nix::sys::signal::kill;
+use nix::sys::signal::Signal::{SIGINT, SIGKILL, SIGTERM};
+use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
 
 use processes::{
-    LONG_QUEUE, Place, Process, aloud, can_run, json_lines, long, program, python, python_modules, scene_file, summary,
-    text, unique, wait,
+    LONG_QUEUE, Place, Process, aloud, can_run, json_lines, long, program, python, python_modules, root, scene_file,
+    summary, text, unique, wait,
 };
 
 /// Limits that any machine keeps. A subscriber that is not run for a while leaves frames in its queue, whose memory the
@@ -268,8 +268,8 @@ fn exists(process: Pid) -> bool {
     kill(process, None).is_ok()
 }
 
-#[test]
-fn a_publisher_that_dies_fails_the_test_at_once() {
+/// The report of a soak test whose publisher gets a signal from somebody else.
+fn report_of_bereft(signal: Signal) -> Value {
     let place = Place::new("bereft");
     let mut soak = place.program();
     soak.args(["soak", "--json", "--duration", "8h", "--rate", "100", "--subscribers", "2"]).args(ANY_SPEED);
@@ -277,12 +277,41 @@ fn a_publisher_that_dies_fails_the_test_at_once() {
     until_publishing(&place);
     wait(3.0);
     let publisher = children(&soak).into_iter().find(|(_, command)| command.contains("\0run\0")).unwrap().0;
-    kill(publisher, SIGKILL).unwrap();
+    kill(publisher, signal).unwrap();
     let output = soak.output_within(60);
     assert_eq!(output.status.code(), Some(1));
     let report = json_lines(&output).pop().unwrap();
-    assert_eq!((&report["verdict"], &report["publisher"]), (&Value::from("FAIL"), &Value::Null));
-    assert!(!checks(&report)["processes that ended by themselves or hung"].0);
+    assert_eq!(report["verdict"], "FAIL");
+    assert_eq!(checks(&report)["processes that ended by themselves or hung"], (false, 1.0));
+    report
+}
+
+#[test]
+fn a_publisher_that_dies_fails_the_test_at_once() {
+    assert_eq!(report_of_bereft(SIGKILL)["publisher"], Value::Null);
+}
+
+#[test]
+fn a_publisher_that_ends_in_good_order_before_its_time_fails_the_test_too() {
+    assert_eq!(report_of_bereft(SIGTERM)["publisher"]["end"], "signal");
+}
+
+/// As in a container, whose only program it is.
+#[test]
+fn a_soak_test_can_be_the_first_process_of_its_system() {
+    if !can_run(root("make a namespace of processes")) {
+        return;
+    }
+    let place = Place::new("first");
+    let mut soak = std::process::Command::new("unshare");
+    soak.args(["--pid", "--fork", "--mount-proc", "--kill-child"]).arg(place.program().get_program());
+    soak.arg("--scene").arg(place.scene_publishing(LONG_QUEUE)).args(["soak", "--json", "--duration", "3"]);
+    soak.args(["--rate", "100", "--subscribers", "1", "--flaky", "1"]);
+    let output = Process::start(soak.args(ANY_SPEED).current_dir(place.folder())).output_within(60);
+    let report = json_lines(&output).pop().unwrap_or_else(|| panic!("{}", text(&output.stderr)));
+    assert_eq!(checks(&report)["processes that ended by themselves or hung"], (true, 0.0));
+    assert_eq!(output.status.code(), Some(0), "{report}");
+    place.assert_clean();
 }
 
 #[test]
@@ -306,7 +335,7 @@ fn nobody_outlives_a_killed_soak_test() {
 
 #[test]
 fn what_cannot_be_is_refused_before_it_starts() {
-    let cases: [(&[&str], &str); 12] = [
+    let cases: [(&[&str], &str); 13] = [
         (&["--subscribers", "0"], "--subscribers"),
         (&["--subscribers", "7", "--flaky", "2"], "publish.subscribers"),
         (&["--rate", "20001"], "--rate"),
@@ -319,6 +348,8 @@ fn what_cannot_be_is_refused_before_it_starts() {
         (&["--conduct", "1", "--subscribers", "8"], "less one for --conduct"),
         (&["--conduct", "1", "--flaky-clients", "9"], "expected at most 8"),
         (&["--flaky-clients", "1"], "--conduct"),
+        // In the publisher's own words.
+        (&["--cpu", "4096"], "error: --cpu"),
     ];
     for (arguments, named) in cases {
         let output = Process::start(program("refused").arg("soak").args(arguments)).output_within(20);

@@ -20,6 +20,7 @@ use bench_dragon::wire::convert;
 use super::events::sentence;
 use super::publishing::{Hooks, Publishing, new_run_id, open_transports};
 use super::realtime_scheduling::RealtimeScheduling;
+use super::soak::Parent;
 use super::{CommandError, Common, number, search_timeline, stop_on_signals, warn_of_gap};
 
 /// Arguments of `run`.
@@ -66,16 +67,13 @@ pub struct RunArguments {
     ros2_control: bool,
     #[command(flatten)]
     scheduling: RealtimeScheduling,
-    /// End when the process that started this one ends
-    #[arg(long, hide = true)]
-    end_with_parent: bool,
+    #[command(flatten)]
+    parent: Parent,
 }
 
 /// Publishes the scene until its duration is over or a signal comes.
 pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError> {
-    if arguments.end_with_parent {
-        super::soak::end_with_parent()?;
-    }
+    arguments.parent.watch()?;
     let text = common.scene_text()?;
     let mut scene = text.parse()?;
     if arguments.ros2 {

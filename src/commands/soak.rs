@@ -86,6 +86,16 @@ pub struct SoakSubscriberArguments {
     /// Sleep longer than the queue lasts between reads
     #[arg(long)]
     slow: bool,
+    #[command(flatten)]
+    parent: Parent,
+}
+
+/// Whose end is that of a process of a soak test too.
+#[derive(Debug, clap::Args)]
+pub struct Parent {
+    /// End when the process that started this one ends, which has this number
+    #[arg(long, value_name = "PID", hide = true)]
+    end_with_parent: Option<i32>,
 }
 
 /// Soaks until its duration is over or a signal comes, and prints the verdict.
@@ -194,8 +204,7 @@ impl SoakArguments {
         if let Some(scene) = &common.scene {
             shared.extend(["--scene".into(), scene.into()]);
         }
-        let mut publisher: Vec<OsString> =
-            ["--loop", "--end-hold", "0", "--end-with-parent"].map(OsString::from).to_vec();
+        let mut publisher: Vec<OsString> = ["--loop", "--end-hold", "0"].map(OsString::from).to_vec();
         publisher.extend(self.conduct.map(|_| "--paused".into()));
         publisher.extend(self.ros2.then(|| "--ros2".into()));
         publisher.extend(self.rate.into_iter().flat_map(|rate| ["--rate".into(), rate.to_string().into()]));
@@ -224,7 +233,10 @@ impl SoakArguments {
 
 impl From<FleetError> for CommandError {
     fn from(error: FleetError) -> Self {
-        Self::Failed(error.to_string())
+        match error {
+            FleetError::Refused(_) => Self::BadInput(error.to_string()),
+            _ => Self::Failed(error.to_string()),
+        }
     }
 }
 
@@ -268,7 +280,7 @@ impl ReportFiles {
 
 /// Observes until a signal comes, an observation a second on standard output.
 pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result<(), CommandError> {
-    end_with_parent()?;
+    arguments.parent.watch()?;
     let stop = stop_on_signals()?;
     let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::OnFrame, frames: Frames::All })?;
     let mut observer = Observer::new(common.load_scene()?.motion.link_tolerance());
@@ -295,18 +307,21 @@ pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result
     print(&mut observer)
 }
 
-/// Has this process killed when the one that started it ends, so that nothing is left behind.
-pub fn end_with_parent() -> Result<(), CommandError> {
-    // The soak test has these blocked, and a mask is inherited: until `stop_on_signals` they end this process at once.
-    let signals = SigSet::from_iter([Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP]);
-    signals.thread_unblock().map_err(std::io::Error::from)?;
-    let set = nix::sys::prctl::set_pdeathsig(Signal::SIGTERM);
-    set.map_err(|error| CommandError::Failed(format!("the end of the parent cannot be watched: {error}")))?;
-    // A parent that ended before that sends no signal any more.
-    if nix::unistd::getppid().as_raw() == 1 {
-        return Err(CommandError::Failed("the program that started this one has ended".to_owned()));
+impl Parent {
+    /// Has this process killed when the one that started it ends, so that nothing is left behind.
+    pub fn watch(&self) -> Result<(), CommandError> {
+        let Some(parent) = self.end_with_parent else { return Ok(()) };
+        // The soak test has these blocked, and a mask is inherited: until `stop_on_signals` they end this process at once.
+        let signals = SigSet::from_iter([Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP]);
+        signals.thread_unblock().map_err(std::io::Error::from)?;
+        let set = nix::sys::prctl::set_pdeathsig(Signal::SIGTERM);
+        set.map_err(|error| CommandError::Failed(format!("the end of the parent cannot be watched: {error}")))?;
+        // A parent that ended before that sends no signal any more.
+        if nix::unistd::getppid().as_raw() != parent {
+            return Err(CommandError::Failed("the program that started this one has ended".to_owned()));
+        }
+        Ok(())
     }
-    Ok(())
 }
 
 /// The seed of random commands.

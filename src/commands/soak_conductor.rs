@@ -8,7 +8,7 @@ use bench_dragon::show::control::Command;
 use bench_dragon::subscribers::soak::conduct::conductor;
 use bench_dragon::subscribers::soak::conduct::model::ShowFacts;
 
-use super::soak::end_with_parent;
+use super::soak::Parent;
 use super::{CommandError, Common, stop_on_signals};
 
 /// How long the publisher may take to answer.
@@ -23,11 +23,20 @@ pub struct SoakConductorArguments {
     /// Frames per second of the publisher, where they are not the scene's
     #[arg(long)]
     rate: Option<f64>,
+    #[command(flatten)]
+    parent: Parent,
+}
+
+/// Arguments of `soak-client`.
+#[derive(Debug, clap::Args)]
+pub struct SoakClientArguments {
+    #[command(flatten)]
+    parent: Parent,
 }
 
 /// Conducts until a signal comes, what it has counted once a second on standard output.
 pub fn conduct(common: &Common, arguments: &SoakConductorArguments) -> Result<(), CommandError> {
-    end_with_parent()?;
+    arguments.parent.watch()?;
     let stop = stop_on_signals()?;
     let scene = common.load_scene()?;
     let facts = ShowFacts::of(&scene, arguments.rate.unwrap_or(scene.rate));
@@ -40,8 +49,8 @@ pub fn conduct(common: &Common, arguments: &SoakConductorArguments) -> Result<()
 }
 
 /// Requests the state of the show again and again, so that it always awaits an answer, until it is killed.
-pub fn client(common: &Common) -> Result<(), CommandError> {
-    end_with_parent()?;
+pub fn client(common: &Common, arguments: &SoakClientArguments) -> Result<(), CommandError> {
+    arguments.parent.watch()?;
     let stop = stop_on_signals()?;
     let Some(mut controller) = conductor::connect(common.name(), &stop) else { return Ok(()) };
     while !stop.load(Ordering::Relaxed) {

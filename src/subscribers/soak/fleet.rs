@@ -23,6 +23,8 @@ const FLAKY_LIFETIME: Duration = Duration::from_secs(5);
 const START_TIMEOUT: Duration = Duration::from_secs(60);
 /// How long the publisher, and then the subscribers, may take to end after a signal.
 const END_TIMEOUT: Duration = Duration::from_secs(15);
+/// The exit code of a program that cannot do what it is asked for.
+const REFUSED: i32 = 2;
 /// From this long after the start the publisher's memory should no longer grow.
 pub const SETTLING: Duration = Duration::from_secs(60);
 
@@ -32,6 +34,9 @@ pub enum FleetError {
     /// A process could not be started or signalled.
     #[error("a process of the soak test could not be started: {0}")]
     Start(#[from] std::io::Error),
+    /// The publisher cannot do what its options or its scene ask for: its own sentence.
+    #[error("{0}")]
+    Refused(String),
     /// The publisher ended before all subscribers had received a frame.
     #[error("the publisher ended at once ({0}){1}")]
     PublisherEnded(ExitStatus, String),
@@ -52,6 +57,8 @@ pub struct Fleet {
     publisher: Child,
     /// How the publisher ended, if it has.
     publisher_ended: Option<ExitStatus>,
+    /// Whether it ended before it was told to.
+    publisher_ended_early: bool,
     summary: Option<RunSummary>,
     members: Vec<Member>,
     conducting: Option<Conducting>,
@@ -75,6 +82,7 @@ impl Fleet {
         let mut fleet = Self {
             publisher: plan.spawn_publisher(&sender)?,
             publisher_ended: None,
+            publisher_ended_early: false,
             summary: None,
             members: Vec::new(),
             conducting: None,
@@ -106,6 +114,9 @@ impl Fleet {
             self.poll(Duration::from_millis(50))?;
             if let Some(status) = self.publisher_ended {
                 self.receive(Duration::from_millis(200));
+                if let (Some(REFUSED), Some(line)) = (status.code(), self.stderr.last()) {
+                    return Err(FleetError::Refused(line.trim_start_matches("error: ").to_owned()));
+                }
                 let stderr = self.stderr.iter().map(|line| format!(": {line}")).collect();
                 return Err(FleetError::PublisherEnded(status, stderr));
             }
@@ -148,10 +159,11 @@ impl Fleet {
         }
         for (index, member) in self.members.iter_mut().enumerate() {
             if member.role == Role::Flaky && member.spawned.elapsed() >= FLAKY_LIFETIME {
+                let had_ended = member.child.try_wait()?.is_some();
                 member.child.kill()?;
                 member.child.wait()?;
                 let next = member.incarnations + 1;
-                member.replace(self.plan.spawn_subscriber(index, member.role, next, &self.sender)?);
+                member.replace(self.plan.spawn_subscriber(index, member.role, next, &self.sender)?, had_ended);
             }
         }
         if let Some(conducting) = &mut self.conducting {
@@ -238,6 +250,14 @@ impl Fleet {
         self.settled_bytes.map(|settled| self.most_bytes_after - settled)
     }
 
+    /// Whether the publisher ended before it was told to, with an error, or not at all. To be called once the fleet has
+    /// finished.
+    pub fn publisher_failed(&self) -> bool {
+        self.publisher_ended_early
+            || self.summary.is_none()
+            || self.publisher_ended.is_none_or(|status| !status.success())
+    }
+
     /// The summary of the publisher, once it has ended in good order.
     pub fn summary(&self) -> Option<&RunSummary> {
         self.summary.as_ref()
@@ -253,6 +273,8 @@ impl Fleet {
         while self.conducting.as_mut().is_some_and(Conducting::is_ending) && Instant::now() < deadline {
             self.receive(Duration::from_millis(20));
         }
+        self.publisher_ended = self.publisher.try_wait()?;
+        self.publisher_ended_early = self.publisher_ended.is_some();
         signal(&self.publisher, Signal::SIGINT);
         let deadline = Instant::now() + END_TIMEOUT;
         while self.publisher_ended.is_none() && Instant::now() < deadline {

@@ -55,6 +55,8 @@ pub struct Member {
     pub incarnations: u64,
     /// The present one's state.
     pub state: ProcessState,
+    /// Former incarnations that had ended by themselves.
+    lost: u64,
     pub(super) child: Child,
     pub(super) spawned: Instant,
     /// What its former incarnations saw.
@@ -73,6 +75,7 @@ impl Member {
             role,
             incarnations: 1,
             state: ProcessState::Running,
+            lost: 0,
             child,
             spawned: Instant::now(),
             past: Observation::default(),
@@ -81,8 +84,9 @@ impl Member {
         }
     }
 
-    /// Puts the process of the next incarnation in the place of one that was killed.
-    pub fn replace(&mut self, child: Child) {
+    /// Puts the process of the next incarnation in the place of one that was killed, or had ended before.
+    pub fn replace(&mut self, child: Child, had_ended: bool) {
+        self.lost += u64::from(had_ended);
         self.past = self.seen();
         self.present = Observation::default();
         self.incarnations += 1;
@@ -124,10 +128,10 @@ impl Member {
         self.fresh.take()
     }
 
-    /// Whether its process ended without a signal from the soak test, or did not end after one. To be called once the
+    /// How many of its processes ended without a signal from the soak test, or did not end after one. To be called once the
     /// fleet has finished.
-    pub fn failed(&self) -> bool {
-        self.state != ProcessState::Ended
+    pub fn failed(&self) -> u64 {
+        self.lost + u64::from(self.state != ProcessState::Ended)
     }
 }
 
@@ -154,7 +158,7 @@ mod tests {
         right.state = ProcessState::Ending;
         hung.state = ProcessState::Ending;
         right.ended(1);
-        assert_eq!([&right, &early, &hung].map(Member::failed), [false, true, true]);
+        assert_eq!([&right, &early, &hung].map(Member::failed), [0, 1, 1]);
         assert_eq!(early.state, ProcessState::EndedByItself);
     }
 
@@ -163,11 +167,14 @@ mod tests {
         let mut member = member();
         let seen = |received| Observation { received, ..Observation::default() };
         member.observed(1, seen(10));
-        member.replace(process());
+        member.replace(process(), false);
         member.observed(1, seen(500));
         member.ended(1);
         member.observed(2, seen(7));
         assert_eq!((member.seen().received, member.present().received), (17, 7));
         assert_eq!((member.state, member.incarnations), (ProcessState::Running, 2));
+        member.replace(process(), true);
+        member.state = ProcessState::Ended;
+        assert_eq!(member.failed(), 1, "one ended by itself and was started again");
     }
 }

@@ -60,16 +60,17 @@ pub(super) enum ProcessEvent {
 
 impl Plan {
     /// This program in a process group of its own, so that Ctrl-C on the terminal reaches the soak test alone.
-    fn command(&self) -> Command {
+    fn command(&self, subcommand: &str) -> Command {
         let mut command = Command::new(&self.program);
-        command.args(&self.common).stdin(Stdio::null()).stdout(Stdio::piped()).process_group(0);
+        command.args(&self.common).arg(subcommand).args(["--end-with-parent", &std::process::id().to_string()]);
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).process_group(0);
         command
     }
 
     /// Starts the publisher.
     pub(super) fn spawn_publisher(&self, sender: &Sender<ProcessEvent>) -> std::io::Result<Child> {
-        let mut command = self.command();
-        command.arg("run").args(&self.publisher).arg("--json").stderr(Stdio::piped());
+        let mut command = self.command("run");
+        command.args(&self.publisher).arg("--json").stderr(Stdio::piped());
         let mut child = command.spawn()?;
         // Nobody receives any more where the test has ended.
         read_lines(child.stdout.take(), sender, |line, sender| {
@@ -91,8 +92,7 @@ impl Plan {
         incarnation: u64,
         sender: &Sender<ProcessEvent>,
     ) -> std::io::Result<Child> {
-        let mut command = self.command();
-        command.arg("soak-subscriber");
+        let mut command = self.command("soak-subscriber");
         if role == Role::Slow {
             command.arg("--slow");
         }
@@ -119,8 +119,8 @@ impl Plan {
         conduct: &ConductPlan,
         sender: &Sender<ProcessEvent>,
     ) -> std::io::Result<Child> {
-        let mut command = self.command();
-        command.args(["soak-conductor", "--seed", &conduct.seed.to_string()]);
+        let mut command = self.command("soak-conductor");
+        command.args(["--seed", &conduct.seed.to_string()]);
         if let Some(rate) = conduct.rate {
             command.args(["--rate", &rate.to_string()]);
         }
@@ -139,7 +139,7 @@ impl Plan {
 
     /// Starts a client of the control service that always awaits an answer.
     pub(super) fn spawn_client(&self) -> std::io::Result<Child> {
-        self.command().arg("soak-client").stdout(Stdio::null()).spawn()
+        self.command("soak-client").stdout(Stdio::null()).spawn()
     }
 }
 

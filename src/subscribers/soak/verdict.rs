@@ -182,6 +182,6 @@ fn wrong_jumps(steady: &[&Member], conducting: &Conducting) -> f64 {
 
 fn lost(fleet: &Fleet) -> f64 {
     let conducting = fleet.conducting().map_or(0, Conducting::failed);
-    let subscribers = fleet.members().iter().filter(|member| member.failed()).count();
-    (conducting + (subscribers + usize::from(fleet.summary().is_none())) as u64) as f64
+    let subscribers: u64 = fleet.members().iter().map(Member::failed).sum();
+    (conducting + subscribers + u64::from(fleet.publisher_failed())) as f64
 }
