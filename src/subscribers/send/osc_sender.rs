@@ -57,8 +57,9 @@ pub struct OscSender {
     pace: Pace,
     arrivals: Arrivals,
     stage: Option<Stage>,
-    /// The latest frame of the run, and when the first one that came was made.
+    /// The latest frame of the run, and the period and the time of the first one that came.
     latest: Option<(FrameHeader, HandlePose)>,
+    first_tick: u64,
     first_stamp_ns: u64,
     due: bool,
     /// Alerts and cues in their order.
@@ -82,6 +83,7 @@ impl OscSender {
             arrivals: Arrivals::default(),
             stage: None,
             latest: None,
+            first_tick: 0,
             first_stamp_ns: 0,
             due: false,
             pending: Vec::new(),
@@ -126,7 +128,8 @@ impl OscSender {
         let of = |cue: &Cue| (cue.run_id, cue.tick, cue.number);
         let is_known = self.last_cue.as_ref().is_some_and(|last| of(last) == of(cue));
         let of_this_run = self.latest.is_some_and(|(header, _)| header.run_id == cue.run_id);
-        let is_old = cue.stamp_ns.saturating_add(CUE_GRACE_NS) < self.first_stamp_ns;
+        // Stamps alone do not tell: the clock may have been set back since the first frame.
+        let is_old = cue.tick < self.first_tick && cue.stamp_ns.saturating_add(CUE_GRACE_NS) < self.first_stamp_ns;
         if is_known || !of_this_run || is_old {
             return;
         }
@@ -143,7 +146,7 @@ impl OscSender {
         match event {
             FeedEvent::Frame { header, handles, .. } => {
                 if self.latest.is_none_or(|(latest, _)| latest.run_id != header.run_id) {
-                    self.first_stamp_ns = header.stamp_ns;
+                    (self.first_tick, self.first_stamp_ns) = (header.tick, header.stamp_ns);
                 }
                 self.latest = Some((*header, handles.first().copied().unwrap_or_default()));
                 self.due |= self.pace.is_due(header);
@@ -208,5 +211,36 @@ impl Handler for OscSenders {
 
     fn polled(&mut self, now: Instant) {
         self.0.iter_mut().for_each(|sender| sender.send_due(now));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::{Ipv4Addr, SocketAddrV4};
+
+    use super::super::network::Route;
+    use super::*;
+
+    const HOUR_NS: u64 = 3_600_000_000_000;
+
+    #[test]
+    fn cues_come_where_the_clock_was_set_back_and_old_ones_do_not() {
+        let discard = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 9);
+        let outlet = Outlet::open(&[discard], Route { interface: None, multicast_ttl: 1 }).unwrap();
+        let mut sender = OscSender::new(Addresses::new("show"), 10.0, outlet);
+        let header = FrameHeader { run_id: 1, tick: 1000, stamp_ns: 100 * HOUR_NS, ..FrameHeader::default() };
+        sender.take(FeedEvent::Frame { header: &header, handles: &[], missed: 0 });
+        let cue = |number, tick, stamp_ns| Cue { run_id: 1, number, tick, stamp_ns, ..Cue::default() };
+        for (cue, sent) in [
+            // Before this listened; afterwards, on a clock that has been set back; afterwards.
+            (cue(1, 10, 99 * HOUR_NS), 0),
+            (cue(2, 1100, 92 * HOUR_NS), 1),
+            (cue(3, 1200, 101 * HOUR_NS), 2),
+            // While it connected.
+            (cue(4, 990, 100 * HOUR_NS - CUE_GRACE_NS / 2), 3),
+        ] {
+            sender.take(FeedEvent::Cue(&cue));
+            assert_eq!(sender.summary.cues, sent, "{cue:?}");
+        }
     }
 }
