@@ -161,7 +161,9 @@ fn arguments_that_cannot_be_used() {
         (vec!["run", "--time-scale", "inf"], "--time-scale"),
         (vec!["run", "--start", "-1"], "--start"),
         (vec!["run", "--start", "nan"], "--start"),
-        (vec!["run", "--start", "433"], "432.917924228"),
+        (vec!["run", "--start", "433"], "412.473837682"),
+        // Where the boards have touched, this show is over.
+        (vec!["run", "--start", "420"], "412.473837682 s, at which it ends (contact)"),
         (vec!["run", "--duration", "soon"], "--duration"),
         (vec!["run", "--duration", "0"], "--duration"),
         (vec!["run", "--duration=-5"], "--duration"),
