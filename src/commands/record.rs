@@ -14,6 +14,7 @@ use bench_dragon::recording::mcap::recover::{RecoverError, Recovered, check_magi
 use bench_dragon::scene::ros2::Topic;
 use bench_dragon::subscribers::connection::Wake;
 use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
+use bench_dragon::subscribers::polling::Obstacle;
 use bench_dragon::subscribers::record::{self, RecordQueue, RecordThread};
 use bench_dragon::wire::sentence::rounded;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -108,7 +109,8 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
     }
 }
 
-/// Passes on what comes until it is over or the thread has ended. Without its stage a recording cannot be replayed: where
+/// Passes on what comes until it is over or the thread has ended. Once something has come, what is in the way of a later
+/// publisher's services is waited for, as a publisher is. Without its stage a recording cannot be replayed: where
 /// that follows its first frames, as it does for one who joins, it is waited for.
 fn follow(
     feed: &mut Feed,
@@ -122,11 +124,12 @@ fn follow(
     let (shortest, longest) = POLL_INTERVAL;
     let (mut interval, mut shown) = (shortest, began);
     let (mut first_frame, mut has_stage) = (None, false);
+    let mut obstacle = Obstacle::default();
     let over =
         || over() || thread.has_ended() || duration.is_some_and(|seconds| began.elapsed().as_secs_f64() >= seconds);
     let waits_for_stage = |first: Option<Instant>| first.is_some_and(|first| first.elapsed() < STAGE_TIMEOUT);
     while !over() || !has_stage && waits_for_stage(first_frame) && !thread.has_ended() {
-        feed.poll(interval, &mut |event| {
+        let polled = feed.poll(interval, &mut |event| {
             match event {
                 FeedEvent::Frame { .. } => drop(first_frame.get_or_insert_with(Instant::now)),
                 FeedEvent::Stage(_) => has_stage = true,
@@ -137,7 +140,12 @@ fn follow(
                 _ => (),
             }
             queue.handle(&event, over);
-        })?;
+        });
+        if first_frame.is_none() {
+            polled?;
+        } else if obstacle.is_met(polled) {
+            std::thread::sleep(Obstacle::RETRY_INTERVAL);
+        }
         if shown.elapsed() >= PROGRESS_INTERVAL {
             shown = Instant::now();
             bar.set_message(sentence(&thread.recorded()));

@@ -14,6 +14,7 @@ use bench_dragon::show::state::{FrameState, Level, PlaybackState, Severity};
 use bench_dragon::subscribers::connection::Wake;
 use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
 use bench_dragon::subscribers::monitor::{IntervalReport, Latency, Monitor, Presence};
+use bench_dragon::subscribers::polling::Obstacle;
 use bench_dragon::wire::json::{AlertObject, CueObject};
 use bench_dragon::wire::sentence::{Figures, alert_sentence, cue_sentence, time_until};
 use bench_dragon::wire::{CollisionAlert, LoopStatus};
@@ -73,6 +74,7 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
     let over = |at: Instant| arguments.duration.is_some_and(|seconds| (at - began).as_secs_f64() >= seconds);
     let interval = Duration::from_secs(1);
     let mut next = began + interval;
+    let (mut has_come, mut obstacle) = (false, Obstacle::default());
     let mut screen =
         Screen { display, name: common.name(), time_scale: 1.0, benches: 0, drawn: Vec::new(), answer: None };
     let has_keys = display == Display::Terminal && stdin().is_terminal();
@@ -99,13 +101,20 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
         }
         let patience = if has_keys { KEY_INTERVAL } else { interval };
         let mut printed = Ok(());
-        feed.poll(next.saturating_duration_since(now).min(patience), &mut |event| {
+        let polled = feed.poll(next.saturating_duration_since(now).min(patience), &mut |event| {
+            has_come = true;
             monitor.handle(&event, monotonic_ns());
             keyboard.iter_mut().for_each(|keyboard| keyboard.handle(&event));
             if printed.is_ok() {
                 printed = screen.print_event(&event);
             }
-        })?;
+        });
+        // Once something has come, what is in the way of a later publisher's services is waited for, as a publisher is.
+        if !has_come {
+            polled?;
+        } else if obstacle.is_met(polled) {
+            std::thread::sleep(Obstacle::RETRY_INTERVAL);
+        }
         monitor.clock(feed.shares_clock());
         printed?;
     }

@@ -12,9 +12,24 @@ use crate::transports::iceoryx2::OpenError;
 
 /// How often frames are polled, which is how much later than the publisher a handler can be.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
-/// How long to wait where the services cannot be used, before the next attempt.
-const RETRY_INTERVAL: Duration = Duration::from_millis(200);
 
+/// What is in the way of services that cannot be used at present. It may go: a program of another version ends, a subscriber
+/// leaves.
+#[derive(Debug, Default)]
+pub struct Obstacle(Option<String>);
+
+impl Obstacle {
+    /// How long to wait before the next attempt.
+    pub const RETRY_INTERVAL: Duration = Duration::from_millis(200);
+
+    /// Takes in how a poll ended: whether there is an obstacle now, of which the log has the sentence once.
+    pub fn is_met(&mut self, polled: Result<(), OpenError>) -> bool {
+        let now = polled.err().map(|error| error.to_string());
+        now.iter().filter(|_| now != self.0).for_each(|sentence| log::warn!("{sentence}"));
+        self.0 = now;
+        self.0.is_some()
+    }
+}
 /// What is called with all that comes.
 pub trait Handler {
     /// Takes in what has come from a publisher, which is known by its place in the list of names, from 0.
@@ -26,10 +41,10 @@ pub trait Handler {
     fn polled(&mut self, now: Instant);
 }
 
-/// The feed of one publisher, and why it cannot be used where that is so.
+/// The feed of one publisher, and what is in its way.
 struct Source {
     feed: Feed,
-    reason: Option<String>,
+    obstacle: Obstacle,
     next: Instant,
 }
 
@@ -48,7 +63,7 @@ pub fn poll_until(
 ) -> Result<(), OpenError> {
     let source = |name: &String| {
         let feed = Feed::new(name, FeedOptions { wake: Wake::Never, frames })?;
-        Ok(Source { feed, reason: None, next: Instant::now() })
+        Ok(Source { feed, obstacle: Obstacle::default(), next: Instant::now() })
     };
     let mut sources = names.iter().map(source).collect::<Result<Vec<_>, OpenError>>()?;
     while !stop.load(Ordering::Relaxed) {
@@ -58,13 +73,9 @@ pub fn poll_until(
             if let Some(shares_clock) = source.feed.shares_clock() {
                 handler.clock(publisher, shares_clock);
             }
-            // The services may become usable while this continues: a program of another version ends, a subscriber leaves.
-            let now = polled.err().map(|error| error.to_string());
-            if now.is_some() {
-                now.iter().filter(|_| now != source.reason).for_each(|sentence| log::warn!("{sentence}"));
-                source.next = Instant::now() + RETRY_INTERVAL;
+            if source.obstacle.is_met(polled) {
+                source.next = Instant::now() + Obstacle::RETRY_INTERVAL;
             }
-            source.reason = now;
         }
         handler.polled(Instant::now());
     }
