@@ -13,6 +13,7 @@ pub mod check;
 pub mod control;
 pub mod draw;
 pub mod events;
+mod lines;
 pub mod metrics;
 pub mod plan;
 mod publishing;

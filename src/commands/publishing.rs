@@ -20,6 +20,7 @@ use bench_dragon::transports::iceoryx2::OpenError;
 use bench_dragon::transports::{self, Transport, TransportConfig, TransportError};
 use bench_dragon::wire::sentence::{Figures, alert_sentence, cue_sentence};
 
+use super::lines::Lines;
 use super::realtime_scheduling::RealtimeScheduling;
 use super::{CommandError, Common, Output, severity_colour, shows_colour};
 
@@ -180,34 +181,35 @@ impl Publishing<'_> {
         sample: &mut (dyn FnMut(&Sample) + Send),
         done: &AtomicBool,
     ) -> Result<(Summary, Vec<Box<dyn Transport>>), CommandError> {
+        let lines = if self.common.quiet || self.common.json { None } else { Some(Lines::start()?) };
+        let announce = |announcement: &Announcement| {
+            lines.iter().zip(self.announced(announcement)).for_each(|(lines, line)| lines.print(line));
+        };
         let run = Run {
             run_id: self.run_id,
             rate: self.rate,
             scene: self.scene,
             sinks: transports.iter_mut().map(|transport| transport.status()).collect::<Result<_, _>>()?,
-            announce: Box::new(|announcement| self.print_announcement(announcement)),
+            announce: Box::new(announce),
             record: Box::new(sample),
         };
-        Ok((statistics::collect(&SystemClock, inbox, run, done), transports))
+        let summary = statistics::collect(&SystemClock, inbox, run, done);
+        lines.into_iter().for_each(Lines::finish);
+        Ok((summary, transports))
     }
 
-    /// One line an alert, with the countdown in wall time, and one a cue.
-    fn print_announcement(&self, announcement: &Announcement) {
-        if self.common.quiet || self.common.json {
-            return;
-        }
+    /// The line of an alert, with the countdown in wall time, or of a cue.
+    fn announced(&self, announcement: &Announcement) -> Option<String> {
         match announcement {
             Announcement::Alert { alert, time_scale } => {
-                let Some(level) = alert.alert_level() else { return };
+                let level = alert.alert_level()?;
                 let colour = Style::new().fg_color(Some(severity_colour(level.severity()).into()));
                 let style = if shows_colour(&std::io::stderr()) { colour } else { Style::new() };
                 let figures = Figures::Shown { time_scale: *time_scale };
                 let sentence = alert_sentence(alert, self.benches, figures);
-                eprintln!("{:>10.3} s  {style}{:<11}{style:#} {sentence}", alert.sim_time, level.name());
+                Some(format!("{:>10.3} s  {style}{:<11}{style:#} {sentence}", alert.sim_time, level.name()))
             }
-            Announcement::Cue(cue) => {
-                eprintln!("{:>10.3} s  {}", cue.sim_time, cue_sentence(cue));
-            }
+            Announcement::Cue(cue) => Some(format!("{:>10.3} s  {}", cue.sim_time, cue_sentence(cue))),
         }
     }
 }
