@@ -229,8 +229,10 @@ impl Vigil {
             // One question at a time: each takes a period of the loop, and others wait behind it.
             match self.probe.as_ref().map(PendingCommand::poll) {
                 Some(Ok(None)) => return Ok(()),
+                // A step that has come to the end of the show is over when its periods are.
                 Some(Ok(Some(state)))
-                    if state.playback_state() == Some(PlaybackState::Playing) && state.tick > self.tick =>
+                    if matches!(state.playback_state(), Some(PlaybackState::Playing | PlaybackState::Ended))
+                        && state.tick > self.tick =>
                 {
                     (self.tick, self.progressed) = (state.tick, now);
                 }
