@@ -14,7 +14,7 @@ use super::{CommandError, Common, Output, figure, number, progress_bar, search_t
 #[derive(Debug, clap::Args)]
 #[command(group = clap::ArgGroup::new("times").required(true))]
 pub struct SolveArguments {
-    /// Simulated seconds, or contact, stall, lock; several divided by commas
+    /// Simulated seconds, or contact, stall, lock, path_end; several divided by commas
     #[arg(long, value_name = "TIMES", value_delimiter = ',', group = "times", allow_negative_numbers = true)]
     at: Vec<String>,
     /// Simulated seconds between two rows; with --until

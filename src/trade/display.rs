@@ -62,7 +62,7 @@ impl Reader {
 pub enum Precision {
     /// As published: 40 bytes a handle.
     Double,
-    /// Rounded to 32 bits: 20 bytes a handle. Not published; measured for comparison.
+    /// Rounded to 32 bits: 20 bytes a handle. What `precision = "f32"` publishes.
     Single,
 }
 

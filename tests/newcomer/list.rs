@@ -30,7 +30,7 @@ pub const NOT_HERE: &[Line] = &[
     ("source /opt/ros/jazzy/setup.bash", "needs ROS 2"),
     ("source install/setup.bash", "needs ROS 2"),
     ("ssh HERE", "needs two machines"),
-    ("sudo tests/newcomer/debian.sh", "half an hour, with a mirror of Debian"),
+    ("sudo env \"PATH=$PATH\" tests/newcomer/debian.sh", "half an hour, with a mirror of Debian"),
     ("stress-ng", "loads the machine for hours"),
     ("tests/run", "runs this test itself"),
 ];
