@@ -5,6 +5,8 @@
 
 mod processes;
 
+use std::collections::BTreeSet;
+
 use serde_json::Value;
 
 use bench_dragon::transports::iceoryx2::{node, service_name};
@@ -301,4 +303,38 @@ fn another_layout_is_refused_with_a_sentence() {
         *error != Some(PublishSubscribeOpenError::DoesNotExist)
     });
     assert_eq!(refused, Some(Some(PublishSubscribeOpenError::IncompatibleTypes)));
+}
+
+#[test]
+fn a_name_that_another_program_takes_between_two_shows_is_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("show.mcap");
+    let watching = Process::start(program("taken").args(["watch", "--json"]));
+    let recorder = Process::start(program("taken").args(["record", "--json", "-o"]).arg(&recording));
+    let show =
+        || summary(&Process::start(program("taken").args(["run", "--json", "--duration", "5"])).output_within(300));
+    show();
+    let (node, service) = (node().unwrap(), service_name(&unique("taken"), "poses").unwrap());
+    let mut taken = None;
+    wait_until("the services' end", || {
+        taken = node.service_builder(&service).publish_subscribe::<u64>().create().ok();
+        taken.is_some()
+    });
+    // Both look for a publisher every 20 ms.
+    wait(3.0);
+    drop(taken);
+    show();
+    for process in [&watching, &recorder] {
+        process.signal(SIGTERM);
+    }
+    let [watched, recorded] = [watching, recorder].map(|process| process.output_within(300));
+    for output in [&watched, &recorded] {
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{message}");
+        assert_eq!(message.matches("another layout of its messages").count(), 1, "{message}");
+    }
+    let runs: BTreeSet<_> =
+        json_lines(&watched).iter().filter_map(|line| Some(line["run_id"].as_str()?.to_owned())).collect();
+    assert_eq!(runs.len(), 2, "{runs:?}");
+    assert_eq!(json_lines(&recorded).pop().unwrap()["files"].as_array().unwrap().len(), 2);
 }
