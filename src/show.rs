@@ -153,18 +153,16 @@ impl Show {
     /// A show of `scene`, whose events `timeline` holds.
     ///
     /// # Errors
-    /// A start before the scene's own, or not before the event at which the show freezes.
+    /// A start before the scene's own or after the motion's end.
     pub fn new(scene: &Scene, timeline: Timeline, playback: Playback) -> Result<Self, StartError> {
+        let end = timeline.end();
+        if !(playback.start >= 0.0 && playback.start < end.time) {
+            return Err(StartError { start: playback.start, end: end.time, kind: end.event.kind });
+        }
         let mut timeline = if scene.alerts.is_some() { timeline } else { timeline.end_only() };
         timeline.reserve_contact();
         let stops = scene.alerts.is_some() && playback.on_contact == OnContact::Stop;
-        let freeze = timeline.freeze(stops);
-        let freeze_time = freeze.time;
-        // Boards that touch from the beginning are shown as they stand.
-        let stands = playback.start == 0.0 && timeline.end().time > 0.0;
-        if !(playback.start >= 0.0 && playback.start < freeze_time || stands) {
-            return Err(StartError { start: playback.start, end: freeze_time, kind: freeze.event.kind });
-        }
+        let freeze_time = timeline.freeze(stops).time;
         let level = scene.alerts.map(|rules| LevelTracker::new(rules, playback.rate));
         let choice = scene.motion.solver(scene.velocities);
         let clearance = scene.alerts.map(|_| scene.motion.clearance_monitor(&choice));

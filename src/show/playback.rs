@@ -30,17 +30,17 @@ impl Playback {
     }
 }
 
-/// A start that is not before the show's end.
+/// A start that is not before the motion's end.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "{start} s is outside the show, expected at least 0 and less than {end:.9} s, at which it ends ({})",
+    "{start} s is outside the motion, expected at least 0 and less than {end:.9} s, at which it ends ({})",
     kind.name()
 )]
 pub struct StartError {
     /// Simulated seconds at which the show was to begin.
     pub start: f64,
-    /// Simulated seconds at which the show freezes.
+    /// Simulated seconds at which the motion ends.
     pub end: f64,
-    /// What freezes it.
+    /// What ends it.
     pub kind: EventKind,
 }
