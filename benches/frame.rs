@@ -235,7 +235,7 @@ fn publish_over_iceoryx2(bencher: Bencher) {
         queue: 64,
         subscribers: 8,
         alerts: true,
-        cues: false,
+        cues: 0,
         stage: stage(1, 0, [0; 32], &scene.motion, &show),
     };
     let mut publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");

@@ -160,7 +160,7 @@ fn publisher_and_subscriber(name: &str, scene: &Scene, show: &Show) -> (SharedMe
         queue: QUEUE,
         subscribers: 1,
         alerts: true,
-        cues: false,
+        cues: 0,
         stage: stage(1, 0, [0; 32], &scene.motion, show),
     };
     let publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");

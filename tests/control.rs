@@ -164,6 +164,28 @@ fn a_show_waits_for_go_at_its_start_and_at_its_cues() {
     assert!(code == 1 && line["code"] == "refused" && sentence.contains("waits for nothing"), "{line} {sentence}");
 }
 
+/// A frame that is further than all cues announces every one of them, however many there are.
+#[test]
+fn all_cues_of_one_step_are_announced() {
+    let name = "many_cues";
+    let scene = scene_file(name, &[]);
+    let numbers = 0..20;
+    let cues =
+        numbers.clone().map(|cue| format!("[[cues]]\nname = \"cue {cue}\"\nat = {}\n", 0.2 + 0.1 * f64::from(cue)));
+    let cues = cues.collect::<String>();
+    std::fs::write(&scene, format!("{}\n{cues}", std::fs::read_to_string(&scene).unwrap())).unwrap();
+    let scene = scene.to_str().unwrap();
+    let arguments = ["--scene", scene, "--rate", "50", "--paused", "--time-scale", "200", "--duration", "60"];
+    let _publisher = publisher(name, &arguments);
+    let watch = Process::start(program(name).args(["watch", "--json", "--duration", "6"]));
+    // It has seen frames before, or would be told of the last cue alone.
+    wait(3.0);
+    done(name, &["go"]);
+    let lines = json_lines(&watch.output_within(60));
+    let names = lines.iter().filter(|line| line["type"] == "cue").map(|line| line["name"].as_str().unwrap());
+    assert_eq!(Vec::from_iter(names), Vec::from_iter(numbers.map(|cue| format!("cue {cue}"))));
+}
+
 /// A show as it stands when a command comes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stand {

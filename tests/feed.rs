@@ -170,7 +170,7 @@ fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {
             queue: 64,
             subscribers: 2,
             alerts: false,
-            cues: false,
+            cues: 0,
             stage,
         };
         SharedMemoryPublisher::open(&config).unwrap()

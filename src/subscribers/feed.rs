@@ -101,7 +101,7 @@ pub enum FeedEvent<'a> {
 ///     queue: 4,
 ///     subscribers: 1,
 ///     alerts: true,
-///     cues: false,
+///     cues: 0,
 ///     stage: stage(1, 0, [0; 32], &scene.motion, &show),
 /// };
 /// let mut publisher = SharedMemoryPublisher::open(&config)?;

@@ -99,8 +99,8 @@ pub struct PublisherConfig {
     pub subscribers: usize,
     /// Whether there is an alerts service.
     pub alerts: bool,
-    /// Whether there is a cues service.
-    pub cues: bool,
+    /// The number of the scene's cues; with none there is no cues service.
+    pub cues: usize,
     /// The stage, sent once and kept for late subscribers.
     pub stage: Stage,
 }
@@ -134,7 +134,7 @@ pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, Tran
         queue: 0,
         subscribers,
         alerts,
-        cues: cues > 0,
+        cues,
         stage,
     };
     config.queue = queue.unwrap_or_else(|| default_queue(&config));
@@ -146,7 +146,7 @@ impl Transport for Iceoryx2 {
         let PublisherConfig { name, single_precision, queue, subscribers, alerts, cues, .. } = &self.config;
         let single = single_precision.map_or(String::new(), |single| format!(", /poses32 ({single})"));
         let alerts = if *alerts { ", /alerts" } else { "" };
-        let cues = if *cues { ", /cues" } else { "" };
+        let cues = if *cues > 0 { ", /cues" } else { "" };
         format!(
             "iceoryx2 services: {name}/poses{single}{alerts}{cues}, /status, /stage, /tick, /control (queues of {queue} \
              frames for {subscribers} subscribers)."
@@ -212,9 +212,12 @@ impl SharedMemoryPublisher {
             Ok((FrameSender::open(&node, config, &described)?, decimation))
         };
         let poses_32 = config.decimation().map(open_32).transpose()?;
-        let alerts = config.alerts.then(|| Repeated::open(&node, config, "alerts")).transpose()?;
-        let cues = config.cues.then(|| Repeated::open(&node, config, "cues")).transpose()?;
-        let mut stage = Repeated::open(&node, config, "stage")?;
+        let open_alerts = || Repeated::open(&node, config, "alerts", SMALL_QUEUE);
+        let alerts = config.alerts.then(open_alerts).transpose()?;
+        // A large step reaches all of them in one frame; at a power of two most changes of a scene keep the service as it is.
+        let open_cues = || Repeated::open(&node, config, "cues", config.cues.next_power_of_two().max(SMALL_QUEUE));
+        let cues = (config.cues > 0).then(open_cues).transpose()?;
+        let mut stage = Repeated::open(&node, config, "stage", SMALL_QUEUE)?;
         stage.send(config.stage).map_err(|error| failed(name, "stage", error))?;
         let tick_service = node
             .service_builder(&service_name(name, "tick")?)
@@ -303,8 +306,13 @@ struct Repeated<Message: ZeroCopySend + std::fmt::Debug + Copy + 'static> {
 }
 
 impl<Message: ZeroCopySend + std::fmt::Debug + Copy + 'static> Repeated<Message> {
-    fn open(node: &Node<ipc::Service>, config: &PublisherConfig, service: &str) -> Result<Self, OpenError> {
-        let (port, service) = sender(node, &config.name, service, config.subscribers)?;
+    fn open(
+        node: &Node<ipc::Service>,
+        config: &PublisherConfig,
+        service: &str,
+        queue: usize,
+    ) -> Result<Self, OpenError> {
+        let (port, service) = sender(node, &config.name, service, config.subscribers, queue)?;
         Ok(Self { latest: None, port, service, sent: Instant::now() })
     }
 
@@ -337,7 +345,7 @@ impl StatusSender {
     pub fn open(name: &str, subscribers: usize) -> Result<Self, OpenError> {
         retry_while_incomplete(|| {
             let node = node()?;
-            let (status, _) = sender(&node, name, "status", subscribers)?;
+            let (status, _) = sender(&node, name, "status", subscribers, SMALL_QUEUE)?;
             reserve_pages()?;
             Ok(Self { status, _node: node })
         })
@@ -358,6 +366,7 @@ fn sender<Message: ZeroCopySend + std::fmt::Debug + Copy>(
     name: &str,
     service: &str,
     subscribers: usize,
+    queue: usize,
 ) -> Result<Opened<Message>, OpenError> {
     let full_name = service_name(name, service)?;
     let opened = node
@@ -366,7 +375,7 @@ fn sender<Message: ZeroCopySend + std::fmt::Debug + Copy>(
         .max_publishers(MOST_PUBLISHERS)
         .max_subscribers(subscribers)
         .max_nodes(subscribers + SPARE_NODES)
-        .subscriber_max_buffer_size(SMALL_QUEUE)
+        .subscriber_max_buffer_size(queue)
         .history_size(1)
         .enable_safe_overflow(true)
         .open_or_create()

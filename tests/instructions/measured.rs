@@ -129,7 +129,7 @@ impl Step {
             queue: 2,
             subscribers: 1,
             alerts: true,
-            cues: false,
+            cues: 0,
             stage: stage(1, 0, [0; 32], &scene.motion, &show),
         };
         let publisher = SharedMemoryPublisher::open(&config).unwrap();

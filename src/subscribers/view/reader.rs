@@ -17,7 +17,7 @@ use crate::wire::{LoopStatus, Stage};
 const POLL_INTERVAL: Duration = Duration::from_millis(4);
 /// How long to wait where the services cannot be used, before the next attempt.
 const RETRY_INTERVAL: Duration = Duration::from_millis(200);
-/// Cues that a browser which takes long to be written to may fall behind.
+/// Cues that a browser which takes long to be written to may fall behind; of a show that has more, as many as it has.
 const KEPT_CUES: usize = 16;
 
 /// Keeps the picture up to date until `stop` is set, through any number of publishers of a name.
@@ -87,7 +87,8 @@ impl Reader<'_> {
             }
             FeedEvent::Cue(cue) => {
                 self.cues += 1;
-                let kept = self.picture.cues.iter().rev().take(KEPT_CUES - 1).rev().cloned();
+                let most = self.stage.map_or(0, |stage| stage.cues as usize).max(KEPT_CUES);
+                let kept = self.picture.cues.iter().rev().take(most - 1).rev().cloned();
                 self.picture.cues = kept.chain([(self.cues, wire::cue(cue).into())]).collect();
             }
             FeedEvent::Frame { header, handles, .. } => self.picture.frame = wire::frame(header, handles).into(),
