@@ -101,6 +101,7 @@ def bar_conducts():
         time_line(page)
         keyboard(page)
         held(page)
+        page = at_the_end(page, browser, ready["url"])
         assert not page.complaints, page.complaints
 
 
@@ -199,6 +200,30 @@ def held(page):
     until(lambda: hold.inner_text() == "Hold", "the button is not latched any more")
     names = page.evaluate("[...document.querySelectorAll('#conduct button, #conduct input, #conduct select')].map((one) => (one.labels?.[0] ?? one).textContent || one.ariaLabel)")
     assert all(names), names
+
+
+def at_the_end(page, browser, url):
+    """A page that comes while the show stands still sets its speed, and at the end the button does what it says."""
+    page.close()
+    page = opened(browser, url)
+    until(lambda: bar_is_shown(page) and page.locator("#conduct-rate option").count() > 1, "the speeds")
+    assert page.locator("#conduct-rate").input_value() == "", "nobody knows the speed of a show that stands still"
+    page.keyboard.press("]")
+    says(page, "The speed is not known until the show plays.")
+    page.get_by_label("Speed").select_option("2 ×")
+    page.evaluate("document.activeElement.blur()")
+    page.keyboard.press("]")
+    until(lambda: page.locator("#conduct-rate").input_value() == "4", "the speed that was set")
+    assert state()["playback"] == "paused"
+    seek(page, CONTACT - 2)
+    page.get_by_role("button", name="Play").click()
+    until(lambda: state()["time_scale"] == 4.0, "that speed")
+    until(lambda: state()["playback"] == "ended", "the end")
+    until(lambda: page.inner_text("#conduct-toggle") == "Pause", "time passes at the end, too")
+    page.get_by_role("button", name="Pause").click()
+    until(lambda: state()["playback"] == "paused", "Pause at the end")
+    until(lambda: page.inner_text("#conduct-toggle") == "Play", "the button becomes Play")
+    return page
 
 
 def token_and_own_pages():

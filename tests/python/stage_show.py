@@ -124,9 +124,10 @@ def fixed_views(page, url, handles):
     along = at(page, 1, 0) - at(page, 0, 0)
     assert abs(along[0]) < 1e-6 and along[1] < 0, f"x points along {along} pixels: not turned to the left"
     page.goto("about:blank")
-    page.goto(f"{url}#shwo,bench=12")
+    page.goto(f"{url}#shwo,bench=12&100%,toString=1,follow=0")
     drawn(page)
-    assert "shwo" in page.inner_text("#address") and page.input_value("#pick") == "12", words(page)
+    said = page.inner_text("#address")
+    assert all(word in said for word in ("shwo", "100%", "toString=1", "follow=0")) and page.input_value("#pick") == "12", words(page)
 
 
 def what_is_coming_is_named_and_seen():

@@ -174,9 +174,14 @@ impl<Tag, Handle: FnMut(Tag, Conducted)> Conducting<Tag, Handle> {
         self.pending.iter_mut().for_each(|pending| pending.overtaken = pending.action != HOLD);
     }
 
-    /// The next action that may be sent by now.
+    /// The next action that may be sent by now: what depends on how the show stands goes before all that came after it,
+    /// but a hold.
     fn next_waiting(&mut self) -> Option<(Tag, Action)> {
-        let most = if self.waiting.front()?.1 == HOLD { MOST_PENDING + MOST_HOLDS } else { MOST_PENDING };
+        let is_hold = self.waiting.front()?.1 == HOLD;
+        if !is_hold && self.pending.iter().any(|pending| !matches!(pending.action, Action::Send(_))) {
+            return None;
+        }
+        let most = if is_hold { MOST_PENDING + MOST_HOLDS } else { MOST_PENDING };
         if self.pending.len() < most { self.waiting.pop_front() } else { None }
     }
 

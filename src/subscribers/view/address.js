@@ -2,7 +2,16 @@
 
 /** Words that stand alone, and words that take numbers (as many as named) or a word after `=`. */
 const ALONE = ["show", "transparent", "nolabels", "dark", "light", "sound"];
-const WITH = { follow: /^\d+$/, bench: /^\d+$/, rotate: /^-?\d+(\.\d+)?$/, view: /^-?[\d.]+,-?[\d.]+,[\d.]+$/, lang: /^(en|zh)$/ };
+const WITH = { follow: /^[1-9]\d*$/, bench: /^[1-9]\d*$/, rotate: /^-?\d+(\.\d+)?$/, view: /^-?[\d.]+,-?[\d.]+,[\d.]+$/, lang: /^(en|zh)$/ };
+
+/** The text of an address; one that is no encoding of a text stands as it is. */
+function textOf(address) {
+  try {
+    return decodeURI(address);
+  } catch {
+    return address;
+  }
+}
 
 /**
  * What the address says: each word with its value, `true` where it has none, numbers as numbers, a place as three of
@@ -10,10 +19,10 @@ const WITH = { follow: /^\d+$/, bench: /^\d+$/, rotate: /^-?\d+(\.\d+)?$/, view:
  */
 export function wordsOf(hash) {
   const said = { unknown: [] };
-  for (const part of decodeURI(hash).replace(/^#/, "").split(/&|,(?![-\d.])/).filter(Boolean)) {
+  for (const part of textOf(hash).replace(/^#/, "").split(/&|,(?![-\d.])/).filter(Boolean)) {
     const [word, value] = part.split("=");
     if (value === undefined && (ALONE.includes(word) || word === "follow")) said[word] = true;
-    else if (value !== undefined && WITH[word]?.test(value)) said[word] = word === "lang" ? value : value.split(",").map(Number);
+    else if (value !== undefined && Object.hasOwn(WITH, word) && WITH[word].test(value)) said[word] = word === "lang" ? value : value.split(",").map(Number);
     else said.unknown.push(part);
   }
   return said;

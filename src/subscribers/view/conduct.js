@@ -5,7 +5,7 @@
 import { answerTo, say, translate } from "./words.js";
 
 /** The numbers of the states of playback. */
-const PLAYING = 0, HELD = 2;
+const PLAYING = 0, HELD = 2, ENDED = 3;
 /** Simulated seconds of one seek by a key. */
 const SEEK = 5;
 /** While the time line is dragged, a seek is sent no more often than this (ms). */
@@ -55,6 +55,9 @@ const token = takeToken();
 /** Whether a certificate of this very scene proves that an event happens when it is announced. */
 const isProved = (stage, { event, time }) => Boolean(stage.proved?.some((outcome) => outcome.event === event && outcome.status === "proved" && outcome.time_lo <= time && time <= outcome.time_hi));
 
+/** Whether time passes there: at its end, too, until a loop begins again or a seek leads back. */
+const advances = ({ playback }) => [PLAYING, ENDED].includes(playback.newest.playback);
+
 /** Whether commands have somebody to obey them. */
 const isThere = ({ playback, stage, trouble }) => Boolean(playback.newest && stage && trouble === null);
 
@@ -72,11 +75,13 @@ export function conduct(dragons) {
   const refusals = new Map();
   /** The stream that is conducted, null for all; the commands so far, and the one whose refusal is shown. */
   let chosen = null, numbered = 0, refused = 0;
-  let shownStages = [], rate = null, dragged = false, sentenceAt = 0, cueAt = 0;
+  let shownStages = [], shownRate, dragged = false, sentenceAt = 0, cueAt = 0;
   /** Where a seek that has not been answered goes, and one that waits for that answer; the time of the last one sent. */
   let sought = null, wanted = null, soughtAt = -Infinity;
   /** The last answer to a seek: frames from before it are still on their way. */
   let landed = null;
+  /** Of each stream the run whose rate is known, and that rate: of its frames, or as it was commanded while the show stands still. */
+  const known = new Map();
 
   const targets = () => (chosen ? [chosen] : streams), there = () => targets().filter(isThere);
   /** The one whose time and speed are shown. */
@@ -110,9 +115,9 @@ export function conduct(dragons) {
     for (const stream of unsent) refuse(id, stream, say("nothingSent"));
     return id;
   }
-  /** Of several, all pause where any plays. */
+  /** Of several, all pause where any is not paused. */
   function toggle() {
-    const plays = there().some(({ playback }) => playback.newest.playback === PLAYING);
+    const plays = there().some(advances);
     command(targets().length === 1 ? "toggle" : plays ? "pause" : "resume");
   }
 
@@ -159,11 +164,22 @@ export function conduct(dragons) {
     );
     put(part("events"), marks.map(({ text }) => text).join(say("between")));
   }
-  function showRate(scale) {
-    if (!(scale > 0) || scale === rate) return;
-    rate = scale;
-    const all = [...new Set([...RATES, scale])].sort((a, b) => a - b);
-    rates.replaceChildren(...all.map((one) => new Option(`${+one.toPrecision(3)} ×`, one, false, one === scale)));
+  /** The rate that is in force, or will be once the show plays; null while it is not known. */
+  function rateOf(stream) {
+    const { newest } = stream.playback, of = known.get(stream);
+    return newest && of?.run === newest.run ? of.rate : null;
+  }
+  const keepRate = (stream, rate) => known.set(stream, { run: stream.playback.newest.run, rate });
+  function commandRate(rate) {
+    command("rate", rate);
+    for (const stream of there()) keepRate(stream, rate);
+  }
+  function showRate(rate) {
+    if (rate === shownRate) return;
+    shownRate = rate;
+    const all = [...new Set([...RATES, rate ?? 1])].sort((a, b) => a - b);
+    rates.replaceChildren(...all.map((one) => new Option(`${+one.toPrecision(3)} ×`, one, false, one === rate)));
+    if (rate === null) rates.selectedIndex = -1;
   }
   /** Whether all that are there are held. */
   function allHeld() {
@@ -191,8 +207,9 @@ export function conduct(dragons) {
     const { playback } = isThere(lead()) ? lead() : all[0], { newest } = playback;
     sendSeek();
     showStages(all);
-    showRate(newest.scale);
-    const plays = all.some((stream) => stream.playback.newest.playback === PLAYING);
+    for (const stream of streams.filter(isThere)) if (stream.playback.newest.scale > 0) keepRate(stream, stream.playback.newest.scale);
+    showRate(rateOf(isThere(lead()) ? lead() : all[0]));
+    const plays = all.some(advances);
     put(part("toggle"), say(plays ? "pause" : "play"));
     const time = dragged || sought !== null || wanted !== null ? now() : playback.time(at);
     if (!dragged) line.value = time;
@@ -211,6 +228,7 @@ export function conduct(dragons) {
       show();
     }
     if (message.type === "answer") {
+      if (message.sentence && message.command === "rate") known.delete(stream);
       if (message.id === sought?.id && stream === sought.stream) {
         landed = message.code ? { stream, run: stream.playback.newest?.run, tick: message.tick, time: message.sim_time } : null;
         sought = null;
@@ -234,10 +252,15 @@ export function conduct(dragons) {
     part("whom").replaceChildren(new Option(say("all"), ""), ...dragons.map(({ name }, place) => new Option(name, place)));
     part("whom").onchange = ({ target }) => {
       chosen = target.value === "" ? null : streams[target.value];
-      [sought, wanted, landed, rate] = [null, null, null, null];
+      [sought, wanted, landed] = [null, null, null];
       show();
     };
   } else part("choice").remove();
+  function changeRate(factor) {
+    const rate = rateOf(lead());
+    if (rate === null) report(say("rateUnknown"));
+    else commandRate(rate * factor);
+  }
   const hold = () => command(allHeld() ? "release" : "hold");
   part("toggle").onclick = toggle;
   part("step").onclick = () => command("step", 1);
@@ -245,8 +268,8 @@ export function conduct(dragons) {
   part("hold").onclick = hold;
   rates.onchange = () => {
     // What is shown is what is in force, which a frame says.
-    command("rate", Number(rates.value));
-    rate = null;
+    commandRate(Number(rates.value));
+    shownRate = undefined;
   };
   line.oninput = () => {
     dragged = true;
@@ -261,7 +284,7 @@ export function conduct(dragons) {
 
   const keys = {
     " ": toggle, ".": () => command("step", 1), h: hold,
-    "[": () => rate && command("rate", rate / 2), "]": () => rate && command("rate", rate * 2),
+    "[": () => changeRate(1 / 2), "]": () => changeRate(2),
     ArrowLeft: () => seek(now() - SEEK), ArrowRight: () => seek(now() + SEEK),
   };
   /** Keys that what has the focus uses itself: the picture moves by arrows, buttons are pressed by space, lists have theirs. */

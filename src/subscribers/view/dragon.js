@@ -15,6 +15,8 @@ const WAITING = { name: "waiting", severity: "ok", happened: false, sentence: nu
 const UNKNOWN = { ...WAITING, name: "unknown" };
 /** Frames that do not come for so long (ms) are missed. */
 const SILENCE = 2000;
+/** Milliseconds between the frames of the slowest publisher. */
+const LONGEST_PERIOD = 10_000;
 
 /** How far from the centre the outermost bench is. */
 function reachOf(stage, handles) {
@@ -77,7 +79,7 @@ export class Dragon {
   situation(now) {
     const { playback, stage, alert, trouble } = this.stream, { newest } = playback;
     const silence = newest ? now - newest.at : 0;
-    const silent = !trouble && newest && silence > Math.max(SILENCE, 3 * playback.interval) ? Math.floor(silence / 1000) : null;
+    const silent = !trouble && newest && silence > Math.max(SILENCE, 3 * (playback.isPaced ? playback.interval : LONGEST_PERIOD)) ? Math.floor(silence / 1000) : null;
     const lost = trouble ?? (newest && stage ? null : "noStage");
     const current = lost ? WAITING : stage.states[newest.state] ?? UNKNOWN;
     let [seconds, ahead] = [NaN, null];

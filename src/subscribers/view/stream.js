@@ -60,6 +60,7 @@ class Playback {
     this.offsets = [];
     this.earliest = this.lag = this.shown = NaN;
     this.interval = 50;
+    this.isPaced = false;
     this.drawnAt = 0;
   }
 
@@ -79,7 +80,8 @@ class Playback {
     this.earliest = offsets[0];
     const spread = offsets[Math.floor(0.95 * (offsets.length - 1))] - offsets[0];
     const { frames } = this.reader, count = Math.min(frames.length, 16);
-    if (count > 1) this.interval = (frame.due - frames.at(-count).due) / (count - 1);
+    this.isPaced = count > 1;
+    if (this.isPaced) this.interval = (frame.due - frames.at(-count).due) / (count - 1);
     this.lag = Math.min(this.interval, LONGEST_GAP) + Math.min(spread, 100);
   }
 

@@ -104,6 +104,7 @@ const WORDS = {
   release: ["Release", "解除锁定"],
   heldRelease: ["HELD: release", "已锁定：解除"],
   rateInForce: ["Speed", "倍速"],
+  rateUnknown: ["The speed is not known until the show plays.", "演出播放后才知道倍速。"],
   timeLine: ["Time of the show", "演出时间"],
   showTime: ["{time} s", "{time} 秒"],
   eventMark: ["{kind}, {time} s{proved}", "{kind}，{time} 秒{proved}"],
