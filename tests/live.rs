@@ -113,6 +113,27 @@ fn every_subscriber_gets_every_frame_at_60_hz() {
 }
 
 #[test]
+fn a_publisher_that_starts_again_is_no_loss_to_the_python_example() {
+    if !can_run(python_modules(&PEER)) {
+        return;
+    }
+    let name = unique("again");
+    let arguments = ["examples/python/subscribe.py", "--json", "--seconds", "12", "--name", &name];
+    let subscriber = Process::start(python().args(arguments));
+    let scene = scene_file("again", &[("[publish]", "[publish]\nqueue = 120")]);
+    let summaries = [(); 2].map(|()| {
+        let arguments = ["run", "--json", "--rate", "50", "--duration", "2"];
+        summary(&Process::start(program("again").arg("--scene").arg(&scene).args(arguments)).output_within(60))
+    });
+    let published = summaries.map(|summary| summary["frames"].as_u64().unwrap());
+    let end = json_lines(&subscriber.output_within(60)).pop().unwrap();
+    // It may have found the first publisher a moment after its first frame.
+    let received = end["received"].as_u64().unwrap();
+    assert!(received > published[1] && received <= published[0] + published[1], "{end}");
+    assert_eq!((&end["type"], &end["missed"]), (&"end".into(), &0.into()), "{end}");
+}
+
+#[test]
 fn alerts_come_once_each_and_in_order_in_rust_and_in_python() {
     let scene = scene_file("continue", &[("on_contact = \"stop\"", "on_contact = \"continue\"")]);
     let names = ["clear", "approaching", "contact", "stall", "lock"];

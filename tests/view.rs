@@ -135,9 +135,16 @@ fn the_python_example_reads_the_socket() {
     let _publisher = publisher("example", &["--start", "300", "--time-scale", "1e-6"]);
     // A publisher that is not optimised makes its tables for seconds.
     frame(&mut connect(&address));
-    let url = format!("ws://{address}/frames");
-    let arguments = ["examples/python/stage_socket.py", "--url", &url, "--seconds", "4"];
-    let output = Process::start(python().args(arguments)).output_within(30);
+    let read = |name: &str| {
+        let url = format!("ws://{address}/frames?name={name}");
+        let arguments = ["examples/python/stage_socket.py", "--url", &url, "--seconds", "4"];
+        Process::start(python().args(arguments)).output_within(30)
+    };
+    let refused = read("nobody");
+    let sentence = text(&refused.stderr);
+    assert!(!refused.status.success() && sentence.lines().count() == 1, "{sentence}");
+    assert!(sentence.contains("name: expected one of the publishers"), "{sentence}");
+    let output = read(&unique("example"));
     let printed = text(&output.stdout);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let [x, y, _] = truth_at_300()[0];

@@ -12,7 +12,7 @@ import math
 import struct
 import time
 
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 VERSION = 3
@@ -83,10 +83,13 @@ def main():
     parser.add_argument("--seconds", type=float, default=float("inf"))
     options = parser.parse_args()
     deadline = time.monotonic() + options.seconds
+    url = f"{options.url}{'&' if '?' in options.url else '?'}rate={options.rate}"
     while time.monotonic() < deadline:
         try:
-            with connect(f"{options.url}?rate={options.rate}", compression=None, max_queue=1) as socket:
+            with connect(url, compression=None, max_queue=1) as socket:
                 follow(socket, deadline)
+        except InvalidStatus as error:
+            raise SystemExit(f"{url}: {error.response.body.decode(errors='replace').strip()}")
         except (OSError, ConnectionClosed) as error:
             print(f"no server: {error}; trying again", flush=True)
             time.sleep(1)

@@ -69,15 +69,16 @@ def main():
     end = time.monotonic() + arguments.seconds
     printed = 0.0
     received = missed = 0
-    sequence = None
+    run_id = sequence = None
     while time.monotonic() < end:
         tick.timed_wait(iox2.Duration.from_millis(200))
         while (sample := subscriber.receive()) is not None:
             header = sample.user_header().contents
             handles = handles_of(sample)
-            if sequence is not None:
+            # Another run is a publisher that was started again, whose frames are counted from the beginning.
+            if header.run_id == run_id:
                 missed += header.sequence - sequence - 1
-            sequence = header.sequence
+            run_id, sequence = header.run_id, header.sequence
             received += 1
             if arguments.json:
                 line = {
