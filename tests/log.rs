@@ -53,6 +53,10 @@ fn proved_whole(log: &Path, summary: &Value) -> Value {
 }
 
 /// The lines of a log that are whole.
+fn lines_of(log: &Path) -> Vec<String> {
+    std::fs::read_to_string(log).unwrap().lines().map(str::to_owned).collect()
+}
+
 fn lines(log: &Path) -> Vec<Value> {
     let text = std::fs::read_to_string(log).unwrap();
     let whole = text.split_inclusive('\n').filter(|line| line.ends_with('\n'));
@@ -116,6 +120,19 @@ fn a_conducted_show_is_proved_with_every_command_at_its_tick() {
     let line = proved_whole(&log, &summary);
     assert_eq!(line["commands"], 12);
     assert_eq!(summary["log"]["frames"], summary["frames"]);
+
+    // Cut behind its last command: what is in no second that was compared does not count.
+    let cut = folder.path().join("cut.jsonl");
+    let last = lines.iter().rposition(|line| line["type"] == "command").unwrap();
+    let kept = lines_of(&log).into_iter().take(last + 1).map(|line| format!("{line}\n"));
+    std::fs::write(&cut, kept.collect::<String>()).unwrap();
+    let seconds = of_type(&lines[..last], "second");
+    let last_tick = seconds.last().unwrap()["to"].as_u64();
+    let frames = seconds.iter().map(|second| second["frames"].as_u64().unwrap()).sum::<u64>();
+    let commands = lines[..=last].iter().filter(|line| line["type"] == "command" && line["tick"].as_u64() <= last_tick);
+    let line = proved(&cut);
+    assert_eq!((line["frames"].as_u64(), line["last_tick"].as_u64()), (Some(frames), last_tick), "{line}");
+    assert_eq!(line["commands"].as_u64(), Some(commands.count() as u64), "{line}");
 
     // For people: the same in words; and one digit of a hash.
     let output = program("verify").args(["verify", log.to_str().unwrap()]).output().unwrap();

@@ -50,6 +50,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     let scene = text.parse()?;
     let timeline = search_timeline(&scene, common);
     let mut output = Output::standard();
+    let certified = arguments.certificate.as_ref().map(|file| proved(&text.text, file, common)).transpose()?;
     if arguments.prove && common.json {
         let (found, freeze) = find_least_clearance(&scene, &timeline, common);
         let enclosure = enclosed(&scene, found, freeze, common)?;
@@ -124,9 +125,9 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         let enclosure = enclosed(&scene, found, freeze, common)?;
         output.line(&format!("  {}", proof_sentence(&scene, enclosure)))?;
     }
-    if let Some(file) = &arguments.certificate {
+    if let Some(sentences) = certified {
         output.line("  Proved of this scene:")?;
-        for sentence in proved(&text.text, file, common)? {
+        for sentence in sentences {
             output.line(&format!("    {sentence}."))?;
         }
     }

@@ -87,6 +87,9 @@ const MOST: f64 = 1e6;
 /// The most moments of a picture that moves: more make a file that no browser shows well.
 const MOST_MOMENTS: f64 = 2000.0;
 
+/// Seconds between two moments of an animation, at least: the last one stands as many steps as there are in seconds.
+const LEAST_STEP: f64 = 1e-3;
+
 /// Draws the stage.
 pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandError> {
     let scene = common.load_scene()?;
@@ -125,9 +128,10 @@ fn steps(every: f64, from: f64, until: f64) -> Result<u64, CommandError> {
     }
     // A last picture that rounding has pushed past --until by less than a part in 10^9 of a step still counts.
     let steps = ((until - from) / every + 1e-9).floor();
-    if steps >= MOST {
+    let pictures = steps + 1.0;
+    if pictures > MOST {
         return Err(CommandError::BadInput(format!(
-            "--every {every} gives {steps:e} pictures, expected at most {MOST:e}"
+            "--every {every} gives {pictures:e} pictures, expected at most {MOST:e}"
         )));
     }
     Ok(steps as u64)
@@ -196,9 +200,17 @@ impl<'a> Session<'a> {
     fn draw_animated(&mut self, look: Look, (from, until): (f64, f64), steps: f64) -> Result<(), CommandError> {
         // The steps are stretched a little, so that the last moment is --until itself.
         let steps = steps.round();
-        if !(1.0..MOST_MOMENTS).contains(&steps) {
+        if !(1.0..=MOST_MOMENTS).contains(&steps) {
             return Err(CommandError::BadInput(format!(
                 "--animated from {} to {} s has {steps} moments after the first, expected 1 to {MOST_MOMENTS}: change --every",
+                figure(from),
+                figure(until)
+            )));
+        }
+        let step = (until - from) / steps;
+        if step < LEAST_STEP {
+            return Err(CommandError::BadInput(format!(
+                "--animated from {} to {} s has steps of {step:e} s, expected at least {LEAST_STEP}: change --every",
                 figure(from),
                 figure(until)
             )));

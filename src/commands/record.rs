@@ -213,7 +213,13 @@ fn mend(common: &Common, file: &Path, arguments: &RecordArguments) -> Result<(),
     let bad = |error: RecoverError| CommandError::BadInput(format!("{shown}: {error}"));
     let unread = |error: io::Error| bad(RecoverError::Read(error));
     let input = File::open(file).map_err(unread)?;
-    let length = input.metadata().map_err(unread)?.len();
+    let metadata = input.metadata().map_err(unread)?;
+    if !metadata.is_file() {
+        return Err(CommandError::BadInput(format!(
+            "{shown} is no regular file, expected a recording whose length is known"
+        )));
+    }
+    let length = metadata.len();
     let path = arguments.output.clone().unwrap_or_else(|| {
         let stem = file.file_stem().unwrap_or_default().to_string_lossy();
         file.with_file_name(format!("{stem}-recovered.mcap"))

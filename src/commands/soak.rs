@@ -152,21 +152,26 @@ fn show_progress(bar: &ProgressBar, fleet: &mut Fleet, seconds: f64) {
 }
 
 fn conclude(report: &Report, common: &Common, files: Option<ReportFiles>) -> Result<(), CommandError> {
+    // Who read the output may have gone with the Ctrl-C that ended the test, or with the terminal.
+    if let Some(files) = files {
+        files.write(report)?;
+    }
+    let printed = print(report, common);
+    if report.verdict == "PASS" {
+        return printed;
+    }
+    let broken: Vec<_> = report.checks.iter().filter(|check| !check.passed).map(|check| check.name).collect();
+    Err(CommandError::Failed(format!("the soak test failed: {}", broken.join("; "))))
+}
+
+fn print(report: &Report, common: &Common) -> Result<(), CommandError> {
     let mut output = Output::standard();
     if common.json {
         output.json(report)?;
     } else {
         report.lines().iter().try_for_each(|line| output.line(line))?;
     }
-    output.finish()?;
-    if let Some(files) = files {
-        files.write(report)?;
-    }
-    if report.verdict == "PASS" {
-        return Ok(());
-    }
-    let broken: Vec<_> = report.checks.iter().filter(|check| !check.passed).map(|check| check.name).collect();
-    Err(CommandError::Failed(format!("the soak test failed: {}", broken.join("; "))))
+    output.finish()
 }
 
 impl SoakArguments {

@@ -1,7 +1,7 @@
 //! `trade`: what accuracy costs on this scene and machine, for every solver.
 
 use std::io::{IsTerminal, stderr};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use bench_dragon::drawing::palette::{LIGHT, SERIES, channels, with_dark_rules};
 use bench_dragon::scene::Scene;
@@ -54,6 +54,10 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
     /// Of a progress bar of 1000, what measuring the solvers takes.
     const SOLVERS: f64 = 850.0;
     let scene = common.load_scene()?;
+    // A file that cannot be written is better known before minutes of measuring.
+    let [plot_file, display_file] =
+        [&arguments.plot, &arguments.display_plot].map(|file| file.as_deref().map(Output::file).transpose());
+    let (plot_file, display_file) = (plot_file?, display_file?);
     announce(&scene, common);
     let timeline = search_timeline(&scene, common);
     let bar = progress_bar(1000, common).with_message("measuring");
@@ -68,10 +72,10 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
     };
     bar.finish_and_clear();
     let (measurements, displayed) = (measured.map_err(CommandError::Failed)?, displayed.map_err(CommandError::Failed)?);
-    if let Some(file) = &arguments.plot {
+    if let Some(file) = plot_file {
         draw(file, |svg| plot(svg, &scene.name, &measurements))?;
     }
-    if let Some(file) = &arguments.display_plot {
+    if let Some(file) = display_file {
         draw(file, |svg| display_plot(svg, &scene.name, &displayed))?;
     }
     let mut output = Output::standard();
@@ -178,7 +182,7 @@ fn print_display(output: &mut Output, scene: &Scene, displayed: &[DisplayMeasure
         "* no other has both fewer bytes and a smaller error. Errors: the largest over all {} handles at the moments of a \
          display at {display_rate} Hz that runs behind the stream by the delay, in the {} s up to the last whole second \
          before the show freezes and at {} moments spread over it, against newton at the simulated time meant to be on display. Single: poses \
-         rounded to 32 bits, which are not published. Of a core: computing the frames by the solver of the scene, \
+         rounded to 32 bits, as `precision = \"f32\"` publishes them. Of a core: computing the frames by the solver of the scene, \
          without transport.",
         scene.team().handles(),
         display::WINDOW,
@@ -195,12 +199,11 @@ const LEAST_ERROR: f64 = 1e-15;
 /// What can go wrong in a drawing.
 type DrawingError = Box<dyn std::error::Error>;
 
-fn draw(file: &Path, plot: impl FnOnce(&mut String) -> Result<(), DrawingError>) -> Result<(), CommandError> {
+fn draw(mut file: Output, plot: impl FnOnce(&mut String) -> Result<(), DrawingError>) -> Result<(), CommandError> {
     let mut svg = String::new();
     plot(&mut svg).map_err(|error| CommandError::Failed(format!("the plot: {error}")))?;
-    let mut output = Output::file(file)?;
-    output.line(&with_dark_rules(&svg))?;
-    output.finish()
+    file.line(&with_dark_rules(&svg))?;
+    file.finish()
 }
 
 /// A colour of the palette.

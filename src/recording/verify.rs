@@ -50,7 +50,7 @@ pub struct Verdict {
     pub same_seconds: u64,
     /// Frames in them.
     pub frames: u64,
-    /// Commands obeyed or refused.
+    /// Commands obeyed or refused in them.
     pub commands: u64,
     /// Periods skipped.
     pub skipped: u64,

@@ -209,7 +209,7 @@ fn times(path: &Path, team: &Team, head_speed: f64, end: f64) -> Vec<f64> {
     let spread = SPREAD_MOMENTS.min(most.div_ceil(2));
     let mut times: Vec<f64> = (0..spread).map(|k| end * k as f64 / spread as f64).collect();
     // Each a quarter of the way that was left before.
-    let last = LAST_MOMENTS.min(most.div_ceil(4));
+    let last = LAST_MOMENTS.min(most.div_ceil(2));
     times.extend((1..=last).map(|k| end * (1.0 - 0.25f64.powi(k as i32))));
     let (head, link) = (team.link(0), team.link(1));
     let crossings = path

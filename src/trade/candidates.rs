@@ -19,7 +19,8 @@ pub(super) fn candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<C
     let exact_contact = contact.map(|errors| errors.exact);
     let mut candidates = Vec::new();
     for accuracy in WISHES.into_iter().rev() {
-        let Some(selection) = selection::cheapest(path, team, head_speed, scene.velocities, accuracy) else { break };
+        // A large team may have room for the tables of weaker wishes alone.
+        let Some(selection) = selection::cheapest(path, team, head_speed, scene.velocities, accuracy) else { continue };
         let (table, make_s) = (selection.table.for_frames(), selection.made_in.as_secs_f64());
         let wish = if accuracy < WISHES[WISHES.len() - 2] { "best".to_owned() } else { format!("{accuracy:e} m") };
         candidates.extend(Instructions::available().into_iter().filter_map(|instructions| {

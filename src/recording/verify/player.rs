@@ -29,6 +29,8 @@ pub(super) struct Player {
     latest: Sample,
     difference: Option<Difference>,
     counts: Counts,
+    /// Of the counts, what no hash has been compared with yet.
+    uncompared: Counts,
 }
 
 /// The latest frame, as far as the line of a second has it.
@@ -95,6 +97,7 @@ impl Player {
             latest: Sample::default(),
             difference: None,
             counts: Counts::default(),
+            uncompared: Counts::default(),
         })
     }
 
@@ -116,6 +119,7 @@ impl Player {
                     return Err("the command is not understood, expected one of those of docs/conducting.md".to_owned());
                 };
                 self.counts.commands += 1;
+                self.uncompared.commands += 1;
                 self.announce(number, line);
                 self.show.command(*tick, command);
                 self.show.finished_step(*tick);
@@ -163,7 +167,9 @@ impl Player {
 
     /// What was found.
     pub fn verdict(self, show: &ShowLine, complete: bool, cut: bool) -> Verdict {
-        let Counts { seconds, same_seconds, frames, commands, skipped, lost, last_tick } = self.counts;
+        let Counts { seconds, same_seconds, skipped, lost, last_tick, .. } = self.counts;
+        let frames = self.counts.frames - self.uncompared.frames;
+        let commands = self.counts.commands - self.uncompared.commands;
         let verdict = match &self.difference {
             Some(_) => "differs",
             None if seconds == 0 => "nothing",
@@ -243,6 +249,7 @@ impl Player {
             self.latest.note(frame);
             self.hashed = Some(self.hashed.map_or((tick, 1), |(from, frames)| (from, frames + 1)));
             self.counts.frames += 1;
+            self.uncompared.frames += 1;
         }
         self.show.finished_step(tick);
         (self.tick, self.sequence) = (tick + 1, self.sequence + 1);
@@ -270,6 +277,9 @@ impl Player {
             ));
         }
         self.counts.seconds += 1;
+        // Commands of the tick that comes next have no frame yet.
+        let commands = self.announced.iter().filter(|line| matches!(line, Line::Command { .. })).count() as u64;
+        self.uncompared = Counts { commands, ..Counts::default() };
         let (hash, sample) = (self.hasher.take(), &self.latest);
         let (same_hash, same_sample) = (hash == line.hash, sample.is(line));
         if same_hash && same_sample {
