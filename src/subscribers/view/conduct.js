@@ -55,8 +55,11 @@ const token = takeToken();
 /** Whether a certificate of this very scene proves that an event happens when it is announced. */
 const isProved = (stage, { event, time }) => Boolean(stage.proved?.some((outcome) => outcome.event === event && outcome.status === "proved" && outcome.time_lo <= time && time <= outcome.time_hi));
 
-/** Whether time passes there: at its end, too, until a loop begins again or a seek leads back. */
-const advances = ({ playback }) => [PLAYING, ENDED].includes(playback.newest.playback);
+/** Whether a pause is what they need: any plays, or all stand at their end, where loops wait to begin again. */
+function canPause(streams) {
+  const all = streams.map(({ playback }) => playback.newest.playback);
+  return all.includes(PLAYING) || all.every((one) => one === ENDED);
+}
 
 /** Whether commands have somebody to obey them. */
 const isThere = ({ playback, stage, trouble }) => Boolean(playback.newest && stage && trouble === null);
@@ -115,10 +118,8 @@ export function conduct(dragons) {
     for (const stream of unsent) refuse(id, stream, say("nothingSent"));
     return id;
   }
-  /** Of several, all pause where any is not paused. */
   function toggle() {
-    const plays = there().some(advances);
-    command(targets().length === 1 ? "toggle" : plays ? "pause" : "resume");
+    command(targets().length === 1 ? "toggle" : canPause(there()) ? "pause" : "resume");
   }
 
   // The time line. One seek is on its way at a time, so that a hand that moves fast leaves no queue behind.
@@ -209,8 +210,7 @@ export function conduct(dragons) {
     showStages(all);
     for (const stream of streams.filter(isThere)) if (stream.playback.newest.scale > 0) keepRate(stream, stream.playback.newest.scale);
     showRate(rateOf(isThere(lead()) ? lead() : all[0]));
-    const plays = all.some(advances);
-    put(part("toggle"), say(plays ? "pause" : "play"));
+    put(part("toggle"), say(canPause(all) ? "pause" : "play"));
     const time = dragged || sought !== null || wanted !== null ? now() : playback.time(at);
     if (!dragged) line.value = time;
     line.setAttribute("aria-valuetext", seconds(time));
