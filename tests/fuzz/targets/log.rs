@@ -99,11 +99,13 @@ fn check_accepted(lines: &[Line], verdict: &Verdict) {
     assert!(end.is_none_or(|at| at + 1 == rest.len()), "something stands behind the end: {rest:?}");
     assert_eq!(verdict.complete, matches!(rest.last(), Some(Line::End { .. })), "{rest:?}");
     // Each tick once, in order.
-    let (mut next, mut frames, mut skipped, mut lost, mut commands, mut seconds) = (0, 0, 0, 0, 0, 0);
+    let (mut next, mut frames, mut skipped, mut lost, mut seconds) = (0, 0, 0, 0, 0);
+    // Ticks of commands; and what counts: frames and commands before the end of a second that has its hash.
+    let (mut commands, mut compared) = (Vec::new(), (0, 0));
     for line in rest {
         match line {
             Line::Command { tick, .. } | Line::StepFinished { tick, .. } => {
-                commands += u64::from(matches!(line, Line::Command { .. }));
+                commands.extend(matches!(line, Line::Command { .. }).then_some(*tick));
                 assert!(*tick >= next, "{line:?} after tick {next}");
                 frames += tick - next;
                 next = *tick;
@@ -120,6 +122,7 @@ fn check_accepted(lines: &[Line], verdict: &Verdict) {
                 frames += (to + 1).saturating_sub(next);
                 next = next.max(to + 1);
                 seconds += 1;
+                compared = (frames, commands.iter().filter(|tick| **tick < next).count() as u64);
             }
             Line::End { frames: claimed, skipped: passed, lost: missing, .. } => {
                 assert_eq!((*claimed, *passed, *missing), (frames, skipped, lost), "{line:?}");
@@ -128,8 +131,8 @@ fn check_accepted(lines: &[Line], verdict: &Verdict) {
             Line::Stopped { .. } => (),
         }
     }
-    let counted = (verdict.seconds, verdict.commands, verdict.skipped, verdict.lost);
-    assert_eq!(counted, (seconds, commands, skipped, lost), "{verdict:?}");
+    assert_eq!((verdict.frames, verdict.commands), compared, "{verdict:?}");
+    assert_eq!((verdict.seconds, verdict.skipped, verdict.lost), (seconds, skipped, lost), "{verdict:?}");
     if verdict.verdict == "same" {
         check_same(show, rest);
     }
