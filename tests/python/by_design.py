@@ -49,7 +49,8 @@ def main():
             try:
                 return builder().open().subscriber_builder().create()
             except iox2.PublishSubscribeOpenError as error:
-                if "DoesNotExist" not in str(error) or time.monotonic() > deadline:
+                # Where the disk is busy a service is incomplete for seconds.
+                if not any(reason in str(error) for reason in ("DoesNotExist", "HangsInCreation")) or time.monotonic() > deadline:
                     raise
                 time.sleep(0.1)
 

@@ -34,7 +34,8 @@ def main():
             stages = service.open().subscriber_builder().create()
             break
         except iox2.PublishSubscribeOpenError as error:
-            if "DoesNotExist" not in str(error) or time.monotonic() > deadline:
+            # Where the disk is busy a service is incomplete for seconds.
+            if not any(reason in str(error) for reason in ("DoesNotExist", "HangsInCreation")) or time.monotonic() > deadline:
                 raise
             time.sleep(0.02)
     while (sample := stages.receive()) is None:
