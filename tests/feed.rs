@@ -154,6 +154,27 @@ fn the_newest_frame_is_one_a_poll_and_the_rest_is_counted() {
     drop(publisher);
 }
 
+/// Whoever keeps the services of a scene with few cues open is in the way of no scene with more.
+#[test]
+fn a_scene_with_more_cues_finds_its_services_open() {
+    let scene = Scene::paper();
+    let show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    let name = unique("more_cues");
+    let [_few, _more] = [3, 40].map(|cues| {
+        let config = PublisherConfig {
+            name: name.clone(),
+            handles: scene.team().handles(),
+            single_precision: None,
+            queue: 64,
+            subscribers: 2,
+            alerts: false,
+            cues,
+            stage: stage(cues as u64, 0, [0; 32], &scene.motion, &show),
+        };
+        SharedMemoryPublisher::open(&config).unwrap()
+    });
+}
+
 /// Of two publishers the one that sends no frames was there first, and has a stage: nothing is taken for the show's before
 /// a frame has come, and the show's stage comes before that.
 #[test]

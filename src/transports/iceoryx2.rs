@@ -24,6 +24,7 @@ use ::iceoryx2::port::publisher::Publisher as Port;
 use ::iceoryx2::port::update_connections::UpdateConnections;
 use ::iceoryx2::prelude::*;
 use ::iceoryx2::service::builder::event::{EventOpenError, EventOpenOrCreateError};
+use ::iceoryx2::service::builder::publish_subscribe::{PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError};
 use ::iceoryx2::service::port_factory::{event, publish_subscribe};
 
 use super::{Transport, TransportConfig, TransportError};
@@ -369,17 +370,28 @@ fn sender<Message: ZeroCopySend + std::fmt::Debug + Copy>(
     queue: usize,
 ) -> Result<Opened<Message>, OpenError> {
     let full_name = service_name(name, service)?;
-    let opened = node
-        .service_builder(&full_name)
-        .publish_subscribe::<Message>()
-        .max_publishers(MOST_PUBLISHERS)
-        .max_subscribers(subscribers)
-        .max_nodes(subscribers + SPARE_NODES)
-        .subscriber_max_buffer_size(queue)
-        .history_size(1)
-        .enable_safe_overflow(true)
-        .open_or_create()
-        .map_err(|error| service_error(&full_name, error))?;
+    let open = |queue| {
+        node.service_builder(&full_name)
+            .publish_subscribe::<Message>()
+            .max_publishers(MOST_PUBLISHERS)
+            .max_subscribers(subscribers)
+            .max_nodes(subscribers + SPARE_NODES)
+            .subscriber_max_buffer_size(queue)
+            .history_size(1)
+            .enable_safe_overflow(true)
+            .open_or_create()
+    };
+    let opened = match open(queue) {
+        // A subscriber of a scene with fewer cues keeps its service open.
+        Err(PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
+            PublishSubscribeOpenError::DoesNotSupportRequestedMinBufferSize,
+        )) if queue > SMALL_QUEUE => {
+            log::warn!("a subscriber keeps \"{full_name}\" open with shorter queues than {queue}: those are used");
+            open(SMALL_QUEUE)
+        }
+        made => made,
+    };
+    let opened = opened.map_err(|error| service_error(&full_name, error))?;
     let port = opened
         .publisher_builder()
         .backpressure_strategy(BackpressureStrategy::DiscardData)
