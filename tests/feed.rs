@@ -12,8 +12,8 @@ use bench_dragon::show::{Playback, Show};
 use bench_dragon::subscribers::connection::Wake;
 use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
 use bench_dragon::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
-use bench_dragon::wire::FrameHeader;
 use bench_dragon::wire::convert::stage;
+use bench_dragon::wire::{FrameHeader, Stage};
 use nix::sys::signal::Signal::SIGKILL;
 use processes::{Process, program, summary, unique, wait};
 
@@ -154,25 +154,29 @@ fn the_newest_frame_is_one_a_poll_and_the_rest_is_counted() {
     drop(publisher);
 }
 
+fn opened(name: &str, scene: &Scene, cues: usize, stage: Stage) -> SharedMemoryPublisher {
+    let config = PublisherConfig {
+        name: name.to_owned(),
+        handles: scene.team().handles(),
+        single_precision: None,
+        queue: 64,
+        subscribers: 2,
+        alerts: false,
+        cues,
+        stage,
+    };
+    SharedMemoryPublisher::open(&config).unwrap()
+}
+
 /// Whoever keeps the services of a scene with few cues open is in the way of no scene with more.
 #[test]
 fn a_scene_with_more_cues_finds_its_services_open() {
     let scene = Scene::paper();
     let show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
     let name = unique("more_cues");
-    let [_few, _more] = [3, 40].map(|cues| {
-        let config = PublisherConfig {
-            name: name.clone(),
-            handles: scene.team().handles(),
-            single_precision: None,
-            queue: 64,
-            subscribers: 2,
-            alerts: false,
-            cues,
-            stage: stage(cues as u64, 0, [0; 32], &scene.motion, &show),
-        };
-        SharedMemoryPublisher::open(&config).unwrap()
-    });
+    let open = |cues| opened(&name, &scene, cues, stage(cues as u64, 0, [0; 32], &scene.motion, &show));
+    let _few = open(3);
+    let _more = open(40);
 }
 
 /// Of two publishers the one that sends no frames was there first, and has a stage: nothing is taken for the show's before
@@ -183,20 +187,7 @@ fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {
     let mut show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
     let name = unique("beside");
     let stages = [7, 8].map(|run_id| stage(run_id, 0, [0; 32], &scene.motion, &show));
-    let open = |stage| {
-        let config = PublisherConfig {
-            name: name.clone(),
-            handles: scene.team().handles(),
-            single_precision: None,
-            queue: 64,
-            subscribers: 2,
-            alerts: false,
-            cues: 0,
-            stage,
-        };
-        SharedMemoryPublisher::open(&config).unwrap()
-    };
-    let [mut bystander, mut sender] = stages.map(open);
+    let [mut bystander, mut sender] = stages.map(|stage| opened(&name, &scene, 0, stage));
     let mut feed = Feed::new(&name, FeedOptions { wake: Wake::Never, frames: Frames::All }).unwrap();
     let mut runs = Vec::new();
     let mut poll = |runs: &mut Vec<(&'static str, u64)>| {
