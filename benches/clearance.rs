@@ -3,15 +3,15 @@
 //! Every case averages over a run of consecutive frames at one place of the show. On the paper's spiral it is given in
 //! hundredths of the head's way to the contact (of the way that leaves it 4 m from the centre, for longer teams).
 
-use bench_dragon::model::Point;
-use bench_dragon::model::curve::Side;
-use bench_dragon::model::path::Path;
-use bench_dragon::model::separation::{separation_board_board, signed_distance_board_board};
-use bench_dragon::model::team::Team;
 use bench_dragon::motion::clearance::{ClearanceMonitor, board, least_clearance_all_pairs};
-use bench_dragon::solve::newton::Newton;
-use bench_dragon::solve::table::FollowerTable;
-use bench_dragon::solve::{Chain, Velocities};
+use bench_dragon::motion::model::Point;
+use bench_dragon::motion::model::curve::Side;
+use bench_dragon::motion::model::path::Path;
+use bench_dragon::motion::model::separation::{separation_board_board, signed_distance_board_board};
+use bench_dragon::motion::model::team::Team;
+use bench_dragon::motion::solve::newton::Newton;
+use bench_dragon::motion::solve::table::FollowerTable;
+use bench_dragon::motion::solve::{Chain, Velocities};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use parry2d_f64::math::Pose;

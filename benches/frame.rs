@@ -6,20 +6,20 @@
 
 use std::f64::consts::TAU;
 
-use bench_dragon::live::{Outgoing, Publisher};
-use bench_dragon::model::path::Path;
-use bench_dragon::model::team::Team;
+use bench_dragon::messages::FrameHeader;
+use bench_dragon::motion::model::path::Path;
+use bench_dragon::motion::model::team::Team;
+use bench_dragon::motion::solve::newton::Newton;
+use bench_dragon::motion::solve::paper::{Paper, PaperRules};
+use bench_dragon::motion::solve::selection;
+use bench_dragon::motion::solve::table::{FollowerTable, Instructions};
+use bench_dragon::motion::solve::{Chain, Solver, Velocities};
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::scene::{AtEnd, Scene};
+use bench_dragon::publisher::live::{Outgoing, Publisher};
+use bench_dragon::publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
+use bench_dragon::show::convert::stage;
+use bench_dragon::show::scene::{AtEnd, Scene};
 use bench_dragon::show::{Playback, Show};
-use bench_dragon::solve::newton::Newton;
-use bench_dragon::solve::paper::{Paper, PaperRules};
-use bench_dragon::solve::selection;
-use bench_dragon::solve::table::{FollowerTable, Instructions};
-use bench_dragon::solve::{Chain, Solver, Velocities};
-use bench_dragon::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
-use bench_dragon::wire::FrameHeader;
-use bench_dragon::wire::convert::stage;
 use divan::Bencher;
 use divan::counter::ItemsCount;
 
@@ -55,7 +55,7 @@ fn newton_cold(bencher: Bencher, rate: f64) {
 /// A spiral scene as the show plays it, including what it costs to distinguish the path's kind.
 #[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
 fn scene_on_a_spiral(bencher: Bencher, rate: f64) {
-    let scene = bench_dragon::scene::Scene::paper();
+    let scene = bench_dragon::show::scene::Scene::paper();
     play(bencher, scene.motion.solver(scene.velocities).solver.as_mut(), 224, rate);
 }
 

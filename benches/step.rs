@@ -13,17 +13,18 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use bench_dragon::live::control::{Door, Doors, door};
-use bench_dragon::live::{Outgoing, Publisher};
-use bench_dragon::recording::arithmetic::Arithmetic;
-use bench_dragon::recording::lines::ShowLine;
-use bench_dragon::recording::log;
-use bench_dragon::scene::{Scene, SceneText};
+use bench_dragon::client::connection::{Connection, Subscription, Wake};
+use bench_dragon::client::shared_memory::{node, service_name};
+use bench_dragon::messages::{FrameHeader, HandlePose};
+use bench_dragon::publisher::live::control::{Door, Doors, door};
+use bench_dragon::publisher::live::{Outgoing, Publisher};
+use bench_dragon::publisher::log;
+use bench_dragon::publisher::log::arithmetic::Arithmetic;
+use bench_dragon::publisher::log::lines::ShowLine;
+use bench_dragon::publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
+use bench_dragon::show::convert::{Stamps, frame_header, handle_pose, stage};
+use bench_dragon::show::scene::{Scene, SceneText};
 use bench_dragon::show::{Playback, Show};
-use bench_dragon::subscribers::connection::{Connection, Subscription, Wake};
-use bench_dragon::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher, node, service_name};
-use bench_dragon::wire::convert::{Stamps, frame_header, handle_pose, stage};
-use bench_dragon::wire::{FrameHeader, HandlePose};
 
 const SIZES: [usize; 4] = [223, 5_000, 100_000, 1_000_000];
 /// Where the show begins, simulated seconds; it plays at 60 Hz from there.

@@ -4,9 +4,9 @@
 
 use std::time::Duration;
 
-use bench_dragon::show::control::{Code, Command};
-use bench_dragon::show::state::PlaybackState;
-use bench_dragon::subscribers::control::Controller;
+use bench_dragon::client::control::Controller;
+use bench_dragon::messages::control::{Code, Command};
+use bench_dragon::messages::state::PlaybackState;
 use iceoryx2::prelude::{LogLevel, set_log_level};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -5,10 +5,10 @@
 
 use std::time::Instant;
 
+use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
-use bench_dragon::motion::event::EventKind;
-use bench_dragon::scene::Scene;
-use bench_dragon::solve::Chain;
+use bench_dragon::motion::solve::Chain;
+use bench_dragon::show::scene::Scene;
 
 fn main() {
     let scene = Scene::paper();

@@ -4,7 +4,7 @@
 
 use std::time::{Duration, Instant};
 
-use bench_dragon::wire::{FrameHeader, HandlePose};
+use bench_dragon::messages::{FrameHeader, HandlePose};
 use iceoryx2::prelude::*;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

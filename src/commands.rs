@@ -38,11 +38,11 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anstyle::AnsiColor;
+use bench_dragon::messages::sentence::rounded;
+use bench_dragon::messages::state::Severity;
 use bench_dragon::motion::Method;
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::scene::{Scene, SceneError, SceneText};
-use bench_dragon::show::state::Severity;
-use bench_dragon::wire::sentence::rounded;
+use bench_dragon::show::scene::{Scene, SceneError, SceneText};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 

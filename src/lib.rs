@@ -1,48 +1,51 @@
 //! A bench dragon, live: where every handle of a coiling chain of benches is, published at a fixed rate.
 //!
-//! Data flows one way, and each module uses only those above it in this list:
+//! This library is the crates of the workspace under one name. Without the feature `cli` it is [`messages`] and [`client`]:
+//! all that a subscriber compiles. `ARCHITECTURE.md` draws how the crates depend on each other.
 //!
-//! - [`model`]: curves and the path made of them, the board, the separation of two boards. Pure functions.
-//! - [`linkage`]: links on a path: the follower and how a link lies.
-//! - [`solve`]: from the head's travel to the state of every handle; several solvers behind one interface.
-//! - [`motion`]: a team on a path: its solver, its events, its clearance.
-//! - [`scene`]: the file a user writes, checked and turned into the types above.
-//! - [`show`]: from a scene and a tick to one frame, deterministic.
-//! - [`certify`]: events and speeds with a proof; of events, as a certificate that other code can check.
-//! - [`plan`]: the least pitch and the greatest speed, for a choreographer.
-//! - [`wire`]: the memory layouts that go over the wire, and every conversion to them.
-//! - `ros2_messages` (features `cli`, `jazzy`, `humble`): the messages of ROS 2, on its network and in recordings.
-//! - `drawing` (feature `cli`): a moment of a motion as an SVG, and the colours of all pictures.
-//! - [`live`]: the fixed-rate loop, its clock, its statistics.
-//! - [`transports`]: iceoryx2 shared memory and ROS 2 topics, as publishers of the loop.
-//! - `recording` (feature `cli`): the log of a run, the proof that it can be played again, and every message as MCAP.
-//! - [`subscribers`]: the feed of a publisher's messages, the terminal monitor, the stage picture, the soak test; no solver.
-//! - `proof` (feature `cli`): the checker of certificates of events; it uses none of the others.
-//! - [`trade`]: accuracy against cost, measured for every solver on a scene and this machine.
+//! - [`messages`]: layouts, states, commands and JSON of what a publisher and its subscribers exchange.
+//! - [`client`]: follow, interpolate and command a running publisher.
+//!
+//! With the feature `cli`:
+//!
+//! - `motion`: the path, the solvers, the events, the clearance. Pure.
+//! - `show`: the scene file, checked, and its frames by tick. Deterministic.
+//! - `certify`: events, clearances and speeds with a proof; the plans of a choreographer.
+//! - `proof`: the checker of certificates. It depends on no other crate of this workspace.
+//! - `publisher`: the fixed-rate loop, its shared memory, its log.
+//! - `ros2_messages`, `ros2`: the messages of ROS 2, and its topics and services.
+//! - `recording`: MCAP recordings, their replay, and the verification of logs.
+//! - `outputs`: the stage page, PosiStageNet, OSC, metrics.
+//! - `soak`, `trade`, `drawing`: the soak test, the measurements of accuracy against cost, the pictures.
 
 #![deny(missing_docs)]
 
 #[cfg(all(feature = "jazzy", feature = "humble"))]
 compile_error!("choose one ROS 2 distribution: `--no-default-features --features cli,humble` for Humble");
 
-pub mod certify;
 #[cfg(feature = "cli")]
-pub mod drawing;
-pub mod linkage;
-pub mod live;
-pub mod model;
-pub mod motion;
-pub mod plan;
+pub use bench_dragon_certify as certify;
+pub use bench_dragon_client as client;
 #[cfg(feature = "cli")]
-pub mod proof;
+pub use bench_dragon_drawing as drawing;
+pub use bench_dragon_messages as messages;
 #[cfg(feature = "cli")]
-pub mod recording;
-#[cfg(any(feature = "cli", feature = "ros2"))]
-pub mod ros2_messages;
-pub mod scene;
-pub mod show;
-pub mod solve;
-pub mod subscribers;
-pub mod trade;
-pub mod transports;
-pub mod wire;
+pub use bench_dragon_motion as motion;
+#[cfg(feature = "cli")]
+pub use bench_dragon_outputs as outputs;
+#[cfg(feature = "cli")]
+pub use bench_dragon_proof as proof;
+#[cfg(feature = "cli")]
+pub use bench_dragon_publisher as publisher;
+#[cfg(feature = "cli")]
+pub use bench_dragon_recording as recording;
+#[cfg(feature = "ros2")]
+pub use bench_dragon_ros2 as ros2;
+#[cfg(feature = "cli")]
+pub use bench_dragon_ros2_messages as ros2_messages;
+#[cfg(feature = "cli")]
+pub use bench_dragon_show as show;
+#[cfg(feature = "cli")]
+pub use bench_dragon_soak as soak;
+#[cfg(feature = "cli")]
+pub use bench_dragon_trade as trade;

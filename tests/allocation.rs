@@ -8,20 +8,20 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use bench_dragon::live::clock::SystemClock;
-use bench_dragon::live::control::{Doors, door};
-use bench_dragon::live::statistics::queues;
-use bench_dragon::live::{Frames, LoopOptions, Period, run_loop};
-use bench_dragon::recording;
-use bench_dragon::recording::arithmetic::Arithmetic;
-use bench_dragon::recording::lines::ShowLine;
-use bench_dragon::scene::{AtEnd, Scene, SceneText, SinglePrecision};
-use bench_dragon::show::control::Command;
-use bench_dragon::show::state::FrameState;
+use bench_dragon::client::clock::SystemClock;
+use bench_dragon::client::connection::{Subscription, Wake};
+use bench_dragon::messages::control::Command;
+use bench_dragon::messages::state::FrameState;
+use bench_dragon::publisher::live::control::{Doors, door};
+use bench_dragon::publisher::live::statistics::queues;
+use bench_dragon::publisher::live::{Frames, LoopOptions, Period, run_loop};
+use bench_dragon::publisher::log;
+use bench_dragon::publisher::log::arithmetic::Arithmetic;
+use bench_dragon::publisher::log::lines::ShowLine;
+use bench_dragon::publisher::transports::{self, TransportConfig};
+use bench_dragon::show::convert::stage;
+use bench_dragon::show::scene::{AtEnd, Scene, SceneText, SinglePrecision};
 use bench_dragon::show::{Outcome, Playback, Show};
-use bench_dragon::subscribers::connection::{Subscription, Wake};
-use bench_dragon::transports::{self, TransportConfig};
-use bench_dragon::wire::convert::stage;
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
@@ -108,19 +108,19 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     let show = Show::new(&scene, timeline, playback).unwrap();
     let name = format!("test_{}_allocation", std::process::id());
     let config = TransportConfig::of(&name, &scene, 500.0, stage(1, 0, [0; 32], &scene.motion, &show));
-    let mut transports = transports::open(&config).unwrap();
+    let mut transports = transports::open(&config, &[transports::iceoryx2::open]).unwrap();
     #[cfg(feature = "ros2")]
     {
-        use bench_dragon::scene::ros2::Ros2Settings;
-        use bench_dragon::transports::ros2::environment::{Network, Range};
-        use bench_dragon::transports::ros2::open_on;
+        use bench_dragon::ros2::environment::{Network, Range};
+        use bench_dragon::ros2::open_on;
+        use bench_dragon::ros2_messages::settings::Ros2Settings;
         let settings = Ros2Settings { rate: Some(100.0), ..Ros2Settings::default() };
         let network = Network { domain: 93, range: Range::Localhost };
         transports.push(open_on(network, None, &config, &settings).unwrap());
     }
     let folder = tempfile::tempdir().unwrap();
     let line = ShowLine::new(&SceneText::paper(), &playback, Arithmetic::of(&scene), "", (1, 2));
-    transports.push(recording::log::open(&folder.path().join("log"), line, scene.team().handles()).unwrap().0);
+    transports.push(log::open(&folder.path().join("log"), line, scene.team().handles()).unwrap().0);
     let mut publishers: Vec<_> = transports.iter_mut().map(|transport| transport.publisher().unwrap()).collect();
     let subscription = Subscription::new(&name, Wake::OnFrame).unwrap();
     let connection = subscription.connect().unwrap().unwrap();

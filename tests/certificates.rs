@@ -19,9 +19,9 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bench_dragon::certify::{MOST_STEPS, Outcome, Status, certify};
-use bench_dragon::motion::event::EventKind;
+use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::scene::Scene;
+use bench_dragon::show::scene::Scene;
 
 const KINDS: [EventKind; 4] = [EventKind::Contact, EventKind::Stall, EventKind::Lock, EventKind::PathEnd];
 
@@ -178,7 +178,7 @@ fn boards_that_pass_within_micrometres_are_told_from_boards_that_touch() {
     // pass, and touch further in.
     const REACH: f64 = 2.0;
     let team = *Scene::paper().team();
-    let least = bench_dragon::plan::least_pitch(&team, REACH, &mut |_| ()).unwrap().value_lo;
+    let least = bench_dragon::certify::plan::least_pitch(&team, REACH, &mut |_| ()).unwrap().value_lo;
     let contact = |pitch: f64| {
         let scene = pitched(pitch);
         let (outcomes, timeline) = outcomes(&scene, MOST_STEPS);

@@ -5,9 +5,9 @@ mod processes;
 
 use std::time::{Duration, Instant};
 
-use bench_dragon::show::control::Command as Conduct;
-use bench_dragon::subscribers::control::conductor::{Action, Conductor};
-use bench_dragon::subscribers::control::{ControlError, Controller, PendingCommand};
+use bench_dragon::client::control::conductor::{Action, Conductor};
+use bench_dragon::client::control::{ControlError, Controller, PendingCommand};
+use bench_dragon::messages::control::Command as Conduct;
 use nix::sys::signal::Signal;
 use processes::{Process, json_lines, long, program, scene_file, text, unique, wait};
 use serde_json::Value;

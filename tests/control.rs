@@ -6,10 +6,10 @@ mod processes;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use bench_dragon::show::control::{Code, Command as Conduct};
-use bench_dragon::show::state::PlaybackState;
-use bench_dragon::subscribers::control::Controller;
-use bench_dragon::wire::ControlResponse;
+use bench_dragon::client::control::Controller;
+use bench_dragon::messages::ControlResponse;
+use bench_dragon::messages::control::{Code, Command as Conduct};
+use bench_dragon::messages::state::PlaybackState;
 use processes::{
     LONG_QUEUE, Place, Process, can_run, example, json_lines, program, python, python_modules, root, scene_file,
     summary, text, unique, wait,

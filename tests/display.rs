@@ -1,8 +1,8 @@
 //! The error at the moment of display against figures that an independent program measured.
 
 use bench_dragon::motion::Method;
-use bench_dragon::scene::Scene;
-use bench_dragon::solve::Velocities;
+use bench_dragon::motion::solve::Velocities;
+use bench_dragon::show::scene::Scene;
 use bench_dragon::trade::display::{Display, DisplayMeasurement, Precision, RATES, Reader, measure};
 
 /// The paper's scene by the safe solver, which needs no table.

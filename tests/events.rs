@@ -1,10 +1,10 @@
 //! Events against figures computed with 50 digits. `tests/oracle` compares them with brute force on random scenes.
 
+use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
-use bench_dragon::motion::event::EventKind;
-use bench_dragon::scene::Scene;
-use bench_dragon::solve::newton::Newton;
-use bench_dragon::solve::{Chain, Velocities};
+use bench_dragon::motion::solve::newton::Newton;
+use bench_dragon::motion::solve::{Chain, Velocities};
+use bench_dragon::show::scene::Scene;
 
 fn scene(text: &str) -> Scene {
     Scene::parse(text, "test", "test").unwrap()

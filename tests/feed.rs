@@ -6,14 +6,14 @@ mod processes;
 
 use std::time::{Duration, Instant};
 
-use bench_dragon::live::{Outgoing, Publisher};
-use bench_dragon::scene::Scene;
+use bench_dragon::client::connection::Wake;
+use bench_dragon::client::feed::{Feed, FeedEvent, FeedOptions, Frames};
+use bench_dragon::messages::{FrameHeader, Stage};
+use bench_dragon::publisher::live::{Outgoing, Publisher};
+use bench_dragon::publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
+use bench_dragon::show::convert::stage;
+use bench_dragon::show::scene::Scene;
 use bench_dragon::show::{Playback, Show};
-use bench_dragon::subscribers::connection::Wake;
-use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
-use bench_dragon::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
-use bench_dragon::wire::convert::stage;
-use bench_dragon::wire::{FrameHeader, Stage};
 use nix::sys::signal::Signal::SIGKILL;
 use processes::{Process, program, summary, unique, wait};
 

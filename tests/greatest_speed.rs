@@ -5,13 +5,13 @@
 #[allow(dead_code, reason = "only speeds are compared")]
 mod tables;
 
-use bench_dragon::motion::event::EventKind;
+use bench_dragon::certify::plan::{GreatestSpeed, greatest_speed};
+use bench_dragon::messages::state::EventKind;
+use bench_dragon::motion::solve::newton::Newton;
+use bench_dragon::motion::solve::reference::Reference;
+use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::plan::{GreatestSpeed, greatest_speed};
-use bench_dragon::scene::Scene;
-use bench_dragon::solve::newton::Newton;
-use bench_dragon::solve::reference::Reference;
-use bench_dragon::solve::{Chain, Velocities};
+use bench_dragon::show::scene::Scene;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;

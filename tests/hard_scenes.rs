@@ -5,19 +5,19 @@ mod processes;
 
 use std::process::Command;
 
-use bench_dragon::model::Point;
-use bench_dragon::model::curve::Side;
-use bench_dragon::model::description::{PathDescription, RouteStep};
-use bench_dragon::model::team::Team;
+use bench_dragon::certify::plan::{greatest_speed, least_pitch};
+use bench_dragon::messages::state::EventKind::{self, Contact, Lock, PathEnd, Stall};
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
-use bench_dragon::motion::event::EventKind::{self, Contact, Lock, PathEnd, Stall};
+use bench_dragon::motion::model::Point;
+use bench_dragon::motion::model::curve::Side;
+use bench_dragon::motion::model::description::{PathDescription, RouteStep};
+use bench_dragon::motion::model::team::Team;
+use bench_dragon::motion::solve::newton::Newton;
+use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::motion::{Method, Motion};
-use bench_dragon::plan::{greatest_speed, least_pitch};
-use bench_dragon::scene::Scene;
+use bench_dragon::show::scene::Scene;
 use bench_dragon::show::{Playback, Show};
-use bench_dragon::solve::newton::Newton;
-use bench_dragon::solve::{Chain, Velocities};
 use processes::{Process, aloud};
 
 fn scene(name: &str) -> Scene {

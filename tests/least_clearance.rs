@@ -14,9 +14,9 @@ mod links;
 #[allow(dead_code, reason = "some families are enough")]
 mod scenes;
 
+use bench_dragon::certify::plan::{LeastPitch, Overlap, least_pitch};
 use bench_dragon::certify::{ClearanceEnclosure, enclose_least_clearance};
-use bench_dragon::plan::{LeastPitch, Overlap, least_pitch};
-use bench_dragon::scene::Scene;
+use bench_dragon::show::scene::Scene;
 use parry2d_f64::math::Pose as At;
 use parry2d_f64::query;
 use parry2d_f64::shape::Cuboid;
@@ -140,9 +140,10 @@ fn least_pitch_compared(text: &str, radius: f64) -> LeastPitch {
         scene["team"].as_table_mut().unwrap().insert("benches".into(), benches.into());
         let text = toml::to_string(&scene).unwrap();
         let (team, path) = scenes::read(&text);
-        let along = bench_dragon::model::path::Path::spiral(pitch, turns);
-        let travelled =
-            |radius: f64| along.length() - bench_dragon::model::path::Path::spiral(pitch, radius / pitch).length();
+        let along = bench_dragon::motion::model::path::Path::spiral(pitch, turns);
+        let travelled = |radius: f64| {
+            along.length() - bench_dragon::motion::model::path::Path::spiral(pitch, radius / pitch).length()
+        };
         let chain = chain::Chain::new(&path, &team);
         if sampled {
             let end = travelled(radius);
@@ -190,7 +191,7 @@ fn least_pitches_of_other_teams_and_radii_are_those_of_the_brute_force() {
 #[test]
 fn a_link_that_locks_with_any_less_is_proved_too() {
     // The head's link is more than twice the radius.
-    let team = bench_dragon::model::team::Team {
+    let team = bench_dragon::motion::model::team::Team {
         benches: 8,
         head_length: 0.542,
         body_length: 0.33,

@@ -3,8 +3,8 @@
 
 mod processes;
 
-use bench_dragon::transports::iceoryx2::{node, service_name};
-use bench_dragon::wire::{FrameHeader, HandlePose32, LoopStatus};
+use bench_dragon::client::shared_memory::{node, service_name};
+use bench_dragon::messages::{FrameHeader, HandlePose32, LoopStatus};
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use processes::{
     Process, can_run, json_lines, program, python, python_modules, scene_file, summary, text, unique, wait,

@@ -9,8 +9,8 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use bench_dragon::transports::iceoryx2::{node, service_name};
-use bench_dragon::wire::{FrameHeader, HandlePose, LoopStatus};
+use bench_dragon::client::shared_memory::{node, service_name};
+use bench_dragon::messages::{FrameHeader, HandlePose, LoopStatus};
 use iceoryx2::prelude::ZeroCopySend;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use nix::sys::signal::Signal::{SIGINT, SIGTERM};

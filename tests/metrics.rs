@@ -9,9 +9,9 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
 
-use bench_dragon::subscribers::connection::Wake;
-use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
-use bench_dragon::wire::LoopStatus;
+use bench_dragon::client::connection::Wake;
+use bench_dragon::client::feed::{Feed, FeedEvent, FeedOptions, Frames};
+use bench_dragon::messages::LoopStatus;
 use nix::sys::signal::Signal;
 use processes::{
     Process, can_run, http_get, http_get_as, program, python, python_modules, scene_file, summary, text, unique, wait,
@@ -209,7 +209,7 @@ fn a_foreign_name_for_this_machine_is_answered_nothing() {
 #[test]
 fn the_dashboard_shows_what_is_served() {
     let dashboard: Value = serde_json::from_str(include_str!("../docs/grafana/bench-dragon.json")).unwrap();
-    let families = include_str!("../src/subscribers/metrics/families.rs");
+    let families = include_str!("../crates/outputs/src/metrics/families.rs");
     let mut expressions = 0;
     for panel in dashboard["panels"].as_array().unwrap() {
         for target in panel["targets"].as_array().into_iter().flatten() {

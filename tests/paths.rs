@@ -1,18 +1,18 @@
 //! Turnarounds and routes: events, least clearance and plans against dense sampling of all pairs, and what a live
 //! subscriber relies on at the junctions.
 
-use bench_dragon::linkage::follower;
-use bench_dragon::model::path::Path;
-use bench_dragon::model::team::Team;
+use bench_dragon::certify::plan::{greatest_speed, least_pitch};
+use bench_dragon::messages::state::EventKind;
+use bench_dragon::messages::state::FrameState;
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
-use bench_dragon::motion::event::EventKind;
+use bench_dragon::motion::linkage::follower;
+use bench_dragon::motion::model::path::Path;
+use bench_dragon::motion::model::team::Team;
+use bench_dragon::motion::solve::newton::Newton;
+use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::plan::{greatest_speed, least_pitch};
-use bench_dragon::scene::Scene;
-use bench_dragon::show::state::FrameState;
+use bench_dragon::show::scene::Scene;
 use bench_dragon::show::{Playback, Show};
-use bench_dragon::solve::newton::Newton;
-use bench_dragon::solve::{Chain, Velocities};
 use proptest::prelude::*;
 
 fn scene(path: &str, benches: usize) -> Scene {

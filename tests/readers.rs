@@ -4,8 +4,8 @@
 mod processes;
 
 use bench_dragon::motion::Method;
-use bench_dragon::scene::Scene;
-use bench_dragon::solve::{Chain, Velocities};
+use bench_dragon::motion::solve::{Chain, Velocities};
+use bench_dragon::show::scene::Scene;
 use processes::{Process, can_run, json_lines, program, python, python_modules, text, unique};
 use serde_json::Value;
 

@@ -2,13 +2,13 @@
 
 use std::f64::consts::{PI, TAU};
 
-use bench_dragon::model::description::PathDescription;
+use bench_dragon::messages::{SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, Stage};
 use bench_dragon::motion::Method;
-use bench_dragon::scene::{AtEnd, OnContact, Scene};
+use bench_dragon::motion::model::description::PathDescription;
+use bench_dragon::motion::solve::Velocities;
+use bench_dragon::show::convert::stage;
+use bench_dragon::show::scene::{AtEnd, OnContact, Scene};
 use bench_dragon::show::{Playback, Show};
-use bench_dragon::solve::Velocities;
-use bench_dragon::wire::convert::stage;
-use bench_dragon::wire::{SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, Stage};
 
 const TEAM: &str =
     "[team]\nbenches = 20\nhead_length = 3.41\nbody_length = 2.2\nwidth = 0.3\nhole_inset = 0.275\n[path]\n";

@@ -7,8 +7,8 @@ use std::net::UdpSocket;
 use std::time::{Duration, Instant};
 
 use bench_dragon::motion::Method;
-use bench_dragon::scene::Scene;
-use bench_dragon::solve::{Chain, Velocities};
+use bench_dragon::motion::solve::{Chain, Velocities};
+use bench_dragon::show::scene::Scene;
 use nix::sys::signal::Signal;
 use processes::{
     Lines, Process, can_run, long, program, python, python_modules, scene_file, summary, text, unique, wait,

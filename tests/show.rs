@@ -1,15 +1,15 @@
 //! The show: deterministic, without drift, frozen and looped as the scene states, and with levels that do not depend on
 //! how often it is looked at.
 
+use bench_dragon::messages::state::EventKind;
+use bench_dragon::messages::state::{FrameState, Level, PlaybackState};
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
-use bench_dragon::motion::event::EventKind;
+use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::scene::{AtEnd, OnContact, Scene};
 use bench_dragon::show::alerts::Alert;
-use bench_dragon::show::state::{FrameState, Level, PlaybackState};
+use bench_dragon::show::convert::{Stamps, frame_header};
+use bench_dragon::show::scene::{AtEnd, OnContact, Scene};
 use bench_dragon::show::{Playback, Show};
-use bench_dragon::solve::{Chain, Velocities};
-use bench_dragon::wire::convert::{Stamps, frame_header};
 use proptest::prelude::*;
 
 fn paper_timeline() -> Timeline {

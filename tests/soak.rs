@@ -7,9 +7,9 @@ mod processes;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use bench_dragon::subscribers::connection::Wake;
-use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
-use bench_dragon::wire::LoopStatus;
+use bench_dragon::client::connection::Wake;
+use bench_dragon::client::feed::{Feed, FeedEvent, FeedOptions, Frames};
+use bench_dragon::messages::LoopStatus;
 use nix::sys::signal::Signal::{SIGINT, SIGKILL, SIGTERM};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;

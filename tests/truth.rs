@@ -3,10 +3,10 @@
 #[path = "truth/tables.rs"]
 mod tables;
 
-use bench_dragon::model::path::Path;
-use bench_dragon::model::team::Team;
-use bench_dragon::solve::paper::{Paper, PaperRules};
-use bench_dragon::solve::{Chain, Solver, Velocities};
+use bench_dragon::motion::model::path::Path;
+use bench_dragon::motion::model::team::Team;
+use bench_dragon::motion::solve::paper::{Paper, PaperRules};
+use bench_dragon::motion::solve::{Chain, Solver, Velocities};
 use tables::{Row, table};
 
 fn paper_team() -> Team {

@@ -10,7 +10,7 @@ use std::net::TcpStream;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use bench_dragon::live::clock::monotonic_ns;
+use bench_dragon::client::clock::monotonic_ns;
 use nix::sys::signal::Signal;
 use processes::{Process, can_run, chromium, long, program, python, python_modules, text, unique, wait};
 use serde_json::Value;

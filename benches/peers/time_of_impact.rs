@@ -5,10 +5,10 @@
 
 use std::time::{Duration, Instant};
 
+use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::clearance::board;
-use bench_dragon::motion::event::EventKind;
-use bench_dragon::scene::Scene;
-use bench_dragon::solve::{Chain, Solver};
+use bench_dragon::motion::solve::{Chain, Solver};
+use bench_dragon::show::scene::Scene;
 use parry2d_f64::bounding_volume::{Aabb, BoundingVolume};
 use parry2d_f64::math::Pose;
 use parry2d_f64::query::{NonlinearRigidMotion, ShapeCastOptions, cast_shapes, cast_shapes_nonlinear};

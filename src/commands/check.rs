@@ -5,13 +5,13 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use bench_dragon::certify::{ClearanceEnclosure, MOST_CLEARANCE_STEPS, enclose_least_clearance};
-use bench_dragon::model::path::{OutlineKind, SegmentOutline};
-use bench_dragon::model::spiral::Direction;
+use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::Motion;
-use bench_dragon::motion::event::EventKind;
+use bench_dragon::motion::model::path::{OutlineKind, SegmentOutline};
+use bench_dragon::motion::model::spiral::Direction;
+use bench_dragon::motion::solve::Velocities;
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent};
-use bench_dragon::scene::{AtEnd, OnContact, Scene};
-use bench_dragon::solve::Velocities;
+use bench_dragon::show::scene::{AtEnd, OnContact, Scene};
 use serde::Serialize;
 
 use super::events::{find_least_clearance, least_clearance, sentence};

@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use bench_dragon::show::control::{Code, Command};
-use bench_dragon::show::state::PlaybackState;
-use bench_dragon::subscribers::control::conductor::Action as Conducting;
-use bench_dragon::subscribers::control::{ControlError, Controller, refusal, standing};
-use bench_dragon::wire::ControlResponse;
+use bench_dragon::client::control::conductor::Action as Conducting;
+use bench_dragon::client::control::{ControlError, Controller, refusal, standing};
+use bench_dragon::messages::ControlResponse;
+use bench_dragon::messages::control::{Code, Command};
+use bench_dragon::messages::state::PlaybackState;
 use serde::Serialize;
 
 use super::{CommandError, Common, Output};

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use bench_dragon::drawing::{Drawing, Extent, Framing, Length, Look, Surroundings, Theme};
-use bench_dragon::model::Point;
+use bench_dragon::motion::model::Point;
+use bench_dragon::motion::solve::{Chain, Solver, Velocities};
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::scene::Scene;
+use bench_dragon::show::scene::Scene;
 use bench_dragon::show::solve_at_or_just_before;
-use bench_dragon::solve::{Chain, Solver, Velocities};
 use serde::Serialize;
 
 use super::solve::time_of;

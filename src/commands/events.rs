@@ -4,9 +4,9 @@ use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use bench_dragon::certify::{self, CertifyError, MOST_STEPS, Outcome, Status};
-use bench_dragon::motion::event::EventKind;
+use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
-use bench_dragon::scene::Scene;
+use bench_dragon::show::scene::Scene;
 use serde::Serialize;
 
 use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar, search_timeline};
@@ -183,5 +183,5 @@ pub fn least_clearance(scene: &Scene, found: Option<TimedClearance>) -> String {
 
 /// A bench as people call it, counted from 1.
 pub fn bench_name(scene: &Scene, bench: u32) -> String {
-    bench_dragon::wire::sentence::bench_name(bench, scene.team().benches as u32)
+    bench_dragon::messages::sentence::bench_name(bench, scene.team().benches as u32)
 }

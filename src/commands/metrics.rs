@@ -3,7 +3,7 @@
 use std::io::ErrorKind;
 use std::net::{Ipv4Addr, SocketAddr};
 
-use bench_dragon::subscribers::metrics::{MetricsError, serve};
+use bench_dragon::outputs::metrics::{MetricsError, serve};
 use serde::Serialize;
 
 use super::{CommandError, Common, Output, stop_on_signals};

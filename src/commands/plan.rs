@@ -1,7 +1,7 @@
 //! `plan`: answers for a choreographer, with where they are decided.
 
-use bench_dragon::plan::{GreatestSpeed, LeastPitch, Overlap, PlanError, greatest_speed, least_pitch};
-use bench_dragon::scene::Accepted;
+use bench_dragon::certify::plan::{GreatestSpeed, LeastPitch, Overlap, PlanError, greatest_speed, least_pitch};
+use bench_dragon::show::scene::Accepted;
 use serde::Serialize;
 
 use super::events::bench_name;

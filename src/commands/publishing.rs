@@ -10,15 +10,15 @@ use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use anstyle::Style;
-use bench_dragon::live::clock::{SystemClock, realtime_ns};
-use bench_dragon::live::control::{Doors, door};
-use bench_dragon::live::statistics::{self, Inbox, Run, RunSummary, Sample, Summary};
-use bench_dragon::live::{
+use bench_dragon::client::clock::{SystemClock, realtime_ns};
+use bench_dragon::client::shared_memory::OpenError;
+use bench_dragon::messages::sentence::{Figures, alert_sentence, cue_sentence};
+use bench_dragon::publisher::live::control::{Doors, door};
+use bench_dragon::publisher::live::statistics::{self, Inbox, Run, RunSummary, Sample, Summary};
+use bench_dragon::publisher::live::{
     Announcement, Counts, Deliveries, End, Frames, LoopOptions, PublishError, Publisher, run_loop,
 };
-use bench_dragon::transports::iceoryx2::OpenError;
-use bench_dragon::transports::{self, Transport, TransportConfig, TransportError};
-use bench_dragon::wire::sentence::{Figures, alert_sentence, cue_sentence};
+use bench_dragon::publisher::transports::{self, Transport, TransportConfig, TransportError};
 
 use super::lines::Lines;
 use super::realtime_scheduling::RealtimeScheduling;
@@ -32,9 +32,27 @@ pub fn new_run_id() -> u64 {
     RandomState::new().hash_one(realtime_ns())
 }
 
+/// Every transport that this program has.
+const TRANSPORTS: [transports::Open; 2] = [transports::iceoryx2::open, ros2_if_built];
+
+#[cfg(feature = "ros2")]
+use bench_dragon::ros2::open as ros2_if_built;
+
+#[cfg(not(feature = "ros2"))]
+fn ros2_if_built(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError> {
+    match config.ros2 {
+        None => Ok(None),
+        Some(_) => Err(TransportError::BadInput(
+            "ROS 2 is requested and this program was built without it: build it with the feature \"jazzy\" or \
+             \"humble\""
+                .to_owned(),
+        )),
+    }
+}
+
 /// The transports, and the loop's ends of those that have a door for commands.
 pub fn open_transports(config: &TransportConfig) -> Result<(Vec<Box<dyn Transport>>, Doors), CommandError> {
-    let mut transports = transports::open(config)?;
+    let mut transports = transports::open(config, &TRANSPORTS)?;
     let mut ports = Vec::new();
     for transport in &mut transports {
         let (port, outer) = door();

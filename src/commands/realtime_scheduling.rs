@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::fs::File;
 
-use bench_dragon::live::realtime;
+use bench_dragon::publisher::live::realtime;
 
 use super::CommandError;
 

@@ -7,16 +7,16 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use bench_dragon::client::connection::Wake;
+use bench_dragon::client::feed::{Feed, FeedEvent, FeedOptions, Frames};
+use bench_dragon::client::polling::Obstacle;
+use bench_dragon::messages::sentence::rounded;
 use bench_dragon::recording::mcap::recorder::{
     Counts, DEFAULT_TOPICS, Recorded, Recorder, RecorderConfig, Split, create,
 };
 use bench_dragon::recording::mcap::recover::{RecoverError, Recovered, check_magic, recover};
-use bench_dragon::scene::ros2::Topic;
-use bench_dragon::subscribers::connection::Wake;
-use bench_dragon::subscribers::feed::{Feed, FeedEvent, FeedOptions, Frames};
-use bench_dragon::subscribers::polling::Obstacle;
-use bench_dragon::subscribers::record::{self, RecordQueue, RecordThread};
-use bench_dragon::wire::sentence::rounded;
+use bench_dragon::recording::record::{self, RecordQueue, RecordThread};
+use bench_dragon::ros2_messages::settings::Topic;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 

@@ -3,16 +3,16 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use bench_dragon::live::End;
-use bench_dragon::live::clock::realtime_ns;
+use bench_dragon::client::clock::realtime_ns;
+use bench_dragon::client::shared_memory::service_name;
+use bench_dragon::messages::Stage;
+use bench_dragon::messages::sentence::rounded;
+use bench_dragon::publisher::live::End;
+use bench_dragon::publisher::transports::{Transport, TransportConfig};
 use bench_dragon::recording::mcap::reader::ReadError;
 use bench_dragon::recording::replay::{Pace, Prepared, ReplayOptions};
-use bench_dragon::scene::ros2::Topic;
-use bench_dragon::scene::{Accepted, Scene};
-use bench_dragon::transports::iceoryx2::service_name;
-use bench_dragon::transports::{Transport, TransportConfig};
-use bench_dragon::wire::Stage;
-use bench_dragon::wire::sentence::rounded;
+use bench_dragon::ros2_messages::settings::Topic;
+use bench_dragon::show::scene::{Accepted, Scene};
 use jiff::{Timestamp, Unit};
 
 use super::publishing::{Hooks, Publishing, new_run_id, open_transports};

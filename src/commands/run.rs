@@ -4,18 +4,18 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use bench_dragon::live::clock::realtime_ns;
-use bench_dragon::motion::event::EventKind;
+use bench_dragon::client::clock::realtime_ns;
+use bench_dragon::client::shared_memory::service_name;
+use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::recording::arithmetic::Arithmetic;
-use bench_dragon::recording::histograms::HistogramLog;
-use bench_dragon::recording::lines::ShowLine;
-use bench_dragon::recording::log::{self as recording_log, LogOutcome};
-use bench_dragon::scene::{Accepted, AtEnd, Scene, SceneText};
+use bench_dragon::publisher::log::arithmetic::Arithmetic;
+use bench_dragon::publisher::log::lines::ShowLine;
+use bench_dragon::publisher::log::{self as recording_log, LogOutcome};
+use bench_dragon::publisher::transports::{Transport, TransportConfig};
+use bench_dragon::show::convert;
+use bench_dragon::show::scene::{Accepted, AtEnd, Scene, SceneText};
 use bench_dragon::show::{Playback, ReachedCue, Show};
-use bench_dragon::transports::iceoryx2::service_name;
-use bench_dragon::transports::{Transport, TransportConfig};
-use bench_dragon::wire::convert;
+use bench_dragon::soak::histograms::HistogramLog;
 
 use super::events::sentence;
 use super::publishing::{Hooks, Publishing, new_run_id, open_transports};
@@ -130,7 +130,7 @@ struct RunSession<'a> {
 impl RunSession<'_> {
     /// Opens what is published to, publishes, and prints the summary.
     fn run(&self, mut show: Show, stop: &AtomicBool) -> Result<(), CommandError> {
-        let scene_hash = *blake3::hash(self.text.text.as_bytes()).as_bytes();
+        let scene_hash = bench_dragon::proof::scene_hash(&self.text.text);
         let stage = convert::stage(self.run_id, realtime_ns(), scene_hash, &self.scene.motion, &show);
         let config = TransportConfig::of(self.common.name(), self.scene, self.playback.rate, stage);
         let (mut transports, doors) = open_transports(&config)?;

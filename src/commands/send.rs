@@ -3,16 +3,14 @@
 use std::net::{Ipv4Addr, SocketAddrV4};
 use std::sync::atomic::Ordering;
 
-use bench_dragon::subscribers::feed::Frames;
-use bench_dragon::subscribers::polling::poll_until;
-use bench_dragon::subscribers::send::axes::Axes;
-use bench_dragon::subscribers::send::network::{NetworkError, Outlet, Route, destination};
-use bench_dragon::subscribers::send::osc::Addresses;
-use bench_dragon::subscribers::send::osc_sender::{MOST_RATE, OscSender, OscSenders};
-use bench_dragon::subscribers::send::psn_sender::{
-    Notice, PsnOptions, PsnSender, USUAL_ADDRESS, USUAL_PORT, USUAL_RATE,
-};
-use bench_dragon::subscribers::send::trackers::{Numbers, Selection};
+use bench_dragon::client::feed::Frames;
+use bench_dragon::client::polling::poll_until;
+use bench_dragon::outputs::send::axes::Axes;
+use bench_dragon::outputs::send::network::{NetworkError, Outlet, Route, destination};
+use bench_dragon::outputs::send::osc::Addresses;
+use bench_dragon::outputs::send::osc_sender::{MOST_RATE, OscSender, OscSenders};
+use bench_dragon::outputs::send::psn_sender::{Notice, PsnOptions, PsnSender, USUAL_ADDRESS, USUAL_PORT, USUAL_RATE};
+use bench_dragon::outputs::send::trackers::{Numbers, Selection};
 
 use super::{CommandError, Common, Output, number, stop_on_signals};
 

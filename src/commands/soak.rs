@@ -7,20 +7,20 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use bench_dragon::live::clock::{monotonic_ns, realtime_ns};
-use bench_dragon::scene::Accepted;
-use bench_dragon::subscribers::connection::Wake;
-use bench_dragon::subscribers::feed::{Feed, FeedOptions, Frames};
-use bench_dragon::subscribers::soak::figures;
-use bench_dragon::subscribers::soak::fleet::{Fleet, FleetError};
-use bench_dragon::subscribers::soak::history::History;
-use bench_dragon::subscribers::soak::limits::{Limits, bytes, nanoseconds, share};
-use bench_dragon::subscribers::soak::member::Role;
-use bench_dragon::subscribers::soak::observer::Observer;
-use bench_dragon::subscribers::soak::processes::{ConductPlan, Plan};
-use bench_dragon::subscribers::soak::report::{Machine, Report, SCHEMA, SubscriberReport};
-use bench_dragon::subscribers::soak::verdict::Verdict;
-use bench_dragon::transports::iceoryx2;
+use bench_dragon::client::clock::{monotonic_ns, realtime_ns};
+use bench_dragon::client::connection::Wake;
+use bench_dragon::client::feed::{Feed, FeedOptions, Frames};
+use bench_dragon::client::shared_memory::service_name;
+use bench_dragon::show::scene::Accepted;
+use bench_dragon::soak::figures;
+use bench_dragon::soak::fleet::{Fleet, FleetError};
+use bench_dragon::soak::history::History;
+use bench_dragon::soak::limits::{Limits, bytes, nanoseconds, share};
+use bench_dragon::soak::member::Role;
+use bench_dragon::soak::observer::Observer;
+use bench_dragon::soak::processes::{ConductPlan, Plan};
+use bench_dragon::soak::report::{Machine, Report, SCHEMA, SubscriberReport};
+use bench_dragon::soak::verdict::Verdict;
 use indicatif::ProgressBar;
 use nix::sys::signal::{SigSet, Signal};
 
@@ -177,7 +177,7 @@ fn print(report: &Report, common: &Common) -> Result<(), CommandError> {
 impl SoakArguments {
     fn check(&self, common: &Common) -> Result<(), CommandError> {
         let admitted = common.load_scene()?.subscribers;
-        iceoryx2::service_name(common.name(), "poses")?;
+        service_name(common.name(), "poses")?;
         if let Some(rate) = self.rate {
             Accepted::RATE.check("--rate", rate).map_err(CommandError::BadInput)?;
         }

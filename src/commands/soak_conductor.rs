@@ -4,9 +4,9 @@ use std::io::Write;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use bench_dragon::show::control::Command;
-use bench_dragon::subscribers::soak::conduct::conductor;
-use bench_dragon::subscribers::soak::conduct::model::ShowFacts;
+use bench_dragon::messages::control::Command;
+use bench_dragon::soak::conduct::conductor;
+use bench_dragon::soak::conduct::model::ShowFacts;
 
 use super::soak::Parent;
 use super::{CommandError, Common, stop_on_signals};

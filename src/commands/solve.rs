@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use bench_dragon::motion::event::EventKind;
+use bench_dragon::messages::state::EventKind;
+use bench_dragon::motion::solve::Chain;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::show::solve_at_or_just_before;
-use bench_dragon::solve::Chain;
 use serde::Serialize;
 
 use super::{CommandError, Common, Output, figure, number, progress_bar, search_timeline};

@@ -4,7 +4,7 @@ use std::io::{IsTerminal, stderr};
 use std::path::PathBuf;
 
 use bench_dragon::drawing::palette::{LIGHT, SERIES, channels, with_dark_rules};
-use bench_dragon::scene::Scene;
+use bench_dragon::show::scene::Scene;
 use bench_dragon::trade::display::{self, Display, DisplayMeasurement, Precision, Reader};
 use bench_dragon::trade::{LAST_SECOND_MOMENTS, Measurement, SPREAD_MOMENTS, measure, publisher_frame_ns};
 use plotters::coord::combinators::LogCoord;

@@ -7,7 +7,7 @@ use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::PathBuf;
 
 use bench_dragon::proof;
-use bench_dragon::recording::verify::{self, Verdict, VerifyError};
+use bench_dragon::publisher::log::verify::{self, Verdict, VerifyError};
 
 use super::{CommandError, Common, Output, progress_bar};
 

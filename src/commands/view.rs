@@ -5,10 +5,9 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use bench_dragon::proof::{Proved, Refused};
-use bench_dragon::subscribers::view::{
-    AllowedOrigin, Certificate, Proofs, Ready, ViewError, ViewOptions, hash_of, serve,
-};
+use bench_dragon::messages::hexadecimal;
+use bench_dragon::outputs::view::{AllowedOrigin, Certificate, Proofs, Ready, ViewError, ViewOptions, serve};
+use bench_dragon::proof::{Proved, Refused, scene_hash};
 use serde::Serialize;
 use serde_json::json;
 
@@ -96,7 +95,7 @@ fn report(shown: &str, checked: Result<Proved, Refused>, json: bool) -> Result<(
     let mut output = Output::standard();
     match checked {
         Ok(proved) => {
-            let scene = hash_of(&proved.scene).map(|byte| format!("{byte:02x}")).concat();
+            let scene = hexadecimal(&scene_hash(&proved.scene));
             if json {
                 output
                     .json(&json!({"type": "certificate", "file": shown, "verdict": "proved", "scene_hash": scene}))?;

@@ -2,10 +2,10 @@
 //! their fuzz target.
 
 use bench_dragon::certify::{self, Line};
-use bench_dragon::motion::event::EventKind as Kind;
+use bench_dragon::messages::state::EventKind as Kind;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::proof::{EventKind, Outcome, Status};
-use bench_dragon::scene::Scene;
+use bench_dragon::show::scene::Scene;
 use serde_json::Value;
 
 /// Seconds by which a time of the ordinary search may be beside the true one.

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use bench_dragon::motion::event::EventKind;
-use bench_dragon::plan::{greatest_speed, least_pitch};
+use bench_dragon::certify::plan::{greatest_speed, least_pitch};
+use bench_dragon::messages::state::EventKind;
 use serde_json::Value;
 
 use crate::events::time_of;

@@ -1,6 +1,6 @@
 //! `events` and `check`: every event of every scene, in text and as JSON, with the bits of the library's timeline.
 
-use bench_dragon::motion::event::EventKind;
+use bench_dragon::messages::state::EventKind;
 use serde_json::Value;
 
 use crate::processes::{Process, text};

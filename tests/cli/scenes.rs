@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
-use bench_dragon::scene::Scene;
+use bench_dragon::show::scene::Scene;
 use serde_json::Value;
 
 use crate::processes::{Process, text};

@@ -1,8 +1,8 @@
 //! `solve`: rows, order, bits and refusals on every scene; links and places against the numbers of the scene file.
 
-use bench_dragon::motion::event::EventKind;
+use bench_dragon::messages::state::EventKind;
+use bench_dragon::motion::solve::Chain;
 use bench_dragon::show::solve_at_or_just_before;
-use bench_dragon::solve::Chain;
 
 use crate::events::time_of;
 use crate::outline::{Outline, spiral_length};

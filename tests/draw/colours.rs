@@ -12,7 +12,7 @@ fn properties<'a>(css: &'a str, selector: &str) -> BTreeMap<&'a str, &'a str> {
 
 #[test]
 fn the_colours_are_those_of_the_page() {
-    let css = include_str!("../../src/subscribers/view/style.css");
+    let css = include_str!("../../crates/outputs/src/view/style.css");
     for (palette, selector) in [(LIGHT, ":root"), (DARK, ":root[data-theme=dark]")] {
         let page = properties(css, selector);
         for (name, colour) in palette.named() {

@@ -4,22 +4,22 @@
 use std::hint::black_box;
 
 use bench_dragon::certify::{Line, certify};
-use bench_dragon::live::control::{Door, Doors, door};
-use bench_dragon::live::{Outgoing, Publisher};
+use bench_dragon::client::connection::{Connection, Subscription, Wake};
+use bench_dragon::messages::control::Command;
 use bench_dragon::motion::Method;
 use bench_dragon::motion::clearance::ClearanceMonitor;
+use bench_dragon::motion::solve::selection;
+use bench_dragon::motion::solve::table::{FollowerTable, Instructions};
+use bench_dragon::motion::solve::{Chain, Solver, Velocities};
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::proof;
-use bench_dragon::scene::{Scene, SceneText};
+use bench_dragon::publisher::live::control::{Door, Doors, door};
+use bench_dragon::publisher::live::{Outgoing, Publisher};
+use bench_dragon::publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
 use bench_dragon::show::alerts::LevelTracker;
-use bench_dragon::show::control::Command;
+use bench_dragon::show::convert::{Stamps, frame_header, stage};
+use bench_dragon::show::scene::{Scene, SceneText};
 use bench_dragon::show::{Frame, Playback, Show};
-use bench_dragon::solve::selection;
-use bench_dragon::solve::table::{FollowerTable, Instructions};
-use bench_dragon::solve::{Chain, Solver, Velocities};
-use bench_dragon::subscribers::connection::{Connection, Subscription, Wake};
-use bench_dragon::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
-use bench_dragon::wire::convert::{Stamps, frame_header, stage};
 
 /// What stands before the name of the instructions that tables are read with.
 pub const WITH: &str = "instructions: ";

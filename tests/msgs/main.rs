@@ -24,14 +24,14 @@ use std::collections::BTreeMap;
 use std::process::Command;
 use std::sync::LazyLock;
 
-use bench_dragon::ros2_messages::{HandlePoses, Header, MessageType, Stamped};
-use bench_dragon::scene::ros2::Topic;
-use bench_dragon::show::state::{FrameState, Level, PlaybackState};
-use bench_dragon::wire::{
+use bench_dragon::messages::state::{FrameState, Level, PlaybackState};
+use bench_dragon::messages::{
     CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32, LoopStatus, NO_BENCH,
     SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, Stage, StageCue, StageEvent,
     StageSegment,
 };
+use bench_dragon::ros2_messages::settings::Topic;
+use bench_dragon::ros2_messages::{HandlePoses, Header, MessageType, Stamped};
 use iceoryx2::prelude::ZeroCopySend;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -360,7 +360,7 @@ fn sizes_and_versions_are_those_that_other_programs_rely_on() {
 
 #[test]
 fn viewers_are_set_up_for_topics_that_exist() {
-    use bench_dragon::scene::ros2::Topic;
+    use bench_dragon::ros2_messages::settings::Topic;
     let all = [Topic::Handles, Topic::Poses, Topic::Alerts, Topic::Stage, Topic::Markers, Topic::Status];
     let topics = all.map(|topic| topic.path("bench_dragon"));
     let foxglove = include_str!("../../examples/foxglove/bench_dragon.json");

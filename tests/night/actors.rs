@@ -5,14 +5,14 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
-use bench_dragon::live::StatusPublisher;
-use bench_dragon::live::control::{Door, MOST_WAITING};
-use bench_dragon::live::statistics::Collector;
-use bench_dragon::show::control::Command;
-use bench_dragon::subscribers::feed::liveness::{Change, Liveness};
-use bench_dragon::subscribers::feed::sequence::SequenceTracker;
-use bench_dragon::transports::background::Worker;
-use bench_dragon::wire::LoopStatus;
+use bench_dragon::client::feed::liveness::{Change, Liveness};
+use bench_dragon::client::feed::sequence::SequenceTracker;
+use bench_dragon::messages::LoopStatus;
+use bench_dragon::messages::control::Command;
+use bench_dragon::publisher::live::StatusPublisher;
+use bench_dragon::publisher::live::control::{Door, MOST_WAITING};
+use bench_dragon::publisher::live::statistics::Collector;
+use bench_dragon::publisher::transports::background::Worker;
 
 use crate::behind::{Behind, Network};
 use crate::collected::Collected;
@@ -80,7 +80,7 @@ impl Actor for Background {
 /// The clock as a step sees it that takes no time.
 pub struct Frozen<'a>(pub &'a World);
 
-impl bench_dragon::live::clock::Clock for Frozen<'_> {
+impl bench_dragon::client::clock::Clock for Frozen<'_> {
     fn monotonic_ns(&self) -> u64 {
         self.0.now_ns()
     }

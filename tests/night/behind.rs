@@ -5,9 +5,9 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 use std::time::Duration;
 
-use bench_dragon::live::Deliveries;
-use bench_dragon::transports::background::Sink;
-use bench_dragon::wire::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus};
+use bench_dragon::messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus};
+use bench_dragon::publisher::live::Deliveries;
+use bench_dragon::publisher::transports::background::Sink;
 
 use crate::world::same;
 

@@ -2,9 +2,9 @@
 
 use std::collections::VecDeque;
 
-use bench_dragon::live::Announcement;
-use bench_dragon::live::statistics::{Sample, Summary};
-use bench_dragon::wire::LoopStatus;
+use bench_dragon::messages::LoopStatus;
+use bench_dragon::publisher::live::Announcement;
+use bench_dragon::publisher::live::statistics::{Sample, Summary};
 
 use crate::world::{SECOND_NS, same};
 

@@ -3,8 +3,8 @@
 //! Shares nothing with the show's own clock, which computes each period from the beginning of its stretch, but the
 //! formula of the contract: sim0 + rate * (tick - tick0) / frame rate, a new (sim0, tick0, rate) at each command.
 
-use bench_dragon::show::control::{Code, Command};
-use bench_dragon::show::state::PlaybackState;
+use bench_dragon::messages::control::{Code, Command};
+use bench_dragon::messages::state::PlaybackState;
 
 /// A cue, by the time at which it is.
 #[derive(Clone, Copy)]

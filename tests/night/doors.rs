@@ -3,9 +3,9 @@
 
 use std::collections::VecDeque;
 
-use bench_dragon::live::control::Answer;
+use bench_dragon::messages::control::{Code, Command};
+use bench_dragon::publisher::live::control::Answer;
 use bench_dragon::show::Outcome;
-use bench_dragon::show::control::{Code, Command};
 
 use crate::world::same;
 

@@ -1,7 +1,7 @@
 //! The alerts as the design promises them, from what a subscriber sees of each frame and the list of events.
 
-use bench_dragon::show::state::{Level, PlaybackState};
-use bench_dragon::wire::FrameHeader;
+use bench_dragon::messages::FrameHeader;
+use bench_dragon::messages::state::{Level, PlaybackState};
 
 /// What is said of a scene's alerts.
 #[derive(Clone)]

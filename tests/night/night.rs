@@ -4,12 +4,12 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Instant;
 
-use bench_dragon::live::control::{Door, Doors, door};
-use bench_dragon::live::statistics::{Collector, Run, queues_of};
-use bench_dragon::live::{Counts, End, LoopOptions, Publisher, StatusPublisher, run_loop};
-use bench_dragon::scene::AtEnd;
+use bench_dragon::publisher::live::control::{Door, Doors, door};
+use bench_dragon::publisher::live::statistics::{Collector, Run, queues_of};
+use bench_dragon::publisher::live::{Counts, End, LoopOptions, Publisher, StatusPublisher, run_loop};
+use bench_dragon::publisher::transports::background::{self, BackgroundConfig, Worker};
+use bench_dragon::show::scene::AtEnd;
 use bench_dragon::show::{Playback, Show};
-use bench_dragon::transports::background::{self, BackgroundConfig, Worker};
 
 use crate::actors::{Background, Controller, Frozen, Statistics, Statuses, Stopper, Subscriber, WallClock};
 use crate::behind::{Behind, Network};
@@ -184,7 +184,7 @@ impl Cast {
         let mut last = collector.borrow_mut();
         last.take();
         let now_ns = world.now_ns();
-        last.report(now_ns, true, |status| bench_dragon::wire::LoopStatus { stamp_ns: now_ns, ..status });
+        last.report(now_ns, true, |status| bench_dragon::messages::LoopStatus { stamp_ns: now_ns, ..status });
         collected.borrow().ended(&last.summary(), counts.frames);
         if let Some((behind, worker)) = thread {
             // Nobody else runs now.

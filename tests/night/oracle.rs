@@ -6,11 +6,11 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use bench_dragon::live::{Frames, Outgoing, Period};
-use bench_dragon::show::control::Command;
-use bench_dragon::show::state::{FrameState, Level};
+use bench_dragon::messages::FrameHeader;
+use bench_dragon::messages::control::Command;
+use bench_dragon::messages::state::{FrameState, Level};
+use bench_dragon::publisher::live::{Frames, Outgoing, Period};
 use bench_dragon::show::{Outcome, Show};
-use bench_dragon::wire::FrameHeader;
 
 use crate::behind::Behind;
 use crate::collected::{Announced, Collected, Expected};
@@ -158,7 +158,7 @@ impl Oracle {
         self.collected.borrow_mut().frame(sample, announcements);
     }
 
-    fn command(&mut self, tick: u64, command: Command) -> Option<bench_dragon::show::control::Code> {
+    fn command(&mut self, tick: u64, command: Command) -> Option<bench_dragon::messages::control::Code> {
         self.entrance.executed(tick, command);
         self.show.count_to(tick);
         self.show.execute(command)

@@ -1,7 +1,7 @@
 //! Each period is a frame or skipped; deadlines never shift.
 
-use bench_dragon::live::{Counts, End};
-use bench_dragon::wire::FrameHeader;
+use bench_dragon::messages::FrameHeader;
+use bench_dragon::publisher::live::{Counts, End};
 
 use crate::world::{SECOND_NS, World, same};
 

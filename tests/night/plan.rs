@@ -1,11 +1,11 @@
 //! What a night is: drawn from its seed before it begins.
 
-use bench_dragon::live::LoopOptions;
-use bench_dragon::motion::event::EventKind;
+use bench_dragon::messages::state::EventKind;
+use bench_dragon::messages::state::{FrameState, Level};
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::scene::{AtEnd, OnContact, Scene};
+use bench_dragon::publisher::live::LoopOptions;
 use bench_dragon::show::Playback;
-use bench_dragon::show::state::{FrameState, Level};
+use bench_dragon::show::scene::{AtEnd, OnContact, Scene};
 
 use crate::levels::Rules;
 use crate::random::Random;

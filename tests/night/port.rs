@@ -5,8 +5,8 @@ use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-use bench_dragon::live::{Outgoing, PublishError, Publisher};
-use bench_dragon::wire::FrameHeader;
+use bench_dragon::messages::FrameHeader;
+use bench_dragon::publisher::live::{Outgoing, PublishError, Publisher};
 
 use crate::oracle::Oracle;
 use crate::world::{SECOND_NS, World};

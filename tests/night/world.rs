@@ -10,7 +10,7 @@ use std::fmt::Debug;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use bench_dragon::live::clock::Clock;
+use bench_dragon::client::clock::Clock;
 
 use crate::plan::Plan;
 use crate::random::Random;

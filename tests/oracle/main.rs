@@ -34,7 +34,7 @@ struct Event {
 /// The events of a scene by the program, or the sentence with which it refuses the scene.
 fn program_events(scene_toml: &str) -> Result<Vec<Event>, String> {
     use bench_dragon::motion::timeline::TimedEvent;
-    use bench_dragon::scene::Scene;
+    use bench_dragon::show::scene::Scene;
     let scene = Scene::parse(scene_toml, "oracle", "oracle").map_err(|error| error.to_string())?;
     let timeline = scene.motion.timeline(&mut |_| ());
     assert_eq!(timeline.searched_until(), None, "the program's search gave up");

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use bench_dragon::messages::{CollisionAlert, FrameHeader, HandlePose};
 use bench_dragon::recording::mcap::recorder::{Recorder, RecorderConfig};
-use bench_dragon::scene::ros2::Topic;
-use bench_dragon::wire::{CollisionAlert, FrameHeader, HandlePose};
+use bench_dragon::ros2_messages::settings::Topic;
 
 use super::{entries, frame_times};
 

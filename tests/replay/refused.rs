@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
-use bench_dragon::live::{Frames, Period};
+use bench_dragon::publisher::live::{Frames, Period};
 use bench_dragon::recording::mcap::reader::ReadError;
 use bench_dragon::recording::replay::{Pace, Prepared, ReplayOptions};
 use mcap::{Message, Schema};

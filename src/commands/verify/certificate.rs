@@ -2,8 +2,9 @@
 
 use std::io::BufRead;
 
-use bench_dragon::proof::{EventKind, Outcome, Proved, Refused, Status};
-use bench_dragon::scene::printable;
+use bench_dragon::messages::hexadecimal;
+use bench_dragon::proof::{EventKind, Outcome, Proved, Refused, Status, scene_hash};
+use bench_dragon::show::scene::printable;
 use serde::Serialize;
 use serde_json::json;
 
@@ -30,7 +31,7 @@ pub(super) fn print(common: &Common, shown: &str, checked: Result<Proved, Refuse
         checked => checked.map_err(|refused| refusal(shown, refused))?,
     };
     let mut output = Output::standard();
-    let scene_hash = blake3::hash(proved.scene.as_bytes()).to_string();
+    let scene_hash = hexadecimal(&scene_hash(&proved.scene));
     if common.json {
         output.json(&Verdict { verdict: "proved", scene_hash, proved: &proved })?;
         return output.finish();

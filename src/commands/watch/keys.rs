@@ -10,11 +10,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-use bench_dragon::show::control::Command;
-use bench_dragon::subscribers::control::conductor::{Action, Conducted, Conductor};
-use bench_dragon::subscribers::control::{refusal, standing};
-use bench_dragon::subscribers::feed::FeedEvent;
-use bench_dragon::subscribers::keys::Key;
+use bench_dragon::client::control::conductor::{Action, Conducted, Conductor};
+use bench_dragon::client::control::{refusal, standing};
+use bench_dragon::client::feed::FeedEvent;
+use bench_dragon::messages::control::Command;
+use bench_dragon::outputs::keys::Key;
 use nix::sys::signal::{SigSet, Signal};
 use signal_hook::consts::{SIGCONT, SIGQUIT, SIGTSTP};
 

@@ -6,15 +6,15 @@
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use bench_dragon::live::control::{Answer, Doors, door};
+use bench_dragon::messages::control::{Code, Command};
+use bench_dragon::messages::state::PlaybackState;
+use bench_dragon::messages::{ControlRequest, ControlResponse};
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::scene::{AtEnd, OnContact, Scene};
-use bench_dragon::show::control::{Code, Command};
-use bench_dragon::show::state::PlaybackState;
+use bench_dragon::publisher::live::control::{Answer, Doors, door};
+use bench_dragon::ros2::Mapping;
+use bench_dragon::show::convert::control_response;
+use bench_dragon::show::scene::{AtEnd, OnContact, Scene};
 use bench_dragon::show::{Outcome, Playback, Show};
-use bench_dragon::transports::ros2::Mapping;
-use bench_dragon::wire::convert::control_response;
-use bench_dragon::wire::{ControlRequest, ControlResponse};
 use fastrand::Rng;
 
 use super::Target;

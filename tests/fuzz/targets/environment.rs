@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use bench_dragon::transports::iceoryx2::service_name;
-use bench_dragon::transports::ros2::Mapping;
-use bench_dragon::transports::ros2::environment::{Network, Range, check_name, other_distribution};
+use bench_dragon::client::shared_memory::service_name;
+use bench_dragon::ros2::Mapping;
+use bench_dragon::ros2::environment::{Network, Range, check_name, other_distribution};
 use fastrand::Rng;
 
 use super::Target;

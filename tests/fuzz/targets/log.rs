@@ -7,14 +7,14 @@ use std::collections::HashMap;
 use std::sync::{Mutex, OnceLock};
 use std::time::Duration;
 
+use bench_dragon::messages::control::{Command, CommandRecord};
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::recording::arithmetic::Arithmetic;
-use bench_dragon::recording::lines::{Line, SecondLine, ShowLine};
-use bench_dragon::recording::verify::{Verdict, verify};
-use bench_dragon::scene::{Scene, SceneText};
-use bench_dragon::show::control::{Command, CommandRecord};
+use bench_dragon::publisher::log::arithmetic::Arithmetic;
+use bench_dragon::publisher::log::lines::{Line, SecondLine, ShowLine};
+use bench_dragon::publisher::log::verify::{Verdict, verify};
+use bench_dragon::show::convert::{Stamps, frame_header, handle_poses};
+use bench_dragon::show::scene::{Scene, SceneText};
 use bench_dragon::show::{Playback, Show};
-use bench_dragon::wire::convert::{Stamps, frame_header, handle_poses};
 use fastrand::Rng;
 use serde_json::{Map, Value};
 
@@ -345,7 +345,7 @@ fn log_of(show: &ShowLine, playback: Playback, commands: &[(u64, Command)], gap:
             bodies.push(body(&writer.second()));
         }
     }
-    let reason = bench_dragon::live::End::Duration;
+    let reason = bench_dragon::publisher::live::End::Duration;
     bodies.push(body(&Line::End { frames, skipped, lost, reason }));
     sealed(&bodies)
 }

@@ -10,7 +10,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock, mpsc};
 use std::time::Duration;
 
-use bench_dragon::subscribers::view::{Ready, ViewError, ViewOptions, serve};
+use bench_dragon::outputs::view::{Ready, ViewError, ViewOptions, serve};
 use fastrand::Rng;
 use serde_json::Value;
 

@@ -7,11 +7,11 @@ use std::os::fd::AsRawFd;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use bench_dragon::live::{Frames, Period};
+use bench_dragon::publisher::live::{Frames, Period};
 use bench_dragon::recording::mcap::reader::{Item, Recording, frame_of};
 use bench_dragon::recording::mcap::recover::{RecoverError, Recovered, check_magic, recover};
 use bench_dragon::recording::replay::{Pace, Prepared, ReplayOptions};
-use bench_dragon::scene::Accepted;
+use bench_dragon::show::scene::Accepted;
 use fastrand::Rng;
 use mcap::records::MessageHeader;
 use mcap::{Message, MessageStream, WriteOptions, Writer};

@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
-use bench_dragon::model::curve::Side;
+use bench_dragon::messages::sentence::{Figures, alert_sentence};
 use bench_dragon::motion::Method;
-use bench_dragon::scene::Scene;
+use bench_dragon::motion::model::curve::Side;
+use bench_dragon::motion::solve::Velocities;
+use bench_dragon::show::convert::{Stamps, collision_alert, frame_header, stage};
+use bench_dragon::show::scene::Scene;
 use bench_dragon::show::{Frame, Playback, Show};
-use bench_dragon::solve::Velocities;
-use bench_dragon::wire::convert::{Stamps, collision_alert, frame_header, stage};
-use bench_dragon::wire::sentence::{Figures, alert_sentence};
 use fastrand::Rng;
 
 use super::Target;

@@ -1,0 +1,158 @@
+//! Lemmas 2 and 3 of `docs/proofs.md`: boards that are apart over a step, and Lemma 5: boards that have a point in common.
+//! Only [`super`] uses it.
+
+use super::capsule::Capsule;
+use super::interval::{Interval, Vector, cross, dot, minus, norm, norm_squared};
+use bench_dragon_motion::model::Point;
+use bench_dragon_motion::model::board::Board;
+use bench_dragon_motion::model::separation::closest_points_board_board;
+use bench_dragon_motion::model::team::Team;
+
+/// What boards are like, in intervals.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shape {
+    pub inset: Interval,
+    pub half_width: Interval,
+}
+
+/// A board, or several on a straight line, over a step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MovingBoard {
+    front: Capsule,
+    rear: Capsule,
+    link: Interval,
+    /// Beyond each handle, as a share of the link.
+    share: Interval,
+    half_width: Interval,
+    /// Doubles near its middle and its half length; the radius holds the whole board about the middle at every moment.
+    centre: [f64; 2],
+    radius: f64,
+    /// Unit direction, nearly.
+    direction: [f64; 2],
+}
+
+impl Shape {
+    pub fn new(team: &Team) -> Self {
+        Self { inset: Interval::point(team.hole_inset), half_width: Interval::point(team.width) * 0.5 }
+    }
+
+    pub fn board(&self, front: Capsule, rear: Capsule, link: Interval) -> MovingBoard {
+        let middle = [0, 1].map(|axis| (front.point[axis] + rear.point[axis]) * 0.5);
+        let centre = middle.map(Interval::middle);
+        let along = minus(front.point, rear.point).map(Interval::middle);
+        let length = along[0].hypot(along[1]);
+        let share = self.inset.over(link);
+        // Any point is s of the way between the handles, s in [-e, 1 + e], and half a width aside; the middle of the two
+        // handles moves no more than both do.
+        let slack = [front, rear]
+            .iter()
+            .fold(Interval::ZERO, |sum, capsule| sum + Interval::point(capsule.half) + Interval::point(capsule.radius));
+        let off = norm([middle[0] - Interval::point(centre[0]), middle[1] - Interval::point(centre[1])]);
+        let radius = (link * 0.5 + self.inset + self.half_width + slack + off).hi;
+        let direction = along.map(|part| part / length);
+        MovingBoard { front, rear, link, share, half_width: self.half_width, centre, radius, direction }
+    }
+
+    /// The furthest from the origin that a point of a board can be.
+    pub fn outermost(&self, board: &MovingBoard) -> f64 {
+        let furthest =
+            |capsule: &Capsule| norm(capsule.point) + Interval::point(capsule.half) + Interval::point(capsule.radius);
+        let corner = (self.inset.square() + self.half_width.square()).sqrt();
+        (furthest(&board.front).max(furthest(&board.rear)) + corner).hi
+    }
+
+    /// The nearest to the origin that a point of a board can be whose handles are both `radius` or more from it.
+    pub fn innermost(&self, radius: f64, link: Interval) -> f64 {
+        let radius = Interval::point(radius);
+        let quarter = link.square() * 0.25;
+        if !quarter.is_below(radius.square()) {
+            return f64::NEG_INFINITY;
+        }
+        let chord = (radius.square() - quarter).sqrt();
+        (chord.min(radius - self.inset) - self.half_width).lo
+    }
+}
+
+impl MovingBoard {
+    /// Whether two boards are proved to be further apart than `metres`, not below 0, by the circles about them.
+    pub fn is_further_than(&self, metres: f64, other: &Self) -> bool {
+        let between = [0, 1].map(|axis| Interval::point(self.centre[axis]) - Interval::point(other.centre[axis]));
+        let apart = norm_squared(between);
+        let reach = Interval::point(self.radius) + Interval::point(other.radius) + Interval::point(metres);
+        reach.square().is_below(apart)
+    }
+
+    /// Whether two boards are proved to be apart.
+    pub fn is_apart_from(&self, other: &Self) -> bool {
+        self.is_apart_by(0.0, other)
+    }
+
+    /// Whether two boards are proved to be further apart than `metres`; below 0: to overlap less deeply.
+    pub fn is_apart_by(&self, metres: f64, other: &Self) -> bool {
+        if self.is_further_than(metres.max(0.0), other) {
+            return true;
+        }
+        let between = [self.centre[0] - other.centre[0], self.centre[1] - other.centre[1]];
+        let normal = |[x, y]: [f64; 2]| [-y, x];
+        let axes = [between, normal(self.direction), normal(other.direction), self.direction, other.direction];
+        let is_separated = |axis: [f64; 2]| self.is_separated(metres, other, axis.map(Interval::point));
+        axes.into_iter().any(is_separated) || metres > 0.0 && is_separated(self.towards(other))
+    }
+
+    /// From this board to the nearest point of another, by the middles of their capsules.
+    fn towards(&self, other: &Self) -> [f64; 2] {
+        let [one, other] = [self, other].map(|board| {
+            let [front, rear] =
+                [board.front, board.rear].map(|capsule| Point::from(capsule.point.map(Interval::middle)));
+            Board::from_handles(front, rear, (board.share * board.link).middle(), 2.0 * board.half_width.middle())
+        });
+        let (from, to) = closest_points_board_board(&one, &other);
+        (to - from).into()
+    }
+
+    fn is_separated(&self, metres: f64, other: &Self, axis: Vector) -> bool {
+        let towards = if dot(axis, minus(other.front.point, self.front.point)).middle()
+            + dot(axis, minus(other.rear.point, self.rear.point)).middle()
+            >= 0.0
+        {
+            axis
+        } else {
+            axis.map(std::ops::Neg::neg)
+        };
+        let back = towards.map(std::ops::Neg::neg);
+        let size = norm(towards);
+        let (length, gap) = (size.hi, size * metres);
+        (self.support(towards, length) + other.support(back, length) + gap).is_negative()
+    }
+
+    /// The largest n . x, from above.
+    fn support(&self, n: Vector, length: f64) -> Interval {
+        let Self { front, rear, share, .. } = self;
+        let ends = |capsule: &Capsule| {
+            let (at, reach) = (dot(n, capsule.point), capsule.reach(n, length).hi);
+            (at - Interval::point(reach), at + Interval::point(reach))
+        };
+        let ((front_least, front_most), (rear_least, rear_most)) = (ends(front), ends(rear));
+        let beyond = Interval::ONE + *share;
+        let axis = (beyond * front_most - *share * rear_least).max(beyond * rear_most - *share * front_least);
+        let aside = |capsule: &Capsule| cross(n, capsule.tangent).abs() * capsule.half;
+        let across = cross(n, minus(front.point, rear.point)).abs()
+            + aside(front)
+            + aside(rear)
+            + Interval::point(length) * (Interval::point(front.radius) + Interval::point(rear.radius)).hi;
+        axis + self.half_width * across.over(self.link).min(Interval::point(length))
+    }
+
+    /// Whether a point is proved to be in the board at every moment of the step.
+    pub fn holds(&self, point: Vector) -> bool {
+        let slack =
+            |capsule: &Capsule| Interval::within((Interval::point(capsule.half) + Interval::point(capsule.radius)).hi);
+        let ends = [&self.front, &self.rear].map(|capsule| capsule.point.map(|part| part + slack(capsule)));
+        let [front, rear] = ends;
+        let (along, to) = (minus(front, rear), minus(point, rear));
+        let square = self.link.square();
+        let reach = dot(to, along);
+        let (least, most) = (-(self.share * square), (Interval::ONE + self.share) * square);
+        least.is_below(reach) && reach.is_below(most) && cross(to, along).abs().is_below(self.link * self.half_width)
+    }
+}

@@ -1,0 +1,149 @@
+//! Teams on inward spirals: boards that overlap with each of the pitches between two, and a pitch with which none touch, from
+//! however far the head comes. Only [`super`] uses it; [`crate::plan`] calls what it exports. "The least pitch" and Lemma 8 in
+//! `docs/proofs.md`.
+//!
+//! With the spiral's a = pitch / 2 pi as the unit of length every spiral is the same, and the team's lengths are intervals.
+
+mod far;
+
+use super::boards::Shape;
+use super::capsule::Span;
+use super::clearance::Descent;
+use super::elementary::{pi, sin_cos};
+use super::interval::Interval;
+use super::knot::Knot;
+use super::lines::Links;
+use super::path::{ExactPath, Place};
+use super::step::{Chain, Claim, Listed, PADS, links_of};
+use bench_dragon_motion::model::description::PathDescription;
+use bench_dragon_motion::model::path::Path;
+use bench_dragon_motion::model::team::Team;
+
+/// Pitches from one to another, metres per turn, and where a team on such a spiral is looked at.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pitches<'a> {
+    /// The team.
+    pub team: &'a Team,
+    /// The least of them.
+    pub from: f64,
+    /// The greatest of them.
+    pub to: f64,
+    /// Polar angle of the head's front handle, radians.
+    pub theta: f64,
+    /// Two benches that share no handle, counted from 0, the one nearer the head first.
+    pub benches: [usize; 2],
+}
+
+impl Pitches<'_> {
+    /// a = pitch / 2 pi of all of them.
+    fn radius_per_radian(&self) -> Interval {
+        Interval { lo: self.from, hi: self.to }.over(pi() * 2.0)
+    }
+
+    /// Whether with each of them the head is further than `radius` metres from the centre.
+    pub fn are_outside(&self, radius: f64) -> bool {
+        Interval::point(radius).over(self.radius_per_radian()).is_below(Interval::point(self.theta))
+    }
+
+    /// Whether with each of them the two boards are proved to overlap.
+    pub fn all_overlap(&self) -> bool {
+        let Self { team, from, to, theta, benches } = *self;
+        if benches[0] + 2 > benches[1] || benches[1] >= team.benches {
+            return false;
+        }
+        let a = self.radius_per_radian();
+        // The path and the team serve to guess where handles are.
+        let [wide, narrow] = [from, to].map(|pitch| Path::spiral(pitch, theta / std::f64::consts::TAU));
+        let handle = benches[1] + 1;
+        let mut ends = [Knot::at(Place(0, theta), 0.0), Knot::at(Place(0, theta), 0.0)];
+        let [first, last] = &mut ends;
+        if first.extend_to(handle, &wide, team).is_err() || last.extend_to(handle, &narrow, team).is_err() {
+            return false;
+        }
+        let mut chain = Chain::new(&wide, ExactPath::inward(Interval::ONE, Interval::ZERO), team);
+        chain.links = chain.links.map(|link| link.over(a));
+        let Shape { inset, half_width } = chain.shape;
+        chain.shape = Shape { inset: inset.over(a), half_width: half_width.over(a) };
+        let claim = Claim { links: Links::All, moving: false, clear: false };
+        PADS.iter().any(|pads| {
+            let mut listed = Listed::new(&chain, Span(Place(0, theta), Place(0, theta)), *pads);
+            while listed.handles.len() <= handle {
+                if listed.extend(first, last, claim).is_err() {
+                    return false;
+                }
+            }
+            chain.common_point(&listed.handles, benches).is_some()
+        })
+    }
+}
+
+/// Pieces of three quarters of a turn that are looked at for a lock.
+const MOST_PIECES: u32 = 10_000;
+
+/// Whether it is proved that the head's link locks before the head, coming from far outside, is `radius` metres from the
+/// centre, with every pitch from one to another.
+pub(crate) fn head_locks(team: &Team, (from, to): (f64, f64), radius: f64) -> bool {
+    let radians = |metres: Interval, pitch: f64| metres.over(Interval::point(pitch).over(pi() * 2.0));
+    let theta = Interval::point(radians(Interval::point(radius), from).hi);
+    let square = radians(links_of(team)[0], to).square();
+    // The greatest of D = theta^2 + (theta + delta)^2 - 2 theta (theta + delta) cos delta over pieces, by Taylor's formula.
+    let mut pieces = vec![(0.0, 1.5 * pi().hi)];
+    let mut looked_at = 0;
+    while let Some((first, last)) = pieces.pop() {
+        looked_at += 1;
+        let middle = 0.5 * first + 0.5 * last;
+        if looked_at > MOST_PIECES || middle <= first || middle >= last {
+            return false;
+        }
+        let (sine, cosine) = sin_cos(middle);
+        let rear = theta + Interval::point(middle);
+        let both = theta * rear * 2.0;
+        let at = theta.square() + rear.square() - both * cosine;
+        let slope = (rear - theta * cosine) * 2.0 + both * sine;
+        // D'' = 2 + 4 theta sin delta + 2 theta (theta + delta) cos delta.
+        let most = Interval::point(2.0) + theta * 4.0 + theta * (theta + Interval::point(last)) * 2.0;
+        let half =
+            (Interval::point(last) - Interval::point(middle)).max(Interval::point(middle) - Interval::point(first));
+        let above = slope.abs() * half + most * half.square() * 0.5;
+        if !(at + above).is_below(square) {
+            if !at.is_below(square) {
+                return false;
+            }
+            pieces.extend([(first, middle), (middle, last)]);
+        }
+    }
+    Interval::ONE.is_below(theta)
+}
+
+/// Metres from the centre beyond which no two boards touch and no link locks, wherever further out the head is: little more
+/// than the least for which Lemma 8 shows that, if not below `radius`. `None` where it shows it of none that is sensible.
+pub(crate) fn clear_beyond(team: &Team, pitch: f64, radius: f64) -> Option<f64> {
+    far::least_radius(team, pitch, radius)
+}
+
+/// Turns from which on no steps are tried: what a scene may have.
+const MOST_TURNS: f64 = 1e7;
+
+/// Whether it is proved that a team whose head comes in on a spiral of this pitch, from however far, has no two boards that
+/// touch and no link that locks until its front handle is `radius` metres from the centre. `progress` gets the share of the
+/// way that is done.
+pub(crate) fn reaches(team: &Team, pitch: f64, radius: f64, most_steps: u64, progress: &mut dyn FnMut(f64)) -> bool {
+    let Some(begin) = clear_beyond(team, pitch, radius) else { return false };
+    if begin <= radius {
+        return true;
+    }
+    // The head begins a little further out, or by rounding a little less so: that is looked at below.
+    let start_turn = begin * (1.0 + 1e-9) / pitch;
+    if start_turn > MOST_TURNS {
+        return false;
+    }
+    let description = PathDescription::Spiral { pitch, start_turn };
+    let path = Path::spiral(pitch, start_turn);
+    let exact = ExactPath::new(&description);
+    let a = Interval::point(pitch).over(pi() * 2.0);
+    let theta = Interval::point(radius).over(a).lo;
+    let end = Knot::at(Place(0, theta), exact.travelled(Place(0, theta)).middle());
+    let travelled = end.travelled;
+    let descent = Descent::new(Chain::new(&path, exact, team), travelled, most_steps).after_all_further_out();
+    begin <= (a * descent.head().1).lo && descent.stays_clear_to(&end, progress)
+}

@@ -1,0 +1,85 @@
+//! Lemma 8 of `docs/proofs.md`: teams of any length far out on an inward spiral, where no two boards can touch. Only
+//! [`super`] uses it.
+
+use crate::boards::Shape;
+use crate::elementary::pi;
+use crate::interval::Interval;
+use crate::step::links_of;
+use bench_dragon_motion::model::team::Team;
+
+/// How many times the longest link or the radius, whichever is more, is doubled to find where the lemma holds.
+const MOST_DOUBLINGS: u32 = 30;
+
+/// How much further out than need be a radius may be, as a share of it.
+const SLACK: f64 = 1e-3;
+
+/// A radius for which the lemma holds, not below `radius`, and little more than the least.
+pub(super) fn least_radius(team: &Team, pitch: f64, radius: f64) -> Option<f64> {
+    let holds = |radius: f64| holds(team, pitch, radius);
+    if holds(radius) {
+        return Some(radius);
+    }
+    let mut outside = 2.0 * radius.max(team.longest_link());
+    let mut doublings = 0;
+    while !holds(outside) {
+        outside *= 2.0;
+        doublings += 1;
+        if doublings > MOST_DOUBLINGS {
+            return None;
+        }
+    }
+    let mut inside = radius;
+    while outside - inside > SLACK * inside {
+        let middle = 0.5 * (inside + outside);
+        if holds(middle) { outside = middle } else { inside = middle }
+    }
+    Some(outside)
+}
+
+/// Whether the lemma holds for all handles at least `radius` metres from the centre.
+fn holds(team: &Team, pitch: f64, radius: f64) -> bool {
+    let a = Interval::point(pitch).over(pi() * 2.0);
+    let r = Interval::point(radius);
+    let [head, body] = links_of(team);
+    let longest = head.max(body);
+    if !longest.is_below(r) {
+        return false;
+    }
+    if team.benches < 3 {
+        return true;
+    }
+    let Shape { inset, half_width } = Shape::new(team);
+    // 1. Boards less than a turn apart.
+    let growth = |link: Interval| a * pi() * link.over(r * 3.0);
+    let lean = |link: Interval| {
+        let growth = growth(link);
+        (link.square() + growth * (r * 2.0 + growth)).over(link * r * 2.0)
+    };
+    let lean = lean(head).max(lean(body));
+    let (aside, left) = (inset + half_width * lean, r - inset * lean - half_width);
+    let most_turned = (a.square() + r.square() + r * growth(body)).sqrt();
+    if !left.is_positive() || !(aside * 2.0 * most_turned).is_below(body * left) {
+        return false;
+    }
+    // 2. No boards a turn apart: the team is too short.
+    // A number of benches below 2^53 is a double.
+    let length = head + body * (team.benches - 1) as f64;
+    if (pi() * length + body * 3.0).is_below(pi() * r * 6.0) {
+        return true;
+    }
+    // 3. Boards a turn apart, or more.
+    let nearest = (r.square() - longest.square() * 0.25).sqrt().min(r - inset) - half_width;
+    if !nearest.is_positive() {
+        return false;
+    }
+    let slope = a.over(nearest).square();
+    let (bent_out, bent_in) = ((Interval::ONE + slope).over(nearest), slope.over(nearest));
+    let thick = half_width * (Interval::ONE + slope).sqrt() * 2.0;
+    let (between, beyond) = (|link: Interval| link.square() * 0.25, |link: Interval| inset * (link + inset));
+    let outside = |link: Interval| (bent_out * beyond(link)).max(bent_in * between(link)) * 0.5;
+    let inside = (bent_out * between(body)).max(bent_in * beyond(body)) * 0.5;
+    (thick + outside(head).max(outside(body)) + inside).is_below(Interval::point(pitch))
+}
+
+#[cfg(test)]
+mod tests;

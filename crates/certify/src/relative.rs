@@ -1,0 +1,301 @@
+//! Lemma 6 of `docs/proofs.md`: handles that move together with the head, to the first order, and the clearance of two boards
+//! that they carry, over a step and at its middle. Only [`super`] uses it.
+
+use super::boards::Shape;
+use super::capsule::Spanned;
+use super::interval::{Interval, Vector, cross, dot, minus, norm, norm_squared, plus, scaled};
+use super::path::{ExactPath, Place};
+use bench_dragon_motion::model::Point;
+use bench_dragon_motion::model::board::Board;
+use bench_dragon_motion::model::separation::{closest_points_board_board, separation_board_board};
+
+/// A handle while the head is `tau` metres from the middle of a step: at `point + tau velocity`, but for an error.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moving {
+    /// The point of a place m.
+    point: Vector,
+    /// The tangent there.
+    tangent: Vector,
+    /// Metres per metre of the head, along that tangent.
+    velocity: Vector,
+    /// The handle's metres per metre of the head, over the step.
+    rate: Interval,
+    /// At least the metres of path from m to the handle at the middle of the step.
+    offset: f64,
+    /// At least the length of the error at the middle of the step.
+    still: f64,
+    /// At least its length anywhere in the step.
+    error: f64,
+    /// At least the curvature where the handle goes, 1/m.
+    curvature: f64,
+}
+
+/// How many times the products of a link are enclosed anew, each time from where they put its rear handle.
+const REFINEMENTS: u32 = 3;
+
+/// When in a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum When {
+    /// With the head in the middle.
+    Middle,
+    /// At any moment.
+    Always,
+}
+
+/// A direction that keeps to a board: parts along its axis and a quarter turn to the left of it, not both 0.
+pub(super) type Direction = [f64; 2];
+
+/// A board carried by two handles.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Carried {
+    front: Moving,
+    rear: Moving,
+    link: Interval,
+    half_length: Interval,
+    half_width: Interval,
+    half_step: f64,
+}
+
+/// A vector that is `at + tau by`, but for an error.
+struct Linear {
+    at: Vector,
+    by: Vector,
+    error: Interval,
+}
+
+impl Moving {
+    /// The head, which is at `middle` in the middle of a step of `half_step` metres to either side.
+    pub fn head(path: &ExactPath, span: &Spanned, middle: Place, half_step: f64) -> Self {
+        Self::new(path, span, middle, Interval::ONE, 0.0, half_step)
+    }
+
+    fn new(path: &ExactPath, span: &Spanned, place: Place, rate: Interval, offset: f64, half_step: f64) -> Self {
+        let (curve, curvature) = (path.curve(place), span.capsule.curvature);
+        let (point, tangent) = (curve.point(place.1), curve.tangent(place.1));
+        let zero = [Interval::ZERO; 2];
+        Self { point, tangent, velocity: zero, rate, offset, still: 0.0, error: 0.0, curvature }
+            .with_rate(rate, half_step)
+    }
+
+    fn with_rate(self, rate: Interval, half_step: f64) -> Self {
+        let middle = rate.middle();
+        let uneven = (rate - Interval::point(middle)).magnitude();
+        let (far, metres) = (Interval::point(rate.magnitude()), Interval::point(half_step));
+        let bend = |reach: Interval| reach.square() * 0.5 * self.curvature;
+        let off = Interval::point(self.offset);
+        let still = (off + bend(off)).hi;
+        let error = (off + metres * uneven + bend(off + far * metres)).hi;
+        Self { velocity: scaled(self.tangent, Interval::point(middle)), rate, still, error, ..self }
+    }
+
+    /// The handle behind this one, near `place` in the middle of the step. `None` where the bounds come out infinite, or
+    /// the place is not in the handle's span.
+    pub fn follower(
+        &self,
+        path: &ExactPath,
+        spans: (&Spanned, &Spanned),
+        place: Place,
+        link: Interval,
+        half_step: f64,
+    ) -> Option<Self> {
+        let (front, rear) = spans;
+        let is_in_span = path.in_order(rear.span.0, place) && path.in_order(place, rear.span.1);
+        if !(is_in_span && path.is_inside(place)) {
+            return None;
+        }
+        let product = front.capsule.product(&rear.capsule, false);
+        let rear_product = front.capsule.product(&rear.capsule, true);
+        if !rear_product.is_positive() {
+            return None;
+        }
+        let point = path.curve(place).point(place.1);
+        let miss = (norm_squared(minus(self.point, point)) - link.square()).abs() * 0.5;
+        let moved = Interval::point(product.magnitude()) * self.offset;
+        let offset = (miss + moved).over(rear_product).hi;
+        let (mut product, mut rear_product) = (product, rear_product);
+        let mut follower = Self::new(path, rear, place, self.rate * product.over(rear_product), offset, half_step);
+        for _ in 0..REFINEMENTS {
+            product = meet(product, self.product(self, &follower, link, half_step))?;
+            rear_product = meet(rear_product, follower.product(self, &follower, link, half_step))?;
+            follower = follower.with_rate(self.rate * product.over(rear_product), half_step);
+        }
+        follower.error.is_finite().then_some(follower)
+    }
+
+    /// A handle so many metres behind this one on a straight line.
+    pub fn moved_back(&self, metres: Interval) -> Self {
+        Self { point: minus(self.point, scaled(self.tangent, metres)), ..*self }
+    }
+
+    /// The tangent here times the link from `rear` to `front`, one of which this handle is.
+    fn product(&self, front: &Self, rear: &Self, link: Interval, half_step: f64) -> Interval {
+        let (at, by) = (minus(front.point, rear.point), minus(front.velocity, rear.velocity));
+        let error = Interval::point(front.error) + Interval::point(rear.error);
+        let (step, turn) = (Interval::within(half_step), self.turn(half_step));
+        let aside = cross(self.tangent, at) + cross(self.tangent, by) * step;
+        let bend = turn * (aside.abs() + error) + turn.square() * 0.5 * link;
+        dot(self.tangent, at) + dot(self.tangent, by) * step + Interval::within((error + bend).hi)
+    }
+
+    /// The angle by which the tangent may differ from that at the place.
+    fn turn(&self, half_step: f64) -> Interval {
+        (Interval::point(self.rate.magnitude()) * half_step + Interval::point(self.offset)) * self.curvature
+    }
+
+    fn error(&self, when: When) -> Interval {
+        Interval::point(if when == When::Middle { self.still } else { self.error })
+    }
+}
+
+/// What two intervals that hold the same number have in common.
+fn meet(one: Interval, other: Interval) -> Option<Interval> {
+    let (lo, hi) = (one.lo.max(other.lo), one.hi.min(other.hi));
+    (lo <= hi).then_some(Interval { lo, hi })
+}
+
+impl Carried {
+    pub fn new(shape: &Shape, front: Moving, rear: Moving, link: Interval, half_step: f64) -> Self {
+        let half_length = link * 0.5 + shape.inset;
+        Self { front, rear, link, half_length, half_width: shape.half_width, half_step }
+    }
+
+    /// The board in doubles, in the middle of the step.
+    pub fn in_doubles(&self) -> Board {
+        let [front, rear] = [self.front.point, self.rear.point].map(|point| {
+            let [x, y] = point.map(Interval::middle);
+            Point::new(x, y)
+        });
+        let (length, width) = (self.half_length.middle(), self.half_width.middle());
+        let board = Board::from_handles(front, rear, 0.0, 2.0 * width);
+        Board { half_length: length, ..board }
+    }
+
+    /// From front to rear handle.
+    fn along(&self, when: When) -> Linear {
+        let Self { front, rear, .. } = self;
+        let error = front.error(when) + rear.error(when);
+        Linear { at: minus(front.point, rear.point), by: minus(front.velocity, rear.velocity), error }
+    }
+
+    /// The gap between this board and another along a direction that keeps to this one: within the interval at each
+    /// of those moments.
+    pub fn gap(&self, other: &Self, direction: Direction, when: When) -> Interval {
+        let along = self.along(when);
+        let normal = Linear { at: turned(along.at, direction), by: turned(along.by, direction), error: along.error };
+        let size = norm(direction.map(Interval::point));
+        let [ahead, left] = direction.map(f64::abs);
+        let support = self.half_length * ahead + self.half_width * left;
+        let corners = [(false, false), (false, true), (true, false), (true, true)];
+        let reach = |corner| self.reach(&normal, size, &other.corner(self, corner, when), when);
+        let [first, second, third, last] = corners.map(reach);
+        (first.min(second).min(third.min(last)).over(self.link) - support).over(size)
+    }
+
+    /// A corner of this board, seen from the middle of the handles of another.
+    fn corner(&self, seen_from: &Self, (ahead, left): (bool, bool), when: When) -> Linear {
+        let Self { front, rear, link, half_length, half_width, .. } = self;
+        let along = self.along(when);
+        // Shares of the link.
+        let share = half_length.over(*link);
+        let share = if ahead { share } else { -share };
+        let aside = half_width.over(*link);
+        let side = if left { aside } else { -aside };
+        let of = |middle: Vector, along: Vector, own: Vector| {
+            let across = [-along[1], along[0]];
+            minus(plus(middle, plus(scaled(along, share), scaled(across, side))), own)
+        };
+        let middle = |one: Vector, other: Vector| plus(one, other).map(|sum| sum * 0.5);
+        let (own_front, own_rear) = (&seen_from.front, &seen_from.rear);
+        let own_error = (own_front.error(when) + own_rear.error(when)) * 0.5;
+        // (1/2 + share) times the front handle and (1/2 - share) times the rear one, and the width.
+        let half = Interval::point(0.5);
+        let error = (half + share).abs() * front.error(when).hi
+            + (half - share).abs() * rear.error(when).hi
+            + aside * along.error.hi
+            + own_error;
+        Linear {
+            at: of(middle(front.point, rear.point), along.at, middle(own_front.point, own_rear.point)),
+            by: of(middle(front.velocity, rear.velocity), along.by, middle(own_front.velocity, own_rear.velocity)),
+            error,
+        }
+    }
+
+    /// The product of a normal as long as `size` links with a corner.
+    fn reach(&self, normal: &Linear, size: Interval, corner: &Linear, when: When) -> Interval {
+        let half = if when == When::Middle { 0.0 } else { self.half_step };
+        let (step, square) = (Interval::within(half), Interval { lo: 0.0, hi: Interval::point(half).square().hi });
+        let far = norm(corner.at) + norm(corner.by) * half + corner.error;
+        let error = normal.error * size * far.hi + (self.link * size + normal.error * size) * corner.error.hi;
+        dot(normal.at, corner.at)
+            + (dot(normal.at, corner.by) + dot(normal.by, corner.at)) * step
+            + dot(normal.by, corner.by) * square
+            + Interval::within(error.hi)
+    }
+
+    /// A point of the board, `along` and `aside` of its middle: where it is in the middle of the step, and how far it may be
+    /// from there.
+    fn point(&self, (along, aside): (f64, f64), when: When) -> (Vector, Interval) {
+        let Linear { at, .. } = self.along(when);
+        let Self { front, rear, link, half_length, half_width, .. } = self;
+        let share = |metres: f64, most: Interval| Interval::point(metres.clamp(-most.lo, most.lo)).over(*link);
+        let (along, aside) = (share(along, *half_length), share(aside, *half_width));
+        let middle = plus(front.point, rear.point).map(|sum| sum * 0.5);
+        let point = plus(middle, plus(scaled(at, along), scaled([-at[1], at[0]], aside)));
+        let half = if when == When::Middle { 0.0 } else { self.half_step };
+        let off = |handle: &Moving| handle.error(when) + norm(handle.velocity) * half;
+        (point, (off(front) + off(rear)) * (Interval::point(0.5) + along.abs() + aside.abs()))
+    }
+
+    /// At least the clearance of two boards at those moments.
+    pub fn at_most(&self, other: &Self, when: When) -> f64 {
+        let most = |one: &Self, other: &Self| {
+            let gap = |direction| one.gap(other, direction, when).hi;
+            [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]].map(gap).into_iter().fold(f64::NEG_INFINITY, f64::max)
+        };
+        let separation = most(self, other).max(most(other, self));
+        if separation <= 0.0 {
+            return separation;
+        }
+        let boards = [self.in_doubles(), other.in_doubles()];
+        let (on_self, on_other) = closest_points_board_board(&boards[0], &boards[1]);
+        let seen = |board: &Board, point: Point| {
+            let offset = point - board.centre;
+            (board.axis.dot(&offset), board.across().dot(&offset))
+        };
+        let (own, own_error) = self.point(seen(&boards[0], on_self), when);
+        let (its, its_error) = other.point(seen(&boards[1], on_other), when);
+        (norm(minus(own, its)) + own_error + its_error).hi
+    }
+
+    /// Whether two boards are proved to stay further apart than `metres` at those moments: along the direction in which they
+    /// are furthest apart in the middle of the step, or another of those that doubles find.
+    pub fn is_further_than(&self, metres: f64, other: &Self, when: When) -> bool {
+        let boards = [self.in_doubles(), other.in_doubles()];
+        let separated = separation_board_board(&boards[0], &boards[1]);
+        if separated > 0.0 {
+            let (from, to) = closest_points_board_board(&boards[0], &boards[1]);
+            let between = to - from;
+            let seen = |board: &Board, way: f64| [way * board.axis.dot(&between), way * board.across().dot(&between)];
+            // Along a face it is that board's own direction which loses nothing to its turning.
+            let (own, its) = (seen(&boards[0], 1.0), seen(&boards[1], -1.0));
+            let slant = |direction: Direction| direction[0].abs().min(direction[1].abs());
+            let along_own = |metres| self.gap(other, own, when).lo > metres;
+            let along_its = |metres| other.gap(self, its, when).lo > metres;
+            if slant(own) <= slant(its) && along_own(metres) || along_its(metres) || along_own(metres) {
+                return true;
+            }
+        }
+        let faces = |own: &Self, other: &Self, [a, b]: [&Board; 2]| {
+            let offset = b.centre - a.centre;
+            let along = 1f64.copysign(a.axis.dot(&offset));
+            let aside = 1f64.copysign(a.across().dot(&offset));
+            [[0.0, aside], [along, 0.0]].into_iter().any(|direction| own.gap(other, direction, when).lo > metres)
+        };
+        faces(self, other, [&boards[0], &boards[1]]) || faces(other, self, [&boards[1], &boards[0]])
+    }
+}
+
+/// A vector turned and stretched like a direction from a board's axis.
+fn turned(axis: Vector, [ahead, left]: Direction) -> Vector {
+    plus(scaled(axis, Interval::point(ahead)), scaled([-axis[1], axis[0]], Interval::point(left)))
+}

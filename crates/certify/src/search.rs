@@ -1,0 +1,384 @@
+//! The search: steps of the head from the start to the end of the motion, halved where their claims cannot be shown, and
+//! at each event that the ordinary search has found, the lines that show it. Only [`super`] uses it.
+
+use std::io;
+
+use super::capsule::Spanned;
+use super::interval::Interval;
+use super::knot::{Knot, place};
+use super::lines::{Line, Links, Outcome, Status};
+use super::path::{ExactPath, Place};
+use super::step::{Chain, Claim, Obstacle, Shown};
+use super::{CertifyError, Given};
+use bench_dragon_messages::state::EventKind;
+use bench_dragon_motion::event::Event;
+use bench_dragon_motion::model::path::Path;
+
+/// Seconds on each side of an event between which it is proved to be.
+const AROUND: f64 = 3e-10;
+
+/// Metres, as a share of the way, below which doubles tell no places apart.
+pub(super) const LEAST: f64 = 7e-13;
+
+/// What a step that succeeded, and one that did not, do to the length of the next.
+const GROWTH: f64 = 1.3;
+const SHRINK: f64 = 0.5;
+
+/// How near an event, in links, a step that cannot be shown is taken to be in the way of the event's own proof.
+const NEAR: f64 = 1e-3;
+
+pub(super) struct Search<'a, 'w> {
+    given: Given<'a>,
+    chain: Chain<'a>,
+    write: &'w mut dyn FnMut(&Line) -> io::Result<()>,
+    /// Where the last step ended.
+    at: Knot,
+    links: Links,
+    /// Claims that steps still make.
+    moving: bool,
+    clear: bool,
+    /// Whether Lemma 4 may still be used.
+    covered: bool,
+    proofs: [Option<Status>; 4],
+    /// Metres of the next step that is tried.
+    step: f64,
+    steps: u64,
+}
+
+/// Why the search cannot go on.
+enum Halt {
+    Error(CertifyError),
+    /// At the place that it has come to.
+    Stuck(String),
+}
+
+impl From<io::Error> for Halt {
+    fn from(error: io::Error) -> Self {
+        Self::Error(CertifyError::Write(error))
+    }
+}
+
+const KINDS: [EventKind; 4] = [EventKind::Contact, EventKind::Stall, EventKind::Lock, EventKind::PathEnd];
+
+impl<'a, 'w> Search<'a, 'w> {
+    pub fn new(given: Given<'a>, write: &'w mut dyn FnMut(&Line) -> io::Result<()>) -> Self {
+        let exact = ExactPath::new(given.description);
+        let chain = Chain::new(given.path, exact, given.team);
+        // A motion that begins earlier passes through all that this one does.
+        let before = -LEAST * (1.0 + given.path.length());
+        let at = Knot::new(given.path, &chain.exact, before);
+        let step = 0.25 * given.team.shortest_link();
+        let (links, proofs) = (Links::All, [const { None }; 4]);
+        Self { given, chain, write, at, links, moving: true, clear: true, covered: true, proofs, step, steps: 0 }
+    }
+
+    /// Writes the certificate and returns what it proves.
+    pub fn run(mut self, progress: &mut dyn FnMut(f64)) -> Result<Vec<Outcome>, CertifyError> {
+        let (version, scene) = (env!("CARGO_PKG_VERSION"), self.given.scene);
+        (self.write)(&Line::Certificate { format: super::FORMAT, version, scene }).map_err(CertifyError::Write)?;
+        let stuck = match self.motion(progress) {
+            Ok(()) => None,
+            Err(Halt::Error(error)) => return Err(error),
+            Err(Halt::Stuck(why)) => Some(why),
+        };
+        let until = self.time(self.at.head).lo;
+        let lock = match self.proofs[EventKind::Lock as usize] {
+            Some(Status::Proved { time_lo, .. }) => Some(time_lo),
+            _ => None,
+        };
+        let outcomes = KINDS.map(|event| {
+            let found = self.proofs[event as usize].take();
+            let status = found.unwrap_or_else(|| match (&stuck, event) {
+                (Some(because), _) => Status::Undecided { time_lo: until, because: because.clone() },
+                (None, EventKind::PathEnd) => Status::None { time_lo: None },
+                (None, _) => Status::None { time_lo: lock },
+            });
+            Outcome { event, status }
+        });
+        for outcome in &outcomes {
+            (self.write)(&Line::Result(outcome.clone())).map_err(CertifyError::Write)?;
+        }
+        Ok(outcomes.into())
+    }
+
+    /// The whole motion, event by event.
+    fn motion(&mut self, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+        let end = self.given.events.last().map_or(self.given.path.length(), |event| event.travelled);
+        let mut progress = |at: f64| progress((at / end).clamp(0.0, 1.0));
+        for event in self.given.events {
+            match event.kind {
+                EventKind::Contact if event.travelled == 0.0 => self.overlap_at_start(event)?,
+                EventKind::PathEnd => {
+                    let beyond = path_end(&self.chain.exact, self.given.path);
+                    self.go_to(event.travelled - self.around(), None, &mut progress)?;
+                    self.go_to_knot(&beyond, None, &mut progress)?;
+                    (self.write)(&Line::PathEnd)?;
+                    self.proofs[EventKind::PathEnd as usize] = Some(self.at_path_end());
+                }
+                kind => {
+                    self.go_to(event.travelled - self.around(), Some(event), &mut progress)?;
+                    match kind {
+                        EventKind::Contact => self.contact(event, &mut progress)?,
+                        EventKind::Stall => self.stall(event, &mut progress)?,
+                        _ => self.lock(event)?,
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Metres on each side of an event.
+    fn around(&self) -> f64 {
+        (AROUND * self.given.head_speed).min(1e-8).max(LEAST * (1.0 + self.given.path.length()))
+    }
+
+    /// Time at a place of the head, from below and above, and never below 0.
+    fn time(&self, place: Place) -> Interval {
+        let time = self.chain.exact.travelled(place).over(Interval::point(self.given.head_speed));
+        // Room for the rounding of a `lead_in` that the scene states otherwise.
+        let slack = 1e-14 * (1.0 + time.magnitude());
+        Interval { lo: (time.lo - slack).max(0.0), hi: (time.hi + slack).max(0.0) }
+    }
+
+    fn knot(&self, travelled: f64) -> Knot {
+        Knot::new(self.chain.path, &self.chain.exact, travelled)
+    }
+
+    fn at_path_end(&self) -> Status {
+        let length = self.given.path.length();
+        let end = place(self.given.path.param_at(length));
+        let (before, after) = (self.chain.exact.moved(end, -LEAST * (1.0 + length)), self.at.head);
+        Status::Proved { time_lo: self.time(before).lo, time_hi: self.time(after).hi, bench_a: None, bench_b: None }
+    }
+
+    /// Places at which an event of doubtful digits is tried to be shown, from near to far.
+    fn beyond(&self, event: &Event) -> impl Iterator<Item = f64> + use<> {
+        let around = self.around().max(2.0 * (event.travelled - self.at.travelled));
+        let (at, most) = (event.travelled, NEAR * self.given.team.shortest_link());
+        (0..24)
+            .map(move |power| around * 2f64.powi(power))
+            .take_while(move |far| *far <= most.max(around))
+            .map(move |far| at + far)
+    }
+
+    /// See [`Search::go_to_knot`].
+    fn go_to(&mut self, travelled: f64, event: Option<&Event>, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+        if travelled <= self.at.travelled {
+            return Ok(());
+        }
+        let target = self.knot(travelled);
+        self.go_to_knot(&target, event, progress)
+    }
+
+    /// Goes in steps to a knot, or so near to an event that a step cannot be shown for its sake. A claim that cannot be
+    /// shown at any length of the step is given up.
+    fn go_to_knot(&mut self, target: &Knot, event: Option<&Event>, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+        let least = 0.01 * LEAST * (1.0 + self.given.path.length());
+        let longest = self.given.team.shortest_link();
+        while self.at.head != target.head {
+            let remaining = target.travelled - self.at.travelled;
+            let mut to =
+                if self.step >= 0.9 * remaining { target.clone() } else { self.knot(self.at.travelled + self.step) };
+            let claim = Claim { links: self.links, moving: self.moving, clear: self.clear };
+            match self.chain.show(&mut self.at, &mut to, claim) {
+                Ok(shown) => {
+                    self.accept(to, shown)?;
+                    self.step = (self.step * GROWTH).min(longest);
+                    progress(self.at.travelled);
+                }
+                Err(obstacle) if self.step.min(remaining) > least => {
+                    self.step = SHRINK * self.step.min(remaining);
+                    // Turns of handles behind the first are not followed by the links of boards 0 and 1 alone.
+                    if self.links == Links::Front && obstacle == Obstacle::Stall(1) && !self.moving {
+                        self.links = Links::All;
+                    }
+                }
+                Err(obstacle) => {
+                    let near = |event: &&Event| event.travelled - self.at.travelled < NEAR * longest;
+                    if event.filter(near).is_some_and(|event| obstacle.is_of(event.kind)) {
+                        return Ok(());
+                    }
+                    self.give_up(obstacle)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn accept(&mut self, to: Knot, shown: Shown) -> Result<(), Halt> {
+        let Shown { step, body_forward } = shown;
+        let exact = &self.chain.exact;
+        if self.chain.start.is_none() {
+            self.chain.start = step.spans.first().map(|span| span.1);
+        }
+        self.covered &= body_forward;
+        if !self.covered {
+            self.links = Links::All;
+        } else if let (Links::All, Some(start), Some(second)) = (step.links, self.chain.start, step.spans.get(1))
+            && exact.in_order(start, second.0)
+        {
+            self.links = Links::Front;
+        }
+        (self.write)(&Line::Step(step))?;
+        self.at = to;
+        self.steps += 1;
+        if self.steps > self.given.most_steps {
+            return Err(Halt::Stuck(format!("the search was given up after {} steps", self.steps)));
+        }
+        Ok(())
+    }
+
+    /// Drops a claim that cannot be shown here, or the whole search.
+    fn give_up(&mut self, obstacle: Obstacle) -> Result<(), Halt> {
+        let time_lo = self.time(self.at.head).lo;
+        match obstacle {
+            Obstacle::Pair(a, b) if self.clear => {
+                let because = format!(
+                    "benches {} and {} (counting from 1) come so near that doubles cannot tell whether they touch",
+                    a + 1,
+                    b + 1
+                );
+                self.proofs[EventKind::Contact as usize] = Some(Status::Undecided { time_lo, because });
+                self.clear = false;
+                Ok(())
+            }
+            Obstacle::Stall(link) if self.moving => {
+                let because = format!(
+                    "bench {} (counting from 1) comes so near a stall that doubles cannot tell whether it does",
+                    link + 1
+                );
+                self.proofs[EventKind::Stall as usize] = Some(Status::Undecided { time_lo, because });
+                self.moving = false;
+                Ok(())
+            }
+            Obstacle::Stall(_) | Obstacle::Behind if self.links == Links::Front => {
+                self.links = Links::All;
+                self.covered = false;
+                Ok(())
+            }
+            Obstacle::Link(link) => Err(Halt::Stuck(format!(
+                "the rear handle of bench {} (counting from 1) cannot be enclosed there",
+                link + 1
+            ))),
+            Obstacle::Stall(_) | Obstacle::Behind | Obstacle::Pair(..) => {
+                Err(Halt::Stuck(format!("a step cannot be shown there: {obstacle:?}")))
+            }
+        }
+    }
+
+    fn proved(&self, from: Place, to: Place, bench_a: Option<u32>, bench_b: Option<u32>) -> Status {
+        let [bench_a, bench_b] = [bench_a, bench_b].map(|bench| bench.map(|bench| bench as usize));
+        Status::Proved { time_lo: self.time(from).lo, time_hi: self.time(to).hi, bench_a, bench_b }
+    }
+
+    /// Boards that overlap before anything has moved.
+    fn overlap_at_start(&mut self, event: &Event) -> Result<(), Halt> {
+        let (from, mut to) = (self.at.clone(), self.knot(LEAST * (1.0 + self.given.path.length())));
+        self.clear = false;
+        let status = if self.touch(event, from, &mut to)? {
+            let [bench_a, bench_b] = [event.bench_a, event.bench_b].map(|bench| bench.map(|bench| bench as usize));
+            Status::Proved { time_lo: 0.0, time_hi: 0.0, bench_a, bench_b }
+        } else {
+            let because = "the boards that overlap from the start do so too little for doubles".to_owned();
+            Status::Undecided { time_lo: 0.0, because }
+        };
+        self.proofs[EventKind::Contact as usize] = Some(status);
+        Ok(())
+    }
+
+    /// Writes that two boards have a point in common with the head between two knots, if that can be shown.
+    fn touch(&mut self, event: &Event, mut from: Knot, to: &mut Knot) -> Result<bool, Halt> {
+        let benches = [event.bench_a, event.bench_b].map(|bench| bench.unwrap_or(0) as usize);
+        let Some(handles) = self.chain.spans(&mut from, to, benches[1] + 1) else { return Ok(false) };
+        let Some(point) = self.chain.common_point(&handles, benches) else { return Ok(false) };
+        let spans = handles[1..].iter().map(|handle| handle.span).collect();
+        (self.write)(&Line::Contact { benches, from: from.head, to: to.head, spans, point })?;
+        Ok(true)
+    }
+
+    fn contact(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+        if !self.clear {
+            return Ok(());
+        }
+        let earliest = self.at.head;
+        self.clear = false;
+        for travelled in self.beyond(event) {
+            self.go_to(travelled, None, progress)?;
+            let (from, mut to) = (self.at.clone(), self.at.clone());
+            if self.touch(event, from, &mut to)? {
+                let status = self.proved(earliest, self.at.head, event.bench_a, event.bench_b);
+                self.proofs[EventKind::Contact as usize] = Some(status);
+                return Ok(());
+            }
+        }
+        let because = "whether the boards that come so near do touch cannot be shown with doubles".to_owned();
+        let status = Status::Undecided { time_lo: self.time(earliest).lo, because };
+        self.proofs[EventKind::Contact as usize] = Some(status);
+        Ok(())
+    }
+
+    fn stall(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+        if !self.moving {
+            return Ok(());
+        }
+        let earliest = self.at.head;
+        let link = event.bench_a.unwrap_or(0) as usize;
+        self.moving = false;
+        if link > 0 {
+            self.links = Links::All;
+        }
+        for travelled in self.beyond(event) {
+            self.go_to(travelled, None, progress)?;
+            let (mut from, mut to) = (self.at.clone(), self.at.clone());
+            let handles = self.chain.spans(&mut from, &mut to, link + 1);
+            let stalled =
+                |handles: &Vec<Spanned>| handles[link].capsule.product(&handles[link + 1].capsule, false).is_negative();
+            if let Some(handles) = handles.filter(stalled) {
+                let (head, spans) = (self.at.head, handles[1..].iter().map(|handle| handle.span).collect());
+                (self.write)(&Line::Stall { link, from: head, to: head, spans })?;
+                self.proofs[EventKind::Stall as usize] = Some(self.proved(earliest, head, event.bench_a, None));
+                return Ok(());
+            }
+        }
+        let because = "whether the link that comes so near a stall does stall cannot be shown with doubles".to_owned();
+        self.proofs[EventKind::Stall as usize] = Some(Status::Undecided { time_lo: self.time(earliest).lo, because });
+        Ok(())
+    }
+
+    fn lock(&mut self, event: &Event) -> Result<(), Halt> {
+        let link = event.bench_a.unwrap_or(0) as usize;
+        for travelled in self.beyond(event) {
+            let mut to = self.knot(travelled);
+            let Some(handles) = self.chain.spans(&mut self.at, &mut to, link) else { continue };
+            let mut end = to.clone();
+            let Some(last) = self.chain.spans(&mut to, &mut end, link) else { continue };
+            let (window, jump) = match self.chain.lock_window(&mut self.at, link, &handles[link], &last[link]) {
+                Some(window) => (Some(window), None),
+                None => (None, self.chain.lock_jump(&mut self.at, link, &handles[link], &last[link])),
+            };
+            if window.is_none() && jump.is_none() {
+                continue;
+            }
+            let spans = |handles: &[Spanned]| handles[1..].iter().map(|handle| handle.span).collect();
+            let line = Line::Lock { link, to: to.head, spans: spans(&handles), last: spans(&last), window, jump };
+            (self.write)(&line)?;
+            self.proofs[EventKind::Lock as usize] = Some(self.proved(self.at.head, to.head, event.bench_a, None));
+            return Ok(());
+        }
+        Err(Halt::Stuck(format!(
+            "whether bench {} (counting from 1) locks there cannot be shown with doubles",
+            link + 1
+        )))
+    }
+}
+
+/// A knot at the path's end or beyond it.
+pub(super) fn path_end(exact: &ExactPath, path: &Path) -> Knot {
+    let length = path.length();
+    let end = place(path.param_at(length));
+    let beyond = exact.moved(end, LEAST * (1.0 + length));
+    let inward = matches!(exact.segments[beyond.0].curve, super::path::Curve::Inward { .. });
+    let head = if inward { Place(beyond.0, 0.0) } else { beyond };
+    Knot::at(head, length)
+}

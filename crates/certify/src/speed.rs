@@ -1,0 +1,157 @@
+//! The greatest speed of any handle over the head's, enclosed: branch and bound over the head's travel. See "Lemma 7"
+//! in `docs/proofs.md`.
+//!
+//! In: a scene's motion and the travel between which handles are looked at. Out: two numbers between which the greatest
+//! ratio is, proved; nothing rests on a solver or on samples. `plan` calls it.
+
+mod step;
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use self::step::{Bounds, Speeds};
+use super::interval::Interval;
+use super::knot::{Knot, place};
+use super::path::{ExactPath, Place};
+use super::step::Chain;
+use bench_dragon_motion::Motion;
+
+/// Metres, as a share of the way, below which doubles tell no places apart.
+const LEAST: f64 = 1e-14;
+
+/// Handles that are enclosed before the search gives up: half a minute to a minute.
+const MOST_HANDLES: u64 = 8_000_000;
+
+/// The greatest speed of any handle over the head's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GreatestRatio {
+    /// At least so fast is the handle at the travel.
+    pub lo: f64,
+    /// No handle is ever faster; infinite where the search was given up before there was a bound.
+    pub hi: f64,
+    /// The handle, counted from 0.
+    pub handle: usize,
+    /// Metres of the head's travel at which it is at least as fast as `lo`.
+    pub travelled: f64,
+    /// A speed of it there that is meant, between what is proved of it.
+    pub ratio: f64,
+    /// Whether `hi` is within the tolerance of `lo`.
+    pub proved: bool,
+    /// Steps of the head that were enclosed.
+    pub steps: u64,
+}
+
+impl GreatestRatio {
+    /// A positive number over the ratio, from below and above.
+    pub fn divide(&self, number: f64) -> (f64, f64) {
+        if self.hi == 1.0 {
+            return (number, number);
+        }
+        let quotient = Interval::point(number).over(Interval { lo: self.lo, hi: self.hi });
+        (quotient.lo.max(0.0), quotient.hi.min(number))
+    }
+}
+
+/// A step of the head that may hold what is faster.
+struct Step {
+    upper: f64,
+    from: f64,
+    to: f64,
+}
+
+impl PartialEq for Step {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Step {}
+
+impl PartialOrd for Step {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Step {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.upper.total_cmp(&other.upper).then(other.from.total_cmp(&self.from))
+    }
+}
+
+/// The greatest speed of any handle over the head's while the head goes from its start so many metres, to a share of
+/// `tolerance`. `progress` gets a share of the work, from 0 to 1.
+pub fn greatest_ratio(motion: &Motion, travelled: f64, tolerance: f64, progress: &mut dyn FnMut(f64)) -> GreatestRatio {
+    let exact = ExactPath::new(motion.description());
+    let speeds = Speeds { chain: Chain::new(motion.path(), exact, motion.team()) };
+    Search { speeds, end: travelled, least: LEAST * (1.0 + motion.path().length()) }.run(tolerance, progress)
+}
+
+struct Search<'a> {
+    speeds: Speeds<'a>,
+    end: f64,
+    /// Metres that doubles tell apart.
+    least: f64,
+}
+
+impl Search<'_> {
+    fn run(&self, tolerance: f64, progress: &mut dyn FnMut(f64)) -> GreatestRatio {
+        // The head itself.
+        let mut best =
+            GreatestRatio { lo: 1.0, hi: 1.0, handle: 0, travelled: 0.0, ratio: 1.0, proved: false, steps: 0 };
+        let exact = &self.speeds.chain.exact;
+        let from = self.beyond(0.0, -1.0, |place| exact.travelled(place).hi <= 0.0);
+        let to = self.beyond(self.end, 1.0, |place| exact.travelled(place).lo >= self.end);
+        let Some((from, to)) = from.zip(to) else { return GreatestRatio { hi: f64::INFINITY, ..best } };
+        let mut open = BinaryHeap::from([Step { upper: f64::INFINITY, from, to }]);
+        let (mut settled, mut handles) = (1.0f64, 0);
+        let enough = |best: &GreatestRatio, upper: f64| upper <= best.lo * (1.0 + tolerance);
+        while let Some(Step { upper, from, to }) = open.pop() {
+            let middle = 0.5 * from + 0.5 * to;
+            let done = enough(&best, upper);
+            if done || handles > MOST_HANDLES || to - from < self.least {
+                return GreatestRatio { hi: upper.max(settled), proved: done, ..best };
+            }
+            for (from, to) in [(from, middle), (middle, to)] {
+                let bounds = self.bounds(from, to);
+                best.steps += 1;
+                handles += bounds.as_ref().map_or(1, |bounds| bounds.handles);
+                let travelled = 0.5 * from + 0.5 * to;
+                if let Some(Bounds { fastest, speed, .. }) = bounds
+                    && speed.lo > best.lo
+                    && (0.0..=self.end).contains(&travelled)
+                {
+                    best = GreatestRatio { lo: speed.lo, ratio: speed.middle(), handle: fastest, travelled, ..best };
+                }
+                let upper = bounds.map_or(f64::INFINITY, |bounds| bounds.upper);
+                if enough(&best, upper) {
+                    settled = settled.max(upper);
+                } else {
+                    open.push(Step { upper, from, to });
+                }
+            }
+            let wide = (open.peek().map_or(settled, |step| step.upper) / best.lo - 1.0).max(tolerance);
+            progress((wide.ln() / tolerance.ln()).clamp(0.0, 1.0));
+        }
+        GreatestRatio { hi: settled, proved: true, ..best }
+    }
+
+    /// Metres of travel a little to one side, of whose place it is sure.
+    fn beyond(&self, travelled: f64, side: f64, is_beyond: impl Fn(Place) -> bool) -> Option<f64> {
+        let mut others = (0..40).map(|power| travelled + side * self.least * 2f64.powi(power));
+        others.find(|other| is_beyond(self.knot(*other).head))
+    }
+
+    fn bounds(&self, from: f64, to: f64) -> Option<Bounds> {
+        let [mut from, mut middle, mut to] = [from, 0.5 * from + 0.5 * to, to].map(|travelled| self.knot(travelled));
+        self.speeds.over(&mut from, &mut middle, &mut to)
+    }
+
+    fn knot(&self, travelled: f64) -> Knot {
+        let Chain { path, exact, .. } = &self.speeds.chain;
+        if travelled <= self.end {
+            return Knot::new(path, exact, travelled);
+        }
+        Knot::at(exact.moved(place(path.param_at(self.end)), travelled - self.end), travelled)
+    }
+}

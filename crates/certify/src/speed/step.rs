@@ -1,0 +1,216 @@
+//! Speeds over one step of the head: the ratio of every handle's speed to the head's, enclosed. See "Lemma 7" in
+//! `docs/proofs.md`. In: two places of the head. Out: bounds. Only [`super`] uses it.
+
+use super::super::capsule::{Capsule, Span, Spanned};
+use super::super::interval::{Interval, cross, dot, minus, norm, scaled};
+use super::super::knot::{Knot, param, span};
+use super::super::link::follower_within;
+use super::super::path::{Curve, Place};
+use super::super::step::Chain;
+use bench_dragon_motion::linkage::follower;
+
+/// How much longer than a unit in the last place the span of the follower of one place is made, in turn.
+const PADS: [f64; 4] = [4.0, 64.0, 1024.0, 16384.0];
+
+/// How often the bounds of a link's ratio are made narrower by those of its rate.
+const ROUNDS: usize = 2;
+
+/// The speed of a handle over the head's.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Speed {
+    /// With the head anywhere in the step.
+    pub ratio: Interval,
+    /// How fast that changes, per metre of the head.
+    rate: Interval,
+}
+
+/// A handle's speed with the head at one place.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    speed: Interval,
+    /// The speed of the handle behind over this one's.
+    link: Interval,
+    /// How fast that changes, per metre of this handle.
+    link_rate: Interval,
+}
+
+/// What is proved of a step.
+#[derive(Debug, Clone)]
+pub(super) struct Bounds {
+    /// No handle is faster anywhere in the step, times the head.
+    pub upper: f64,
+    /// The fastest handle with the head at the middle, and its speed there.
+    pub fastest: usize,
+    pub speed: Interval,
+    /// Handles that were enclosed.
+    pub handles: u64,
+}
+
+/// Speeds of a team on a path.
+pub(super) struct Speeds<'a> {
+    pub chain: Chain<'a>,
+}
+
+impl Speeds<'_> {
+    /// The bounds over the step from one place of the head to another, if they can be enclosed.
+    pub fn over(&self, from: &mut Knot, middle: &mut Knot, to: &mut Knot) -> Option<Bounds> {
+        let exact = &self.chain.exact;
+        if !(exact.in_order(from.head, middle.head) && exact.in_order(middle.head, to.head)) {
+            return None;
+        }
+        let wide = self.chain.spans_until(from, to, |handles| self.is_enough(handles))?;
+        let mut same = middle.clone();
+        let thin = self.chain.spans_until(middle, &mut same, |handles| handles.len() >= wide.len())?;
+        let samples = self.samples(&thin)?;
+        let greatest =
+            |one: (usize, Interval), other: (usize, Interval)| if other.1.lo > one.1.lo { other } else { one };
+        let speeds = samples.iter().map(|sample| sample.speed.abs()).enumerate();
+        let (fastest, speed) = speeds.reduce(greatest)?;
+        let half = exact.length(from.head, middle.head).max(exact.length(middle.head, to.head));
+        let upper = self.greatest(&wide, &samples, half).unwrap_or(f64::INFINITY);
+        let handles = (thin.len() + wide.len()) as u64;
+        Some(Bounds { upper, fastest, speed, handles })
+    }
+
+    /// Whether no handle behind the last of these can be faster than it.
+    fn is_enough(&self, handles: &[Spanned]) -> bool {
+        let (last, benches) = (handles.len() - 1, self.chain.team.benches);
+        let Place(segment, at) = handles[last].span.1;
+        if last == benches {
+            return true;
+        }
+        if segment > 0 {
+            return false;
+        }
+        match self.chain.exact.segments[0].curve {
+            Curve::Line { .. } => true,
+            Curve::Inward { a } => {
+                let longest = if last == 0 { self.chain.link(0).max(self.chain.link(1)) } else { self.chain.link(1) };
+                let square = Interval::point(at).square();
+                let turned = longest * (square + Interval::point(2.0));
+                turned.is_below(a * at * 2.0 * (square + Interval::ONE))
+            }
+            _ => false,
+        }
+    }
+
+    /// Handles' speeds with the head at one place, from the spans of the handles that rounding leaves.
+    fn samples(&self, thin: &[Spanned]) -> Option<Vec<Sample>> {
+        let mut speed = Interval::ONE;
+        let mut samples = Vec::with_capacity(thin.len());
+        for (link, pair) in thin.windows(2).enumerate() {
+            let [front, rear] = pair else { return None };
+            if self.is_rigid(front, rear) {
+                samples.push(Sample { speed, link: Interval::ONE, link_rate: Interval::ZERO });
+                continue;
+            }
+            let rear_cosine = front.capsule.product(&rear.capsule, true).lo / self.chain.link(link).hi;
+            let ratio = self.ratio_at(front.capsule.middle, link, rear_cosine)?;
+            let crude = product_ratio(&front.capsule, &rear.capsule);
+            let rate = self.rate(front, rear, crude);
+            let ratio = ratio + Interval::within(front.capsule.half) * rate;
+            samples.push(Sample { speed, link: ratio, link_rate: rate });
+            speed = speed * ratio;
+        }
+        samples.push(Sample { speed, link: Interval::ONE, link_rate: Interval::ZERO });
+        Some(samples)
+    }
+
+    /// The rear handle's speed over the front's, with the front at one place; the rear cosine is needed roughly.
+    fn ratio_at(&self, front: Place, link: usize, rear_cosine: f64) -> Option<Interval> {
+        let Chain { path, exact, team, .. } = &self.chain;
+        let rear = follower(path, param(front), team.link(link)).ok()?;
+        let front = Spanned::new(exact, Span(front, front));
+        let turned = match exact.curve(front.span.0) {
+            Curve::Inward { .. } | Curve::Outward { .. } => front.span.0.1,
+            _ => 0.0,
+        };
+        let length = self.chain.link(link);
+        let size = length.hi + (front.first[0].magnitude() + front.first[1].magnitude()) * (1.0 + 0.1 * turned);
+        PADS.iter().find_map(|pad| {
+            let rear = Spanned::new(exact, span(exact, rear, rear, pad * f64::EPSILON * size / rear_cosine.max(1e-12)));
+            follower_within(exact, &front, &rear, length)?;
+            Some(product_ratio(&front.capsule, &rear.capsule))
+        })
+    }
+
+    /// Whether two handles are on one line or one circle all the while.
+    fn is_rigid(&self, front: &Spanned, rear: &Spanned) -> bool {
+        let segment = rear.span.0.0;
+        segment == front.span.1.0
+            && matches!(self.chain.exact.segments[segment].curve, Curve::Line { .. } | Curve::Arc { .. })
+    }
+
+    /// How fast the rear handle's speed over the front's changes, per metre of the front.
+    fn rate(&self, front: &Spanned, rear: &Spanned, ratio: Interval) -> Interval {
+        let (u, x) = (&front.capsule, &rear.capsule);
+        let bend = |span: Span| self.chain.exact.bend(span.0, span.1);
+        let middle = Interval::point(ratio.middle());
+        let apart = norm(minus(u.tangent, scaled(x.tangent, middle)));
+        let off = u.turned() + x.turned() * middle.magnitude() + (ratio - middle).abs();
+        let apart = apart + Interval::within(off.hi);
+        let bends = bend(front.span) * u.across(x, false) - ratio.square() * bend(rear.span) * u.across(x, true);
+        (apart.square() + bends).over(u.product(x, true))
+    }
+
+    /// How fast that changes in turn, per metre of the front; `None` where a handle passes from one segment to another.
+    fn rate_of_rate(&self, front: &Spanned, rear: &Spanned, ratio: Interval, rate: Interval) -> Option<Interval> {
+        let (u, x) = (&front.capsule, &rear.capsule);
+        let exact = &self.chain.exact;
+        let bend = |span: Span| exact.bend(span.0, span.1);
+        let bend_rate = |span: Span| exact.bend_rate(span.0, span.1);
+        let (front_rate, rear_rate) = (bend_rate(front.span)?, bend_rate(rear.span)?);
+        let (front_bend, rear_bend) = (bend(front.span), ratio * bend(rear.span));
+        let (front_across, rear_across) = (u.across(x, false), u.across(x, true));
+        let turned = Interval::within((u.turned() + x.turned()).hi);
+        let (sine, cosine) = (cross(x.tangent, u.tangent) + turned, dot(x.tangent, u.tangent) + turned);
+        let change = rate * 3.0 * (ratio - cosine - rear_bend * rear_across)
+            + (front_bend - rear_bend) * (ratio * 3.0 * sine - u.product(x, false) * (front_bend + rear_bend))
+            + front_rate * front_across
+            - ratio * ratio.square() * rear_rate * rear_across;
+        Some(change.over(u.product(x, true)))
+    }
+
+    /// At least the greatest speed of any handle over the step.
+    fn greatest(&self, wide: &[Spanned], samples: &[Sample], half: f64) -> Option<f64> {
+        let mut front = Speed { ratio: Interval::ONE, rate: Interval::ZERO };
+        let mut greatest = 1.0f64;
+        for (link, pair) in wide.windows(2).enumerate() {
+            let [ahead, behind] = pair else { return None };
+            if self.is_rigid(ahead, behind) {
+                continue;
+            }
+            let (sample, rear) = (samples[link], samples[link + 1]);
+            let moved = (Interval::point(half) * front.ratio.magnitude()).hi.min(2.0 * ahead.capsule.half);
+            let mut ratio = product_ratio(&ahead.capsule, &behind.capsule);
+            let mut rate = Interval::ZERO;
+            for _ in 0..ROUNDS {
+                rate = self.rate(ahead, behind, ratio);
+                if let Some(change) = self.rate_of_rate(ahead, behind, ratio, rate) {
+                    rate = intersection(rate, sample.link_rate + Interval::within(moved) * change)?;
+                }
+                ratio = intersection(ratio, sample.link + Interval::within(moved) * rate)?;
+            }
+            let rate = front.rate * ratio + front.ratio.square() * rate;
+            let ratio = intersection(front.ratio * ratio, rear.speed + Interval::within(half) * rate)?;
+            front = Speed { ratio, rate };
+            // Also where it is not a number.
+            if !ratio.magnitude().is_finite() {
+                return None;
+            }
+            greatest = greatest.max(ratio.magnitude());
+        }
+        Some(greatest)
+    }
+}
+
+/// The front product over the rear product, over two spans.
+fn product_ratio(front: &Capsule, rear: &Capsule) -> Interval {
+    front.product(rear, false).over(front.product(rear, true))
+}
+
+/// What two enclosures of one number have in common; `None` for what cannot be.
+fn intersection(one: Interval, other: Interval) -> Option<Interval> {
+    let (lo, hi) = (one.lo.max(other.lo), one.hi.min(other.hi));
+    (lo <= hi).then_some(Interval { lo, hi })
+}

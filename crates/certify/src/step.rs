@@ -1,0 +1,310 @@
+//! One step of the head: the spans of the handles, and whether the lemmas hold over them. Only [`super`] uses it.
+
+use super::boards::{MovingBoard, Shape};
+use super::capsule::{Span, Spanned, moved_back};
+use super::interval::Interval;
+use super::knot::{Knot, span};
+use super::lines::{Links, Step};
+use super::link::{Front, follower_within};
+use super::path::{Curve, ExactPath, Place};
+use bench_dragon_messages::state::EventKind;
+use bench_dragon_motion::model::Point;
+use bench_dragon_motion::model::board::Board;
+use bench_dragon_motion::model::path::Path;
+use bench_dragon_motion::model::separation::overlap_centre;
+use bench_dragon_motion::model::team::Team;
+
+/// What a step is to show.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Claim {
+    pub links: Links,
+    pub moving: bool,
+    pub clear: bool,
+}
+
+/// What could not be shown of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Obstacle {
+    /// A link's follower cannot be enclosed.
+    Link(usize),
+    /// A link's front product is not surely positive.
+    Stall(usize),
+    /// Handle 1 may be behind where it started.
+    Behind,
+    /// Two boards may touch.
+    Pair(usize, usize),
+}
+
+impl Obstacle {
+    /// Whether an event of a kind is what stands in the way.
+    pub fn is_of(self, kind: EventKind) -> bool {
+        match self {
+            Self::Pair(..) => kind == EventKind::Contact,
+            Self::Stall(_) => kind == EventKind::Stall,
+            Self::Link(_) => kind == EventKind::Lock,
+            Self::Behind => false,
+        }
+    }
+}
+
+/// A step that holds.
+pub(super) struct Shown {
+    pub step: Step,
+    /// Whether every link behind the head's surely goes forward.
+    pub body_forward: bool,
+}
+
+/// A team on a path, in intervals.
+pub(super) struct Chain<'a> {
+    pub path: &'a Path,
+    pub exact: ExactPath,
+    pub team: &'a Team,
+    pub links: [Interval; 2],
+    pub shape: Shape,
+    /// A bound of S of Lemma 4: no earlier than where handle 1 started.
+    pub start: Option<Place>,
+}
+
+/// How much longer than the rounding of doubles a span is made, at both ends.
+const PAD: f64 = 64.0 * f64::EPSILON;
+
+/// How many times that is tried, in turn.
+pub(super) const PADS: [f64; 3] = [1.0, 16.0, 256.0];
+
+/// Metres between the handles of the head's bench, and of every other.
+pub(super) fn links_of(team: &Team) -> [Interval; 2] {
+    [team.head_length, team.body_length].map(|length| Interval::point(length) - Interval::point(team.hole_inset) * 2.0)
+}
+
+impl<'a> Chain<'a> {
+    pub fn new(path: &'a Path, exact: ExactPath, team: &'a Team) -> Self {
+        Self { path, exact, team, links: links_of(team), shape: Shape::new(team), start: None }
+    }
+
+    /// Metres between the handles of a bench.
+    pub fn link(&self, bench: usize) -> Interval {
+        self.links[bench.min(1)]
+    }
+
+    /// Shows a claim over the step between two knots, or tells what stands in the way.
+    pub fn show(&self, from: &mut Knot, to: &mut Knot, claim: Claim) -> Result<Shown, Obstacle> {
+        let mut unlinked = None;
+        for pads in PADS {
+            match self.show_with(from, to, claim, pads) {
+                // Where spans that are wider are long enough for the links, it is something else that stands in the way.
+                Err(Obstacle::Link(link)) => unlinked = unlinked.or(Some(link)),
+                other => return other,
+            }
+        }
+        Err(Obstacle::Link(unlinked.unwrap_or(0)))
+    }
+
+    fn show_with(&self, from: &mut Knot, to: &mut Knot, claim: Claim, pads: f64) -> Result<Shown, Obstacle> {
+        let mut listed = Listed::new(self, Span(from.head, to.head), pads);
+        while listed.handles.len() <= self.team.benches && !listed.is_enough(claim) {
+            listed.extend(from, to, claim)?;
+        }
+        if claim.clear {
+            listed.boards_are_apart(claim.links)?;
+        }
+        let spans = listed.handles[1..].iter().map(|handle| handle.span).collect();
+        let Claim { links, moving, clear } = claim;
+        let step = Step { links, from: from.head, to: to.head, moving, clear, spans };
+        Ok(Shown { step, body_forward: listed.body_forward })
+    }
+
+    /// Handles 0 to `handle` between two knots, if Lemma 1 holds for every link between them.
+    pub fn spans(&self, from: &mut Knot, to: &mut Knot, handle: usize) -> Option<Vec<Spanned>> {
+        self.spans_until(from, to, |handles| handles.len() > handle)
+    }
+
+    /// Handles from 0 on between two knots, until they are enough, if Lemma 1 holds for every link between them.
+    pub fn spans_until(
+        &self,
+        from: &mut Knot,
+        to: &mut Knot,
+        enough: impl Fn(&[Spanned]) -> bool,
+    ) -> Option<Vec<Spanned>> {
+        let claim = Claim { links: Links::All, moving: false, clear: false };
+        PADS.iter().find_map(|pads| {
+            let mut listed = Listed::new(self, Span(from.head, to.head), *pads);
+            while !enough(&listed.handles) {
+                listed.extend(from, to, claim).ok()?;
+            }
+            Some(listed.handles)
+        })
+    }
+
+    /// A point that is surely in both boards.
+    pub fn common_point(&self, handles: &[Spanned], benches: [usize; 2]) -> Option<[f64; 2]> {
+        let (inset, width) = (self.shape.inset.middle(), 2.0 * self.shape.half_width.middle());
+        let boards = benches.map(|bench| {
+            let [front, rear] = [bench, bench + 1].map(|handle| {
+                let [x, y] = handles[handle].capsule.point.map(Interval::middle);
+                Point::new(x, y)
+            });
+            Board::from_handles(front, rear, inset, width)
+        });
+        let point: [f64; 2] = overlap_centre(&boards[0], &boards[1]).into();
+        let holds = |bench: &usize| self.board(handles, *bench).holds(point.map(Interval::point));
+        benches.iter().all(holds).then_some(point)
+    }
+
+    /// The board of a bench over listed handles.
+    pub fn board(&self, handles: &[Spanned], bench: usize) -> MovingBoard {
+        self.shape.board(handles[bench].capsule, handles[bench + 1].capsule, self.link(bench))
+    }
+}
+
+/// The handles of a step that have been enclosed.
+pub(super) struct Listed<'c, 'a> {
+    chain: &'c Chain<'a>,
+    pub handles: Vec<Spanned>,
+    pad: f64,
+    pads: f64,
+    /// Whether every link behind the head's surely goes forward.
+    pub body_forward: bool,
+}
+
+impl<'c, 'a> Listed<'c, 'a> {
+    pub fn new(chain: &'c Chain<'a>, head: Span, pads: f64) -> Self {
+        let handles = vec![Spanned::new(&chain.exact, head)];
+        Self { chain, handles, pad: 0.0, pads, body_forward: true }
+    }
+
+    /// Goes on behind handles that are enclosed already, the last of them in exactly the span between two knots.
+    pub fn behind(chain: &'c Chain<'a>, handles: Vec<Spanned>, pads: f64) -> Self {
+        Self { chain, handles, pad: 0.0, pads, body_forward: true }
+    }
+
+    /// Whether a handle is on a straight line without a beginning.
+    pub fn is_on_line(&self, handle: usize) -> bool {
+        let Chain { exact, .. } = self.chain;
+        self.handles[handle].span.1.0 == 0 && matches!(exact.segments[0].curve, Curve::Line { .. })
+    }
+
+    /// At least how far all handles from this one on are from the centre; minus infinity where they may be anywhere.
+    fn ring(&self, handle: usize) -> f64 {
+        let Place(segment, theta) = self.handles[handle].span.1;
+        match self.chain.exact.segments[0].curve {
+            Curve::Inward { a } if segment == 0 => (a * theta).lo,
+            _ => f64::NEG_INFINITY,
+        }
+    }
+
+    fn ring_holds(&self, board: usize, from_handle: usize) -> bool {
+        self.is_beyond(0.0, &self.chain.board(&self.handles, board), from_handle)
+    }
+
+    /// Whether all boards whose handles are this one or behind it are further than `metres` from one further in.
+    pub fn is_beyond(&self, metres: f64, inner: &MovingBoard, from_handle: usize) -> bool {
+        let Chain { shape, links, .. } = self.chain;
+        shape.innermost(self.ring(from_handle), links[1])
+            > (Interval::point(shape.outermost(inner)) + Interval::point(metres)).hi
+    }
+
+    /// Whether the handles that are listed are all that the claim needs.
+    fn is_enough(&self, claim: Claim) -> bool {
+        let last = self.handles.len() - 1;
+        if last < 2 {
+            return false;
+        }
+        match claim.links {
+            Links::Front if !claim.clear => true,
+            Links::Front if matches!(self.chain.exact.segments[0].curve, Curve::Inward { .. }) => {
+                self.ring_holds(0, last) && self.ring_holds(1, last)
+            }
+            _ => self.is_on_line(last),
+        }
+    }
+
+    /// Encloses one handle more.
+    pub fn extend(&mut self, from: &mut Knot, to: &mut Knot, claim: Claim) -> Result<(), Obstacle> {
+        let Chain { path, exact, team, start, .. } = self.chain;
+        let link = self.handles.len() - 1;
+        let solved = from.extend_to(link + 1, path, team).and_then(|()| to.extend_to(link + 1, path, team));
+        solved.map_err(|_| Obstacle::Link(link))?;
+        let front = self.handles[link];
+        let ends = [from.handles[link + 1], to.handles[link + 1]];
+        let length = self.chain.link(link);
+        // A unit in the last place of a spiral's coordinate theta is theta times as many metres as one of its radius.
+        let turned = if matches!(exact.curve(front.span.0), Curve::Inward { .. } | Curve::Outward { .. }) {
+            front.span.0.1
+        } else {
+            0.0
+        };
+        let radius = front.first[0].magnitude() + front.first[1].magnitude();
+        let size = length.hi + radius * (1.0 + 0.1 * turned);
+        let rear_cosine = ends[0].rear_cosine.min(ends[1].rear_cosine).max(1e-12);
+        let front_cosine = ends.iter().map(|end| end.front_cosine.abs()).fold(0.0, f64::max);
+        let mut pad = (self.pads * PAD * size + 1.000_001 * self.pad * front_cosine) / rear_cosine;
+        let turns = ends[0].front_cosine.signum() != ends[1].front_cosine.signum();
+        if turns {
+            let half = front.capsule.half;
+            pad += 4.0 * (1.0 + front.capsule.curvature * length.hi) * half * (half / length.lo) / rear_cosine;
+        }
+        self.pad = pad;
+        let rear = Spanned::new(exact, span(exact, ends[0].param, ends[1].param, pad));
+        let sign = follower_within(exact, &front, &rear, length).ok_or(Obstacle::Link(link))?;
+        let forward = sign == Front::Forward;
+        if !forward && (claim.moving || link == 1 && claim.links == Links::Front) {
+            return Err(Obstacle::Stall(link));
+        }
+        if link == 0 && claim.links == Links::Front && !start.is_some_and(|start| exact.in_order(start, rear.span.0)) {
+            return Err(Obstacle::Behind);
+        }
+        self.body_forward &= forward || link == 0;
+        self.handles.push(rear);
+        Ok(())
+    }
+
+    /// Shows that boards are apart: all of them, or those of boards 0 and 1.
+    fn boards_are_apart(&self, links: Links) -> Result<(), Obstacle> {
+        let (chain, benches) = (self.chain, self.chain.team.benches);
+        let listed = self.handles.len() - 1;
+        let boards: Vec<_> = (0..listed).map(|bench| chain.board(&self.handles, bench)).collect();
+        let is_spiral = matches!(chain.exact.segments[0].curve, Curve::Inward { .. });
+        let firsts = if links == Links::All { listed } else { listed.min(2) };
+        for (a, board) in boards[..firsts].iter().enumerate() {
+            let outermost = chain.shape.outermost(board);
+            let mut beyond = false;
+            for (b, other) in boards.iter().enumerate().skip(a + 2) {
+                beyond = is_spiral && chain.shape.innermost(self.ring(b), chain.links[1]) > outermost;
+                if beyond {
+                    break;
+                }
+                if !board.is_apart_from(other) {
+                    return Err(Obstacle::Pair(a, b));
+                }
+            }
+            // The boards that are not listed.
+            let next = listed.max(a + 2);
+            if next < benches && !beyond {
+                let apart = if is_spiral {
+                    chain.shape.innermost(self.ring(listed), chain.links[1]) > outermost
+                } else {
+                    board.is_apart_from(&self.straight_run(next))
+                };
+                if !apart {
+                    return Err(Obstacle::Pair(a, next));
+                }
+            }
+        }
+        if links == Links::All && !is_spiral && listed < benches {
+            let inset = Interval::point(chain.team.hole_inset) * 2.0;
+            if !inset.is_below(chain.links[1]) {
+                return Err(Obstacle::Pair(listed, listed + 2));
+            }
+        }
+        Ok(())
+    }
+
+    /// The boards from `first` to the last, all on the line on which the last listed handle is.
+    pub fn straight_run(&self, first: usize) -> MovingBoard {
+        let (chain, listed) = (self.chain, self.handles.len() - 1);
+        let link = chain.links[1];
+        let back = |handles: usize| moved_back(&self.handles[listed].capsule, link * handles as f64);
+        let benches = chain.team.benches;
+        chain.shape.board(back(first - listed), back(benches - listed), link * (benches - first) as f64)
+    }
+}

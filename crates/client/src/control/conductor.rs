@@ -1,0 +1,263 @@
+//! Conducting from a thread of its own, so that whoever commands never waits: neither for the answer nor for a
+//! publisher that hangs.
+//!
+//! In: an [`Action`] with a tag. Out: the tag and what became of it, handed to a function on that thread. Called by
+//! `watch` for its keys and by the stage picture's server for its browsers.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use super::{ControlError, Controller, PATIENCE, PendingCommand, Vigil};
+use bench_dragon_messages::ControlResponse;
+use bench_dragon_messages::control::{Code, Command};
+use bench_dragon_messages::state::PlaybackState;
+
+/// How often responses are looked for while some are awaited.
+const POLL_INTERVAL: Duration = Duration::from_micros(500);
+/// After so long without a command the service is let go of, so that it can be made anew by another publisher.
+const IDLE: Duration = Duration::from_secs(1);
+/// Commands that may be sent and unanswered at once, and holds besides: the service admits 8 of a client, and one asks
+/// whether a step makes progress.
+const MOST_PENDING: usize = 4;
+const MOST_HOLDS: usize = 3;
+/// Commands that may be unanswered, sent or not.
+const MOST_WAITING: usize = 64;
+/// What overtakes all that waits, which is then dropped: nothing that was asked before a hold is done after it.
+const HOLD: Action = Action::Send(Command::Hold);
+
+/// What a person asks of a show: a command, or one that depends on how the show stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Action {
+    /// This command.
+    Send(Command),
+    /// Pause a show that plays, resume one that is paused or waits.
+    Toggle,
+    /// So many simulated seconds forward or back, within 0 and the end.
+    SeekBy {
+        /// Simulated seconds, negative for back.
+        seconds: f64,
+        /// Simulated seconds at which the show freezes; infinite where that is not known.
+        end: f64,
+    },
+}
+
+impl Action {
+    /// The command, where the show stands as a response reports.
+    pub fn command(self, state: &ControlResponse) -> Command {
+        match self {
+            Self::Send(command) => command,
+            // A resume also ends the waiting at a cue or at the start. While held it is refused, which says why.
+            Self::Toggle => match state.playback_state() {
+                Some(PlaybackState::Paused | PlaybackState::Held) => Command::Resume,
+                _ => Command::Pause,
+            },
+            Self::SeekBy { seconds, end } => Command::Seek((state.sim_time + seconds).min(end).max(0.0)),
+        }
+    }
+}
+
+/// What became of an action: the command it came to and the response to it.
+pub type Conducted = Result<(Command, ControlResponse), ControlError>;
+
+/// Too many commands wait already: the publisher does not keep up, or does not answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("too many commands are waiting")]
+pub struct TooMany;
+
+/// A thread that conducts the publisher of one name, through any number of publishers. Dropping it ends the thread;
+/// what has no answer by then gets none.
+pub struct Conductor<Tag> {
+    requests: Option<Sender<(Tag, Action)>>,
+    unanswered: Arc<AtomicUsize>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl<Tag: Send + 'static> Conductor<Tag> {
+    /// Starts the thread. `handle` is called on it with the tag of each action and what became of it.
+    ///
+    /// # Errors
+    /// The system's, where it has no thread left.
+    pub fn start(name: &str, handle: impl FnMut(Tag, Conducted) + Send + 'static) -> std::io::Result<Self> {
+        let (sender, receiver) = channel();
+        let unanswered = Arc::new(AtomicUsize::new(0));
+        let (name, counter) = (name.to_owned(), Arc::clone(&unanswered));
+        let thread = std::thread::Builder::new().name("conductor".to_owned()).spawn(move || {
+            let (waiting, pending) = (VecDeque::new(), Vec::new());
+            let (controller, vigil) = (None, Vigil::new());
+            Conducting { name, controller, unanswered: counter, waiting, pending, vigil, handle }.run(&receiver);
+        });
+        let thread = Some(thread?);
+        Ok(Self { requests: Some(sender), unanswered, thread })
+    }
+
+    /// Asks for an action. A hold overtakes all that waits; that gets [`ControlError::Overtaken`].
+    ///
+    /// # Errors
+    /// [`TooMany`]: nothing will become of it.
+    pub fn request(&self, tag: Tag, action: Action) -> Result<(), TooMany> {
+        let most = if action == HOLD { MOST_WAITING + MOST_HOLDS } else { MOST_WAITING };
+        if self.unanswered.fetch_add(1, Ordering::Relaxed) < most
+            && let Some(requests) = &self.requests
+            && requests.send((tag, action)).is_ok()
+        {
+            return Ok(());
+        }
+        self.unanswered.fetch_sub(1, Ordering::Relaxed);
+        Err(TooMany)
+    }
+}
+
+impl<Tag> Drop for Conductor<Tag> {
+    fn drop(&mut self) {
+        self.requests = None;
+        if let Some(thread) = self.thread.take() {
+            // A panic has been printed by then.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// An action that has been sent.
+struct Pending<Tag> {
+    tag: Tag,
+    action: Action,
+    /// The action's command, or, where that depends on how the show stands, the question how it does.
+    command: Command,
+    /// Whether it has been sent before, to a publisher that was gone.
+    repeated: bool,
+    /// Whether a hold has come since: nothing more is sent for it.
+    overtaken: bool,
+    sent: Instant,
+    response: PendingCommand,
+}
+
+/// What the thread owns; made there, since ports stay on the thread that made them.
+struct Conducting<Tag, Handle> {
+    name: String,
+    controller: Option<Controller>,
+    unanswered: Arc<AtomicUsize>,
+    waiting: VecDeque<(Tag, Action)>,
+    pending: Vec<Pending<Tag>>,
+    vigil: Vigil,
+    handle: Handle,
+}
+
+impl<Tag, Handle: FnMut(Tag, Conducted)> Conducting<Tag, Handle> {
+    fn run(&mut self, requests: &Receiver<(Tag, Action)>) {
+        loop {
+            let patience = if self.pending.is_empty() { IDLE } else { POLL_INTERVAL };
+            match requests.recv_timeout(patience) {
+                Ok((tag, action)) if action == HOLD => self.hold(tag),
+                Ok(request) => self.waiting.push_back(request),
+                Err(RecvTimeoutError::Timeout) if self.pending.is_empty() => self.controller = None,
+                Err(RecvTimeoutError::Timeout) => (),
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+            while let Some((tag, action)) = self.next_waiting() {
+                self.begin(tag, action, false);
+            }
+            self.poll();
+        }
+    }
+
+    /// Drops what waits, but for holds, and has the hold sent next.
+    fn hold(&mut self, tag: Tag) {
+        let (holds, overtaken) = self.waiting.drain(..).partition(|(_, action)| *action == HOLD);
+        self.waiting = holds;
+        self.waiting.push_back((tag, HOLD));
+        let overtaken: VecDeque<_> = overtaken;
+        overtaken.into_iter().for_each(|(tag, _)| self.answer(tag, Err(ControlError::Overtaken)));
+        self.pending.iter_mut().for_each(|pending| pending.overtaken = pending.action != HOLD);
+    }
+
+    /// The next action that may be sent by now: what depends on how the show stands goes before all that came after it,
+    /// but a hold.
+    fn next_waiting(&mut self) -> Option<(Tag, Action)> {
+        let is_hold = self.waiting.front()?.1 == HOLD;
+        if !is_hold && self.pending.iter().any(|pending| !matches!(pending.action, Action::Send(_))) {
+            return None;
+        }
+        let most = if is_hold { MOST_PENDING + MOST_HOLDS } else { MOST_PENDING };
+        if self.pending.len() < most { self.waiting.pop_front() } else { None }
+    }
+
+    fn begin(&mut self, tag: Tag, action: Action, repeated: bool) {
+        let command = if let Action::Send(command) = action { command } else { Command::State };
+        self.send(tag, action, command, repeated);
+    }
+
+    fn send(&mut self, tag: Tag, action: Action, command: Command, repeated: bool) {
+        match self.request(command) {
+            Ok(response) => {
+                if self.pending.is_empty() {
+                    self.vigil = Vigil::new();
+                }
+                let sent = Instant::now();
+                self.pending.push(Pending { tag, action, command, repeated, overtaken: false, sent, response });
+            }
+            Err(error) => self.answer(tag, Err(error)),
+        }
+    }
+
+    fn request(&mut self, command: Command) -> Result<PendingCommand, ControlError> {
+        let controller = match &mut self.controller {
+            Some(controller) => controller,
+            none => none.insert(Controller::new(&self.name)?),
+        };
+        controller.request(command)
+    }
+
+    /// Looks for the responses to all that are pending, in the order in which they were sent.
+    fn poll(&mut self) {
+        let alive = match &mut self.controller {
+            _ if self.pending.is_empty() => return,
+            Some(controller) => self.vigil.check(controller),
+            None => Err(ControlError::Ended(self.name.clone())),
+        };
+        let now = Instant::now();
+        let mut repeats = Vec::new();
+        for pending in std::mem::take(&mut self.pending) {
+            let Pending { action, command, repeated, overtaken, sent, .. } = pending;
+            let polled = match pending.response.poll() {
+                Ok(None) if alive.is_err() => Err(ControlError::Ended(self.name.clone())),
+                Ok(None) if now < self.vigil.deadline(command, sent) => {
+                    self.pending.push(pending);
+                    continue;
+                }
+                Ok(None) => Err(ControlError::NoAnswer { name: self.name.clone(), timeout: PATIENCE }),
+                Ok(Some(response)) => Ok(response),
+                Err(error) => Err(error),
+            };
+            let tag = pending.tag;
+            let is_question = command == Command::State && action != Action::Send(Command::State);
+            match polled {
+                // A question that was refused has told nothing.
+                Ok(state) if is_question && matches!(state.result(), Some(Code::Done | Code::Already)) => {
+                    if overtaken {
+                        self.answer(tag, Err(ControlError::Overtaken));
+                    } else {
+                        self.send(tag, action, action.command(&state), repeated);
+                    }
+                }
+                // The publisher may have been started again since the service was opened.
+                Err(ControlError::NoPublisher(_) | ControlError::Ended(_)) if !repeated && !overtaken => {
+                    repeats.push((tag, action));
+                }
+                polled => self.answer(tag, polled.map(|response| (command, response))),
+            }
+        }
+        if !repeats.is_empty() || alive.is_err() {
+            self.controller = None;
+        }
+        repeats.into_iter().for_each(|(tag, action)| self.begin(tag, action, true));
+    }
+
+    fn answer(&mut self, tag: Tag, conducted: Conducted) {
+        self.unanswered.fetch_sub(1, Ordering::Relaxed);
+        (self.handle)(tag, conducted);
+    }
+}

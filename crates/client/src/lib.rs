@@ -1,0 +1,13 @@
+//! Programs in processes of their own that follow a running publisher: all that a subscriber in Rust compiles.
+//!
+//! [`feed`] is the one source of a publisher's messages; [`hermite`] interpolates between frames; [`control`] sends commands.
+//! This crate knows the messages and no solver.
+
+pub mod clock;
+pub mod connection;
+pub mod control;
+pub mod feed;
+pub mod hermite;
+pub mod monitor;
+pub mod polling;
+pub mod shared_memory;

@@ -1,0 +1,154 @@
+//! What can go wrong with iceoryx2's services, each in one sentence that names a remedy.
+
+use ::iceoryx2::port::publisher::PublisherCreateError;
+use ::iceoryx2::prelude::ServiceName;
+use ::iceoryx2::service::builder::publish_subscribe::{
+    PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
+};
+
+use super::MOST_PUBLISHERS;
+use super::memory::SHARED_MEMORY;
+
+/// Why the shared memory cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// iceoryx2 has no services of such a name.
+    #[error("the name is \"{name}\", expected a name for services of iceoryx2: not empty, at most {most} bytes")]
+    Name {
+        /// The name given.
+        name: String,
+        /// The most bytes a name may have.
+        most: usize,
+    },
+    /// Somebody publishes under this name already.
+    #[error("another publisher is running under the name \"{0}\": stop it, or choose another name for this one")]
+    AlreadyPublished(String),
+    /// A service has as many publishers as it admits.
+    #[error(
+        "\"{0}\" has {MOST_PUBLISHERS} publishers, which is as many as it admits, a tunnel to other machines included: end \
+         one of them, or choose another name"
+    )]
+    TooManyPublishers(String),
+    /// The queues would not fit.
+    #[error(
+        "the queues of {queue} frames for {subscribers} subscribers need {needed} bytes of shared memory and \
+         {SHARED_MEMORY} has {free} left: lower publish.queue or publish.subscribers in the scene, or make \
+         {SHARED_MEMORY} larger"
+    )]
+    NoRoom {
+        /// Frames in a queue.
+        queue: usize,
+        /// Subscribers that may come.
+        subscribers: usize,
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes left.
+        free: u64,
+    },
+    /// A service stays incomplete.
+    #[error(
+        "the service \"{0}\" is incomplete and nobody completes it: stop every program that uses it, or choose another \
+         name"
+    )]
+    Incomplete(String),
+    /// There is no room even for bookkeeping.
+    #[error("{SHARED_MEMORY} has {free} bytes left, which is too little: remove what fills it, or make it larger")]
+    Full {
+        /// Bytes left.
+        free: u64,
+    },
+    /// The services on this machine belong to another user.
+    #[error(
+        "{folder} belongs to another user, who keeps all others out: run as that user, or build every program that is to \
+         take part with the feature any_user"
+    )]
+    AnotherUsers {
+        /// The folder that cannot be entered.
+        folder: String,
+    },
+    /// A service of this name exists with other properties.
+    #[error(
+        "the service \"{0}\" exists with another layout of its messages, or with other limits: a program of another \
+         version of bench-dragon has it open; stop that or take the same version for both, or choose another \
+         name"
+    )]
+    Incompatible(String),
+    /// A service of this name exists with other attributes.
+    #[error(
+        "the service \"{0}\" exists with other attributes: a tunnel brings it from another machine, or a subscriber keeps \
+         that of another scene open (a program on another machine, through a tunnel, may keep it); end that, or choose \
+         another name"
+    )]
+    OtherAttributes(String),
+    /// A program has opened a service before its publisher, with limits of its own.
+    #[error(
+        "the service \"{0}\" exists with lower limits than this scene asks for: a program that was started before the show \
+         has made it, such as a tunnel that listens to it; start that after the show"
+    )]
+    OtherLimits(String),
+    /// The service admits no more subscribers.
+    #[error(
+        "\"{service}\" has {most} subscribers, which is as many as its publisher admits (publish.subscribers in its \
+         scene): end one first, or raise that and start the publisher again"
+    )]
+    TooManySubscribers {
+        /// The service.
+        service: String,
+        /// Subscribers admitted.
+        most: usize,
+    },
+    /// Anything else.
+    #[error("iceoryx2 could not open \"{service}\": {reason}")]
+    Failed {
+        /// The service.
+        service: String,
+        /// What iceoryx2 reports.
+        reason: String,
+    },
+}
+
+/// Returns why a service of messages cannot be opened.
+pub fn service_error(service: &ServiceName, error: PublishSubscribeOpenOrCreateError) -> OpenError {
+    use PublishSubscribeOpenError as Open;
+    if matches!(error, PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(Open::HangsInCreation)) {
+        return OpenError::Incomplete(service.to_string());
+    }
+    if matches!(error, PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(Open::IncompatibleAttributes)) {
+        return OpenError::OtherAttributes(service.to_string());
+    }
+    let incompatible = match &error {
+        PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(open) => !matches!(
+            open,
+            Open::DoesNotExist | Open::InternalFailure | Open::Interrupt | Open::InsufficientPermissions
+        ),
+        PublishSubscribeOpenOrCreateError::PublishSubscribeCreateError(create) => {
+            matches!(create, PublishSubscribeCreateError::AlreadyExists)
+        }
+        _ => false,
+    };
+    if incompatible {
+        OpenError::Incompatible(format!("{service} ({error:?})"))
+    } else {
+        OpenError::Failed { service: service.to_string(), reason: format!("{error:?}") }
+    }
+}
+
+/// Returns why a publisher's port cannot be made.
+pub fn port_error(name: &str, service: &str, error: PublisherCreateError) -> OpenError {
+    match error {
+        PublisherCreateError::ExceedsMaxSupportedPublishers => {
+            OpenError::TooManyPublishers(format!("{name}/{service}"))
+        }
+        other => failed(name, service, other),
+    }
+}
+
+/// Returns the error of a service whose maker has not finished it.
+pub fn incomplete(name: &str, service: &str) -> OpenError {
+    OpenError::Incomplete(format!("{name}/{service}"))
+}
+
+/// Returns the error that has no remedy of its own.
+pub fn failed(name: &str, service: &str, error: impl std::fmt::Debug) -> OpenError {
+    OpenError::Failed { service: format!("{name}/{service}"), reason: format!("{error:?}") }
+}

@@ -1,0 +1,214 @@
+//! The benches of a chain: their true rectangles in metres, coloured by speed, with the signs of head and tail.
+
+use svg::node::element::{Circle, Group, Path, Polygon, Polyline};
+
+use super::camera::{Camera, StageBox};
+use super::metres;
+use super::palette::Palette;
+use bench_dragon_motion::model::board::Board;
+use bench_dragon_motion::model::separation::separation_board_board;
+use bench_dragon_motion::model::team::Team;
+use bench_dragon_motion::model::{Point, Vector};
+use bench_dragon_motion::solve::Chain;
+
+/// Speeds from the slowest to the fastest handle, metres per second: the ends of the colour scale.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Speeds {
+    /// The least.
+    pub least: f64,
+    /// The greatest.
+    pub greatest: f64,
+}
+
+impl Speeds {
+    /// Of no handle.
+    pub const NONE: Self = Self { least: f64::INFINITY, greatest: f64::NEG_INFINITY };
+
+    /// Takes in the handles of a chain.
+    pub fn include(&mut self, chain: &Chain) {
+        for speed in chain.speed.iter().filter(|speed| speed.is_finite()) {
+            (self.least, self.greatest) = (self.least.min(*speed), self.greatest.max(*speed));
+        }
+    }
+
+    /// The colour scale: from backwards at the head's speed to three times that at most, and no narrower than a
+    /// thousandth of it to either side, so that rounding has no colour. `None` where no speed is known.
+    pub fn scale(&self, head_speed: f64) -> Option<ColourScale> {
+        if self.least > self.greatest {
+            return None;
+        }
+        let [least, greatest] = [self.least, self.greatest].map(|speed| speed.clamp(-head_speed, 3.0 * head_speed));
+        let wider = (0.001 * head_speed - 0.5 * (greatest - least)).max(0.0);
+        Some(ColourScale {
+            least: least - wider,
+            greatest: greatest + wider,
+            some_below: self.least < least,
+            some_above: self.greatest > greatest,
+        })
+    }
+}
+
+/// Which speeds have which colours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ColourScale {
+    /// Metres per second at its slow end.
+    pub least: f64,
+    /// Metres per second at its fast end.
+    pub greatest: f64,
+    /// Whether some handles are slower still.
+    pub some_below: bool,
+    /// Whether some handles are faster still.
+    pub some_above: bool,
+}
+
+impl ColourScale {
+    /// Where a speed lies on the scale, from 0 to 1.
+    pub fn part(&self, speed: f64) -> f64 {
+        (speed - self.least) / (self.greatest - self.least)
+    }
+}
+
+/// The board of a bench. The heading keeps digits that two handles far from the origin have lost.
+pub fn board(team: &Team, chain: &Chain, bench: usize) -> Board {
+    let (sine, cosine) = chain.heading[bench].sin_cos();
+    let front = Point::new(chain.x[bench], chain.y[bench]);
+    Board::from_front(front, Vector::new(cosine, sine), team.link(bench), team.hole_inset, team.width)
+}
+
+/// The box of a board.
+pub fn extent(board: &Board) -> StageBox {
+    let mut extent = StageBox::EMPTY;
+    board.corners().into_iter().for_each(|corner| extent.include(corner));
+    extent
+}
+
+/// The benches of which any part may lie in a box, with their boards, the head first.
+pub fn seen(team: &Team, chain: &Chain, view: &StageBox) -> Vec<(usize, Board)> {
+    let boards = (0..team.benches).map(|bench| (bench, board(team, chain, bench)));
+    boards.filter(|(_, board)| extent(board).meets(view)).collect()
+}
+
+/// The pairs of benches, of those given, whose boards overlap, and by how many metres; the lower bench first. Boards that
+/// share a handle never count.
+pub fn overlapping(boards: &[(usize, Board)], tolerance: f64) -> Vec<(usize, usize, f64)> {
+    // Sorted by their left ends: only those that begin before a board ends can overlap it.
+    let mut sorted: Vec<(StageBox, usize, &Board)> =
+        boards.iter().map(|(bench, board)| (extent(board), *bench, board)).collect();
+    sorted.sort_by(|a, b| a.0.least.x.total_cmp(&b.0.least.x));
+    let mut pairs = Vec::new();
+    for (index, (extent, bench, board)) in sorted.iter().enumerate() {
+        let near = sorted[index + 1..].iter().take_while(|(other, ..)| other.least.x <= extent.greatest.x);
+        for (_, other_bench, other) in near.filter(|(other, ..)| other.meets(extent)) {
+            let separation = separation_board_board(board, other);
+            if bench.abs_diff(*other_bench) > 1 && separation < -tolerance {
+                pairs.push((*bench.min(other_bench), *bench.max(other_bench), -separation));
+            }
+        }
+    }
+    pairs.sort_by_key(|pair| (pair.0, pair.1));
+    pairs
+}
+
+/// The corners of a board as an SVG list of points.
+pub fn corners(board: &Board) -> String {
+    let corners = board.corners().map(|corner| format!("{},{}", metres(corner.x), metres(corner.y)));
+    corners.join(" ")
+}
+
+/// The boards and their handles, the tail's below and the head's on top.
+pub fn group(boards: &[(usize, Board)], fill: impl Fn(usize) -> String, camera: &Camera, palette: &Palette) -> Group {
+    let mut group = Group::new().set("id", "benches").set("stroke-linejoin", "round");
+    let width = boards.first().map_or(0.0, |(_, board)| 2.0 * board.half_width);
+    // From this width on an edge can be seen, and from that on a hole.
+    if width * camera.scale > 5.0 {
+        group = group.set("stroke", palette.ground).set("stroke-width", camera.metres(0.8));
+    }
+    for (bench, board) in boards.iter().rev() {
+        let polygon = Polygon::new().set("id", format!("bench-{bench}"));
+        group = group.add(polygon.set("fill", fill(*bench)).set("points", corners(board)));
+    }
+    group
+}
+
+/// The holes of the handles, where they are large enough to be seen.
+pub fn handles(team: &Team, chain: &Chain, camera: &Camera, palette: &Palette) -> Group {
+    let mut group = Group::new().set("id", "handles").set("fill", palette.ground);
+    if team.width * camera.scale < 14.0 {
+        return group;
+    }
+    let radius = team.width / 7.0;
+    let view = camera.view().padded(radius);
+    for (x, y) in chain.x.iter().zip(&chain.y).filter(|(x, y)| view.contains(Point::new(**x, **y))) {
+        group = group.add(Circle::new().set("cx", metres(*x)).set("cy", metres(*y)).set("r", metres(radius)));
+    }
+    group
+}
+
+/// The outline of a board, so many units wide, and less on a board that is hardly wider.
+pub fn outline(board: &Board, colour: &str, units: f64, camera: &Camera) -> Polygon {
+    let units = units.min(units * 0.3 * board.half_width * camera.scale).max(0.4 * units);
+    let outline = Polygon::new().set("points", corners(board)).set("fill", "none");
+    outline.set("stroke", colour).set("stroke-width", camera.metres(units)).set("stroke-linejoin", "round")
+}
+
+/// Chevrons in the direction of travel, light on dark or dark on light whatever the board's colour; on a board too narrow
+/// for them a single larger one at its front.
+pub fn head_sign(board: &Board, camera: &Camera, palette: &Palette) -> Group {
+    let (length, width) = (board.half_length, board.half_width);
+    let place = |along: f64, across: f64| board.centre + along * board.axis + across * board.across();
+    let mut group = Group::new().set("id", "head").set("fill", "none").set("stroke-linejoin", "round");
+    let narrow = width * camera.scale < 3.0;
+    let (half, tips) = if narrow { (6.0 / camera.scale, vec![1.0]) } else { (0.6 * width, vec![0.85, 0.55, 0.25]) };
+    let line = (0.4 * half).max(1.8 / camera.scale);
+    for (colour, line) in [(palette.ground, 2.2 * line), (palette.ink, line)] {
+        for tip in &tips {
+            let (tip, back) = (tip * length, tip * length - 1.5 * half);
+            let points = [place(back, half), place(tip, 0.0), place(back, -half)];
+            let points = points.map(|point| format!("{},{}", metres(point.x), metres(point.y))).join(" ");
+            let chevron = Polyline::new().set("points", points).set("stroke", colour);
+            group = group.add(chevron.set("stroke-width", metres(line)));
+        }
+    }
+    group
+}
+
+/// Bars across the end, longer than the board is wide where that is too narrow to be seen.
+pub fn tail_sign(board: &Board, camera: &Camera, palette: &Palette) -> Path {
+    let (length, width) = (board.half_length, board.half_width.max(4.0 / camera.scale));
+    let place = |along: f64, across: f64| {
+        let point = board.centre + along * board.axis + across * board.across();
+        format!("{} {}", metres(point.x), metres(point.y))
+    };
+    let bars = [0.9, 0.7, 0.5].map(|at| format!("M{}L{}", place(-at * length, width), place(-at * length, -width)));
+    let line = (0.3 * width).max(1.5 / camera.scale);
+    let path = Path::new().set("id", "tail").set("d", bars.concat()).set("fill", "none");
+    path.set("stroke", palette.ink).set("stroke-width", metres(line))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lying(x: f64, y: f64) -> Board {
+        Board::from_front(Point::new(x, y), Vector::x(), 2.0, 0.5, 1.0)
+    }
+
+    #[test]
+    fn only_boards_that_overlap_and_share_no_handle_are_pairs() {
+        // Boards 3 m long and 1 m wide: 0 and 2 overlap by 0.25 m, 0 and 3 touch, 1 overlaps 0 but shares a handle.
+        let boards = [(0, lying(0.0, 0.0)), (1, lying(0.5, 0.5)), (2, lying(1.0, 0.75)), (3, lying(0.0, -1.0))];
+        let found = overlapping(&boards, 1e-9);
+        assert_eq!(found.iter().map(|pair| (pair.0, pair.1)).collect::<Vec<_>>(), [(0, 2)]);
+        assert!((found[0].2 - 0.25).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn the_scale_has_a_least_width_and_ends_at_three_times_the_head() {
+        let scale = |least, greatest| Speeds { least, greatest }.scale(2.0).unwrap();
+        let whole = ColourScale { least: 1.998, greatest: 2.002, some_below: false, some_above: false };
+        assert_eq!(scale(2.0, 2.0), whole);
+        assert_eq!(scale(1.0, 1e9), ColourScale { least: 1.0, greatest: 6.0, some_above: true, ..whole });
+        assert_eq!(Speeds::NONE.scale(2.0), None);
+        assert_eq!(scale(1.0, 3.0).part(2.0), 0.5);
+    }
+}

@@ -1,0 +1,329 @@
+//! The stage as a picture: a moment of a motion as SVG text, and a stretch of it as one SVG that moves.
+//!
+//! In: a motion, its events, chains at times, a [`Look`]. Out: text. Pure. `draw` calls it; the plots of `trade` and of the
+//! soak report take their colours from [`palette`].
+//!
+//! The stage is drawn in metres, y upward, within a group whose transform puts it on the sheet, and clipped at the frame:
+//! whoever opens the file in an editor finds true coordinates.
+
+pub mod animation;
+mod benches;
+pub mod camera;
+mod look;
+mod marks;
+pub mod palette;
+mod route;
+mod sheet;
+
+use svg::Document;
+use svg::node::element::{ClipPath, Definitions, Description, Group, Path, Rectangle, Title};
+
+use bench_dragon_messages::sentence::rounded;
+use bench_dragon_motion::Motion;
+use bench_dragon_motion::model::Point;
+use bench_dragon_motion::model::board::Board;
+use bench_dragon_motion::model::description::PathDescription;
+use bench_dragon_motion::solve::Chain;
+use bench_dragon_motion::timeline::Timeline;
+use benches::{ColourScale, Speeds};
+use camera::{Camera, Frame, StageBox};
+pub use look::{Framing, Length, Look, Surroundings, Theme};
+use marks::{Happened, Tense};
+use palette::Palette;
+
+/// Units across a sheet, whatever its size in print or on a screen.
+const WIDTH: f64 = 960.0;
+
+/// The face of all words, that of the page.
+const FACE: &str = "system-ui, sans-serif";
+
+/// What is there at the moments of a picture or of a sequence of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    boards: StageBox,
+    speeds: Speeds,
+    last: f64,
+}
+
+impl Extent {
+    /// Of no moment.
+    pub const NONE: Self = Self { boards: StageBox::EMPTY, speeds: Speeds::NONE, last: 0.0 };
+
+    /// Takes in the chain at a time.
+    pub fn include(&mut self, motion: &Motion, time: f64, chain: &Chain) {
+        for bench in 0..motion.team().benches {
+            let corners = benches::board(motion.team(), chain, bench).corners();
+            corners.into_iter().for_each(|corner| self.boards.include(corner));
+        }
+        self.speeds.include(chain);
+        self.last = self.last.max(time);
+    }
+}
+
+/// One camera and one look for one picture or many.
+pub struct Drawing<'a> {
+    name: &'a str,
+    motion: &'a Motion,
+    timeline: &'a Timeline,
+    look: Look,
+    height: f64,
+    camera: Camera,
+    scale: Option<ColourScale>,
+}
+
+impl<'a> Drawing<'a> {
+    /// Drawings of a motion that is called `name`, at moments of which `extent` has all that is there.
+    pub fn new(name: &'a str, motion: &'a Motion, timeline: &'a Timeline, extent: &Extent, look: Look) -> Self {
+        let shown = match look.framing {
+            Framing::Everything => {
+                let boards = extent.boards;
+                boards.padded(0.04 * boards.width().max(boards.height()) + motion.team().width)
+            }
+            Framing::Radius(radius) => StageBox::around(Point::origin(), 2.0 * radius, 2.0 * radius),
+            // As high as the frame allows: the width alone is given.
+            Framing::View(centre, across) => StageBox::around(centre, across, f64::MIN_POSITIVE),
+        };
+        // A team in a straight line still has room beside it, and a tower is not higher than a page.
+        let shape = match look.framing {
+            Framing::View(..) => 1.0,
+            _ => (shown.height() / shown.width()).clamp(0.3, 1.3),
+        };
+        let rows =
+            1 + marks::happened(timeline, extent.last).iter().filter(|past| past.timed.event.place.is_some()).count();
+        let (frame, height) = match look.surroundings {
+            Surroundings::Words => {
+                let (above, below) = sheet::margins(rows);
+                let height = look.sheet_height().unwrap_or(above + below + shape * sheet::frame_width());
+                let height = height.max(above + below + 50.0);
+                (sheet::frame(height, rows), height)
+            }
+            Surroundings::Caption | Surroundings::Nothing => {
+                let height = look.sheet_height().unwrap_or(shape * WIDTH);
+                (Frame { left: 0.0, top: 0.0, width: WIDTH, height }, height)
+            }
+        };
+        let camera = Camera::showing(&shown, frame);
+        let scale = extent.speeds.scale(motion.head_speed());
+        Self { name, motion, timeline, look, height, camera, scale }
+    }
+
+    /// The SVG of a chain at a time.
+    pub fn svg(&self, time: f64, chain: &Chain) -> String {
+        let palette = self.look.theme.palette();
+        let happened = marks::happened(self.timeline, time);
+        let boards = benches::seen(self.motion.team(), chain, &self.camera.view());
+        let overlaps = self.overlaps(chain);
+        let (outlined, what) = outlined(&happened, &overlaps);
+        let outlined: Vec<usize> =
+            outlined.into_iter().filter(|bench| boards.iter().any(|(seen, _)| seen == bench)).collect();
+        let mut stage = self.stage().add(self.path(palette));
+        stage =
+            stage.add(benches::group(&boards, |bench| self.fill(chain.speed[bench], palette), &self.camera, palette));
+        stage = stage.add(benches::handles(self.motion.team(), chain, &self.camera, palette));
+        let benches = self.motion.team().benches;
+        let (mut marks, mut labels) = (Group::new().set("id", "marks"), Group::new().set("id", "labels"));
+        let (mut events, mut places) = (Vec::new(), Vec::new());
+        for past in &happened {
+            if let Some(place) = past.place(&self.camera) {
+                let place = self.camera.sheet(place);
+                places.push(place);
+                marks = marks.add(past.sign(place, palette));
+                events.push((*past, past.sentence("here", benches)));
+            }
+        }
+        let mut signs = (false, false);
+        for (bench, board) in boards.iter().rev() {
+            if *bench + 1 == benches && benches > 1 {
+                stage = stage.add(benches::tail_sign(board, &self.camera, palette));
+                signs.1 = true;
+            }
+            if outlined.contains(bench) {
+                stage = stage.add(benches::outline(board, palette.ground, 6.0, &self.camera));
+                stage = stage.add(benches::outline(board, palette.danger, 3.0, &self.camera));
+            } else if *bench == 0 {
+                stage = stage.add(benches::outline(board, palette.ink, 2.0, &self.camera));
+            }
+            if *bench == 0 {
+                stage = stage.add(benches::head_sign(board, &self.camera, palette));
+                signs.0 = true;
+            }
+            if let Some(name) = name(*bench, benches - 1, &outlined) {
+                let colour = if outlined.contains(bench) { palette.danger } else { palette.ink };
+                labels = labels.add(sheet::label(&name, self.beside(board, &places), colour, &self.camera, palette));
+            }
+        }
+        let mut document = self.document(time, chain, palette);
+        // The clip path is of the sheet, whatever the group within is drawn in.
+        document = document.add(Group::new().set("clip-path", "url(#frame)").add(stage).add(marks));
+        if self.look.surroundings == Surroundings::Words {
+            let coloured = boards.iter().any(|(bench, _)| chain.speed[*bench].is_finite());
+            let contents = sheet::Contents {
+                scale: self.scale.filter(|_| coloured),
+                head: signs.0,
+                tail: signs.1,
+                outlined: (!outlined.is_empty()).then_some(what),
+                events: &events,
+            };
+            let (below, colour) = self.subtitle(time, &happened, &overlaps, palette);
+            document = document
+                .add(labels)
+                .add(sheet::axes(&self.camera, palette))
+                .add(sheet::title(&self.title(time), &below, colour, palette))
+                .add(sheet::legend(&contents, &self.camera, palette));
+        }
+        self.finished(&document)
+    }
+
+    /// The text of a document, with the dark rules where they are wanted.
+    fn finished(&self, document: &Document) -> String {
+        let svg = document.to_string();
+        if self.look.theme == Theme::Auto { palette::with_dark_rules(&svg) } else { svg }
+    }
+
+    /// An empty sheet with its ground, its clip path and what it says to those who do not see it.
+    fn document(&self, time: f64, chain: &Chain, palette: &Palette) -> Document {
+        let part = self.height / WIDTH;
+        let ground = Rectangle::new().set("width", WIDTH).set("height", rounded(self.height, 4));
+        let clip = ClipPath::new().set("id", "frame").add(sheet::outline(self.camera.frame));
+        Document::new()
+            .set("viewBox", format!("0 0 {WIDTH} {}", rounded(self.height, 4)))
+            .set("width", self.look.width.attribute(1.0))
+            .set("height", self.look.width.attribute(part))
+            .set("role", "img")
+            .add(Title::new(text(&self.title(time))))
+            .add(Description::new().add(svg::node::Text::new(text(&self.description(chain)))))
+            .add(Definitions::new().add(clip))
+            .add(ground.set("fill", palette.ground))
+    }
+
+    /// The group of the stage, in metres.
+    fn stage(&self) -> Group {
+        Group::new().set("id", "stage").set("transform", self.camera.transform())
+    }
+
+    fn path(&self, palette: &Palette) -> Path {
+        let path = Path::new().set("id", "path").set("d", route::data(self.motion, &self.camera)).set("fill", "none");
+        // Finer where many turns stand close together.
+        let turns = match self.motion.description() {
+            PathDescription::Spiral { pitch, .. } | PathDescription::Turnaround { pitch, .. } => {
+                pitch * self.camera.scale
+            }
+            PathDescription::Route { .. } => f64::INFINITY,
+        };
+        let width = self.camera.metres((0.07 * turns).clamp(0.5, 1.3));
+        path.set("stroke", palette.faint).set("stroke-width", width).set("stroke-linejoin", "round")
+    }
+
+    fn fill(&self, speed: f64, palette: &Palette) -> String {
+        match self.scale {
+            Some(scale) if speed.is_finite() => palette.shade(scale.part(speed)),
+            _ => palette.still.to_owned(),
+        }
+    }
+
+    /// Where the name of a board stands: beside it, away from the middle of the picture, unless a mark is there.
+    fn beside(&self, board: &Board, marks: &[(f64, f64)]) -> (f64, f64) {
+        let (x, y) = self.camera.sheet(board.centre);
+        let across = board.across();
+        let outward = board.centre - self.camera.centre;
+        let side = if across.dot(&outward) < 0.0 { -across } else { across };
+        let away = board.half_width * self.camera.scale + 16.0;
+        let places = [1.0, -1.0].map(|sign| (x + sign * 2.2 * away * side.x, y - sign * away * side.y));
+        let frame = self.camera.frame;
+        let free = |(x, y): &(f64, f64)| {
+            (frame.left + 30.0..frame.right() - 30.0).contains(x)
+                && (frame.top + 20.0..frame.bottom() - 10.0).contains(y)
+                && marks.iter().all(|(a, b)| (x - a).abs() > 60.0 || (y - b).abs() > 34.0)
+        };
+        places.into_iter().find(free).unwrap_or(places[0])
+    }
+
+    fn overlaps(&self, chain: &Chain) -> Vec<(usize, usize, f64)> {
+        let team = self.motion.team();
+        // What overlaps a board in the picture may itself lie beyond its edge.
+        let reach = team.longest_link() + 2.0 * team.hole_inset + team.width;
+        let near = benches::seen(team, chain, &self.camera.view().padded(reach));
+        benches::overlapping(&near, 1e-9 * team.longest_link())
+    }
+
+    fn title(&self, time: f64) -> String {
+        format!("{} at {} s", self.name, rounded(time, 3))
+    }
+
+    /// What is to be said of the time, and its colour.
+    fn subtitle<'p>(
+        &self,
+        time: f64,
+        happened: &[Happened],
+        overlaps: &[(usize, usize, f64)],
+        palette: &'p Palette,
+    ) -> (String, &'p str) {
+        let benches = self.motion.team().benches;
+        let now = happened.iter().rev().find(|happened| happened.tense == Tense::Present);
+        if let Some(now) = now {
+            let place = now.timed.event.place.unwrap_or_default();
+            let place = format!("at ({}, {}) m", rounded(place.x, 3), rounded(place.y, 3));
+            return (now.sentence(&place, benches), palette.danger);
+        }
+        if let Some(sentence) = marks::overlap_sentence(overlaps, benches) {
+            return (sentence, palette.danger);
+        }
+        let next = self.timeline.events().iter().find(|event| event.time > time);
+        let next = next
+            .map(|next| format!("{} in {} s", next.event.kind.name().replace('_', " "), rounded(next.time - time, 3)));
+        (next.unwrap_or_default(), palette.quiet)
+    }
+
+    /// The picture in words.
+    fn description(&self, chain: &Chain) -> String {
+        let team = self.motion.team();
+        let (x, y) = (rounded(chain.x[0], 3), rounded(chain.y[0], 3));
+        let mut words = format!(
+            "A bench dragon of {} benches seen from above; the front handle of its head is at ({x}, {y}) m.",
+            team.benches
+        );
+        for timed in self.timeline.events() {
+            let (kind, time) = (timed.event.kind.name().replace('_', " "), rounded(timed.time, 3));
+            let benches = [timed.event.bench_a, timed.event.bench_b].into_iter().flatten();
+            let benches: Vec<String> = benches.map(|bench| format!("bench {}", bench + 1)).collect();
+            let benches = if benches.is_empty() { String::new() } else { format!(", {}", benches.join(" and ")) };
+            words += &format!(" Event: {kind} at {time} s{benches}.");
+        }
+        words + " Lengths are metres; benches count from 1 in words and from 0 in the names of elements."
+    }
+}
+
+/// The benches to outline and what they do: those that touch at this very time, or those that overlap.
+fn outlined(happened: &[Happened], overlaps: &[(usize, usize, f64)]) -> (Vec<usize>, &'static str) {
+    let touching = happened.iter().filter(|past| past.tense == Tense::Present);
+    let touching = touching.filter(|past| past.timed.event.bench_b.is_some()).flat_map(Happened::benches);
+    let mut benches: Vec<usize> = touching.map(|bench| bench as usize).collect();
+    let what = if overlaps.is_empty() { "boards that touch" } else { "boards that overlap" };
+    benches.extend(overlaps.iter().flat_map(|(one, other, _)| [*one, *other]));
+    benches.sort_unstable();
+    benches.dedup();
+    (benches, what)
+}
+
+/// What a bench is called in the picture, if it is: the head, the tail, and few that touch.
+fn name(bench: usize, last: usize, outlined: &[usize]) -> Option<String> {
+    let concerned = outlined.len() <= 4 && outlined.contains(&bench);
+    match bench {
+        0 if concerned => Some("head (bench 1)".to_owned()),
+        0 => Some("head".to_owned()),
+        _ if concerned => Some(format!("bench {}", bench + 1)),
+        _ if bench == last => Some("tail".to_owned()),
+        _ => None,
+    }
+}
+
+/// Metres as SVG data: to a tenth of a micrometre.
+fn metres(value: f64) -> String {
+    rounded(value, 7)
+}
+
+/// Text without the control characters that XML does not take.
+fn text(content: &str) -> String {
+    let allowed = |letter: &char| !letter.is_control() && !matches!(letter, '\u{fffe}' | '\u{ffff}');
+    content.chars().filter(allowed).collect()
+}

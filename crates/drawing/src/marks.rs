@@ -1,0 +1,115 @@
+//! What has happened by a time and what overlaps then: the marks of a picture and their words. The present tense is for
+//! what is so at this very time; whatever was before is told in the past tense.
+
+use svg::node::element::{Circle, Group, Path};
+
+use super::camera::Camera;
+use super::palette::Palette;
+use super::rounded;
+use bench_dragon_messages::sentence::bench_name;
+use bench_dragon_messages::state::EventKind;
+use bench_dragon_motion::model::Point;
+use bench_dragon_motion::timeline::{TimedEvent, Timeline};
+
+/// Seconds about an event that are its own time: a time typed with six decimals is still the event's.
+const NOW: f64 = 1e-6;
+
+/// Whether an event is now or was before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tense {
+    /// It is now.
+    Present,
+    /// It was.
+    Past,
+}
+
+/// An event that has happened by the time of a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Happened {
+    /// The event.
+    pub timed: TimedEvent,
+    /// Whether that is now.
+    pub tense: Tense,
+}
+
+/// The events that have happened by a time, in order.
+pub fn happened(timeline: &Timeline, time: f64) -> Vec<Happened> {
+    let passed = timeline.events().iter().filter(|timed| timed.time <= time + NOW);
+    let tense = |timed: &TimedEvent| if timed.time < time - NOW { Tense::Past } else { Tense::Present };
+    passed.map(|timed| Happened { timed: *timed, tense: tense(timed) }).collect()
+}
+
+impl Happened {
+    /// The benches concerned, from 0.
+    pub fn benches(&self) -> impl Iterator<Item = u32> + use<> {
+        [self.timed.event.bench_a, self.timed.event.bench_b].into_iter().flatten()
+    }
+
+    /// What happens or has happened, and where, in a team of so many benches; benches count from 1.
+    pub fn sentence(&self, place: &str, benches: usize) -> String {
+        let who: Vec<String> = self.benches().map(|bench| bench_name(bench, benches as u32)).collect();
+        let who = who.join(" and ");
+        let time = rounded(self.timed.time, 3);
+        let sentence = match (self.timed.event.kind, self.tense) {
+            (EventKind::Contact, Tense::Present) => format!("contact: {who} touch {place}"),
+            (EventKind::Contact, Tense::Past) => format!("contact: {who} touched {place} at {time} s"),
+            (EventKind::Stall, Tense::Present) => format!("stall: {who} stalls, its rear handle {place}"),
+            (EventKind::Stall, Tense::Past) => format!("stall: {who} stalled at {time} s, its rear handle {place}"),
+            (EventKind::Lock, Tense::Present) => format!("lock: {who} locks, its rear handle {place}"),
+            (EventKind::Lock, Tense::Past) => format!("lock: {who} locked at {time} s, its rear handle {place}"),
+            (EventKind::PathEnd, Tense::Present) => return "the head is at the end of the path".to_owned(),
+            (EventKind::PathEnd, Tense::Past) => return format!("the head reached the end of the path at {time} s"),
+        };
+        sentence + " (counting from 1)"
+    }
+
+    /// The mark at the place of the event: of a contact a ring and a cross, of a stall a diamond, of a lock a square. In
+    /// the colour of danger where it is now, quiet where it was.
+    pub fn sign(&self, (x, y): (f64, f64), palette: &Palette) -> Group {
+        let colour = match self.tense {
+            Tense::Present => palette.danger,
+            Tense::Past => palette.quiet,
+        };
+        let mut group = Group::new().set("fill", "none").set("stroke-linejoin", "round");
+        for (colour, width) in [(palette.ground, 6.0), (colour, 2.5)] {
+            let lines = |data: &str| {
+                let moved = format!("translate({} {})", rounded(x, 3), rounded(y, 3));
+                let path = Path::new().set("d", data).set("transform", moved);
+                path.set("stroke", colour).set("stroke-width", width)
+            };
+            group = match self.timed.event.kind {
+                EventKind::Contact => group
+                    .add(
+                        Circle::new()
+                            .set("cx", rounded(x, 3))
+                            .set("cy", rounded(y, 3))
+                            .set("r", 13)
+                            .set("stroke", colour)
+                            .set("stroke-width", width),
+                    )
+                    .add(lines("M7 0H20M-7 0H-20M0 7V20M0 -7V-20")),
+                EventKind::Stall => group.add(lines("M14 0L0 14L-14 0L0 -14Z")),
+                EventKind::Lock | EventKind::PathEnd => group.add(lines("M-11 -11H11V11H-11Z")),
+            };
+        }
+        group
+    }
+
+    /// Where it happened, if that is in the picture.
+    pub fn place(&self, camera: &Camera) -> Option<Point> {
+        self.timed.event.place.filter(|place| camera.view().contains(*place))
+    }
+}
+
+/// Which pairs overlap now, in words for people; `None` where none do.
+pub fn overlap_sentence(pairs: &[(usize, usize, f64)], benches: usize) -> Option<String> {
+    let deepest = pairs.iter().copied().max_by(|a, b| a.2.total_cmp(&b.2))?;
+    let name = |bench: usize| bench_name(bench as u32, benches as u32);
+    let (one, other, depth) = deepest;
+    let depth = rounded(depth, 3);
+    let deepest = format!("{} and {}", name(one), name(other));
+    Some(match pairs.len() {
+        1 => format!("{deepest} overlap now, by {depth} m (counting from 1)"),
+        count => format!("{count} pairs of boards overlap now, {deepest} most, by {depth} m (counting from 1)"),
+    })
+}

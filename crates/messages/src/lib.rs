@@ -1,0 +1,14 @@
+//! What a publisher and its subscribers say to each other, once.
+//!
+//! [`layouts`] are the structs in shared memory; [`state`] and [`control`] are the types behind their numbers; [`json`] and
+//! [`sentence`] are the same messages for programs and for people. This crate knows no transport and no solver: publisher
+//! and subscribers both depend on it.
+
+mod accessors;
+pub mod control;
+pub mod json;
+pub mod layouts;
+pub mod sentence;
+pub mod state;
+
+pub use layouts::*;

@@ -1,0 +1,202 @@
+//! Alerts in words, for people: benches are counted from 1, and the sentence states it.
+//!
+//! In: a [`CollisionAlert`] and the number of benches. Out: a sentence. Called by `run`, `watch` and the stage picture's
+//! server, so that all of them print the same.
+
+use super::layouts::{CollisionAlert, Cue};
+use crate::state::EventKind;
+use crate::state::{FrameState, Level};
+
+/// Whether a sentence holds what changes from frame to frame: the time until the event, and the clearance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Figures {
+    /// It does.
+    Shown {
+        /// Simulated seconds per second of wall time, in which the time until the event is given; 0 while paused.
+        time_scale: f64,
+    },
+    /// It does not: they stand beside the sentence.
+    Omitted,
+}
+
+/// A cue that the show has reached, as a sentence.
+pub fn cue_sentence(cue: &Cue) -> String {
+    let waits = if cue.pauses == 1 { ": waiting for go" } else { "" };
+    format!("cue {} \"{}\"{waits}", cue.number, cue.name.as_str())
+}
+
+/// A bench as people call it, counted from 1.
+pub fn bench_name(bench: u32, benches: u32) -> String {
+    let number = u64::from(bench) + 1;
+    match number {
+        1 => "bench 1 (the head)".to_owned(),
+        _ if number == u64::from(benches) => format!("bench {number} (the tail)"),
+        _ => format!("bench {number}"),
+    }
+}
+
+/// An alert as a sentence, in a team of so many benches: what happened, in the past tense, since the show may go on; or
+/// what is coming and where, and apart from it the two that are nearest now.
+pub fn alert_sentence(alert: &CollisionAlert, benches: u32, figures: Figures) -> String {
+    let happened = alert.alert_level().is_some_and(Level::has_happened);
+    let sentence = match (happened, alert.event_kind()) {
+        (true, Some(kind)) => happening(alert, kind, benches),
+        (true, None) => "at an unknown place".to_owned(),
+        (false, kind) => {
+            let coming = kind.map(|kind| coming(alert, kind, benches, figures));
+            let coming = coming.unwrap_or_else(|| "no contact, stall or lock ahead".to_owned());
+            match nearest(alert, benches, figures) {
+                Some(nearest) => format!("{coming}; {nearest}"),
+                None => coming,
+            }
+        }
+    };
+    if sentence.contains("bench ") { format!("{sentence} (counting from 1)") } else { sentence }
+}
+
+/// A state that no alert reports, as a sentence; `None` where an alert does, or where there is nothing to report.
+pub fn state_sentence(state: FrameState) -> Option<&'static str> {
+    match state {
+        FrameState::PathEnd => Some("the head has reached the end of the path"),
+        _ => None,
+    }
+}
+
+fn happening(alert: &CollisionAlert, kind: EventKind, benches: u32) -> String {
+    let who = names(alert.event_benches(), benches);
+    let (time, place) = (alert.event_time, place(alert));
+    match kind {
+        EventKind::Contact => format!("{who} touched at {place}, t = {time:.6} s"),
+        EventKind::Stall => {
+            format!("{who} stalled, t = {time:.6} s: from the handle at {place} on, the team was pushed backwards")
+        }
+        EventKind::Lock => {
+            format!("{who} locked, its rear handle at {place}, t = {time:.6} s: the motion cannot continue")
+        }
+        EventKind::PathEnd => format!("the head reached the end of the path, t = {time:.6} s"),
+    }
+}
+
+fn place(alert: &CollisionAlert) -> String {
+    format!("({:.3}, {:.3}) m", alert.event_x, alert.event_y)
+}
+
+fn coming(alert: &CollisionAlert, kind: EventKind, benches: u32, figures: Figures) -> String {
+    let who = names(alert.event_benches(), benches);
+    let when = match figures {
+        Figures::Shown { time_scale } => format!(" {}", time_until(alert.time_to_event, time_scale)),
+        Figures::Omitted => String::new(),
+    };
+    format!("{}: {who} at {}{when}", kind.name(), place(alert))
+}
+
+/// Wall time until so many simulated seconds have passed, at a rate in force; a show that stands still comes nowhere.
+pub fn time_until(simulated_seconds: f64, time_scale: f64) -> String {
+    if time_scale > 0.0 { format!("in {:.1} s", simulated_seconds / time_scale) } else { "not while paused".to_owned() }
+}
+
+/// A number with so many decimals at most: no zeros at its end, and no minus before zero.
+pub fn rounded(value: f64, decimals: usize) -> String {
+    let fixed = format!("{value:.decimals$}");
+    let short = if fixed.contains('.') { fixed.trim_end_matches('0').trim_end_matches('.') } else { &fixed };
+    if short == "-0" { "0".to_owned() } else { short.to_owned() }
+}
+
+/// Zero has no sign for people: a touch is solved to the last bits, on either side.
+fn nearest(alert: &CollisionAlert, benches: u32, figures: Figures) -> Option<String> {
+    alert.nearest_benches().next()?;
+    let nearest = format!("nearest now are {}", names(alert.nearest_benches(), benches));
+    if figures == Figures::Omitted {
+        return Some(nearest);
+    }
+    let clearance = (alert.clearance * 1e4).round() / 1e4 + 0.0;
+    let apart =
+        if clearance < 0.0 { format!("overlap by {:.4} m", -clearance) } else { format!("{clearance:.4} m apart") };
+    Some(format!("{nearest}, {apart}"))
+}
+
+fn names(concerned: impl Iterator<Item = u32>, benches: u32) -> String {
+    concerned.map(|bench| bench_name(bench, benches)).collect::<Vec<_>>().join(" and ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::NO_BENCH;
+
+    const SHOWN: Figures = Figures::Shown { time_scale: 2.0 };
+
+    fn alert(level: Level, kind: Option<EventKind>) -> CollisionAlert {
+        let event = kind.map_or(0, |kind| FrameState::from(kind) as u32);
+        CollisionAlert {
+            level: level as u32,
+            bench_a: 0,
+            bench_b: 9,
+            clearance: 0.0031,
+            event,
+            event_time: 412.473837682,
+            time_to_event: 13.0,
+            event_bench_a: 0,
+            event_bench_b: 8,
+            event_x: 1.25,
+            event_y: -0.5,
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn what_comes_has_its_kind_its_benches_and_its_time() {
+        let coming = alert(Level::Approaching, Some(EventKind::Contact));
+        let nearest = "nearest now are bench 1 (the head) and bench 10, 0.0031 m apart (counting from 1)";
+        let sentence = |figures| alert_sentence(&coming, 223, figures);
+        assert_eq!(
+            sentence(SHOWN),
+            format!("contact: bench 1 (the head) and bench 9 at (1.250, -0.500) m in 6.5 s; {nearest}")
+        );
+        let words = "contact: bench 1 (the head) and bench 9 at (1.250, -0.500) m; \
+                     nearest now are bench 1 (the head) and bench 10 (counting from 1)";
+        assert_eq!(sentence(Figures::Omitted), words);
+        let stall = CollisionAlert {
+            event_bench_b: NO_BENCH,
+            bench_a: NO_BENCH,
+            bench_b: NO_BENCH,
+            ..alert(Level::Clear, Some(EventKind::Stall))
+        };
+        assert_eq!(
+            alert_sentence(&stall, 2, SHOWN),
+            "stall: bench 1 (the head) at (1.250, -0.500) m in 6.5 s (counting from 1)"
+        );
+        let nothing = alert(Level::Approaching, None);
+        assert_eq!(alert_sentence(&nothing, 223, SHOWN), format!("no contact, stall or lock ahead; {nearest}"));
+    }
+
+    #[test]
+    fn what_has_happened_has_its_place_and_its_time() {
+        let contact = alert(Level::Contact, Some(EventKind::Contact));
+        assert_eq!(
+            alert_sentence(&contact, 9, SHOWN),
+            "bench 1 (the head) and bench 9 (the tail) touched at (1.250, -0.500) m, t = 412.473838 s (counting from 1)"
+        );
+        let lock = CollisionAlert { event_bench_b: NO_BENCH, ..alert(Level::Lock, Some(EventKind::Lock)) };
+        let sentence = alert_sentence(&lock, 223, SHOWN);
+        assert!(sentence.starts_with("bench 1 (the head) locked, its rear handle at (1.250, -0.500) m"), "{sentence}");
+    }
+
+    #[test]
+    fn a_show_that_stands_still_comes_to_no_event() {
+        let contact = alert(Level::Approaching, Some(EventKind::Contact));
+        let sentence = alert_sentence(&contact, 9, Figures::Shown { time_scale: 0.0 });
+        assert!(
+            sentence.starts_with(
+                "contact: bench 1 (the head) and bench 9 (the tail) at (1.250, -0.500) m not while paused"
+            ),
+            "{sentence}"
+        );
+    }
+
+    #[test]
+    fn an_alert_about_nothing_names_nobody() {
+        let nothing = CollisionAlert::default();
+        assert_eq!(alert_sentence(&nothing, 2, SHOWN), "no contact, stall or lock ahead");
+    }
+}

@@ -1,0 +1,287 @@
+//! How far two boards can move relative to each other while the head goes from one place to another: the bound on which
+//! the search rests. The proof is in the header of [`super`].
+
+use std::f64::consts::TAU;
+
+use crate::event::Budget;
+use crate::linkage::follower;
+use crate::model::board::Board;
+use crate::model::curve::{Coordinate, Segment};
+use crate::model::path::{Param, Path};
+use crate::model::spiral::{Direction, Spiral};
+use crate::model::team::Team;
+use crate::model::{Point, Vector};
+
+use super::ConservativeAdvancement;
+use super::configuration::{Configuration, Halt, Pair};
+use super::reach::Reach;
+
+/// What one handle did in a step.
+#[derive(Debug, Clone, Copy)]
+struct HandleMotion {
+    /// Metres of path that it passed over, forth and back: at least its total variation.
+    length: f64,
+    /// Handles that are numbered alike all went one way, and the same way, as did all between them.
+    run: u32,
+}
+
+/// What the handles did in one step of the head, from the first one on.
+#[derive(Debug, Default)]
+pub(super) struct Displacements {
+    handles: Vec<HandleMotion>,
+    /// The places at which the last handle turned round in the step, in order.
+    turned_at: Vec<Param>,
+    forward: Option<bool>,
+    /// A turning place could not be followed back to a handle: from here on nothing is known.
+    unbounded: bool,
+}
+
+impl Displacements {
+    /// Metres by which the handle added last may have left the stretch between its first and its last place.
+    pub fn excursion(&self) -> f64 {
+        match self.handles.last() {
+            Some(last) if self.unbounded || !self.turned_at.is_empty() => last.length,
+            _ => 0.0,
+        }
+    }
+
+    /// Adds handles, which both configurations hold, until there are `count`.
+    pub fn extend_to(
+        &mut self,
+        count: usize,
+        chain: &ConservativeAdvancement,
+        ends: (&Configuration, &Configuration),
+        budget: &mut Budget,
+    ) -> Result<(), Halt> {
+        while self.handles.len() < count {
+            self.push(chain, ends, budget)?;
+        }
+        Ok(())
+    }
+
+    fn push(
+        &mut self,
+        chain: &ConservativeAdvancement,
+        (before, after): (&Configuration, &Configuration),
+        budget: &mut Budget,
+    ) -> Result<(), Halt> {
+        let handle = self.handles.len();
+        let front_turned = !self.turned_at.is_empty();
+        if handle > 0 {
+            self.turned_at = self.followers_of_turns(chain, (before, after), handle - 1, budget)?;
+        }
+        let (first, last) = (before.places[handle], after.places[handle]);
+        let mut length = 0.0;
+        let mut from = first;
+        for to in self.turned_at.iter().copied().chain([last]) {
+            length += length_bound(chain.path, from, to);
+            from = to;
+        }
+        let ahead = progress(chain.path, first, last);
+        let one_way = !self.unbounded && !front_turned && self.turned_at.is_empty();
+        let same_way = ahead == 0.0 || self.forward.is_none_or(|forward| forward == (ahead > 0.0));
+        let run = self.handles.last().map_or(0, |motion| motion.run) + u32::from(!(one_way && same_way));
+        if ahead != 0.0 {
+            self.forward = Some(ahead > 0.0);
+        }
+        self.handles.push(HandleMotion { length: if self.unbounded { f64::INFINITY } else { length }, run });
+        Ok(())
+    }
+
+    /// Where the follower of `handle` turned round: behind each place where the handle itself did, and behind each
+    /// place it passed over where a follower turns.
+    fn followers_of_turns(
+        &mut self,
+        chain: &ConservativeAdvancement,
+        (before, after): (&Configuration, &Configuration),
+        handle: usize,
+        budget: &mut Budget,
+    ) -> Result<Vec<Param>, Halt> {
+        let turns = if handle == 0 { &chain.head_turns } else { &chain.body_turns };
+        if self.turned_at.is_empty() && turns.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut fronts = Vec::new();
+        let mut from = before.places[handle];
+        for to in self.turned_at.iter().copied().chain([after.places[handle]]) {
+            let backward = progress(chain.path, from, to) < 0.0;
+            let (low, high) = if backward { (to, from) } else { (from, to) };
+            let begin = turns.partition_point(|turn| progress(chain.path, low, *turn) <= 0.0);
+            let end = turns.partition_point(|turn| progress(chain.path, *turn, high) > 0.0).max(begin);
+            if backward {
+                fronts.extend(turns[begin..end].iter().rev());
+            } else {
+                fronts.extend(&turns[begin..end]);
+            }
+            fronts.push(to);
+            from = to;
+        }
+        fronts.pop();
+        if !budget.spend(fronts.len() as u64) {
+            return Err(Halt::Spent);
+        }
+        let link = chain.team.link(handle);
+        let rears: Option<Vec<Param>> =
+            fronts.into_iter().map(|front| follower(chain.path, front, link).ok()).collect();
+        // Rounding may take a turning place past a lock; the step is then halved.
+        self.unbounded |= rears.is_none();
+        Ok(rears.unwrap_or_default())
+    }
+
+    /// How much nearer to each other two boards may have come and gone again, metres: B of the proof. `Weights` are
+    /// those for the sign of the clearance that is to be excluded.
+    pub fn relative_motion_bound(
+        &self,
+        chain: &ConservativeAdvancement,
+        ends: (&Configuration, &Configuration),
+        (a, b): Pair,
+        weights: Weights,
+    ) -> f64 {
+        let stage = self.on_stage(chain, a, weights) + self.on_stage(chain, b, weights);
+        if self.handles[a].run != self.handles[b + 1].run {
+            return stage;
+        }
+        let (before, after) = ends;
+        let segments =
+            [before.places[a], before.places[b + 1], after.places[a], after.places[b + 1]].map(|place| place.segment);
+        let curve = chain.curves[segments[0]];
+        match chain.path.segment(before.places[a]) {
+            Segment::Line(_) | Segment::Arc(_) if segments.iter().all(|segment| chain.curves[*segment] == curve) => 0.0,
+            Segment::Spiral(spiral) if segments.iter().all(|segment| *segment == segments[0]) => {
+                let seen = |bench| seen_from_spiral(chain, ends, bench, (spiral, a), weights);
+                stage.min(seen(a) + seen(b))
+            }
+            _ => stage,
+        }
+    }
+
+    /// At least the relative motion of any two of the foremost boards, metres.
+    pub fn most_relative_motion(&self, chain: &ConservativeAdvancement, benches: usize) -> f64 {
+        2.0 * (0..benches).map(|bench| self.on_stage(chain, bench, Weights::Additive)).fold(0.0, f64::max)
+    }
+
+    /// The circles that the foremost boards do not leave in the step.
+    pub fn reach(
+        &self,
+        chain: &ConservativeAdvancement,
+        ends: (&Configuration, &Configuration),
+        benches: usize,
+    ) -> Reach {
+        let (before, after) = (&ends.0.boards[..benches], &ends.1.boards[..benches]);
+        let sum: Vector = before.iter().map(|board| board.centre.coords).sum();
+        let centre = Point::from(sum / benches as f64);
+        let (mut radius, mut outermost) = (0.0, 0.0);
+        for (bench, (first, last)) in before.iter().zip(after).enumerate() {
+            let stage = self.on_stage(chain, bench, Weights::OnePoint);
+            let outward = match chain.path.segment(ends.0.places[bench]) {
+                Segment::Spiral(spiral) if self.stays_on_segment(ends, bench) => {
+                    let outward = |handle| spiral.radius_per_radian() * turned(ends, handle).abs();
+                    let around = seen_from_spiral(chain, ends, bench, (spiral, bench), Weights::OnePoint);
+                    stage.min(around + outward(bench))
+                }
+                _ => stage,
+            };
+            let far = |board: &Board| (board.centre - centre).norm() + board.circle_radius();
+            let out =
+                |board: &Board| board.corners().map(|corner| corner.coords.norm()).into_iter().fold(0.0, f64::max);
+            // What was one board's point at both ends was no further out between than half the way there and back.
+            radius = f64::max(radius, 0.5 * (far(first) + far(last) + stage));
+            outermost = f64::max(outermost, 0.5 * (out(first) + out(last) + outward));
+        }
+        Reach { centre, radius, outermost }
+    }
+
+    fn stays_on_segment(&self, (before, after): (&Configuration, &Configuration), bench: usize) -> bool {
+        let segment = before.places[bench].segment;
+        let places = [before.places[bench + 1], after.places[bench], after.places[bench + 1]];
+        self.handles[bench].run == self.handles[bench + 1].run && places.iter().all(|place| place.segment == segment)
+    }
+
+    /// How far any point of a board moved on the stage, metres.
+    fn on_stage(&self, chain: &ConservativeAdvancement, bench: usize, weights: Weights) -> f64 {
+        weights.board(chain.team, bench, self.handles[bench].length, self.handles[bench + 1].length)
+    }
+}
+
+/// How far any point of a board, whose handles are on a spiral, moved as seen from a frame that turns about the centre
+/// with handle `reference` and goes outward with it, along the direction in which the next handle was, metres.
+fn seen_from_spiral(
+    chain: &ConservativeAdvancement,
+    ends: (&Configuration, &Configuration),
+    bench: usize,
+    (spiral, reference): (&Spiral, usize),
+    weights: Weights,
+) -> f64 {
+    let (a, frame) = (spiral.radius_per_radian(), turned(ends, reference));
+    let moved = |handle: usize| {
+        let (first, last) = (ends.0.places[handle].at, ends.1.places[handle].at);
+        let radius = spiral.radius(if first.high > last.high { first } else { last });
+        let around = (last.minus(first) - frame).abs();
+        let apart = first.minus(ends.0.places[reference + 1].at);
+        // No less than twice the sine of half the angle.
+        let aside = (apart - TAU * (apart / TAU).round()).abs() + around;
+        (radius + a) * around + a * frame.abs() * aside
+    };
+    weights.board(chain.team, bench, moved(bench), moved(bench + 1))
+}
+
+/// The change of a handle's coordinate in a step within one segment.
+fn turned((before, after): (&Configuration, &Configuration), handle: usize) -> f64 {
+    after.places[handle].at.minus(before.places[handle].at)
+}
+
+/// How the displacements of a board's two handles bound those of its points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Weights {
+    /// The most that one point of the board moves: enough where a clearance above zero is to be excluded.
+    OnePoint,
+    /// A bound that is additive over sub-steps, for overlaps.
+    Additive,
+}
+
+impl Weights {
+    /// The weights for a search of clearances at or below `limit`.
+    pub fn for_limit(limit: f64) -> Self {
+        if limit < 0.0 { Self::Additive } else { Self::OnePoint }
+    }
+
+    fn board(self, team: &Team, bench: usize, front: f64, rear: f64) -> f64 {
+        let both = front + rear;
+        let link_part = match self {
+            Self::OnePoint => front.max(rear),
+            Self::Additive => both,
+        };
+        link_part + (team.hole_inset + 0.5 * team.width) / team.link(bench) * both
+    }
+}
+
+/// Units of a segment's coordinate from one place to another, positive in the direction of travel; infinite from one
+/// segment to another.
+pub(super) fn progress(path: &Path, from: Param, to: Param) -> f64 {
+    match from.segment.cmp(&to.segment) {
+        std::cmp::Ordering::Less => f64::INFINITY,
+        std::cmp::Ordering::Greater => f64::NEG_INFINITY,
+        std::cmp::Ordering::Equal => match path.segment(from) {
+            Segment::Spiral(spiral) if spiral.direction() == Direction::Inward => from.at.minus(to.at),
+            _ => to.at.minus(from.at),
+        },
+    }
+}
+
+/// At least the metres of path between two places.
+fn length_bound(path: &Path, from: Param, to: Param) -> f64 {
+    if from.segment != to.segment {
+        return path.arc_length(from, to).abs();
+    }
+    let coordinates = to.at.minus(from.at).abs();
+    match path.segment(from) {
+        Segment::Line(_) => coordinates,
+        Segment::Arc(arc) => arc.radius * coordinates,
+        // The arc length of a radian grows outward.
+        Segment::Spiral(spiral) => {
+            let outer: Coordinate = if from.at.high > to.at.high { from.at } else { to.at };
+            let (radius, a) = (spiral.radius(outer), spiral.radius_per_radian());
+            coordinates * (radius * radius + a * a).sqrt()
+        }
+    }
+}

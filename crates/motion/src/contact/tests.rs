@@ -1,0 +1,190 @@
+use std::f64::consts::TAU;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::model::Point;
+use crate::model::curve::Side;
+use crate::singularities::Singularities;
+
+const PAPER: Team = Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
+
+/// The searches' answers for the whole of a motion: the contact, the least clearance up to `freeze`, the motion's end.
+fn search(path: &Path, team: &Team, freeze: Option<f64>) -> (Option<Event>, Option<LeastClearance>, f64) {
+    let mut unreported = |_| {};
+    let mut budget = Budget::new(200_000_000, &mut unreported);
+    let singular = Singularities::search(path, team, &mut budget);
+    let end = singular.end.map_or(singular.searched_until, |end| end.travelled);
+    let searches = ConservativeAdvancement::new(path, team, &singular.head_turns, &singular.body_turns);
+    let contact = searches.first_contact(0.0, end, &mut budget).unwrap();
+    let least = searches.least_clearance(0.0, freeze.unwrap_or(end), &mut budget).unwrap();
+    assert!(contact.searched_until >= end && least.searched_until >= freeze.unwrap_or(end));
+    (contact.value, least.value, end)
+}
+
+/// The least clearance of all pairs at one place of the head.
+fn all_pairs(path: &Path, team: &Team, travelled: f64) -> f64 {
+    let mut unreported = |_| {};
+    let mut at = Configuration::new(path, travelled);
+    at.solve_to(team.benches, path, team, &mut Budget::new(u64::MAX, &mut unreported)).unwrap();
+    let pairs = (0..team.benches).flat_map(|a| (a + 2..team.benches).map(move |b| (a, b)));
+    at.deepest(&pairs.collect::<Vec<_>>()).unwrap().0
+}
+
+/// Nothing that equally spaced configurations show contradicts the searches.
+fn check(path: &Path, team: &Team, samples: usize) -> Result<(), TestCaseError> {
+    let (contact, least, end) = search(path, team, None);
+    let least = least.unwrap();
+    let close = |one: f64, other: f64| (one - other).abs() <= 1e-11 * (1.0 + team.longest_link());
+    if let Some(contact) = contact {
+        let there = all_pairs(path, team, contact.travelled);
+        prop_assert!(close(there, 0.0) || (contact.travelled == 0.0 && there < 0.0), "{contact:?} {there}");
+        prop_assert!(least.value <= 0.0, "{contact:?} {least:?}");
+    } else {
+        prop_assert!(least.value > 0.0, "{least:?}");
+    }
+    prop_assert!(close(all_pairs(path, team, least.travelled), least.value), "{least:?}");
+    for k in 0..samples {
+        let travelled = end * k as f64 / samples as f64;
+        let sampled = all_pairs(path, team, travelled);
+        prop_assert!(sampled >= least.value - 1e-12, "{least:?}, but {sampled} at {travelled}");
+        let before = contact.is_none_or(|contact| travelled < contact.travelled);
+        prop_assert!(!before || sampled > 0.0, "{contact:?}, but {sampled} at {travelled}");
+    }
+    Ok(())
+}
+
+fn assert_contact(path: &Path, team: &Team, travelled: f64, benches: (u32, u32)) -> Point {
+    let (contact, ..) = search(path, team, Some(1.0));
+    let contact = contact.unwrap();
+    assert!((contact.travelled - travelled).abs() < 2e-12 * travelled, "{}", contact.travelled);
+    assert_eq!((contact.bench_a, contact.bench_b), (Some(benches.0), Some(benches.1)));
+    contact.place.unwrap()
+}
+
+#[test]
+fn spirals_touch_where_the_earlier_searches_did() {
+    let place = assert_contact(&Path::spiral(0.55, 16.0), &PAPER, 412.473_837_682_114_8, (0, 8));
+    assert!((place - Point::new(1.474_394_671_647_727_4, 2.110_664_876_932_433)).norm() < 1e-11, "{place}");
+    assert_contact(&Path::spiral(0.45, 16.0), &PAPER, 215.337_252_953_147_58, (0, 19));
+    assert_contact(&Path::spiral(0.55, 6.0), &Team { benches: 20, ..PAPER }, 32.298_201_353_636_706, (0, 8));
+    let all_but_touching = Team { benches: 3, head_length: 1.996, body_length: 1.996, width: 0.1, hole_inset: 0.498 };
+    assert_contact(&Path::spiral(2.4, 12.0), &all_but_touching, 657.988_566_973_9, (0, 2));
+}
+
+#[test]
+fn a_touch_within_a_step_in_which_handles_turn_is_found() {
+    let team = Team { benches: 12, head_length: 1.7, body_length: 3.7, width: 0.05, hole_inset: 0.6 };
+    let lane = Path::route(Point::origin(), 0.25).line(19.994_074_807_700_006).arc(Side::Right, 3.0, 0.75).line(2.1);
+    let bend = lane.arc(Side::Left, 0.3, 0.25).line(0.36).arc(Side::Left, 0.01, 1.0);
+    let path = bend.arc(Side::Left, 0.039_788_735_772_973_836, 4.0).build().unwrap();
+    assert_contact(&path, &team, 37.145_313_188_924, (1, 8));
+}
+
+#[test]
+fn the_least_clearance_of_a_turnaround() {
+    let path = Path::turnaround(1.7, 4.5, 2.0, 100.0, 369.16).unwrap();
+    let (contact, least, _) = search(&path, &PAPER, None);
+    let least = least.unwrap();
+    assert!(contact.is_none() && (least.bench_a, least.bench_b) == (0, 16), "{least:?}");
+    assert!((least.value - 0.279_042_939_008_634).abs() < 1e-13 && (least.travelled - 130.159_928_5).abs() < 1e-5);
+}
+
+#[test]
+fn a_straight_procession_is_one_step() {
+    let path = Path::route(Point::origin(), 0.1).line(1e6).build().unwrap();
+    for team in [PAPER, Team { benches: 3, ..PAPER }] {
+        let searches = ConservativeAdvancement::new(&path, &team, &[], &[]);
+        let mut unreported = |_| {};
+        let mut budget = Budget::new(20_000, &mut unreported);
+        let contact = searches.first_contact(0.0, 1e6, &mut budget).unwrap();
+        let least = searches.least_clearance(0.0, 1e6, &mut budget).unwrap();
+        assert!(contact == Found { value: None, searched_until: 1e6 } && least.searched_until == 1e6);
+        assert!((least.value.unwrap().value - 1.1).abs() < 1e-10);
+    }
+}
+
+#[test]
+fn what_overlaps_at_the_start_is_the_deepest_pair() {
+    let path = Path::spiral(0.2, 16.0);
+    let (contact, ..) = search(&path, &PAPER, Some(0.1));
+    let contact = contact.unwrap();
+    let mut unreported = |_| {};
+    let mut start = Configuration::new(&path, 0.0);
+    start.solve_to(223, &path, &PAPER, &mut Budget::new(u64::MAX, &mut unreported)).unwrap();
+    let pair = (contact.bench_a.unwrap() as usize, contact.bench_b.unwrap() as usize);
+    assert_eq!((contact.travelled, start.clearance(pair)), (0.0, all_pairs(&path, &PAPER, 0.0)));
+}
+
+#[test]
+fn rounding_in_the_last_digits_before_a_lock_is_no_error() {
+    let hole_inset = 0.028413322610933628;
+    let team =
+        Team { benches: 3, head_length: 3.350262415408828, body_length: 1.3837549674849094, width: 0.02, hole_inset };
+    let pitch = 3.4942913904095154;
+    let fold = Path::spiral(pitch, 1.0).as_spiral().and_then(|(spiral, _)| spiral.fold(team.link(0))).unwrap();
+    let (contact, least, _) = search(&Path::spiral(pitch, 7.063442453912254 + fold / TAU), &team, None);
+    assert!(contact.is_none() && least.is_some());
+}
+
+#[test]
+fn a_spent_budget_tells_how_far_the_search_came() {
+    let path = Path::spiral(0.55, 16.0);
+    let searches = ConservativeAdvancement::new(&path, &PAPER, &[], &[]);
+    let mut shares = Vec::new();
+    let mut report = |share| shares.push(share);
+    let found = searches.first_contact(0.0, 430.0, &mut Budget::new(20_000, &mut report)).unwrap();
+    assert!(found.value.is_none() && found.searched_until > 10.0 && found.searched_until < 412.0, "{found:?}");
+    assert!(shares.is_sorted() && shares.len() > 10);
+}
+
+fn any_team() -> impl Strategy<Value = Team> {
+    (3..25usize, 0.5..4.0f64, 0.5..4.0f64, 0.02..0.8f64, 0.01..0.48f64).prop_map(
+        |(benches, head, body, width, inset)| {
+            let hole_inset = inset * f64::min(head, body);
+            Team { benches, head_length: head, body_length: body, width, hole_inset }
+        },
+    )
+}
+
+fn any_route() -> impl Strategy<Value = Path> {
+    let piece = (0..3, 0.05..2.5f64, 0.05..0.9f64, 0.0..6.0f64);
+    proptest::collection::vec(piece, 1..7).prop_map(|pieces| {
+        let add = |route: crate::model::path::Route, (kind, radius, turns, length)| match kind {
+            0 => route.line(length),
+            1 => route.arc(Side::Left, radius, turns),
+            _ => route.arc(Side::Right, radius, turns),
+        };
+        pieces.into_iter().fold(Path::route(Point::origin(), 0.0), add).build().unwrap()
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(CASES) })]
+
+    #[test]
+    fn sampling_a_spiral_shows_nothing_better(team in any_team(), pitch in 0.3..4.0f64, turns in 2.0..9.0f64) {
+        let fold = Path::spiral(pitch, 1.0).as_spiral().and_then(|(spiral, _)| spiral.fold(team.longest_link()));
+        let turns = turns + fold.unwrap_or(0.0) / TAU;
+        check(&Path::spiral(pitch, turns), &team, SAMPLES)?;
+    }
+
+    #[test]
+    fn sampling_a_turnaround_shows_nothing_better(
+        team in any_team(), pitch in 0.5..3.0f64, radius in 1.0..6.0f64, ratio in 0.4..2.5f64, lead in 0.0..20.0f64,
+    ) {
+        // Where the arcs are that tight against the links, the approach itself may lock.
+        prop_assume!(radius > 0.8 * team.longest_link());
+        if let Ok(path) = Path::turnaround(pitch, radius, ratio, lead, team.length()) {
+            check(&path, &team, SAMPLES)?;
+        }
+    }
+
+    #[test]
+    fn sampling_a_tight_route_shows_nothing_better(team in any_team(), path in any_route()) {
+        check(&path, &team, SAMPLES)?;
+    }
+}
+
+const CASES: u32 = 12;
+const SAMPLES: usize = 300;

@@ -1,0 +1,404 @@
+//! The motion: a team on a path at a speed, followed by a method. It alone decides what a show computes: which solver and
+//! why, which events, the live clearance, the time of a travelled distance, the outline to draw.
+//!
+//! In: what a scene states. The show, the plans and the commands call it; no other module distinguishes the kinds of
+//! path.
+
+pub mod clearance;
+pub mod contact;
+pub mod event;
+pub mod linkage;
+pub mod model;
+pub mod singularities;
+pub mod solve;
+pub mod timeline;
+
+use bench_dragon_messages::state::EventKind;
+
+use crate::model::board::Board;
+use crate::model::description::PathDescription;
+use crate::model::path::{Disjoint, Path, SegmentOutline};
+use crate::model::team::Team;
+use crate::solve::newton::Newton;
+use crate::solve::paper::{self, Paper, PaperRules};
+use crate::solve::selection::{self, Selection};
+use crate::solve::table::{FollowerTable, Instructions};
+use crate::solve::{Solver, Velocities};
+
+use clearance::ClearanceMonitor;
+use contact::{ConservativeAdvancement, LeastClearance};
+use event::{Budget, Event};
+use singularities::Singularities;
+use timeline::{TimedClearance, TimedEvent, Timeline};
+
+/// How the solver is chosen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Method {
+    /// The cheapest solver that is measured to meet this position error, metres.
+    Accuracy(f64),
+    /// Exact motion, each follower bracketed.
+    Newton,
+    /// Exact motion, every handle interpolated in a table of where such chains stand.
+    FollowerTable,
+    /// The paper's rules, on a spiral.
+    Paper(PaperRules),
+}
+
+/// A solver and why it was chosen.
+pub struct Choice {
+    /// The solver.
+    pub solver: Box<dyn Solver>,
+    /// Its name, its settings and the reason, for people.
+    pub reason: String,
+    /// The table that the solver interpolates in, if it does.
+    table: Option<FollowerTable>,
+}
+
+impl Choice {
+    /// Metres that the clearance of a frame can differ from that of exact motion: twice what a board's points move with
+    /// handles that are as far off as the solver promises.
+    pub fn clearance_error(&self, team: &Team) -> f64 {
+        let factor = |link| Board::displacement_factor(link, team.hole_inset, team.width);
+        let factor = factor(team.link(0)).max(factor(team.link(1)));
+        2.0 * factor * self.table.as_ref().map_or(0.0, FollowerTable::accuracy)
+    }
+}
+
+/// A motion that cannot be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MotionError {
+    /// The path has a gap or a corner.
+    #[error("the path has a gap: {0}")]
+    Disjoint(#[from] Disjoint),
+    /// The paper's rules are for its spiral.
+    #[error("the paper's solver follows an inward spiral to its centre and no other path")]
+    PaperElsewhere,
+}
+
+/// A team on a path.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon_motion::model::description::PathDescription;
+/// use bench_dragon_motion::model::team::Team;
+/// use bench_dragon_messages::state::EventKind;
+/// use bench_dragon_motion::{Method, Motion};
+///
+/// let team = Team { benches: 20, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
+/// let path = PathDescription::Spiral { pitch: 0.55, start_turn: 16.0 };
+/// let motion = Motion::new(path, team, 1.0, Method::Newton)?;
+/// let timeline = motion.timeline(&mut |_| ());
+/// let contact = timeline.find(EventKind::Contact).unwrap();
+/// assert!((contact.time - 412.473_837_682).abs() < 1e-9);
+/// assert_eq!((contact.event.bench_a, contact.event.bench_b), (Some(0), Some(8)));
+/// assert_eq!(timeline.end().event.kind, EventKind::Lock);
+/// # Ok::<(), bench_dragon_motion::MotionError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motion {
+    description: PathDescription,
+    path: Path,
+    team: Team,
+    head_speed: f64,
+    method: Method,
+    instructions: Instructions,
+}
+
+/// Units of work after which the search for stall and lock gives up: some ten seconds.
+const SINGULARITIES_BUDGET: u64 = 50_000_000;
+
+/// Units of work after which the search for a contact, or for the least clearance, gives up: about half a minute.
+const CONTACT_BUDGET: u64 = 100_000_000;
+
+/// Metres by which a table of its own may be off where the clearance has to make a coarse one.
+const CLEARANCE_ACCURACY: f64 = 1e-4;
+
+const NO_TABLE: &str = "there is no table for this team and path";
+
+/// What was measured of a table, for people.
+fn measured(selection: &Selection, requested: f64) -> String {
+    let Selection { table, accuracy, error, moments, made_in, .. } = selection;
+    let target = if !selection.meets() {
+        format!("the best there is for the {requested:e} m requested")
+    } else if selection.is_at_the_floor() {
+        format!("for the {requested:e} m requested, which doubles cannot hold everywhere here")
+    } else if *accuracy < requested {
+        format!("for the {requested:e} m requested, taken as {accuracy:.1e} m, a thousandth of a link")
+    } else {
+        format!("for the {requested:e} m requested")
+    };
+    format!(
+        "{error:.1e} m measured against newton at {moments} moments, {target}; {:.0} bytes a handle, {:.2} of the most \
+         exact table's, {} kB, made in {:.0} ms",
+        table.bytes_per_handle(),
+        table.relative_cost(),
+        table.memory_bytes().div_ceil(1000),
+        1e3 * made_in.as_secs_f64()
+    )
+}
+
+impl Motion {
+    /// The motion of `team`, its head moving at `head_speed` metres per second along the path.
+    ///
+    /// # Errors
+    /// [`MotionError`]
+    pub fn new(description: PathDescription, team: Team, head_speed: f64, method: Method) -> Result<Self, MotionError> {
+        let path = description.path()?;
+        if matches!(method, Method::Paper(_)) && path.as_spiral().is_none() {
+            return Err(MotionError::PaperElsewhere);
+        }
+        let instructions = Instructions::fastest(team.handles());
+        Ok(Self { description, path, team, head_speed, method, instructions })
+    }
+
+    /// The numbers of which the path is made.
+    pub fn description(&self) -> &PathDescription {
+        &self.description
+    }
+
+    /// The path.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The benches.
+    pub fn team(&self) -> &Team {
+        &self.team
+    }
+
+    /// Metres per second of the head along the curve.
+    pub fn head_speed(&self) -> f64 {
+        self.head_speed
+    }
+
+    /// How the solver is chosen.
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// The same motion by another method.
+    ///
+    /// # Errors
+    /// [`MotionError::PaperElsewhere`]
+    pub fn with_method(&self, method: Method) -> Result<Self, MotionError> {
+        let other = Self::new(self.description.clone(), self.team, self.head_speed, method)?;
+        Ok(Self { instructions: self.instructions, ..other })
+    }
+
+    /// The instructions that a table is read with: the fastest this processor has, unless others were requested.
+    pub fn instructions(&self) -> Instructions {
+        self.instructions
+    }
+
+    /// The same motion with other instructions, or `None` where this processor lacks them.
+    pub fn with_instructions(self, instructions: Instructions) -> Option<Self> {
+        instructions.is_available().then_some(Self { instructions, ..self })
+    }
+
+    /// Metres by which the links of this motion's frames may be off, besides 1e-12 of their length and the rounding of the
+    /// handles' coordinates.
+    pub fn link_tolerance(&self) -> f64 {
+        // Both ends of a link may be off by the rounding of a product and of a sum, in both coordinates.
+        let rounding = 4.0 * f64::EPSILON * self.path.largest_summand(self.team.length());
+        match self.method {
+            Method::Accuracy(accuracy) => selection::link_tolerance(&self.team, accuracy) + rounding,
+            _ => rounding,
+        }
+    }
+
+    /// Simulated seconds after which the head has travelled so many metres along the path, as the method has it.
+    pub fn time_at(&self, travelled: f64) -> f64 {
+        match (self.method, self.path.as_spiral()) {
+            (Method::Paper(_), Some((spiral, start))) => {
+                let theta = self.path.param_at(travelled).at.high;
+                paper::time_of_theta(spiral, start.high, self.head_speed, theta)
+            }
+            _ => travelled / self.head_speed,
+        }
+    }
+
+    /// What a drawing needs of the path, segment by segment.
+    pub fn outline(&self) -> Vec<SegmentOutline> {
+        self.path.outline()
+    }
+
+    /// The solver, made anew.
+    pub fn solver(&self, velocities: Velocities) -> Choice {
+        let newton = |reason: String| {
+            let newton = Newton::new(self.path.clone(), self.team, self.head_speed, velocities);
+            Choice { solver: Box::new(newton), reason, table: None }
+        };
+        match (self.method, self.path.as_spiral()) {
+            (Method::Accuracy(accuracy), _) => {
+                let (team, head_speed, with) = (self.team, self.head_speed, self.instructions);
+                match selection::cheapest_with(&self.path, team, head_speed, velocities, accuracy, with) {
+                    Some(selection) => {
+                        let why = measured(&selection, accuracy);
+                        self.chosen_table(selection.table, &why)
+                    }
+                    None => newton(format!("newton: {NO_TABLE}, and {accuracy:e} m is met by exact motion alone")),
+                }
+            }
+            (Method::FollowerTable, _) => {
+                let table = FollowerTable::new(&self.path, self.team, self.head_speed, velocities);
+                match table.and_then(|table| table.with_instructions(self.instructions)) {
+                    Some(table) => self.chosen_table(table, "named by the scene"),
+                    None => newton(format!("newton: the scene names follower_table, but {NO_TABLE}")),
+                }
+            }
+            (Method::Paper(rules), Some((spiral, start))) => {
+                let paper = Paper::new(*spiral, start.high, self.team, self.head_speed, velocities, rules);
+                let reason = "paper: named by the scene; its head is too fast by sqrt(1 + 1/theta^2)".to_owned();
+                Choice { solver: Box::new(paper), reason, table: None }
+            }
+            (Method::Newton | Method::Paper(_), _) => newton("newton: named by the scene".to_owned()),
+        }
+    }
+
+    fn chosen_table(&self, table: FollowerTable, why: &str) -> Choice {
+        let valid = if table.valid_until() * self.head_speed < self.path.length() {
+            format!(" up to {:.3} s, then newton", table.valid_until())
+        } else {
+            String::new()
+        };
+        let reason = format!("follower_table ({}, {}){valid}: {why}", table.instructions().name(), table.format());
+        Choice { solver: Box::new(table.for_frames()), reason, table: Some(table) }
+    }
+
+    /// The live clearance of this motion's frames.
+    /// `choice` is the solver of the same frames, whose table it shares.
+    pub fn clearance_monitor(&self, choice: &Choice) -> ClearanceMonitor {
+        let made_here = match (&choice.table, self.method) {
+            (Some(_), _) | (None, Method::Paper(_)) => None,
+            (None, _) => self.table_for_clearance(),
+        };
+        match choice.table.as_ref().or(made_here.as_ref()) {
+            Some(table) => ClearanceMonitor::new(&self.path, self.team, table),
+            None => ClearanceMonitor::without_table(self.team, self.link_error()),
+        }
+    }
+
+    /// Metres by which a link can be off its length, beyond rounding: the paper's bisection stops at an angle, and along an
+    /// arc of radius r a chord changes by at most r for each radian.
+    pub(crate) fn link_error(&self) -> f64 {
+        match (self.method, self.path.as_spiral()) {
+            (Method::Paper(rules), Some((spiral, start))) => {
+                let outermost = spiral.radius_per_radian() * start.high + self.team.length();
+                rules.bisection_tolerance * (outermost + spiral.radius_per_radian())
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// A table for the clearance of frames that come from another solver: the most exact one, or where that would be too
+    /// large, a coarse one.
+    fn table_for_clearance(&self) -> Option<FollowerTable> {
+        let exact = || FollowerTable::new(&self.path, self.team, self.head_speed, Velocities::Omitted);
+        let coarse = || {
+            let (path, team, speed) = (&self.path, self.team, self.head_speed);
+            selection::cheapest(path, team, speed, Velocities::Omitted, CLEARANCE_ACCURACY).filter(Selection::meets)
+        };
+        let coarse = || coarse().map(|selection| selection.table);
+        match self.method {
+            // There an exact one has been tried.
+            Method::Accuracy(_) | Method::FollowerTable => coarse(),
+            Method::Newton | Method::Paper(_) => exact().or_else(coarse),
+        }
+    }
+
+    /// Metres that the head has travelled at a time; not a number where the method does not follow the path exactly.
+    pub fn travelled_at(&self, time: f64) -> f64 {
+        match self.method {
+            Method::Paper(_) => f64::NAN,
+            _ => self.head_speed * time,
+        }
+    }
+
+    /// All events, contact included. `progress` is called now and then with the share of the search that is done, from
+    /// 0 to 1.
+    pub fn timeline(&self, progress: &mut dyn FnMut(f64)) -> Timeline {
+        let found = self.singularities(&mut |share| progress(0.1 * share));
+        let end = self.end(&found);
+        let mut searched_until = found.searched_until;
+        let mut events: Vec<Event> = found.stall.into_iter().chain([end]).collect();
+        let mut progress = |share: f64| progress(0.1 + 0.9 * share);
+        let mut budget = Budget::new(CONTACT_BUDGET, &mut progress);
+        let until = end.travelled.min(searched_until);
+        match self.advancement(&found).first_contact(0.0, until, &mut budget) {
+            Ok(contact) => {
+                searched_until = searched_until.min(contact.searched_until);
+                events.extend(contact.value);
+            }
+            Err(stuck) => {
+                log::warn!("the search for a contact stopped at a place without a solution: {stuck}");
+                searched_until = 0.0;
+            }
+        }
+        self.timed(events, searched_until)
+    }
+
+    /// The events but for the contact, which costs a search.
+    pub fn timeline_without_contact(&self) -> Timeline {
+        let found = self.singularities(&mut |_| ());
+        let end = self.end(&found);
+        self.timed(found.stall.into_iter().chain([end]).collect(), found.searched_until)
+    }
+
+    /// The least clearance from the start until the show freezes at `freeze`. `None` under three benches. `progress` is
+    /// called as by [`Motion::timeline`].
+    pub fn least_clearance(
+        &self,
+        timeline: &Timeline,
+        freeze: &TimedEvent,
+        progress: &mut dyn FnMut(f64),
+    ) -> Option<TimedClearance> {
+        if self.team.benches < 3 {
+            return None;
+        }
+        let found = self.singularities(&mut |_| ());
+        // Until boards touch for the first time their clearance is above what it is then.
+        let from = timeline.find(EventKind::Contact).map_or(0.0, |contact| contact.event.travelled);
+        let to = freeze.event.travelled;
+        let mut budget = Budget::new(CONTACT_BUDGET, progress);
+        let least = self.advancement(&found).least_clearance(from, to.max(from), &mut budget).ok()?;
+        let LeastClearance { travelled, .. } = least.value?;
+        Some(TimedClearance {
+            least: least.value?,
+            time: self.time_at(travelled),
+            searched_until: (least.searched_until < to).then(|| self.time_at(least.searched_until)),
+        })
+    }
+
+    /// Stall, lock and the turns of the handles.
+    pub fn singularities(&self, progress: &mut dyn FnMut(f64)) -> Singularities {
+        Singularities::search(&self.path, &self.team, &mut Budget::new(SINGULARITIES_BUDGET, progress))
+    }
+
+    /// The search for contacts and clearances, given what [`Motion::singularities`] found.
+    pub fn advancement<'a>(&'a self, found: &'a Singularities) -> ConservativeAdvancement<'a> {
+        ConservativeAdvancement::new(&self.path, &self.team, &found.head_turns, &found.body_turns)
+    }
+
+    /// The lock or path end; where the search gave up before either, the path's end, as far as anyone knows.
+    fn end(&self, found: &Singularities) -> Event {
+        let path_end = EventKind::PathEnd;
+        let travelled = self.path.length();
+        found.end.unwrap_or(Event { kind: path_end, travelled, bench_a: None, bench_b: None, place: None })
+    }
+
+    /// The time of an event. That of a lock is never past the lock when it is multiplied by the speed again: there handles
+    /// would have jumped.
+    fn time_of(&self, event: &Event) -> f64 {
+        let time = self.time_at(event.travelled);
+        let is_past = event.kind == EventKind::Lock && self.travelled_at(time) > event.travelled;
+        if is_past { time.next_down() } else { time }
+    }
+
+    /// The events with their times, and the time up to which they are all there are.
+    fn timed(&self, events: Vec<Event>, searched_until: f64) -> Timeline {
+        let end = events.iter().fold(0.0, |end: f64, event| end.max(event.travelled));
+        let timed = events.into_iter().map(|event| TimedEvent { event, time: self.time_of(&event) }).collect();
+        Timeline::new(timed, (searched_until < end).then(|| self.time_at(searched_until)))
+    }
+}

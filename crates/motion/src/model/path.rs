@@ -1,0 +1,391 @@
+//! The path that the handles ride: segments one after the other without a gap or a corner, travelled by arc length. A
+//! spiral is a path of one segment.
+//!
+//! Scenes construct it; the linkage, the solvers and the events travel it. Distance 0 is where the head starts; a path
+//! reaches as far behind its start as any team needs, and ends at [`Path::length`].
+
+use std::f64::consts::TAU;
+
+use super::curve::{Arc, Coordinate, Curve, Line, Segment, Side};
+use super::double_double::DoubleDouble;
+use super::spiral::{Direction, Spiral};
+use super::{Point, Vector};
+
+/// A place on a path: the segment, counted from 0, and the place on it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Param {
+    pub(crate) segment: usize,
+    pub(crate) at: Coordinate,
+}
+
+impl Param {
+    /// The place with this coordinate on a segment, counted from 0.
+    pub fn new(segment: usize, coordinate: Coordinate) -> Self {
+        Self { segment, at: coordinate }
+    }
+
+    /// The segment, counted from 0.
+    pub fn segment(&self) -> usize {
+        self.segment
+    }
+
+    /// The place in the segment's own coordinate: metres on a line or an arc, the polar angle in radians on a spiral.
+    pub fn coordinate(&self) -> Coordinate {
+        self.at
+    }
+}
+
+/// Two segments that do not join: the path would have a gap or a corner.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("segment {segment} does not join the one before it: a gap of {gap:e} m, a corner of {corner:e} rad")]
+pub struct Disjoint {
+    /// The later of the two segments, counted from 0.
+    pub segment: usize,
+    /// Metres between the end of one and the start of the other.
+    pub gap: f64,
+    /// Radians between their directions.
+    pub corner: f64,
+}
+
+/// A segment in its place on the path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Placed {
+    segment: Segment,
+    /// Metres of travel at which it begins; minus infinity for the first.
+    begin: f64,
+    /// Metres of travel at which it ends.
+    end: f64,
+    /// Its coordinate where it begins, or for the first segment where the head starts or the segment ends, if that is
+    /// earlier; and the metres of travel there.
+    anchor: Coordinate,
+    anchor_travelled: f64,
+    /// Its coordinate where it ends.
+    last: Coordinate,
+}
+
+impl Placed {
+    fn at(&self, travelled: f64) -> Coordinate {
+        self.segment.advance(self.anchor, travelled - self.anchor_travelled)
+    }
+}
+
+/// A smooth path.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Path {
+    segments: Vec<Placed>,
+}
+
+/// What a drawing needs of a segment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SegmentOutline {
+    /// Which curve it is.
+    pub kind: OutlineKind,
+    /// Where it begins.
+    pub start: Point,
+    /// Direction of travel there, radians counter-clockwise from x.
+    pub heading: f64,
+    /// Metres along it.
+    pub length: f64,
+}
+
+/// The curve of a segment's outline.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum OutlineKind {
+    /// Straight on.
+    Line,
+    /// Part of a circle.
+    Arc {
+        /// 1/m, positive where it turns left.
+        curvature: f64,
+    },
+    /// Along r = pitch theta / 2 pi; outward, turned by half a turn.
+    Spiral {
+        /// Towards the centre or away from it.
+        direction: Direction,
+        /// Metres per turn.
+        pitch: f64,
+        /// Polar angle on the unturned spiral where it begins, radians.
+        first: f64,
+        /// Polar angle on the unturned spiral where it ends, radians.
+        last: f64,
+    },
+}
+
+impl Path {
+    /// Inward along the spiral r = a theta (a = `pitch` / 2 pi) from theta = 2 pi `start_turn` to the centre.
+    pub fn spiral(pitch: f64, start_turn: f64) -> Self {
+        let spiral = Spiral::new(pitch, Direction::Inward);
+        let anchor = DoubleDouble::from_turns(start_turn);
+        let end = spiral.arc_length(anchor, Coordinate::ZERO);
+        Self {
+            segments: vec![Placed {
+                segment: Segment::Spiral(spiral),
+                begin: f64::NEG_INFINITY,
+                end,
+                anchor,
+                anchor_travelled: 0.0,
+                last: Coordinate::ZERO,
+            }],
+        }
+    }
+
+    /// Inward along the spiral r = a theta (a = `pitch` / 2 pi) up to `turn_radius`, through an S of two arcs to the
+    /// opposite point, and outward along the same spiral turned by half a turn. Travel starts `lead_in` metres before
+    /// the turn and ends `lead_out` metres after it.
+    ///
+    /// With R = `turn_radius` the chords of both arcs lie on the diameter through the two ends and make the same angle
+    /// atan(R/a) with the tangents there. So both arcs turn by twice that angle, their radii sum to sqrt(R^2 + a^2),
+    /// and their lengths to 2 sqrt(R^2 + a^2) atan(R/a), whatever `arc_ratio`, the first radius over the second.
+    ///
+    /// # Errors
+    /// [`Disjoint`] where numbers so extreme are given that rounding leaves a gap.
+    pub fn turnaround(
+        pitch: f64,
+        turn_radius: f64,
+        arc_ratio: f64,
+        lead_in: f64,
+        lead_out: f64,
+    ) -> Result<Self, Disjoint> {
+        let inward = Spiral::new(pitch, Direction::Inward);
+        let a = inward.radius_per_radian();
+        let both = turn_radius.hypot(a);
+        let second_radius = both / (1.0 + arc_ratio);
+        let first_radius = arc_ratio * second_radius;
+        let angle = 2.0 * (turn_radius / a).atan();
+        // Far out a rounded number of turns would be a place well beside the turn's own.
+        let DoubleDouble { high, low } = DoubleDouble::quotient(turn_radius, pitch);
+        let anchor = DoubleDouble::from_turns(high).plus(TAU * low);
+        let (start, tangent) = (inward.point(anchor), inward.tangent(anchor));
+        let first = Arc::new(start, tangent, Side::Right, first_radius);
+        let middle = start + (-2.0 * first_radius / both) * start.coords;
+        let last = Coordinate { high: angle, low: 0.0 };
+        let second = Arc::new(middle, first.tangent(last), Side::Left, second_radius);
+        let approach = Placed {
+            segment: Segment::Spiral(inward),
+            begin: f64::NEG_INFINITY,
+            end: lead_in,
+            anchor,
+            anchor_travelled: lead_in,
+            last: anchor,
+        };
+        let mut path = Self { segments: vec![approach] };
+        path.push(Segment::Arc(first), Coordinate::ZERO, last, first_radius * angle);
+        path.push(Segment::Arc(second), Coordinate::ZERO, last, second_radius * angle);
+        let outward = Spiral::new(pitch, Direction::Outward);
+        path.push(Segment::Spiral(outward), anchor, outward.advance(anchor, lead_out), lead_out);
+        path.joined()
+    }
+
+    /// A route that begins at `start` in the direction `heading_turns` turns counter-clockwise from x, with a straight
+    /// line without end behind it. Lines and arcs are added to it one by one.
+    pub fn route(start: Point, heading_turns: f64) -> Route {
+        let (sine, cosine) = DoubleDouble::from_turns(heading_turns).sin_cos();
+        let segment = Segment::Line(Line { origin: start, direction: Vector::new(cosine, sine) });
+        let zero = Coordinate::ZERO;
+        let behind =
+            Placed { segment, begin: f64::NEG_INFINITY, end: 0.0, anchor: zero, anchor_travelled: 0.0, last: zero };
+        Route { path: Self { segments: vec![behind] }, end: start, heading_turns }
+    }
+
+    fn push(&mut self, segment: Segment, anchor: Coordinate, last: Coordinate, length: f64) {
+        let begin = self.length();
+        self.segments.push(Placed { segment, begin, end: begin + length, anchor, anchor_travelled: begin, last });
+    }
+
+    /// The path itself where every segment continues the one before it.
+    fn joined(self) -> Result<Self, Disjoint> {
+        for (index, pair) in self.segments.windows(2).enumerate() {
+            let (before, after) = (&pair[0].segment, &pair[1].segment);
+            let (last, first) = (self.last(index), pair[1].anchor);
+            let (end, start) = (before.point(last), after.point(first));
+            let (old, new) = (before.tangent(last), after.tangent(first));
+            let gap = (end - start).norm();
+            let corner = old.perp(&new).atan2(old.dot(&new)).abs();
+            let sharpest = before.curvature(last).max(after.curvature(first));
+            let size = end.coords.norm() + 1.0 / sharpest.max(1.0);
+            // Not a number is no join either.
+            if !(gap <= 1e-12 * size && corner <= 1e-12) {
+                return Err(Disjoint { segment: index + 1, gap, corner });
+            }
+        }
+        Ok(self)
+    }
+
+    /// Metres that the head can travel.
+    pub fn length(&self) -> f64 {
+        self.segments[self.segments.len() - 1].end
+    }
+
+    /// The number of segments, with the one that reaches behind the start.
+    pub fn segments(&self) -> usize {
+        self.segments.len()
+    }
+
+    /// Metres of travel at which each segment after the first begins.
+    pub fn junctions(&self) -> impl Iterator<Item = f64> + '_ {
+        self.segments[1..].iter().map(|placed| placed.begin)
+    }
+
+    /// The place `travelled` metres of arc length past the start; clamped to the path's end.
+    ///
+    /// The error is at most 4 eps (r + |travelled|) along the curve, r being the distance from the origin.
+    pub fn param_at(&self, travelled: f64) -> Param {
+        let travelled = travelled.min(self.length());
+        let segment = self.segments.partition_point(|placed| placed.begin <= travelled).max(1) - 1;
+        Param { segment, at: self.segments[segment].at(travelled) }
+    }
+
+    /// Metres of travel at a place.
+    pub fn travelled(&self, param: Param) -> f64 {
+        let Placed { segment, anchor, anchor_travelled, .. } = &self.segments[param.segment];
+        anchor_travelled + segment.arc_length(*anchor, param.at)
+    }
+
+    /// The point of a place.
+    pub fn point(&self, param: Param) -> Point {
+        self.segment(param).point(param.at)
+    }
+
+    /// The unit tangent of a place, in the direction of travel.
+    pub fn tangent(&self, param: Param) -> Vector {
+        self.segment(param).tangent(param.at)
+    }
+
+    /// Metres of arc length from one place to another; negative against the direction of travel.
+    pub fn arc_length(&self, from: Param, to: Param) -> f64 {
+        if from.segment == to.segment {
+            return self.segment(from).arc_length(from.at, to.at);
+        }
+        if from.segment > to.segment {
+            return -self.arc_length(to, from);
+        }
+        let between = self.segments[to.segment].begin - self.segments[from.segment].end;
+        let rest = self.segment(from).arc_length(from.at, self.last(from.segment));
+        rest + between + self.segment(to).arc_length(self.segments[to.segment].anchor, to.at)
+    }
+
+    /// Metres: the largest number to which the points of lines and arcs are added up, for handles up to `behind` metres behind
+    /// the start. Points that lie nearer to the origin of coordinates are rounded as that number is.
+    pub fn largest_summand(&self, behind: f64) -> f64 {
+        let of = |placed: &Placed| {
+            let length = placed.end - placed.begin.max(-behind);
+            match placed.segment {
+                Segment::Line(line) => line.origin.coords.amax(),
+                Segment::Arc(arc) => arc.origin.coords.amax().max(length.min(2.0 * arc.radius)),
+                Segment::Spiral(_) => 0.0,
+            }
+        };
+        self.segments.iter().map(of).fold(0.0, f64::max)
+    }
+
+    /// The greatest curvature from one distance of travel to another, 1/m: the tangent turns by no more per metre.
+    pub fn max_curvature_between(&self, from: f64, to: f64) -> f64 {
+        let met = self.segments.iter().filter(|placed| placed.begin <= to && placed.end >= from);
+        met.map(|placed| {
+            // A spiral bends most where it is nearest to the centre.
+            let innermost = match placed.segment {
+                Segment::Spiral(spiral) if spiral.direction() == Direction::Inward => to.min(placed.end),
+                _ => from.max(placed.begin).min(placed.end),
+            };
+            placed.segment.curvature(placed.at(innermost))
+        })
+        .fold(0.0, f64::max)
+    }
+
+    /// The spiral, and its coordinate where travel starts, of a path that is nothing else.
+    pub fn as_spiral(&self) -> Option<(&Spiral, Coordinate)> {
+        match self.segments.as_slice() {
+            [Placed { segment: Segment::Spiral(spiral), anchor, .. }] => Some((spiral, *anchor)),
+            _ => None,
+        }
+    }
+
+    /// What a drawing needs of each segment, in order, from where the head starts.
+    pub fn outline(&self) -> Vec<SegmentOutline> {
+        let ahead = self.segments.iter().filter(|placed| placed.end > 0.0);
+        ahead
+            .map(|placed| {
+                let begin = placed.begin.max(0.0);
+                let (first, last) = (placed.at(begin), placed.last);
+                let tangent = placed.segment.tangent(first);
+                let kind = match placed.segment {
+                    Segment::Line(_) => OutlineKind::Line,
+                    Segment::Arc(arc) => OutlineKind::Arc { curvature: arc.signed_curvature() },
+                    Segment::Spiral(spiral) => OutlineKind::Spiral {
+                        direction: spiral.direction(),
+                        pitch: spiral.pitch(),
+                        first: first.high,
+                        last: last.high,
+                    },
+                };
+                let start = placed.segment.point(first);
+                SegmentOutline { kind, start, heading: tangent.y.atan2(tangent.x), length: placed.end - begin }
+            })
+            .collect()
+    }
+
+    pub(crate) fn segment(&self, param: Param) -> &Segment {
+        &self.segments[param.segment].segment
+    }
+
+    /// The coordinate with which a segment begins; of the first segment, of the place from which it is measured.
+    pub(crate) fn first(&self, segment: usize) -> Coordinate {
+        self.segments[segment].anchor
+    }
+
+    /// The coordinate with which a segment ends.
+    pub(crate) fn last(&self, segment: usize) -> Coordinate {
+        self.segments[segment].last
+    }
+
+    /// Metres of travel at which a segment ends.
+    pub(crate) fn end_of(&self, segment: usize) -> f64 {
+        self.segments[segment].end
+    }
+}
+
+/// A route being built.
+#[derive(Debug, Clone)]
+pub struct Route {
+    path: Path,
+    end: Point,
+    heading_turns: f64,
+}
+
+impl Route {
+    /// Straight on for `length` metres.
+    pub fn line(self, length: f64) -> Self {
+        let line = Line { origin: self.end, direction: self.direction() };
+        self.continued(Segment::Line(line), Coordinate { high: length, low: 0.0 }, length, 0.0)
+    }
+
+    /// Along a circle of `radius` metres whose centre is on one side, for `turns` turns (90 degrees are a quarter).
+    pub fn arc(self, side: Side, radius: f64, turns: f64) -> Self {
+        let arc = Arc::new(self.end, self.direction(), side, radius);
+        let turned = if side == Side::Left { turns } else { -turns };
+        self.continued(Segment::Arc(arc), DoubleDouble::from_turns(turns), radius * TAU * turns, turned)
+    }
+
+    fn direction(&self) -> Vector {
+        let (sine, cosine) = DoubleDouble::from_turns(self.heading_turns).sin_cos();
+        Vector::new(cosine, sine)
+    }
+
+    fn continued(mut self, segment: Segment, last: Coordinate, length: f64, turned: f64) -> Self {
+        self.path.push(segment, Coordinate::ZERO, last, length);
+        self.end = segment.point(last);
+        self.heading_turns += turned;
+        self
+    }
+
+    /// The path.
+    ///
+    /// # Errors
+    /// [`Disjoint`] where numbers so extreme are given that rounding leaves a gap.
+    pub fn build(self) -> Result<Path, Disjoint> {
+        self.path.joined()
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

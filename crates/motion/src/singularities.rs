@@ -1,0 +1,249 @@
+//! Singular configurations of the chain: the first stall (dead point) and the lock or path end that ends the motion.
+//!
+//! In: a path and a team. Out: [`Singularities`], in metres of travel of the head. The timeline calls the search once,
+//! before anything moves; the search for contacts cuts its steps at the turning points found here.
+//!
+//! **Two links are enough.** Let F be the follower map of a body link, from its front handle's travel to its rear
+//! handle's. Handle k + 1 is behind handle k, so no handle after the first is ever further along the path than handle 1
+//! has been; on the first segment, outside the fold, F is continuous however far back. So while F is continuous up to
+//! where handle 1 has been, no body link locks. Before the first stall all handles go forward, so each place is first
+//! reached by the foremost handle that did not start beyond it. The handles that start behind handle 1 are on the first
+//! segment: a straight line, where nothing happens, or an inward spiral, where nothing happens but near its centre
+//! (`inward`); only a start so near makes `Search::body_stall` consider more links. So there are two problems in one
+//! variable, a `LinkTrace` each: the head's link for all places of the head, and a body link for all places that handle
+//! 1 has come to. They are solved in lockstep, and every step is proven to hold nothing unseen (`certificate`) or
+//! halved, down to the resolution of doubles (`trace`). Between two turning points of handle 1 its place is monotone in
+//! the head's, so one is found from the other by bisection.
+
+mod certificate;
+mod inward;
+mod trace;
+
+use crate::model::Point;
+use crate::model::path::{Param, Path};
+use crate::model::root::bisect_predicate;
+use crate::model::team::Team;
+
+use bench_dragon_messages::state::EventKind;
+
+use super::event::{Budget, Event};
+use certificate::{Configuration, Link};
+use trace::{LinkTrace, TraceEnd};
+
+/// In the last digits before a lock: in so many rounding may make a handle jump, so many more are safe, and before so many none
+/// has jumped.
+const JUMP_DIGITS: u32 = 256;
+const SAFE_DIGITS: u32 = 32;
+const UNTOUCHED_DIGITS: u32 = 1024;
+/// How far a handle goes that jumps, in links: on those digits it goes less towards any other lock.
+const JUMP: f64 = 0.05;
+
+/// The singular configurations of a motion, up to the one that ends it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Singularities {
+    /// The first stall of any link.
+    pub stall: Option<Event>,
+    /// The lock, or the path's end where no link locks. `None` where the search ended before either.
+    pub end: Option<Event>,
+    /// Metres of travel of the head up to which the search is complete: that of `end`, where there is one.
+    pub searched_until: f64,
+    /// Metres of travel of the head at which the first link's rear handle turns round, in order.
+    pub head_turns: Vec<f64>,
+    /// Metres of travel of a body link's front handle at which its rear handle turns round, in order.
+    pub body_turns: Vec<f64>,
+}
+
+impl Singularities {
+    /// Searches from the start of the motion until it ends or the budget is spent.
+    pub fn search(path: &Path, team: &Team, budget: &mut Budget) -> Self {
+        let trace = |link: usize, start| LinkTrace::new(Link { path, length: team.link(link) }, start);
+        let traces = trace(0, Some(0.0)).and_then(|head| {
+            let body = if team.benches > 1 { Some(trace(1, None)?) } else { None };
+            Ok((head, body))
+        });
+        let Ok((head, body)) = traces else {
+            return Self { stall: None, end: None, searched_until: 0.0, head_turns: vec![], body_turns: vec![] };
+        };
+        let mut search = Search { path, team, head, body };
+        search.run(budget);
+        search.conclude()
+    }
+}
+
+struct Search<'a> {
+    path: &'a Path,
+    team: &'a Team,
+    /// In metres of travel of the head.
+    head: LinkTrace<'a>,
+    /// In metres of travel of the body link's front handle; `None` for one bench.
+    body: Option<LinkTrace<'a>>,
+}
+
+impl Search<'_> {
+    /// Traces the head's link, and the body link as far as handle 1 has come, until one ends the motion.
+    fn run(&mut self, budget: &mut Budget) {
+        for step in 0u64.. {
+            if step % 256 == 0 {
+                budget.report(self.head.at().front / self.path.length());
+            }
+            let body_is_behind = self.body_lags();
+            let spent = match &mut self.body {
+                Some(body) if body_is_behind && body.end().is_none() => !body.advance(budget),
+                _ if body_is_behind || self.head.end().is_some() => break,
+                _ => !self.head.advance(budget),
+            };
+            if spent {
+                break;
+            }
+        }
+    }
+
+    /// Whether handle 1 has come further than the body link is traced.
+    fn body_lags(&self) -> bool {
+        self.body.as_ref().is_some_and(|body| body.at().front < self.head.furthest_rear())
+    }
+
+    fn conclude(self) -> Singularities {
+        let limit = self.head.at().front.max(0.0);
+        let body_limit = self.body.as_ref().filter(|_| self.body_lags()).and_then(|body| {
+            let reached = self.handle_1_reaches(body.at().front, limit)?;
+            Some((body.end(), reached.next_down().max(0.0)))
+        });
+        let (end, searched_until) = match (body_limit, self.head.end()) {
+            (Some((Some(TraceEnd::Lock), at)), _) => {
+                let at = self.before_jump(at, 1);
+                (Some(self.event(EventKind::Lock, at, 1)), at)
+            }
+            (Some((_, at)), _) => (None, at),
+            (None, Some(TraceEnd::Lock)) => {
+                let at = self.before_jump(limit, 0);
+                (Some(self.event(EventKind::Lock, at, 0)), at)
+            }
+            (None, Some(TraceEnd::PathEnd)) => {
+                let kind = EventKind::PathEnd;
+                (Some(Event { kind, travelled: limit, bench_a: None, bench_b: None, place: None }), limit)
+            }
+            (None, Some(TraceEnd::Undecided) | None) => (None, limit),
+        };
+        let stall = self.stall(searched_until).filter(|stall| stall.travelled < searched_until);
+        let head_turns: Vec<_> = self.head.turns().iter().copied().filter(|at| *at <= searched_until).collect();
+        let places = head_turns.iter().chain([&0.0, &searched_until]).filter_map(|at| self.handle_1(*at));
+        let furthest = places.fold(f64::NEG_INFINITY, f64::max);
+        let body_turns = self.body.as_ref().map_or(&[][..], LinkTrace::turns);
+        let body_turns = body_turns.iter().copied().filter(|at| *at <= furthest).collect();
+        Singularities { stall, end, searched_until, head_turns, body_turns }
+    }
+
+    /// Metres of travel of handle 1.
+    fn handle_1(&self, head: f64) -> Option<f64> {
+        self.head.link().configuration(head).ok().map(|configuration| configuration.rear)
+    }
+
+    /// The head's first travel up to `limit` at which handle 1 has come to `place`.
+    fn handle_1_reaches(&self, place: f64, limit: f64) -> Option<f64> {
+        let reached = |head: f64| self.handle_1(head).is_none_or(|at| at >= place);
+        if reached(0.0) {
+            return Some(0.0);
+        }
+        let turns = self.head.turns().iter().copied().filter(|at| *at < limit);
+        let mut from = 0.0;
+        for to in turns.chain([limit]) {
+            if reached(to) {
+                return Some(bisect_predicate(reached, from, to));
+            }
+            from = to;
+        }
+        None
+    }
+
+    /// The first stall up to `limit` metres of travel of the head.
+    fn stall(&self, limit: f64) -> Option<Event> {
+        let start = self.head.link().configuration(0.0).ok()?;
+        if start.is_stalled() {
+            return Some(self.event(EventKind::Stall, 0.0, 0));
+        }
+        let head = self.head.turns().first().copied().filter(|at| *at <= limit);
+        let body = self.body_stall(&start, head.unwrap_or(limit));
+        match (head, body) {
+            (Some(at), Some((body, _))) if at <= body => Some(self.event(EventKind::Stall, at, 0)),
+            (_, Some((at, link))) => Some(self.event(EventKind::Stall, at, link)),
+            (head, None) => head.map(|at| self.event(EventKind::Stall, at, 0)),
+        }
+    }
+
+    /// The first stall of a body link while handle 1 only goes forward, up to `limit`: the head's travel, and the link.
+    fn body_stall(&self, head: &Configuration, limit: f64) -> Option<(f64, usize)> {
+        let body = self.body.as_ref()?;
+        let innermost = *body.turns().first()?;
+        let mut first: Option<(f64, usize)> = None;
+        let mut front = head.rear;
+        for link in 1..self.team.benches {
+            let configuration = body.link().configuration(front).ok()?;
+            if configuration.is_stalled() {
+                return Some((0.0, link));
+            }
+            let turn = body.turns().iter().copied().find(|at| *at > front);
+            if let Some(at) = turn.and_then(|turn| self.handle_reaches(link, turn, limit))
+                && first.is_none_or(|(earlier, _)| at < earlier)
+            {
+                first = Some((at, link));
+            }
+            if front <= innermost {
+                break;
+            }
+            front = configuration.rear;
+        }
+        first
+    }
+
+    /// The head's first travel up to `limit` at which a handle has come to `place`, none having turned round before.
+    fn handle_reaches(&self, handle: usize, place: f64, limit: f64) -> Option<f64> {
+        let reached = |head: f64| {
+            let body = self.body.as_ref().unwrap_or(&self.head).link();
+            let body_links = (1..handle).try_fold(self.handle_1(head)?, |front, _| {
+                body.configuration(front).ok().map(|configuration| configuration.rear)
+            });
+            body_links.map(|at| at >= place)
+        };
+        let reached = |head: f64| reached(head).unwrap_or(true);
+        reached(limit).then(|| bisect_predicate(reached, 0.0, limit))
+    }
+
+    fn event(&self, kind: EventKind, travelled: f64, link: usize) -> Event {
+        let place = self.rear_point(travelled, link);
+        Event { kind, travelled, bench_a: Some(link as u32), bench_b: None, place }
+    }
+
+    /// The place of a lock, or one some digits before it. Where a nearer place of the path comes within the link's reach its rear
+    /// handle jumps there, and frames, which round otherwise than this search, may have jumped some digits earlier.
+    fn before_jump(&self, travelled: f64, link: usize) -> f64 {
+        let length = self.team.link(link);
+        let place = |digits: u32| travelled - f64::from(digits) * f64::EPSILON * (travelled + length);
+        let rear = |digits: u32| self.rear(place(digits), link).map(|rear| self.path.travelled(rear));
+        // Where digits are as large as that, frames show nothing else than jumps.
+        let is_fine = travelled - place(UNTOUCHED_DIGITS) < 1e-6 * length && place(UNTOUCHED_DIGITS) >= 0.0;
+        let Some(before) = rear(UNTOUCHED_DIGITS).filter(|_| is_fine) else { return travelled };
+        let has_jumped = |digits: &u32| rear(*digits).is_some_and(|rear| rear > before + JUMP * length);
+        // From the first on, since rounding is not monotone.
+        let first = (0..JUMP_DIGITS).rev().find(has_jumped);
+        first.map_or(travelled, |digits| place(digits + SAFE_DIGITS))
+    }
+
+    /// The rear handle of a link; where rounding leaves none in the last digits, at the last place before.
+    fn rear_point(&self, travelled: f64, link: usize) -> Option<Point> {
+        let digit = f64::EPSILON * (travelled + self.team.link(link));
+        let earlier = (0..40).map(|power| travelled - digit * f64::from(power).exp2());
+        let mut places = [travelled].into_iter().chain(earlier).take_while(|at| *at >= 0.0);
+        places.find_map(|at| self.rear(at, link)).map(|rear| self.path.point(rear))
+    }
+
+    /// The rear handle of a link as frames have it.
+    fn rear(&self, travelled: f64, link: usize) -> Option<Param> {
+        let head = self.path.param_at(travelled);
+        let follower = |front, link| crate::linkage::follower(self.path, front, self.team.link(link));
+        (0..=link).try_fold(head, follower).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,88 @@
+//! Solvers: from the head's travel to the state of every handle.
+//!
+//! They differ in cost and accuracy and stand behind [`Solver`]; [`crate`] chooses one. Each that is kept lies
+//! on the measured front of error against time, but for the paper's and the reference.
+
+pub mod newton;
+pub mod paper;
+pub mod reference;
+pub mod selection;
+pub mod table;
+
+use crate::linkage::NoFollower;
+
+/// The state of all handles at one moment, as flat arrays by handle, the head first.
+///
+/// All arrays have one length, the number of handles. Without velocities, `speed`, `vx` and `vy` hold NaN.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Chain {
+    /// Metres to the right of the centre.
+    pub x: Vec<f64>,
+    /// Metres up from the centre.
+    pub y: Vec<f64>,
+    /// Radians in (-pi, pi], the direction of the bench this handle leads; the last handle takes the last bench's.
+    pub heading: Vec<f64>,
+    /// Signed speed along the path, metres per second, positive in the direction of travel.
+    pub speed: Vec<f64>,
+    /// Velocity along x, metres per second.
+    pub vx: Vec<f64>,
+    /// Velocity along y, metres per second.
+    pub vy: Vec<f64>,
+}
+
+impl Chain {
+    /// A chain of `handles` handles, all at the origin and without velocity.
+    pub fn new(handles: usize) -> Self {
+        let numbers = |value| vec![value; handles];
+        Self {
+            x: numbers(0.0),
+            y: numbers(0.0),
+            heading: numbers(0.0),
+            speed: numbers(f64::NAN),
+            vx: numbers(f64::NAN),
+            vy: numbers(f64::NAN),
+        }
+    }
+
+    /// The number of handles.
+    pub fn handles(&self) -> usize {
+        self.x.len()
+    }
+}
+
+/// Whether a solver is to compute speeds and velocities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Velocities {
+    /// Compute them.
+    Computed,
+    /// Leave them NaN, at no cost.
+    Omitted,
+}
+
+/// A way to find the chain. Implementations own their scratch memory, so that solving allocates nothing.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon_show::scene::Scene;
+/// use bench_dragon_motion::solve::{Chain, Velocities};
+///
+/// let scene = Scene::paper();
+/// let mut solver = scene.motion.solver(Velocities::Computed).solver;
+/// let mut chain = Chain::new(scene.team().handles());
+/// solver.solve(300.0, &mut chain)?;
+/// // The head of the paper's dragon after 300 s of true motion, and its speed.
+/// assert!((chain.x[0] - 4.420_274_064_106).abs() < 1e-9 && (chain.y[0] - 2.320_428_674_331).abs() < 1e-9);
+/// assert!((chain.speed[0] - 1.0).abs() < 1e-12);
+/// # Ok::<(), bench_dragon_motion::linkage::NoFollower>(())
+/// ```
+pub trait Solver: Send {
+    /// The name by which a scene selects this solver.
+    fn name(&self) -> &'static str;
+
+    /// Fills `chain` with the state at `time` simulated seconds after the scene's start.
+    ///
+    /// # Errors
+    /// [`NoFollower`] where the motion has ended in a lock before `time`; `chain` is then unspecified.
+    fn solve(&mut self, time: f64, chain: &mut Chain) -> Result<(), NoFollower>;
+}

@@ -1,0 +1,301 @@
+//! Which figures are served, under which names. In: what a [`Monitor`](bench_dragon_client::monitor::Monitor) knows. Out:
+//! families of samples. Pure.
+//!
+//! Names and units follow Prometheus ("Metric and label naming"): seconds, bytes, metres, `_total` for what is counted.
+//! Every sample has the publisher's name as its label `name`; the run is a label of one of them only, since each new value
+//! of a label makes a new series.
+
+use super::exposition::{Family, Kind};
+use bench_dragon_client::monitor::{IntervalReport, Presence};
+use bench_dragon_messages::state::{FrameState, PlaybackState};
+use bench_dragon_messages::{CollisionAlert, FrameHeader, LoopStatus};
+
+/// All families of the publisher `name`. Those of a publisher that is not there have no samples.
+pub fn families(name: &str, report: &IntervalReport) -> Vec<Family> {
+    let families = Families { name };
+    let mut all = families.of_this_process(report);
+    if let Some(status) = &report.status {
+        all.extend(families.of_status(status));
+    }
+    if let Some(header) = report.present_header() {
+        all.extend(families.of_frame(&header));
+    }
+    if let Some(alert) = &report.alert {
+        all.push(families.of_alert(alert));
+    }
+    all
+}
+
+/// The families of several publishers as one list, in which each family stands once with the samples of all.
+pub fn joined(publishers: impl IntoIterator<Item = Vec<Family>>) -> Vec<Family> {
+    let mut all: Vec<Family> = Vec::new();
+    for family in publishers.into_iter().flatten() {
+        match all.iter_mut().find(|known| known.name == family.name) {
+            Some(known) => known.samples.extend(family.samples),
+            None => all.push(family),
+        }
+    }
+    all
+}
+
+struct Families<'a> {
+    name: &'a str,
+}
+
+impl Families<'_> {
+    fn labels(&self, further: &[(&'static str, &str)]) -> Vec<(&'static str, String)> {
+        let further = further.iter().map(|(label, value)| (*label, (*value).to_owned()));
+        [("name", self.name.to_owned())].into_iter().chain(further).collect()
+    }
+
+    /// A family of one sample.
+    fn one(
+        &self,
+        name: &'static str,
+        kind: Kind,
+        unit: Option<&'static str>,
+        help: &'static str,
+        value: f64,
+    ) -> Family {
+        Family { name, kind, unit, help, samples: vec![(self.labels(&[]), value)] }
+    }
+
+    fn count(&self, name: &'static str, help: &'static str, count: u64) -> Family {
+        self.one(name, Kind::Counter, None, help, count as f64)
+    }
+
+    fn gauge(&self, name: &'static str, help: &'static str, value: f64) -> Family {
+        self.one(name, Kind::Gauge, None, help, value)
+    }
+
+    /// One sample for each of several states, 1 for the one that holds.
+    fn states<'a>(
+        &self,
+        name: &'static str,
+        help: &'static str,
+        all: impl Iterator<Item = &'a str>,
+        present: Option<&str>,
+    ) -> Family {
+        let sample = |state: &str| (self.labels(&[("state", state)]), f64::from(u8::from(Some(state) == present)));
+        Family { name, kind: Kind::Gauge, unit: None, help, samples: all.map(sample).collect() }
+    }
+
+    fn of_this_process(&self, report: &IntervalReport) -> Vec<Family> {
+        let is = |holds: bool| f64::from(u8::from(holds));
+        vec![
+            self.gauge(
+                "bench_dragon_up",
+                "1 while a publisher of this name is alive, else 0.",
+                is(report.presence != Presence::Waiting),
+            ),
+            self.gauge(
+                "bench_dragon_silent",
+                "1 while the publisher is alive and sends no frames, else 0.",
+                is(report.presence == Presence::Silent),
+            ),
+            self.count(
+                "bench_dragon_metrics_frames_received",
+                "Frames that this process received, of all runs.",
+                report.received,
+            ),
+            self.count(
+                "bench_dragon_metrics_frames_missed",
+                "Frames that this process missed, by the gaps between those that it received.",
+                report.missed,
+            ),
+        ]
+    }
+
+    fn of_status(&self, status: &LoopStatus) -> Vec<Family> {
+        let run = format!("{:016x}", status.run_id);
+        let run = self.labels(&[("run_id", run.as_str()), ("scene", status.scene.as_str())]);
+        vec![
+            Family {
+                name: "bench_dragon_run",
+                kind: Kind::Info,
+                unit: None,
+                help: "The present run and its scene.",
+                samples: vec![(run, 1.0)],
+            },
+            self.count(
+                "bench_dragon_frames_published",
+                "Frames published in this run, as of its latest status.",
+                status.sequence + 1,
+            ),
+            self.count("bench_dragon_periods_skipped", "Periods skipped in this run.", status.skipped),
+            self.count(
+                "bench_dragon_overruns",
+                "Incidents in this run in which at least one period was skipped.",
+                status.overruns,
+            ),
+            self.count("bench_dragon_shows_played", "Shows played to their end in this run.", status.shows_played),
+            self.count(
+                "bench_dragon_unforeseen_contacts",
+                "Contacts that no search had found before the show.",
+                status.unforeseen_contacts,
+            ),
+            self.count(
+                "bench_dragon_unsolved_frames",
+                "Frames without a solution, which repeated the one before.",
+                status.unsolved_frames,
+            ),
+            self.one(
+                "bench_dragon_requested_rate_hertz",
+                Kind::Gauge,
+                Some("hertz"),
+                "The rate that was asked for.",
+                status.rate,
+            ),
+            self.one(
+                "bench_dragon_measured_rate_hertz",
+                Kind::Gauge,
+                Some("hertz"),
+                "Frames published in the last second.",
+                status.measured_rate,
+            ),
+            self.summary(
+                "bench_dragon_wakeup_lateness_seconds",
+                "How late the loop woke, in the last second and in the whole run; quantile 1 is the maximum.",
+                [status.lateness_p50_second, status.lateness_p99_second, status.lateness_max_second],
+                [
+                    status.lateness_p50_total,
+                    status.lateness_p99_total,
+                    status.lateness_p999_total,
+                    status.lateness_max_total,
+                ],
+            ),
+            self.summary(
+                "bench_dragon_step_seconds",
+                "What a step of the loop cost, in the last second and in the whole run; quantile 1 is the maximum.",
+                [status.step_p50_second, status.step_p99_second, status.step_max_second],
+                [status.step_p50_total, status.step_p99_total, status.step_p999_total, status.step_max_total],
+            ),
+            self.one(
+                "bench_dragon_resident_memory_bytes",
+                Kind::Gauge,
+                Some("bytes"),
+                "Resident memory of the publisher.",
+                status.resident_bytes as f64,
+            ),
+            self.gauge(
+                "bench_dragon_open_file_descriptors",
+                "Open file descriptors of the publisher.",
+                f64::from(status.file_descriptors),
+            ),
+            self.gauge(
+                "bench_dragon_subscribers",
+                "Subscribers of the frames over shared memory, this process included.",
+                f64::from(status.subscribers),
+            ),
+        ]
+    }
+
+    /// Nanoseconds as quantiles: 0.5, 0.99, 1 of the last second; 0.5, 0.99, 0.999, 1 of the run.
+    fn summary(&self, name: &'static str, help: &'static str, second: [u64; 3], run: [u64; 4]) -> Family {
+        let sample =
+            |window, quantile, ns: u64| (self.labels(&[("window", window), ("quantile", quantile)]), ns as f64 / 1e9);
+        let second = ["0.5", "0.99", "1"].into_iter().zip(second).map(|(quantile, ns)| sample("second", quantile, ns));
+        let run = ["0.5", "0.99", "0.999", "1"].into_iter().zip(run).map(|(quantile, ns)| sample("run", quantile, ns));
+        Family { name, kind: Kind::Summary, unit: Some("seconds"), help, samples: second.chain(run).collect() }
+    }
+
+    fn of_frame(&self, header: &FrameHeader) -> Vec<Family> {
+        let state = header.frame_state().map(FrameState::name);
+        let playback = header.playback_state().map(PlaybackState::name);
+        let mut families = vec![
+            self.one(
+                "bench_dragon_simulated_time_seconds",
+                Kind::Gauge,
+                Some("seconds"),
+                "Simulated seconds since the start of the scene.",
+                header.sim_time,
+            ),
+            self.gauge(
+                "bench_dragon_time_scale",
+                "Simulated seconds per second; 0 while paused or held.",
+                header.time_scale,
+            ),
+            self.states(
+                "bench_dragon_state",
+                "What the dragon is doing: 1 for the present state.",
+                FrameState::ALL.into_iter().map(FrameState::name),
+                state,
+            ),
+            self.states(
+                "bench_dragon_playback",
+                "Whether simulated time advances: 1 for the present state.",
+                PlaybackState::ALL.into_iter().map(PlaybackState::name),
+                playback,
+            ),
+        ];
+        if !header.min_clearance.is_nan() {
+            families.push(self.one(
+                "bench_dragon_clearance_meters",
+                Kind::Gauge,
+                Some("meters"),
+                "Distance of the nearest two boards that share no handle, negative where they overlap.",
+                header.min_clearance,
+            ));
+        }
+        families
+    }
+
+    fn of_alert(&self, alert: &CollisionAlert) -> Family {
+        self.gauge(
+            "bench_dragon_alert_level",
+            "The level of the latest alert: 0 clear, 1 approaching, 2 contact, 3 stall, 4 lock.",
+            f64::from(alert.level),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench_dragon_client::feed::FeedEvent;
+    use bench_dragon_client::monitor::Monitor;
+    use bench_dragon_messages::state::Level;
+
+    #[test]
+    fn nothing_of_a_publisher_that_is_gone_is_served_but_that_it_is_down() {
+        let mut monitor = Monitor::default();
+        let value = |report: &IntervalReport, name| {
+            let families = families("n", report);
+            let found = families.iter().find(|family| family.name == name);
+            found.map(|family| family.samples[0].1)
+        };
+        let waiting = monitor.report();
+        assert_eq!(
+            (value(&waiting, "bench_dragon_up"), value(&waiting, "bench_dragon_step_seconds")),
+            (Some(0.0), None)
+        );
+        let header = FrameHeader::default();
+        let frame = FeedEvent::Frame { header: &header, handles: &[], missed: 3 };
+        let status = LoopStatus { step_p50_second: 1500, ..LoopStatus::default() };
+        for event in
+            [frame, FeedEvent::Status(&status), FeedEvent::Alert(&CollisionAlert::default()), FeedEvent::Silent]
+        {
+            monitor.handle(&event, 0);
+        }
+        let silent = monitor.report();
+        assert_eq!(value(&silent, "bench_dragon_up"), Some(1.0));
+        assert_eq!(value(&silent, "bench_dragon_silent"), Some(1.0));
+        assert_eq!(value(&silent, "bench_dragon_step_seconds"), Some(1.5e-6));
+        assert_eq!(value(&silent, "bench_dragon_alert_level"), Some(0.0));
+        monitor.handle(&FeedEvent::Gone, 0);
+        let gone = monitor.report();
+        assert_eq!(families("n", &gone).len(), 4, "this process's own");
+        assert_eq!(
+            (value(&gone, "bench_dragon_up"), value(&gone, "bench_dragon_metrics_frames_missed")),
+            (Some(0.0), Some(3.0))
+        );
+    }
+
+    #[test]
+    fn the_levels_are_listed() {
+        let name = "n";
+        let family = Families { name }.of_alert(&CollisionAlert::default());
+        let levels = Level::ALL.map(|level| format!("{} {}", level as u32, level.name()));
+        assert!(family.help.ends_with(&format!("{}.", levels.join(", "))), "{}", family.help);
+    }
+}

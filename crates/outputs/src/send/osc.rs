@@ -1,0 +1,224 @@
+//! The OSC messages (Open Sound Control 1.0), one function for each address. In: what a publisher has sent. Out: messages
+//! whose arguments always have the same types. Pure; called by the [`sender`](super::osc_sender).
+//!
+//! `docs/sending.md` lists the addresses. They are for desks that people set up, so handles and benches count from 1. Where
+//! there is no bench the number is -1; where there is no time or no clearance the number is [`NEVER`], which no threshold
+//! that a desk waits for is above.
+
+use rosc::encoder::encode;
+use rosc::{OscBundle, OscMessage, OscPacket, OscTime, OscType};
+
+use bench_dragon_messages::state::EventKind;
+use bench_dragon_messages::state::{FrameState, Level, PlaybackState};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, NO_BENCH, Stage};
+
+/// A time or a distance that there is not.
+pub const NEVER: f32 = 1e6;
+/// Messages in a bundle at most: so many of the largest fit a datagram that the network does not cut.
+const MOST_MESSAGES: usize = 8;
+
+/// The messages of one publisher.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Addresses {
+    /// What each address begins with: a slash and the publisher's name.
+    prefix: String,
+}
+
+impl Addresses {
+    /// Addresses that begin with the publisher's name. What no address may hold becomes an underscore.
+    pub fn new(name: &str) -> Self {
+        let allowed = |c: char| c.is_ascii_graphic() && !"#*,?[]{}".contains(c);
+        let prefix = name.trim_matches('/').chars().map(|c| if allowed(c) { c } else { '_' }).collect::<String>();
+        Self { prefix: format!("/{prefix}") }
+    }
+
+    /// What each address begins with.
+    pub fn prefix(&self) -> &str {
+        &self.prefix
+    }
+
+    fn message(&self, address: &str, args: Vec<OscType>) -> OscMessage {
+        OscMessage { addr: format!("{}/{address}", self.prefix), args }
+    }
+
+    /// `/alert ,sisffffiii`: level and its number, what it is about, simulated seconds until that, the clearance, where and
+    /// which benches that is about, the latest cue.
+    pub fn alert(&self, alert: &CollisionAlert, cue: u32) -> OscMessage {
+        let level = alert.alert_level().map_or("unknown", Level::name);
+        let event = alert.event_kind().map_or("none", EventKind::name);
+        self.message(
+            "alert",
+            vec![
+                text(level),
+                OscType::Int(alert.level as i32),
+                text(event),
+                or_never(alert.time_to_event),
+                or_never(alert.clearance),
+                or_zero(alert.event_x),
+                or_zero(alert.event_y),
+                bench(alert.event_bench_a),
+                bench(alert.event_bench_b),
+                OscType::Int(cue as i32),
+            ],
+        )
+    }
+
+    /// `/countdown ,fs`: seconds of wall time until the next event, and which one it is.
+    pub fn countdown(&self, coming: Option<(f64, &'static str)>) -> OscMessage {
+        let (seconds, event) = coming.unwrap_or((f64::NAN, "none"));
+        self.message("countdown", vec![or_never(seconds), text(event)])
+    }
+
+    /// `/state ,sisi`: what the dragon is doing and its number, whether time advances and its number.
+    pub fn state(&self, state: State) -> OscMessage {
+        let (state, playback) = match state {
+            State::Of { state, playback } => ((state.name(), state as i32), (playback.name(), playback as i32)),
+            State::Stopped => (("stopped", -1), ("stopped", -1)),
+        };
+        let [state, playback] = [state, playback].map(|(name, number)| [text(name), OscType::Int(number)]);
+        self.message("state", [state, playback].concat())
+    }
+
+    /// `/cue ,isf`: its number, its name, the simulated seconds of the frame that reached it.
+    pub fn cue(&self, cue: &Cue) -> OscMessage {
+        let args = vec![OscType::Int(cue.number as i32), text(cue.name.as_str()), float(cue.sim_time)];
+        self.message("cue", args)
+    }
+
+    /// `/head ,fffff`: x, y, heading, and the velocity in metres per second of wall time.
+    pub fn head(&self, header: &FrameHeader, head: &HandlePose) -> OscMessage {
+        let [vx, vy] = [head.vx, head.vy].map(|speed| or_zero(speed * header.time_scale));
+        self.message("head", vec![float(head.x), float(head.y), float(head.heading), vx, vy])
+    }
+
+    /// `/sim_time ,f`: simulated seconds.
+    pub fn sim_time(&self, header: &FrameHeader) -> OscMessage {
+        self.message("sim_time", vec![float(header.sim_time)])
+    }
+}
+
+/// What `/state` tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum State {
+    /// Frames come.
+    Of {
+        /// What the dragon is doing.
+        state: FrameState,
+        /// Whether time advances.
+        playback: PlaybackState,
+    },
+    /// Frames have stopped.
+    Stopped,
+}
+
+impl State {
+    /// That of a frame; `None` for one of a later layout.
+    pub fn of(header: &FrameHeader) -> Option<Self> {
+        Some(Self::Of { state: header.frame_state()?, playback: header.playback_state()? })
+    }
+}
+
+/// The next event that the show comes to, in seconds of wall time, with its name; `None` where there is none ahead, and
+/// while time stands still.
+pub fn next_event(stage: &Stage, header: &FrameHeader) -> Option<(f64, &'static str)> {
+    let plays = header.playback_state() == Some(PlaybackState::Playing) && header.time_scale > 0.0;
+    let ahead = |time: f64| time > header.sim_time && time <= stage.freeze_time;
+    let next = stage.events_in_use().iter().find(|event| plays && ahead(event.time))?;
+    let name = FrameState::ALL.get(next.state as usize)?.name();
+    Some(((next.time - header.sim_time) / header.time_scale, name))
+}
+
+/// Messages in their order as datagrams: bundles to be obeyed at once, since a desk's clock is another one.
+pub fn datagrams(messages: Vec<OscMessage>) -> Vec<Vec<u8>> {
+    let immediately = OscTime { seconds: 0, fractional: 1 };
+    let bundle = |messages: &[OscMessage]| {
+        let content = messages.iter().cloned().map(OscPacket::Message).collect();
+        // Only an address that is none could be refused, and `Addresses` makes none.
+        encode(&OscPacket::Bundle(OscBundle { timetag: immediately, content })).ok()
+    };
+    messages.chunks(MOST_MESSAGES).filter_map(bundle).collect()
+}
+
+fn text(text: &str) -> OscType {
+    OscType::String(text.to_owned())
+}
+
+fn float(value: f64) -> OscType {
+    OscType::Float(value as f32)
+}
+
+fn or_never(value: f64) -> OscType {
+    if value.is_nan() { OscType::Float(NEVER) } else { float(value) }
+}
+
+fn or_zero(value: f64) -> OscType {
+    if value.is_nan() { OscType::Float(0.0) } else { float(value) }
+}
+
+/// As people count.
+fn bench(number: u32) -> OscType {
+    OscType::Int(if number == NO_BENCH { -1 } else { number as i32 + 1 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench_dragon_messages::{SceneName, StageEvent};
+
+    #[test]
+    fn an_alert_about_nothing_fires_no_threshold_and_names_nobody() {
+        let message = Addresses::new("bench_dragon").alert(&CollisionAlert::default(), 0);
+        assert_eq!(message.addr, "/bench_dragon/alert");
+        let (never, none) = (OscType::Float(1e6), OscType::Int(-1));
+        let expected = [text("clear"), OscType::Int(0), text("none"), never.clone(), never];
+        assert_eq!(message.args[..5], expected);
+        assert_eq!(message.args[7..], [none.clone(), none, OscType::Int(0)]);
+    }
+
+    #[test]
+    fn a_name_becomes_an_address() {
+        for (name, prefix) in
+            [("bench_dragon", "/bench_dragon"), ("a/b c", "/a/b_c"), ("/x{1}*", "/x_1__"), ("龙", "/_")]
+        {
+            assert_eq!(Addresses::new(name).prefix(), prefix);
+        }
+    }
+
+    #[test]
+    fn the_countdown_is_to_what_the_show_comes_to() {
+        let mut stage = Stage { freeze_time: 20.0, events: 3, ..Stage::default() };
+        let event = |time, state: FrameState| StageEvent { time, state: state as u32, reserved: 0 };
+        stage.timeline[0] = event(10.0, FrameState::Contact);
+        stage.timeline[1] = event(20.0, FrameState::Stall);
+        stage.timeline[2] = event(30.0, FrameState::Lock);
+        let at = |sim_time, time_scale, playback: PlaybackState| {
+            let header = FrameHeader { sim_time, time_scale, playback: playback as u32, ..FrameHeader::default() };
+            next_event(&stage, &header)
+        };
+        let playing = PlaybackState::Playing;
+        assert_eq!(at(5.0, 2.0, playing), Some((2.5, "contact")));
+        assert_eq!(at(10.0, 1.0, playing), Some((10.0, "stall")));
+        assert_eq!(at(20.0, 1.0, playing), None, "it freezes before the lock");
+        assert_eq!(at(5.0, 0.0, PlaybackState::Paused), None);
+        assert_eq!(at(5.0, 1.0, PlaybackState::Ended), None);
+    }
+
+    #[test]
+    fn bundles_fit_a_datagram_and_keep_the_order() {
+        let addresses = Addresses::new(&"n".repeat(60));
+        let cue = |number| Cue { number, name: SceneName::new(&"x".repeat(64)), ..Cue::default() };
+        let datagrams = datagrams((0..20).map(|number| addresses.cue(&cue(number))).collect());
+        assert_eq!(datagrams.len(), 3);
+        let mut numbers = Vec::new();
+        for datagram in &datagrams {
+            assert!(datagram.len() <= 1472, "{} bytes", datagram.len());
+            let (_, packet) = rosc::decoder::decode_udp(datagram).unwrap();
+            let OscPacket::Bundle(bundle) = packet else { panic!("a bundle") };
+            for packet in bundle.content {
+                let OscPacket::Message(message) = packet else { panic!("messages") };
+                numbers.push(message.args[0].clone().int().unwrap());
+            }
+        }
+        assert_eq!(numbers, Vec::from_iter(0..20));
+    }
+}

@@ -1,0 +1,246 @@
+//! When OSC messages go out, and which once only. In: the events of a feed. Out: datagrams by [`osc`](super::osc). Called
+//! by `send osc`.
+
+use std::time::{Duration, Instant};
+
+use rosc::OscMessage;
+
+use super::network::Outlet;
+use super::osc::{Addresses, State, datagrams, next_event};
+use super::{Arrivals, Pace};
+use bench_dragon_client::feed::FeedEvent;
+use bench_dragon_client::polling::Handler;
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage};
+
+/// The most bundles of frames per second.
+pub const MOST_RATE: u32 = 60;
+/// The least time between two countdowns.
+const COUNTDOWN_INTERVAL: Duration = Duration::from_millis(100);
+/// How often the state is told that has not changed, for who listens later.
+const STATE_INTERVAL: Duration = Duration::from_secs(1);
+/// A cue is sent that was reached so much before the first frame that came: to be connected takes a moment, and a show can
+/// begin with a cue.
+const CUE_GRACE_NS: u64 = 1_000_000_000;
+
+/// What has been sent.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
+pub struct OscSummary {
+    /// Frames of the publisher that were sent.
+    pub frames: u64,
+    /// Alerts sent.
+    pub alerts: u64,
+    /// Cues sent.
+    pub cues: u64,
+    /// Datagrams sent, to all destinations together.
+    pub packets: u64,
+    /// Datagrams that could not be sent.
+    pub unsent_packets: u64,
+}
+
+impl OscSummary {
+    /// What two senders have sent together.
+    fn plus(self, other: Self) -> Self {
+        Self {
+            frames: self.frames + other.frames,
+            alerts: self.alerts + other.alerts,
+            cues: self.cues + other.cues,
+            packets: self.packets + other.packets,
+            unsent_packets: self.unsent_packets + other.unsent_packets,
+        }
+    }
+}
+
+/// The sender of one publisher's messages.
+pub struct OscSender {
+    addresses: Addresses,
+    outlet: Outlet,
+    pace: Pace,
+    arrivals: Arrivals,
+    stage: Option<Stage>,
+    /// The latest frame of the run, and the period and the time of the first one that came.
+    latest: Option<(FrameHeader, HandlePose)>,
+    first_tick: u64,
+    first_stamp_ns: u64,
+    due: bool,
+    /// Alerts and cues in their order.
+    pending: Vec<OscMessage>,
+    last_alert: Option<CollisionAlert>,
+    last_cue: Option<Cue>,
+    told_state: Option<State>,
+    told_countdown: bool,
+    next_state: Instant,
+    next_countdown: Instant,
+    summary: OscSummary,
+}
+
+impl OscSender {
+    /// A sender of at most `rate` bundles of frames per second by `outlet`.
+    pub fn new(addresses: Addresses, rate: f64, outlet: Outlet) -> Self {
+        Self {
+            addresses,
+            outlet,
+            pace: Pace::new(rate),
+            arrivals: Arrivals::default(),
+            stage: None,
+            latest: None,
+            first_tick: 0,
+            first_stamp_ns: 0,
+            due: false,
+            pending: Vec::new(),
+            last_alert: None,
+            last_cue: None,
+            told_state: None,
+            told_countdown: false,
+            next_state: Instant::now(),
+            next_countdown: Instant::now(),
+            summary: OscSummary::default(),
+        }
+    }
+
+    /// Tells receivers that nothing holds any more, and returns what has been sent.
+    pub fn finish(mut self) -> OscSummary {
+        let mut messages = std::mem::take(&mut self.pending);
+        if self.latest.is_some() {
+            messages.push(self.addresses.state(State::Stopped));
+        }
+        self.send_all(messages);
+        OscSummary { packets: self.outlet.sent(), unsent_packets: self.outlet.unsent(), ..self.summary }
+    }
+
+    fn send_all(&mut self, messages: Vec<OscMessage>) {
+        datagrams(messages).iter().for_each(|datagram| self.outlet.send(datagram));
+    }
+
+    /// An alert is sent once, though a connection that is made anew begins with the current one again.
+    fn take_alert(&mut self, alert: &CollisionAlert) {
+        let of = |alert: &CollisionAlert| (alert.run_id, alert.tick, alert.level, alert.event);
+        if self.last_alert.as_ref().is_some_and(|last| of(last) == of(alert)) {
+            return;
+        }
+        self.last_alert = Some(*alert);
+        let header = self.latest.map(|(header, _)| header).filter(|header| header.run_id == alert.run_id);
+        self.pending.push(self.addresses.alert(alert, header.map_or(0, |header| header.cue)));
+        self.summary.alerts += 1;
+    }
+
+    /// A cue is sent once, and never one that the show had passed long before this sender listened.
+    fn take_cue(&mut self, cue: &Cue) {
+        let of = |cue: &Cue| (cue.run_id, cue.tick, cue.number);
+        let is_known = self.last_cue.as_ref().is_some_and(|last| of(last) == of(cue));
+        let of_this_run = self.latest.is_some_and(|(header, _)| header.run_id == cue.run_id);
+        // Stamps alone do not tell: the clock may have been set back since the first frame.
+        let is_old = cue.tick < self.first_tick && cue.stamp_ns.saturating_add(CUE_GRACE_NS) < self.first_stamp_ns;
+        if is_known || !of_this_run || is_old {
+            return;
+        }
+        self.last_cue = Some(*cue);
+        self.pending.push(self.addresses.cue(cue));
+        self.summary.cues += 1;
+    }
+}
+
+impl OscSender {
+    /// Takes in what has come.
+    fn take(&mut self, event: FeedEvent<'_>) {
+        self.arrivals.handle(&event, Instant::now());
+        match event {
+            FeedEvent::Frame { header, handles, .. } => {
+                if self.latest.is_none_or(|(latest, _)| latest.run_id != header.run_id) {
+                    (self.first_tick, self.first_stamp_ns) = (header.tick, header.stamp_ns);
+                }
+                self.latest = Some((*header, handles.first().copied().unwrap_or_default()));
+                self.due |= self.pace.is_due(header);
+            }
+            FeedEvent::Stage(stage) => self.stage = Some(*stage),
+            FeedEvent::Alert(alert) => self.take_alert(alert),
+            FeedEvent::Cue(cue) => self.take_cue(cue),
+            FeedEvent::Gone => self.stage = None,
+            FeedEvent::Started { .. } | FeedEvent::Status(_) | FeedEvent::Silent => (),
+        }
+    }
+
+    /// Sends what is due.
+    fn send_due(&mut self, now: Instant) {
+        let mut messages = std::mem::take(&mut self.pending);
+        let due = std::mem::take(&mut self.due);
+        if let Some((header, head)) = &self.latest {
+            let stopped = self.arrivals.stopped_since(now).is_some();
+            let state = if stopped { Some(State::Stopped) } else { State::of(header) };
+            // A change waits for no interval; nor does a countdown that ends.
+            if let Some(state) = state.filter(|state| self.told_state != Some(*state) || now >= self.next_state) {
+                messages.push(self.addresses.state(state));
+                (self.told_state, self.next_state) = (Some(state), now + STATE_INTERVAL);
+            }
+            let stage = self.stage.as_ref().filter(|stage| stage.run_id == header.run_id && !stopped);
+            let coming = stage.and_then(|stage| next_event(stage, header));
+            let is_due = if coming.is_some() { due && now >= self.next_countdown } else { self.told_countdown };
+            if is_due {
+                messages.push(self.addresses.countdown(coming));
+                (self.told_countdown, self.next_countdown) = (coming.is_some(), now + COUNTDOWN_INTERVAL);
+            }
+            if due {
+                self.summary.frames += 1;
+                messages.extend([self.addresses.sim_time(header), self.addresses.head(header, head)]);
+            }
+        }
+        self.send_all(messages);
+    }
+}
+
+/// The senders of several publishers, each with addresses of its own.
+pub struct OscSenders(Vec<OscSender>);
+
+impl OscSenders {
+    /// One for each publisher, in the order in which they are polled.
+    pub fn new(senders: Vec<OscSender>) -> Self {
+        Self(senders)
+    }
+
+    /// Tells receivers that nothing holds any more, and returns what has been sent, of all together.
+    pub fn finish(self) -> OscSummary {
+        self.0.into_iter().map(OscSender::finish).fold(OscSummary::default(), OscSummary::plus)
+    }
+}
+
+impl Handler for OscSenders {
+    fn handle(&mut self, publisher: usize, event: FeedEvent<'_>) {
+        if let Some(sender) = self.0.get_mut(publisher) {
+            sender.take(event);
+        }
+    }
+
+    fn polled(&mut self, now: Instant) {
+        self.0.iter_mut().for_each(|sender| sender.send_due(now));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::{Ipv4Addr, SocketAddrV4};
+
+    use super::super::network::Route;
+    use super::*;
+
+    const HOUR_NS: u64 = 3_600_000_000_000;
+
+    #[test]
+    fn cues_come_where_the_clock_was_set_back_and_old_ones_do_not() {
+        let discard = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 9);
+        let outlet = Outlet::open(&[discard], Route { interface: None, multicast_ttl: 1 }).unwrap();
+        let mut sender = OscSender::new(Addresses::new("show"), 10.0, outlet);
+        let header = FrameHeader { run_id: 1, tick: 1000, stamp_ns: 100 * HOUR_NS, ..FrameHeader::default() };
+        sender.take(FeedEvent::Frame { header: &header, handles: &[], missed: 0 });
+        let cue = |number, tick, stamp_ns| Cue { run_id: 1, number, tick, stamp_ns, ..Cue::default() };
+        for (cue, sent) in [
+            // Before this listened; afterwards, on a clock that has been set back; afterwards.
+            (cue(1, 10, 99 * HOUR_NS), 0),
+            (cue(2, 1100, 92 * HOUR_NS), 1),
+            (cue(3, 1200, 101 * HOUR_NS), 2),
+            // While it connected.
+            (cue(4, 990, 100 * HOUR_NS - CUE_GRACE_NS / 2), 3),
+        ] {
+            sender.take(FeedEvent::Cue(&cue));
+            assert_eq!(sender.summary.cues, sent, "{cue:?}");
+        }
+    }
+}

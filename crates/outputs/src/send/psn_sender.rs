@@ -1,0 +1,286 @@
+//! Trackers for lighting desks: which, when, and what they say while no frames come. In: the events of the feeds of one
+//! publisher or several. Out: datagrams by [`psn`](super::psn). Called by `send psn`.
+//!
+//! A receiver holds for present what is in the latest frame. So each frame has the trackers of all publishers, each with the
+//! time for which its place holds, and there is one count of frames: two senders to one desk would mix theirs.
+
+use std::time::{Duration, Instant};
+
+use super::Pace;
+use super::axes::Axes;
+use super::network::Outlet;
+use super::psn::{MOST_PACKETS, TrackerName, data_frame, info_frame};
+use super::psn_source::Source;
+use super::trackers::{Numbers, Selection};
+use bench_dragon_client::clock::monotonic_ns;
+use bench_dragon_client::feed::FeedEvent;
+use bench_dragon_client::polling::Handler;
+use bench_dragon_messages::{FrameHeader, HandlePose};
+
+/// The multicast group and the port of the protocol.
+pub const USUAL_ADDRESS: &str = "236.10.10.10";
+/// See [`USUAL_ADDRESS`].
+pub const USUAL_PORT: u16 = 56565;
+/// The protocol's usual rate of positions, per second.
+pub const USUAL_RATE: f64 = 60.0;
+/// How often names are sent.
+const INFO_INTERVAL: Duration = Duration::from_secs(1);
+/// How long desks are told at the full rate that frames have stopped, and how often from then on.
+const STOPPED_FULL_RATE: Duration = Duration::from_secs(10);
+/// See [`STOPPED_FULL_RATE`].
+const STOPPED_INTERVAL: Duration = Duration::from_secs(1);
+
+/// What is sent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PsnOptions {
+    /// Which handles of each publisher.
+    pub trackers: Selection,
+    /// In which axes.
+    pub axes: Axes,
+    /// At most so many frames per second.
+    pub rate: f64,
+    /// The trackers' numbers, for each publisher in the order in which they are polled.
+    pub numbers: Vec<Numbers>,
+    /// The name under which desks list this sender.
+    pub system_name: String,
+}
+
+/// What a person who runs a sender wants to know at once.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Notice {
+    /// Frames of a team come whose trackers were not known.
+    Team {
+        /// The number of handles.
+        handles: u32,
+        /// The trackers, in the order of their numbers.
+        trackers: Vec<TrackerName>,
+        /// Packets of positions a frame, of all publishers together.
+        packets: usize,
+        /// Packets of names a second.
+        name_packets: usize,
+    },
+    /// Some that were chosen cannot be sent; one sentence.
+    LeftOut(String),
+    /// Frames have stopped: the publisher's trackers have status 0.
+    Stopped,
+    /// They come again.
+    Resumed,
+}
+
+/// What has been sent.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
+pub struct PsnSummary {
+    /// Frames that were sent, each with the newest of every publisher.
+    pub frames: u64,
+    /// Frames of publishers that came too soon after one that was sent, or were overtaken before they were read or sent.
+    pub passed_over: u64,
+    /// Frames sent with status 0 while none came.
+    pub stopped_frames: u64,
+    /// Frames of names.
+    pub name_frames: u64,
+    /// Datagrams sent.
+    pub packets: u64,
+    /// Datagrams that could not be sent.
+    pub unsent_packets: u64,
+}
+
+/// The sender of all publishers' trackers.
+pub struct PsnSender<'a> {
+    options: PsnOptions,
+    outlet: Outlet,
+    /// Called with the place of a publisher and what a person wants to know of it.
+    notify: &'a mut dyn FnMut(usize, Notice),
+    started_ns: u64,
+    pace: Pace,
+    /// One for each publisher, in the order of their trackers' numbers.
+    sources: Vec<Source>,
+    due: bool,
+    next_info: Instant,
+    /// When desks are told again that the frames of all have stopped.
+    next_stopped: Option<Instant>,
+    data_frame_id: u8,
+    info_frame_id: u8,
+    summary: PsnSummary,
+}
+
+impl<'a> PsnSender<'a> {
+    /// A sender by `outlet`, which calls `notify` with the place of a publisher and what a person wants to know of it.
+    pub fn new(options: PsnOptions, outlet: Outlet, notify: &'a mut dyn FnMut(usize, Notice)) -> Self {
+        Self {
+            pace: Pace::new(options.rate),
+            sources: options.numbers.iter().cloned().map(Source::new).collect(),
+            options,
+            outlet,
+            notify,
+            started_ns: monotonic_ns(),
+            due: false,
+            next_info: Instant::now(),
+            next_stopped: None,
+            data_frame_id: 0,
+            info_frame_id: 0,
+            summary: PsnSummary::default(),
+        }
+    }
+
+    /// Tells desks that nothing holds any more, and returns what has been sent.
+    pub fn finish(mut self) -> PsnSummary {
+        if self.sources.iter().any(Source::is_known) {
+            self.sources.iter_mut().for_each(Source::stop);
+            self.send_stopped();
+        }
+        PsnSummary { packets: self.outlet.sent(), unsent_packets: self.outlet.unsent(), ..self.summary }
+    }
+
+    fn elapsed_us(&self) -> u64 {
+        monotonic_ns().saturating_sub(self.started_ns) / 1000
+    }
+
+    /// Whether a frame goes out for this one. Several publishers have one count of intervals, on the clock that their deadlines
+    /// have in common; that of one alone begins with its run.
+    fn is_due(&mut self, header: &FrameHeader, made_ns: u64) -> bool {
+        match &self.sources[..] {
+            [_] => self.pace.is_due(header),
+            _ => self.pace.is_due(&FrameHeader { run_id: 0, deadline_ns: made_ns, ..*header }),
+        }
+    }
+
+    fn take_frame(&mut self, publisher: usize, header: &FrameHeader, handles: &[HandlePose]) {
+        let Some(made_ns) = self.sources.get(publisher).map(|source| source.made_ns(header)) else { return };
+        let is_due = self.is_due(header, made_ns);
+        let alone = self.sources.len() == 1;
+        let Some(source) = self.sources.get_mut(publisher) else { return };
+        // Of several, each frame goes out with the next that is due of any.
+        if alone && !is_due {
+            self.summary.passed_over += 1;
+            return;
+        }
+        if std::mem::take(&mut source.stopped) {
+            (self.notify)(publisher, Notice::Resumed);
+        }
+        self.next_stopped = None;
+        if let Some(left_out) = source.meet(header.handles, &self.options.trackers) {
+            // At once, after the frame at hand.
+            self.next_info = Instant::now();
+            left_out.into_iter().for_each(|sentence| (self.notify)(publisher, Notice::LeftOut(sentence)));
+        }
+        let timestamp_us = made_ns.saturating_sub(self.started_ns) / 1000;
+        let overtakes = source.take(header, handles, self.options.axes, timestamp_us);
+        self.summary.passed_over += u64::from(overtakes);
+        self.due |= is_due;
+    }
+
+    /// Sends all trackers as they are, all packets back to back; nothing where there are none. Returns the number of
+    /// packets.
+    fn send_trackers(&mut self) -> usize {
+        let mut trackers = Vec::with_capacity(self.sources.iter().map(|source| source.trackers.len()).sum());
+        for source in &mut self.sources {
+            source.unsent = false;
+            trackers.extend_from_slice(&source.trackers);
+        }
+        if trackers.is_empty() {
+            return 0;
+        }
+        self.data_frame_id = next_frame_id(self.data_frame_id);
+        let frame = data_frame(self.elapsed_us(), self.data_frame_id, &trackers);
+        frame.packets.iter().for_each(|packet| self.outlet.send(packet));
+        let mut room = frame.trackers;
+        for (publisher, source) in self.sources.iter_mut().enumerate() {
+            let (remaining, left_out) = source.fit(room);
+            room = remaining;
+            if let Some(left_out) = left_out {
+                let (chosen, of) = (source.trackers.len(), source.of());
+                let sent = chosen - left_out;
+                let sentence = format!(
+                    "only {sent} of {chosen} handles{of} are sent: a frame has {MOST_PACKETS} packets at most; \
+                     --trackers chooses others"
+                );
+                (self.notify)(publisher, Notice::LeftOut(sentence));
+            }
+        }
+        frame.packets.len()
+    }
+
+    /// Sends the names. Returns the number of packets.
+    fn send_names(&mut self) -> usize {
+        self.info_frame_id = next_frame_id(self.info_frame_id);
+        let names: Vec<TrackerName> = self.sources.iter().flat_map(Source::names).cloned().collect();
+        let frame = info_frame(self.elapsed_us(), self.info_frame_id, &self.options.system_name, &names);
+        frame.packets.iter().for_each(|packet| self.outlet.send(packet));
+        self.summary.name_frames += 1;
+        frame.packets.len()
+    }
+
+    /// Sends the trackers of publishers that have all stopped.
+    fn send_stopped(&mut self) {
+        self.send_trackers();
+        self.summary.stopped_frames += 1;
+    }
+
+    /// Stops the trackers of those publishers from which no frames come any more. Since when none comes from any.
+    fn stop_silent(&mut self, now: Instant) -> Option<Instant> {
+        let mut since = None;
+        let mut all = true;
+        for (publisher, source) in self.sources.iter_mut().enumerate().filter(|(_, source)| source.is_known()) {
+            let stopped = source.stopped_since(now);
+            if stopped.is_some() && !source.stopped {
+                source.stop();
+                (self.notify)(publisher, Notice::Stopped);
+            }
+            all &= stopped.is_some();
+            since = since.max(stopped);
+        }
+        since.filter(|_| all)
+    }
+}
+
+/// The number of the next frame: 1 to 255, and again. A receiver exists that takes 0 for none.
+fn next_frame_id(latest: u8) -> u8 {
+    latest % u8::MAX + 1
+}
+
+impl Handler for PsnSender<'_> {
+    fn handle(&mut self, publisher: usize, event: FeedEvent<'_>) {
+        if let Some(source) = self.sources.get_mut(publisher) {
+            source.arrived(&event, Instant::now());
+        }
+        if let FeedEvent::Frame { header, handles, missed } = event {
+            self.summary.passed_over += missed;
+            self.take_frame(publisher, header, handles);
+        }
+    }
+
+    fn clock(&mut self, publisher: usize, shares_clock: bool) {
+        if let Some(source) = self.sources.get_mut(publisher) {
+            source.shares_clock = shares_clock;
+        }
+    }
+
+    fn polled(&mut self, now: Instant) {
+        let mut packets = 0;
+        if std::mem::take(&mut self.due) {
+            self.summary.frames += 1;
+            packets = self.send_trackers();
+        }
+        if let Some(since) = self.stop_silent(now) {
+            let next = self.next_stopped.unwrap_or(now);
+            if now >= next {
+                self.send_stopped();
+                let full_rate = now < since + STOPPED_FULL_RATE;
+                let interval =
+                    if full_rate { Duration::from_secs_f64(1.0 / self.options.rate) } else { STOPPED_INTERVAL };
+                self.next_stopped = Some((next + interval).max(now));
+            }
+        }
+        // No names between a place and the frame that it waits for.
+        let is_sent = self.sources.iter().any(Source::is_known) && self.sources.iter().all(|source| !source.unsent);
+        if is_sent && now >= self.next_info {
+            self.next_info = now + INFO_INTERVAL;
+            let name_packets = self.send_names();
+            for (publisher, source) in self.sources.iter_mut().enumerate() {
+                if let Some((handles, trackers)) = source.announce() {
+                    (self.notify)(publisher, Notice::Team { handles, trackers, packets, name_packets });
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,306 @@
+//! The live stage picture: reads the frames of one publisher or several and serves them to browsers, with the page that draws
+//! them.
+//!
+//! Called by the `view` command. `reader` reads a publisher's shared memory on a thread of its own, since ports cannot leave
+//! the thread that made them, and hands the newest picture over; `browser` sends it to one browser at that one's pace, over
+//! one WebSocket for each publisher; `wire` is its layout on the way. `origin` is who may connect, `gate` who may command,
+//! and how; `certificates` is what is proved of which scene.
+
+mod browser;
+mod certificates;
+mod gate;
+pub(crate) mod origin;
+mod reader;
+mod wire;
+
+use std::io;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::Bytes;
+use axum::extract::ws::rejection::WebSocketUpgradeRejection;
+use axum::extract::ws::{Utf8Bytes, WebSocketUpgrade};
+use axum::extract::{Query, Request, State as Shared};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::{IntoResponse, Redirect, Response};
+use axum::routing::get;
+use tokio::sync::watch;
+use tower_http::services::ServeDir;
+
+use super::http::Listening;
+use bench_dragon_client::connection::Wake;
+use bench_dragon_client::feed::{Feed, FeedOptions, Frames};
+use bench_dragon_client::shared_memory::{OpenError, service_name};
+pub use certificates::{Certificate, Proofs, SceneHash};
+use gate::Gate;
+pub use gate::Token;
+use origin::Admission;
+pub use origin::AllowedOrigin;
+
+/// Browsers send requests of a few letters.
+const MAX_REQUEST_BYTES: usize = 1024;
+/// Each frame that woke the server would cost the publisher more than the frame itself.
+const FEED: FeedOptions = FeedOptions { wake: Wake::Never, frames: Frames::Newest };
+
+/// The newest of everything a browser needs, each as it goes over the wire; empty where there is none.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Picture {
+    /// Set while there is no publisher.
+    waiting: Utf8Bytes,
+    stage: Utf8Bytes,
+    alert: Utf8Bytes,
+    /// The latest cues, each with its number among all that have come to this server, so that none is left out.
+    cues: Arc<[(u64, Utf8Bytes)]>,
+    frame: Bytes,
+    /// Whether frames are stamped by the clock of this machine; `None` while there is no publisher.
+    shares_clock: Option<bool>,
+}
+
+impl Picture {
+    /// No publisher, and the reason where there is one that cannot be used.
+    fn waiting(reason: Option<&str>) -> Self {
+        Self { waiting: wire::waiting(reason).into(), ..Self::default() }
+    }
+}
+
+#[derive(Clone)]
+struct Server {
+    channels: Arc<[Channel]>,
+    admission: Arc<Admission>,
+}
+
+/// What a browser is served of one publisher.
+#[derive(Clone)]
+struct Channel {
+    name: String,
+    pictures: watch::Receiver<Picture>,
+    /// `None` where nobody may command.
+    gate: Option<Arc<Gate>>,
+}
+
+/// How the stage picture is served.
+#[derive(Debug, Clone)]
+pub struct ViewOptions {
+    /// Where to listen; port 0 takes any free one.
+    pub address: SocketAddr,
+    /// Whether browsers may conduct the show.
+    pub control: bool,
+    /// Pages of other places that are let in.
+    pub origins: Vec<AllowedOrigin>,
+    /// A folder that is served below `/pages/`.
+    pub pages: Option<PathBuf>,
+    /// What is proved of which scenes; it may grow while pages are served.
+    pub proofs: Arc<Proofs>,
+}
+
+/// What browsers need to connect.
+#[derive(Debug, Clone)]
+pub struct Ready {
+    /// Where the server listens.
+    pub address: SocketAddr,
+    /// What whoever conducts has to give, where that is needed: as soon as more than this machine's own page is let in.
+    pub token: Option<Token>,
+}
+
+/// Why the stage picture could not be served.
+#[derive(Debug, thiserror::Error)]
+pub enum ViewError {
+    /// The publisher's services cannot be used.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// The address cannot be listened on.
+    #[error(
+        "cannot serve the stage picture at {address}: {source}; choose a free port with --port and an address of this \
+         machine with --listen"
+    )]
+    Listen {
+        /// The address given.
+        address: SocketAddr,
+        /// What the system reported.
+        source: std::io::Error,
+    },
+    /// The folder of pages is none.
+    #[error("--pages {}: {source}, expected a folder", folder.display())]
+    Pages {
+        /// The folder given.
+        folder: PathBuf,
+        /// What the system reported.
+        source: std::io::Error,
+    },
+    /// No token can be made.
+    #[error("the system has no random numbers for a token: {0}")]
+    Token(#[from] getrandom::Error),
+}
+
+/// Serves the picture of the publishers `names` until `stop` is set. `ready` is called once browsers can connect.
+///
+/// # Errors
+/// [`ViewError`] for a name, an address or a folder that cannot be used.
+pub fn serve<Refused: From<ViewError>>(
+    names: &[String],
+    options: ViewOptions,
+    stop: &Arc<AtomicBool>,
+    ready: impl FnOnce(&Ready) -> Result<(), Refused>,
+) -> Result<(), Refused> {
+    let ViewOptions { address, control, origins, pages, proofs } = options;
+    names.iter().try_for_each(|name| service_name(name, "poses").map(drop)).map_err(ViewError::from)?;
+    if let Some(folder) = &pages {
+        std::fs::read_dir(folder).map_err(|source| ViewError::Pages { folder: folder.clone(), source })?;
+    }
+    let listen = |source| ViewError::Listen { address, source };
+    let server = Listening::at(address).map_err(listen)?;
+    let address = server.address;
+    let loopback = address.ip().is_loopback();
+    let needs_token = control && (!loopback || !origins.is_empty());
+    let token = if needs_token { Some(Token::random().map_err(ViewError::from)?) } else { None };
+    let gate = |name: &str| control.then(|| Gate::new(name, token.clone()).map(Arc::new)).transpose();
+    let gates = names.iter().map(|name| gate(name)).collect::<Result<Vec<_>, _>>().map_err(listen)?;
+    ready(&Ready { address, token: token.clone() })?;
+    let (mut channels, mut readers) = (Vec::new(), Vec::new());
+    for (name, gate) in names.iter().zip(gates) {
+        let (sender, pictures) = watch::channel(Picture::default());
+        channels.push(Channel { name: name.clone(), pictures, gate });
+        let (name, proofs, stop) = (name.clone(), Arc::clone(&proofs), Arc::clone(stop));
+        readers.push(std::thread::spawn(move || {
+            let read = Feed::new(&name, FEED).map(|feed| reader::read(feed, &name, &proofs, &sender, &stop));
+            stop.store(true, Ordering::Relaxed);
+            read
+        }));
+    }
+    let admission = Arc::new(Admission { loopback, origins });
+    let router = router(Server { channels: channels.into(), admission }, pages.as_deref());
+    let served = server.serve(router, stop);
+    // A panic of a reader has already been printed.
+    let read = readers.into_iter().try_for_each(|reader| reader.join().unwrap_or(Ok(())));
+    served.map_err(listen)?;
+    Ok(read.map_err(ViewError::from)?)
+}
+
+/// A file of the user's folder; a name that no file can have is that of none.
+async fn own_file<B>(found: impl Future<Output = io::Result<Response<B>>>) -> Response
+where
+    Response<B>: IntoResponse,
+{
+    match found.await {
+        Ok(file) => file.into_response(),
+        Err(error) if error.kind() == io::ErrorKind::InvalidFilename => StatusCode::NOT_FOUND.into_response(),
+        Err(_) => StatusCode::INTERNAL_SERVER_ERROR.into_response(),
+    }
+}
+
+fn router(server: Server, pages: Option<&Path>) -> Router {
+    let file = |kind, text| get(move || async move { served(kind, text) });
+    let names = publishers_module(&server.channels);
+    let mut router = Router::new();
+    if let Some(folder) = pages {
+        let mut files = ServeDir::new(folder);
+        let own = Router::new().fallback(move |request: Request| own_file(files.try_call(request)));
+        let own = own.layer(from_fn_with_state(server.clone(), own_page));
+        router = router.nest("/pages/", own).route("/pages", get(|| async { Redirect::permanent("/pages/") }));
+    }
+    router
+        .route("/", file("text/html; charset=utf-8", include_str!("view/index.html")))
+        .route("/address.js", file("text/javascript; charset=utf-8", include_str!("view/address.js")))
+        .route("/boards.js", file("text/javascript; charset=utf-8", include_str!("view/boards.js")))
+        .route("/camera.js", file("text/javascript; charset=utf-8", include_str!("view/camera.js")))
+        .route("/dragon.js", file("text/javascript; charset=utf-8", include_str!("view/dragon.js")))
+        .route("/drawing.js", file("text/javascript; charset=utf-8", include_str!("view/drawing.js")))
+        .route("/hands.js", file("text/javascript; charset=utf-8", include_str!("view/hands.js")))
+        .route("/hermite.js", file("text/javascript; charset=utf-8", include_str!("view/hermite.js")))
+        .route("/marks.js", file("text/javascript; charset=utf-8", include_str!("view/marks.js")))
+        .route("/palette.js", file("text/javascript; charset=utf-8", include_str!("view/palette.js")))
+        .route("/panel.js", file("text/javascript; charset=utf-8", include_str!("view/panel.js")))
+        .route("/publishers.js", get(move || async move { served("text/javascript; charset=utf-8", names) }))
+        .route("/roster.js", file("text/javascript; charset=utf-8", include_str!("view/roster.js")))
+        .route("/show.js", file("text/javascript; charset=utf-8", include_str!("view/show.js")))
+        .route("/signs.js", file("text/javascript; charset=utf-8", include_str!("view/signs.js")))
+        .route("/sound.js", file("text/javascript; charset=utf-8", include_str!("view/sound.js")))
+        .route("/stage.js", file("text/javascript; charset=utf-8", include_str!("view/stage.js")))
+        .route("/stream.js", file("text/javascript; charset=utf-8", include_str!("view/stream.js")))
+        .route("/words.js", file("text/javascript; charset=utf-8", include_str!("view/words.js")))
+        .route("/style.css", file("text/css; charset=utf-8", include_str!("view/style.css")))
+        .route("/conduct.js", file("text/javascript; charset=utf-8", include_str!("view/conduct.js")))
+        .route("/conduct.css", file("text/css; charset=utf-8", include_str!("view/conduct.css")))
+        .route("/frames", get(frames))
+        .with_state(server)
+}
+
+/// The module that tells the page whose dragons it draws.
+fn publishers_module(channels: &[Channel]) -> String {
+    let names: Vec<_> = channels.iter().map(|channel| &channel.name).collect();
+    // JSON is JavaScript.
+    format!("export const publishers = {};\n", serde_json::json!(names))
+}
+
+/// A file of the page, which fetches nothing from anywhere else.
+fn served(kind: &'static str, text: impl IntoResponse) -> Response {
+    let headers = [
+        (header::CONTENT_TYPE, kind),
+        (header::CACHE_CONTROL, "no-cache"),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::CONTENT_SECURITY_POLICY, "default-src 'self'; connect-src 'self' ws:; img-src data:"),
+    ];
+    (headers, text).into_response()
+}
+
+/// A file of the user's own. A foreign name that resolves to this machine gets none.
+async fn own_page(Shared(server): Shared<Server>, request: Request, next: Next) -> Response {
+    if !server.admission.allows_host(text_of(request.headers(), header::HOST)) {
+        return (StatusCode::FORBIDDEN, "this server has another name").into_response();
+    }
+    let mut response = next.run(request).await;
+    let headers = response.headers_mut();
+    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
+    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    response
+}
+
+fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
+    headers.get(name)?.to_str().ok()
+}
+
+async fn frames(
+    Shared(server): Shared<Server>,
+    headers: HeaderMap,
+    Query(query): Query<Vec<(String, String)>>,
+    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
+) -> Response {
+    if !server.admission.allows(text_of(&headers, header::ORIGIN), text_of(&headers, header::HOST)) {
+        let sentence = "a page from elsewhere may not watch the stage picture; view --allow-origin lets it in";
+        return (StatusCode::FORBIDDEN, sentence).into_response();
+    }
+    let field = |wanted: &str| query.iter().find(|(field, _)| field == wanted).map(|(_, value)| value.as_str());
+    let Some(gap) = gap(field("rate")) else {
+        return (StatusCode::BAD_REQUEST, "rate: expected 1 to 1000000 frames a second").into_response();
+    };
+    let mut channels = server.channels.iter();
+    let channel = match field("name") {
+        None => channels.next(),
+        Some(name) => channels.find(|channel| channel.name == name),
+    };
+    let Some(channel) = channel.cloned() else {
+        return (StatusCode::NOT_FOUND, "name: expected one of the publishers that this server was started for")
+            .into_response();
+    };
+    match upgrade {
+        Ok(upgrade) => upgrade
+            .max_frame_size(MAX_REQUEST_BYTES)
+            .max_message_size(MAX_REQUEST_BYTES)
+            .on_upgrade(move |socket| browser::serve(socket, channel, gap)),
+        Err(_) => (StatusCode::UPGRADE_REQUIRED, "frames come over a WebSocket: open ws://.../frames").into_response(),
+    }
+}
+
+/// The least time between two frames at a `rate` that was asked for, none without one; `None` for a rate that cannot be.
+fn gap(rate: Option<&str>) -> Option<Duration> {
+    match rate.map(str::parse::<f64>) {
+        None => Some(Duration::ZERO),
+        Some(Ok(rate)) if (1.0..=1e6).contains(&rate) => Some(Duration::from_secs_f64(rate.recip())),
+        Some(_) => None,
+    }
+}

@@ -1,0 +1,128 @@
+//! Sends the newest picture to one browser, at the pace at which it reads. Called by the server.
+//!
+//! A socket's buffers hold seconds of frames, so a socket that can be written to is no sign that the other side has
+//! read. Each frame is therefore followed by a ping, which every WebSocket answers by itself once it has read that
+//! far, and no more than [`MAX_IN_FLIGHT`] frames stay unanswered: a slow browser gets fewer frames, not later ones.
+
+use std::time::Duration;
+
+use axum::extract::ws::{Message, Utf8Bytes, WebSocket};
+use futures_util::{Sink, SinkExt, StreamExt};
+use tokio::sync::{mpsc, watch};
+use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout};
+
+use super::gate::Visitor;
+use super::{Channel, Picture, wire};
+use bench_dragon_client::clock::monotonic_ns;
+
+/// Frames that may be in flight to a browser: enough for 60 a second over a network that takes 50 ms.
+const MAX_IN_FLIGHT: u64 = 3;
+/// How often a browser is sent a ping even where it gets no frames.
+const PING_INTERVAL: Duration = Duration::from_secs(10);
+/// A browser that sends nothing for so long, or takes so long to be written to, is gone.
+const TIMEOUT: Duration = Duration::from_secs(30);
+
+/// Serves a browser one publisher until it goes. `gap` is the least time between two frames.
+pub(super) async fn serve(socket: WebSocket, channel: Channel, gap: Duration) {
+    let Channel { mut pictures, gate, .. } = channel;
+    let (mut sink, mut stream) = socket.split();
+    let (sender, mut answers) = mpsc::unbounded_channel();
+    let mut visitor = Visitor::new(gate.as_deref(), sender);
+    let permission = visitor.permission().map(text);
+    if !matches!(timeout(TIMEOUT, send(&mut sink, permission.into_iter().collect())).await, Ok(Ok(()))) {
+        return;
+    }
+    let mut pings = interval(PING_INTERVAL);
+    pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let (mut sent, mut answered) = (0, 0);
+    let (mut due, mut last_received) = (Instant::now(), Instant::now());
+    // One who comes later gets the latest cue, as over shared memory.
+    let past_cues = pictures.borrow().cues.iter().rev().skip(1).cloned().collect();
+    let mut known = Picture { cues: past_cues, ..Picture::default() };
+    pictures.mark_changed();
+    loop {
+        let has_credit = sent - answered < MAX_IN_FLIGHT;
+        let messages = tokio::select! {
+            message = stream.next() => {
+                let Some(Ok(message)) = message else { return };
+                last_received = Instant::now();
+                match message {
+                    Message::Close(_) => return,
+                    Message::Pong(count) => {
+                        // Only the last of several pings need be answered.
+                        let count = count.as_ref().try_into().map_or(0, u64::from_le_bytes);
+                        answered = count.clamp(answered, sent);
+                        continue;
+                    }
+                    Message::Text(request) if request == "clock" => {
+                        // Of frames that another machine's clock has stamped, this one tells nothing.
+                        let shares_clock = pictures.borrow().shares_clock == Some(true);
+                        vec![text(wire::clock(shares_clock.then(monotonic_ns)))]
+                    }
+                    Message::Text(request) => visitor.receive(&request).map(text).into_iter().collect(),
+                    _ => continue,
+                }
+            }
+            Some(answer) = answers.recv() => {
+                visitor.unanswered -= 1;
+                vec![text(answer)]
+            }
+            changed = wait_for(&mut pictures, due), if has_credit => {
+                if changed.is_err() {
+                    return;
+                }
+                let picture = pictures.borrow_and_update().clone();
+                let mut messages = changed_messages(&picture, &known);
+                if picture.frame != known.frame && !picture.frame.is_empty() {
+                    sent += 1;
+                    due = (due + gap).max(Instant::now() - gap);
+                    messages.extend([Message::Binary(picture.frame.clone()), ping(sent)]);
+                }
+                known = picture;
+                messages
+            }
+            _ = pings.tick() => {
+                if last_received.elapsed() > TIMEOUT {
+                    return;
+                }
+                vec![ping(sent)]
+            }
+        };
+        if !matches!(timeout(TIMEOUT, send(&mut sink, messages)).await, Ok(Ok(()))) {
+            return;
+        }
+    }
+}
+
+/// Waits for a new picture that may be sent already. The sender has gone where this is an error.
+async fn wait_for(pictures: &mut watch::Receiver<Picture>, due: Instant) -> Result<(), watch::error::RecvError> {
+    sleep_until(due).await;
+    pictures.changed().await
+}
+
+/// The messages about what has changed besides the frame.
+fn changed_messages(picture: &Picture, known: &Picture) -> Vec<Message> {
+    let parts = |of: &Picture| [of.waiting.clone(), of.stage.clone(), of.alert.clone()];
+    let changed = parts(picture).into_iter().zip(parts(known)).filter(|(new, old)| new != old && !new.is_empty());
+    let newest_cue = known.cues.iter().map(|(number, _)| *number).max().unwrap_or(0);
+    let cues = picture.cues.iter().filter(|(number, _)| *number > newest_cue);
+    changed.map(|(new, _)| new).chain(cues.map(|(_, cue)| cue.clone())).map(Message::Text).collect()
+}
+
+fn text(json: String) -> Message {
+    Message::Text(Utf8Bytes::from(json))
+}
+
+fn ping(count: u64) -> Message {
+    Message::Ping(count.to_le_bytes().to_vec().into())
+}
+
+async fn send(
+    sink: &mut (impl Sink<Message, Error = axum::Error> + Unpin),
+    messages: Vec<Message>,
+) -> Result<(), axum::Error> {
+    for message in messages {
+        sink.feed(message).await?;
+    }
+    sink.flush().await
+}

@@ -1,0 +1,146 @@
+//! Reads the shared memory and keeps the newest picture. In: the events of a [`feed`](bench_dragon_client::feed). Out:
+//! a [`Picture`] in a channel. Called by the server, on a thread of its own.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use tokio::sync::watch;
+
+use super::{Picture, Proofs, SceneHash, wire};
+use bench_dragon_client::feed::{Feed, FeedEvent};
+use bench_dragon_messages::{LoopStatus, Stage};
+use bench_dragon_proof::Outcome;
+
+/// How often frames are polled: some browsers draw 240 times a second, none needs more. To be woken by each frame
+/// instead would cost the publisher more than the frame itself.
+const POLL_INTERVAL: Duration = Duration::from_millis(4);
+/// How long to wait where the services cannot be used, before the next attempt.
+const RETRY_INTERVAL: Duration = Duration::from_millis(200);
+/// Cues that a browser which takes long to be written to may fall behind; of a show that has more, as many as it has.
+const KEPT_CUES: usize = 16;
+
+/// Keeps the picture up to date until `stop` is set, through any number of publishers of a name.
+pub(super) fn read(mut feed: Feed, name: &str, proofs: &Proofs, sender: &watch::Sender<Picture>, stop: &AtomicBool) {
+    let (picture, publisher) = (Picture::waiting(None), name.to_owned());
+    let mut reader =
+        Reader { picture, publisher, proofs, stage: None, proved: None, unproved: None, status: None, cues: 0 };
+    let mut reason: Option<String> = None;
+    sender.send_replace(reader.picture.clone());
+    while !stop.load(Ordering::Relaxed) {
+        let mut changed = false;
+        let polled = feed.poll(POLL_INTERVAL, &mut |event| changed |= reader.handle(event));
+        changed |= reader.look_for_proof();
+        // The services may become usable while this continues: a program of another version ends, a subscriber leaves.
+        let now = polled.err().map(|error| error.to_string());
+        if now != reason {
+            now.iter().for_each(|sentence| log::warn!("{sentence}"));
+            if now.is_some() || !changed {
+                reader.picture = Picture::waiting(now.as_deref());
+            }
+            changed = true;
+        }
+        // Known as soon as the publisher is found, and thus no later than its stage.
+        let shares_clock = feed.shares_clock();
+        changed |= shares_clock != reader.picture.shares_clock;
+        reader.picture.shares_clock = shares_clock;
+        if changed {
+            sender.send_replace(reader.picture.clone());
+        }
+        if now.is_some() {
+            std::thread::sleep(RETRY_INTERVAL);
+        }
+        reason = now;
+    }
+}
+
+/// The newest of everything, as far as it has come.
+struct Reader<'a> {
+    picture: Picture,
+    /// The publisher's name.
+    publisher: String,
+    proofs: &'a Proofs,
+    stage: Option<Stage>,
+    /// What is proved of the scene of that stage.
+    proved: Option<Arc<[Outcome]>>,
+    /// The scene of which it has been said that no certificate is its own.
+    unproved: Option<SceneHash>,
+    /// Of the run whose status came last: it alone holds the scene's name.
+    status: Option<LoopStatus>,
+    /// Cues that have come so far.
+    cues: u64,
+}
+
+impl Reader<'_> {
+    /// Takes in an event; whether the picture has changed.
+    fn handle(&mut self, event: FeedEvent<'_>) -> bool {
+        match event {
+            FeedEvent::Stage(stage) => {
+                self.stage = Some(*stage);
+                self.proved = self.proofs.of(&stage.scene_hash);
+                self.describe();
+                self.warn_of_another_scene();
+            }
+            FeedEvent::Alert(alert) => {
+                let benches = self.stage.map_or(0, |stage| stage.benches);
+                self.picture.alert = wire::alert(alert, benches).into();
+            }
+            FeedEvent::Cue(cue) => {
+                self.cues += 1;
+                let most = self.stage.map_or(0, |stage| stage.cues as usize).max(KEPT_CUES);
+                let kept = self.picture.cues.iter().rev().take(most - 1).rev().cloned();
+                self.picture.cues = kept.chain([(self.cues, wire::cue(cue).into())]).collect();
+            }
+            FeedEvent::Frame { header, handles, .. } => self.picture.frame = wire::frame(header, handles).into(),
+            FeedEvent::Gone => {
+                self.picture = Picture::waiting(None);
+                (self.stage, self.proved, self.status) = (None, None, None);
+                return true;
+            }
+            // The page counts the time since the latest frame by itself.
+            FeedEvent::Status(status) => {
+                if self.status.replace(*status).is_some_and(|known| known.run_id == status.run_id) {
+                    return false;
+                }
+                self.describe();
+                return true;
+            }
+            FeedEvent::Silent | FeedEvent::Started { .. } => return false,
+        }
+        self.picture.waiting = Default::default();
+        true
+    }
+
+    /// Takes up what has been proved of the scene since its stage came; whether that changes the picture.
+    fn look_for_proof(&mut self) -> bool {
+        let Some(stage) = self.stage.as_ref().filter(|_| self.proved.is_none()) else { return false };
+        self.proved = self.proofs.of(&stage.scene_hash);
+        if self.proved.is_some() {
+            self.describe();
+        }
+        self.proved.is_some()
+    }
+
+    /// Says once of a scene that the certificates are of others.
+    fn warn_of_another_scene(&mut self) {
+        let Some(stage) = self.stage.as_ref().filter(|stage| self.proofs.are_of_others(&stage.scene_hash)) else {
+            return;
+        };
+        if self.unproved.replace(stage.scene_hash) != Some(stage.scene_hash) {
+            log::warn!(
+                "\"{}\" shows a scene with another text than that of any certificate (BLAKE3 {}): its page says nothing \
+                 of proofs",
+                self.publisher,
+                stage.scene_hash_digits().as_deref().unwrap_or("not known")
+            );
+        }
+    }
+
+    /// Says what the stage is, with the scene's name once it is known.
+    fn describe(&mut self) {
+        let Some(stage) = &self.stage else { return };
+        let status = self.status.as_ref().filter(|status| status.run_id == stage.run_id);
+        let scene = status.map(|status| status.scene.as_str());
+        self.picture.stage = wire::stage(stage, &self.publisher, scene, self.proved.as_deref()).into();
+    }
+}

@@ -1,0 +1,196 @@
+//! What a browser receives: frames as bytes, and JSON for what changes seldom. Called by the server only.
+//!
+//! Everything is little-endian. A frame is a header of 72 bytes and 20 bytes for each handle, head first:
+//!
+//! | byte | type | what |
+//! |---|---|---|
+//! | 0 | u8 | version of this layout: 3 |
+//! | 1 | u8 | state: its place in the list `states` of the message `stage`, from 0 |
+//! | 2 | u8 | playback: 0 playing, 1 paused, 2 held, 3 ended |
+//! | 3 | u8 | 0 |
+//! | 4 | u32 | number of handles |
+//! | 8 | f64 | simulated time, s |
+//! | 16 | f64 | simulated seconds per second of wall time; 0 while paused or held |
+//! | 24 | u64 | sequence: counts the frames published in this run; a browser skips some |
+//! | 32 | u64 | run: new for every start of a publisher |
+//! | 40 | u64 | CLOCK_MONOTONIC in ns when the publisher sent the frame |
+//! | 48 | u64 | tick |
+//! | 56 | f32 | least clearance, m; NaN where not computed |
+//! | 60 | u32 | epoch: grows by one at every jump of simulated time |
+//! | 64 | u32 | the latest cue passed, from 1; 0 where none has been |
+//! | 68 | u32 | 0 |
+//! | 72 + 20 k | 5 x f32 | handle k: x, y (m), heading (rad), vx, vy (m per simulated second; NaN where not computed, 0 where the show stands still) |
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use bench_dragon_messages::json::{AlertObject, CueObject, Exact, StageObject};
+use bench_dragon_messages::sentence::{Figures, alert_sentence, state_sentence};
+use bench_dragon_messages::state::{FrameState, Level, Severity};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage};
+use bench_dragon_proof::Outcome;
+
+const VERSION: u8 = 3;
+const HEADER_BYTES: usize = 72;
+const HANDLE_BYTES: usize = 20;
+
+pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(HEADER_BYTES + HANDLE_BYTES * handles.len());
+    bytes.extend([VERSION, header.state as u8, header.playback as u8, 0]);
+    bytes.extend((handles.len() as u32).to_le_bytes());
+    bytes.extend(header.sim_time.to_le_bytes());
+    bytes.extend(header.time_scale.to_le_bytes());
+    for number in [header.sequence, header.run_id, header.sent_ns, header.tick] {
+        bytes.extend(number.to_le_bytes());
+    }
+    bytes.extend((header.min_clearance as f32).to_le_bytes());
+    for number in [header.epoch, header.cue, 0] {
+        bytes.extend(number.to_le_bytes());
+    }
+    for pose in handles {
+        for number in [pose.x, pose.y, pose.heading, pose.vx, pose.vy] {
+            bytes.extend((number as f32).to_le_bytes());
+        }
+    }
+    bytes
+}
+
+/// The stage, the name of its publisher and, once they are known, that of its scene and what is proved of its events.
+pub(super) fn stage(stage: &Stage, publisher: &str, scene: Option<&str>, proved: Option<&[Outcome]>) -> String {
+    #[derive(Serialize)]
+    struct StageMessage<'a> {
+        r#type: &'static str,
+        publisher: &'a str,
+        scene: Option<&'a str>,
+        #[serde(flatten)]
+        stage: StageObject,
+        proved: Option<&'a [Outcome]>,
+        states: [Value; FrameState::ALL.len()],
+    }
+    let (stage, states) = (StageObject::from(stage), FrameState::ALL.map(state));
+    json!(StageMessage { r#type: "stage", publisher, scene, stage, proved, states }).to_string()
+}
+
+/// A cue that the show has reached.
+pub(super) fn cue(cue: &Cue) -> String {
+    json!(CueObject::from(cue)).to_string()
+}
+
+/// All that a page need know of a state, so that it can show one that it has never heard of.
+fn state(state: FrameState) -> Value {
+    json!({"name": state.name(), "severity": state.severity().name(), "happened": state.event().is_some(),
+        "sentence": state_sentence(state)})
+}
+
+/// An alert, its severity and its sentence, in a team of so many benches; the page shows its figures beside it.
+pub(super) fn alert(alert: &CollisionAlert, benches: u32) -> String {
+    #[derive(Serialize)]
+    struct AlertMessage {
+        #[serde(flatten)]
+        alert: AlertObject,
+        severity: &'static str,
+        happened: bool,
+        sentence: String,
+    }
+    let level = alert.alert_level();
+    let message = AlertMessage {
+        alert: alert.into(),
+        severity: level.map_or(Severity::Ok, Level::severity).name(),
+        happened: level.is_some_and(Level::has_happened),
+        sentence: alert_sentence(alert, benches, Figures::Omitted),
+    };
+    json!(message).to_string()
+}
+
+/// No publisher is there, or one that cannot be used for this `reason`.
+pub(super) fn waiting(reason: Option<&str>) -> String {
+    json!({"type": "waiting", "reason": reason}).to_string()
+}
+
+/// The response to `clock`: CLOCK_MONOTONIC, which frames are stamped with; `None` where they are stamped with another
+/// machine's, or none come.
+pub(super) fn clock(monotonic_ns: Option<u64>) -> String {
+    json!({"type": "clock", "monotonic_ns": monotonic_ns.map(Exact)}).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_has_the_documented_layout() {
+        let header = FrameHeader {
+            run_id: u64::MAX,
+            sequence: 7,
+            tick: 9,
+            sent_ns: 1 << 60,
+            sim_time: 405.5,
+            time_scale: 2.0,
+            min_clearance: 0.25,
+            handles: 2,
+            state: 2,
+            playback: 3,
+            cue: 5,
+            epoch: 4,
+            ..FrameHeader::default()
+        };
+        let pose = HandlePose { x: 8.75, y: -1.5, heading: 0.5, vx: 3.0, vy: -4.0 };
+        let still = HandlePose { vx: f64::NAN, ..pose };
+        let bytes = frame(&header, &[pose, still]);
+        assert_eq!(bytes.len(), 112);
+        assert_eq!(bytes[..8], [3, 2, 3, 0, 2, 0, 0, 0]);
+        assert_eq!(bytes[8..16], 405.5_f64.to_le_bytes());
+        assert_eq!(bytes[16..24], 2.0_f64.to_le_bytes());
+        assert_eq!(bytes[24..32], 7_u64.to_le_bytes());
+        assert_eq!(bytes[32..40], [0xff; 8]);
+        assert_eq!(bytes[40..48], [0, 0, 0, 0, 0, 0, 0, 0x10]);
+        assert_eq!(bytes[48..56], 9_u64.to_le_bytes());
+        assert_eq!(bytes[56..72], [0, 0, 0x80, 0x3e, 4, 0, 0, 0, 5, 0, 0, 0, 0, 0, 0, 0]);
+        let numbers: Vec<_> = bytes[72..].chunks(4).map(|four| f32::from_le_bytes(four.try_into().unwrap())).collect();
+        assert_eq!(numbers[..8], [8.75, -1.5, 0.5, 3.0, -4.0, 8.75, -1.5, 0.5]);
+        assert!(numbers[8].is_nan() && numbers[9] == -4.0);
+    }
+
+    #[test]
+    fn a_clock_that_is_not_the_frames_own_is_null() {
+        let known: Value = serde_json::from_str(&clock(Some(u64::MAX))).unwrap();
+        let unknown: Value = serde_json::from_str(&clock(None)).unwrap();
+        assert_eq!(known, json!({"type": "clock", "monotonic_ns": u64::MAX.to_string()}));
+        assert_eq!(unknown, json!({"type": "clock", "monotonic_ns": null}));
+    }
+
+    #[test]
+    fn the_states_stand_in_the_order_of_their_numbers() {
+        let json: Value = serde_json::from_str(&stage(&Stage::default(), "dragon", Some("paper"), None)).unwrap();
+        assert_eq!((&json["publisher"], &json["scene"]), (&"dragon".into(), &"paper".into()));
+        assert!(json["scene_hash"].is_null() && json["proved"].is_null(), "{json}");
+        let states = json["states"].as_array().unwrap();
+        assert_eq!(states.len(), FrameState::ALL.len());
+        for (state, number) in FrameState::ALL.into_iter().zip(0..) {
+            assert_eq!((state as usize, &states[number]["name"]), (number, &state.name().into()));
+        }
+        let contact = json!({"name": "contact", "severity": "error", "happened": true, "sentence": null});
+        assert_eq!(states[2], contact);
+        assert_eq!(states[5]["sentence"], "the head has reached the end of the path");
+    }
+
+    #[test]
+    fn an_alert_carries_the_sentence_of_its_numbers() {
+        let alert_of = CollisionAlert {
+            level: 1,
+            event: 2,
+            event_bench_a: 0,
+            event_bench_b: 8,
+            event_x: 1.0,
+            event_y: 2.0,
+            ..Default::default()
+        };
+        let json: Value = serde_json::from_str(&alert(&alert_of, 9)).unwrap();
+        assert_eq!((&json["type"], &json["event"]), (&"alert".into(), &"contact".into()));
+        assert_eq!((&json["severity"], &json["happened"]), (&"warning".into(), &false.into()));
+        assert_eq!(
+            json["sentence"],
+            "contact: bench 1 (the head) and bench 9 (the tail) at (1.000, 2.000) m (counting from 1)"
+        );
+    }
+}

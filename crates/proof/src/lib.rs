@@ -1,0 +1,182 @@
+//! The checker of certificates of events: what docs/proofs.md says of a file, and nothing else. `verify`,
+//! `check --certificate` and `view --certificate` call it.
+//!
+//! In: the lines of a certificate. Out: what it proves, or the first line that does not follow. It uses no other room:
+//! no geometry, no parsing and no solver of the program, only that page, which it has in common with the search.
+
+mod boards;
+mod capsule;
+mod chain;
+mod elementary;
+mod events;
+mod interval;
+mod lines;
+mod link;
+mod path;
+mod results;
+mod scene;
+mod steps;
+/// Returns BLAKE3 of a scene's text, the name under which the messages of a show and a certificate mean the same scene.
+pub fn scene_hash(text: &str) -> [u8; 32] {
+    *blake3::hash(text.as_bytes()).as_bytes()
+}
+
+#[cfg(test)]
+mod tests;
+
+use std::io::{self, BufRead, Read};
+
+use serde::Serialize;
+
+use self::events::{Events, LockShown};
+use self::lines::Line;
+pub use self::lines::{EventKind, Outcome, Status};
+use self::path::Span;
+use self::scene::Scene;
+use self::steps::{Step, Steps};
+
+/// The form of the file.
+const FORMAT: u32 = 1;
+/// Bytes of the longest line.
+const LONGEST_LINE: u64 = 1 << 28;
+
+/// What a certificate proves.
+#[derive(Debug, Clone, Serialize)]
+pub struct Proved {
+    /// The text of the scene that it is about.
+    pub scene: String,
+    /// The version of the program that wrote it.
+    pub version: String,
+    /// Contact, stall, lock and path end, in this order.
+    pub results: Vec<Outcome>,
+    /// Steps checked.
+    pub steps: u64,
+    /// Links checked, in all steps.
+    pub links: u64,
+    /// Pairs of boards checked, in all steps.
+    pub pairs: u64,
+}
+
+/// Why a file proves nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum Refused {
+    /// It cannot be read.
+    #[error("{0}")]
+    Unreadable(io::Error),
+    /// It has not the form of a certificate.
+    #[error("line {line}: {problem}")]
+    Form {
+        /// The line, from 1.
+        line: u64,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// It has the form of one, but a line does not follow from those before it.
+    #[error("line {line}: {problem}")]
+    DoesNotFollow {
+        /// The line, from 1.
+        line: u64,
+        /// What does not follow.
+        problem: String,
+    },
+}
+
+/// The text of the scene that a certificate is about, from its first line. Nothing else of it is checked.
+///
+/// # Errors
+/// [`Refused::Form`] for a line that is not the first of a certificate.
+pub fn scene_of(first_line: &[u8]) -> Result<String, Refused> {
+    let form = |problem: String| Refused::Form { line: 1, problem };
+    let parsed = serde_json::from_slice(first_line).map_err(|error| form(error.to_string()))?;
+    Ok(Checker::begin(parsed).map_err(form)?.proved.scene)
+}
+
+/// Checks a certificate. `progress` is told how many bytes have been read.
+///
+/// # Errors
+/// [`Refused`]: the first line that is wrong.
+pub fn verify(mut lines: impl BufRead, progress: &mut dyn FnMut(u64)) -> Result<Proved, Refused> {
+    let mut bytes = 0;
+    let mut checker: Option<Checker> = None;
+    for line in 1.. {
+        let form = |problem: String| Refused::Form { line, problem };
+        let mut text = Vec::new();
+        let read = (&mut lines).take(LONGEST_LINE).read_until(b'\n', &mut text).map_err(Refused::Unreadable)?;
+        if read == 0 {
+            break;
+        }
+        bytes += read as u64;
+        progress(bytes);
+        let parsed: Line = serde_json::from_slice(&text).map_err(|error| form(error.to_string()))?;
+        match (&mut checker, parsed) {
+            (None, first) => checker = Some(Checker::begin(first).map_err(form)?),
+            (Some(checker), parsed) => {
+                checker.add(parsed).map_err(|problem| Refused::DoesNotFollow { line, problem })?;
+            }
+        }
+    }
+    match checker {
+        Some(checker) if checker.proved.results.len() == 4 => Ok(checker.finished()),
+        Some(_) => Err(Refused::Form { line: 1, problem: "the file ends before its four results".to_owned() }),
+        None => Err(Refused::Form { line: 1, problem: "the file is empty".to_owned() }),
+    }
+}
+
+/// A certificate as far as it has been checked.
+struct Checker {
+    scene: Scene,
+    steps: Steps,
+    events: Events,
+    proved: Proved,
+}
+
+impl Checker {
+    fn begin(first: Line) -> Result<Self, String> {
+        let Line::Certificate { format, version, scene: text } = first else {
+            return Err("the first line is not that of a certificate".to_owned());
+        };
+        if format != FORMAT {
+            return Err(format!("a certificate of format {format}, expected {FORMAT}"));
+        }
+        let scene = Scene::read(&text).map_err(|problem| format!("the scene: {problem}"))?;
+        let proved = Proved { scene: text, version, results: Vec::new(), steps: 0, links: 0, pairs: 0 };
+        Ok(Self { scene, steps: Steps::new(), events: Events::default(), proved })
+    }
+
+    fn add(&mut self, line: Line) -> Result<(), String> {
+        let Self { scene, steps, events, proved } = self;
+        let is_result = matches!(line, Line::Result(_));
+        if !is_result && (events.finish.is_some() || !proved.results.is_empty()) {
+            return Err("nothing but results can follow a lock, the path's end or a result".to_owned());
+        }
+        match line {
+            Line::Certificate { .. } => Err("a second first line".to_owned()),
+            Line::Step { links, from, to, moving, clear, spans } => {
+                steps.add(scene, Step { links, head: Span(from, to), moving, clear, spans })
+            }
+            Line::Contact { benches, from, to, spans, point } => {
+                events.add_contact(scene, steps, benches, Span(from, to), &spans, point)
+            }
+            Line::Stall { link, from, to, spans } => events.add_stall(scene, steps, link, Span(from, to), &spans),
+            Line::Lock { link, to, spans, last, window, jump } => {
+                let shown = match (window, jump) {
+                    (Some(window), None) => LockShown::Vanishes(window),
+                    (None, Some(jump)) => LockShown::Jumps(jump),
+                    _ => return Err("expected one of `window` and `jump`".to_owned()),
+                };
+                events.add_lock(scene, steps, (link, to), (&spans, &last), shown)
+            }
+            Line::PathEnd {} => events.add_path_end(scene, steps),
+            Line::Result(outcome) => {
+                results::check(scene, steps, events, &outcome, &proved.results)?;
+                proved.results.push(outcome);
+                Ok(())
+            }
+        }
+    }
+
+    fn finished(self) -> Proved {
+        let Steps { steps, links, pairs, .. } = self.steps;
+        Proved { steps, links, pairs, ..self.proved }
+    }
+}

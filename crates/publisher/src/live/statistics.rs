@@ -1,0 +1,162 @@
+//! What the loop has done: lateness and step cost as percentiles, the status once a second, the summary at the end.
+//!
+//! In: samples and alerts from queues. Out: [`LoopStatus`] to every [`StatusPublisher`], alerts to the terminal, a
+//! [`Summary`]. Runs on a thread of its own, so that no percentile is computed, no file read and no line printed on the
+//! loop's thread. The thread only moves things; [`accumulator`] does the arithmetic.
+
+pub mod accumulator;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde::{Deserialize, Serialize};
+
+use super::{Announcement, Deliveries, End, StatusPublisher};
+use bench_dragon_client::clock::Clock;
+use bench_dragon_messages::LoopStatus;
+
+pub use accumulator::{Accumulator, Durations, Percentiles, Sample, Summary};
+
+/// Samples that their queue holds: three seconds of the highest rate.
+const QUEUED_SAMPLES: usize = 1 << 16;
+/// Alerts and cues that their queue holds.
+const QUEUED_ANNOUNCEMENTS: usize = 1 << 10;
+/// Nanoseconds between two emptyings of the queues.
+const POLL_INTERVAL_NS: u64 = 20_000_000;
+
+/// The queues between the loop and this thread.
+pub fn queues() -> (super::Reports, Inbox) {
+    queues_of(QUEUED_SAMPLES, QUEUED_ANNOUNCEMENTS)
+}
+
+/// Queues that hold so many samples, and so many alerts and cues.
+pub fn queues_of(samples: usize, announcements: usize) -> (super::Reports, Inbox) {
+    let (mut samples, mut sample_inbox) = rtrb::RingBuffer::new(samples);
+    // Each page of this memory is written here once: otherwise the loop's thread would be the first to touch it, and for
+    // minutes a soak test would take that for growth.
+    while samples.push(Sample::NOTHING).is_ok() {}
+    while sample_inbox.pop().is_ok() {}
+    let (announcements, announcement_inbox) = rtrb::RingBuffer::new(announcements);
+    let reports = super::Reports { samples, announcements };
+    (reports, Inbox { samples: sample_inbox, announcements: announcement_inbox })
+}
+
+/// This thread's ends of the queues.
+pub struct Inbox {
+    samples: rtrb::Consumer<Sample>,
+    announcements: rtrb::Consumer<Announcement>,
+}
+
+/// The summary of a run: what `run --json` prints at its end, and a soak test reads.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RunSummary {
+    /// Frames published.
+    pub frames: u64,
+    /// Incidents in which at least one period was skipped.
+    pub overruns: u64,
+    /// Periods skipped.
+    pub skipped: u64,
+    /// Wake-up lateness against the intended deadlines.
+    pub wakeup_ns: Percentiles,
+    /// Cost of a step.
+    pub step_ns: Percentiles,
+    /// Why the loop ended.
+    pub end: End,
+    /// What each transport with a queue of its own has delivered, by its name.
+    #[serde(flatten)]
+    pub deliveries: BTreeMap<String, Deliveries>,
+}
+
+/// The run that statistics are made of, and where they go.
+pub struct Run<'a> {
+    /// The run's number.
+    pub run_id: u64,
+    /// Requested frames per second.
+    pub rate: f64,
+    /// The scene's name.
+    pub scene: &'a str,
+    /// Where the status goes.
+    pub sinks: Vec<Box<dyn StatusPublisher>>,
+    /// What is done with each alert and cue.
+    pub announce: Box<dyn FnMut(&Announcement) + 'a>,
+    /// What else is done with each sample.
+    pub record: Box<dyn FnMut(&Sample) + 'a>,
+}
+
+/// What the statistics thread does, without its waiting and without what only the operating system knows: a simulated
+/// scheduler can call it in that thread's place.
+pub struct Collector<'a> {
+    inbox: Inbox,
+    run: Run<'a>,
+    accumulator: Accumulator,
+}
+
+impl<'a> Collector<'a> {
+    /// Nothing collected yet, at `now_ns` of CLOCK_MONOTONIC.
+    pub fn new(inbox: Inbox, run: Run<'a>, now_ns: u64) -> Self {
+        let accumulator = Accumulator::new(run.run_id, run.rate, run.scene, now_ns);
+        Self { inbox, run, accumulator }
+    }
+
+    /// Empties the queues.
+    pub fn take(&mut self) {
+        while let Ok(announcement) = self.inbox.announcements.pop() {
+            (self.run.announce)(&announcement);
+        }
+        while let Ok(sample) = self.inbox.samples.pop() {
+            self.accumulator.record(&sample);
+            (self.run.record)(&sample);
+        }
+    }
+
+    /// Sends the status where one is due, or the run is `ending`. `complete` adds the stamp and what else is not of the
+    /// run.
+    pub fn report(&mut self, now_ns: u64, ending: bool, complete: impl FnOnce(LoopStatus) -> LoopStatus) {
+        let Self { accumulator, run, .. } = self;
+        let status = if ending { accumulator.status(now_ns) } else { accumulator.status_if_due(now_ns) };
+        if let Some(status) = status.map(complete) {
+            run.sinks.iter_mut().for_each(|sink| sink.publish_status(&status));
+        }
+    }
+
+    /// What is known of the run.
+    pub fn summary(&self) -> Summary {
+        self.accumulator.summary()
+    }
+}
+
+/// Collects until `done` is set and the queues are empty.
+pub fn collect<C: Clock>(clock: &C, inbox: Inbox, run: Run, done: &AtomicBool) -> Summary {
+    let mut collector = Collector::new(inbox, run, clock.monotonic_ns());
+    loop {
+        // Read before the queues are emptied: what was pushed before it was set is then still seen.
+        let ending = done.load(Ordering::Acquire);
+        collector.take();
+        let now_ns = clock.monotonic_ns();
+        collector.report(now_ns, ending, |status| LoopStatus {
+            stamp_ns: clock.realtime_ns(),
+            resident_bytes: resident_bytes(),
+            file_descriptors: file_descriptors(),
+            ..status
+        });
+        if ending {
+            return collector.summary();
+        }
+        clock.sleep_until(now_ns + POLL_INTERVAL_NS);
+    }
+}
+
+/// Resident memory of this process, bytes; 0 where /proc does not list it.
+fn resident_bytes() -> u64 {
+    let pages = std::fs::read_to_string("/proc/self/statm").ok();
+    let resident = pages.and_then(|text| text.split_whitespace().nth(1)?.parse::<u64>().ok()).unwrap_or(0);
+    let page = nix::unistd::sysconf(nix::unistd::SysconfVar::PAGE_SIZE).ok().flatten();
+    resident * page.unwrap_or(4096) as u64
+}
+
+/// Open file descriptors of this process; 0 where /proc does not list them.
+fn file_descriptors() -> u32 {
+    std::fs::read_dir("/proc/self/fd").map_or(0, |entries| entries.count() as u32)
+}

@@ -1,0 +1,238 @@
+//! The arithmetic of the statistics: samples and times in, a [`LoopStatus`] a second and a [`Summary`] out.
+//!
+//! Pure: the statistics thread calls it and adds what only the operating system knows.
+
+use hdrhistogram::Histogram;
+use serde::{Deserialize, Serialize};
+
+use crate::live::{Counts, End};
+use bench_dragon_messages::{LoopStatus, SceneName};
+
+/// The longest lateness and step cost that a histogram distinguishes: an hour.
+const LONGEST_NS: u64 = 3_600_000_000_000;
+/// Entries that one late wake-up makes in a histogram, at most: a second's periods at the highest rate.
+const MOST_ENTRIES: u64 = 20_000;
+const SECOND_NS: u64 = 1_000_000_000;
+
+/// One frame, as the loop saw it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// The frame's tick.
+    pub tick: u64,
+    /// The frame's simulated seconds.
+    pub sim_time: f64,
+    /// Shows played so far.
+    pub shows_played: u64,
+    /// Unforeseen contacts so far.
+    pub unforeseen_contacts: u64,
+    /// Unsolved frames so far.
+    pub unsolved_frames: u64,
+    /// What was counted so far, this frame included.
+    pub counts: Counts,
+    /// How late the thread woke after the intended deadline.
+    pub lateness_ns: u64,
+    /// From waking to the frame's being published everywhere.
+    pub step_ns: u64,
+    /// Subscribers connected.
+    pub subscribers: u32,
+}
+
+impl Sample {
+    /// Before the first frame.
+    pub(super) const NOTHING: Self = Self {
+        tick: 0,
+        sim_time: 0.0,
+        shows_played: 0,
+        unforeseen_contacts: 0,
+        unsolved_frames: 0,
+        counts: Counts { frames: 0, overruns: 0, skipped: 0, end: End::Signal },
+        lateness_ns: 0,
+        step_ns: 0,
+        subscribers: 0,
+    };
+}
+
+/// Percentiles of a duration, nanoseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Percentiles {
+    /// Half are at most this.
+    pub p50: u64,
+    /// 99 % are at most this.
+    pub p99: u64,
+    /// 99.9 % are at most this.
+    pub p999: u64,
+    /// All are at most this.
+    pub max: u64,
+}
+
+impl Percentiles {
+    /// The percentiles of what a histogram holds; zeros where it holds nothing.
+    pub fn of(histogram: &Histogram<u64>) -> Self {
+        let at = |quantile| histogram.value_at_quantile(quantile);
+        Self { p50: at(0.5), p99: at(0.99), p999: at(0.999), max: histogram.max() }
+    }
+}
+
+/// What is known of a run at its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Summary {
+    /// Wake-up lateness against the intended deadlines; skipped periods count with the lateness they would have had.
+    pub wakeup_ns: Percentiles,
+    /// Cost of a step: frame, publishing and waking subscribers.
+    pub step_ns: Percentiles,
+    /// Frames whose samples came through the queue. The percentiles miss the others.
+    pub samples: u64,
+}
+
+/// The distributions of the two durations over some time, nanoseconds.
+pub struct Durations {
+    /// Wake-up lateness; skipped periods count with the lateness they would have had.
+    pub lateness: Histogram<u64>,
+    /// Cost of a step.
+    pub step: Histogram<u64>,
+}
+
+impl Default for Durations {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Durations {
+    /// Nothing yet.
+    pub fn new() -> Self {
+        // 1 ns to an hour with three digits are bounds the constructor accepts.
+        let histogram = || Histogram::new_with_bounds(1, LONGEST_NS, 3).expect("valid bounds");
+        Self { lateness: histogram(), step: histogram() }
+    }
+
+    /// Counts a sample. A late wake-up delays every period it covers, and each counts with what was left of it:
+    /// HdrHistogram's correction for coordinated omission. Where it covers very many, neighbours share an entry, so that
+    /// an hour's stop does not hold the thread up.
+    pub fn record(&mut self, sample: &Sample, period_ns: u64) {
+        let values = (sample.lateness_ns / period_ns).max(1);
+        let stride = values.div_ceil(MOST_ENTRIES);
+        for first in (0..values).step_by(stride as usize) {
+            let shared = stride.min(values - first);
+            self.lateness.saturating_record_n(sample.lateness_ns - first * period_ns, shared);
+        }
+        self.step.saturating_record(sample.step_ns);
+    }
+
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.lateness.reset();
+        self.step.reset();
+    }
+}
+
+/// What has been counted of a run so far.
+pub struct Accumulator {
+    run_id: u64,
+    rate: f64,
+    scene: SceneName,
+    total: Durations,
+    /// Since the latest status.
+    second: Durations,
+    latest: Option<Sample>,
+    samples: u64,
+    /// When the latest status was made, or the run began, and the frames published until then.
+    second_began_ns: u64,
+    frames_before: u64,
+    status_due_ns: u64,
+}
+
+impl Accumulator {
+    /// Nothing yet, at `now_ns` of CLOCK_MONOTONIC.
+    pub fn new(run_id: u64, rate: f64, scene: &str, now_ns: u64) -> Self {
+        Self {
+            run_id,
+            rate,
+            scene: SceneName::new(scene),
+            total: Durations::new(),
+            second: Durations::new(),
+            latest: None,
+            samples: 0,
+            second_began_ns: now_ns,
+            frames_before: 0,
+            status_due_ns: now_ns + SECOND_NS,
+        }
+    }
+
+    /// Counts a frame.
+    pub fn record(&mut self, sample: &Sample) {
+        let period_ns = (1e9 / self.rate) as u64;
+        self.total.record(sample, period_ns);
+        self.second.record(sample, period_ns);
+        self.samples += 1;
+        self.latest = Some(*sample);
+    }
+
+    /// The status, where a second is over; once for every second, whether or not a frame came in it. `None` before the
+    /// first frame.
+    ///
+    /// `stamp_ns`, `resident_bytes` and `file_descriptors` are left 0.
+    pub fn status_if_due(&mut self, now_ns: u64) -> Option<LoopStatus> {
+        if now_ns < self.status_due_ns {
+            return None;
+        }
+        let status = self.status(now_ns)?;
+        // The next whole second since the beginning, so that late calls do not add up.
+        self.status_due_ns += SECOND_NS * ((now_ns - self.status_due_ns) / SECOND_NS + 1);
+        Some(status)
+    }
+
+    /// The status of what has happened since the latest one, however short. `None` where no time has passed since, and
+    /// before the first frame. The fields that [`Accumulator::status_if_due`] leaves 0 are 0 here too.
+    pub fn status(&mut self, now_ns: u64) -> Option<LoopStatus> {
+        let sample = self.latest?;
+        let elapsed_ns = now_ns.saturating_sub(self.second_began_ns);
+        if elapsed_ns == 0 {
+            return None;
+        }
+        let frames = sample.counts.frames - self.frames_before;
+        let [late, late_total] = [&self.second, &self.total].map(|over| Percentiles::of(&over.lateness));
+        let [step, step_total] = [&self.second, &self.total].map(|over| Percentiles::of(&over.step));
+        self.frames_before = sample.counts.frames;
+        self.second_began_ns = now_ns;
+        self.second.clear();
+        Some(LoopStatus {
+            run_id: self.run_id,
+            tick: sample.tick,
+            sequence: sample.counts.frames - 1,
+            stamp_ns: 0,
+            sim_time: sample.sim_time,
+            rate: self.rate,
+            measured_rate: frames as f64 * 1e9 / elapsed_ns as f64,
+            overruns: sample.counts.overruns,
+            skipped: sample.counts.skipped,
+            shows_played: sample.shows_played,
+            unforeseen_contacts: sample.unforeseen_contacts,
+            unsolved_frames: sample.unsolved_frames,
+            lateness_p50_second: late.p50,
+            lateness_p99_second: late.p99,
+            lateness_max_second: late.max,
+            lateness_p50_total: late_total.p50,
+            lateness_p99_total: late_total.p99,
+            lateness_p999_total: late_total.p999,
+            lateness_max_total: late_total.max,
+            step_p50_second: step.p50,
+            step_p99_second: step.p99,
+            step_max_second: step.max,
+            step_p50_total: step_total.p50,
+            step_p99_total: step_total.p99,
+            step_p999_total: step_total.p999,
+            step_max_total: step_total.max,
+            resident_bytes: 0,
+            subscribers: sample.subscribers,
+            file_descriptors: 0,
+            scene: self.scene,
+        })
+    }
+
+    /// What is known of the run.
+    pub fn summary(&self) -> Summary {
+        let (wakeup_ns, step_ns) = (Percentiles::of(&self.total.lateness), Percentiles::of(&self.total.step));
+        Summary { wakeup_ns, step_ns, samples: self.samples }
+    }
+}

@@ -1,0 +1,343 @@
+//! `run --log`: a transport whose receiver is a file.
+//!
+//! [`LogPublisher`] is the loop's end: it copies the arrays of a frame into a queue and returns, without a lock, an
+//! allocation or a system call. A thread puts them into the order of the message, hashes and writes. Unlike
+//! `transports::background` it leaves no frame out while there is room for it; where there is none, the frame's tick is still
+//! recorded, as that of a lost frame. A frame and its commands are queued together, or not at all.
+
+pub mod arithmetic;
+pub mod hash;
+pub mod lines;
+#[cfg(test)]
+mod tests;
+pub mod verify;
+mod writer;
+
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use crate::live::{Counts, Deliveries, Outgoing, PublishError, Publisher, StatusPublisher};
+use crate::transports::{Transport, TransportError};
+use bench_dragon_messages::LoopStatus;
+use bench_dragon_messages::control::{Code, Command, CommandRecord};
+use hash::{HANDLE_WORDS, HEADER_WORDS, columns, header_words};
+use lines::ShowLine;
+use writer::LogWriter;
+
+/// Seconds of frames that the thread may fall behind before frames are lost, and the memory that these may take.
+const QUEUED_SECONDS: f64 = 5.0;
+const QUEUED_BYTES: usize = 64_000_000;
+/// Frames that the queue holds at least.
+const LEAST_FRAMES: usize = 4;
+/// Words that frames leave free: for commands, and for the ticks of lost frames.
+const RESERVED_WORDS: usize = RECORD_WORDS << 16;
+/// Words that are touched beforehand for the next frame: what a processor's own cache holds.
+const MOST_PREPARED: usize = 1 << 15;
+/// How often the thread empties the queue.
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
+/// How long the file is given to take the last lines: one on a dead network drive never does.
+const LONGEST_END: Duration = Duration::from_secs(10);
+
+/// Words of a record, and of a frame's before its columns: what it is, the tick, the handles, the header.
+const RECORD_WORDS: usize = 5;
+const FRAME_WORDS: usize = 3 + HEADER_WORDS;
+
+/// What a record is: its first word.
+const FRAME: u64 = 0;
+const LOST: u64 = 1;
+const COMMAND: u64 = 2;
+const STEP_FINISHED: u64 = 3;
+/// In place of a code: the step has begun.
+const NO_CODE: u64 = u64::MAX;
+/// In place of a tick: nothing is missing.
+const NEVER: u64 = u64::MAX;
+
+/// What the ends share besides the queue.
+struct Shared {
+    stop: AtomicBool,
+    /// The first tick of which the queue took nothing, from which on it gets nothing.
+    missing_from: AtomicU64,
+    frames: AtomicU64,
+    lost: AtomicU64,
+    /// What the loop has counted, once it is over.
+    ended: Mutex<Option<Counts>>,
+    failure: Mutex<Option<String>>,
+}
+
+/// The loop's end. The queue holds numbers, as the arrays of a chain do, and bits of whole numbers as such: nothing
+/// computes with either.
+pub struct LogPublisher {
+    queue: Producer<f64>,
+    reserved: usize,
+    /// Words of the latest frame.
+    frame_words: usize,
+    shared: Arc<Shared>,
+}
+
+/// The thread's end.
+pub(super) struct LogReader {
+    pub queue: Consumer<f64>,
+    columns: Vec<f64>,
+}
+
+/// How a log fared, once its run is over.
+#[derive(Clone)]
+pub struct LogOutcome(Arc<Shared>);
+
+/// The log of a run.
+struct Log {
+    file: PathBuf,
+    publisher: Option<LogPublisher>,
+    shared: Arc<Shared>,
+    thread: JoinHandle<()>,
+}
+
+/// The status is no part of a log.
+struct NoStatus;
+
+/// Makes the file and starts its thread.
+///
+/// # Errors
+/// [`TransportError::BadInput`] where the file cannot be made, [`TransportError::Failed`] where there is no thread.
+pub fn open(file: &Path, show: ShowLine, handles: usize) -> Result<(Box<dyn Transport>, LogOutcome), TransportError> {
+    let shown = file.display().to_string();
+    let refused = |error| TransportError::BadInput(format!("--log: {shown}: {error}, expected a file to write"));
+    let opened = File::create(file).map_err(refused)?;
+    let (publisher, reader) = queue(handles, show.rate);
+    let shared = Arc::clone(&publisher.shared);
+    let serving = Arc::clone(&shared);
+    let thread = move || serve(reader, LogWriter::new(opened, show), &serving, &shown);
+    let thread = std::thread::Builder::new().name("log".to_owned()).spawn(thread);
+    let thread = thread.map_err(|error| TransportError::Failed(format!("the log's thread: {error}")))?;
+    let outcome = LogOutcome(Arc::clone(&shared));
+    Ok((Box::new(Log { file: file.to_owned(), publisher: Some(publisher), shared, thread }), outcome))
+}
+
+impl LogOutcome {
+    /// Takes in what the loop has counted: the log's last lines. To be called before the transports are finished.
+    pub fn ended(&self, counts: Counts) {
+        *self.0.ended.lock().unwrap_or_else(PoisonError::into_inner) = Some(counts);
+    }
+
+    /// Why the log is not whole, in one sentence; `None` where it is.
+    pub fn failure(&self) -> Option<String> {
+        self.0.failure.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// The queue for frames of so many handles, all of its memory in place.
+pub(super) fn queue(handles: usize, rate: f64) -> (LogPublisher, LogReader) {
+    let frame = words_of(handles);
+    let affordable = QUEUED_BYTES / (frame * size_of::<f64>());
+    let frames = ((rate * QUEUED_SECONDS) as usize).min(affordable).max(LEAST_FRAMES);
+    queue_of(frames * frame, RESERVED_WORDS)
+}
+
+/// The queue with room for so many words of frames, and for so many besides.
+pub(super) fn queue_of(words: usize, reserved: usize) -> (LogPublisher, LogReader) {
+    let (mut queue, mut consumer) = RingBuffer::new(words + reserved);
+    // The loop's thread is not to be the first that touches a page.
+    while queue.push(0.0).is_ok() {}
+    while consumer.pop().is_ok() {}
+    let shared = Arc::new(Shared {
+        stop: AtomicBool::new(false),
+        missing_from: AtomicU64::new(NEVER),
+        frames: AtomicU64::new(0),
+        lost: AtomicU64::new(0),
+        ended: Mutex::new(None),
+        failure: Mutex::new(None),
+    });
+    let reader = LogReader { queue: consumer, columns: Vec::new() };
+    (LogPublisher { queue, reserved, frame_words: 0, shared }, reader)
+}
+
+/// Words of a frame.
+fn words_of(handles: usize) -> usize {
+    FRAME_WORDS + HANDLE_WORDS * handles
+}
+
+impl LogPublisher {
+    /// Pushes words for which there is room.
+    pub(super) fn push(&mut self, words: &[f64]) {
+        let pushed = self.queue.push_entire_slice(words);
+        debug_assert!(pushed.is_ok(), "{pushed:?}");
+    }
+
+    fn push_record(&mut self, record: [u64; RECORD_WORDS]) {
+        self.push(&record.map(f64::from_bits));
+    }
+}
+
+impl Publisher for LogPublisher {
+    fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
+        let Outgoing { header, frame, .. } = outgoing;
+        let tick = header.tick;
+        if self.shared.missing_from.load(Ordering::Relaxed) != NEVER {
+            return Ok(());
+        }
+        let handles = frame.chain.handles();
+        self.frame_words = words_of(handles);
+        let (room, of_commands) = (self.queue.slots(), frame.commands.len() * RECORD_WORDS);
+        if room < of_commands + RECORD_WORDS {
+            self.shared.missing_from.store(tick, Ordering::Release);
+            return Ok(());
+        }
+        for record in &frame.commands {
+            let code = |code: Code| code as u64;
+            self.push_record(match *record {
+                CommandRecord::Given { command, code: answered } => {
+                    let (number, value) = command.number_and_value();
+                    [COMMAND, tick, u64::from(number), value.to_bits(), answered.map_or(NO_CODE, code)]
+                }
+                CommandRecord::StepFinished { code: answered } => [STEP_FINISHED, tick, code(answered), 0, 0],
+            });
+        }
+        if room < of_commands + self.frame_words + self.reserved {
+            self.push_record([LOST, tick, 0, 0, 0]);
+            return Ok(());
+        }
+        let mut words = [FRAME, tick, handles as u64, 0, 0, 0, 0, 0, 0, 0, 0];
+        words[FRAME_WORDS - HEADER_WORDS..].copy_from_slice(&header_words(header));
+        self.push(&words.map(f64::from_bits));
+        columns(&frame.chain).iter().for_each(|column| self.push(column));
+        Ok(())
+    }
+
+    /// Writes zeros where the next frame will be: its memory, which the log's thread has read on another processor, is in
+    /// this one's cache when it comes.
+    fn prepare(&mut self) {
+        drop(self.queue.write_chunk(self.frame_words.min(MOST_PREPARED)));
+    }
+
+    fn maintain(&mut self) {}
+
+    fn subscribers(&self) -> u32 {
+        0
+    }
+}
+
+impl StatusPublisher for NoStatus {
+    fn publish_status(&mut self, _: &LoopStatus) {}
+}
+
+impl Transport for Log {
+    fn describe(&self) -> String {
+        format!("Log of commands and of a hash a second: {}", self.file.display())
+    }
+
+    fn publisher(&mut self) -> Result<Box<dyn Publisher>, TransportError> {
+        match self.publisher.take() {
+            Some(publisher) => Ok(Box::new(publisher)),
+            None => Err(TransportError::Failed("the log's publisher is taken".to_owned())),
+        }
+    }
+
+    fn status(&mut self) -> Result<Box<dyn StatusPublisher>, TransportError> {
+        Ok(Box::new(NoStatus))
+    }
+
+    fn finish(self: Box<Self>) -> Option<(&'static str, Deliveries)> {
+        self.shared.stop.store(true, Ordering::Release);
+        let began = Instant::now();
+        while !self.thread.is_finished() && began.elapsed() < LONGEST_END {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        if !self.thread.is_finished() {
+            let sentence = format!("--log: {}: it takes no more, the log is cut", self.file.display());
+            fail(&self.shared, sentence);
+        }
+        let [frames, skipped] = [&self.shared.frames, &self.shared.lost].map(|count| count.load(Ordering::Acquire));
+        Some(("log", Deliveries { frames, skipped, discarded: 0 }))
+    }
+}
+
+/// Keeps the first failure.
+fn fail(shared: &Shared, sentence: String) {
+    shared.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(sentence);
+}
+
+/// Writes what the queue brings until the run is over.
+fn serve(mut reader: LogReader, mut writer: LogWriter<impl io::Write>, shared: &Shared, file: &str) {
+    loop {
+        // Read before the queue is emptied: what was put there before it was set is then still written.
+        let ending = shared.stop.load(Ordering::Acquire);
+        let missing_from = shared.missing_from.load(Ordering::Acquire);
+        reader.empty(&mut writer);
+        if missing_from != NEVER {
+            writer.stopped(missing_from);
+            let sentence = format!("--log: {file}: the log was too far behind at tick {missing_from} and ends there");
+            log::error!("{sentence}; the show goes on");
+            fail(shared, sentence);
+        } else if ending {
+            match *shared.ended.lock().unwrap_or_else(PoisonError::into_inner) {
+                Some(counts) => writer.end(&counts),
+                None => writer.break_off(),
+            }
+        }
+        let counts = writer.counts();
+        if let Some(error) = writer.take_failure() {
+            let sentence = format!("--log: {file}: {error}: the log is cut");
+            log::error!("{sentence}; the show goes on");
+            fail(shared, sentence);
+        }
+        shared.frames.store(counts.frames, Ordering::Release);
+        shared.lost.store(counts.lost, Ordering::Release);
+        if ending || missing_from != NEVER {
+            return;
+        }
+        std::thread::sleep(POLL_INTERVAL);
+    }
+}
+
+impl LogReader {
+    /// Writes all that is in the queue.
+    fn empty(&mut self, writer: &mut LogWriter<impl io::Write>) {
+        // A record that is longer has more behind it.
+        while let Ok(record) = self.queue.read_chunk(RECORD_WORDS) {
+            let mut words = [0; RECORD_WORDS];
+            let (first, second) = record.as_slices();
+            words.iter_mut().zip(first.iter().chain(second)).for_each(|(word, number)| *word = number.to_bits());
+            let [kind, tick, third, fourth, fifth] = words;
+            if kind == FRAME {
+                if !self.frame(third as usize, writer) {
+                    return;
+                }
+                continue;
+            }
+            record.commit_all();
+            let code = |number: u64| Code::ALL.get(number as usize).copied();
+            match kind {
+                LOST => writer.lost(tick),
+                STEP_FINISHED => code(third).into_iter().for_each(|code| {
+                    writer.command(tick, CommandRecord::StepFinished { code });
+                }),
+                // Numbers that this end has written are numbers of commands; only a value can be out of range.
+                _ => Command::of_number(third as u32, f64::from_bits(fourth)).into_iter().for_each(|command| {
+                    writer.command(tick, CommandRecord::Given { command, code: code(fifth) });
+                }),
+            }
+        }
+    }
+
+    /// Writes a frame of so many handles; false where the loop has not pushed all of it yet.
+    fn frame(&mut self, handles: usize, writer: &mut LogWriter<impl io::Write>) -> bool {
+        if self.queue.slots() < words_of(handles) {
+            return false;
+        }
+        let mut words = [0.0; FRAME_WORDS];
+        self.columns.resize(HANDLE_WORDS * handles, 0.0);
+        // All of them are there.
+        let _ = self.queue.pop_entire_slice(&mut words);
+        let _ = self.queue.pop_entire_slice(&mut self.columns);
+        let header: [u64; HEADER_WORDS] = std::array::from_fn(|k| words[FRAME_WORDS - HEADER_WORDS + k].to_bits());
+        writer.frame(&header, std::array::from_fn(|k| &self.columns[k * handles..(k + 1) * handles]));
+        true
+    }
+}

@@ -1,0 +1,63 @@
+//! The hash of frames: BLAKE3 over what is the same whenever the same show is played.
+//!
+//! A frame contributes the bytes of its message as subscribers get it: of [`FrameHeader`] `sequence` and `tick` (bytes 8
+//! to 23) and all from `sim_time` on (bytes 48 to 95), then every [`HandlePose`](bench_dragon_messages::HandlePose). What is left out is
+//! the run's: its number and its stamps.
+
+use bench_dragon_messages::FrameHeader;
+use bench_dragon_motion::solve::Chain;
+
+/// Words of eight bytes that a header contributes.
+pub(super) const HEADER_WORDS: usize = 8;
+/// Words of a handle.
+pub(super) const HANDLE_WORDS: usize = 5;
+
+/// What a header contributes, in the order of its bytes.
+pub(super) fn header_words(header: &FrameHeader) -> [u64; HEADER_WORDS] {
+    let FrameHeader { sequence, tick, sim_time, time_scale, min_clearance, .. } = *header;
+    let FrameHeader { handles, state, playback, cue, epoch, reserved, .. } = *header;
+    let pair = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
+    [
+        sequence,
+        tick,
+        sim_time.to_bits(),
+        time_scale.to_bits(),
+        min_clearance.to_bits(),
+        pair(handles, state),
+        pair(playback, cue),
+        pair(epoch, reserved),
+    ]
+}
+
+/// The arrays of a chain that its poses are made of, in the order of a pose's fields.
+pub(super) fn columns(chain: &Chain) -> [&[f64]; HANDLE_WORDS] {
+    [&chain.x, &chain.y, &chain.heading, &chain.vx, &chain.vy]
+}
+
+/// The hash of some frames.
+#[derive(Default)]
+pub(super) struct FrameHasher {
+    hasher: blake3::Hasher,
+    bytes: Vec<u8>,
+}
+
+impl FrameHasher {
+    /// Adds a frame: what its header contributes, and its [`columns`].
+    pub fn frame(&mut self, header: &[u64; HEADER_WORDS], columns: [&[f64]; HANDLE_WORDS]) {
+        self.bytes.clear();
+        self.bytes.extend(header.iter().flat_map(|word| word.to_le_bytes()));
+        let [x, y, heading, vx, vy] = columns;
+        let poses = x.iter().zip(y).zip(heading).zip(vx.iter().zip(vy));
+        for (((x, y), heading), (vx, vy)) in poses {
+            [x, y, heading, vx, vy].iter().for_each(|number| self.bytes.extend(number.to_bits().to_le_bytes()));
+        }
+        self.hasher.update(&self.bytes);
+    }
+
+    /// The hash in hexadecimal digits, after which the next begins.
+    pub fn take(&mut self) -> String {
+        let hash = self.hasher.finalize().to_hex().to_string();
+        self.hasher.reset();
+        hash
+    }
+}

@@ -1,0 +1,263 @@
+//! The lines of a log: JSON objects, each with a check over all bytes before it.
+//!
+//! [`Seal`] makes and tests the checks. A line whose check does not fit was not written so: it is damage or forgery and is
+//! reported by its number, before anything is computed.
+
+use serde::{Deserialize, Serialize};
+
+use super::arithmetic::Arithmetic;
+use crate::live::End;
+use bench_dragon_messages::control::{Code, Command, CommandRecord};
+use bench_dragon_show::Playback;
+use bench_dragon_show::scene::{AtEnd, OnContact, SceneText};
+
+/// The version of this format.
+pub const FORMAT: u32 = 2;
+
+/// What stands before a line's check, and after it.
+const CHECK: &str = ",\"check\":\"";
+const CHECK_DIGITS: usize = 16;
+const CHECK_END: &str = "\"}";
+
+/// A line, but for its check. Lines stand in the order of ticks.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum Line {
+    /// The first line: all that determines the frames but the commands and the skipped periods.
+    Show(Box<ShowLine>),
+    /// A command, obeyed or refused at the beginning of a period.
+    Command {
+        /// The period.
+        tick: u64,
+        /// Its name.
+        command: String,
+        /// Its value, where it has one that is a number.
+        value: Option<f64>,
+        /// What became of it, by name; `None` for a step that has begun.
+        code: Option<String>,
+    },
+    /// A step was over, or was broken off, in this period.
+    StepFinished {
+        /// The period.
+        tick: u64,
+        /// How it ended, by name.
+        code: String,
+    },
+    /// Periods that had passed before their frame could be begun: they have none.
+    Skipped {
+        /// The first.
+        from: u64,
+        /// The last.
+        to: u64,
+    },
+    /// Frames that were published and are in no hash, since the log was behind.
+    Lost {
+        /// The tick of the first.
+        from: u64,
+        /// The tick of the last.
+        to: u64,
+    },
+    /// A second of the loop: the ticks whose `floor(tick / rate)` is its number.
+    Second(SecondLine),
+    /// The log was behind by so much that it gave up; the show went on.
+    Stopped {
+        /// The first tick that it has not seen.
+        tick: u64,
+    },
+    /// The last line of a run whose end the log has seen.
+    End {
+        /// Frames in the hashes.
+        frames: u64,
+        /// Periods skipped.
+        skipped: u64,
+        /// Frames in no hash.
+        lost: u64,
+        /// Why the run ended. After an error the frame of its period may have been published and is not here.
+        reason: End,
+    },
+}
+
+/// The show.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShowLine {
+    /// [`FORMAT`].
+    pub format: u32,
+    /// The program's version.
+    pub version: String,
+    /// What the frames were computed with.
+    pub arithmetic: Arithmetic,
+    /// The solver and why it was chosen, for people.
+    pub solver: String,
+    /// The run's number, as text.
+    pub run_id: String,
+    /// CLOCK_REALTIME in nanoseconds when the log was begun, as text: for people.
+    pub stamp_ns: String,
+    /// Frames per second.
+    pub rate: f64,
+    /// Simulated seconds at which the show begins.
+    pub start: f64,
+    /// Simulated seconds per second of wall time.
+    pub time_scale: f64,
+    /// `stop` or `continue`.
+    pub on_contact: String,
+    /// `hold` or `loop`.
+    pub at_end: String,
+    /// Seconds of wall time for which a looping show stands at its end.
+    pub end_hold: f64,
+    /// Whether the show waits at its start.
+    pub paused: bool,
+    /// How errors called the scene's file.
+    pub scene_file: String,
+    /// The scene's name where its text gives none.
+    pub scene_stem: String,
+    /// The scene as it was written, TOML.
+    pub scene: String,
+}
+
+/// The hash of a second.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SecondLine {
+    /// Its number, from 0.
+    pub second: u64,
+    /// The tick of the first frame in the hash.
+    pub from: u64,
+    /// The tick of the last.
+    pub to: u64,
+    /// Frames in the hash.
+    pub frames: u64,
+    /// BLAKE3 over them.
+    pub hash: String,
+    /// Simulated seconds of the last.
+    pub sim_time: f64,
+    /// Some of its handles: number, x, y.
+    pub handles: Vec<(u32, f64, f64)>,
+}
+
+impl ShowLine {
+    /// The show of a scene.
+    pub fn new(scene: &SceneText, playback: &Playback, arithmetic: Arithmetic, solver: &str, run: (u64, u64)) -> Self {
+        let Playback { start, time_scale, rate, on_contact, at_end, end_hold, paused } = *playback;
+        let on_contact = if on_contact == OnContact::Stop { "stop" } else { "continue" };
+        let at_end = if at_end == AtEnd::Hold { "hold" } else { "loop" };
+        Self {
+            format: FORMAT,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            arithmetic,
+            solver: solver.to_owned(),
+            run_id: run.0.to_string(),
+            stamp_ns: run.1.to_string(),
+            rate,
+            start,
+            time_scale,
+            on_contact: on_contact.to_owned(),
+            at_end: at_end.to_owned(),
+            end_hold,
+            paused,
+            scene_file: scene.file.clone(),
+            scene_stem: scene.stem.clone(),
+            scene: scene.text.clone(),
+        }
+    }
+
+    /// How the scene was played; `None` for words that this program does not know.
+    pub fn playback(&self) -> Option<Playback> {
+        let on_contact = match self.on_contact.as_str() {
+            "stop" => OnContact::Stop,
+            "continue" => OnContact::Continue,
+            _ => return None,
+        };
+        let at_end = match self.at_end.as_str() {
+            "hold" => AtEnd::Hold,
+            "loop" => AtEnd::Loop,
+            _ => return None,
+        };
+        let Self { start, time_scale, rate, end_hold, paused, .. } = *self;
+        Some(Playback { start, time_scale, rate, on_contact, at_end, end_hold, paused })
+    }
+
+    /// The scene as it was written.
+    pub fn scene_text(&self, file: &str) -> SceneText {
+        let file = format!("{file}, line 1, the scene \"{}\"", self.scene_file);
+        SceneText { text: self.scene.clone(), file, stem: self.scene_stem.clone() }
+    }
+}
+
+impl Line {
+    /// The line of a command, or of the end of a step.
+    pub fn of(tick: u64, record: CommandRecord) -> Self {
+        match record {
+            CommandRecord::Given { command, code } => {
+                let (number, value) = command.number_and_value();
+                let has_value = matches!(command, Command::Rate(_) | Command::Seek(_) | Command::Step(_));
+                let command = Command::NAMES[number as usize].to_owned();
+                let value = (has_value && value.is_finite()).then_some(value);
+                Self::Command { tick, command, value, code: code.map(|code| code.name().to_owned()) }
+            }
+            CommandRecord::StepFinished { code } => Self::StepFinished { tick, code: code.name().to_owned() },
+        }
+    }
+}
+
+/// The command of a name and a value; `None` for one that no log has.
+pub(super) fn command_of(name: &str, value: Option<f64>) -> Option<Command> {
+    let number = Command::NAMES.iter().position(|known| *known == name)? as u32;
+    // A value that is not a number stands as null.
+    Command::of_number(number, value.unwrap_or(f64::NAN)).ok()
+}
+
+/// The code of a name.
+pub(super) fn code_of(name: &str) -> Option<Code> {
+    Code::ALL.into_iter().find(|code| code.name() == name)
+}
+
+/// The checks of a file, line by line.
+#[derive(Default)]
+pub struct Seal {
+    hasher: blake3::Hasher,
+}
+
+impl Seal {
+    /// The text of a line, its check and its end included.
+    pub fn line(&mut self, line: &Line) -> String {
+        // Structs of numbers and text: serde_json has no reason to refuse one.
+        let mut text = serde_json::to_string(line).unwrap_or_default();
+        text.pop();
+        let check = self.check(&text);
+        text.push_str(&check);
+        text
+    }
+
+    /// Reads a line that ends with a newline.
+    ///
+    /// # Errors
+    /// What is wrong with it, without its place.
+    pub fn read(&mut self, text: &str) -> Result<Line, String> {
+        let length = CHECK.len() + CHECK_DIGITS + CHECK_END.len() + 1;
+        let body = text.len().checked_sub(length).and_then(|at| text.split_at_checked(at));
+        let sealed = body.filter(|(_, check)| check.starts_with(CHECK) && check.ends_with("\"}\n"));
+        let Some((body, check)) = sealed else {
+            return Err("it does not end in a check, expected a line of a log".to_owned());
+        };
+        let expected = self.check(body);
+        if check != expected {
+            let digits = |check: &str| check[CHECK.len()..CHECK.len() + CHECK_DIGITS].to_owned();
+            return Err(format!(
+                "its check is {}, expected {}: it, or a line before it, is not as it was written",
+                digits(check),
+                digits(&expected)
+            ));
+        }
+        serde_json::from_str(&format!("{body}}}")).map_err(|error| format!("{error}, expected a line of a log"))
+    }
+
+    /// The end of a line that begins with `body`: BLAKE3 over all bytes of the file before the check.
+    fn check(&mut self, body: &str) -> String {
+        self.hasher.update(body.as_bytes());
+        let hash = self.hasher.finalize().to_hex();
+        let end = format!("{CHECK}{}{CHECK_END}\n", &hash[..CHECK_DIGITS]);
+        self.hasher.update(end.as_bytes());
+        end
+    }
+}

@@ -1,0 +1,210 @@
+//! `verify`: plays the show of a log again, tick by tick, and compares.
+//!
+//! In: the lines of a log. Out: a [`Verdict`], or a [`VerifyError`] that names the line. The show is computed by the code
+//! that `run` uses, with the instructions that the log names. Where this machine lacks those, or its elementary functions
+//! round differently, other bits prove nothing: there the handles in the line of each second are compared with what a
+//! second solver, `newton`, has for that moment.
+
+mod player;
+
+use std::io::{BufRead, Read};
+
+use serde::Serialize;
+
+use super::lines::{FORMAT, Line, Seal, ShowLine};
+use bench_dragon_motion::Method;
+use bench_dragon_motion::solve::table::Instructions;
+use bench_dragon_show::scene::{Accepted, Scene, printable};
+use player::Player;
+
+/// Why there is no verdict.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// The file is no log, or is damaged.
+    #[error("line {line}: {}", printable(.problem))]
+    Line {
+        /// The line, from 1.
+        line: u64,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// The scene in its first line cannot be read.
+    #[error("{0}")]
+    Scene(String),
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] std::io::Error),
+}
+
+/// What `verify` found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Verdict {
+    /// `same`: every bit. `close`: on a machine with another arithmetic, every place within the tolerance. `differs`.
+    /// `nothing`: the log has no second that could be compared.
+    pub verdict: &'static str,
+    /// The first difference.
+    pub difference: Option<Difference>,
+    /// Seconds whose hash was compared.
+    pub seconds: u64,
+    /// Of these, those with the same hash.
+    pub same_seconds: u64,
+    /// Frames in them.
+    pub frames: u64,
+    /// Commands obeyed or refused in them.
+    pub commands: u64,
+    /// Periods skipped.
+    pub skipped: u64,
+    /// Frames that the log has lost.
+    pub lost: u64,
+    /// The last tick that is proved; `None` where none is.
+    pub last_tick: Option<u64>,
+    /// Whether the log has its last line.
+    pub complete: bool,
+    /// Whether the last line is cut.
+    pub cut: bool,
+    /// The version of the program that wrote it.
+    pub version: String,
+    /// The instructions that its frames were computed with.
+    pub instructions: String,
+    /// Whether this machine computes the same bits.
+    pub same_arithmetic: bool,
+    /// Metres: how far sampled handles are from the second solver's, at most; `None` where bits decided.
+    pub max_difference: Option<f64>,
+    /// Metres: what that may be.
+    pub tolerance: Option<f64>,
+}
+
+/// The first difference between a log and its show.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Difference {
+    /// The line, from 1.
+    pub line: u64,
+    /// The second, from 0.
+    pub second: u64,
+    /// The first tick concerned.
+    pub from: u64,
+    /// The last tick concerned.
+    pub to: u64,
+    /// What differs, in words.
+    pub what: String,
+}
+
+/// Bytes of the longest line that is read: the scene in the first one is text that a person or a program wrote.
+const LONGEST_LINE: u64 = 1 << 26;
+
+/// Plays a log again.
+///
+/// `file` is how errors call it. `progress` is called with the bytes read so far.
+///
+/// # Errors
+/// [`VerifyError`]
+pub fn verify(log: impl BufRead, file: &str, progress: &mut dyn FnMut(u64)) -> Result<Verdict, VerifyError> {
+    let mut lines = Lines { log, seal: Seal::default(), number: 0, bytes: 0, cut: false };
+    let show = match lines.next()? {
+        Some(Line::Show(show)) => *show,
+        Some(_) => return Err(lines.error("expected the line of the show, {\"type\":\"show\",...}")),
+        None if lines.cut => return Err(lines.error("it is cut, expected the line of the show")),
+        None => return Err(VerifyError::Line { line: 1, problem: "the file is empty, expected a log".to_owned() }),
+    };
+    let mut player = player(&show, file, &lines)?;
+    let (mut complete, mut ended) = (false, false);
+    while player.difference().is_none() {
+        let Some(line) = lines.next()? else {
+            if ended && lines.cut {
+                return Err(lines.error("it stands behind the end of the log"));
+            }
+            break;
+        };
+        if ended {
+            return Err(lines.error("it stands behind the end of the log"));
+        }
+        match line {
+            Line::Show(_) => return Err(lines.error("a second show, expected one a log")),
+            Line::End { .. } | Line::Stopped { .. } => (complete, ended) = (matches!(line, Line::End { .. }), true),
+            _ => {}
+        }
+        player.line(lines.number, &line).map_err(|problem| lines.error(&problem))?;
+        progress(lines.bytes);
+    }
+    Ok(player.verdict(&show, complete, lines.cut))
+}
+
+/// The player of a show.
+fn player<R>(show: &ShowLine, file: &str, lines: &Lines<R>) -> Result<Player, VerifyError> {
+    if show.format != FORMAT {
+        return Err(lines.error(&format!("the format is {}, expected {FORMAT}", show.format)));
+    }
+    let scene = show.scene_text(file).parse().map_err(|error| VerifyError::Scene(error.to_string()))?;
+    let playback = show.playback().ok_or_else(|| {
+        lines.error("on_contact and at_end are not understood, expected \"stop\" or \"continue\", \"hold\" or \"loop\"")
+    })?;
+    let numbers = [
+        (Accepted::RATE, "rate", playback.rate),
+        (Accepted::TIME_SCALE, "time_scale", playback.time_scale),
+        (Accepted::END_HOLD, "end_hold", playback.end_hold),
+    ];
+    for (accepted, name, value) in numbers {
+        accepted.check(name, value).map_err(|sentence| lines.error(&sentence))?;
+    }
+    let instructions = Instructions::of_name(&show.arithmetic.instructions).filter(|set| set.is_available());
+    let motion = match instructions {
+        Some(instructions) => scene.motion.clone().with_instructions(instructions),
+        None => None,
+    };
+    let scene = Scene { motion: motion.unwrap_or_else(|| scene.motion.clone()), ..scene };
+    let player = Player::new(&scene, playback, show.arithmetic.is_available());
+    player.map_err(|error| lines.error(&error.to_string()))
+}
+
+/// Metres that two exact solutions of a scene may be apart at a place, besides their rounding.
+fn accuracy_of(scene: &Scene) -> f64 {
+    /// What `verify` takes for equal at best.
+    const LEAST: f64 = 1e-12;
+    /// The paper's rules are compared with themselves: their bisection leaves so much to rounding.
+    const PAPER: f64 = 1e-9;
+    match scene.motion.method() {
+        Method::Accuracy(accuracy) => accuracy.max(LEAST),
+        Method::Paper(_) => PAPER,
+        Method::Newton | Method::FollowerTable => LEAST,
+    }
+}
+
+/// The lines of a file.
+struct Lines<R> {
+    log: R,
+    seal: Seal,
+    /// The latest line, from 1.
+    number: u64,
+    bytes: u64,
+    cut: bool,
+}
+
+impl<R> Lines<R> {
+    fn error(&self, problem: &str) -> VerifyError {
+        VerifyError::Line { line: self.number, problem: problem.to_owned() }
+    }
+}
+
+impl<R: BufRead> Lines<R> {
+    /// The next line; `None` at the end, and where the last line is cut.
+    fn next(&mut self) -> Result<Option<Line>, VerifyError> {
+        let mut bytes = Vec::new();
+        let read = (&mut self.log).take(LONGEST_LINE).read_until(b'\n', &mut bytes)?;
+        if read == 0 {
+            return Ok(None);
+        }
+        self.number += 1;
+        self.bytes += read as u64;
+        if bytes.last() != Some(&b'\n') && read as u64 == LONGEST_LINE {
+            return Err(self.error(&format!("it is longer than {LONGEST_LINE} bytes, expected a line of a log")));
+        }
+        if bytes.last() != Some(&b'\n') {
+            self.cut = true;
+            return Ok(None);
+        }
+        let text =
+            std::str::from_utf8(&bytes).map_err(|_| self.error("it is not UTF-8 text, expected a line of a log"))?;
+        let line = self.seal.read(text).map_err(|problem| self.error(&problem))?;
+        Ok(Some(line))
+    }
+}

@@ -1,0 +1,442 @@
+//! Plays a show from the lines of its log, in the order of ticks, and compares as it goes.
+
+use super::super::hash::{FrameHasher, columns, header_words};
+use super::super::lines::{Line, SecondLine, ShowLine, code_of, command_of};
+use super::super::writer::{sampled, second_of};
+use super::{Difference, Verdict, accuracy_of};
+use bench_dragon_motion::solve::{Chain, Solver, Velocities};
+use bench_dragon_motion::{Method, Motion};
+use bench_dragon_show::convert::{Stamps, frame_header};
+use bench_dragon_show::scene::Scene;
+use bench_dragon_show::{Frame, Playback, Show, StartError, solve_at_or_just_before};
+
+/// A show that follows a log.
+pub(super) struct Player {
+    show: Show,
+    rate: f64,
+    same_arithmetic: bool,
+    reference: Reference,
+    /// The next tick.
+    tick: u64,
+    sequence: u64,
+    /// What the log has of the commands before the frame of `tick`.
+    announced: Vec<Line>,
+    /// The line of the latest command.
+    command_line: u64,
+    hasher: FrameHasher,
+    /// The frames since the latest hash: the first tick, and their number.
+    hashed: Option<(u64, u64)>,
+    latest: Sample,
+    difference: Option<Difference>,
+    counts: Counts,
+    /// Of the counts, what no hash has been compared with yet.
+    uncompared: Counts,
+}
+
+/// The latest frame, as far as the line of a second has it.
+#[derive(Default)]
+struct Sample {
+    tick: u64,
+    sim_time: f64,
+    handles: Vec<(u32, f64, f64)>,
+}
+
+#[derive(Default)]
+struct Counts {
+    seconds: u64,
+    same_seconds: u64,
+    frames: u64,
+    commands: u64,
+    skipped: u64,
+    lost: u64,
+    last_tick: Option<u64>,
+}
+
+/// Seconds that the times of events, at which a show freezes or pauses and from which it goes on, may be apart between two
+/// arithmetics.
+const EVENT_TIME: f64 = 1e-9;
+/// How much an error of a place can grow along the chain, at most. It grows as handles are faster than those before them,
+/// without bound at a lock; there the error is about the root of the rounding, which is so many times the rounding.
+const MOST_GROWTH: f64 = 1e6;
+
+/// The second solver, for a machine whose bits are others.
+struct Reference {
+    solver: Box<dyn Solver>,
+    chain: Chain,
+    head_speed: f64,
+    accuracy: f64,
+    /// Metres: the greatest distance seen, and what was allowed there.
+    worst: Option<(f64, f64)>,
+}
+
+impl Player {
+    /// The player of a scene.
+    pub fn new(scene: &Scene, playback: Playback, same_arithmetic: bool) -> Result<Self, StartError> {
+        let motion = &scene.motion;
+        let timeline = match scene.alerts {
+            Some(_) => motion.timeline(&mut |_| ()),
+            None => motion.timeline_without_contact(),
+        };
+        let show = Show::new(scene, timeline, playback)?;
+        let other = match motion.method() {
+            Method::Paper(_) => motion.clone(),
+            _ => motion.with_method(Method::Newton).unwrap_or_else(|_| motion.clone()),
+        };
+        let reference = Reference::new(&other, accuracy_of(scene));
+        Ok(Self {
+            show,
+            rate: playback.rate,
+            same_arithmetic,
+            reference,
+            tick: 0,
+            sequence: 0,
+            announced: Vec::new(),
+            command_line: 0,
+            hasher: FrameHasher::default(),
+            hashed: None,
+            latest: Sample::default(),
+            difference: None,
+            counts: Counts::default(),
+            uncompared: Counts::default(),
+        })
+    }
+
+    /// The first difference so far.
+    pub fn difference(&self) -> Option<&Difference> {
+        self.difference.as_ref()
+    }
+
+    /// Follows a line.
+    ///
+    /// # Errors
+    /// What is wrong with a line that no run can have written.
+    pub fn line(&mut self, number: u64, line: &Line) -> Result<(), String> {
+        match line {
+            Line::Command { tick, command, value, code } => {
+                self.play_until(number, *tick)?;
+                let known = code.as_deref().is_none_or(|code| code_of(code).is_some());
+                let Some(command) = command_of(command, *value).filter(|_| known) else {
+                    return Err("the command is not understood, expected one of those of docs/conducting.md".to_owned());
+                };
+                self.counts.commands += 1;
+                self.uncompared.commands += 1;
+                self.announce(number, line);
+                self.show.command(*tick, command);
+                self.show.finished_step(*tick);
+            }
+            Line::StepFinished { tick, .. } => {
+                self.play_until(number, *tick)?;
+                self.announce(number, line);
+            }
+            Line::Skipped { from, to } => {
+                self.play_until(number, *from)?;
+                self.counts.skipped += self.range(*from, *to)?;
+                self.skip_to(number, to + 1)?;
+            }
+            Line::Lost { from, to } => {
+                self.play_until(number, *from)?;
+                if second_of(*from, self.rate) != second_of(*to, self.rate) {
+                    return Err(format!("ticks {from} to {to} are of several seconds, expected a line for each"));
+                }
+                self.counts.lost += self.range(*from, *to)?;
+                while self.tick <= *to && self.difference.is_none() {
+                    self.play(number, false);
+                }
+            }
+            Line::Second(second) => self.second(number, second)?,
+            Line::End { frames, skipped, lost, .. } => {
+                if !self.announced.is_empty() {
+                    let tick = self.tick;
+                    return Err(format!("the commands of tick {tick} in line {} have no frame", self.command_line));
+                }
+                if let Some((from, _)) = self.hashed {
+                    return Err(format!("the frames from tick {from} on have no hash"));
+                }
+                let Counts { frames: played, skipped: passed, lost: missing, .. } = self.counts;
+                if (*frames, *skipped, *lost) != (played, passed, missing) {
+                    return Err(format!(
+                        "{frames} frames, {skipped} periods skipped, {lost} frames lost, expected {played}, {passed}, \
+                         {missing} from the lines before"
+                    ));
+                }
+            }
+            Line::Show(_) | Line::Stopped { .. } => {}
+        }
+        Ok(())
+    }
+
+    /// What was found.
+    pub fn verdict(self, show: &ShowLine, complete: bool, cut: bool) -> Verdict {
+        let Counts { seconds, same_seconds, skipped, lost, last_tick, .. } = self.counts;
+        let frames = self.counts.frames - self.uncompared.frames;
+        let commands = self.counts.commands - self.uncompared.commands;
+        let verdict = match &self.difference {
+            Some(_) => "differs",
+            None if seconds == 0 => "nothing",
+            None if same_seconds == seconds => "same",
+            None => "close",
+        };
+        Verdict {
+            verdict,
+            difference: self.difference,
+            seconds,
+            same_seconds,
+            frames,
+            commands,
+            skipped,
+            lost,
+            last_tick,
+            complete,
+            cut,
+            version: show.version.clone(),
+            instructions: show.arithmetic.instructions.clone(),
+            same_arithmetic: self.same_arithmetic,
+            max_difference: self.reference.worst.map(|(metres, _)| metres),
+            tolerance: self.reference.worst.map(|(_, tolerance)| tolerance),
+        }
+    }
+
+    /// Ticks in a range of a line that begins at the next tick.
+    fn range(&self, from: u64, to: u64) -> Result<u64, String> {
+        if from != self.tick || to < from || to == u64::MAX {
+            return Err(format!("ticks {from} to {to} are out of order, expected to begin at tick {}", self.tick));
+        }
+        Ok(to - from + 1)
+    }
+
+    fn announce(&mut self, number: u64, line: &Line) {
+        self.announced.push(line.clone());
+        self.command_line = number;
+    }
+
+    /// Plays the frames before a tick.
+    fn play_until(&mut self, number: u64, tick: u64) -> Result<(), String> {
+        if tick < self.tick {
+            return Err(format!("tick {tick} is out of order, expected {} or a later one", self.tick));
+        }
+        // Frames of two seconds have the line of the first between them; this also bounds what a wrong digit costs.
+        if tick > self.tick && second_of(tick - 1, self.rate) != second_of(self.tick, self.rate) {
+            return Err(format!(
+                "ticks {} to {} are of several seconds without their hash, expected the line of second {}",
+                self.tick,
+                tick - 1,
+                second_of(self.tick, self.rate)
+            ));
+        }
+        while self.tick < tick && self.difference.is_none() {
+            self.play(number, true);
+        }
+        Ok(())
+    }
+
+    /// Leaves periods out, before which all commands have had their frame.
+    fn skip_to(&mut self, number: u64, tick: u64) -> Result<(), String> {
+        if !self.announced.is_empty() {
+            return Err(format!("the period {} is skipped, expected its frame after line {number}", self.tick));
+        }
+        self.tick = tick;
+        Ok(())
+    }
+
+    /// Plays the frame of the next tick.
+    fn play(&mut self, number: u64, hashed: bool) {
+        let tick = self.tick;
+        let stamps = Stamps { run_id: 0, sequence: self.sequence, stamp_ns: 0, deadline_ns: 0 };
+        let frame = self.show.frame(tick);
+        let commands: Vec<Line> = frame.commands.iter().map(|record| Line::of(tick, *record)).collect();
+        if hashed {
+            self.hasher.frame(&header_words(&frame_header(frame, stamps)), columns(&frame.chain));
+            self.latest.note(frame);
+            self.hashed = Some(self.hashed.map_or((tick, 1), |(from, frames)| (from, frames + 1)));
+            self.counts.frames += 1;
+            self.uncompared.frames += 1;
+        }
+        self.show.finished_step(tick);
+        (self.tick, self.sequence) = (tick + 1, self.sequence + 1);
+        if commands != self.announced {
+            let line = if self.announced.is_empty() { number } else { self.command_line };
+            let what = format!("commands: the log has {}, computed {}", listed(&self.announced), listed(&commands));
+            self.differ(line, (tick, tick), what);
+        }
+        self.announced.clear();
+    }
+
+    fn second(&mut self, number: u64, line: &SecondLine) -> Result<(), String> {
+        let next = line.to.checked_add(1).ok_or("the tick is too large")?;
+        // Frames that were lost at the second's end have been played.
+        self.play_until(number, next.max(self.tick))?;
+        let Some((from, frames)) = self.hashed.take().filter(|_| self.difference.is_none()) else {
+            return if self.difference.is_some() { Ok(()) } else { Err("there is no frame for its hash".to_owned()) };
+        };
+        let (second, to) = (second_of(from, self.rate), self.latest.tick);
+        if (line.second, line.from, line.to, line.frames) != (second, from, to, frames) {
+            return Err(format!(
+                "second {} with {} frames of ticks {} to {}, expected second {second} with {frames} frames of ticks {from} \
+                 to {to}",
+                line.second, line.frames, line.from, line.to
+            ));
+        }
+        self.counts.seconds += 1;
+        // Commands of the tick that comes next have no frame yet.
+        let commands = self.announced.iter().filter(|line| matches!(line, Line::Command { .. })).count() as u64;
+        self.uncompared = Counts { commands, ..Counts::default() };
+        let (hash, sample) = (self.hasher.take(), &self.latest);
+        let (same_hash, same_sample) = (hash == line.hash, sample.is(line));
+        if same_hash && same_sample {
+            self.counts.same_seconds += 1;
+            self.counts.last_tick = Some(to);
+            return Ok(());
+        }
+        if !self.same_arithmetic {
+            match self.reference.compare(line, self.latest.sim_time) {
+                Ok(()) => self.counts.last_tick = Some(to),
+                Err(what) => self.differ(number, (from, to), what),
+            }
+            return Ok(());
+        }
+        let apart = sample.distance(line).map_or(String::new(), |metres| {
+            format!("; sampled handles of its last frame are up to {metres:.1e} m apart")
+        });
+        let what = match (same_hash, same_sample) {
+            (true, _) => format!("the handles in its line, not its hash{apart}"),
+            (_, true) => {
+                format!("hash {}, computed {hash}; the sampled handles of its last frame are the same", line.hash)
+            }
+            _ => format!("hash {}, computed {hash}{apart}", line.hash),
+        };
+        self.differ(number, (from, to), what);
+        Ok(())
+    }
+
+    fn differ(&mut self, line: u64, (from, to): (u64, u64), what: String) {
+        let second = second_of(from, self.rate);
+        self.difference.get_or_insert(Difference { line, second, from, to, what });
+    }
+}
+
+impl Sample {
+    fn note(&mut self, frame: &Frame) {
+        (self.tick, self.sim_time) = (frame.tick, frame.sim_time);
+        self.handles.clear();
+        let chain = &frame.chain;
+        let handles = sampled(chain.handles());
+        self.handles.extend(handles.map(|handle| (handle as u32, chain.x[handle], chain.y[handle])));
+    }
+
+    /// Whether a line has these very bits.
+    fn is(&self, line: &SecondLine) -> bool {
+        let bits = |(handle, x, y): &(u32, f64, f64)| (*handle, x.to_bits(), y.to_bits());
+        self.sim_time.to_bits() == line.sim_time.to_bits()
+            && self.handles.iter().map(bits).eq(line.handles.iter().map(bits))
+    }
+
+    /// Metres between the handles of a line and these, at most; `None` where they are others.
+    fn distance(&self, line: &SecondLine) -> Option<f64> {
+        let same_handles = self.handles.iter().map(|of| of.0).eq(line.handles.iter().map(|of| of.0));
+        let pairs = self.handles.iter().zip(&line.handles);
+        let most = pairs.map(|(a, b)| (a.1 - b.1).hypot(a.2 - b.2)).fold(0.0, f64::max);
+        same_handles.then_some(most)
+    }
+}
+
+impl Reference {
+    fn new(motion: &Motion, accuracy: f64) -> Self {
+        Self {
+            solver: motion.solver(Velocities::Computed).solver,
+            chain: Chain::new(motion.team().handles()),
+            head_speed: motion.head_speed(),
+            accuracy,
+            worst: None,
+        }
+    }
+
+    /// Compares the handles of a line, and its time, with those of the second solver, and of the show.
+    fn compare(&mut self, line: &SecondLine, shown: f64) -> Result<(), String> {
+        let time = line.sim_time;
+        let apart = (time - shown).abs();
+        if apart.is_nan() || apart > EVENT_TIME + self.accuracy / self.head_speed + 8.0 * f64::EPSILON * shown {
+            return Err(format!("its simulated time is {time} s, computed {shown} s"));
+        }
+        if line.handles.is_empty() || solve_at_or_just_before(self.solver.as_mut(), time, &mut self.chain).is_err() {
+            return Err(format!("there is no solution at its simulated time of {time} s"));
+        }
+        for (handle, x, y) in &line.handles {
+            let place = self.chain.x.get(*handle as usize).zip(self.chain.y.get(*handle as usize));
+            let metres = place.map_or(f64::INFINITY, |(own_x, own_y)| (x - own_x).hypot(y - own_y));
+            // Both solutions may be off by what doubles do not hold.
+            let rounding = 8.0 * f64::EPSILON * (x.hypot(*y) + self.head_speed * time);
+            let tolerance = self.accuracy + 2.0 * rounding * growth(&self.chain.speed, *handle as usize);
+            if metres.is_nan() || metres > tolerance {
+                let handle = handle + 1;
+                return Err(format!(
+                    "handle {handle}, counted from 1, is {metres:.1e} m from newton's place, more than {tolerance:.1e} m"
+                ));
+            }
+            if self.worst.is_none_or(|(worst, _)| metres > worst) {
+                self.worst = Some((metres, tolerance));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// By how much an error of a place before a handle can have grown there, from the speeds of the handles.
+fn growth(speeds: &[f64], handle: usize) -> f64 {
+    let least = speeds.iter().take(handle + 1).map(|speed| speed.abs()).fold(f64::INFINITY, f64::min);
+    let growth = speeds.get(handle).map_or(f64::NAN, |speed| speed.abs()) / least;
+    // Not a number where a handle stands still and so do those behind it.
+    if growth.is_nan() { MOST_GROWTH } else { growth.clamp(1.0, MOST_GROWTH) }
+}
+
+/// Commands in words.
+fn listed(lines: &[Line]) -> String {
+    let words = lines.iter().map(|line| match line {
+        Line::Command { command, value, code, .. } => {
+            let value = value.map_or(String::new(), |value| format!(" {value}"));
+            format!("{command}{value} ({})", code.as_deref().unwrap_or("begun"))
+        }
+        Line::StepFinished { code, .. } => format!("the end of a step ({code})"),
+        _ => String::new(),
+    });
+    let words: Vec<String> = words.collect();
+    if words.is_empty() { "none".to_owned() } else { words.join(", ") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Handles of a head that another arithmetic has rounded to the next place, up to the lock, where they run away from
+    /// every rounding.
+    #[test]
+    fn handles_of_another_rounding_are_close_up_to_the_lock() {
+        let text = include_str!("../../../../../config/paper.toml").replace("accuracy = ", "# ");
+        let text =
+            text.replace("[motion]\n", "[motion]\nsolver = \"newton\"\n").replace("benches = 223", "benches = 40");
+        let scene = Scene::parse(&text, "lock.toml", "lock").unwrap();
+        let motion = &scene.motion;
+        let lock = motion.timeline_without_contact().freeze(false).time;
+        let mut reference = Reference::new(motion, accuracy_of(&scene));
+        let mut solver = motion.solver(Velocities::Omitted).solver;
+        let mut chain = Chain::new(motion.team().handles());
+        let mut furthest: f64 = 0.0;
+        for before in [100.0, 1.0, 1e-3, 1e-6, 1e-9, 1e-10, 1e-11, 1e-12, 0.0] {
+            let time = lock - before;
+            let rounded = time - 8.0 * f64::EPSILON * time;
+            solve_at_or_just_before(solver.as_mut(), rounded, &mut chain).unwrap();
+            let line = |moved: f64| SecondLine {
+                second: 0,
+                from: 0,
+                to: 0,
+                frames: 1,
+                hash: String::new(),
+                sim_time: time,
+                handles: sampled(40).map(|handle| (handle as u32, chain.x[handle] + moved, chain.y[handle])).collect(),
+            };
+            assert_eq!(reference.compare(&line(0.0), time), Ok(()), "{before} s before the lock");
+            furthest = furthest.max(reference.worst.unwrap().0);
+            assert!(reference.compare(&line(1e-4), time).is_err(), "{before} s before the lock");
+        }
+        assert!(furthest > 1e-11, "the last moments are no harder than others: {furthest:.1e} m");
+    }
+}

@@ -1,0 +1,380 @@
+//! iceoryx2: frames, alerts, status and stage in shared memory, for any number of processes on this machine.
+//!
+//! [`SharedMemoryPublisher`] lives on the loop's thread, [`StatusSender`] on the statistics thread; both are made there,
+//! since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/alerts`, `/status`,
+//! `/stage`, the event service `<name>/tick` and, where a scene asks for it, `<name>/poses32`.
+//!
+//! One show has a name: the service of commands, `<name>/control`, admits one server, and that is opened first. iceoryx2
+//! knows by a lock of the operating system whether its process lives, so that one that was killed is in nobody's way and one
+//! that is stopped still has the name. The other services admit a second publisher: what joins this machine to others.
+
+mod control;
+mod frames;
+mod queues;
+
+use std::time::{Duration, Instant};
+
+use ::iceoryx2::port::SendError;
+use ::iceoryx2::port::notifier::Notifier;
+use ::iceoryx2::port::publisher::Publisher as Port;
+use ::iceoryx2::port::update_connections::UpdateConnections;
+use ::iceoryx2::prelude::*;
+use ::iceoryx2::service::builder::event::{EventOpenError, EventOpenOrCreateError};
+use ::iceoryx2::service::builder::publish_subscribe::{PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError};
+use ::iceoryx2::service::port_factory::{event, publish_subscribe};
+
+use bench_dragon_client::shared_memory::{
+    MOST_PUBLISHERS, OpenError, failed, incomplete, node, port_error, reserve_pages, service_error, service_name,
+    stale_files,
+};
+
+use super::{Transport, TransportConfig, TransportError};
+use crate::live::control::Door;
+use crate::live::{Deliveries, Outgoing, PublishError, Publisher, StatusPublisher};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, HandlePose32, LoopStatus, Stage};
+use bench_dragon_show::Frame;
+use bench_dragon_show::convert::{Decimation, handle_pose, handle_pose_32, handle_poses};
+use bench_dragon_show::scene::SinglePrecision;
+
+use frames::{FrameSender, FrameService};
+use queues::{check_room, default_queue};
+
+/// How often the stage, the latest alert and the latest cue are sent again while there is a tunnel: it hands on what is sent,
+/// to the machines that are there at that moment, and keeps nothing for those that come later.
+const REPEAT_INTERVAL: Duration = Duration::from_secs(1);
+/// Nodes that may have a service open at once beyond one a subscriber: the publisher's, and those that died and have
+/// not been cleaned up after yet.
+const SPARE_NODES: usize = 32;
+/// Alerts and statuses that a subscriber may fall behind.
+const SMALL_QUEUE: usize = 16;
+/// How long an incomplete service may stop a publisher; [`stale_files`] needs less to remove it.
+const PATIENCE: Duration = Duration::from_secs(6);
+
+/// What a publisher offers.
+#[derive(Debug, Clone)]
+pub struct PublisherConfig {
+    /// The name under which services appear.
+    pub name: String,
+    /// Handles in a frame.
+    pub handles: usize,
+    /// The service of poses in single precision, where there is one.
+    pub single_precision: Option<SinglePrecision>,
+    /// Frames a subscriber may fall behind.
+    pub queue: usize,
+    /// Subscribers that each service admits at once.
+    pub subscribers: usize,
+    /// Whether there is an alerts service.
+    pub alerts: bool,
+    /// The number of the scene's cues; with none there is no cues service.
+    pub cues: usize,
+    /// The stage, sent once and kept for late subscribers.
+    pub stage: Stage,
+}
+
+impl PublisherConfig {
+    /// Which handles the frames in single precision have, where there are any.
+    fn decimation(&self) -> Option<Decimation> {
+        self.single_precision.map(|SinglePrecision { every }| Decimation { handles: self.handles, every })
+    }
+}
+
+/// The services of a run.
+struct Iceoryx2 {
+    config: PublisherConfig,
+    control: Option<control::ControlThread>,
+}
+
+/// The services that the scene asks for, which every scene does; nothing is opened yet but a thread that removes
+/// [`stale_files`].
+///
+/// # Errors
+/// [`TransportError::BadInput`] for a name that iceoryx2 cannot take.
+pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError> {
+    let TransportConfig { name, handles, alerts, cues, single_precision, queue, subscribers, stage, .. } = *config;
+    service_name(name, "poses")?;
+    stale_files::spawn_reaper();
+    let mut config = PublisherConfig {
+        name: name.to_owned(),
+        handles,
+        single_precision,
+        queue: 0,
+        subscribers,
+        alerts,
+        cues,
+        stage,
+    };
+    config.queue = queue.unwrap_or_else(|| default_queue(&config));
+    Ok(Some(Box::new(Iceoryx2 { config, control: None })))
+}
+
+impl Transport for Iceoryx2 {
+    fn describe(&self) -> String {
+        let PublisherConfig { name, single_precision, queue, subscribers, alerts, cues, .. } = &self.config;
+        let single = single_precision.map_or(String::new(), |single| format!(", /poses32 ({single})"));
+        let alerts = if *alerts { ", /alerts" } else { "" };
+        let cues = if *cues > 0 { ", /cues" } else { "" };
+        format!(
+            "iceoryx2 services: {name}/poses{single}{alerts}{cues}, /status, /stage, /tick, /control (queues of {queue} \
+             frames for {subscribers} subscribers)."
+        )
+    }
+
+    fn publisher(&mut self) -> Result<Box<dyn Publisher>, TransportError> {
+        Ok(Box::new(SharedMemoryPublisher::open(&self.config)?))
+    }
+
+    fn status(&mut self) -> Result<Box<dyn StatusPublisher>, TransportError> {
+        Ok(Box::new(StatusSender::open(&self.config.name, self.config.subscribers)?))
+    }
+
+    fn control(&mut self, door: Door) -> Result<Option<Door>, TransportError> {
+        self.control = Some(control::ControlThread::start(&self.config.name, door)?);
+        Ok(None)
+    }
+
+    fn finish(self: Box<Self>) -> Option<(&'static str, Deliveries)> {
+        None
+    }
+}
+
+type Service<Payload, Header> = publish_subscribe::PortFactory<ipc::Service, Payload, Header>;
+type Sender<Payload, Header> = Port<ipc::Service, Payload, Header>;
+/// A port, and its service.
+type Opened<Message> = (Sender<Message, ()>, Service<Message, ()>);
+
+/// Publishes frames, alerts and the stage.
+pub struct SharedMemoryPublisher {
+    poses: FrameSender<HandlePose>,
+    poses_32: Option<(FrameSender<HandlePose32>, Decimation)>,
+    alerts: Option<Repeated<CollisionAlert>>,
+    cues: Option<Repeated<Cue>>,
+    stage: Repeated<Stage>,
+    tick: Notifier<ipc::Service>,
+    tick_service: event::PortFactory<ipc::Service>,
+    // Dropped last: the ports above belong to it.
+    _node: Node<ipc::Service>,
+}
+
+impl SharedMemoryPublisher {
+    /// Opens the services and sends the stage. To be called on the thread that will publish. Whoever calls it sees to it that
+    /// no other show has the name: within a run [`Transport::control`] does, which is called before.
+    ///
+    /// # Errors
+    /// [`OpenError`]: each names what is in the way and what to do.
+    pub fn open(config: &PublisherConfig) -> Result<Self, OpenError> {
+        retry_while_incomplete(|| Self::open_now(config))
+    }
+
+    fn open_now(config: &PublisherConfig) -> Result<Self, OpenError> {
+        let name = config.name.as_str();
+        service_name(name, "poses")?;
+        check_room(config)?;
+        let node = node()?;
+        let whole = FrameService { service: "poses", poses: config.handles, every: None };
+        let poses = FrameSender::open(&node, config, &whole)?;
+        let open_32 = |decimation: Decimation| {
+            let every = Some(decimation.every);
+            let described = FrameService { service: "poses32", poses: decimation.poses(), every };
+            Ok((FrameSender::open(&node, config, &described)?, decimation))
+        };
+        let poses_32 = config.decimation().map(open_32).transpose()?;
+        let open_alerts = || Repeated::open(&node, config, "alerts", SMALL_QUEUE);
+        let alerts = config.alerts.then(open_alerts).transpose()?;
+        // A large step reaches all of them in one frame; at a power of two most changes of a scene keep the service as it is.
+        let open_cues = || Repeated::open(&node, config, "cues", config.cues.next_power_of_two().max(SMALL_QUEUE));
+        let cues = (config.cues > 0).then(open_cues).transpose()?;
+        let mut stage = Repeated::open(&node, config, "stage", SMALL_QUEUE)?;
+        stage.send(config.stage).map_err(|error| failed(name, "stage", error))?;
+        let tick_service = node
+            .service_builder(&service_name(name, "tick")?)
+            .event()
+            .max_listeners(config.subscribers)
+            .max_nodes(config.subscribers + SPARE_NODES)
+            .open_or_create()
+            .map_err(|error| match error {
+                EventOpenOrCreateError::EventOpenError(EventOpenError::HangsInCreation) => incomplete(name, "tick"),
+                // A tunnel that listens to it was started first.
+                EventOpenOrCreateError::EventOpenError(
+                    EventOpenError::DoesNotSupportRequestedAmountOfNodes
+                    | EventOpenError::DoesNotSupportRequestedAmountOfListeners,
+                ) => OpenError::OtherLimits(format!("{name}/tick")),
+                other => failed(name, "tick", other),
+            })?;
+        let tick = tick_service.notifier_builder().create().map_err(|error| failed(name, "tick", error))?;
+        reserve_pages()?;
+        Ok(Self { poses, poses_32, alerts, cues, stage, tick, tick_service, _node: node })
+    }
+
+    fn send_frame(&self, header: &FrameHeader, frame: &Frame) -> Result<(), String> {
+        self.poses.send(header, handle_poses(&frame.chain))?;
+        match &self.poses_32 {
+            None => Ok(()),
+            Some((port, Decimation { every: 1, .. })) => {
+                port.send(header, handle_poses(&frame.chain).map(handle_pose_32))
+            }
+            Some((port, decimation)) => {
+                let pose = |index| handle_pose_32(handle_pose(&frame.chain, decimation.handle(index)));
+                port.send(header, (0..decimation.poses()).map(pose))
+            }
+        }
+    }
+
+    fn send_cues(&mut self, outgoing: Outgoing<'_>) -> Result<(), String> {
+        let Some(cues) = &mut self.cues else { return Ok(()) };
+        outgoing.cues().try_for_each(|cue| cues.send(cue)).map_err(|error| error.to_string())
+    }
+
+    fn send_alerts(&mut self, outgoing: Outgoing<'_>) -> Result<(), String> {
+        let Some(alerts) = &mut self.alerts else { return Ok(()) };
+        outgoing.alerts().try_for_each(|alert| alerts.send(alert)).map_err(|error| error.to_string())
+    }
+}
+
+impl Publisher for SharedMemoryPublisher {
+    fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
+        let sent = self.send_frame(outgoing.header, outgoing.frame).and_then(|()| self.send_alerts(outgoing));
+        let sent = sent.and_then(|()| self.send_cues(outgoing));
+        sent.map_err(|reason| PublishError(format!("the shared memory failed: {reason}")))?;
+        // Waking costs a socket write per listener, several times what sending does: it is left out for nobody.
+        if self.tick_service.dynamic_config().number_of_listeners() > 0 {
+            // A listener that died or does not drain is its own loss: the frame is in its queue.
+            let _ = self.tick.notify();
+        }
+        Ok(())
+    }
+
+    fn maintain(&mut self) {
+        // A late subscriber gets the history of a service only when its publisher looks for new connections.
+        if let Some(alerts) = &mut self.alerts {
+            alerts.maintain();
+        }
+        if let Some(cues) = &mut self.cues {
+            cues.maintain();
+        }
+        self.stage.maintain();
+        self.poses.update_connections();
+        if let Some((port, _)) = &self.poses_32 {
+            port.update_connections();
+        }
+    }
+
+    fn subscribers(&self) -> u32 {
+        self.poses.subscribers() + self.poses_32.as_ref().map_or(0, |(port, _)| port.subscribers())
+    }
+}
+
+/// Messages that hold until the next one: the latest is sent again and again while there is a tunnel.
+struct Repeated<Message: ZeroCopySend + std::fmt::Debug + Copy + 'static> {
+    latest: Option<Message>,
+    port: Sender<Message, ()>,
+    service: Service<Message, ()>,
+    sent: Instant,
+}
+
+impl<Message: ZeroCopySend + std::fmt::Debug + Copy + 'static> Repeated<Message> {
+    fn open(
+        node: &Node<ipc::Service>,
+        config: &PublisherConfig,
+        service: &str,
+        queue: usize,
+    ) -> Result<Self, OpenError> {
+        let (port, service) = sender(node, &config.name, service, config.subscribers, queue)?;
+        Ok(Self { latest: None, port, service, sent: Instant::now() })
+    }
+
+    fn send(&mut self, message: Message) -> Result<(), SendError> {
+        (self.latest, self.sent) = (Some(message), Instant::now());
+        self.port.send_copy(message).map(|_| ())
+    }
+
+    /// Lets late subscribers in, on this machine and on others.
+    fn maintain(&mut self) {
+        let _ = self.port.update_connections();
+        let has_tunnel = self.service.dynamic_config().number_of_publishers() > 1;
+        if let Some(latest) = self.latest.filter(|_| has_tunnel && self.sent.elapsed() >= REPEAT_INTERVAL) {
+            let _ = self.send(latest);
+        }
+    }
+}
+
+/// Publishes the loop's status; to be made on the statistics thread.
+pub struct StatusSender {
+    status: Sender<LoopStatus, ()>,
+    _node: Node<ipc::Service>,
+}
+
+impl StatusSender {
+    /// Opens `<name>/status`, which admits so many `subscribers` at once.
+    ///
+    /// # Errors
+    /// As [`SharedMemoryPublisher::open`].
+    pub fn open(name: &str, subscribers: usize) -> Result<Self, OpenError> {
+        retry_while_incomplete(|| {
+            let node = node()?;
+            let (status, _) = sender(&node, name, "status", subscribers, SMALL_QUEUE)?;
+            reserve_pages()?;
+            Ok(Self { status, _node: node })
+        })
+    }
+}
+
+impl StatusPublisher for StatusSender {
+    fn publish_status(&mut self, status: &LoopStatus) {
+        if let Err(error) = self.status.send_copy(*status) {
+            log::warn!("the status could not be sent: {error}");
+        }
+    }
+}
+
+/// A port for messages that are sent seldom, and its service; the last one is kept for late subscribers.
+fn sender<Message: ZeroCopySend + std::fmt::Debug + Copy>(
+    node: &Node<ipc::Service>,
+    name: &str,
+    service: &str,
+    subscribers: usize,
+    queue: usize,
+) -> Result<Opened<Message>, OpenError> {
+    let full_name = service_name(name, service)?;
+    let open = |queue| {
+        node.service_builder(&full_name)
+            .publish_subscribe::<Message>()
+            .max_publishers(MOST_PUBLISHERS)
+            .max_subscribers(subscribers)
+            .max_nodes(subscribers + SPARE_NODES)
+            .subscriber_max_buffer_size(queue)
+            .history_size(1)
+            .enable_safe_overflow(true)
+            .open_or_create()
+    };
+    let opened = match open(queue) {
+        // A subscriber of a scene with fewer cues keeps its service open.
+        Err(PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
+            PublishSubscribeOpenError::DoesNotSupportRequestedMinBufferSize,
+        )) if queue > SMALL_QUEUE => {
+            log::warn!("a subscriber keeps \"{full_name}\" open with shorter queues than {queue}: those are used");
+            open(SMALL_QUEUE)
+        }
+        made => made,
+    };
+    let opened = opened.map_err(|error| service_error(&full_name, error))?;
+    let port = opened
+        .publisher_builder()
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .create()
+        .map_err(|error| port_error(name, service, error))?;
+    Ok((port, opened))
+}
+
+/// Tries again while a service is incomplete: its maker is about to finish it, or was killed, and then its file is removed
+/// after a while ([`stale_files`]).
+fn retry_while_incomplete<Opened>(open: impl Fn() -> Result<Opened, OpenError>) -> Result<Opened, OpenError> {
+    let began = Instant::now();
+    loop {
+        match open() {
+            Err(OpenError::Incomplete(_)) if began.elapsed() < PATIENCE => {
+                std::thread::sleep(Duration::from_millis(100))
+            }
+            other => return other,
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! The door for commands over shared memory: the request-response service `<name>/control`, on a thread of its own.
+//!
+//! A client that is dead or floods the door costs the loop nothing: the thread takes requests, the loop takes one command
+//! a period from a queue of bounded length.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use ::iceoryx2::active_request::ActiveRequest;
+use ::iceoryx2::port::server::Server;
+use ::iceoryx2::prelude::*;
+use ::iceoryx2::service::builder::request_response::{
+    RequestResponseCreateError as Create, RequestResponseOpenError as Open,
+    RequestResponseOpenOrCreateError as OpenOrCreate,
+};
+use ::iceoryx2::service::port_factory::server::ServerCreateError;
+
+use super::{SPARE_NODES, node, retry_while_incomplete, service_name};
+use crate::live::control::{Answer, Door, MOST_WAITING};
+use bench_dragon_client::shared_memory::{OpenError, failed, incomplete};
+use bench_dragon_messages::control::{Code, Command};
+use bench_dragon_messages::state::PlaybackState;
+use bench_dragon_messages::{ControlRequest, ControlResponse};
+use bench_dragon_show::convert::control_response;
+
+/// Clients that the service admits at once.
+const MOST_CLIENTS: usize = 16;
+/// Requests of one client that may have no answer yet, so that one which floods the door leaves room for the others.
+const MOST_REQUESTS: usize = 8;
+/// How often requests are looked for, and answers while some are awaited: iceoryx2 has no wake-up for either.
+const POLL_INTERVAL: Duration = Duration::from_millis(2);
+const ANSWER_INTERVAL: Duration = Duration::from_micros(500);
+
+type Request = ActiveRequest<ipc::Service, ControlRequest, (), ControlResponse, ()>;
+
+/// A request that waits for the loop.
+struct Pending {
+    ticket: u64,
+    request: Request,
+    /// What to answer in place of the loop's code: the request itself could not be passed on.
+    instead: Option<Code>,
+}
+
+/// The thread. Dropping it ends it.
+pub(super) struct ControlThread {
+    stop: Arc<AtomicBool>,
+    handle: Option<JoinHandle<()>>,
+}
+
+impl ControlThread {
+    /// Opens `<name>/control` and serves it.
+    ///
+    /// # Errors
+    /// [`OpenError`]
+    pub(super) fn start(name: &str, door: Door) -> Result<Self, OpenError> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let (opened, opening) = mpsc::channel();
+        let thread = {
+            let (name, stop) = (name.to_owned(), Arc::clone(&stop));
+            move || match retry_while_incomplete(|| open(&name)) {
+                // The node is dropped last: the server belongs to it.
+                Ok((_node, server)) => {
+                    let _ = opened.send(Ok(()));
+                    serve(&server, door, &stop);
+                }
+                Err(error) => drop(opened.send(Err(error))),
+            }
+        };
+        let refused = |reason: String| OpenError::Failed { service: format!("{name}/control"), reason };
+        let spawned = std::thread::Builder::new().name("control".to_owned()).spawn(thread);
+        let handle = Some(spawned.map_err(|error| refused(error.to_string()))?);
+        let thread = Self { stop, handle };
+        opening.recv().unwrap_or_else(|_| Err(refused("its thread ended early".to_owned())))?;
+        Ok(thread)
+    }
+}
+
+impl Drop for ControlThread {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Release);
+        if let Some(handle) = self.handle.take() {
+            // A panic has been printed by then.
+            let _ = handle.join();
+        }
+    }
+}
+
+type Opened = (Node<ipc::Service>, Server<ipc::Service, ControlRequest, (), ControlResponse, ()>);
+
+fn open(name: &str) -> Result<Opened, OpenError> {
+    let node = node()?;
+    let service = node
+        .service_builder(&service_name(name, "control")?)
+        .request_response::<ControlRequest, ControlResponse>()
+        // This is what keeps a second show from the name.
+        .max_servers(1)
+        .max_clients(MOST_CLIENTS)
+        .max_nodes(MOST_CLIENTS + SPARE_NODES)
+        .max_active_requests_per_client(MOST_REQUESTS)
+        .open_or_create()
+        .map_err(|error| match error {
+            // A show that was killed while it made this.
+            OpenOrCreate::RequestResponseOpenError(Open::HangsInCreation)
+            | OpenOrCreate::RequestResponseCreateError(Create::HangsInCreation) => incomplete(name, "control"),
+            other => failed(name, "control", other),
+        })?;
+    let server = service
+        .server_builder()
+        // A dead client must not stop the others.
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .create()
+        .map_err(|error| match error {
+            ServerCreateError::ExceedsMaxSupportedServers => OpenError::AlreadyPublished(name.to_owned()),
+            other => failed(name, "control", other),
+        })?;
+    Ok((node, server))
+}
+
+fn serve(server: &Server<ipc::Service, ControlRequest, (), ControlResponse, ()>, mut door: Door, stop: &AtomicBool) {
+    let mut pending: Vec<Pending> = Vec::with_capacity(MOST_WAITING);
+    while !stop.load(Ordering::Acquire) {
+        // Bounded, so that a client which floods the door does not keep answers back.
+        for _ in 0..MOST_WAITING {
+            let Ok(Some(request)) = server.receive() else { break };
+            let of_client = pending.iter().filter(|waiting| waiting.request.origin() == request.origin()).count();
+            if of_client < MOST_REQUESTS {
+                pending.extend(pass_on(&mut door, request));
+            } else {
+                refuse(&request, Code::TooMany);
+            }
+        }
+        while let Some(Answer { ticket, outcome }) = door.answer() {
+            let Some(index) = pending.iter().position(|waiting| waiting.ticket == ticket) else { continue };
+            let Pending { request, instead, .. } = pending.swap_remove(index);
+            let code = match instead {
+                // While held every command but three is refused, whatever its value.
+                Some(Code::OutOfRange) if outcome.playback == PlaybackState::Held => Code::Refused,
+                instead => instead.unwrap_or(outcome.code),
+            };
+            let outcome = bench_dragon_show::Outcome { code, ..outcome };
+            // A client that has gone needs no answer.
+            let _ = request.send_copy(control_response(request.payload().id, &outcome));
+        }
+        std::thread::sleep(if door.waiting() == 0 { POLL_INTERVAL } else { ANSWER_INTERVAL });
+    }
+}
+
+/// Passes a request on to the loop. One that cannot be understood is answered with how the show stands.
+fn pass_on(door: &mut Door, request: Request) -> Option<Pending> {
+    let ControlRequest { value, command, .. } = *request.payload();
+    let (command, instead) = match Command::of_number(command, value) {
+        Ok(command) => (command, None),
+        Err(code) => (Command::State, Some(code)),
+    };
+    match door.send(command) {
+        Ok(ticket) => Some(Pending { ticket, request, instead }),
+        Err(code) => {
+            refuse(&request, code);
+            None
+        }
+    }
+}
+
+/// Answers a request that the loop never sees.
+fn refuse(request: &Request, code: Code) {
+    let id = request.payload().id;
+    let _ = request.send_copy(ControlResponse { id, code: code as u32, ..Default::default() });
+}

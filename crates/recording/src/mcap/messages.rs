@@ -1,0 +1,111 @@
+//! The messages of each topic that is recorded, as the ROS 2 transport would send them.
+//!
+//! In: what a subscriber received. Out: a [`Batch`], with the memory of the one before. Called by the
+//! [`recorder`](super::recorder).
+
+use super::file::Batch;
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+use bench_dragon_ros2_messages::diagnostics::{DiagnosticArray, LoopSecond};
+use bench_dragon_ros2_messages::markers::MarkerArray;
+use bench_dragon_ros2_messages::path::Path;
+use bench_dragon_ros2_messages::settings::{DiagnosticLimits, Topic};
+use bench_dragon_ros2_messages::transforms::TfMessage;
+use bench_dragon_ros2_messages::{Clock, HandlePoses, PoseArray, Stamped};
+
+/// The messages of one publisher.
+pub(super) struct Messages {
+    name: String,
+    topics: Vec<Topic>,
+    /// Those of the latest call.
+    pub batch: Batch,
+    handles: HandlePoses,
+    poses: PoseArray,
+    /// Once there is a stage.
+    markers: Option<MarkerArray>,
+    transforms: TfMessage,
+}
+
+impl Messages {
+    /// The messages of the publisher `name` on these topics.
+    pub fn new(name: &str, topics: &[Topic]) -> Self {
+        Self {
+            name: name.to_owned(),
+            topics: topics.to_vec(),
+            batch: Batch::default(),
+            handles: HandlePoses::of(0),
+            poses: PoseArray::of(0),
+            markers: None,
+            transforms: TfMessage::of(name),
+        }
+    }
+
+    /// Those of a frame, on the stage and at the alert that hold.
+    pub fn frame(
+        &mut self,
+        frame: &FrameHeader,
+        handles: &[HandlePose],
+        stage: Option<&Stage>,
+        alert: Option<&CollisionAlert>,
+    ) {
+        let batch = &mut self.batch;
+        batch.clear();
+        let (stamp_ns, sequence) = (frame.stamp_ns, frame.sequence as u32);
+        for topic in self.topics.iter().copied() {
+            match topic {
+                Topic::Handles => {
+                    self.handles.update(frame, handles);
+                    batch.push(topic, stamp_ns, sequence, &self.handles);
+                }
+                Topic::Poses => {
+                    self.poses.update(frame, handles);
+                    batch.push(topic, stamp_ns, sequence, &self.poses);
+                }
+                Topic::Clock => batch.push(topic, stamp_ns, sequence, &Clock::of(frame)),
+                Topic::Tf => {
+                    self.transforms.update(frame, handles);
+                    batch.push(topic, stamp_ns, sequence, &self.transforms);
+                }
+                Topic::Markers => {
+                    if let (Some(markers), Some(stage)) = (&mut self.markers, stage) {
+                        markers.update(frame, handles, stage, alert);
+                        batch.push(topic, stamp_ns, sequence, markers);
+                    }
+                }
+                Topic::Alerts | Topic::Stage | Topic::Diagnostics | Topic::Status | Topic::Path | Topic::Cues => (),
+            }
+        }
+    }
+
+    /// Those of a stage: with it comes the path.
+    pub fn stage(&mut self, sequence: u32, stage: &Stage) {
+        self.batch.clear();
+        self.markers = self.topics.contains(&Topic::Markers).then(|| MarkerArray::of(stage));
+        self.batch.push(Topic::Stage, stage.stamp_ns, sequence, &Stamped::stage(*stage));
+        if self.topics.contains(&Topic::Path) {
+            self.batch.push(Topic::Path, stage.stamp_ns, sequence, &Path::of(stage));
+        }
+    }
+
+    /// That of an alert.
+    pub fn alert(&mut self, sequence: u32, alert: CollisionAlert) {
+        self.batch.clear();
+        self.batch.push(Topic::Alerts, alert.stamp_ns, sequence, &Stamped::alert(alert));
+    }
+
+    /// That of a cue.
+    pub fn cue(&mut self, sequence: u32, cue: Cue) {
+        self.batch.clear();
+        self.batch.push(Topic::Cues, cue.stamp_ns, sequence, &Stamped::cue(cue));
+    }
+
+    /// Those of a status: with it come the diagnostics, at the alert that holds, of what has changed since the status
+    /// `before`, by the default limits: those of the scene are not on the wire.
+    pub fn status(&mut self, sequence: u32, status: &LoopStatus, alert: Option<&CollisionAlert>, before: &LoopStatus) {
+        self.batch.clear();
+        self.batch.push(Topic::Status, status.stamp_ns, sequence, &Stamped::status(*status));
+        let limits = DiagnosticLimits::default();
+        let second = LoopSecond { before, discarded: 0, discarded_before: 0, limits };
+        let message = DiagnosticArray::of(&self.name, status, alert, &second);
+        self.batch.push(Topic::Diagnostics, status.stamp_ns, sequence, &message);
+    }
+}

@@ -1,0 +1,373 @@
+//! A recording as it is read: whether it can be played, what it holds, and its chunks one by one.
+//!
+//! In: an MCAP file with an end, written by `record` or by another recorder of the same ROS 2 topics. Out: a [`Recording`],
+//! whose existence proves that there are frames of a known type; then [`Item`]s, a chunk at a time, in the order in which the
+//! file has them. That is the order in which they were received: log times go back where the recording machine's clock was set
+//! back. Called by the [`replay`](crate::replay).
+
+use std::collections::HashMap;
+use std::fmt::Display;
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
+use std::sync::Arc;
+
+use byteorder::LittleEndian;
+use mcap::Channel;
+use mcap::records::{ChunkIndex, Record, op};
+use serde::de::DeserializeOwned;
+
+use super::index::{Index, index, told};
+use super::recover::records_of_chunk;
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, LoopStatus, Stage};
+use bench_dragon_ros2_messages::settings::Topic;
+use bench_dragon_ros2_messages::{HandlePoses, Header, MessageType, Stamped, fields};
+use bench_dragon_show::scene::printable;
+
+/// What a replay reads.
+const TOPICS: [Topic; 5] = [Topic::Handles, Topic::Alerts, Topic::Cues, Topic::Status, Topic::Stage];
+/// What stands before the bytes of a message: CDR, little-endian.
+const ENCAPSULATION: [u8; 2] = [0, 1];
+
+/// Why a file cannot be played: one sentence, but for the file's name.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// The system gives no bytes.
+    #[error("{0}, expected a recording (MCAP)")]
+    File(#[from] io::Error),
+    /// It begins otherwise.
+    #[error("this is no MCAP file, expected a recording of bench-dragon record")]
+    NotMcap,
+    /// It was cut.
+    #[error("it has no end, as when its recorder was killed: mend it with bench-dragon record --recover")]
+    NoEnd,
+    /// It was written without an index of its chunks.
+    #[error("it has no index of its chunks: write one with bench-dragon record --recover")]
+    NoIndex,
+    /// A topic that has to be there is not.
+    #[error("it has no topic {0}, expected a recording with the topics handles and stage")]
+    NoTopic(&'static str),
+    /// Frames of several publishers.
+    #[error("it has frames of several publishers ({}), expected those of one", printable(.0))]
+    Publishers(String),
+    /// The messages of a topic are of another type, or in another encoding.
+    #[error("its topic {} has {}, expected {expected}", printable(.topic), printable(.found))]
+    Type {
+        /// The topic.
+        topic: String,
+        /// What it has.
+        found: String,
+        /// What it should have.
+        expected: String,
+    },
+    /// The type has the same name and other fields.
+    #[error(
+        "its topic {} has other fields than {of} of this version, expected a recording of the same version",
+        printable(.topic)
+    )]
+    Fields {
+        /// The topic.
+        topic: String,
+        /// The type.
+        of: String,
+    },
+    /// There is nothing to play.
+    #[error("it has no frames")]
+    NoFrames,
+    /// A chunk or a message cannot be read.
+    #[error("it is damaged at byte {at} ({}): mend it with bench-dragon record --recover", printable(.reason))]
+    Damaged {
+        /// Where the chunk begins.
+        at: u64,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A message can be read and not be played.
+    #[error("it has a frame {0}")]
+    Frame(String),
+    /// The show is over before.
+    #[error("--start is {start} and the recording reaches {end} s of the show, expected an earlier start")]
+    Start {
+        /// Simulated seconds that were asked for.
+        start: f64,
+        /// The greatest in the recording.
+        end: f64,
+    },
+}
+
+/// A message of a chunk.
+#[derive(Debug)]
+pub enum Item {
+    /// A frame as its bytes, which [`frame_of`] and [`header_of`] read.
+    Frame(Vec<u8>),
+    /// An alert.
+    Alert(CollisionAlert),
+    /// A cue.
+    Cue(Cue),
+    /// A status.
+    Status(Box<LoopStatus>),
+    /// A stage.
+    Stage(Box<Stage>),
+}
+
+/// A file that can be played.
+pub struct Recording {
+    file: File,
+    length: u64,
+    /// In the order of the file.
+    chunks: Vec<ChunkIndex>,
+    channels: HashMap<u16, Topic>,
+    contents: Contents,
+}
+
+/// What a recording holds.
+#[derive(Debug, Clone)]
+pub struct Contents {
+    /// The publisher's name.
+    pub name: String,
+    /// The scene's name, where a status holds it.
+    pub scene: Option<String>,
+    /// The topics that have messages and are played, in the order of their numbers.
+    pub topics: Vec<Topic>,
+    /// Frames per second of the publisher's loop.
+    pub rate: f64,
+    /// Frames; `None` where the file does not count them.
+    pub frames: Option<u64>,
+    /// The first and the last frame.
+    pub ends: [FrameHeader; 2],
+    /// The stage.
+    pub stage: Stage,
+}
+
+impl Contents {
+    /// Seconds of wall time from the beginning of the first frame's period to the end of the last one's.
+    pub fn seconds(&self) -> f64 {
+        let [first, last] = self.ends;
+        (last.tick.saturating_sub(first.tick) as f64 + 1.0) / self.rate
+    }
+}
+
+impl Recording {
+    /// Opens a file, reads its index and what its topics begin with.
+    ///
+    /// # Errors
+    /// [`ReadError`]
+    pub fn open(path: &Path) -> Result<Self, ReadError> {
+        let mut file = File::open(path)?;
+        let length = file.seek(SeekFrom::End(0))?;
+        let Index { channels, mut chunks, counts } = index(&mut file, length)?;
+        let (channels, name) = played(&channels)?;
+        chunks.sort_by_key(|chunk| chunk.chunk_start_offset);
+        let handles = channels.iter().find(|(_, topic)| **topic == Topic::Handles).map(|(id, _)| *id);
+        let frames = counts.and_then(|counts| counts.get(&handles?).copied());
+        // Filled below.
+        let contents = Contents {
+            name,
+            scene: None,
+            topics: Vec::new(),
+            rate: 0.0,
+            frames,
+            ends: [FrameHeader::default(); 2],
+            stage: Stage::default(),
+        };
+        let mut recording = Self { file, length, chunks, channels, contents };
+        recording.read_contents()?;
+        Ok(recording)
+    }
+
+    /// What it holds.
+    pub fn contents(&self) -> &Contents {
+        &self.contents
+    }
+
+    /// The number of chunks.
+    pub fn chunks(&self) -> usize {
+        self.chunks.len()
+    }
+
+    /// Hands over the messages of a chunk.
+    ///
+    /// # Errors
+    /// [`ReadError::Damaged`], after the messages before it, or [`ReadError::File`].
+    pub fn read_chunk(&mut self, chunk: usize, handle: &mut dyn FnMut(Item)) -> Result<(), ReadError> {
+        let Some(index) = self.chunks.get(chunk) else { return Ok(()) };
+        let at = index.chunk_start_offset;
+        let damaged = |reason: &dyn Display| ReadError::Damaged { at, reason: reason.to_string() };
+        let bytes = usize::try_from(index.chunk_length).ok().filter(|_| {
+            let end = at.checked_add(index.chunk_length);
+            end.is_some_and(|end| end <= self.length)
+        });
+        let mut record = vec![0; bytes.ok_or_else(|| damaged(&"a chunk beyond the file's end"))?];
+        self.file.seek(SeekFrom::Start(at))?;
+        self.file.read_exact(&mut record)?;
+        let Some(([op::CHUNK, _, _, _, _, _, _, _, _], body)) = record.split_first_chunk() else {
+            return Err(damaged(&"no chunk is where the index has one"));
+        };
+        for record in records_of_chunk(body).map_err(|error| damaged(&told(&error)))? {
+            let Record::Message { header, data } = record else { continue };
+            let Some(topic) = self.channels.get(&header.channel_id) else { continue };
+            let item = match topic {
+                Topic::Handles => Some(Item::Frame(data.into_owned())),
+                Topic::Alerts => decoded(&data).map(|Stamped { layout, .. }| Item::Alert(layout)),
+                Topic::Cues => decoded(&data).map(|Stamped { layout, .. }| Item::Cue(layout)),
+                Topic::Status => decoded(&data).map(|Stamped { layout, .. }| Item::Status(Box::new(layout))),
+                _ => decoded(&data).map(|Stamped { layout, .. }| Item::Stage(Box::new(layout))),
+            };
+            handle(item.ok_or_else(|| damaged(&format_args!("a message of {} cannot be read", topic.name())))?);
+        }
+        Ok(())
+    }
+
+    /// Finds the first message of each topic, and the last frame.
+    fn read_contents(&mut self) -> Result<(), ReadError> {
+        let frame = |item| if let Item::Frame(bytes) = item { Some(bytes) } else { None };
+        let first = self.first(Topic::Handles, frame)?.ok_or(ReadError::NoFrames)?;
+        let last = self.last_frame()?;
+        // All are to have as many handles as this one: it is read as a whole.
+        let first = frame_of(&first)?.frame;
+        let last = last.map_or(Ok(first), |bytes| header_of(&bytes))?;
+        let stage = self.first(Topic::Stage, |item| if let Item::Stage(stage) = item { Some(*stage) } else { None })?;
+        let status =
+            self.first(Topic::Status, |item| if let Item::Status(status) = item { Some(*status) } else { None })?;
+        let alert = self.first(Topic::Alerts, |item| matches!(item, Item::Alert(_)).then_some(()))?;
+        let cue = self.first(Topic::Cues, |item| matches!(item, Item::Cue(_)).then_some(()))?;
+        let contents = &mut self.contents;
+        contents.stage = stage.ok_or(ReadError::NoTopic("stage"))?;
+        contents.ends = [first, last];
+        contents.scene = status.map(|status| status.scene.as_str().to_owned());
+        contents.rate = status.map_or_else(|| rate_between(&first, &last), |status| status.rate);
+        contents.topics = vec![Topic::Handles, Topic::Stage];
+        contents.topics.extend([alert.map(|()| Topic::Alerts), cue.map(|()| Topic::Cues)].into_iter().flatten());
+        contents.topics.sort_unstable();
+        Ok(())
+    }
+
+    /// The first message of a topic that `pick` takes.
+    fn first<T>(&mut self, topic: Topic, pick: impl Fn(Item) -> Option<T>) -> Result<Option<T>, ReadError> {
+        for chunk in 0..self.chunks.len() {
+            let mut found = None;
+            if self.may_hold(chunk, topic) {
+                self.read_chunk(chunk, &mut |item| found = found.take().or_else(|| pick(item)))?;
+            }
+            if found.is_some() {
+                return Ok(found);
+            }
+        }
+        Ok(None)
+    }
+
+    fn last_frame(&mut self) -> Result<Option<Vec<u8>>, ReadError> {
+        for chunk in (0..self.chunks.len()).rev() {
+            let mut last = None;
+            if self.may_hold(chunk, Topic::Handles) {
+                self.read_chunk(chunk, &mut |item| {
+                    if let Item::Frame(bytes) = item {
+                        last = Some(bytes);
+                    }
+                })?;
+            }
+            if last.is_some() {
+                return Ok(last);
+            }
+        }
+        Ok(None)
+    }
+
+    /// Whether a chunk can have messages of a topic. Where it has no index of its messages it can.
+    fn may_hold(&self, chunk: usize, topic: Topic) -> bool {
+        let offsets = &self.chunks[chunk].message_index_offsets;
+        offsets.is_empty() || self.channels.iter().any(|(id, of)| *of == topic && offsets.contains_key(id))
+    }
+}
+
+/// The header of a frame, of which the handles are not read.
+///
+/// # Errors
+/// [`ReadError::Frame`]
+pub fn header_of(bytes: &[u8]) -> Result<FrameHeader, ReadError> {
+    let read: Option<(Header, FrameHeader)> = decoded(bytes);
+    read.map(|(_, header)| header).ok_or_else(unreadable)
+}
+
+/// A frame with its handles.
+///
+/// # Errors
+/// [`ReadError::Frame`]
+pub fn frame_of(bytes: &[u8]) -> Result<HandlePoses, ReadError> {
+    let read: Option<HandlePoses> = decoded(bytes);
+    let whole = read.filter(|read| read.poses.len() == read.frame.handles as usize && !read.poses.is_empty());
+    whole.ok_or_else(unreadable)
+}
+
+fn unreadable() -> ReadError {
+    ReadError::Frame("that cannot be read".to_owned())
+}
+
+/// Frames per second of a loop, from two of its frames.
+fn rate_between(first: &FrameHeader, last: &FrameHeader) -> f64 {
+    let nanoseconds = last.deadline_ns.saturating_sub(first.deadline_ns) as f64;
+    let ticks = last.tick.saturating_sub(first.tick) as f64;
+    // That of a scene which names none.
+    if ticks > 0.0 && nanoseconds > 0.0 { 1e9 * ticks / nanoseconds } else { 60.0 }
+}
+
+/// A message from its bytes.
+fn decoded<Message: DeserializeOwned>(bytes: &[u8]) -> Option<Message> {
+    let (encapsulation, body) = bytes.split_at_checked(4)?;
+    if encapsulation[..2] != ENCAPSULATION {
+        return None;
+    }
+    cdr_encoding::from_bytes::<Message, LittleEndian>(body).ok().map(|(message, _)| message)
+}
+
+/// The channels that are played, and the name of the publisher whose they are.
+fn played(channels: &HashMap<u16, Arc<Channel<'_>>>) -> Result<(HashMap<u16, Topic>, String), ReadError> {
+    let handles = format!("/{}", Topic::Handles.name());
+    let own = MessageType::of(Topic::Handles).ros_name();
+    let is_own = |channel: &Channel<'_>| channel.schema.as_ref().is_some_and(|schema| schema.name == own);
+    let all = channels.values();
+    let mut names: Vec<&str> = all.clone().filter_map(|channel| channel.topic.strip_suffix(&handles)).collect();
+    if names.len() > 1 {
+        // Another's topic may end so too.
+        names = all.filter(|channel| is_own(channel)).filter_map(|it| it.topic.strip_suffix(&handles)).collect();
+    }
+    names.sort_unstable();
+    names.dedup();
+    let name = match names[..] {
+        [] => return Err(ReadError::NoTopic("handles")),
+        [name] => name,
+        _ => return Err(ReadError::Publishers(names.join(", "))),
+    };
+    let mut played = HashMap::new();
+    for (id, channel) in channels {
+        let last = channel.topic.strip_prefix(name).and_then(|rest| rest.strip_prefix('/'));
+        if let Some(topic) = TOPICS.into_iter().find(|topic| Some(topic.name()) == last) {
+            check_type(channel, topic)?;
+            played.insert(*id, topic);
+        }
+    }
+    Ok((played, name.trim_start_matches('/').to_owned()))
+}
+
+/// Fails unless the messages of a channel are those of the topic in this version.
+fn check_type(channel: &Channel<'_>, topic: Topic) -> Result<(), ReadError> {
+    let of = MessageType::of(topic);
+    let schema = channel.schema.as_ref();
+    let found = schema.map_or("no type", |schema| &schema.name);
+    let (encoding, language) = (&*channel.message_encoding, schema.map_or("", |schema| &schema.encoding));
+    if found != of.ros_name() || encoding != "cdr" || language != "ros2msg" {
+        return Err(ReadError::Type {
+            topic: channel.topic.clone(),
+            found: format!("{found} ({encoding}, {language})"),
+            expected: format!("{} (cdr, ros2msg)", of.ros_name()),
+        });
+    }
+    let text = schema.map(|schema| String::from_utf8_lossy(&schema.data)).unwrap_or_default();
+    // As definitions name it.
+    let name = of.ros_name().replace("/msg/", "/");
+    if fields(&name, &text) == fields(&name, &of.schema()) {
+        Ok(())
+    } else {
+        Err(ReadError::Fields { topic: channel.topic.clone(), of: of.ros_name() })
+    }
+}

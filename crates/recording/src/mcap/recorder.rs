@@ -1,0 +1,383 @@
+//! A show as files: which messages a topic gets, where a file ends and the next begins, and what is counted.
+//!
+//! In: what a subscriber receives, in the order in which it does. Out: files of one run each. Called by the subscriber that
+//! records, on its thread.
+
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::file::McapFile;
+use super::messages::Messages;
+use super::run::{Run, Seldom};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+use bench_dragon_ros2_messages::settings::Topic;
+
+/// What is recorded by default: all that a replay needs, and what tools show without this program's messages.
+pub const DEFAULT_TOPICS: [Topic; 8] = [
+    Topic::Handles,
+    Topic::Poses,
+    Topic::Alerts,
+    Topic::Stage,
+    Topic::Status,
+    Topic::Diagnostics,
+    Topic::Path,
+    Topic::Cues,
+];
+/// Messages of a run that are kept until its first frame.
+const MOST_EARLY: usize = 256;
+
+/// When a recording goes on in another file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Split {
+    /// Before a file has more bytes than this, unless one frame has more.
+    Bytes(u64),
+    /// After so many nanoseconds of the publisher's monotonic clock.
+    Nanoseconds(u64),
+}
+
+/// What is recorded, and where.
+#[derive(Debug, Clone)]
+pub struct RecorderConfig {
+    /// The publisher's name, which is the namespace of the topics.
+    pub name: String,
+    /// The first file; the others are numbered after it.
+    pub file: PathBuf,
+    /// Whether files that exist are replaced.
+    pub replace: bool,
+    /// The topics.
+    pub topics: Vec<Topic>,
+    /// When a file ends, besides with its run.
+    pub split: Option<Split>,
+}
+
+/// What has been recorded so far.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Recorded {
+    /// The files, in the order of time.
+    pub files: Vec<PathBuf>,
+    /// How much is in them.
+    pub counts: Counts,
+}
+
+/// How much has been recorded.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Messages of all topics.
+    pub messages: u64,
+    /// Frames of which there is a message.
+    pub frames: u64,
+    /// Frames of the same runs that did not come, between those that did.
+    pub missed: u64,
+    /// Bytes of all files.
+    pub bytes: u64,
+    /// Nanoseconds from the first to the last frame of each run, added up.
+    pub nanoseconds: u64,
+}
+
+/// Why a recording ended early, in one sentence.
+#[derive(Debug, thiserror::Error)]
+#[error("{file}: {error}: the recording ends there, {state}")]
+pub struct RecordError {
+    file: String,
+    error: io::Error,
+    state: &'static str,
+}
+
+/// Records.
+pub struct Recorder {
+    config: RecorderConfig,
+    /// The first file until the first frame; whether it is to be removed if there is none.
+    first: Option<(File, bool)>,
+    run: Option<Run>,
+    early: Vec<Seldom>,
+    recorded: Recorded,
+    /// Bytes of the files that are finished.
+    finished_bytes: u64,
+    number: u64,
+    messages: Messages,
+}
+
+impl Recorder {
+    /// A recorder, whose first file is there and empty, unless it is to be replaced.
+    ///
+    /// # Errors
+    /// The file cannot be made, or is there and is not to be replaced.
+    pub fn new(config: RecorderConfig) -> io::Result<Self> {
+        let is_new = !config.file.exists();
+        let file = create(&config.file, config.replace)?;
+        let messages = Messages::new(&config.name, &config.topics);
+        Ok(Self {
+            config,
+            first: Some((file, is_new)),
+            run: None,
+            early: Vec::new(),
+            recorded: Recorded::default(),
+            finished_bytes: 0,
+            number: 1,
+            messages,
+        })
+    }
+
+    /// What has been recorded so far.
+    pub fn recorded(&self) -> &Recorded {
+        &self.recorded
+    }
+
+    /// A frame, before which `missed` of its run did not come.
+    ///
+    /// # Errors
+    /// [`RecordError`]; the files are finished then.
+    pub fn frame(&mut self, frame: &FrameHeader, handles: &[HandlePose], missed: u64) -> Result<(), RecordError> {
+        self.recorded.counts.missed += missed;
+        match &self.run {
+            Some(run) if run.run_id == frame.run_id => {
+                let since = frame.deadline_ns.saturating_sub(run.file_began_ns);
+                if matches!(self.config.split, Some(Split::Nanoseconds(most)) if since >= most) {
+                    self.next_file(frame)?;
+                }
+            }
+            _ => self.begin(frame)?,
+        }
+        self.fill_frame(frame, handles);
+        if !self.has_room()? {
+            self.next_file(frame)?;
+            self.fill_frame(frame, handles);
+        }
+        let written = self.append_batch(None)?;
+        self.recorded.counts.frames += u64::from(written > 0);
+        if let Some(run) = &mut self.run {
+            self.recorded.counts.nanoseconds += frame.deadline_ns.saturating_sub(run.latest_deadline_ns);
+            run.latest_deadline_ns = frame.deadline_ns;
+        }
+        Ok(())
+    }
+
+    /// A stage.
+    ///
+    /// # Errors
+    /// As [`Recorder::frame`].
+    pub fn stage(&mut self, stage: &Stage) -> Result<(), RecordError> {
+        self.seldom(Seldom::Stage(Box::new(*stage)))
+    }
+
+    /// An alert.
+    ///
+    /// # Errors
+    /// As [`Recorder::frame`].
+    pub fn alert(&mut self, alert: &CollisionAlert) -> Result<(), RecordError> {
+        self.seldom(Seldom::Alert(*alert))
+    }
+
+    /// A cue.
+    ///
+    /// # Errors
+    /// As [`Recorder::frame`].
+    pub fn cue(&mut self, cue: &Cue) -> Result<(), RecordError> {
+        self.seldom(Seldom::Cue(*cue))
+    }
+
+    /// A status.
+    ///
+    /// # Errors
+    /// As [`Recorder::frame`].
+    pub fn status(&mut self, status: &LoopStatus) -> Result<(), RecordError> {
+        self.seldom(Seldom::Status(*status))
+    }
+
+    /// Does what is due. To be called several times a second.
+    ///
+    /// # Errors
+    /// As [`Recorder::frame`].
+    pub fn maintain(&mut self) -> Result<(), RecordError> {
+        let Some(run) = &mut self.run else { return Ok(()) };
+        let done = run.file.maintain();
+        self.recorded.counts.bytes = self.finished_bytes + run.file.bytes();
+        done.or_else(|error| self.fail(error))
+    }
+
+    /// Finishes the file of the run, if there is one: its publisher has gone, or the recording ends.
+    ///
+    /// # Errors
+    /// As [`Recorder::frame`].
+    pub fn finish_run(&mut self) -> Result<(), RecordError> {
+        let Some(mut run) = self.run.take() else { return Ok(()) };
+        let attached = run.attach(&self.config.name);
+        let finished = run.file.finish();
+        let bytes = *finished.as_ref().unwrap_or_else(|(bytes, _)| bytes);
+        self.finished_bytes += bytes;
+        self.recorded.counts.bytes = self.finished_bytes;
+        match (attached, finished) {
+            (Err(error), _) | (_, Err((_, error))) => {
+                Err(self.error(error, "the file has no end: mend it with record --recover"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Ends the recording. A file that has got no frame is removed.
+    ///
+    /// # Errors
+    /// As [`Recorder::frame`].
+    pub fn finish(&mut self) -> Result<(), RecordError> {
+        if let Some((_, is_new)) = self.first.take()
+            && is_new
+        {
+            // Whoever has removed it before has done the same.
+            let _ = std::fs::remove_file(&self.config.file);
+        }
+        self.finish_run()
+    }
+
+    /// Begins the first file of a run with what came before its first frame.
+    fn begin(&mut self, frame: &FrameHeader) -> Result<(), RecordError> {
+        self.finish_run()?;
+        let file = self.make_file()?;
+        self.run = Some(Run::new(file, frame));
+        for early in std::mem::take(&mut self.early) {
+            if early.run_id() == frame.run_id {
+                self.seldom(early)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes on in another file, which begins with what a subscriber that joins now would get.
+    fn next_file(&mut self, frame: &FrameHeader) -> Result<(), RecordError> {
+        let Some(run) = &self.run else { return Ok(()) };
+        let Run { status, diagnosed, seldom, latest_deadline_ns, .. } = *run;
+        let stage = run.stage.clone().map(Seldom::Stage);
+        let held = [stage, run.alert.map(Seldom::Alert), run.cue.map(Seldom::Cue)];
+        self.finish_run()?;
+        let file = self.make_file()?;
+        self.run = Some(Run { latest_deadline_ns, status, diagnosed, seldom, ..Run::new(file, frame) });
+        held.into_iter().flatten().try_for_each(|held| self.seldom(held))
+    }
+
+    /// The next file, emptied where it was there.
+    fn make_file(&mut self) -> Result<McapFile, RecordError> {
+        let (path, file) = match self.first.take() {
+            Some((file, _)) => (self.config.file.clone(), Ok(file)),
+            None => loop {
+                self.number += 1;
+                let path = numbered(&self.config.file, self.number);
+                let file = create(&path, self.config.replace);
+                // In the midst of a show no file is worth an end.
+                if !matches!(&file, Err(error) if error.kind() == io::ErrorKind::AlreadyExists) {
+                    break (path, file);
+                }
+            },
+        };
+        self.recorded.files.push(path);
+        let limit = match self.config.split {
+            Some(Split::Bytes(most)) => Some(most),
+            _ => None,
+        };
+        let RecorderConfig { name, topics, .. } = &self.config;
+        let emptied = file.and_then(|file| file.set_len(0).or_else(no_regular_file).map(|()| file));
+        let made = emptied.and_then(|file| McapFile::new(file, name, topics, limit));
+        made.map_err(|error| self.error(error, "nothing is in it"))
+    }
+
+    /// A message that is not sent with every frame.
+    fn seldom(&mut self, message: Seldom) -> Result<(), RecordError> {
+        let Some(run) = self.run.as_mut().filter(|run| run.run_id == message.run_id()) else {
+            // Without frames there is nothing to keep it with.
+            if self.early.len() < MOST_EARLY {
+                self.early.push(message);
+            }
+            return Ok(());
+        };
+        let log_time = run.log_time(&message);
+        let sequence = run.seldom;
+        run.seldom = sequence.wrapping_add(1);
+        match message {
+            Seldom::Stage(stage) => {
+                self.messages.stage(sequence, &stage);
+                run.stage = Some(stage);
+            }
+            Seldom::Alert(alert) => {
+                run.alert = Some(alert);
+                self.messages.alert(sequence, alert);
+            }
+            Seldom::Cue(cue) => {
+                run.cue = Some(cue);
+                self.messages.cue(sequence, cue);
+            }
+            Seldom::Status(status) => {
+                run.status = Some(status);
+                let before = run.diagnosed.replace(status).unwrap_or(status);
+                self.messages.status(sequence, &status, run.alert.as_ref(), &before);
+            }
+        }
+        let attached = if run.attached || run.stage.is_none() || run.status.is_none() {
+            Ok(())
+        } else {
+            run.attach(&self.config.name)
+        };
+        attached.or_else(|error| self.fail(error))?;
+        // Files are split before frames only.
+        self.append_batch(Some(log_time)).map(drop)
+    }
+
+    fn fill_frame(&mut self, frame: &FrameHeader, handles: &[HandlePose]) {
+        let run = self.run.as_ref();
+        let (stage, alert) = (run.and_then(|run| run.stage.as_deref()), run.and_then(|run| run.alert.as_ref()));
+        self.messages.frame(frame, handles, stage, alert);
+    }
+
+    /// Whether the batch fits into this file.
+    fn has_room(&mut self) -> Result<bool, RecordError> {
+        let room = self.run.as_mut().map_or(Ok(true), |run| run.file.has_room(&self.messages.batch));
+        room.or_else(|error| self.fail(error))
+    }
+
+    /// Writes the batch, logged at its messages' own times or at another; how many messages that were.
+    fn append_batch(&mut self, log_time: Option<u64>) -> Result<u64, RecordError> {
+        let appended = self.run.as_mut().map_or(Ok(0), |run| run.file.append(&self.messages.batch, log_time));
+        let written = appended.or_else(|error| self.fail(error))?;
+        self.recorded.counts.messages += written;
+        Ok(written)
+    }
+
+    /// Finishes the file as far as the disk takes it, and returns the error.
+    fn fail<Done>(&mut self, error: io::Error) -> Result<Done, RecordError> {
+        let state = match self.finish_run() {
+            Ok(()) => "the file is whole up to there",
+            Err(_) => "the file has no end: mend it with record --recover",
+        };
+        Err(self.error(error, state))
+    }
+
+    fn error(&self, error: io::Error, state: &'static str) -> RecordError {
+        let file = self.recorded.files.last().unwrap_or(&self.config.file).display().to_string();
+        RecordError { file, error, state }
+    }
+}
+
+/// A new file to write, or with `replace` perhaps one that is there, with its content.
+///
+/// # Errors
+/// It cannot be made, or is there and is not to be replaced.
+pub fn create(path: &Path, replace: bool) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.write(true);
+    if replace {
+        options.create(true).truncate(false)
+    } else {
+        options.create_new(true)
+    };
+    options.open(path)
+}
+
+/// A device has no length to set.
+fn no_regular_file(error: io::Error) -> io::Result<()> {
+    if error.raw_os_error() == Some(nix::libc::EINVAL) { Ok(()) } else { Err(error) }
+}
+
+/// `show-2.mcap` for `show.mcap`.
+fn numbered(path: &Path, number: u64) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let extension = path.extension().map_or(String::new(), |extension| format!(".{}", extension.to_string_lossy()));
+    path.with_file_name(format!("{stem}-{number}{extension}"))
+}

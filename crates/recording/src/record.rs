@@ -1,0 +1,203 @@
+//! A subscriber that records: from the feed through a queue to a thread that compresses and writes.
+//!
+//! The feed's end copies each frame and returns, so that a slow disk does not keep it from the shared memory. Where the thread
+//! is 64 MB behind, the feed's end waits for it with the next frame, until the recording is over: frames then stay in the shared
+//! memory until the oldest of them are overwritten, which shows as a gap, and neither the publisher nor the memory of this
+//! process notices. What is not sent with every frame is little and never waits. Called by the command `record`.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use crate::mcap::recorder::{RecordError, Recorded, Recorder};
+use bench_dragon_client::feed::FeedEvent;
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+
+/// The bytes of frames that may wait.
+const QUEUED_BYTES: usize = 64_000_000;
+/// How often the thread does what is due.
+const MAINTAIN_INTERVAL: Duration = Duration::from_millis(50);
+/// How long the feed's end waits for room before it looks again.
+const ROOM_INTERVAL: Duration = Duration::from_millis(1);
+/// How long the end of a recording waits for a disk that takes nothing: a slow one needs seconds for what it was given.
+const STUCK_SECONDS: u64 = 30;
+/// How often the end of a recording looks whether the thread is done.
+const FINISH_INTERVAL: Duration = Duration::from_millis(10);
+
+/// What the feed brings.
+enum Item {
+    Frame { header: FrameHeader, handles: Vec<HandlePose>, missed: u64 },
+    Stage(Box<Stage>),
+    Alert(CollisionAlert),
+    Cue(Cue),
+    Status(Box<LoopStatus>),
+    Gone,
+}
+
+/// What both ends know.
+#[derive(Default)]
+struct Shared {
+    queued_bytes: AtomicUsize,
+    ended: AtomicBool,
+    recorded: Mutex<Recorded>,
+}
+
+/// The feed's end.
+pub struct RecordQueue {
+    items: Sender<Item>,
+    /// Memory of frames that have been written.
+    free: Receiver<Vec<HandlePose>>,
+    shared: Arc<Shared>,
+}
+
+/// The thread.
+pub struct RecordThread {
+    shared: Arc<Shared>,
+    handle: JoinHandle<(Recorded, Option<RecordError>)>,
+}
+
+/// Why a recording has not all that its queue was given, in one sentence.
+#[derive(Debug, thiserror::Error)]
+pub enum UnfinishedError {
+    /// The disk refused it.
+    #[error(transparent)]
+    Record(RecordError),
+    /// The disk neither takes nor refuses it.
+    #[error(
+        "nothing could be written for {STUCK_SECONDS} s: the recording ends there, a file without an end is mended by \
+         record --recover"
+    )]
+    Stuck,
+}
+
+/// Starts the thread of a recorder.
+///
+/// # Errors
+/// The system gives no thread.
+pub fn start(recorder: Recorder) -> std::io::Result<(RecordQueue, RecordThread)> {
+    let (items, inbox) = channel();
+    let (used, free) = channel();
+    let shared = Arc::new(Shared::default());
+    let serving = Arc::clone(&shared);
+    let thread = move || {
+        let done = serve(recorder, &inbox, &used, &serving);
+        serving.ended.store(true, Ordering::Release);
+        done
+    };
+    let handle = std::thread::Builder::new().name("record".to_owned()).spawn(thread)?;
+    Ok((RecordQueue { items, free, shared: Arc::clone(&shared) }, RecordThread { shared, handle }))
+}
+
+impl RecordQueue {
+    /// Passes an event on. A frame waits for room until `over`, after which there is none for it.
+    pub fn handle(&self, event: &FeedEvent<'_>, over: impl Fn() -> bool) {
+        let item = match event {
+            FeedEvent::Frame { header, handles, missed } => {
+                while self.shared.queued_bytes.load(Ordering::Acquire) > QUEUED_BYTES {
+                    if over() {
+                        return;
+                    }
+                    std::thread::sleep(ROOM_INTERVAL);
+                }
+                let mut copy = self.free.try_recv().unwrap_or_default();
+                copy.clear();
+                copy.extend_from_slice(handles);
+                Item::Frame { header: **header, handles: copy, missed: *missed }
+            }
+            FeedEvent::Stage(stage) => Item::Stage(Box::new(**stage)),
+            FeedEvent::Alert(alert) => Item::Alert(**alert),
+            FeedEvent::Cue(cue) => Item::Cue(**cue),
+            FeedEvent::Status(status) => Item::Status(Box::new(**status)),
+            FeedEvent::Gone => Item::Gone,
+            FeedEvent::Started { .. } | FeedEvent::Silent => return,
+        };
+        self.shared.queued_bytes.fetch_add(bytes(&item), Ordering::AcqRel);
+        // A thread that has failed takes nothing more, and its error is reported when it is joined.
+        let _ = self.items.send(item);
+    }
+}
+
+impl RecordThread {
+    /// Whether the thread has ended, because the disk takes no more.
+    pub fn has_ended(&self) -> bool {
+        self.shared.ended.load(Ordering::Acquire) || self.handle.is_finished()
+    }
+
+    /// What has been recorded so far.
+    pub fn recorded(&self) -> Recorded {
+        self.shared.recorded.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Ends the thread once it has written all that `queue` was given. What it has recorded, and why not everything. A thread
+    /// that gets on with nothing is left behind.
+    pub fn finish(self, queue: RecordQueue) -> (Recorded, Option<UnfinishedError>) {
+        drop(queue);
+        let (mut left, mut since) = (usize::MAX, Instant::now());
+        while !self.handle.is_finished() {
+            let queued = self.shared.queued_bytes.load(Ordering::Acquire);
+            if queued != left {
+                (left, since) = (queued, Instant::now());
+            } else if since.elapsed() >= Duration::from_secs(STUCK_SECONDS) {
+                return (self.recorded(), Some(UnfinishedError::Stuck));
+            }
+            std::thread::sleep(FINISH_INTERVAL);
+        }
+        let recorded = self.recorded();
+        // A panic has been printed by then.
+        let (recorded, error) = self.handle.join().unwrap_or((recorded, None));
+        (recorded, error.map(UnfinishedError::Record))
+    }
+}
+
+/// The memory of an item, with a share of the queue's own.
+fn bytes(item: &Item) -> usize {
+    match item {
+        Item::Frame { handles, .. } => size_of::<Item>() + size_of_val(&handles[..]),
+        _ => size_of::<Item>() + size_of::<Stage>(),
+    }
+}
+
+/// Records what comes until the other end of the queue is dropped or the disk takes no more.
+fn serve(
+    mut recorder: Recorder,
+    inbox: &Receiver<Item>,
+    used: &Sender<Vec<HandlePose>>,
+    shared: &Shared,
+) -> (Recorded, Option<RecordError>) {
+    let done = loop {
+        let item = match inbox.recv_timeout(MAINTAIN_INTERVAL) {
+            Ok(item) => Some(item),
+            Err(RecvTimeoutError::Timeout) => None,
+            Err(RecvTimeoutError::Disconnected) => break recorder.finish(),
+        };
+        if let Some(item) = &item {
+            shared.queued_bytes.fetch_sub(bytes(item), Ordering::AcqRel);
+        }
+        let done = match item {
+            Some(Item::Frame { header, handles, missed }) => {
+                let done = recorder.frame(&header, &handles, missed);
+                // Nobody takes it where the recording is about to end.
+                let _ = used.send(handles);
+                done
+            }
+            Some(Item::Stage(stage)) => recorder.stage(&stage),
+            Some(Item::Alert(alert)) => recorder.alert(&alert),
+            Some(Item::Cue(cue)) => recorder.cue(&cue),
+            Some(Item::Status(status)) => recorder.status(&status),
+            Some(Item::Gone) => recorder.finish_run(),
+            None => Ok(()),
+        };
+        if let Err(error) = done.and_then(|()| recorder.maintain()) {
+            break Err(error);
+        }
+        let (mut shown, recorded) =
+            (shared.recorded.lock().unwrap_or_else(PoisonError::into_inner), recorder.recorded());
+        shown.counts = recorded.counts;
+        if shown.files.len() != recorded.files.len() {
+            shown.files.clone_from(&recorded.files);
+        }
+    };
+    (recorder.recorded().clone(), done.err())
+}

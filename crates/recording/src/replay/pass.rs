@@ -1,0 +1,163 @@
+//! The frames of a recording from where a replay begins to its end, each with the alerts and cues that go with it.
+//!
+//! A recorder may receive an alert a little before or after the frame that it goes with. Frames of a chunk are therefore handed
+//! over once the chunk after it has been read. Called by the [`replay`](super).
+
+use std::collections::VecDeque;
+
+use crate::mcap::reader::{Item, ReadError, Recording, frame_of, header_of};
+use bench_dragon_messages::{CollisionAlert, Cue};
+use bench_dragon_ros2_messages::HandlePoses;
+
+/// Where a replay begins.
+#[derive(Debug, Clone)]
+pub(super) struct Start {
+    /// The chunk to begin to read with: one before that of the first frame.
+    chunk: usize,
+    /// Frames of earlier periods are passed over.
+    tick: u64,
+    /// Simulated seconds of the first frame.
+    pub sim_time: f64,
+    /// What a subscriber that joins then gets: the latest.
+    alert: Option<CollisionAlert>,
+    cue: Option<Cue>,
+}
+
+/// A frame, and what goes out beside it.
+#[derive(Debug)]
+pub(super) struct Recorded {
+    pub frame: HandlePoses,
+    pub alerts: Vec<CollisionAlert>,
+    pub cues: Vec<Cue>,
+}
+
+/// One showing.
+pub(super) struct Pass {
+    next_chunk: usize,
+    /// The frames that are handed over, and those of the chunk that was read after them.
+    frames: VecDeque<Vec<u8>>,
+    ahead: VecDeque<Vec<u8>>,
+    /// The chunks that these are of.
+    chunk: usize,
+    ahead_chunk: usize,
+    /// Those that no frame has taken.
+    alerts: VecDeque<CollisionAlert>,
+    cues: VecDeque<Cue>,
+    /// As in [`Start`].
+    from_tick: u64,
+    /// Whether no frame has been handed over.
+    first: bool,
+    /// What is wrong with the next chunk: what was read before is handed over first.
+    failure: Option<ReadError>,
+}
+
+impl Start {
+    /// The first frame at or after so many simulated seconds; that of the file for `None`.
+    pub fn find(recording: &mut Recording, seconds: Option<f64>) -> Result<Self, ReadError> {
+        let [first, _] = recording.contents().ends;
+        // Not the first one's tick: where the index is wrong about a chunk, there is a frame before it.
+        let mut start = Self { chunk: 0, tick: 0, sim_time: first.sim_time, alert: None, cue: None };
+        let Some(seconds) = seconds else { return Ok(start) };
+        let mut pass = Pass::new(&start);
+        let mut end = f64::NEG_INFINITY;
+        while let Some(bytes) = pass.next_frame(recording)? {
+            let header = header_of(&bytes)?;
+            if header.sim_time >= seconds {
+                (start.chunk, start.tick) = (pass.chunk.saturating_sub(1), header.tick);
+                start.sim_time = header.sim_time;
+                return Ok(start);
+            }
+            let (alerts, cues) = pass.take_messages(header.tick);
+            start.alert = alerts.last().copied().or(start.alert);
+            start.cue = cues.last().copied().or(start.cue);
+            end = end.max(header.sim_time);
+        }
+        Err(ReadError::Start { start: seconds, end })
+    }
+}
+
+impl Pass {
+    pub fn new(start: &Start) -> Self {
+        Self {
+            next_chunk: start.chunk,
+            frames: VecDeque::new(),
+            ahead: VecDeque::new(),
+            chunk: start.chunk,
+            ahead_chunk: start.chunk,
+            alerts: start.alert.into_iter().collect(),
+            cues: start.cue.into_iter().collect(),
+            from_tick: start.tick,
+            first: true,
+            failure: None,
+        }
+    }
+
+    /// The next frame; `None` at the end of the recording.
+    pub fn next(&mut self, recording: &mut Recording) -> Result<Option<Recorded>, ReadError> {
+        while let Some(bytes) = self.next_frame(recording)? {
+            let tick = header_of(&bytes)?.tick;
+            if self.first && tick < self.from_tick {
+                continue;
+            }
+            let frame = frame_of(&bytes)?;
+            // What belongs to frames that are missing at the end goes with the last one.
+            let is_last = self.frames.is_empty() && self.ahead.is_empty();
+            let (mut alerts, mut cues) = self.take_messages(if is_last { u64::MAX } else { tick });
+            if std::mem::take(&mut self.first) {
+                keep_latest_before(&mut alerts, |alert| alert.tick < tick);
+                keep_latest_before(&mut cues, |cue| cue.tick < tick);
+            }
+            return Ok(Some(Recorded { frame, alerts, cues }));
+        }
+        Ok(None)
+    }
+
+    /// The next frame's bytes.
+    fn next_frame(&mut self, recording: &mut Recording) -> Result<Option<Vec<u8>>, ReadError> {
+        while self.frames.is_empty() {
+            self.frames = std::mem::take(&mut self.ahead);
+            self.chunk = self.ahead_chunk;
+            while self.ahead.is_empty() && self.next_chunk < recording.chunks() && self.failure.is_none() {
+                self.read_chunk(recording);
+            }
+            if self.frames.is_empty() && self.ahead.is_empty() {
+                return self.failure.take().map_or(Ok(None), Err);
+            }
+        }
+        Ok(self.frames.pop_front())
+    }
+
+    /// Reads a chunk: all of it, or nothing where it is damaged.
+    fn read_chunk(&mut self, recording: &mut Recording) {
+        let (mut frames, mut alerts, mut cues) = (VecDeque::new(), Vec::new(), Vec::new());
+        let read = recording.read_chunk(self.next_chunk, &mut |item| match item {
+            Item::Frame(bytes) => frames.push_back(bytes),
+            Item::Alert(alert) => alerts.push(alert),
+            Item::Cue(cue) => cues.push(cue),
+            Item::Status(_) | Item::Stage(_) => (),
+        });
+        self.ahead_chunk = self.next_chunk;
+        self.next_chunk += 1;
+        match read {
+            Ok(()) => {
+                self.ahead = frames;
+                self.alerts.extend(alerts);
+                self.cues.extend(cues);
+            }
+            Err(error) => self.failure = Some(error),
+        }
+    }
+
+    /// Those of periods up to `tick`.
+    fn take_messages(&mut self, tick: u64) -> (Vec<CollisionAlert>, Vec<Cue>) {
+        let alerts = self.alerts.partition_point(|alert| alert.tick <= tick);
+        let cues = self.cues.partition_point(|cue| cue.tick <= tick);
+        (self.alerts.drain(..alerts).collect(), self.cues.drain(..cues).collect())
+    }
+}
+
+/// Leaves only the last of those that are older than the first frame.
+fn keep_latest_before<T>(messages: &mut Vec<T>, is_before: impl Fn(&T) -> bool) {
+    let before = messages.iter().take_while(|message| is_before(message)).count();
+    messages.drain(..before.saturating_sub(1));
+}

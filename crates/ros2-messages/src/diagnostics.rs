@@ -1,0 +1,190 @@
+//! diagnostic_msgs: the health of the loop and of the dragon, once a second.
+
+use serde::Serialize;
+
+use super::{Header, level_of};
+use crate::settings::DiagnosticLimits;
+use bench_dragon_messages::state::EventKind;
+use bench_dragon_messages::state::Severity;
+use bench_dragon_messages::{CollisionAlert, LoopStatus};
+
+/// diagnostic_msgs/KeyValue.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct KeyValue {
+    /// What.
+    pub key: String,
+    /// How much.
+    pub value: String,
+}
+
+/// diagnostic_msgs/DiagnosticStatus.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct DiagnosticStatus {
+    /// 0 OK, 1 WARN, 2 ERROR.
+    pub level: u8,
+    /// What is diagnosed.
+    pub name: String,
+    /// In a few words.
+    pub message: String,
+    /// The publisher's name.
+    pub hardware_id: String,
+    /// The figures.
+    pub values: Vec<KeyValue>,
+}
+
+/// diagnostic_msgs/DiagnosticArray.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct DiagnosticArray {
+    /// When this was so.
+    pub header: Header,
+    /// The loop and the dragon.
+    pub status: Vec<DiagnosticStatus>,
+}
+
+/// DiagnosticStatus.OK, WARN and ERROR.
+const OK: u8 = 0;
+const WARN: u8 = 1;
+const ERROR: u8 = 2;
+
+/// What the diagnostics of a second of the loop need besides its status.
+#[derive(Debug, Clone, Copy)]
+pub struct LoopSecond<'a> {
+    /// The status one second before; one that is the same where that is not known.
+    pub before: &'a LoopStatus,
+    /// Messages that no ROS 2 queue would take, since the start.
+    pub discarded: u64,
+    /// The same as of one second before.
+    pub discarded_before: u64,
+    /// From when on a figure is worth a warning, or is an error.
+    pub limits: DiagnosticLimits,
+}
+
+impl LoopSecond<'_> {
+    /// The level of the last second alone, and why.
+    fn level(&self, status: &LoopStatus) -> (u8, String) {
+        let Self { before, discarded, discarded_before, limits } = *self;
+        let since = |now: u64, then: u64| now.saturating_sub(then);
+        let skipped = since(status.skipped, before.skipped);
+        let lateness = status.lateness_p99_second as f64 * 1e-9;
+        let graded = |warn: bool, error: bool| if error { ERROR } else { u8::from(warn) * WARN };
+        let findings = [
+            (
+                u8::from(status.unforeseen_contacts > before.unforeseen_contacts) * ERROR,
+                "a contact that no search had found".to_owned(),
+            ),
+            (
+                u8::from(status.unsolved_frames > before.unsolved_frames) * ERROR,
+                format!("{} frames without a solution", since(status.unsolved_frames, before.unsolved_frames)),
+            ),
+            (
+                graded(skipped >= limits.skipped_warn, skipped >= limits.skipped_error_at(status.rate)),
+                format!("{skipped} periods skipped"),
+            ),
+            (
+                graded(lateness >= limits.lateness_warn, lateness >= limits.lateness_error),
+                format!("wake-up lateness p99 {:.1} us", 1e6 * lateness),
+            ),
+            (
+                u8::from(discarded > discarded_before) * WARN,
+                format!("{} messages discarded", since(discarded, discarded_before)),
+            ),
+        ];
+        let worst = findings.iter().map(|(level, _)| *level).max().unwrap_or(OK);
+        let named: Vec<_> = findings.into_iter().filter(|(level, _)| *level > OK).map(|(_, finding)| finding).collect();
+        (worst, if named.is_empty() { "on time".to_owned() } else { named.join(", ") })
+    }
+}
+
+impl DiagnosticArray {
+    /// The loop's health and the dragon's, of the last second.
+    pub fn of(name: &str, status: &LoopStatus, alert: Option<&CollisionAlert>, second: &LoopSecond) -> Self {
+        let value = |key: &str, value: String| KeyValue { key: key.to_owned(), value };
+        let level = level_of(alert);
+        let (loop_level, message) = second.level(status);
+        let the_loop = DiagnosticStatus {
+            level: loop_level,
+            name: format!("{name}: loop"),
+            message,
+            hardware_id: name.to_owned(),
+            values: vec![
+                value("rate", format!("{:.3}", status.measured_rate)),
+                value("requested rate", status.rate.to_string()),
+                value("overruns", status.overruns.to_string()),
+                value("skipped periods", status.skipped.to_string()),
+                value("wake-up lateness p99 (us)", format!("{:.1}", status.lateness_p99_second as f64 / 1e3)),
+                value("step cost p99 (us)", format!("{:.1}", status.step_p99_second as f64 / 1e3)),
+                value("messages discarded", second.discarded.to_string()),
+            ],
+        };
+        let mut values = vec![
+            value("level", level.name().to_owned()),
+            value("sim_time (s)", format!("{:.3}", status.sim_time)),
+            value("scene", status.scene.as_str().to_owned()),
+        ];
+        if let Some(alert) = alert {
+            values.push(value("clearance (m)", format!("{:.4}", alert.clearance)));
+            values.push(value("time to event (s)", format!("{:.3}", alert.event_time - status.sim_time)));
+            values.push(value("nearest benches (from 0)", listed(alert.nearest_benches())));
+            values.push(value("event", alert.event_kind().map_or("none", EventKind::name).to_owned()));
+            values.push(value("event benches (from 0)", listed(alert.event_benches())));
+        }
+        let dragon = DiagnosticStatus {
+            level: match level.severity() {
+                Severity::Ok => OK,
+                Severity::Warning => WARN,
+                Severity::Error => ERROR,
+            },
+            name: format!("{name}: dragon"),
+            message: level.name().to_owned(),
+            hardware_id: name.to_owned(),
+            values,
+        };
+        Self { header: Header::of(status.stamp_ns), status: vec![the_loop, dragon] }
+    }
+}
+
+/// Benches in a row, or "none".
+fn listed(benches: impl Iterator<Item = u32>) -> String {
+    let names: Vec<_> = benches.map(|bench| bench.to_string()).collect();
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn level(before: LoopStatus, now: LoopStatus, limits: DiagnosticLimits, discarded: [u64; 2]) -> (u8, String) {
+        let [discarded_before, discarded] = discarded;
+        let second = LoopSecond { before: &before, discarded, discarded_before, limits };
+        let [the_loop, _] = DiagnosticArray::of("d", &now, None, &second).status.try_into().unwrap();
+        (the_loop.level, the_loop.message)
+    }
+
+    #[test]
+    fn the_limits_of_the_scene_hold_for_the_last_second_alone() {
+        let status = |skipped| LoopStatus { rate: 60.0, skipped, ..LoopStatus::default() };
+        let default = DiagnosticLimits::default();
+        let told = |before, now| level(status(before), status(now), default, [5, 5]);
+        assert_eq!(told(900, 900), (OK, "on time".to_owned()));
+        assert_eq!(told(900, 901), (WARN, "1 periods skipped".to_owned()));
+        assert_eq!(told(900, 905), (WARN, "5 periods skipped".to_owned()));
+        assert_eq!(told(900, 906), (ERROR, "6 periods skipped".to_owned()));
+
+        let limits =
+            DiagnosticLimits { skipped_warn: 3, skipped_error: Some(4), lateness_warn: 1e-3, lateness_error: 2e-3 };
+        let late = |lateness_p99_second| LoopStatus { lateness_p99_second, ..status(2) };
+        let told = |skipped: u64, lateness| level(status(2 - skipped), late(lateness), limits, [0, 0]);
+        assert_eq!(told(2, 999_999), (OK, "on time".to_owned()));
+        assert_eq!(told(0, 1_000_000), (WARN, "wake-up lateness p99 1000.0 us".to_owned()));
+        assert_eq!(told(0, 2_000_000), (ERROR, "wake-up lateness p99 2000.0 us".to_owned()));
+        assert_eq!(level(status(0), status(4), limits, [0, 0]).0, ERROR);
+
+        assert_eq!(level(status(0), status(0), default, [5, 7]), (WARN, "2 messages discarded".to_owned()));
+        let unsolved = LoopStatus { unsolved_frames: 3, ..status(1) };
+        let both = "3 frames without a solution, 1 periods skipped".to_owned();
+        assert_eq!(level(status(0), unsolved, default, [0, 0]), (ERROR, both));
+        let contact = LoopStatus { unforeseen_contacts: 1, ..status(0) };
+        assert_eq!(level(status(0), contact, default, [0, 0]).0, ERROR);
+        assert_eq!(level(contact, contact, default, [0, 0]), (OK, "on time".to_owned()));
+    }
+}

@@ -1,0 +1,277 @@
+//! visualization_msgs: the benches as cubes for RViz and Foxglove, where it touches, what is coming and where, and the
+//! sentence about it.
+
+use serde::Serialize;
+
+use super::{Header, Pose, Time, Xyz, level_of};
+use bench_dragon_messages::sentence::{Figures, alert_sentence, bench_name, state_sentence};
+use bench_dragon_messages::state::{FrameState, Severity};
+use bench_dragon_messages::{CollisionAlert, FrameHeader, HandlePose, Stage};
+use bench_dragon_motion::model::Point;
+use bench_dragon_motion::model::board::Board;
+
+/// builtin_interfaces/Duration.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Duration {
+    /// Seconds.
+    pub sec: i32,
+    /// Nanoseconds.
+    pub nanosec: u32,
+}
+
+/// std_msgs/ColorRGBA.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Color {
+    /// Red, 0 to 1.
+    pub r: f32,
+    /// Green, 0 to 1.
+    pub g: f32,
+    /// Blue, 0 to 1.
+    pub b: f32,
+    /// Opacity, 0 to 1.
+    pub a: f32,
+}
+
+/// sensor_msgs/CompressedImage, always empty here.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct CompressedImage {
+    /// Empty.
+    pub header: Header,
+    /// Empty.
+    pub format: String,
+    /// Empty.
+    pub data: Vec<u8>,
+}
+
+/// visualization_msgs/UVCoordinate, never sent.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct UvCoordinate {
+    /// Never sent.
+    pub u: f32,
+    /// Never sent.
+    pub v: f32,
+}
+
+/// visualization_msgs/MeshFile, always empty here.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct MeshFile {
+    /// Empty.
+    pub filename: String,
+    /// Empty.
+    pub data: Vec<u8>,
+}
+
+/// visualization_msgs/Marker.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Marker {
+    /// The frame's stamp.
+    pub header: Header,
+    /// `benches`, `contact`, `coming`, `sentence` or `numbers`.
+    pub ns: String,
+    /// The bench, from 0; of `numbers` the place among them.
+    pub id: i32,
+    /// The shape.
+    pub r#type: i32,
+    /// Add or delete.
+    pub action: i32,
+    /// Where it is.
+    pub pose: Pose,
+    /// Metres along, across and up.
+    pub scale: Xyz,
+    /// Its colour.
+    pub color: Color,
+    /// Zero: until it is replaced.
+    pub lifetime: Duration,
+    /// False.
+    pub frame_locked: bool,
+    /// Of `coming` the ends of the dashes of its ring; empty for all others.
+    pub points: Vec<Xyz>,
+    /// Empty.
+    pub colors: Vec<Color>,
+    /// Empty.
+    pub texture_resource: String,
+    /// Empty.
+    pub texture: CompressedImage,
+    /// Empty.
+    pub uv_coordinates: Vec<UvCoordinate>,
+    /// Of `sentence` and `numbers` the words; empty for all others.
+    pub text: String,
+    /// Empty.
+    pub mesh_resource: String,
+    /// Empty.
+    pub mesh_file: MeshFile,
+    /// False.
+    pub mesh_use_embedded_materials: bool,
+}
+
+/// Marker.CUBE, Marker.SPHERE, Marker.LINE_LIST and Marker.TEXT_VIEW_FACING.
+const CUBE: i32 = 1;
+const SPHERE: i32 = 2;
+const LINE_LIST: i32 = 5;
+const TEXT: i32 = 9;
+/// Marker.ADD and Marker.DELETE.
+const ADD: i32 = 0;
+const DELETE: i32 = 2;
+/// Metres up that a bench is drawn: the width of a hand above the board's own thickness.
+const BENCH_HEIGHT: f64 = 0.1;
+/// Dashes of the ring around the place of what is coming, and its radius in widths of a board.
+const DASHES: usize = 16;
+const RING_RADIUS: f64 = 2.5;
+/// Benches that can be named at once: two that it happens to, and two that are nearest now.
+const MOST_NAMED: usize = 4;
+
+impl Marker {
+    fn new(ns: &str, id: i32, shape: i32) -> Self {
+        Self {
+            header: Header::of(0),
+            ns: ns.to_owned(),
+            id,
+            r#type: shape,
+            action: ADD,
+            pose: Pose::flat(0.0, 0.0, 0.0),
+            scale: Xyz::default(),
+            color: Color { r: 1.0, g: 1.0, b: 1.0, a: 1.0 },
+            lifetime: Duration::default(),
+            frame_locked: false,
+            points: Vec::new(),
+            colors: Vec::new(),
+            texture_resource: String::new(),
+            texture: CompressedImage {
+                header: Header { stamp: Time::default(), frame_id: String::new() },
+                format: String::new(),
+                data: Vec::new(),
+            },
+            uv_coordinates: Vec::new(),
+            text: String::new(),
+            mesh_resource: String::new(),
+            mesh_file: MeshFile { filename: String::new(), data: Vec::new() },
+            mesh_use_embedded_materials: false,
+        }
+    }
+}
+
+/// visualization_msgs/MarkerArray: a cube for each bench, a sphere where two benches touched, a dashed ring where the
+/// coming event will be, the sentence that `run`, `watch` and the stage picture print, the names of the benches it is
+/// about.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MarkerArray {
+    /// The benches from the head on, then `contact`, `coming`, `sentence` and the `numbers`.
+    pub markers: Vec<Marker>,
+}
+
+impl MarkerArray {
+    /// The markers of a stage, not yet in any place.
+    pub fn of(stage: &Stage) -> Self {
+        let width = stage.width;
+        let bench = |bench: u32| {
+            let length = if bench == 0 { stage.head_length } else { stage.body_length };
+            Marker { scale: Xyz { x: length, y: width, z: BENCH_HEIGHT }, ..Marker::new("benches", bench as i32, CUBE) }
+        };
+        let sign = |ns, shape, scale| Marker { scale, color: colour(Severity::Error), ..Marker::new(ns, 0, shape) };
+        // Only the height of words counts.
+        let words = |ns, id| Marker { scale: Xyz { x: 0.0, y: 0.0, z: width }, ..Marker::new(ns, id, TEXT) };
+        let contact = sign("contact", SPHERE, Xyz { x: width, y: width, z: width });
+        let coming =
+            Marker { points: ring(width), ..sign("coming", LINE_LIST, Xyz { x: 0.3 * width, y: 0.0, z: 0.0 }) };
+        let mut markers: Vec<Marker> = (0..stage.benches).map(bench).collect();
+        markers.extend([contact, coming, words("sentence", 0)]);
+        markers.extend((0..MOST_NAMED as i32).map(|id| words("numbers", id)));
+        Self { markers }
+    }
+
+    /// Puts every marker where it is in a frame. `alert` is the latest alert.
+    pub fn update(
+        &mut self,
+        frame: &FrameHeader,
+        handles: &[HandlePose],
+        stage: &Stage,
+        alert: Option<&CollisionAlert>,
+    ) {
+        let stamp = Time::of(frame.stamp_ns);
+        let level = level_of(alert);
+        let alert = alert.filter(|_| level.severity() > Severity::Ok);
+        let named = alert.map_or_else(Vec::new, |alert| named(alert, level.has_happened()));
+        let (benches, signs) = self.markers.split_at_mut(stage.benches as usize);
+        for (bench, (marker, pair)) in benches.iter_mut().zip(handles.windows(2)).enumerate() {
+            let points = [Point::new(pair[0].x, pair[0].y), Point::new(pair[1].x, pair[1].y)];
+            let centre = Board::from_handles(points[0], points[1], stage.hole_inset, stage.width).centre;
+            marker.header.stamp = stamp;
+            marker.pose = Pose::flat(centre.x, centre.y, pair[0].heading);
+            marker.color = match (named.iter().find(|(one, _)| *one == bench as u32), bench) {
+                (Some((_, severity)), _) => colour(*severity),
+                (None, 0) => Color { r: 0.85, g: 0.65, b: 0.13, a: 1.0 },
+                _ => Color { r: 0.55, g: 0.35, b: 0.2, a: 1.0 },
+            };
+        }
+        let [contact, coming, sentence, numbers @ ..] = signs else { return };
+        let place = alert.filter(|alert| alert.event_x.is_finite()).map(|alert| (alert.event_x, alert.event_y));
+        put(contact, stamp, place.filter(|_| level.has_happened()));
+        put(coming, stamp, place.filter(|_| !level.has_happened()));
+        sentence.text = words(frame, stage, alert).unwrap_or_default();
+        // Above the ring; without one, above the head.
+        let head = handles.first().map(|head| (head.x, head.y));
+        let above = place.or(head).map(|(x, y)| (x, y + (RING_RADIUS + 2.0) * stage.width));
+        put(sentence, stamp, above.filter(|_| !sentence.text.is_empty()));
+        for (k, marker) in numbers.iter_mut().enumerate() {
+            let bench = named.get(k);
+            marker.text = bench.map_or_else(String::new, |(bench, _)| bench_name(*bench, stage.benches));
+            let at = bench.and_then(|(bench, _)| benches.get(*bench as usize)).map(|marker| &marker.pose.position);
+            put(marker, stamp, at.map(|place| (place.x, place.y)));
+        }
+    }
+}
+
+/// Shows a marker at a place, or not at all.
+fn put(marker: &mut Marker, stamp: Time, place: Option<(f64, f64)>) {
+    marker.header.stamp = stamp;
+    marker.action = if place.is_some() { ADD } else { DELETE };
+    if let Some((x, y)) = place {
+        marker.pose = Pose::flat(x, y, 0.0);
+        if marker.r#type == TEXT {
+            // Words lie above the boards.
+            marker.pose.position.z = 2.0 * BENCH_HEIGHT;
+        }
+    }
+}
+
+/// The benches an alert is about, with their colours: those of the event, and before it those that are nearest now.
+fn named(alert: &CollisionAlert, happened: bool) -> Vec<(u32, Severity)> {
+    let mut named: Vec<_> = alert.event_benches().map(|bench| (bench, Severity::Error)).collect();
+    if !happened {
+        for bench in alert.nearest_benches() {
+            if named.iter().all(|(other, _)| *other != bench) {
+                named.push((bench, Severity::Warning));
+            }
+        }
+    }
+    named
+}
+
+/// The sentence about an alert as of a frame, or about a state that no alert reports.
+fn words(frame: &FrameHeader, stage: &Stage, alert: Option<&CollisionAlert>) -> Option<String> {
+    let state = FrameState::ALL.get(frame.state as usize).and_then(|state| state_sentence(*state));
+    let of = |alert: &CollisionAlert| {
+        // Alerts come once a second, frames more often.
+        let now = CollisionAlert { time_to_event: alert.event_time - frame.sim_time, ..*alert };
+        alert_sentence(&now, stage.benches, Figures::Shown { time_scale: frame.time_scale })
+    };
+    state.map(str::to_owned).or_else(|| alert.map(of))
+}
+
+/// The ends of the dashes of a ring, m from its middle.
+fn ring(width: f64) -> Vec<Xyz> {
+    let at = |step: usize| {
+        let (sin, cos) = (step as f64 * std::f64::consts::PI / DASHES as f64).sin_cos();
+        Xyz { x: RING_RADIUS * width * cos, y: RING_RADIUS * width * sin, z: BENCH_HEIGHT }
+    };
+    (0..2 * DASHES).map(at).collect()
+}
+
+/// The colour of a severity.
+fn colour(severity: Severity) -> Color {
+    match severity {
+        Severity::Ok => Color { r: 0.2, g: 0.6, b: 0.3, a: 1.0 },
+        Severity::Warning => Color { r: 1.0, g: 0.75, b: 0.0, a: 1.0 },
+        Severity::Error => Color { r: 0.9, g: 0.1, b: 0.1, a: 1.0 },
+    }
+}

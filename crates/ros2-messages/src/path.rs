@@ -1,0 +1,133 @@
+//! nav_msgs/Path: the line that the head follows.
+
+use serde::Serialize;
+
+use super::{Header, Pose};
+use bench_dragon_messages::{SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_OUTWARD_SPIRAL, Stage, StageSegment};
+
+/// The turn between two points, radians: a chord of it misses a circle of 9 m by 9 mm.
+const TURN: f64 = std::f64::consts::PI / 36.0;
+/// Points of a path at most; one that turns more often gets fewer for each turn.
+const MOST_POINTS: f64 = 10_000.0;
+
+/// geometry_msgs/PoseStamped.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PoseStamped {
+    /// As that of the path.
+    pub header: Header,
+    /// A point, and the direction of travel there.
+    pub pose: Pose,
+}
+
+/// nav_msgs/Path.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Path {
+    /// When it was published.
+    pub header: Header,
+    /// From the start to the end.
+    pub poses: Vec<PoseStamped>,
+}
+
+impl Path {
+    /// The path of a stage, published when that was.
+    pub fn of(stage: &Stage) -> Self {
+        let header = Header::of(stage.stamp_ns);
+        let poses = poses(stage.path_in_use(), stage.pitch);
+        let poses = poses.into_iter().map(|pose| PoseStamped { header: header.clone(), pose }).collect();
+        Self { header, poses }
+    }
+}
+
+/// Points along segments, with the direction of travel: the ends of every segment, and between them one for each turn by
+/// five degrees. `pitch` is that of the spirals, metres per turn.
+fn poses(segments: &[StageSegment], pitch: f64) -> Vec<Pose> {
+    let turned: f64 = segments.iter().map(turn_of).sum();
+    let turn = TURN.max(turned / MOST_POINTS);
+    let along = |segment: &StageSegment| {
+        let pieces = (turn_of(segment) / turn).ceil().max(1.0) as usize;
+        let segment = *segment;
+        (0..=pieces).map(move |piece| pose_at(&segment, pitch, piece as f64 / pieces as f64))
+    };
+    segments.iter().flat_map(along).collect()
+}
+
+/// Radians by which a segment turns.
+fn turn_of(segment: &StageSegment) -> f64 {
+    match segment.kind {
+        SEGMENT_ARC => (segment.curvature * segment.length).abs(),
+        SEGMENT_INWARD_SPIRAL | SEGMENT_OUTWARD_SPIRAL => (segment.theta_last - segment.theta_first).abs(),
+        _ => 0.0,
+    }
+}
+
+/// The pose at a share, from 0 to 1, of a segment: of its length, or of a spiral's polar angle.
+fn pose_at(segment: &StageSegment, pitch: f64, share: f64) -> Pose {
+    let StageSegment { x, y, heading, length, curvature, theta_first, theta_last, kind, .. } = *segment;
+    match kind {
+        SEGMENT_ARC => {
+            let here = heading + share * curvature * length;
+            let right = x + (here.sin() - heading.sin()) / curvature;
+            Pose::flat(right, y - (here.cos() - heading.cos()) / curvature, here)
+        }
+        SEGMENT_INWARD_SPIRAL | SEGMENT_OUTWARD_SPIRAL => {
+            let theta = theta_first + share * (theta_last - theta_first);
+            let per_radian = pitch / std::f64::consts::TAU;
+            let (sine, cosine) = theta.sin_cos();
+            let radius = per_radian * theta;
+            // Against the derivative by theta: inward because theta decreases, outward because of the half turn.
+            let (along_x, along_y) = (radius * sine - per_radian * cosine, -radius * cosine - per_radian * sine);
+            let side = if kind == SEGMENT_INWARD_SPIRAL { 1.0 } else { -1.0 };
+            Pose::flat(side * radius * cosine, side * radius * sine, along_y.atan2(along_x))
+        }
+        _ => {
+            let (sine, cosine) = heading.sin_cos();
+            Pose::flat(x + share * length * cosine, y + share * length * sine, heading)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench_dragon_motion::model::Point;
+    use bench_dragon_motion::model::curve::Side;
+    use bench_dragon_motion::model::path::Path as ModelPath;
+    use bench_dragon_show::convert::stage_segment;
+
+    /// Every pose lies on the path, and looks along it, by the path's own points and tangents.
+    fn check(path: &ModelPath, pitch: f64) {
+        let segments: Vec<_> = path.outline().iter().map(stage_segment).collect();
+        let poses = poses(&segments, pitch);
+        assert!(poses.len() > 50 && poses.len() < 2500, "{}", poses.len());
+        let mut travelled = 0.0;
+        let mut before: Option<Pose> = None;
+        for pose in poses {
+            let here = Point::new(pose.position.x, pose.position.y);
+            // The chord and a little more: the arc between is at most a thousandth longer.
+            let chord = before.map_or(0.0, |b| (here.x - b.position.x).hypot(here.y - b.position.y));
+            let range = [travelled + chord - 1e-9, travelled + 1.002 * chord + 1e-6];
+            let distance = |s: f64| nalgebra::distance(&path.point(path.param_at(s.clamp(0.0, path.length()))), &here);
+            let (mut low, mut high) = (range[0], range[1]);
+            for _ in 0..200 {
+                let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+                if distance(a) < distance(b) { high = b } else { low = a }
+            }
+            travelled = (0.5 * (low + high)).clamp(0.0, path.length());
+            assert!(distance(travelled) < 1e-6, "{} m off at {travelled} m", distance(travelled));
+            let tangent = path.tangent(path.param_at(travelled));
+            let (z, w) = (pose.orientation.z, pose.orientation.w);
+            let along = (w * w - z * z) * tangent.x + 2.0 * w * z * tangent.y;
+            assert!(along > 1.0 - 1e-6 || travelled > path.length() - 0.01, "{along} at {travelled} m");
+            before = Some(pose);
+        }
+        assert!((travelled - path.length()).abs() < 1e-4, "it ends at {travelled} of {} m", path.length());
+    }
+
+    #[test]
+    fn the_points_lie_on_the_path_and_look_along_it() {
+        check(&ModelPath::spiral(0.55, 16.0), 0.55);
+        check(&ModelPath::turnaround(1.7, 4.5, 2.0, 100.0, 60.0).unwrap(), 1.7);
+        let route = ModelPath::route(Point::new(-3.0, 2.0), 0.1).line(5.0).arc(Side::Left, 3.0, 0.5);
+        check(&route.line(2.0).arc(Side::Right, 1.5, 0.75).build().unwrap(), f64::NAN);
+    }
+}

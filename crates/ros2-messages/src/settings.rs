@@ -1,0 +1,189 @@
+//! The topics that a scene can request, their quality of service, and the limits of the diagnostics.
+//!
+//! A scene file states these settings; the ROS 2 transport and recordings read them.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+/// A topic that a scene can request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Topic {
+    /// `/<name>/handles`, bench_dragon_msgs/HandlePoses.
+    Handles,
+    /// `/<name>/poses`, geometry_msgs/PoseArray.
+    Poses,
+    /// `/<name>/alerts`, bench_dragon_msgs/CollisionAlert.
+    Alerts,
+    /// `/<name>/stage`, bench_dragon_msgs/Stage.
+    Stage,
+    /// `/diagnostics`, diagnostic_msgs/DiagnosticArray.
+    Diagnostics,
+    /// `/<name>/markers`, visualization_msgs/MarkerArray.
+    Markers,
+    /// `/<name>/status`, bench_dragon_msgs/LoopStatus.
+    Status,
+    /// `/<name>/path`, nav_msgs/Path.
+    Path,
+    /// `/<name>/cues`, bench_dragon_msgs/Cue.
+    Cues,
+    /// `/clock`, rosgraph_msgs/Clock.
+    Clock,
+    /// `/tf`, tf2_msgs/TFMessage.
+    Tf,
+}
+
+impl Topic {
+    /// What is published by default.
+    pub const DEFAULT: [Self; 7] =
+        [Self::Handles, Self::Poses, Self::Alerts, Self::Stage, Self::Diagnostics, Self::Path, Self::Cues];
+
+    /// Every one.
+    pub const ALL: [Self; 11] = [
+        Self::Handles,
+        Self::Poses,
+        Self::Alerts,
+        Self::Stage,
+        Self::Diagnostics,
+        Self::Markers,
+        Self::Status,
+        Self::Path,
+        Self::Cues,
+        Self::Clock,
+        Self::Tf,
+    ];
+
+    /// The name in the scene, and the last part of the topic's.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Handles => "handles",
+            Self::Poses => "poses",
+            Self::Alerts => "alerts",
+            Self::Stage => "stage",
+            Self::Diagnostics => "diagnostics",
+            Self::Markers => "markers",
+            Self::Status => "status",
+            Self::Path => "path",
+            Self::Cues => "cues",
+            Self::Clock => "clock",
+            Self::Tf => "tf",
+        }
+    }
+
+    /// The topic's full name, where the publisher is called `publisher`.
+    pub fn path(self, publisher: &str) -> String {
+        match self {
+            // Where every tool looks.
+            Self::Diagnostics | Self::Clock | Self::Tf => format!("/{}", self.name()),
+            _ => format!("/{publisher}/{}", self.name()),
+        }
+    }
+
+    /// The default quality of service.
+    ///
+    /// Reliable throughout, since a default subscription is reliable and gets nothing from a best-effort publisher; a
+    /// best-effort subscription gets what a reliable publisher sends. What is sent seldom is kept for late subscribers.
+    pub fn default_qos(self) -> Qos {
+        match self {
+            Self::Alerts | Self::Stage | Self::Path | Self::Cues => {
+                Qos { reliability: Reliability::Reliable, durability: Durability::TransientLocal, depth: 1 }
+            }
+            _ => Qos { reliability: Reliability::Reliable, durability: Durability::Volatile, depth: 10 },
+        }
+    }
+}
+
+/// Whether lost messages are sent again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reliability {
+    /// They are.
+    Reliable,
+    /// They are not.
+    BestEffort,
+}
+
+/// Whether late subscribers get what was sent before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Durability {
+    /// They do not.
+    Volatile,
+    /// They get the last message. (More, up to the depth, only while others subscribe at the same time.)
+    TransientLocal,
+}
+
+/// The quality of service of a topic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Qos {
+    /// Whether lost messages are sent again.
+    pub reliability: Reliability,
+    /// Whether late subscribers get what was sent before.
+    pub durability: Durability,
+    /// The last messages that are kept.
+    pub depth: u32,
+}
+
+/// From when on the diagnostics of the loop's last second are a warning, and from when on an error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DiagnosticLimits {
+    /// Periods skipped, at least 1.
+    pub skipped_warn: u64,
+    /// The same; by default a tenth of the loop's rate.
+    pub skipped_error: Option<u64>,
+    /// Wake-up lateness, 99th percentile, seconds; infinite by default: what is late but in time has no consequence.
+    pub lateness_warn: f64,
+    /// The same.
+    pub lateness_error: f64,
+}
+
+impl Default for DiagnosticLimits {
+    fn default() -> Self {
+        Self { skipped_warn: 1, skipped_error: None, lateness_warn: f64::INFINITY, lateness_error: f64::INFINITY }
+    }
+}
+
+impl DiagnosticLimits {
+    /// Periods skipped in a second that are an error at a rate of the loop.
+    pub fn skipped_error_at(&self, rate: f64) -> u64 {
+        self.skipped_error.unwrap_or(((0.1 * rate).ceil() as u64).max(2)).max(self.skipped_warn)
+    }
+}
+
+/// What a scene states about its ROS 2 topics.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ros2Settings {
+    /// Frames per second on ROS 2; by default the smaller of 60 and the loop's rate.
+    pub rate: Option<f64>,
+    /// The topics and how each is published.
+    pub topics: BTreeMap<Topic, Qos>,
+    /// Whether there are services that conduct the show.
+    pub control: bool,
+    /// The limits of the diagnostics.
+    pub diagnostics: DiagnosticLimits,
+}
+
+impl Default for Ros2Settings {
+    fn default() -> Self {
+        let topics = Topic::DEFAULT.into_iter().map(|topic| (topic, topic.default_qos())).collect();
+        Self { rate: None, topics, control: false, diagnostics: DiagnosticLimits::default() }
+    }
+}
+
+impl Ros2Settings {
+    /// The topics that a scene fills: one without `[alerts]` has no alerts, one without `[[cues]]` no cues.
+    pub fn offered(&self, alerts: bool, cues: bool) -> impl Iterator<Item = Topic> {
+        let filled = move |topic: &Topic| match topic {
+            Topic::Alerts => alerts,
+            Topic::Cues => cues,
+            _ => true,
+        };
+        self.topics.keys().copied().filter(filled)
+    }
+
+    /// Frames per second on ROS 2 where the loop makes `loop_rate`.
+    pub fn rate_of(&self, loop_rate: f64) -> f64 {
+        self.rate.unwrap_or(60.0).min(loop_rate)
+    }
+}

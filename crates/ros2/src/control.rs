@@ -1,0 +1,228 @@
+//! The door for commands over ROS 2: the services below `/<name>`, on a thread of their own.
+//!
+//! Made of ros2-client's subscriptions (for the requests, so that the node shows its services) and RustDDS's writers (for
+//! the responses), not of ros2-client's `Server`: that one hides the bytes of a request, which tell the mapping
+//! ([`mapping`]), and answers at once. A client whose reply reader RustDDS has not matched yet would never get that
+//! answer, so an answer waits here until it is ([`Matches`]). A client that is dead or floods the door costs the loop
+//! nothing: the thread takes requests, the loop takes one command a period from a queue of bounded length.
+
+mod calls;
+mod endpoints;
+mod mapping;
+mod services;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use ros2_client::Context;
+use rustdds::{GUID, SampleIdentity, SequenceNumber};
+
+use super::Ros2Error;
+use super::matching::Matches;
+use bench_dragon_messages::control::{Code, Command};
+use bench_dragon_publisher::live::control::{Answer, Door, MOST_WAITING};
+use calls::{Conductor, Next, refusal, sentence};
+use endpoints::{Client, Endpoints};
+pub use mapping::Mapping;
+use mapping::Request;
+use services::{Call, Response};
+
+/// Calls of one process that may have no answer yet, so that one which floods the door leaves room for the others.
+const MOST_CALLS: usize = 16;
+/// Calls that may have no answer yet in all; further ones wait in their readers.
+const MOST_PENDING: usize = 512;
+/// How long an answer waits for its client's reply reader. RMW implementations give up after 0.1 s; a loaded machine
+/// takes longer, and nobody else waits.
+const MATCHING_PATIENCE: Duration = Duration::from_secs(2);
+/// How often requests are looked for, and answers while some are awaited.
+const POLL_INTERVAL: Duration = Duration::from_millis(2);
+const ANSWER_INTERVAL: Duration = Duration::from_micros(500);
+/// How long clients are given for the last answers.
+const LINGER: Duration = Duration::from_millis(20);
+
+/// The thread. Dropping it ends it.
+pub(super) struct ControlThread {
+    stop: Arc<AtomicBool>,
+    handle: Option<JoinHandle<()>>,
+}
+
+impl ControlThread {
+    /// Offers the services below `/<name>` and serves them.
+    ///
+    /// # Errors
+    /// [`Ros2Error`]
+    pub(super) fn start(
+        name: &str,
+        context: Context,
+        matches: Matches,
+        mapping: Mapping,
+        door: Door,
+    ) -> Result<Self, Ros2Error> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let (opened, opening) = mpsc::channel();
+        let thread = {
+            let (name, stop) = (name.to_owned(), Arc::clone(&stop));
+            move || match Endpoints::open(&name, &context) {
+                Ok(endpoints) => {
+                    let _ = opened.send(Ok(()));
+                    Server::new(endpoints, matches, mapping, door).serve(&stop);
+                }
+                Err(error) => drop(opened.send(Err(error))),
+            }
+        };
+        let spawned = std::thread::Builder::new().name("ros2 control".to_owned()).spawn(thread);
+        let handle = Some(spawned.map_err(|error| Ros2Error::Failed(error.to_string()))?);
+        let thread = Self { stop, handle };
+        opening.recv().unwrap_or_else(|_| Err(Ros2Error::Failed("the control thread ended early".to_owned())))?;
+        Ok(thread)
+    }
+}
+
+impl Drop for ControlThread {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Release);
+        if let Some(handle) = self.handle.take() {
+            // A panic has been printed by then.
+            let _ = handle.join();
+        }
+    }
+}
+
+/// A call that has no answer yet.
+struct Pending {
+    /// The index of its service.
+    port: usize,
+    call: Call,
+    client: Client,
+    progress: Progress,
+}
+
+/// How far a call is.
+enum Progress {
+    /// To be passed to the loop as soon as its queue has room.
+    Waiting(Command),
+    /// With the loop.
+    Sent(u64, Command),
+    /// Answered, but for its client's reply reader.
+    Answered(Response, Instant),
+}
+
+struct Server {
+    endpoints: Endpoints,
+    matches: Matches,
+    mapping: Mapping,
+    door: Door,
+    conductor: Conductor,
+    pending: Vec<Pending>,
+}
+
+impl Server {
+    fn new(endpoints: Endpoints, matches: Matches, mapping: Mapping, door: Door) -> Self {
+        Self {
+            endpoints,
+            matches,
+            mapping,
+            door,
+            conductor: Conductor::default(),
+            pending: Vec::with_capacity(MOST_PENDING),
+        }
+    }
+
+    fn serve(mut self, stop: &AtomicBool) {
+        while !stop.load(Ordering::Acquire) {
+            for port in 0..self.endpoints.ports.len() {
+                self.take_requests(port);
+            }
+            self.pass_on();
+            self.take_answers();
+            self.send_answers();
+            std::thread::sleep(if self.pending.is_empty() { POLL_INTERVAL } else { ANSWER_INTERVAL });
+        }
+        std::thread::sleep(LINGER);
+    }
+
+    fn take_requests(&mut self, port: usize) {
+        // Bounded, so that a client which floods the door does not keep answers back.
+        for _ in 0..MOST_WAITING {
+            if self.pending.len() >= MOST_PENDING {
+                return;
+            }
+            let end = &mut self.endpoints.ports[port];
+            let Ok(Some((raw, info))) = end.requests.take() else { return };
+            let Request { header, body } = match self.mapping.split(raw.bytes(), end.service.lengths) {
+                Ok(request) => request,
+                Err(misfit) => {
+                    end.report_misfit(self.mapping, misfit);
+                    continue;
+                }
+            };
+            let writer = GUID::from(info.publisher_gid());
+            let named = info.related_request_id().map(|id| GUID::from(id.writer_gid));
+            let reader = named.filter(|guid| *guid != GUID::GUID_UNKNOWN && *guid != writer);
+            let identity = SampleIdentity {
+                writer_guid: reader.unwrap_or(writer),
+                sequence_number: SequenceNumber::from(info.sequence_number()),
+            };
+            let call = (end.service.read)(body);
+            let client = Client { writer, header: header.to_vec(), identity, reader };
+            let of_process =
+                self.pending.iter().filter(|pending| pending.client.writer.prefix == writer.prefix).count();
+            let progress = if of_process < MOST_CALLS {
+                match self.conductor.begin(call) {
+                    Next::Obey(command) => Progress::Waiting(command),
+                    Next::Answer(response) => Progress::Answered(response, Instant::now()),
+                }
+            } else {
+                end.report_crowd(MOST_CALLS);
+                let sentence = format!("refused: {MOST_CALLS} calls of this process have no answer yet");
+                let Some(response) = refusal(call, &sentence) else { continue };
+                Progress::Answered(response, Instant::now())
+            };
+            self.pending.push(Pending { port, call, client, progress });
+        }
+    }
+
+    /// Passes commands to the loop, in the order in which they came, as far as its queue has room.
+    fn pass_on(&mut self) {
+        for pending in &mut self.pending {
+            if let Progress::Waiting(command) = pending.progress {
+                let Ok(ticket) = self.door.send(command) else { return };
+                pending.progress = Progress::Sent(ticket, command);
+            }
+        }
+    }
+
+    fn take_answers(&mut self) {
+        while let Some(Answer { ticket, outcome }) = self.door.answer() {
+            let of_ticket =
+                |pending: &&mut Pending| matches!(pending.progress, Progress::Sent(sent, _) if sent == ticket);
+            let Some(pending) = self.pending.iter_mut().find(of_ticket) else { continue };
+            let Progress::Sent(_, command) = pending.progress else { continue };
+            if !matches!(outcome.code, Code::Done | Code::Already) {
+                self.endpoints.ports[pending.port].report_refusal(&sentence(command, &outcome));
+            }
+            pending.progress = match self.conductor.proceed(pending.call, command, &outcome) {
+                Next::Obey(command) => Progress::Waiting(command),
+                Next::Answer(response) => Progress::Answered(response, Instant::now()),
+            };
+        }
+    }
+
+    /// Sends the answers whose clients can be reached.
+    fn send_answers(&mut self) {
+        let (ports, matches) = (&mut self.endpoints.ports, &self.matches);
+        self.pending.retain(|Pending { port, client, progress, .. }| {
+            let Progress::Answered(response, since) = progress else { return true };
+            let port = &mut ports[*port];
+            let reached = matches.reaches(port.responses_guid, port.requests_guid, client.writer, client.reader);
+            if !reached && since.elapsed() < MATCHING_PATIENCE {
+                return true;
+            }
+            port.answer(client, response);
+            false
+        });
+    }
+}

@@ -1,0 +1,210 @@
+//! The ends of the services on DDS: subscriptions that give requests as bytes, writers that send responses as bytes.
+//!
+//! Called by the control thread, which makes them and drops them.
+
+use std::convert::Infallible;
+use std::fmt;
+
+use ros2_client::{Context, Node, NodeName, NodeOptions, Subscription};
+use rustdds::bytes::Bytes;
+use rustdds::no_key::{DataWriter, SerializerAdapter};
+use rustdds::policy::{self, ResourceLimits};
+use rustdds::{
+    CDRSerializerAdapter, GUID, QosPolicies, QosPolicyBuilder, RTPSEntity, RepresentationIdentifier, SampleIdentity,
+    TopicKind, WriteOptionsBuilder,
+};
+use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
+
+use super::mapping::{Mapping, Misfit};
+use super::services::{Response, SERVICES, Service};
+use crate::Ros2Error;
+
+/// Requests of one service that its reader keeps between two polls.
+const REQUEST_DEPTH: i32 = 256;
+/// Answers of one service kept for clients that are slow or dead.
+const MOST_ANSWERS: i32 = 4096;
+/// More bytes than any request here has.
+const MOST_REQUEST_BYTES: usize = 64;
+
+/// The bytes of a request as they came.
+pub(super) struct Raw {
+    bytes: [u8; MOST_REQUEST_BYTES],
+    length: usize,
+}
+
+impl Raw {
+    /// The request's bytes.
+    pub(super) fn bytes(&self) -> &[u8] {
+        &self.bytes[..self.length]
+    }
+}
+
+impl<'de> Deserialize<'de> for Raw {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct AllBytes;
+        impl<'de> Visitor<'de> for AllBytes {
+            type Value = Raw;
+
+            fn expecting(&self, text: &mut fmt::Formatter) -> fmt::Result {
+                text.write_str("a request")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut bytes: A) -> Result<Raw, A::Error> {
+                let mut raw = Raw { bytes: [0; MOST_REQUEST_BYTES], length: 0 };
+                // CDR tells no length of its own: the end of the message is an error here, and the length.
+                while let Ok(Some(byte)) = bytes.next_element() {
+                    raw.bytes[raw.length] = byte;
+                    raw.length += 1;
+                }
+                Ok(raw)
+            }
+        }
+        deserializer.deserialize_tuple(MOST_REQUEST_BYTES, AllBytes)
+    }
+}
+
+/// Sends bytes as they are.
+struct AsTheyAre;
+
+impl SerializerAdapter<Vec<u8>> for AsTheyAre {
+    type Error = Infallible;
+
+    fn output_encoding() -> RepresentationIdentifier {
+        RepresentationIdentifier::CDR_LE
+    }
+
+    fn to_bytes(value: &Vec<u8>) -> Result<Bytes, Infallible> {
+        Ok(Bytes::copy_from_slice(value))
+    }
+}
+
+/// The ends of one service.
+pub(super) struct Port {
+    pub(super) service: &'static Service,
+    pub(super) requests: Subscription<Raw>,
+    pub(super) requests_guid: GUID,
+    pub(super) responses_guid: GUID,
+    responses: DataWriter<Vec<u8>, AsTheyAre>,
+    /// What has been reported once.
+    reported: Reported,
+}
+
+#[derive(Default)]
+struct Reported {
+    misfit: bool,
+    crowd: bool,
+    refusal: bool,
+    discarded: bool,
+}
+
+/// All services, and the node that they belong to.
+pub(super) struct Endpoints {
+    pub(super) ports: Vec<Port>,
+    // Dropped after the ports: they belong to it.
+    _node: Node,
+}
+
+impl Endpoints {
+    pub(super) fn open(name: &str, context: &Context) -> Result<Self, Ros2Error> {
+        let failed = |error: &dyn fmt::Display| Ros2Error::Failed(error.to_string());
+        let node_name = NodeName::new(&format!("/{name}"), "control").map_err(|error| failed(&error))?;
+        let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
+        let mut node = context.new_node(node_name, options).map_err(|error| failed(&error))?;
+        let participant = context.domain_participant();
+        let publisher = participant.create_publisher(&policies(MOST_ANSWERS)).map_err(|error| failed(&error))?;
+        let mut open = |service: &'static Service| {
+            let topic = |prefix: &str, suffix: &str, direction: &str, depth: i32| {
+                let topic = format!("{prefix}/{name}/{}{suffix}", service.name);
+                let kind = format!("{}::srv::dds_::{}_{direction}_", service.package, service.kind);
+                participant.create_topic(topic, kind, &policies(depth), TopicKind::NoKey)
+            };
+            let requests = topic("rq", "Request", "Request", REQUEST_DEPTH).map_err(|error| failed(&error))?;
+            let responses = topic("rr", "Reply", "Response", MOST_ANSWERS).map_err(|error| failed(&error))?;
+            let requests = node.create_subscription(&requests, None).map_err(|error| failed(&error))?;
+            let responses: DataWriter<_, _> =
+                publisher.create_datawriter_no_key(&responses, None).map_err(|error| failed(&error))?;
+            let (requests_guid, responses_guid) = (requests.guid(), responses.guid());
+            Ok(Port { service, requests, requests_guid, responses_guid, responses, reported: Reported::default() })
+        };
+        let ports = SERVICES.iter().map(&mut open).collect::<Result<_, Ros2Error>>()?;
+        Ok(Self { ports, _node: node })
+    }
+}
+
+/// As ROS 2 has it for services: reliable, volatile. A full queue refuses at once instead of blocking.
+fn policies(depth: i32) -> QosPolicies {
+    QosPolicyBuilder::new()
+        .reliability(policy::Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO })
+        .durability(policy::Durability::Volatile)
+        .history(policy::History::KeepLast { depth })
+        .resource_limits(ResourceLimits { max_samples: depth, max_instances: 1, max_samples_per_instance: depth })
+        .build()
+}
+
+/// Whom an answer goes to.
+pub(super) struct Client {
+    /// What sent the request.
+    pub(super) writer: GUID,
+    /// What Cyclone wants before the response.
+    pub(super) header: Vec<u8>,
+    /// What the response refers to.
+    pub(super) identity: SampleIdentity,
+    /// What will read the response, where the request names it, as those of Fast DDS do.
+    pub(super) reader: Option<GUID>,
+}
+
+impl Port {
+    /// Sends a response.
+    pub(super) fn answer(&mut self, client: &Client, response: &Response) {
+        let mut bytes = client.header.clone();
+        // The header's 16 bytes leave the alignment of what follows as it is.
+        let Ok(body) = CDRSerializerAdapter::<Response>::to_bytes(response) else { return };
+        bytes.extend_from_slice(&body);
+        let options = WriteOptionsBuilder::new().related_sample_identity(client.identity).build();
+        if self.responses.write_with_options(bytes, options).is_err()
+            && !std::mem::replace(&mut self.reported.discarded, true)
+        {
+            log::warn!(
+                "ROS 2 service {}: a client is so slow, or dead, that answers are discarded until it is back or its lease \
+                 ends (reported once)",
+                self.service.name
+            );
+        }
+    }
+
+    pub(super) fn report_misfit(&mut self, mapping: Mapping, misfit: Misfit) {
+        if std::mem::replace(&mut self.reported.misfit, true) {
+            return;
+        }
+        let name = self.service.name;
+        match misfit {
+            Misfit::OtherMapping(other) => log::warn!(
+                "ROS 2 service {name}: a client calls as {} does, and this publisher answers those of {}: refused \
+                 (reported once). Set RMW_IMPLEMENTATION alike on both sides",
+                other.rmw(),
+                mapping.rmw()
+            ),
+            Misfit::Length(bytes) => log::warn!(
+                "ROS 2 service {name}: a request of {bytes} bytes is none of {}/{}: refused (reported once)",
+                self.service.package,
+                self.service.kind
+            ),
+        }
+    }
+
+    pub(super) fn report_crowd(&mut self, most: usize) {
+        if !std::mem::replace(&mut self.reported.crowd, true) {
+            let name = self.service.name;
+            log::warn!(
+                "ROS 2 service {name}: a process has {most} calls without an answer: further ones are refused \
+                 (reported once)"
+            );
+        }
+    }
+
+    pub(super) fn report_refusal(&mut self, sentence: &str) {
+        if !std::mem::replace(&mut self.reported.refusal, true) {
+            log::warn!("ROS 2 service {}: {sentence} (reported once)", self.service.name);
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! The ROS 2 node and its topics: the sink of the background thread.
+//!
+//! Everything of ros2-client but the participant is created and dropped on that thread.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use ros2_client::{Context, Node, NodeName, NodeOptions};
+
+use super::matching::Matches;
+use super::port::{Attend, Maker, Port, SELDOM_BYTES, Stream};
+use super::{Ros2Config, Ros2Error};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+use bench_dragon_publisher::transports::background::Sink;
+use bench_dragon_ros2_messages::diagnostics::{DiagnosticArray, LoopSecond};
+use bench_dragon_ros2_messages::markers::MarkerArray;
+use bench_dragon_ros2_messages::path::Path;
+use bench_dragon_ros2_messages::settings::{DiagnosticLimits, Topic};
+use bench_dragon_ros2_messages::transforms::TfMessage;
+use bench_dragon_ros2_messages::{Clock, HandlePoses, PoseArray, Stamped};
+
+/// More bytes than a point of the path has.
+const PATH_POSE_BYTES: usize = 88;
+/// More bytes than the transforms of head and tail have, whatever the name.
+const TRANSFORMS_BYTES: usize = 1000;
+/// How long a reliable subscriber is given for the last messages.
+const LINGER: Duration = Duration::from_millis(100);
+
+/// The publishers that the scene requests, and the messages they send, whose memory is used again.
+pub(super) struct Topics {
+    name: String,
+    stage: Stage,
+    handles: Option<Stream<HandlePoses>>,
+    poses: Option<Stream<PoseArray>>,
+    markers: Option<Stream<MarkerArray>>,
+    alerts: Option<Port<Stamped<CollisionAlert>>>,
+    stages: Option<Port<Stamped<Stage>>>,
+    status: Option<Port<Stamped<LoopStatus>>>,
+    diagnostics: Option<Port<DiagnosticArray>>,
+    cues: Option<Port<Stamped<Cue>>>,
+    clock: Option<Port<Clock>>,
+    transforms: Option<Stream<TfMessage>>,
+    path: Option<Port<Path>>,
+    latest_alert: Option<CollisionAlert>,
+    /// The latest status, and the messages discarded by then.
+    diagnosed: (LoopStatus, u64),
+    limits: DiagnosticLimits,
+    /// Messages that a full queue of RustDDS did not take, because a reliable subscriber was slow or dead.
+    discarded: u64,
+    matches: Matches,
+    // Dropped after the publishers: they belong to it.
+    node: Node,
+}
+
+impl Topics {
+    pub(super) fn open(context: Context, matches: Matches, config: Ros2Config) -> Result<Self, Ros2Error> {
+        let Ros2Config { stage, handles, .. } = config;
+        let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(error.to_string());
+        let node_name = NodeName::new(&format!("/{}", config.name), "publisher").map_err(|error| failed(&error))?;
+        // Fewer endpoints, fewer complaints of subscribers that look for what RustDDS cannot send.
+        let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
+        let node = context.new_node(node_name, options).map_err(|error| failed(&error))?;
+        let mut maker = Maker { context, node, config: &config };
+        let path = Arc::new(Path::of(&stage));
+        let path_bytes = SELDOM_BYTES + path.poses.len() * PATH_POSE_BYTES;
+        let mut topics = Self {
+            name: config.name.clone(),
+            stage,
+            handles: maker.stream(Topic::Handles, 40, || HandlePoses::of(handles))?,
+            poses: maker.stream(Topic::Poses, 56, || PoseArray::of(handles))?,
+            markers: maker.stream(Topic::Markers, 300, || MarkerArray::of(&stage))?,
+            alerts: if config.alerts { maker.port(Topic::Alerts, SELDOM_BYTES, 1.0)? } else { None },
+            stages: maker.port(Topic::Stage, SELDOM_BYTES, 1.0)?,
+            status: maker.port(Topic::Status, SELDOM_BYTES, 1.0)?,
+            diagnostics: maker.port(Topic::Diagnostics, SELDOM_BYTES, 1.0)?,
+            cues: if config.cues > 0 { maker.port(Topic::Cues, SELDOM_BYTES, 1.0)? } else { None },
+            clock: maker.port(Topic::Clock, SELDOM_BYTES, config.rate)?,
+            transforms: maker
+                .port(Topic::Tf, TRANSFORMS_BYTES, config.rate)?
+                .map(|port| port.stream(TfMessage::of(&config.name))),
+            path: maker.port(Topic::Path, path_bytes, 1.0)?,
+            latest_alert: None,
+            diagnosed: (LoopStatus::default(), 0),
+            limits: config.settings.diagnostics,
+            discarded: 0,
+            matches,
+            node: maker.node,
+        };
+        // What does not change.
+        if let Some(port) = &mut topics.stages {
+            port.send(Arc::new(Stamped::stage(stage)), &mut topics.discarded);
+        }
+        if let Some(port) = &mut topics.path {
+            port.send(path, &mut topics.discarded);
+        }
+        Ok(topics)
+    }
+}
+
+impl Sink for Topics {
+    fn attend(&mut self) {
+        self.matches.update();
+        fn end<T: Attend>(end: &mut Option<T>) -> Option<&mut dyn Attend> {
+            end.as_mut().map(|end| end as &mut dyn Attend)
+        }
+        let streams = [end(&mut self.handles), end(&mut self.poses), end(&mut self.markers), end(&mut self.transforms)];
+        let seldom = [end(&mut self.alerts), end(&mut self.cues), end(&mut self.stages), end(&mut self.path)];
+        let others = [end(&mut self.status), end(&mut self.diagnostics), end(&mut self.clock)];
+        for end in streams.into_iter().chain(seldom).chain(others).flatten() {
+            end.attend(&self.matches, &mut self.node);
+        }
+    }
+
+    fn frame(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
+        let discarded = &mut self.discarded;
+        if let Some(stream) = &mut self.handles {
+            stream.publish(discarded, |message| message.update(header, handles));
+        }
+        if let Some(stream) = &mut self.poses {
+            stream.publish(discarded, |message| message.update(header, handles));
+        }
+        if let Some(port) = &mut self.clock {
+            port.send(Arc::new(Clock::of(header)), discarded);
+        }
+        if let Some(stream) = &mut self.transforms {
+            stream.publish(discarded, |message| message.update(header, handles));
+        }
+        if let Some(stream) = &mut self.markers {
+            let (stage, alert) = (&self.stage, self.latest_alert.as_ref());
+            stream.publish(discarded, |message| message.update(header, handles, stage, alert));
+        }
+    }
+
+    fn alert(&mut self, alert: CollisionAlert) {
+        self.latest_alert = Some(alert);
+        if let Some(port) = &mut self.alerts {
+            port.send(Arc::new(Stamped::alert(alert)), &mut self.discarded);
+        }
+    }
+
+    fn cue(&mut self, cue: Cue) {
+        if let Some(port) = &mut self.cues {
+            port.send(Arc::new(Stamped::cue(cue)), &mut self.discarded);
+        }
+    }
+
+    fn status(&mut self, status: &LoopStatus) {
+        if let Some(port) = &mut self.status {
+            port.send(Arc::new(Stamped::status(*status)), &mut self.discarded);
+        }
+        if let Some(port) = &mut self.diagnostics {
+            let (before, discarded_before) = std::mem::replace(&mut self.diagnosed, (*status, self.discarded));
+            let (discarded, limits) = (self.discarded, self.limits);
+            let second = LoopSecond { before: &before, discarded, discarded_before, limits };
+            let message = DiagnosticArray::of(&self.name, status, self.latest_alert.as_ref(), &second);
+            port.send(Arc::new(message), &mut self.discarded);
+        }
+    }
+
+    fn discarded(&self) -> u64 {
+        self.discarded
+    }
+
+    fn linger(&self) -> Duration {
+        LINGER
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rustdds::CDRSerializerAdapter;
+    use rustdds::no_key::SerializerAdapter;
+    use serde::Serialize;
+
+    use super::*;
+    use crate::port::HEADER_BYTES;
+    use bench_dragon_messages::{SEGMENT_ARC, SceneName, StageSegment};
+
+    fn bytes<Message: Serialize>(message: &Message) -> usize {
+        CDRSerializerAdapter::<Message>::to_bytes(message).unwrap().len()
+    }
+
+    #[test]
+    fn no_message_is_larger_than_its_bound() {
+        let status = LoopStatus { scene: SceneName::new(&"n".repeat(100)), ..LoopStatus::default() };
+        let alert = CollisionAlert { level: 1, event: 2, ..CollisionAlert::default() };
+        let worst = LoopStatus {
+            skipped: u64::MAX,
+            unforeseen_contacts: u64::MAX,
+            unsolved_frames: u64::MAX,
+            lateness_p99_second: u64::MAX,
+            ..status
+        };
+        let limits = DiagnosticLimits { lateness_warn: 0.0, ..DiagnosticLimits::default() };
+        let second = LoopSecond { before: &status, discarded: u64::MAX, discarded_before: 0, limits };
+        // iceoryx2 takes no longer name.
+        let diagnostics = DiagnosticArray::of(&"n".repeat(255), &worst, Some(&alert), &second);
+        let seldom = [
+            bytes(&Stamped::stage(Stage::default())),
+            bytes(&Stamped::status(status)),
+            bytes(&Stamped::alert(alert)),
+            bytes(&diagnostics),
+            bytes(&Stamped::cue(Cue { name: SceneName::new(&"n".repeat(100)), ..Cue::default() })),
+            bytes(&Clock::of(&FrameHeader::default())),
+        ];
+        assert!(seldom.iter().all(|bytes| *bytes < SELDOM_BYTES), "{seldom:?} bytes of {SELDOM_BYTES}");
+        let mut stage = Stage { segments: 1, ..Stage::default() };
+        stage.path[0] = StageSegment { length: 10.0, curvature: 10.0, kind: SEGMENT_ARC, ..StageSegment::default() };
+        let path = Path::of(&stage);
+        assert!(path.poses.len() > 1000 && bytes(&path) < SELDOM_BYTES + path.poses.len() * PATH_POSE_BYTES);
+        let transforms = bytes(&TfMessage::of(&"n".repeat(255)));
+        assert!(transforms < TRANSFORMS_BYTES, "{transforms}");
+        assert!(bytes(&HandlePoses::of(224)) < HEADER_BYTES + 224 * size_of::<HandlePose>());
+    }
+}

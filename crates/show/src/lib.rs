@@ -1,0 +1,389 @@
+//! The show: from a scene and a tick to one [`Frame`], the same bits every time.
+//!
+//! In: a scene, its timeline, and ticks. Out: frames. Knows the solver, the events and the alert rules; knows no wall
+//! clock and no transport. The live loop calls it.
+
+pub mod alerts;
+pub mod clock;
+pub mod convert;
+mod playback;
+pub mod scene;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use crate::scene::cue::CueAction;
+use crate::scene::{OnContact, Scene};
+use bench_dragon_messages::state::EventKind;
+use bench_dragon_motion::clearance::{ClearanceMonitor, PairClearance};
+use bench_dragon_motion::event::Event;
+use bench_dragon_motion::linkage::NoFollower;
+use bench_dragon_motion::solve::{Chain, Solver, Velocities};
+use bench_dragon_motion::timeline::{TimedEvent, Timeline};
+use bench_dragon_motion::{Choice, Method};
+
+use alerts::{Alert, LevelTracker};
+use bench_dragon_messages::control::{COMMANDS_PER_FRAME, Code, Command, CommandRecord};
+use bench_dragon_messages::state::{FrameState, PlaybackState};
+use clock::{CueTime, ShowClock, ShowTime};
+pub use playback::{Playback, StartError};
+
+/// One moment of the show.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// The number of the period.
+    pub tick: u64,
+    /// Simulated seconds since the start of the scene.
+    pub sim_time: f64,
+    /// Simulated seconds per second of wall time, as in force: 0 while paused or held, unchanged once the show has ended.
+    pub time_scale: f64,
+    /// The latest event passed, or `Approaching`, or `Moving`.
+    pub state: FrameState,
+    /// Whether simulated time advances.
+    pub playback: PlaybackState,
+    /// Where every handle is.
+    pub chain: Chain,
+    /// Metres between the nearest two boards that share no handle; NaN where none is computed.
+    pub min_clearance: f64,
+    /// The alerts that go with this frame, in order. Its memory is reserved once.
+    pub alerts: Vec<Alert>,
+    /// Jumps of simulated time so far: loops, seeks, restarts.
+    pub epoch: u32,
+    /// The latest cue passed, counted from 1 in the order of their times; 0 where none has been.
+    pub cue: u32,
+    /// The cues reached since the frame before, in order. Its memory is reserved once.
+    pub cues: Vec<ReachedCue>,
+    /// What the show was commanded at the beginning of this period, and a step that was over, in order. Its memory is
+    /// reserved once.
+    pub commands: Vec<CommandRecord>,
+    /// Times the show has been played to its end and begun again.
+    pub shows_played: u64,
+    /// Contacts so far that no search had found: boards that overlapped before any contact was due.
+    pub unforeseen_contacts: u64,
+    /// Frames so far for whose time there was no solution, so that the one before was shown again.
+    pub unsolved_frames: u64,
+}
+
+impl Frame {
+    /// A frame of so many handles, all at the origin, before anything has happened.
+    pub fn new(handles: usize) -> Self {
+        Self {
+            tick: 0,
+            sim_time: 0.0,
+            time_scale: 1.0,
+            state: FrameState::Moving,
+            playback: PlaybackState::Playing,
+            chain: Chain::new(handles),
+            min_clearance: f64::NAN,
+            alerts: Vec::with_capacity(alerts::MOST_PER_FRAME),
+            epoch: 0,
+            cue: 0,
+            cues: Vec::new(),
+            commands: Vec::with_capacity(COMMANDS_PER_FRAME),
+            shows_played: 0,
+            unforeseen_contacts: 0,
+            unsolved_frames: 0,
+        }
+    }
+}
+
+/// A cue that a frame has reached.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReachedCue {
+    /// Its number, from 1 in the order of the cues' times.
+    pub number: u32,
+    /// Simulated seconds at which it is.
+    pub time: f64,
+    /// Whether the show waits there for [`Command::Go`].
+    pub pauses: bool,
+    /// Its name.
+    pub name: Arc<str>,
+}
+
+/// How a command was answered, and how the show stands then.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// What became of the command.
+    pub code: Code,
+    /// The period at whose beginning it was obeyed, or a step was over.
+    pub tick: u64,
+    /// Simulated seconds of that period.
+    pub sim_time: f64,
+    /// Simulated seconds per second, as in force.
+    pub time_scale: f64,
+    /// Simulated seconds per second while the show plays; kept through a pause.
+    pub playing_rate: f64,
+    /// Whether simulated time advances.
+    pub playback: PlaybackState,
+    /// The latest cue passed, from 1.
+    pub cue: u32,
+}
+
+/// A scene being played.
+pub struct Show {
+    clock: ShowClock,
+    solver: Box<dyn Solver>,
+    solver_reason: String,
+    velocities: Velocities,
+    /// What the head travels in a simulated second; not a number where the method does not follow the path exactly.
+    metres_per_second: f64,
+    timeline: Timeline,
+    clearance: Option<ClearanceMonitor>,
+    level: Option<LevelTracker>,
+    /// Metres of overlap that no search has let pass; `None` where the solver does not follow the searched motion.
+    overlap_tolerance: Option<f64>,
+    /// The time that the chain was asked for, and whether it moves then.
+    solved: Option<(f64, bool)>,
+    /// The time at which it stands: not a number before the first solution.
+    solved_at: f64,
+    /// In the order of their times.
+    cues: Vec<ReachedCue>,
+    missing_cues: Vec<String>,
+    /// What the next frame reports of commands.
+    commands: Vec<CommandRecord>,
+    /// Whether a step has begun whose end no frame has reported.
+    stepping: bool,
+    frame: Frame,
+}
+
+/// Metres of overlap before the contact, as a share of the longest link, that rounding explains in an exact frame.
+const ROUNDING_OVERLAP: f64 = 1e-9;
+
+impl Show {
+    /// A show of `scene`, whose events `timeline` holds.
+    ///
+    /// # Errors
+    /// A start before the scene's own or after the motion's end.
+    pub fn new(scene: &Scene, timeline: Timeline, playback: Playback) -> Result<Self, StartError> {
+        let end = timeline.end();
+        if !(playback.start >= 0.0 && playback.start < end.time) {
+            return Err(StartError { start: playback.start, end: end.time, kind: end.event.kind });
+        }
+        let mut timeline = if scene.alerts.is_some() { timeline } else { timeline.end_only() };
+        timeline.reserve_contact();
+        let stops = scene.alerts.is_some() && playback.on_contact == OnContact::Stop;
+        let freeze_time = timeline.freeze(stops).time;
+        let level = scene.alerts.map(|rules| LevelTracker::new(rules, playback.rate));
+        let choice = scene.motion.solver(scene.velocities);
+        let clearance = scene.alerts.map(|_| scene.motion.clearance_monitor(&choice));
+        let rounding = ROUNDING_OVERLAP * scene.team().longest_link() + choice.clearance_error(scene.team());
+        let Choice { solver, reason, .. } = choice;
+        let exact = !matches!(scene.motion.method(), Method::Paper(_));
+        let (cues, missing_cues) = cues(scene, &timeline);
+        let cue_times = cues.iter().map(|cue| CueTime { time: cue.time, pauses: cue.pauses }).collect();
+        let frame = Frame { cues: Vec::with_capacity(2 * cues.len()), ..Frame::new(scene.team().handles()) };
+        Ok(Self {
+            clock: ShowClock::new(&playback, freeze_time, cue_times),
+            solver,
+            solver_reason: reason,
+            velocities: scene.velocities,
+            metres_per_second: scene.motion.travelled_at(1.0),
+            timeline,
+            clearance,
+            level,
+            overlap_tolerance: exact.then_some(rounding),
+            solved: None,
+            solved_at: f64::NAN,
+            cues,
+            missing_cues,
+            commands: Vec::with_capacity(COMMANDS_PER_FRAME),
+            stepping: false,
+            frame,
+        })
+    }
+
+    /// The cues of this show, in the order of their times.
+    pub fn cues(&self) -> &[ReachedCue] {
+        &self.cues
+    }
+
+    /// The names of cues before an event that does not happen, or before the scene's start.
+    pub fn missing_cues(&self) -> &[String] {
+        &self.missing_cues
+    }
+
+    /// The solver of this show and why it was chosen, for people.
+    pub fn solver_reason(&self) -> &str {
+        &self.solver_reason
+    }
+
+    /// The events of this show, in order.
+    pub fn timeline(&self) -> &Timeline {
+        &self.timeline
+    }
+
+    /// Simulated seconds at which the show freezes.
+    pub fn freeze_time(&self) -> f64 {
+        self.clock.freeze_time()
+    }
+
+    /// Pairs of boards tested for their separation so far: none where the scene has no alerts.
+    pub fn pairs_tested(&self) -> u64 {
+        self.clearance.as_ref().map_or(0, |monitor| monitor.counters().pairs)
+    }
+
+    /// Obeys a command at the beginning of the period `tick`, before its frame. `None` for a step, which
+    /// [`finished_step`](Self::finished_step) answers once it is over.
+    pub fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
+        // A step that is over by now came before the command.
+        self.clock.advance(tick);
+        self.record_finished_step();
+        let code = self.clock.apply(tick, command);
+        self.record_finished_step();
+        self.commands.push(CommandRecord::Given { command, code });
+        self.stepping |= code.is_none();
+        let code = code?;
+        if code == Code::Done && matches!(command, Command::Seek(_) | Command::Restart) {
+            // The level after this is published anew, even where it is the same as before.
+            self.level.iter_mut().for_each(LevelTracker::forget);
+        }
+        Some(self.outcome(tick, code))
+    }
+
+    /// The answer to the step that was over, or was broken off, at `tick`. To be called after its frame, and before a
+    /// command, which may be the next step.
+    pub fn finished_step(&mut self, tick: u64) -> Option<Outcome> {
+        self.clock.advance(tick);
+        self.record_finished_step();
+        let code = self.clock.take_step_outcome()?;
+        Some(self.outcome(tick, code))
+    }
+
+    /// Notes for the next frame that a step is over, once.
+    fn record_finished_step(&mut self) {
+        if self.stepping
+            && let Some(code) = self.clock.step_outcome()
+        {
+            self.stepping = false;
+            self.commands.push(CommandRecord::StepFinished { code });
+        }
+    }
+
+    fn outcome(&mut self, tick: u64, code: Code) -> Outcome {
+        let ShowTime { sim_time, time_scale, playback, cues_passed, .. } = self.clock.advance(tick);
+        let playing_rate = self.clock.playing_rate();
+        Outcome { code, tick, sim_time, time_scale, playing_rate, playback, cue: cues_passed as u32 }
+    }
+
+    /// The frame of a tick: time, chain, clearance, state, alerts, cues.
+    ///
+    /// Ticks are given in increasing order; some may be left out. The same ticks with the same commands give the same
+    /// bits.
+    pub fn frame(&mut self, tick: u64) -> &Frame {
+        let ShowTime { sim_time, time_scale, playback, epoch, shows_played, cues_passed } = self.clock.advance(tick);
+        let jumped = epoch != self.frame.epoch;
+        self.record_finished_step();
+        let frame = &mut self.frame;
+        frame.commands.clear();
+        frame.commands.append(&mut self.commands);
+        frame.cues.clear();
+        frame.cues.extend(self.clock.reached().iter().map(|cue| self.cues[*cue].clone()));
+        self.clock.clear_reached();
+        (frame.tick, frame.sim_time, frame.time_scale, frame.playback) = (tick, sim_time, time_scale, playback);
+        (frame.epoch, frame.shows_played, frame.cue) = (epoch, shows_played, cues_passed as u32);
+        self.solve(sim_time);
+        let closest = self.measure_clearance();
+        self.record_unforeseen_contact(closest);
+        self.update_state(jumped, closest);
+        &self.frame
+    }
+
+    /// Brings the chain to a time. A show that stands still is solved once.
+    fn solve(&mut self, sim_time: f64) {
+        let moves = self.frame.playback == PlaybackState::Playing;
+        if self.solved == Some((sim_time, moves)) {
+            return;
+        }
+        self.solved = Some((sim_time, moves));
+        let at = solve_at_or_just_before(self.solver.as_mut(), sim_time, &mut self.frame.chain);
+        self.solved_at = at.unwrap_or_else(|_| {
+            self.frame.unsolved_frames += 1;
+            f64::NAN
+        });
+        if !moves && self.velocities == Velocities::Computed {
+            let Chain { speed, vx, vy, .. } = &mut self.frame.chain;
+            [speed, vx, vy].into_iter().for_each(|numbers| numbers.fill(0.0));
+        }
+    }
+
+    fn measure_clearance(&mut self) -> Option<PairClearance> {
+        let travelled = self.metres_per_second * self.solved_at;
+        let least = self.clearance.as_mut()?.least_clearance(&self.frame.chain, travelled);
+        self.frame.min_clearance = least.map_or(f64::NAN, |least| least.value);
+        least
+    }
+
+    /// Boards that overlap while no contact has happened are a contact now, whatever the searches found.
+    fn record_unforeseen_contact(&mut self, closest: Option<PairClearance>) {
+        let (Some(tolerance), Some(closest)) = (self.overlap_tolerance, closest) else { return };
+        let time = self.frame.sim_time;
+        let happened = self.timeline.find(EventKind::Contact).is_some_and(|contact| contact.time <= time);
+        if closest.value >= -tolerance || happened {
+            return;
+        }
+        self.frame.unforeseen_contacts += 1;
+        let event = Event {
+            kind: EventKind::Contact,
+            travelled: f64::NAN,
+            bench_a: Some(closest.bench_a as u32),
+            bench_b: Some(closest.bench_b as u32),
+            place: Some(nalgebra::center(&closest.point_a, &closest.point_b)),
+        };
+        self.timeline.record_contact(TimedEvent { event, time });
+    }
+
+    fn update_state(&mut self, jumped: bool, closest: Option<PairClearance>) {
+        let frame = &mut self.frame;
+        frame.alerts.clear();
+        let passed = self.timeline.latest_passed(frame.sim_time);
+        frame.state = passed.map_or(FrameState::Moving, |passed| passed.event.kind.into());
+        let Some(level) = &mut self.level else { return };
+        if jumped {
+            level.restart();
+        }
+        let moves = frame.playback == PlaybackState::Playing;
+        level.update(frame.tick, frame.sim_time, moves, &self.timeline, closest, &mut frame.alerts);
+        if passed.is_none() {
+            frame.state = level.current().into();
+        }
+    }
+}
+
+/// The cues of a scene in the order of their times, and the names of those that have none.
+fn cues(scene: &Scene, timeline: &Timeline) -> (Vec<ReachedCue>, Vec<String>) {
+    let (mut cues, mut missing) = (Vec::new(), Vec::new());
+    for cue in &scene.cues {
+        match cue.time(&scene.motion, timeline) {
+            Some(time) => {
+                let pauses = cue.then == CueAction::Pause;
+                cues.push(ReachedCue { number: 0, time, pauses, name: cue.name.as_str().into() });
+            }
+            None => missing.push(cue.name.clone()),
+        }
+    }
+    cues.sort_by(|a, b| a.time.total_cmp(&b.time));
+    cues.iter_mut().zip(1..).for_each(|(cue, number)| cue.number = number);
+    (cues, missing)
+}
+
+/// Solves at `time`, or at the latest moment before it at which there is a solution, and returns that moment.
+///
+/// The time of a lock, multiplied by the speed again, can lie past the lock by the last digit; the paper's solver is
+/// one of its own time steps ahead. Nothing else steps back, and nothing does so by more than 1e-4 of the time.
+///
+/// # Errors
+/// [`NoFollower`] where there is none as near; `chain` is then unspecified.
+pub fn solve_at_or_just_before(solver: &mut dyn Solver, time: f64, chain: &mut Chain) -> Result<f64, NoFollower> {
+    let mut back = f64::EPSILON * time;
+    let mut at = time;
+    while let Err(none) = solver.solve(at, chain) {
+        at = time - back;
+        back *= 2.0;
+        // Not a number, and a time of 0, end it too.
+        if !(back > 0.0 && back <= 1e-4 * time) {
+            return Err(none);
+        }
+    }
+    Ok(at)
+}

@@ -1,0 +1,427 @@
+//! The file a user writes, checked once and turned into the types of the model.
+//!
+//! In: TOML text, or what the command line overrides. Out: a [`Scene`], whose existence is the proof that every number
+//! is in range and that the start is legal. Errors name the file, the line, the field and what was expected.
+
+pub mod accepted;
+pub mod cue;
+pub mod path;
+pub mod precision;
+pub mod ros2;
+mod text;
+
+use std::path::Path as FilePath;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+pub use self::accepted::Accepted;
+use self::cue::{Cue, RawCue};
+use self::path::RawPath;
+use self::precision::Precision;
+pub use self::precision::SinglePrecision;
+use self::ros2::RawRos2;
+pub use self::text::{SceneText, printable};
+use bench_dragon_motion::model::description::PathDescription;
+use bench_dragon_motion::model::team::Team;
+use bench_dragon_motion::solve::Velocities;
+use bench_dragon_motion::solve::paper::PaperRules;
+use bench_dragon_motion::{Method, Motion, MotionError};
+use bench_dragon_ros2_messages::settings::Ros2Settings;
+
+/// The paper's scene, as built into the program.
+const PAPER: &str = include_str!("../../../config/paper.toml");
+/// Subscribers that each iceoryx2 service admits at once by default.
+const DEFAULT_SUBSCRIBERS: usize = 8;
+/// Seconds of wall time for which a looping show stands at its end by default.
+const DEFAULT_END_HOLD: f64 = 5.0;
+
+/// Input that cannot be used, in one sentence that names the place and what was expected.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}", printable(.0))]
+pub struct SceneError(String);
+
+/// The solvers that a scene can name.
+#[derive(Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum SolverName {
+    /// Exact motion, each follower bracketed.
+    Newton,
+    /// Exact motion, every handle interpolated in a table of where such chains stand.
+    FollowerTable,
+    /// The paper's rules.
+    Paper,
+}
+
+/// What `run` does when two boards touch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OnContact {
+    /// The show freezes at the contact.
+    Stop,
+    /// The show continues.
+    Continue,
+}
+
+/// What `run` does once the show has frozen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AtEnd {
+    /// It publishes the frozen frame until it is ended.
+    Hold,
+    /// It begins again at the start.
+    Loop,
+}
+
+/// When to warn of what lies ahead.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AlertRules {
+    /// Simulated seconds before an event.
+    pub approach_time: f64,
+    /// Metres between two boards.
+    pub approach_clearance: f64,
+}
+
+/// A scene: what is danced, how exactly, and how it is published.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon_show::scene::{Scene, SceneText};
+///
+/// let twenty = SceneText::paper().text.replace("benches = 223", "benches = 20");
+/// let scene = Scene::parse(&twenty, "twenty.toml", "twenty")?;
+/// assert_eq!(scene.team().handles(), 21);
+/// // What cannot be used is named by file, line and field.
+/// let wrong = twenty.replace("pitch = 0.55", "pitch = 0");
+/// let error = Scene::parse(&wrong, "wrong.toml", "wrong").unwrap_err().to_string();
+/// assert!(error.starts_with("wrong.toml, line ") && error.contains("path.pitch is 0, expected"), "{error}");
+/// # Ok::<(), bench_dragon_show::scene::SceneError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// The scene's name; by default the stem of its file.
+    pub name: String,
+    /// The team on its path, and how exactly it is followed.
+    pub motion: Motion,
+    /// What happens at a contact.
+    pub on_contact: OnContact,
+    /// What happens at the end.
+    pub at_end: AtEnd,
+    /// Seconds of wall time for which a looping show stands at its end.
+    pub end_hold: f64,
+    /// The moments that have names, in the order of the file.
+    pub cues: Vec<Cue>,
+    /// When to warn; `None` where the scene requests no alerts.
+    pub alerts: Option<AlertRules>,
+    /// Frames per second.
+    pub rate: f64,
+    /// Whether velocities are computed.
+    pub velocities: Velocities,
+    /// The service of poses in single precision beside that of whole frames; `None` where the scene asks for none.
+    pub single_precision: Option<SinglePrecision>,
+    /// Frames a subscriber may fall behind, where the scene states it.
+    pub queue: Option<usize>,
+    /// Subscribers that each iceoryx2 service admits at once.
+    pub subscribers: usize,
+    /// The ROS 2 topics; `None` where the scene requests none.
+    pub ros2: Option<Ros2Settings>,
+}
+
+impl Scene {
+    /// The scene of the paper, which is built in.
+    pub fn paper() -> Self {
+        // A test parses the built-in text, and nothing can change it afterwards.
+        SceneText::paper().parse().expect("the built-in scene is valid")
+    }
+
+    /// Reads a scene from a file.
+    ///
+    /// # Errors
+    /// One sentence for a file that cannot be read or used.
+    pub fn load(file: &FilePath) -> Result<Self, SceneError> {
+        SceneText::load(file)?.parse()
+    }
+
+    /// Reads a scene from TOML text. `file` is how errors call it, `stem` its name where it gives none itself.
+    ///
+    /// # Errors
+    /// One sentence that names the file, the line, the field and what was expected.
+    pub fn parse(text: &str, file: &str, stem: &str) -> Result<Self, SceneError> {
+        let source = Source { text, file };
+        let deserializer = toml::Deserializer::parse(text).map_err(|error| source.toml_error(&error, ""))?;
+        let raw: RawScene = serde_path_to_error::deserialize(deserializer)
+            .map_err(|error| source.toml_error(error.inner(), &error.path().to_string()))?;
+        raw.validated(&source, stem)
+    }
+
+    /// The benches.
+    pub fn team(&self) -> &Team {
+        self.motion.team()
+    }
+
+    /// Whether a show of this scene stops at a contact: it computes none without alerts.
+    pub fn stops_at_contact(&self) -> bool {
+        self.alerts.is_some() && self.on_contact == OnContact::Stop
+    }
+}
+
+/// The text being read, for finding lines.
+struct Source<'a> {
+    text: &'a str,
+    file: &'a str,
+}
+
+impl Source<'_> {
+    fn line(&self, offset: usize) -> usize {
+        self.text.as_bytes().iter().take(offset).filter(|byte| **byte == b'\n').count() + 1
+    }
+
+    /// What the TOML reader refused, in one sentence.
+    fn toml_error(&self, error: &toml::de::Error, field: &str) -> SceneError {
+        let place = error.span().map_or(String::new(), |span| format!(", line {}", self.line(span.start)));
+        // What carries its place in the text is wrapped in a field that no user wrote.
+        let field = field.replace(".$__serde_spanned_private_value", "");
+        let field = if field.is_empty() || field == "." { String::new() } else { format!("{field}: ") };
+        let message = error.message().trim().replace('\n', ", ");
+        let message =
+            message.replace("expected i64", "expected an integer").replace("expected f64", "expected a number");
+        SceneError(format!("{}{place}: {field}{message}", self.file))
+    }
+
+    fn field_error<T>(&self, value: &Spanned<T>, sentence: &str) -> SceneError {
+        self.field_error_at(value.span().start, sentence)
+    }
+
+    fn field_error_at(&self, offset: usize, sentence: &str) -> SceneError {
+        SceneError(format!("{}, line {}: {sentence}", self.file, self.line(offset)))
+    }
+
+    /// A name, which is printed as it is.
+    fn printable(&self, field: &str, value: &Spanned<String>) -> Result<String, SceneError> {
+        let name = value.get_ref();
+        if name.chars().any(char::is_control) {
+            let sentence = format!("{field} has a control character in it, expected text of one line");
+            return Err(self.field_error(value, &sentence));
+        }
+        Ok(name.clone())
+    }
+
+    fn check(&self, field: &str, value: &Spanned<f64>, accepted: Accepted) -> Result<f64, SceneError> {
+        accepted.check(field, *value.get_ref()).map_err(|sentence| self.field_error(value, &sentence))
+    }
+
+    fn check_count(&self, field: &str, value: &Spanned<i64>, accepted: Accepted) -> Result<usize, SceneError> {
+        let number =
+            accepted.check(field, *value.get_ref() as f64).map_err(|sentence| self.field_error(value, &sentence))?;
+        Ok(number as usize)
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawScene {
+    name: Option<Spanned<String>>,
+    team: RawTeam,
+    path: RawPath,
+    motion: RawMotion,
+    alerts: Option<RawAlerts>,
+    #[serde(default)]
+    cues: Vec<RawCue>,
+    #[serde(default)]
+    publish: RawPublish,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawTeam {
+    benches: Spanned<i64>,
+    head_length: Spanned<f64>,
+    body_length: Spanned<f64>,
+    width: Spanned<f64>,
+    hole_inset: Spanned<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawMotion {
+    head_speed: Spanned<f64>,
+    accuracy: Option<Spanned<f64>>,
+    solver: Option<Spanned<SolverName>>,
+    paper: Option<Spanned<RawPaper>>,
+    on_contact: Option<OnContact>,
+    at_end: Option<AtEnd>,
+    end_hold: Option<Spanned<f64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPaper {
+    time_step: Option<Spanned<f64>>,
+    difference_interval: Option<Spanned<f64>>,
+    bisection_tolerance: Option<Spanned<f64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawAlerts {
+    approach_time: Option<Spanned<f64>>,
+    approach_clearance: Option<Spanned<f64>>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPublish {
+    rate: Option<Spanned<f64>>,
+    velocities: Option<bool>,
+    #[serde(default)]
+    precision: Precision,
+    every: Option<Spanned<i64>>,
+    queue: Option<Spanned<i64>>,
+    subscribers: Option<Spanned<i64>>,
+    ros2: Option<RawRos2>,
+}
+
+impl RawScene {
+    fn validated(self, source: &Source, stem: &str) -> Result<Scene, SceneError> {
+        let team = self.team.validated(source)?;
+        let description = self.path.validated(source, &team)?;
+        let head_speed = source.check("motion.head_speed", &self.motion.head_speed, Accepted::SPEED)?;
+        let method = self.motion.method(source)?;
+        if let (Method::Paper(rules), PathDescription::Spiral { pitch, start_turn }) = (method, &description)
+            && path::is_folded_after(*pitch, *start_turn, head_speed * rules.time_step, &team)
+        {
+            return Err(self.motion.first_step_error(source, rules.time_step));
+        }
+        let motion = Motion::new(description, team, head_speed, method).map_err(|error| {
+            match (&error, &self.motion.solver) {
+                (MotionError::PaperElsewhere, Some(given)) => source.field_error(
+                    given,
+                    "motion.solver is \"paper\", which follows spirals only, expected another solver or no such field",
+                ),
+                _ => self.path.error(source, &error.to_string()),
+            }
+        })?;
+        let name = match &self.name {
+            None => stem.to_owned(),
+            Some(name) if name.get_ref().trim().is_empty() => {
+                return Err(source.field_error(name, "name is empty, expected a name or no such field"));
+            }
+            Some(name) => source.printable("name", name)?,
+        };
+        let rate =
+            self.publish.rate.as_ref().map_or(Ok(60.0), |rate| source.check("publish.rate", rate, Accepted::RATE))?;
+        let queue =
+            self.publish.queue.as_ref().map(|queue| source.check_count("publish.queue", queue, Accepted::QUEUE));
+        let subscribers = self.publish.subscribers.as_ref().map_or(Ok(DEFAULT_SUBSCRIBERS), |subscribers| {
+            source.check_count("publish.subscribers", subscribers, Accepted::SUBSCRIBERS)
+        })?;
+        let velocities = self.publish.velocities.unwrap_or(true);
+        Ok(Scene {
+            name,
+            motion,
+            on_contact: self.motion.on_contact.unwrap_or(OnContact::Stop),
+            at_end: self.motion.at_end.unwrap_or(AtEnd::Hold),
+            end_hold: self
+                .motion
+                .end_hold
+                .as_ref()
+                .map_or(Ok(DEFAULT_END_HOLD), |seconds| source.check("motion.end_hold", seconds, Accepted::END_HOLD))?,
+            cues: self.cues.iter().map(|cue| cue.validated(source, self.alerts.is_some())).collect::<Result<_, _>>()?,
+            alerts: self.alerts.as_ref().map(|alerts| alerts.validated(source)).transpose()?,
+            rate,
+            velocities: if velocities { Velocities::Computed } else { Velocities::Omitted },
+            single_precision: self.publish.precision.single(self.publish.every.as_ref(), source)?,
+            queue: queue.transpose()?,
+            subscribers,
+            ros2: self.publish.ros2.as_ref().map(|ros2| ros2.validated(source)).transpose()?,
+        })
+    }
+}
+
+impl RawTeam {
+    fn validated(&self, source: &Source) -> Result<Team, SceneError> {
+        let length = |field, value| source.check(field, value, Accepted::LENGTH);
+        let team = Team {
+            benches: source.check_count("team.benches", &self.benches, Accepted::BENCHES)?,
+            head_length: length("team.head_length", &self.head_length)?,
+            body_length: length("team.body_length", &self.body_length)?,
+            width: length("team.width", &self.width)?,
+            hole_inset: length("team.hole_inset", &self.hole_inset)?,
+        };
+        for (field, board) in [("head_length", &self.head_length), ("body_length", &self.body_length)] {
+            // Anything shorter has its two holes in one place, or crosswise.
+            if *board.get_ref() - 2.0 * team.hole_inset < Accepted::LENGTH.least {
+                let sentence = format!(
+                    "team.{field} is {} and leaves no bench between its holes, expected more than twice \
+                     team.hole_inset ({}) by at least {} metres",
+                    board.get_ref(),
+                    team.hole_inset,
+                    Accepted::LENGTH.least
+                );
+                return Err(source.field_error(board, &sentence));
+            }
+        }
+        Ok(team)
+    }
+}
+
+impl RawMotion {
+    /// The paper's rules are one step ahead of the time: the first frame is where the first step ends.
+    fn first_step_error(&self, source: &Source, time_step: f64) -> SceneError {
+        let sentence = format!(
+            "motion.paper.time_step is {time_step}, after which the head is so near the centre that a bench is folded back \
+             on itself, expected a shorter one"
+        );
+        let given = self.paper.as_ref().and_then(|paper| paper.get_ref().time_step.as_ref());
+        source.field_error(given.unwrap_or(&self.head_speed), &sentence)
+    }
+
+    fn method(&self, source: &Source) -> Result<Method, SceneError> {
+        let solver = self.solver.as_ref().map(|solver| *solver.get_ref());
+        if let (Some(paper), true) = (&self.paper, solver != Some(SolverName::Paper)) {
+            let sentence = "motion.paper is given but motion.solver is not \"paper\", expected both or neither";
+            return Err(source.field_error(paper, sentence));
+        }
+        match (&self.accuracy, solver) {
+            (Some(accuracy), Some(_)) => {
+                let sentence = "motion.accuracy and motion.solver are both given, expected one of them";
+                Err(source.field_error(accuracy, sentence))
+            }
+            (Some(accuracy), None) => {
+                Ok(Method::Accuracy(source.check("motion.accuracy", accuracy, Accepted::ACCURACY)?))
+            }
+            (None, None) => Ok(Method::Accuracy(1e-9)),
+            (None, Some(SolverName::Newton)) => Ok(Method::Newton),
+            (None, Some(SolverName::FollowerTable)) => Ok(Method::FollowerTable),
+            (None, Some(SolverName::Paper)) => Ok(Method::Paper(self.paper_rules(source)?)),
+        }
+    }
+
+    fn paper_rules(&self, source: &Source) -> Result<PaperRules, SceneError> {
+        let usual = PaperRules::default();
+        let Some(paper) = &self.paper else { return Ok(usual) };
+        let RawPaper { time_step, difference_interval, bisection_tolerance } = paper.get_ref();
+        let number = |field: &str, value: &Option<Spanned<f64>>, usual| {
+            let field = format!("motion.paper.{field}");
+            value.as_ref().map_or(Ok(usual), |value| source.check(&field, value, Accepted::PAPER_RULE))
+        };
+        Ok(PaperRules {
+            time_step: number("time_step", time_step, usual.time_step)?,
+            difference_interval: number("difference_interval", difference_interval, usual.difference_interval)?,
+            bisection_tolerance: number("bisection_tolerance", bisection_tolerance, usual.bisection_tolerance)?,
+        })
+    }
+}
+
+impl RawAlerts {
+    fn validated(&self, source: &Source) -> Result<AlertRules, SceneError> {
+        let number = |field, value: &Option<Spanned<f64>>, default| {
+            value.as_ref().map_or(Ok(default), |value| source.check(field, value, Accepted::WARNING))
+        };
+        Ok(AlertRules {
+            approach_time: number("alerts.approach_time", &self.approach_time, 10.0)?,
+            approach_clearance: number("alerts.approach_clearance", &self.approach_clearance, 0.05)?,
+        })
+    }
+}

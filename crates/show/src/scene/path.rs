@@ -1,0 +1,295 @@
+//! The `[path]` table: a spiral, a turnaround, or a route of lines and arcs.
+//!
+//! In: what serde has read. Out: a [`PathDescription`], or one sentence about the field that is wrong. Only [`super`]
+//! calls it.
+
+use std::f64::consts::TAU;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::{Accepted, SceneError, Source};
+use bench_dragon_motion::linkage::follower;
+use bench_dragon_motion::model::Point;
+use bench_dragon_motion::model::curve::{Curve, Side};
+use bench_dragon_motion::model::description::{PathDescription, RouteStep};
+use bench_dragon_motion::model::double_double::DoubleDouble;
+use bench_dragon_motion::model::path::Path;
+use bench_dragon_motion::model::root::bisect_predicate;
+use bench_dragon_motion::model::spiral::{Direction, Spiral};
+use bench_dragon_motion::model::team::Team;
+
+/// The most segments of a route.
+pub(crate) const MOST_STEPS: usize = 31;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawPath {
+    kind: Spanned<String>,
+    pitch: Option<Spanned<f64>>,
+    start_turn: Option<Spanned<f64>>,
+    turn_radius: Option<Spanned<f64>>,
+    arc_ratio: Option<Spanned<f64>>,
+    lead_in: Option<Spanned<f64>>,
+    lead_out: Option<Spanned<f64>>,
+    start: Option<Spanned<[f64; 2]>>,
+    heading_turns: Option<Spanned<f64>>,
+    pieces: Option<Spanned<Vec<Spanned<RawStep>>>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawStep {
+    kind: RawStepKind,
+    length: Option<Spanned<f64>>,
+    radius: Option<Spanned<f64>>,
+    turns: Option<Spanned<f64>>,
+    side: Option<RawSide>,
+}
+
+#[derive(Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum RawStepKind {
+    Line,
+    Arc,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum RawSide {
+    Left,
+    Right,
+}
+
+impl RawPath {
+    /// The path that is meant.
+    pub(super) fn validated(&self, source: &Source, team: &Team) -> Result<PathDescription, SceneError> {
+        match self.kind.get_ref().as_str() {
+            "spiral" => self.spiral(source, team),
+            "turnaround" => self.turnaround(source, team),
+            "pieces" => self.route(source),
+            other => {
+                let sentence = format!("path.kind is \"{other}\", expected \"spiral\", \"turnaround\" or \"pieces\"");
+                Err(source.field_error(&self.kind, &sentence))
+            }
+        }
+    }
+
+    /// An error of the path as a whole.
+    pub(super) fn error(&self, source: &Source, sentence: &str) -> SceneError {
+        source.field_error(&self.kind, sentence)
+    }
+
+    /// Refuses fields that the kind does not have.
+    fn only(&self, source: &Source, fields: &[&str]) -> Result<(), SceneError> {
+        let refused = |field: &str, at: usize| {
+            let (kind, fields) = (self.kind.get_ref(), fields.join(", "));
+            let sentence = format!("path.{field} is given but path.kind is \"{kind}\", expected only {fields}");
+            source.field_error_at(at, &sentence)
+        };
+        let numbers = [
+            ("pitch", &self.pitch),
+            ("start_turn", &self.start_turn),
+            ("turn_radius", &self.turn_radius),
+            ("arc_ratio", &self.arc_ratio),
+            ("lead_in", &self.lead_in),
+            ("lead_out", &self.lead_out),
+            ("heading_turns", &self.heading_turns),
+        ];
+        let numbers = numbers.map(|(field, value)| (field, value.as_ref().map(|value| value.span().start)));
+        let others = [
+            ("start", self.start.as_ref().map(|value| value.span().start)),
+            ("pieces", self.pieces.as_ref().map(|value| value.span().start)),
+        ];
+        for (field, given) in numbers.into_iter().chain(others) {
+            if let Some(at) = given.filter(|_| !fields.contains(&field)) {
+                return Err(refused(field, at));
+            }
+        }
+        Ok(())
+    }
+
+    fn needed<'a, T>(
+        &self,
+        source: &Source,
+        field: &str,
+        value: &'a Option<Spanned<T>>,
+    ) -> Result<&'a Spanned<T>, SceneError> {
+        value.as_ref().ok_or_else(|| {
+            let sentence = format!("path.{field} is missing, a path of kind \"{}\" needs it", self.kind.get_ref());
+            source.field_error(&self.kind, &sentence)
+        })
+    }
+
+    fn number(
+        &self,
+        source: &Source,
+        field: &str,
+        value: &Option<Spanned<f64>>,
+        accepted: Accepted,
+    ) -> Result<f64, SceneError> {
+        source.check(&format!("path.{field}"), self.needed(source, field, value)?, accepted)
+    }
+
+    fn spiral(&self, source: &Source, team: &Team) -> Result<PathDescription, SceneError> {
+        self.only(source, &["pitch", "start_turn"])?;
+        let pitch = self.number(source, "pitch", &self.pitch, Accepted::LENGTH)?;
+        let given = self.needed(source, "start_turn", &self.start_turn)?;
+        let start_turn = source.check("path.start_turn", given, Accepted::START_TURN)?;
+        if let Some(least) = least_legal_start(pitch, start_turn, team) {
+            let sentence = format!(
+                "path.start_turn is {start_turn}, which is so near the centre that a bench is folded back on itself, \
+                 expected at least {least:.9}"
+            );
+            return Err(source.field_error(given, &sentence));
+        }
+        Ok(PathDescription::Spiral { pitch, start_turn })
+    }
+
+    fn turnaround(&self, source: &Source, team: &Team) -> Result<PathDescription, SceneError> {
+        self.only(source, &["pitch", "turn_radius", "arc_ratio", "start_turn", "lead_in", "lead_out"])?;
+        let pitch_given = self.needed(source, "pitch", &self.pitch)?;
+        let pitch = source.check("path.pitch", pitch_given, Accepted::LENGTH)?;
+        let turn_radius = self.number(source, "turn_radius", &self.turn_radius, Accepted::LENGTH)?;
+        let arc_ratio = self.number(source, "arc_ratio", &self.arc_ratio, Accepted::ARC_RATIO)?;
+        let spiral = Spiral::new(pitch, Direction::Inward);
+        let turn = DoubleDouble::from_turns(turn_radius / pitch);
+        let lead_in = self.lead_in(source, &spiral, turn_radius / pitch)?;
+        let start_turn = spiral.advance(turn, -lead_in).high / TAU;
+        if let Some(least) = least_legal_start(pitch, start_turn, team) {
+            let needed = spiral.arc_length(DoubleDouble::from_turns(least), turn);
+            let sentence = format!(
+                "the head starts so near the centre that a bench is folded back on itself, expected path.start_turn \
+                 of at least {least:.9}, or path.lead_in of at least {needed:.9}"
+            );
+            return Err(source
+                .field_error(self.start_turn.as_ref().or(self.lead_in.as_ref()).unwrap_or(pitch_given), &sentence));
+        }
+        let lead_out = match &self.lead_out {
+            Some(given) => source.check("path.lead_out", given, Accepted::ROUTE)?,
+            None => team.length(),
+        };
+        Ok(PathDescription::Turnaround { pitch, turn_radius, arc_ratio, lead_in, lead_out })
+    }
+
+    /// Metres of path before the turn.
+    fn lead_in(&self, source: &Source, spiral: &Spiral, turn: f64) -> Result<f64, SceneError> {
+        match (&self.lead_in, &self.start_turn) {
+            (Some(lead_in), Some(_)) => {
+                let sentence = "path.lead_in and path.start_turn are both given, expected one of them";
+                Err(source.field_error(lead_in, sentence))
+            }
+            (Some(lead_in), None) => source.check("path.lead_in", lead_in, Accepted::ROUTE),
+            (None, Some(given)) => {
+                let start_turn = source.check("path.start_turn", given, Accepted::START_TURN)?;
+                if start_turn < turn {
+                    let sentence = format!(
+                        "path.start_turn is {start_turn}, which is inside the turn, expected at least {turn} \
+                         (path.turn_radius / path.pitch)"
+                    );
+                    return Err(source.field_error(given, &sentence));
+                }
+                Ok(spiral.arc_length(DoubleDouble::from_turns(start_turn), DoubleDouble::from_turns(turn)))
+            }
+            (None, None) => {
+                let sentence = "path.lead_in and path.start_turn are both missing, expected one of them";
+                Err(source.field_error(&self.kind, sentence))
+            }
+        }
+    }
+
+    fn route(&self, source: &Source) -> Result<PathDescription, SceneError> {
+        self.only(source, &["start", "heading_turns", "pieces"])?;
+        let start = match &self.start {
+            Some(given) => {
+                for number in given.get_ref() {
+                    Accepted::PLACE
+                        .check("path.start", *number)
+                        .map_err(|sentence| source.field_error(given, &sentence))?;
+                }
+                Point::from(*given.get_ref())
+            }
+            None => Point::origin(),
+        };
+        let heading_turns = match &self.heading_turns {
+            Some(given) => source.check("path.heading_turns", given, Accepted::HEADING)?,
+            None => 0.0,
+        };
+        let given = self.needed(source, "pieces", &self.pieces)?;
+        if given.get_ref().is_empty() || given.get_ref().len() > MOST_STEPS {
+            let sentence = format!("path.pieces has {} pieces, expected from 1 to {MOST_STEPS}", given.get_ref().len());
+            return Err(source.field_error(given, &sentence));
+        }
+        let segments = given.get_ref().iter().map(|step| step.get_ref().validated(source, step));
+        let steps = segments.collect::<Result<_, _>>()?;
+        Ok(PathDescription::Route { start, heading_turns, steps })
+    }
+}
+
+impl RawStep {
+    fn validated(&self, source: &Source, at: &Spanned<Self>) -> Result<RouteStep, SceneError> {
+        let check = |field: &str, value: &Spanned<f64>, accepted: Accepted| {
+            source.check(&format!("path.pieces.{field}"), value, accepted)
+        };
+        match (self.kind, &self.length, &self.turns, &self.radius, self.side) {
+            (RawStepKind::Line, Some(length), None, None, None) => {
+                Ok(RouteStep::Line { length: check("length", length, Accepted::LEG)? })
+            }
+            (RawStepKind::Line, ..) => Err(source.field_error(at, "a line has a length and nothing else")),
+            (RawStepKind::Arc, length, turns, Some(radius), Some(side)) if length.is_some() != turns.is_some() => {
+                let radius = check("radius", radius, Accepted::LENGTH)?;
+                let turns = match (turns, length) {
+                    (Some(turns), _) => check("turns", turns, Accepted::ARC_TURNS)?,
+                    (None, Some(length)) => {
+                        let turns = check("length", length, Accepted::LEG)? / (std::f64::consts::TAU * radius);
+                        Accepted::ARC_TURNS
+                            .check("path.pieces.length in turns", turns)
+                            .map_err(|sentence| source.field_error(length, &sentence))?
+                    }
+                    // The guard has seen one of the two.
+                    (None, None) => return Err(source.field_error(at, "an arc needs turns or a length")),
+                };
+                let side = match side {
+                    RawSide::Left => Side::Left,
+                    RawSide::Right => Side::Right,
+                };
+                Ok(RouteStep::Arc { side, turns, radius })
+            }
+            (RawStepKind::Arc, ..) => Err(source.field_error(
+                at,
+                "an arc has a radius, a side (\"left\" or \"right\") and either turns (0.25 is a quarter circle) or a \
+                 length",
+            )),
+        }
+    }
+}
+
+/// Whether one Euler step of the paper's rules, of so many metres, ends where a bench is folded back on itself, or at the
+/// centre.
+pub(super) fn is_folded_after(pitch: f64, start_turn: f64, metres: f64, team: &Team) -> bool {
+    let start = TAU * start_turn;
+    let theta = start - metres * TAU / (pitch * start);
+    theta.is_nan() || theta <= 0.0 || least_legal_start(pitch, theta / TAU, team).is_some()
+}
+
+/// Where a start is illegal, the least number of turns that is not, rounded up to nine decimals.
+///
+/// Only the first link of each length can be at or inside its fold: all others of that length are further out.
+fn least_legal_start(pitch: f64, start_turn: f64, team: &Team) -> Option<f64> {
+    let spiral = Spiral::new(pitch, Direction::Inward);
+    let folds = [0, 1].map(|bench| spiral.fold(team.link(bench)));
+    let outside = |theta: f64, fold: Option<f64>| fold.is_none_or(|fold| theta > fold);
+    let legal = |turns: f64| {
+        let path = Path::spiral(pitch, turns);
+        let head = path.param_at(0.0);
+        outside(head.coordinate().high, folds[0])
+            && (team.benches < 2
+                || follower(&path, head, team.link(0)).is_ok_and(|second| outside(second.coordinate().high, folds[1])))
+    };
+    if legal(start_turn) {
+        return None;
+    }
+    // Beyond both folds every start is legal.
+    let safe = folds.iter().flatten().fold(start_turn, |most, fold| most.max(*fold / TAU)) * 1.01;
+    Some((bisect_predicate(legal, start_turn, safe) * 1e9).ceil() / 1e9)
+}

@@ -1,0 +1,169 @@
+//! What a conductor counts: answers by kind, faults, latencies, and whether the frame of an answer's tick agrees with it.
+
+use std::collections::VecDeque;
+
+use hdrhistogram::Histogram;
+
+use super::Conducted;
+use bench_dragon_messages::control::{Code, Command};
+use bench_dragon_messages::state::PlaybackState;
+use bench_dragon_messages::{ControlResponse, FrameHeader};
+use bench_dragon_publisher::live::statistics::Percentiles;
+
+/// The longest latency that is resolved: an hour.
+const LONGEST_NS: u64 = 3_600_000_000_000;
+/// Faults that are kept in words.
+const MOST_FAULTS: usize = 10;
+/// Seconds for which frames are kept for comparison.
+const KEPT_SECONDS: f64 = 2.0;
+
+/// A command and what came of it.
+pub(super) struct Answered {
+    pub command: Command,
+    /// CLOCK_MONOTONIC at which it was sent, ns.
+    pub sent_ns: u64,
+    /// CLOCK_MONOTONIC at which the answer had come, ns.
+    pub answered_ns: u64,
+    /// The answer, and whether the command table allows it. `Err` where none came.
+    pub answer: Result<(ControlResponse, Result<(), String>), String>,
+    /// Whether it is a step that ran, whose answer comes when it is over.
+    pub is_step_that_ran: bool,
+}
+
+/// Counts so far, and what is to be compared yet.
+pub(super) struct Record {
+    conducted: Conducted,
+    frames: VecDeque<FrameHeader>,
+    most_frames: usize,
+    /// Answers whose frame has not come yet.
+    waiting: Vec<Answered>,
+    applied: Histogram<u64>,
+    answered: Histogram<u64>,
+}
+
+impl Record {
+    pub fn new(seed: u64, rate: f64) -> Self {
+        // 1 ns to an hour with three digits are bounds the constructor accepts.
+        let histogram = || Histogram::new_with_bounds(1, LONGEST_NS, 3).expect("valid bounds");
+        Self {
+            conducted: Conducted { seed, period_ns: 1e9 / rate, ..Conducted::default() },
+            frames: VecDeque::new(),
+            most_frames: 100 + (rate * KEPT_SECONDS) as usize,
+            waiting: Vec::new(),
+            applied: histogram(),
+            answered: histogram(),
+        }
+    }
+
+    /// Takes in the header of a frame.
+    pub fn frame(&mut self, header: &FrameHeader) {
+        if self.frames.len() == self.most_frames {
+            self.frames.pop_front();
+        }
+        self.frames.push_back(*header);
+    }
+
+    /// Takes in what came of a command.
+    pub fn answered(&mut self, answered: Answered) {
+        let conducted = &mut self.conducted;
+        conducted.sent += 1;
+        let (answer, allowed) = match &answered.answer {
+            Ok((answer, allowed)) => (*answer, allowed),
+            Err(reason) => {
+                conducted.lost += 1;
+                let fault = format!("{}: no answer: {reason}", description(answered.command));
+                return self.fault(fault);
+            }
+        };
+        let name = Command::NAMES[answered.command.number_and_value().0 as usize];
+        let code = answer.result().map_or("unknown", Code::name);
+        *conducted.answers.entry(name.to_owned()).or_default().entry(code.to_owned()).or_default() += 1;
+        if let Err(expected) = allowed {
+            conducted.wrong += 1;
+            let fault = format!("{}: {}, {expected}", description(answered.command), answer_in_words(&answer));
+            self.fault(fault);
+        } else {
+            let refused = matches!(answer.result(), Some(Code::Refused | Code::OutOfRange));
+            conducted.refused_as_expected += u64::from(refused);
+        }
+        if is_jump(&answered, &answer) {
+            self.conducted.jumps += 1;
+        }
+        if !answered.is_step_that_ran {
+            self.answered.saturating_record(answered.answered_ns.saturating_sub(answered.sent_ns));
+        }
+        self.waiting.push(answered);
+    }
+
+    /// Compares the answers whose frames have come by now.
+    pub fn compare(&mut self) {
+        let Some(newest) = self.frames.back().map(|frame| frame.tick) else { return };
+        for answered in std::mem::take(&mut self.waiting) {
+            let Ok((answer, _)) = &answered.answer else { continue };
+            if answer.tick > newest {
+                self.waiting.push(answered);
+                continue;
+            }
+            // This subscriber may have missed it; those that must miss none are others.
+            let Ok(place) = self.frames.binary_search_by_key(&answer.tick, |frame| frame.tick) else { continue };
+            let frame = self.frames[place];
+            self.conducted.compared += 1;
+            if !answered.is_step_that_ran {
+                self.applied.saturating_record(frame.sent_ns.saturating_sub(answered.sent_ns));
+            }
+            let before = place.checked_sub(1).map(|before| self.frames[before]);
+            // At the tick of a step's answer another command may have been obeyed.
+            let before = before.filter(|before| before.tick + 1 == frame.tick && !answered.is_step_that_ran);
+            let jumps = before.map(|before| (frame.epoch.wrapping_sub(before.epoch), jumps_due(&answered, &before)));
+            let agrees = frame.sim_time.to_bits() == answer.sim_time.to_bits()
+                && frame.time_scale == answer.time_scale
+                && (frame.playback, frame.cue) == (answer.playback, answer.cue)
+                && jumps.is_none_or(|(jumps, due)| jumps == due);
+            if !agrees {
+                self.conducted.contradicted += 1;
+                let (described, words) = (description(answered.command), answer_in_words(answer));
+                self.fault(format!("{described}: {words}, and the frame is {frame:?}; jumps and those due {jumps:?}"));
+            }
+        }
+    }
+
+    fn fault(&mut self, sentence: String) {
+        if self.conducted.faults.len() < MOST_FAULTS {
+            self.conducted.faults.push(sentence);
+        }
+    }
+
+    /// Whether answers wait for their frames.
+    pub fn is_waiting(&self) -> bool {
+        !self.waiting.is_empty()
+    }
+
+    /// What has been counted.
+    pub fn conducted(&self) -> Conducted {
+        let of = |histogram: &Histogram<u64>| (!histogram.is_empty()).then(|| Percentiles::of(histogram));
+        Conducted { applied_ns: of(&self.applied), answered_ns: of(&self.answered), ..self.conducted.clone() }
+    }
+}
+
+fn is_jump(answered: &Answered, answer: &ControlResponse) -> bool {
+    matches!(answered.command, Command::Seek(_) | Command::Restart) && answer.result() == Some(Code::Done)
+}
+
+/// By how much `epoch` has to grow after the frame before: at a seek, at a restart, and where the show had ended.
+fn jumps_due(answered: &Answered, before: &FrameHeader) -> u32 {
+    let commanded = answered.answer.as_ref().is_ok_and(|(answer, _)| is_jump(answered, answer));
+    let begins_again = before.playback_state() == Some(PlaybackState::Ended);
+    u32::from(commanded) + u32::from(begins_again)
+}
+
+fn description(command: Command) -> String {
+    let (number, value) = command.number_and_value();
+    format!("{} {value}", Command::NAMES[number as usize])
+}
+
+fn answer_in_words(answer: &ControlResponse) -> String {
+    let ControlResponse { tick, sim_time, time_scale, cue, .. } = answer;
+    let code = answer.result().map_or("unknown", Code::name);
+    let playback = answer.playback_state().map_or("unknown", PlaybackState::name);
+    format!("answered {code}, {playback} at {time_scale} x, t = {sim_time} s, cue {cue}, tick {tick}")
+}

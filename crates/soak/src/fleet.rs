@@ -1,0 +1,308 @@
+//! The processes of a soak test: one publisher, and subscribers that keep up, are slow, or die and return.
+//!
+//! In: a [`Plan`], and what the processes print. Out: what the subscribers have seen and the publisher has counted.
+//! Used by the command `soak`, which calls [`Fleet::poll`] often and takes a row of [`figures`](super::figures) once a
+//! second.
+
+use std::process::{Child, ExitStatus};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::Signal;
+
+use super::conducting::Conducting;
+use super::member::{Member, ProcessState, Role};
+use super::observation::Status;
+use super::processes::{Plan, ProcessEvent, signal};
+use super::resources::Resources;
+use bench_dragon_publisher::live::statistics::RunSummary;
+
+/// How long a flaky subscriber runs before it is killed.
+const FLAKY_LIFETIME: Duration = Duration::from_secs(5);
+/// How long subscribers may take to receive their first frame.
+const START_TIMEOUT: Duration = Duration::from_secs(60);
+/// How long the publisher, and then the subscribers, may take to end after a signal.
+const END_TIMEOUT: Duration = Duration::from_secs(15);
+/// The exit code of a program that cannot do what it is asked for.
+const REFUSED: i32 = 2;
+/// From this long after the start the publisher's memory should no longer grow.
+pub const SETTLING: Duration = Duration::from_secs(60);
+
+/// Why the soak test could not continue.
+#[derive(Debug, thiserror::Error)]
+pub enum FleetError {
+    /// A process could not be started or signalled.
+    #[error("a process of the soak test could not be started: {0}")]
+    Start(#[from] std::io::Error),
+    /// The publisher cannot do what its options or its scene ask for: its own sentence.
+    #[error("{0}")]
+    Refused(String),
+    /// The publisher ended before all subscribers had received a frame.
+    #[error("the publisher ended at once ({0}){1}")]
+    PublisherEnded(ExitStatus, String),
+    /// A subscriber ended before it received a frame.
+    #[error("the subscriber {0} ended at once: its error stands above")]
+    SubscriberEnded(String),
+    /// Whoever conducts did not begin.
+    #[error("the conductor did not begin within {} s", START_TIMEOUT.as_secs())]
+    NoConductor,
+    /// Frames did not come.
+    #[error("not every subscriber received a frame within {} s", START_TIMEOUT.as_secs())]
+    NoFrames,
+}
+
+/// All processes of a soak test. Dropping it kills those that still run.
+pub struct Fleet {
+    plan: Plan,
+    publisher: Child,
+    /// How the publisher ended, if it has.
+    publisher_ended: Option<ExitStatus>,
+    /// Whether it ended before it was told to.
+    publisher_ended_early: bool,
+    summary: Option<RunSummary>,
+    members: Vec<Member>,
+    conducting: Option<Conducting>,
+    events: Receiver<ProcessEvent>,
+    sender: Sender<ProcessEvent>,
+    /// Lines of the publisher's standard error that nobody has taken yet.
+    stderr: Vec<String>,
+    settled_bytes: Option<u64>,
+    most_bytes_after: u64,
+    began: Instant,
+}
+
+impl Fleet {
+    /// Starts the publisher and the subscribers, and waits until every steady one has received a frame, or until
+    /// `proceed` returns false.
+    ///
+    /// # Errors
+    /// [`FleetError`] where that does not come about.
+    pub fn start(plan: Plan, proceed: &dyn Fn() -> bool) -> Result<Self, FleetError> {
+        let (sender, events) = channel();
+        let mut fleet = Self {
+            publisher: plan.spawn_publisher(&sender)?,
+            publisher_ended: None,
+            publisher_ended_early: false,
+            summary: None,
+            members: Vec::new(),
+            conducting: None,
+            events,
+            sender,
+            stderr: Vec::new(),
+            settled_bytes: None,
+            most_bytes_after: 0,
+            began: Instant::now(),
+            plan,
+        };
+        for (index, role) in fleet.plan.roles.clone().into_iter().enumerate() {
+            let member = fleet.spawn(index, role)?;
+            fleet.members.push(member);
+        }
+        fleet.wait_for_frames(proceed)?;
+        if let Some(conduct) = &fleet.plan.conduct {
+            fleet.conducting = Some(Conducting::start(&fleet.plan, conduct, &fleet.sender)?);
+            fleet.wait_for_conductor(proceed)?;
+        }
+        fleet.began = Instant::now();
+        Ok(fleet)
+    }
+
+    fn wait_for_frames(&mut self, proceed: &dyn Fn() -> bool) -> Result<(), FleetError> {
+        let deadline = Instant::now() + START_TIMEOUT;
+        let receives = |member: &Member| member.role != Role::Steady || member.present().received > 0;
+        while proceed() && !self.members.iter().all(receives) {
+            self.poll(Duration::from_millis(50))?;
+            if let Some(status) = self.publisher_ended {
+                self.receive(Duration::from_millis(200));
+                if let (Some(REFUSED), Some(line)) = (status.code(), self.stderr.last()) {
+                    return Err(FleetError::Refused(line.trim_start_matches("error: ").to_owned()));
+                }
+                let stderr = self.stderr.iter().map(|line| format!(": {line}")).collect();
+                return Err(FleetError::PublisherEnded(status, stderr));
+            }
+            if let Some(member) = self.members.iter().find(|member| member.state == ProcessState::EndedByItself) {
+                return Err(FleetError::SubscriberEnded(member.label.clone()));
+            }
+            if Instant::now() > deadline {
+                return Err(FleetError::NoFrames);
+            }
+        }
+        Ok(())
+    }
+
+    /// It searches the scene for events before it reports for the first time.
+    fn wait_for_conductor(&mut self, proceed: &dyn Fn() -> bool) -> Result<(), FleetError> {
+        let deadline = Instant::now() + START_TIMEOUT;
+        while proceed() && self.conducting.as_ref().is_some_and(|conducting| conducting.conducted().is_none()) {
+            self.poll(Duration::from_millis(50))?;
+            if self.publisher_ended.is_some() || Instant::now() > deadline {
+                return Err(FleetError::NoConductor);
+            }
+        }
+        Ok(())
+    }
+
+    fn spawn(&self, index: usize, role: Role) -> Result<Member, FleetError> {
+        let number = self.plan.roles[..=index].iter().filter(|other| **other == role).count();
+        let child = self.plan.spawn_subscriber(index, role, 1, &self.sender)?;
+        Ok(Member::new(format!("{} {number}", role.name()), role, child))
+    }
+
+    /// Takes in what comes within `time`, notices deaths, and kills and replaces flaky subscribers.
+    ///
+    /// # Errors
+    /// [`FleetError::Start`] where a subscriber cannot be started again.
+    pub fn poll(&mut self, time: Duration) -> Result<(), FleetError> {
+        self.receive(time);
+        if self.publisher_ended.is_none() {
+            self.publisher_ended = self.publisher.try_wait()?;
+        }
+        for (index, member) in self.members.iter_mut().enumerate() {
+            if member.role == Role::Flaky && member.spawned.elapsed() >= FLAKY_LIFETIME {
+                let had_ended = member.child.try_wait()?.is_some();
+                member.child.kill()?;
+                member.child.wait()?;
+                let next = member.incarnations + 1;
+                member.replace(self.plan.spawn_subscriber(index, member.role, next, &self.sender)?, had_ended);
+            }
+        }
+        if let Some(conducting) = &mut self.conducting {
+            conducting.poll(&self.plan)?;
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, time: Duration) {
+        let deadline = Instant::now() + time;
+        loop {
+            match self.events.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+                Ok(event) => self.handle(event),
+                Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => return,
+            }
+        }
+    }
+
+    fn handle(&mut self, event: ProcessEvent) {
+        match event {
+            ProcessEvent::Observed { member, incarnation, observation } => {
+                self.members[member].observed(incarnation, *observation);
+            }
+            ProcessEvent::Ended { member, incarnation } => self.members[member].ended(incarnation),
+            ProcessEvent::Conducted(conducted) => {
+                self.conducting.iter_mut().for_each(|conducting| conducting.counted((*conducted).clone()));
+            }
+            ProcessEvent::ConductorEnded => self.conducting.iter_mut().for_each(Conducting::ended),
+            ProcessEvent::Summary(summary) => self.summary = Some(*summary),
+            ProcessEvent::Stderr(line) => self.stderr.push(line),
+        }
+    }
+
+    /// Whether the publisher has ended.
+    pub fn publisher_has_ended(&self) -> bool {
+        self.publisher_ended.is_some()
+    }
+
+    /// Who conducts, if anybody does.
+    pub fn conducting(&self) -> Option<&Conducting> {
+        self.conducting.as_ref()
+    }
+
+    /// The subscribers.
+    pub fn members(&self) -> &[Member] {
+        &self.members
+    }
+
+    pub(super) fn members_mut(&mut self) -> &mut [Member] {
+        &mut self.members
+    }
+
+    fn steady(&self) -> impl Iterator<Item = &Member> {
+        self.members.iter().filter(|member| member.role == Role::Steady)
+    }
+
+    /// The latest status that a steady subscriber has received.
+    pub fn status(&self) -> Option<Status> {
+        self.steady().find_map(|member| member.present().status)
+    }
+
+    /// Frames that steady subscribers have missed so far.
+    pub fn missed(&self) -> u64 {
+        self.steady().map(|member| member.present().missed).sum()
+    }
+
+    /// The lines that the publisher has printed on standard error since the last call.
+    pub fn take_stderr(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.stderr)
+    }
+
+    /// What the publisher's process holds now, from which the growth of its memory follows.
+    pub(super) fn measure_publisher(&mut self) -> Option<Resources> {
+        let held = Resources::of(self.publisher.id())?;
+        if self.began.elapsed() >= SETTLING {
+            self.settled_bytes.get_or_insert(held.resident_bytes);
+            self.most_bytes_after = self.most_bytes_after.max(held.resident_bytes);
+        }
+        Some(held)
+    }
+
+    /// By how many bytes the publisher's resident memory grew after [`SETTLING`]; `None` if the test was shorter.
+    pub fn resident_growth(&self) -> Option<u64> {
+        self.settled_bytes.map(|settled| self.most_bytes_after - settled)
+    }
+
+    /// Whether the publisher ended before it was told to, with an error, or not at all. To be called once the fleet has
+    /// finished.
+    pub fn publisher_failed(&self) -> bool {
+        self.publisher_ended_early
+            || self.summary.is_none()
+            || self.publisher_ended.is_none_or(|status| !status.success())
+    }
+
+    /// The summary of the publisher, once it has ended in good order.
+    pub fn summary(&self) -> Option<&RunSummary> {
+        self.summary.as_ref()
+    }
+
+    /// Ends whoever conducts, then the publisher, lets subscribers receive what is left, and ends them.
+    ///
+    /// # Errors
+    /// [`FleetError::Start`] where the state of a process is not known.
+    pub fn finish(&mut self) -> Result<(), FleetError> {
+        self.conducting.iter_mut().for_each(Conducting::end);
+        let deadline = Instant::now() + END_TIMEOUT;
+        while self.conducting.as_mut().is_some_and(Conducting::is_ending) && Instant::now() < deadline {
+            self.receive(Duration::from_millis(20));
+        }
+        self.publisher_ended = self.publisher.try_wait()?;
+        self.publisher_ended_early = self.publisher_ended.is_some();
+        signal(&self.publisher, Signal::SIGINT);
+        let deadline = Instant::now() + END_TIMEOUT;
+        while self.publisher_ended.is_none() && Instant::now() < deadline {
+            self.receive(Duration::from_millis(20));
+            self.publisher_ended = self.publisher.try_wait()?;
+        }
+        self.receive(Duration::from_millis(200));
+        for member in self.members.iter_mut().filter(|member| member.state == ProcessState::Running) {
+            member.state = ProcessState::Ending;
+            signal(&member.child, Signal::SIGTERM);
+        }
+        let deadline = Instant::now() + END_TIMEOUT;
+        let ending = |members: &[Member]| members.iter().any(|member| member.state == ProcessState::Ending);
+        while ending(&self.members) && Instant::now() < deadline {
+            self.receive(Duration::from_millis(20));
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Fleet {
+    fn drop(&mut self) {
+        let conducting = self.conducting.iter_mut().flat_map(Conducting::children);
+        let members = self.members.iter_mut().map(|member| &mut member.child);
+        for child in members.chain(conducting).chain([&mut self.publisher]) {
+            // It may have ended already, which is what is wanted.
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! `soak --report`: the distributions of wake-up lateness and step cost as an HdrHistogram interval log.
+//!
+//! In: the samples of the loop, on the statistics thread. Out: a text file of format version 1.3, two lines for each ten
+//! seconds, with the tags `lateness` and `step`, values in nanoseconds, each histogram encoded as V2 and compressed: what
+//! HistogramLogProcessor, HistogramLogAnalyzer and the readers of HdrHistogram's ports take. The sum over all lines of a
+//! tag is the distribution whose percentiles the summary of the run has. The command `run` calls it for `soak`.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::Path;
+use std::time::{Duration, UNIX_EPOCH};
+
+use hdrhistogram::serialization::V2DeflateSerializer;
+use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, Tag};
+
+use bench_dragon_publisher::live::statistics::{Durations, Sample};
+
+/// What stands above the lines in every interval log.
+const LEGEND: &str = "\"StartTimestamp\",\"Interval_Length\",\"Interval_Max\",\"Interval_Compressed_Histogram\"\n";
+/// Seconds of an interval: a night's log stays small, and a bad minute is found.
+const INTERVAL_S: f64 = 10.0;
+
+/// The log of a run's distributions.
+pub struct HistogramLog<W = File> {
+    file: W,
+    /// How errors call it.
+    name: String,
+    rate: f64,
+    serializer: V2DeflateSerializer,
+    /// The interval that the latest sample lies in, and its distributions.
+    interval: u64,
+    durations: Durations,
+    text: Vec<u8>,
+    failure: Option<String>,
+}
+
+impl HistogramLog {
+    /// Makes the file of a run of so many frames per second that begins at `began_ns` of CLOCK_REALTIME.
+    ///
+    /// # Errors
+    /// A sentence, where the file cannot be made.
+    pub fn create(file: &Path, rate: f64, began_ns: u64) -> Result<Self, String> {
+        let name = file.display().to_string();
+        let failed = |error: io::Error| format!("{name}: {error}, expected a file to write");
+        let opened = File::create(file).map_err(failed)?;
+        Ok(Self::new(opened, name, rate, began_ns))
+    }
+}
+
+impl<W: Write> HistogramLog<W> {
+    fn new(file: W, name: String, rate: f64, began_ns: u64) -> Self {
+        let (serializer, durations) = (V2DeflateSerializer::new(), Durations::new());
+        let mut log = Self { file, name, rate, serializer, interval: 0, durations, text: Vec::new(), failure: None };
+        let begun = IntervalLogWriterBuilder::new()
+            .add_comment(&format!("[Logged with bench-dragon {}]", env!("CARGO_PKG_VERSION")))
+            .add_comment("[Histogram log format version 1.3]")
+            .with_start_time(UNIX_EPOCH + Duration::from_nanos(began_ns))
+            .begin_log_with(&mut log.text, &mut log.serializer);
+        // Writing to memory cannot fail.
+        debug_assert!(begun.is_ok());
+        log.text.extend(LEGEND.as_bytes());
+        log.write();
+        log
+    }
+
+    /// Counts a frame.
+    pub fn record(&mut self, sample: &Sample) {
+        let interval = (sample.tick as f64 / self.rate / INTERVAL_S) as u64;
+        if interval > self.interval {
+            self.close_interval();
+            self.interval = interval;
+        }
+        self.durations.record(sample, (1e9 / self.rate) as u64);
+    }
+
+    /// Writes the last interval; why the log is not whole, in a sentence, or `None` where it is.
+    pub fn finish(mut self) -> Option<String> {
+        self.close_interval();
+        self.failure
+    }
+
+    fn close_interval(&mut self) {
+        let begins = Duration::from_secs_f64(self.interval as f64 * INTERVAL_S);
+        let length = Duration::from_secs_f64(INTERVAL_S);
+        let Durations { lateness, step } = &self.durations;
+        if lateness.is_empty() {
+            return;
+        }
+        // A builder without comments and times writes nothing of its own. Neither memory nor the serializer of a histogram
+        // that is within its bounds has a reason to fail.
+        if let Ok(mut log) = IntervalLogWriterBuilder::new().begin_log_with(&mut self.text, &mut self.serializer) {
+            for (tag, histogram) in [("lateness", lateness), ("step", step)] {
+                let written = log.write_histogram(histogram, begins, length, Tag::new(tag));
+                debug_assert!(written.is_ok(), "{written:?}");
+            }
+        }
+        self.durations.clear();
+        self.write();
+    }
+
+    /// Writes what stands in memory; nothing any more after a failure.
+    fn write(&mut self) {
+        if self.failure.is_none()
+            && let Err(error) = self.file.write_all(&self.text)
+        {
+            let sentence = format!("{}: {error}: the histograms are cut", self.name);
+            log::error!("{sentence}; the show goes on");
+            self.failure = Some(sentence);
+        }
+        self.text.clear();
+    }
+}

@@ -1,0 +1,153 @@
+//! Whether each frame follows from the one before: still while paused or held, at the rate in force while playing, a new
+//! epoch where simulated time jumps and nowhere else.
+//!
+//! In: the frames of a publisher that loops without standing at its end, as the soak test starts it. What a frame is
+//! checked against are frames before it, never the commands. Called by the [`observer`](super::observer).
+
+use bench_dragon_messages::state::PlaybackState;
+use bench_dragon_messages::{FrameHeader, HandlePose};
+
+/// How far a number of periods may be from a whole one.
+const PERIODS_TOLERANCE: f64 = 0.01;
+
+/// What is known of the frames so far.
+#[derive(Debug, Default)]
+pub(super) struct Obedience {
+    /// The frame at which the present stretch began: one of the same epoch, playback and time scale.
+    anchor: FrameHeader,
+    previous: Option<FrameHeader>,
+    /// The handles of the previous frame, if it stood still.
+    still: Vec<HandlePose>,
+    /// Simulated seconds at which the show ends, once that was seen.
+    end: Option<f64>,
+}
+
+impl Obedience {
+    /// Checks a frame of a publisher at so many frames per second.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn check(&mut self, header: &FrameHeader, handles: &[HandlePose], rate: f64) -> Result<(), String> {
+        let previous = self.previous.replace(*header);
+        let result = self.stands_as_it_says(header, handles).and_then(|()| match &previous {
+            Some(before) if before.run_id == header.run_id && before.sequence + 1 == header.sequence => {
+                self.follows(before, header, handles, rate)
+            }
+            // What lies between was not received.
+            _ => {
+                self.anchor = *header;
+                Ok(())
+            }
+        });
+        if result.is_err() {
+            self.anchor = *header;
+        }
+        self.still.clear();
+        if header.playback_state() != Some(PlaybackState::Playing) {
+            self.still.extend_from_slice(handles);
+        }
+        let with_frame = |fault: &str| format!("{fault}: {header:?} after {previous:?}");
+        result.map_err(with_frame)
+    }
+
+    /// Whether playback, time scale and velocities fit each other.
+    fn stands_as_it_says(&mut self, header: &FrameHeader, handles: &[HandlePose]) -> Result<(), &'static str> {
+        let Some(playback) = header.playback_state() else { return Err("no such playback") };
+        let stands = matches!(playback, PlaybackState::Paused | PlaybackState::Held);
+        if stands != (header.time_scale == 0.0) || header.time_scale < 0.0 || !header.time_scale.is_finite() {
+            return Err("the time scale is not that of its playback");
+        }
+        // Where a scene asks for no velocities they are no numbers.
+        let moves = |handle: &HandlePose| handle.vx.abs() > 0.0 || handle.vy.abs() > 0.0;
+        if playback != PlaybackState::Playing && handles.iter().any(moves) {
+            return Err("a frame that stands still has velocities");
+        }
+        if playback == PlaybackState::Ended && *self.end.get_or_insert(header.sim_time) != header.sim_time {
+            return Err("the show has ended at another time than before");
+        }
+        let end = self.end.unwrap_or(f64::INFINITY);
+        if header.sim_time >= 0.0 && header.sim_time <= end { Ok(()) } else { Err("the time is outside the show") }
+    }
+
+    fn follows(
+        &mut self,
+        before: &FrameHeader,
+        header: &FrameHeader,
+        handles: &[HandlePose],
+        rate: f64,
+    ) -> Result<(), &'static str> {
+        let Some(jumps) = header.epoch.checked_sub(before.epoch) else { return Err("the epoch has fallen") };
+        let periods = header.tick.saturating_sub(before.tick);
+        let begins_again = before.playback_state() == Some(PlaybackState::Ended);
+        if jumps == 0 {
+            if begins_again {
+                return Err("the show has ended and does not begin again");
+            }
+            let same_pose = |(a, b): (&HandlePose, &HandlePose)| (a.x, a.y, a.heading) == (b.x, b.y, b.heading);
+            let still = self.still.len() == handles.len() && header.sim_time == before.sim_time;
+            if still && !self.still.iter().zip(handles).all(same_pose) {
+                return Err("the same moment is shown in another pose");
+            }
+            return self.goes_on(before, header, rate, periods);
+        }
+        self.anchor = *header;
+        // A period takes one command, so that it has one jump, and one more where the show begins again.
+        if periods == 1 && jumps > 1 + u32::from(begins_again) {
+            return Err("more jumps than a period can have");
+        }
+        Ok(())
+    }
+
+    /// Whether the time is that of the present stretch; begins another where something changes.
+    fn goes_on(
+        &mut self,
+        before: &FrameHeader,
+        header: &FrameHeader,
+        rate: f64,
+        periods: u64,
+    ) -> Result<(), &'static str> {
+        let ticks = header.tick - self.anchor.tick;
+        let expected = self.anchor.sim_time + self.anchor.time_scale * ticks as f64 / rate;
+        let tolerance = 8.0 * f64::EPSILON * expected;
+        let on_time = (header.sim_time - expected).abs() <= tolerance;
+        let same = (header.playback, header.time_scale) == (self.anchor.playback, self.anchor.time_scale);
+        if on_time && same {
+            return Ok(());
+        }
+        self.anchor = *header;
+        if on_time || self.stops_early(before, header, expected + tolerance, rate, periods) {
+            Ok(())
+        } else {
+            Err("the time is not that of the rate in force")
+        }
+    }
+
+    /// Whether a time before the expected one has a reason: the end, a cue that pauses, or a step that was over within
+    /// periods that were skipped.
+    fn stops_early(
+        &mut self,
+        before: &FrameHeader,
+        header: &FrameHeader,
+        latest: f64,
+        rate: f64,
+        periods: u64,
+    ) -> bool {
+        if !(header.sim_time >= before.sim_time && header.sim_time <= latest) {
+            return false;
+        }
+        let stands = header.time_scale == 0.0;
+        if stands && header.cue > before.cue {
+            return true;
+        }
+        let played = (header.sim_time - before.sim_time) * rate / before.time_scale;
+        if periods > 1 && played < periods as f64 && (played - played.round()).abs() <= PERIODS_TOLERANCE {
+            return true;
+        }
+        // A show that is paused in the very period in which it ends has not been seen to end.
+        let ends = stands || header.playback_state() == Some(PlaybackState::Ended);
+        ends && *self.end.get_or_insert(header.sim_time) == header.sim_time
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,3 @@
+//! What tests of several crates share. The program contains none of it.
+
+pub mod simulated;

@@ -1,0 +1,112 @@
+//! What looking for collisions costs on a scene: the live clearance and all pairs per frame, the exact search and sampled
+//! ones. Called by [`super::measure`] only.
+
+use std::time::Instant;
+
+use super::CollisionMeasurement;
+use bench_dragon_messages::state::EventKind;
+use bench_dragon_motion::clearance::least_clearance_all_pairs;
+use bench_dragon_motion::solve::Chain;
+use bench_dragon_motion::timeline::Timeline;
+use bench_dragon_show::scene::Scene;
+
+/// Seconds between two samples of a contact search that samples.
+const SAMPLING_INTERVALS: [f64; 3] = [1.0, 0.1, 0.01];
+
+/// All pairs against the live way, and sampled searches against the exact one. `exact_error` is the error of the
+/// contact in `timeline`, `solve_ns` what the fastest solver takes for a frame.
+pub(super) fn measure(
+    scene: &Scene,
+    timeline: &Timeline,
+    exact_error: Option<f64>,
+    solve_ns: f64,
+) -> Vec<CollisionMeasurement> {
+    if scene.team().benches < 3 {
+        return Vec::new();
+    }
+    let end = timeline.end().time;
+    let frame_cost = |method: &str, ns: f64| CollisionMeasurement {
+        method: method.to_owned(),
+        frame_ns: Some(ns),
+        search_s: None,
+        contact_time_error: None,
+    };
+    let live = live_clearance_ns(scene, end);
+    let all_pairs = all_pairs_ns(scene, end);
+    let mut measurements = vec![frame_cost("live clearance", live), frame_cost("all pairs", all_pairs)];
+    let began = Instant::now();
+    let _ = scene.motion.timeline(&mut |_| ());
+    measurements.push(CollisionMeasurement {
+        method: "exact search".to_owned(),
+        frame_ns: None,
+        search_s: Some(began.elapsed().as_secs_f64()),
+        contact_time_error: exact_error,
+    });
+    let Some(contact) = timeline.find(EventKind::Contact) else { return measurements };
+    for interval in SAMPLING_INTERVALS {
+        let found = first_overlapping_sample(scene, contact.time, end, interval);
+        measurements.push(CollisionMeasurement {
+            method: format!("all pairs every {interval} s"),
+            frame_ns: None,
+            search_s: Some(1e-9 * (all_pairs + solve_ns) * (found.unwrap_or(end) / interval)),
+            contact_time_error: found.map(|time| time - contact.time),
+        });
+    }
+    measurements
+}
+
+/// The first sample at or after `contact` at which boards overlap, simulated seconds.
+fn first_overlapping_sample(scene: &Scene, contact: f64, end: f64, interval: f64) -> Option<f64> {
+    let mut solver = scene.motion.solver(scene.velocities).solver;
+    let mut chain = Chain::new(scene.team().handles());
+    let first = (contact / interval).ceil() as u64;
+    (first..first + 1000).map(|sample| sample as f64 * interval).take_while(|time| *time < end).find(|time| {
+        solver.solve(*time, &mut chain).is_ok()
+            && least_clearance_all_pairs(&chain, scene.team()).is_some_and(|least| least.value <= 0.0)
+    })
+}
+
+/// Nanoseconds of the live clearance, the median over runs of frames evenly over the show.
+fn live_clearance_ns(scene: &Scene, end: f64) -> f64 {
+    const RUNS: usize = 20;
+    const RUN: usize = 40;
+    let mut choice = scene.motion.solver(scene.velocities);
+    let mut chain = Chain::new(scene.team().handles());
+    let mut monitor = scene.motion.clearance_monitor(&choice);
+    let mut times = Vec::with_capacity(RUNS * RUN);
+    for run in 0..RUNS {
+        for frame in 0..RUN {
+            let time = 0.99 * end * run as f64 / RUNS as f64 + frame as f64 / scene.rate;
+            if time >= end || choice.solver.solve(time, &mut chain).is_err() {
+                break;
+            }
+            let began = Instant::now();
+            let _ = std::hint::black_box(monitor.least_clearance(&chain, scene.motion.travelled_at(time)));
+            // The first frame of a run follows a jump.
+            if frame > 0 {
+                times.push(began.elapsed().as_nanos() as u64);
+            }
+        }
+    }
+    median(times)
+}
+
+/// Nanoseconds of all pairs, the median over a few frames of the show.
+fn all_pairs_ns(scene: &Scene, end: f64) -> f64 {
+    let mut solver = scene.motion.solver(scene.velocities).solver;
+    let mut chain = Chain::new(scene.team().handles());
+    let mut times = Vec::new();
+    for share in [0.1, 0.3, 0.5, 0.7, 0.9] {
+        if solver.solve(share * end, &mut chain).is_ok() {
+            let began = Instant::now();
+            let _ = std::hint::black_box(least_clearance_all_pairs(&chain, scene.team()));
+            times.push(began.elapsed().as_nanos() as u64);
+        }
+    }
+    median(times)
+}
+
+fn median(mut times: Vec<u64>) -> f64 {
+    times.sort_unstable();
+    times.get(times.len() / 2).map_or(f64::NAN, |nanoseconds| *nanoseconds as f64)
+}

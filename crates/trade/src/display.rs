@@ -1,0 +1,349 @@
+//! The error at the moment of display against bytes per second: what a publishing rate buys for readers that hold,
+//! that interpolate linearly, and that interpolate by Hermite.
+//!
+//! In: a scene, its timeline, a display. Out: one [`DisplayMeasurement`] per reader, rate and precision. The stream is
+//! simulated: every frame arrives at its deadline, so that transport adds neither delay nor jitter. Nothing here reads a
+//! clock; the same scene gives the same errors.
+
+use serde::Serialize;
+
+use super::{pareto_front, worse};
+use bench_dragon_client::hermite::HermiteReader;
+use bench_dragon_messages::state::PlaybackState;
+use bench_dragon_messages::{FrameHeader, HandlePose};
+use bench_dragon_motion::Method;
+use bench_dragon_motion::solve::{Chain, Solver, Velocities};
+use bench_dragon_motion::timeline::Timeline;
+use bench_dragon_show::convert::handle_pose;
+use bench_dragon_show::scene::Scene;
+use bench_dragon_show::solve_at_or_just_before;
+
+/// The publishing rates that are measured, hertz.
+pub const RATES: [f64; 9] = [1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 240.0, 1000.0];
+/// Seconds whose display moments are measured, up to the last whole second before the freeze.
+pub const WINDOW: f64 = 2.0;
+/// Further display moments, spread evenly over the show.
+pub const SPREAD_MOMENTS: usize = 20;
+/// The fewest and the most display moments in the window, whatever the display's rate.
+const WINDOW_MOMENTS: [usize; 2] = [120, 2000];
+/// Seconds between a moment and what a clock of whole nanoseconds makes of it, at most: two roundings.
+const CLOCK_ROUNDING: f64 = 2e-9;
+
+/// How a reader fills the time between two frames. None of them extrapolates: where the next frame has not arrived,
+/// each holds the last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Reader {
+    /// The last frame, as it is.
+    Hold,
+    /// Straight lines between positions.
+    Linear,
+    /// [`HermiteReader`].
+    Hermite,
+}
+
+impl Reader {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Hold, Self::Linear, Self::Hermite];
+
+    /// The name in tables and in JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hold => "hold",
+            Self::Linear => "linear",
+            Self::Hermite => "hermite",
+        }
+    }
+}
+
+/// The numbers in a frame's poses. Headers are double in both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// As published: 40 bytes a handle.
+    Double,
+    /// Rounded to 32 bits: 20 bytes a handle. What `precision = "f32"` publishes.
+    Single,
+}
+
+impl Precision {
+    /// Both of them.
+    pub const ALL: [Self; 2] = [Self::Double, Self::Single];
+
+    /// Bytes of one frame's message.
+    fn frame_bytes(self, handles: usize) -> f64 {
+        let pose = match self {
+            Self::Double => size_of::<HandlePose>(),
+            Self::Single => size_of::<HandlePose>() / 2,
+        };
+        (size_of::<FrameHeader>() + pose * handles) as f64
+    }
+}
+
+/// A display, and what publishing costs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Display {
+    /// Pictures per second.
+    pub rate: f64,
+    /// Seconds by which every reader's display runs behind the stream; `None` for 0 with [`Reader::Hold`] and one
+    /// publishing period with the others.
+    pub delay: Option<f64>,
+    /// Nanoseconds that the publisher takes to compute a frame.
+    pub frame_ns: f64,
+}
+
+/// What a reader of a stream shows, and what the stream costs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DisplayMeasurement {
+    /// Always `display`; distinguishes this line from those of the solvers.
+    pub r#type: &'static str,
+    /// The reader.
+    pub reader: Reader,
+    /// Frames published per second.
+    pub rate_hz: f64,
+    /// Pictures displayed per second.
+    pub display_rate_hz: f64,
+    /// Seconds by which the display runs behind the stream.
+    pub delay_s: f64,
+    /// The largest distance of a handle on display from where it is at the simulated time meant to be on display,
+    /// metres.
+    pub max_position_error: f64,
+    /// Bytes of headers and poses per second, without what a transport adds.
+    pub bytes_per_second: f64,
+    /// The numbers in the poses.
+    pub precision: Precision,
+    /// Share of a core that computing the frames takes, without transport.
+    pub cpu_share: f64,
+    /// Whether no other has both fewer bytes per second and a smaller error; errors below the noise are equal.
+    pub on_front: bool,
+}
+
+/// Measures every reader at every rate on `scene`. `progress` receives the share of the work that is done, from 0 to 1.
+///
+/// # Errors
+/// A sentence where the scene has no solution at a moment before its freeze.
+pub fn measure(
+    scene: &Scene,
+    timeline: &Timeline,
+    display: Display,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Vec<DisplayMeasurement>, String> {
+    let end = last_frame_time(timeline.freeze(scene.stops_at_contact()).time);
+    let truth = truth(scene, &display_moments(end, display.rate))?;
+    let noise = noise(scene, &truth);
+    let mut measurements = Vec::new();
+    for (index, rate) in RATES.into_iter().enumerate() {
+        let mut stream = Stream::new(scene, rate, end);
+        for reader in Reader::ALL {
+            let period = 1.0 / rate;
+            let delay = display.delay.unwrap_or(if reader == Reader::Hold { 0.0 } else { period });
+            let errors = stream.errors(reader, delay, &truth)?;
+            measurements.extend(Precision::ALL.into_iter().zip(errors).map(|(precision, error)| DisplayMeasurement {
+                r#type: "display",
+                reader,
+                rate_hz: rate,
+                display_rate_hz: display.rate,
+                delay_s: delay,
+                max_position_error: error,
+                bytes_per_second: precision.frame_bytes(scene.team().handles()) * rate,
+                precision,
+                cpu_share: 1e-9 * display.frame_ns * rate,
+                on_front: false,
+            }));
+        }
+        progress((index + 1) as f64 / RATES.len() as f64);
+    }
+    let points: Vec<(f64, f64)> =
+        measurements.iter().map(|m| (m.bytes_per_second, m.max_position_error.max(noise))).collect();
+    for (measurement, on_front) in measurements.iter_mut().zip(pareto_front(&points)) {
+        measurement.on_front = on_front;
+    }
+    Ok(measurements)
+}
+
+/// The last whole second before the freeze: all rates have a frame there, so that none is charged for the frozen frame,
+/// which comes at another phase for each. The freeze itself in a show of less than a second.
+fn last_frame_time(freeze: f64) -> f64 {
+    if freeze >= 1.0 { freeze.floor() } else { freeze }
+}
+
+/// Simulated times on display, in order. A display and a stream run by clocks of their own, so their phase drifts: the
+/// multiples of the golden ratio spread the display's moments evenly over its period, and thereby over that of any
+/// stream.
+fn display_moments(end: f64, display_rate: f64) -> Vec<f64> {
+    let golden = 0.5 * (5f64.sqrt() - 1.0);
+    let window = WINDOW.min(end);
+    let pictures = (window * display_rate).ceil().max(1.0);
+    let count = (pictures as usize).clamp(WINDOW_MOMENTS[0], WINDOW_MOMENTS[1]);
+    let in_window = (0..count).map(|k| {
+        // Of a fast display some pictures are left out; a slow one passes the window several times.
+        let picture = (k as f64 * (pictures / count as f64).max(1.0)).floor() % pictures;
+        let phase = (k as f64 * golden).fract();
+        end - window + window * (picture + phase) / pictures
+    });
+    let spread = (0..SPREAD_MOMENTS).map(|k| end * (k as f64 + golden) / SPREAD_MOMENTS as f64);
+    let mut moments: Vec<f64> = in_window.chain(spread).collect();
+    moments.sort_unstable_by(f64::total_cmp);
+    moments
+}
+
+/// Where the handles are at one moment.
+struct Moment {
+    time: f64,
+    chain: Chain,
+}
+
+/// The safe solver's chains. Always with velocities: they carry a moment over the rounding of the clock.
+fn truth(scene: &Scene, times: &[f64]) -> Result<Vec<Moment>, String> {
+    let exact = scene.motion.with_method(Method::Newton).map_err(|error| error.to_string())?;
+    let mut solver = exact.solver(Velocities::Computed).solver;
+    let solved = times.iter().map(|&time| {
+        let mut chain = Chain::new(scene.team().handles());
+        solve(solver.as_mut(), time, &mut chain)?;
+        Ok(Moment { time, chain })
+    });
+    solved.collect()
+}
+
+fn solve(solver: &mut dyn Solver, time: f64, chain: &mut Chain) -> Result<(), String> {
+    solve_at_or_just_before(solver, time, chain).map(|_| ()).map_err(|none| format!("the chain at {time} s: {none}"))
+}
+
+/// Metres below which errors are rounding, as [`super::Measurement::noise`].
+fn noise(scene: &Scene, truth: &[Moment]) -> f64 {
+    let head_speed = scene.motion.head_speed();
+    let of_moment = |Moment { time, chain }: &Moment| {
+        let of_handle = |handle: usize| {
+            let reach = chain.x[handle].hypot(chain.y[handle]) + head_speed * time;
+            8.0 * f64::EPSILON * reach * (chain.speed[handle] / head_speed).abs().max(1.0)
+        };
+        (0..chain.handles()).map(of_handle).fold(0.0, f64::max)
+    };
+    truth.iter().map(of_moment).fold(0.0, f64::max)
+}
+
+/// A published frame, in both precisions.
+#[derive(Clone)]
+struct Published {
+    tick: u64,
+    header: FrameHeader,
+    poses: [Vec<HandlePose>; 2],
+}
+
+/// A stream of frames at one rate, computed where a display moment needs them.
+struct Stream {
+    solver: Box<dyn Solver>,
+    rate: f64,
+    end: f64,
+    chain: Chain,
+    /// The last two frames computed: display moments come in order, and each needs the frames on either side.
+    latest: [Option<Published>; 2],
+}
+
+impl Stream {
+    fn new(scene: &Scene, rate: f64, end: f64) -> Self {
+        let solver = scene.motion.solver(scene.velocities).solver;
+        Self { solver, rate, end, chain: Chain::new(scene.team().handles()), latest: [None, None] }
+    }
+
+    /// The largest error of a reader over all moments, in both precisions, metres.
+    fn errors(&mut self, reader: Reader, delay: f64, truth: &[Moment]) -> Result<[f64; 2], String> {
+        let mut worst = [0.0; 2];
+        let mut shown = Vec::new();
+        for moment in truth {
+            let tick = (moment.time * self.rate).floor() as u64;
+            let before = self.frame(tick)?;
+            let has_arrived = (tick + 1) as f64 <= (moment.time + delay) * self.rate * (1.0 + 4.0 * f64::EPSILON);
+            let is_published = (tick + 1) as f64 <= self.end * self.rate;
+            let next =
+                if reader != Reader::Hold && has_arrived && is_published { Some(self.frame(tick + 1)?) } else { None };
+            for (precision, worst) in worst.iter_mut().enumerate() {
+                let time = show(reader, &before, next.as_ref(), precision, moment.time, &mut shown);
+                *worst = worse(*worst, distance(&moment.chain, time - moment.time, &shown));
+            }
+        }
+        Ok(worst)
+    }
+
+    /// The frame of a tick.
+    fn frame(&mut self, tick: u64) -> Result<Published, String> {
+        if let Some(frame) = self.latest.iter().flatten().find(|frame| frame.tick == tick) {
+            return Ok(frame.clone());
+        }
+        let sim_time = tick as f64 / self.rate;
+        solve(self.solver.as_mut(), sim_time, &mut self.chain)?;
+        let header = FrameHeader {
+            tick,
+            deadline_ns: nanoseconds(sim_time),
+            sim_time,
+            time_scale: 1.0,
+            playback: PlaybackState::Playing as u32,
+            handles: self.chain.handles() as u32,
+            ..Default::default()
+        };
+        let poses: Vec<HandlePose> = (0..self.chain.handles()).map(|handle| handle_pose(&self.chain, handle)).collect();
+        let rounded = poses.iter().map(single).collect();
+        let frame = Published { tick, header, poses: [poses, rounded] };
+        self.latest.rotate_left(1);
+        self.latest[1] = Some(frame.clone());
+        Ok(frame)
+    }
+}
+
+/// CLOCK_MONOTONIC at a simulated time, for a show that began at 0.
+fn nanoseconds(sim_time: f64) -> u64 {
+    (1e9 * sim_time).round() as u64
+}
+
+/// What 32 bits keep of a pose.
+fn single(pose: &HandlePose) -> HandlePose {
+    let round = |value: f64| f64::from(value as f32);
+    let HandlePose { x, y, heading, vx, vy } = *pose;
+    HandlePose { x: round(x), y: round(y), heading: round(heading), vx: round(vx), vy: round(vy) }
+}
+
+/// Fills `shown` with what a reader shows at a simulated time between two frames, and returns the simulated time that
+/// it is meant to be: the same, or what the reader's clock of whole nanoseconds makes of it.
+fn show(
+    reader: Reader,
+    before: &Published,
+    next: Option<&Published>,
+    precision: usize,
+    time: f64,
+    shown: &mut Vec<HandlePose>,
+) -> f64 {
+    let poses = &before.poses[precision];
+    shown.clear();
+    match (reader, next) {
+        (Reader::Hold, _) | (Reader::Linear, None) => shown.extend_from_slice(poses),
+        (Reader::Linear, Some(next)) => {
+            let (from, to) = (before.header.sim_time, next.header.sim_time);
+            let u = (time - from) / (to - from);
+            shown.extend(poses.iter().zip(&next.poses[precision]).map(|(a, b)| HandlePose {
+                x: a.x + (b.x - a.x) * u,
+                y: a.y + (b.y - a.y) * u,
+                ..*a
+            }));
+        }
+        (Reader::Hermite, _) => {
+            let mut hermite = HermiteReader::new(2);
+            for frame in [Some(before), next].into_iter().flatten() {
+                hermite.push(&frame.header, &frame.poses[precision]);
+            }
+            let shown_time = hermite.at(nanoseconds(time), shown);
+            return shown_time.filter(|shown| (shown - time).abs() <= CLOCK_ROUNDING).unwrap_or(time);
+        }
+    }
+    time
+}
+
+/// The largest distance of a handle from where it is `later` seconds after a chain's moment, metres. What lies within the
+/// rounding of the clock is no longer than the velocity times that, to 1e-17 m.
+fn distance(chain: &Chain, later: f64, shown: &[HandlePose]) -> f64 {
+    let of_handle = |(handle, pose): (usize, &HandlePose)| {
+        let x = chain.x[handle] + later * chain.vx[handle];
+        let y = chain.y[handle] + later * chain.vy[handle];
+        (pose.x - x).hypot(pose.y - y)
+    };
+    shown.iter().enumerate().map(of_handle).fold(0.0, worse)
+}
