@@ -39,6 +39,19 @@ impl Process {
         nix::sys::signal::kill(nix::unistd::Pid::from_raw(self.0.id() as i32), signal).unwrap();
     }
 
+    /// Stops the process: `kill` returns before the signal takes hold, this once every thread stands still.
+    pub fn stop(&self) {
+        self.signal(nix::sys::signal::Signal::SIGSTOP);
+        let tasks = format!("/proc/{}/task", self.id());
+        wait_until("every thread stands still", || {
+            std::fs::read_dir(&tasks).unwrap().flatten().all(|task| {
+                let stat = std::fs::read_to_string(task.path().join("stat")).unwrap_or_default();
+                // The state follows the name, which is in parentheses.
+                stat.is_empty() || stat.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with('T'))
+            })
+        });
+    }
+
     /// Closes the reading end of standard output, as `| head` does once it has enough.
     pub fn close_stdout(&mut self) {
         drop(self.0.stdout.take());
@@ -104,12 +117,17 @@ impl Lines {
 
     /// The lines up to the next one that contains `what`, which has to come within `seconds`, and that one.
     pub fn all_until(&self, what: &str, seconds: u64) -> Vec<String> {
+        self.all_until_one(|line| line.contains(what), what, seconds)
+    }
+
+    /// The lines up to the next one that `is_it` accepts, which has to come within `seconds`, and that one.
+    pub fn all_until_one(&self, is_it: impl Fn(&str) -> bool, what: &str, seconds: u64) -> Vec<String> {
         let deadline = Instant::now() + Duration::from_secs(seconds);
         let mut lines = Vec::new();
         loop {
             let left = deadline.saturating_duration_since(Instant::now());
             lines.push(self.0.recv_timeout(left).unwrap_or_else(|_| panic!("no \"{what}\" within {seconds} s")));
-            if lines.last().is_some_and(|line| line.contains(what)) {
+            if lines.last().is_some_and(|line| is_it(line)) {
                 return lines;
             }
         }
@@ -349,6 +367,15 @@ pub fn is_root() -> bool {
 /// Requires the rights of root.
 pub fn root(what_for: &str) -> Result<(), String> {
     if is_root() { Ok(()) } else { Err(format!("only root can {what_for}")) }
+}
+
+/// Waits until a condition holds, for a minute at most.
+pub fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while !holds() {
+        assert!(Instant::now() < deadline, "not within a minute: {what}");
+        std::thread::sleep(Duration::from_millis(10));
+    }
 }
 
 pub fn wait(seconds: f64) {

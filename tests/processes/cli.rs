@@ -4,7 +4,6 @@
 //! A scene that is added to the folder is tested with the others. `BENCH_DRAGON_LONG=1` adds what takes minutes,
 //! `trade` on long teams.
 
-
 mod answers;
 mod conventions;
 mod events;

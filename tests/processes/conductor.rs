@@ -68,7 +68,7 @@ fn answers(actions: &[Action], between: impl FnOnce(), name: &str) -> Vec<(usize
 fn nothing_that_was_asked_before_a_hold_is_done_after_it() {
     let name = "hold_overtakes";
     let publisher = publisher(name, &[]);
-    publisher.signal(Signal::SIGSTOP);
+    publisher.stop();
     let send = |command| Action::Send(command);
     // Three are sent, the last of them a question; four wait for its answer, and two of them would end the hold.
     let actions = [
@@ -96,7 +96,7 @@ fn nothing_that_was_asked_before_a_hold_is_done_after_it() {
 fn each_action_finds_the_show_as_the_one_before_left_it() {
     let name = "each_in_turn";
     let publisher = publisher(name, &[]);
-    publisher.signal(Signal::SIGSTOP);
+    publisher.stop();
     let step = Action::Send(Conduct::Step(1));
     let actions = [Action::Toggle, Action::Toggle, Action::Toggle, step];
     let answered = answers(&actions, || publisher.signal(Signal::SIGCONT), name);
@@ -124,7 +124,7 @@ fn a_publisher_that_dies_before_it_answers_is_noticed() {
 fn commands_to_a_publisher_that_dies_are_given_up_in_their_order() {
     let name = "dies_in_order";
     let publisher = publisher(name, &[]);
-    publisher.signal(Signal::SIGSTOP);
+    publisher.stop();
     let actions = [2.0, 3.0, 4.0, 5.0, 6.0].map(|rate| Action::Send(Conduct::Rate(rate)));
     let answered = answers(&actions, || publisher.signal(Signal::SIGKILL), name);
     println!("{answered:?}");

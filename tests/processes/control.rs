@@ -177,11 +177,13 @@ fn all_cues_of_one_step_are_announced() {
     let scene = scene.to_str().unwrap();
     let arguments = ["--scene", scene, "--rate", "50", "--paused", "--time-scale", "200", "--duration", "60"];
     let _publisher = publisher(name, &arguments);
-    let watch = Process::start(program(name).args(["watch", "--json", "--duration", "6"]));
-    // It has seen frames before, or would be told of the last cue alone.
-    wait(3.0);
+    let mut watch = Process::start(program(name).args(["watch", "--json", "--duration", "6"]));
+    let printed = watch.lines();
+    let of = |line: &str| serde_json::from_str::<Value>(line).unwrap();
+    // It has seen frames before, or would be sent the last cue alone.
+    printed.all_until_one(|line| of(line)["received"].as_u64().is_some_and(|frames| frames > 0), "a frame", 60);
     done(name, &["go"]);
-    let lines = json_lines(&watch.output_within(60));
+    let lines = Vec::from_iter(printed.rest(60).iter().map(|line| of(line)));
     let names = lines.iter().filter(|line| line["type"] == "cue").map(|line| line["name"].as_str().unwrap());
     assert_eq!(Vec::from_iter(names), Vec::from_iter(numbers.map(|cue| format!("cue {cue}"))));
 }

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
-use nix::sys::signal::Signal::{self, SIGBUS, SIGCONT, SIGINT, SIGKILL, SIGSTOP, SIGTERM};
+use nix::sys::signal::Signal::{self, SIGBUS, SIGCONT, SIGINT, SIGKILL, SIGTERM};
 use serde_json::Value;
 
 use harness::{LONG_QUEUE, Lines, Place, Process, can_run, is_root, json_lines, long, root, summary, text, wait};
@@ -221,7 +221,7 @@ fn a_stopped_publisher_skips_whole_periods_and_catches_nothing_up() {
     let publisher = publisher(&place, &["--rate", "100", "--duration", "8"]);
     let steady = observer(&place);
     steady.1.until("\"status\":{", 300);
-    publisher.signal(SIGSTOP);
+    publisher.stop();
     wait(5.0);
     publisher.signal(SIGCONT);
     let summary = summary(&publisher.output_within(300));

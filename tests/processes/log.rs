@@ -166,7 +166,7 @@ fn a_turnaround_and_a_looping_show_with_skipped_periods_are_proved() {
     let arguments = ["--rate", "200", "--start", "412.2", "--loop", "--end-hold", "0.05"];
     let publisher = run("log_loop", &scene(folder.path(), "paper"), &log, &arguments);
     wait_for_seconds(&log, 1);
-    publisher.signal(Signal::SIGSTOP);
+    publisher.stop();
     wait(0.3);
     publisher.signal(Signal::SIGCONT);
     let seconds = of_type(&lines(&log), "second").len();

@@ -167,7 +167,7 @@ fn prometheus_reads_what_is_true_of_a_publisher() {
     until(url, "paused", |samples| {
         samples["bench_dragon_playback,state=paused"] == 1.0 && samples["bench_dragon_time_scale"] == 0.0
     });
-    publisher.signal(Signal::SIGSTOP);
+    publisher.stop();
     until(url, "silent", |samples| samples["bench_dragon_silent"] == 1.0 && samples["bench_dragon_up"] == 1.0);
     publisher.signal(Signal::SIGCONT);
     publisher.signal(Signal::SIGTERM);

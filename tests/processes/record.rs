@@ -36,7 +36,10 @@ fn publisher(name: &str, scene: &Path, arguments: &[&str]) -> Process {
 }
 
 fn recorder(name: &str, file: &Path, arguments: &[&str]) -> Process {
-    let mut command = program(name);
+    let program = program(name);
+    // Under nohup the tests ignore SIGHUP, and so would the recorder.
+    let mut command = Command::new("env");
+    command.arg("--default-signal=HUP").arg(program.get_program()).args(program.get_args());
     command.args(["--json", "record", "--output", file.to_str().unwrap()]).args(arguments);
     Process::start(&mut command)
 }

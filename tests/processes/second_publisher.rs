@@ -6,7 +6,7 @@
 use crate::harness;
 
 use harness::{LONG_QUEUE, Lines, Place, Process, can_run, python, python_modules, summary, text};
-use nix::sys::signal::Signal::{SIGCONT, SIGINT, SIGKILL, SIGSTOP, SIGTERM, SIGUSR1};
+use nix::sys::signal::Signal::{SIGCONT, SIGINT, SIGKILL, SIGTERM, SIGUSR1};
 use serde_json::Value;
 
 fn object(line: &str) -> Value {
@@ -86,7 +86,7 @@ fn a_second_publisher_is_admitted_and_nothing_of_it_is_taken_for_the_show() {
 
     // The name stays the show's: while it runs, while it is stopped, for whatever publishes.
     assert_refused(&place, &["run"]);
-    first.signal(SIGSTOP);
+    first.stop();
     assert_refused(&place, &["run", "--duration", "1"]);
     let soaked = Process::start(place.program().args(["soak", "--duration", "1", "--rate", "100"])).output_within(300);
     assert!(!soaked.status.success(), "{}", text(&soaked.stdout));

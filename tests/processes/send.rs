@@ -191,7 +191,7 @@ fn a_desk_is_told_when_the_publisher_dies_and_when_it_is_back() {
     assert_eq!(only_tracker(&socket), (0.0, position, speed), "it stays where it was");
     let stopped = publisher(name, &["--start", "100", "--duration", "600"]);
     until_status(&socket, 1.0);
-    stopped.signal(Signal::SIGSTOP);
+    stopped.stop();
     until_status(&socket, 0.0);
     stopped.signal(Signal::SIGCONT);
     until_status(&socket, 1.0);
@@ -357,7 +357,7 @@ fn a_sender_that_is_killed_or_stopped_costs_nobody_a_frame() {
     for round in 0..if long() { 100 } else { 5 } {
         let senders = senders(name);
         for sender in &senders {
-            sender.signal(Signal::SIGSTOP);
+            sender.stop();
         }
         // The loop waits for none of them: twice as many frames as their queues hold.
         assert_eq!(further_frames(&watched, 2 * 64), 0, "round {round}");

@@ -17,7 +17,7 @@ use serde_json::Value;
 
 use harness::{
     LONG_QUEUE, Place, Process, aloud, can_run, json_lines, long, program, python, python_modules, root, scene_file,
-    summary, text, unique, wait,
+    summary, text, unique, wait, wait_until,
 };
 
 /// Limits that any machine keeps. A subscriber that is not run for a while leaves frames in its queue, whose memory the
@@ -320,9 +320,8 @@ fn nobody_outlives_a_killed_soak_test() {
     let mut soak = place.program();
     soak.args(["soak", "--duration", "8h", "--rate", "100", "--slow", "1"]);
     let soak = Process::start(&mut soak);
-    wait(3.0);
+    wait_until("its five children run", || children(&soak).len() == 5);
     let children = children(&soak);
-    assert_eq!(children.len(), 5, "{children:?}");
     soak.signal(SIGKILL);
     drop(soak);
     let deadline = Instant::now() + Duration::from_secs(20);

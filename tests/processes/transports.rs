@@ -8,7 +8,7 @@ use crate::harness;
 use std::collections::BTreeMap;
 use std::process::Command;
 
-use harness::{Process, can_run, json_lines, program, python, python_modules, scene_file, summary, text, unique, wait};
+use harness::{Process, can_run, json_lines, program, python, python_modules, scene_file, summary, text, unique};
 use nix::sys::signal::Signal::{SIGINT, SIGTERM};
 use serde_json::Value;
 
@@ -108,8 +108,10 @@ fn suite(transport: &str, modules: &[&str]) {
     ready.until("ready", 300);
     let first = publisher(&name, 60);
     // The debug build makes its tables for seconds: the late one waits for what the early one has got.
-    let beginning = ready.all_until("frame", 300);
-    wait(1.5);
+    let mut beginning = ready.all_until("frame", 300);
+    for _ in 0..2 {
+        beginning.extend(ready.all_until("\"alert\"", 300));
+    }
     let late = Process::start(&mut peer(transport, &name, 2)).output_within(300);
     first.signal(SIGINT);
     let summary_of_first = summary(&first.output_within(300));

@@ -9,7 +9,7 @@ use std::process::{Command, Output};
 use harness::hosts::Hosts;
 use harness::{
     Process, can_run, json_lines, long, not_run, program, python, python_modules, scene_file, summary, text, unique,
-    wait,
+    wait, wait_until,
 };
 use serde_json::Value;
 
@@ -281,7 +281,7 @@ fn a_reliable_subscriber_that_stops_reading_holds_nobody_up() {
     let lines = stopped.lines();
     // Its first message.
     lines.until("handles", 60);
-    stopped.signal(nix::sys::signal::Signal::SIGSTOP);
+    stopped.stop();
     let output = publisher.output_within(60);
     stopped.signal(nix::sys::signal::Signal::SIGKILL);
     let printed = text(&output.stderr);
@@ -296,7 +296,11 @@ fn a_reliable_subscriber_that_stops_reading_holds_nobody_up() {
 fn without_being_asked_there_is_no_dds_thread_and_no_network_socket() {
     let plain = Process::start(program("plain").args(["run", "--duration", "6"]));
     let requested = Process::start(program("requested").args(["run", "--ros2", "--duration", "6"]));
-    wait(2.0);
+    wait_until("both have opened their transports", || {
+        let (threads, sockets) = of_process(requested.id());
+        let is_open = of_process(plain.id()).0.iter().any(|name| name.trim() == "control");
+        is_open && dds_threads(&threads) >= 2 && sockets >= 2
+    });
     let (threads, sockets) = of_process(plain.id());
     assert_eq!((dds_threads(&threads), sockets), (0, 0), "{threads:?}");
     // That the same look finds them where they are.
@@ -352,8 +356,11 @@ fn two_hosts_find_each_other_by_multicast_or_where_the_subscriber_names_the_publ
         let mut run = program("hosts");
         run.args(["run", "--ros2", "--json", "--duration", "9"]);
         let publisher = Process::start(on("left", &run).env("ROS_AUTOMATIC_DISCOVERY_RANGE", range));
-        // A subscriber announces itself to its static peers in a burst when it starts: somebody must be there to hear it.
-        std::thread::sleep(std::time::Duration::from_secs(2));
+        // A subscriber announces itself to its static peers in a burst when it starts: the publisher must hear it.
+        wait_until("ROS 2 is up", || {
+            let (threads, sockets) = of_process(publisher.id());
+            dds_threads(&threads) >= 2 && sockets >= 2
+        });
         let subscriber = peer("hosts", "5", &["poses"]);
         let reader = Process::start(on("right", &subscriber).env("CYCLONEDDS_URI", peers));
         let output = reader.output_within(40);

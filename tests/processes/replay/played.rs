@@ -55,7 +55,7 @@ fn options_change_when_frames_go_out_and_never_what_they_hold() {
     let folder = tempfile::tempdir().unwrap();
     // What overflows a queue of eight while the recorder stands still is not in the file.
     let file = recording("replay_gap", folder.path(), 8, |recorder| {
-        recorder.signal(Signal::SIGSTOP);
+        recorder.stop();
         wait(1.5);
         recorder.signal(Signal::SIGCONT);
         wait(1.5);
