@@ -1,9 +1,9 @@
-//! The messages of other languages: `src/wire/layouts.rs` and the enums in `src/show/state.rs` are the one place where
+//! The messages of other languages: `crates/messages/src/layouts.rs` and the enums in `crates/messages/src/state.rs` are the one place where
 //! fields, types, versions, constants and their comments are written. `msgs/msg/*.msg` and
 //! `examples/python/bench_dragon_messages.py` are generated from it: after a change run
 //!
 //! ```text
-//! BENCH_DRAGON_WRITE=1 cargo test --test msgs
+//! BENCH_DRAGON_WRITE=1 cargo test --test repository msgs::
 //! ```
 //!
 //! and commit what it writes; without the variable the first test fails where a file is another. A new field takes its
@@ -68,7 +68,7 @@ static DIFFERENCES: LazyLock<Vec<String>> = LazyLock::new(|| {
             std::fs::write(path(&file), wanted).unwrap();
         } else {
             differences.push(format!(
-                "{file} does not follow from src/wire/layouts.rs: run BENCH_DRAGON_WRITE=1 cargo test --test msgs\n{}",
+                "{file} does not follow from crates/messages/src/layouts.rs: run BENCH_DRAGON_WRITE=1 cargo test --test repository msgs::\n{}",
                 difference(&found, &wanted)
             ));
         }

@@ -130,21 +130,3 @@ fn the_program_needs_nothing_besides_itself() {
     let page = harness::http_get(ready["url"].as_str().unwrap(), "*/*");
     assert!(page.starts_with("HTTP/1.1 200") && page.contains("stage.js"), "{page}");
 }
-
-/// What goes into the package: all that the sources include, and nothing of the machinery around them.
-#[test]
-fn the_package_holds_what_the_program_is_built_from() {
-    let listed = cargo(&["package", "--list", "--allow-dirty", "--offline"]);
-    let listed: BTreeSet<&str> = listed.lines().collect();
-    for file in ["Cargo.lock", "LICENSE-APACHE", "LICENSE-MIT", "README.md", "SECURITY.md", "config/paper.toml"] {
-        assert!(listed.contains(file), "{file} is not packaged");
-    }
-    for kind in [".js", ".css", ".html"] {
-        assert!(listed.iter().any(|file| file.starts_with("src/subscribers/view/") && file.ends_with(kind)), "{kind}");
-    }
-    for file in &listed {
-        let hidden = file.starts_with('.') && !file.starts_with(".cargo_vcs_info");
-        assert!(!hidden || *file == ".gitignore", "{file} is packaged");
-        assert!(!file.starts_with("target/") && !file.starts_with("fuzz/"), "{file} is packaged");
-    }
-}

@@ -7,8 +7,8 @@ const WIDTH: usize = 120;
 
 /// The first lines of a generated file.
 pub const NOTICE: &str = "\
-# Generated from src/wire/layouts.rs, src/show/state.rs and src/motion/event.rs, not written by hand:
-# BENCH_DRAGON_WRITE=1 cargo test --test msgs
+# Generated from crates/messages/src (layouts and state), not written by hand:
+# BENCH_DRAGON_WRITE=1 cargo test --test repository msgs::
 ";
 
 /// What an enum is called in other languages.

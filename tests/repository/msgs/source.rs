@@ -1,4 +1,4 @@
-//! The contents of `src/wire/layouts.rs` and the files below it, `src/show/state.rs` and `src/motion/event.rs`, read from
+//! The contents of `crates/messages/src/layouts.rs`, the files below it and `crates/messages/src/state.rs`, read from
 //! their text: layouts, constants, enums, and the doc comments on all of them.
 
 use std::collections::BTreeMap;
@@ -83,11 +83,16 @@ pub struct Source {
 impl Source {
     /// Reads the sources of this checkout.
     pub fn read() -> Self {
-        let files = ["src/wire/layouts.rs", "src/wire/layouts/control.rs", "src/wire/layouts/stage.rs"];
+        let files = [
+            "crates/messages/src/layouts.rs",
+            "crates/messages/src/layouts/control.rs",
+            "crates/messages/src/layouts/stage.rs",
+        ];
         let layouts: Vec<_> = files.into_iter().flat_map(items).collect();
-        let (states, events) = (items("src/show/state.rs"), items("src/motion/event.rs"));
+        let states = items("crates/messages/src/state.rs");
         let mut enums: Vec<_> = states.iter().filter_map(enumeration).collect();
-        let mut kinds = events.iter().filter_map(enumeration).find(|item| item.name == "EventKind").unwrap();
+        let kinds = enums.iter().position(|item| item.name == "EventKind").unwrap();
+        let mut kinds = enums.remove(kinds);
         let states = &enums.iter().find(|item| item.name == "FrameState").unwrap().variants;
         for kind in &mut kinds.variants {
             let state = states.iter().find(|state| state.name == kind.name);

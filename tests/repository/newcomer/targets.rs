@@ -17,22 +17,26 @@ pub fn look_up(root: &Path, command: &str) -> Result<(), String> {
             name => names.push(name),
         }
     }
-    match names.into_iter().find(|name| !text.contains(name)) {
+    let is_there = |name: &&str| name.split("::").all(|part| text.contains(part));
+    match names.into_iter().find(|name| !is_there(name)) {
         Some(name) => Err(format!("{command}: nothing there is called {name}")),
         None => Ok(()),
     }
 }
 
-/// The text of a target, with its files' names: of what `Cargo.toml` states, `name.rs`, or all of the folder `name`.
+/// The text of a target, with its files' names: of what `Cargo.toml` states, `name.rs`, or all below the folder `name`.
 fn source(root: &Path, folder: &str, name: &str) -> Option<String> {
     let manifest = std::fs::read_to_string(root.join("Cargo.toml")).ok()?;
     let stated =
         manifest.split_once(&format!("name = \"{name}\"\npath = \"")).and_then(|(_, rest)| rest.split('"').next());
     let file = stated.map_or(root.join(folder).join(name).with_extension("rs"), |path| root.join(path));
-    let files = match std::fs::read_dir(root.join(folder).join(name)) {
-        Ok(entries) => entries.map(|entry| entry.unwrap().path()).filter(|path| path.is_file()).collect(),
-        Err(_) => Vec::from([file]),
-    };
+    let folder = root.join(folder).join(name);
+    let files = if folder.is_dir() { files_below(&folder) } else { Vec::from([file]) };
     let text = |file: PathBuf| Some(format!("{}\n{}", file.display(), std::fs::read_to_string(&file).ok()?));
     files.into_iter().map(text).collect()
+}
+
+fn files_below(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.flat_map(|path| if path.is_dir() { files_below(&path) } else { Vec::from([path]) }).collect()
 }
