@@ -6,8 +6,11 @@
 
 use std::f64::consts::TAU;
 
-use super::curve::{Arc, Coordinate, Curve, Line, Segment, Side};
+use super::arc::Arc;
+use super::curve::{Coordinate, Curve, Side};
 use super::double_double::DoubleDouble;
+use super::line::Line;
+use super::segment::Segment;
 use super::spiral::{Direction, Spiral};
 use super::{Point, Vector};
 
@@ -282,12 +285,8 @@ impl Path {
     pub fn max_curvature_between(&self, from: f64, to: f64) -> f64 {
         let met = self.segments.iter().filter(|placed| placed.begin <= to && placed.end >= from);
         met.map(|placed| {
-            // A spiral bends most where it is nearest to the centre.
-            let innermost = match placed.segment {
-                Segment::Spiral(spiral) if spiral.direction() == Direction::Inward => to.min(placed.end),
-                _ => from.max(placed.begin).min(placed.end),
-            };
-            placed.segment.curvature(placed.at(innermost))
+            let tightest = if placed.segment.tightens() { to } else { from.max(placed.begin) }.min(placed.end);
+            placed.segment.curvature(placed.at(tightest))
         })
         .fold(0.0, f64::max)
     }
@@ -326,6 +325,10 @@ impl Path {
 
     pub(crate) fn segment(&self, param: Param) -> &Segment {
         &self.segments[param.segment].segment
+    }
+
+    pub(crate) fn segment_at(&self, index: usize) -> &Segment {
+        &self.segments[index].segment
     }
 
     /// The coordinate with which a segment begins; of the first segment, of the place from which it is measured.

@@ -3,12 +3,16 @@
 //! The path and the linkage call it. All formulas are derived in the polar frame of a handle, so that none subtracts two
 //! positions that are nearly the same.
 
-use std::f64::consts::{PI, TAU};
+mod bounds;
+mod links;
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::LazyLock;
 
-use super::curve::{Coordinate, Curve};
+use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower, ReachedDisc};
 use super::double_double::DoubleDouble;
 use super::root::{bisect_predicate, increasing_root};
+use super::team::Team;
 use super::{Point, Vector};
 
 /// Which way a spiral is travelled.
@@ -29,10 +33,8 @@ pub struct Spiral {
     direction: Direction,
 }
 
-/// No point behind is as far away as the link is long: any further motion would make the handle jump.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("no point behind on the path is one link away")]
-pub struct NoFollower;
+/// The longest step, in radians, of the search for a follower along a spiral.
+const LONGEST_STEP: f64 = 0.5;
 
 impl Spiral {
     /// A spiral of `pitch` metres per turn, which must be positive and finite; the scene, which knows the user's file and
@@ -235,6 +237,107 @@ impl Curve for Spiral {
             Direction::Inward => self.inward(from, metres),
             Direction::Outward => self.inward(from, -metres),
         }
+    }
+
+    #[inline]
+    fn sign(&self) -> f64 {
+        match self.direction {
+            Direction::Inward => -1.0,
+            Direction::Outward => 1.0,
+        }
+    }
+
+    fn rate(&self, at: Coordinate) -> f64 {
+        self.sign() * (self.radius_per_radian.high * 1f64.hypot(at.high))
+    }
+
+    fn contains(&self, at: Coordinate) -> bool {
+        at.high > 0.0
+    }
+
+    fn turning(&self) -> f64 {
+        // Inward is clockwise.
+        self.sign()
+    }
+
+    fn tightens(&self) -> bool {
+        self.direction == Direction::Inward
+    }
+
+    fn length_bound(&self, one: Coordinate, other: Coordinate) -> f64 {
+        self.outer_length(one, other)
+    }
+
+    fn displacement(&self, from: Coordinate, to: Coordinate) -> Vector {
+        // A "link" of one metre has the displacement as its direction.
+        self.pose(to, from, 1.0).direction
+    }
+
+    fn link_pose(&self, front: Coordinate, rear: Coordinate, link: f64) -> LinkPose {
+        self.pose(front, rear, link)
+    }
+
+    fn follower(&self, front: Coordinate, behind: f64, link: f64) -> Result<Follower, NoFollower> {
+        Ok(match self.direction {
+            Direction::Inward => Follower::Behind(self.follower_angle(self.radius(front), link)?),
+            Direction::Outward => self.inner_follower(front, behind, link),
+        })
+    }
+
+    fn ahead(&self, rear: Coordinate, gap: f64, link: f64) -> Option<f64> {
+        self.angle_ahead(rear, gap, link)
+    }
+
+    fn second_derivative_bound(&self, at: Coordinate, distance: f64) -> f64 {
+        let a = self.radius_per_radian.high;
+        let theta = match self.direction {
+            Direction::Inward => at.high + LONGEST_STEP,
+            Direction::Outward => at.high,
+        };
+        a * a * (1.0 + theta * theta) + distance * a * 2f64.hypot(theta)
+    }
+
+    fn longest_step(&self) -> f64 {
+        LONGEST_STEP
+    }
+
+    fn distance_grows(&self, front: Coordinate, rear: Coordinate) -> bool {
+        rear.minus(front).abs() <= FRAC_PI_2 && (self.direction == Direction::Inward || front.high >= 1.0 + FRAC_PI_2)
+    }
+
+    /// On the outward spiral, from a front handle at theta to a rear one at theta - d,
+    /// chord^2 = (a d)^2 + 4 a^2 theta (theta - d) sin^2(d/2) grows with d while tan(d/2) <= theta - d, and with theta
+    /// for fixed d. So where that inequality holds at the follower it holds at all smaller d; d falls as theta grows,
+    /// and it continues to hold. The rear cosine is positive there, and the front one (see `pose`) is larger.
+    fn is_steady(&self, front: Coordinate, rear: Coordinate) -> bool {
+        let d = front.minus(rear);
+        self.direction == Direction::Outward && d < PI && (0.5 * d).tan() < rear.high
+    }
+
+    /// From theta = max(1, link / a) outward sin(d/2) <= link / (2 r) <= 1/2.
+    fn stall_free_until(&self, link: f64) -> Option<Coordinate> {
+        let theta = (link / self.radius_per_radian.high).max(1.0);
+        Some(Coordinate { high: theta, low: 0.0 })
+    }
+
+    fn fold(&self, link: f64) -> Option<f64> {
+        Self::fold(self, link)
+    }
+
+    fn first_within(&self, disc: &ReachedDisc, begin: Option<Coordinate>, last: Coordinate) -> Option<Coordinate> {
+        self.first_in_disc(disc, begin, last)
+    }
+
+    fn quiet_place(&self, team: &Team, limit: f64, last: Coordinate) -> Option<Coordinate> {
+        self.quiet_from(team, limit, last)
+    }
+
+    fn seen_from_frame(&self, moved: (Coordinate, Coordinate), turned: f64, behind: Coordinate) -> Option<f64> {
+        Some(self.seen_from_polar_frame(moved, turned, behind))
+    }
+
+    fn frame_travel(&self, turned: f64) -> f64 {
+        self.radius_per_radian.high * turned.abs()
     }
 }
 

@@ -15,9 +15,8 @@ use super::rows::{Band, LANES, Lanes, Lengths, Piece, Rows, Tolerance};
 use super::track::{Node, Track};
 use crate::linkage;
 use crate::model::Vector;
-use crate::model::curve::Segment;
+use crate::model::curve::Curve;
 use crate::model::path::Param;
-use crate::model::spiral::Direction;
 use crate::model::team::Team;
 
 /// Halvings of what lies between two kinks, at most.
@@ -263,16 +262,7 @@ impl BandBuilder<'_> {
 
 /// Whether a place at a link's distance is where the linkage has the follower of `front`.
 fn is_follower(track: &Track, place: Param, front: Param, link: f64) -> bool {
-    let apart = place.at.minus(front.at).abs();
-    // As long as the distance has grown all the way.
-    let nearest = match track.path.segment(front) {
-        Segment::Line(_) => true,
-        Segment::Arc(_) => apart <= FRAC_PI_2,
-        Segment::Spiral(spiral) => {
-            apart <= FRAC_PI_2 && (spiral.direction() == Direction::Inward || front.at.high >= 1.0 + FRAC_PI_2)
-        }
-    };
-    if nearest && place.segment == front.segment {
+    if place.segment == front.segment && track.path.segment(front).distance_grows(front.at, place.at) {
         return true;
     }
     let Ok(found) = linkage::follower(track.path, front, link) else { return false };
