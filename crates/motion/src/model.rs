@@ -8,6 +8,7 @@ pub mod board;
 pub mod curve;
 pub mod description;
 pub mod double_double;
+pub mod elementary;
 pub mod line;
 pub mod path;
 pub mod root;
@@ -36,6 +37,33 @@ mod tests {
             }
         };
         std::fs::read_dir(folder).unwrap().map(named).sum()
+    }
+
+    /// Returns the lines of product code of a folder that call an elementary function of the standard library.
+    fn elementary_calls(folder: &Path) -> Vec<String> {
+        let methods = "sin cos sin_cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp exp2 exp_m1 ln ln_1p \
+                       log log2 log10 powf cbrt hypot";
+        let calls: Vec<String> = methods.split_whitespace().map(|method| format!(".{method}(")).collect();
+        let mut found = Vec::new();
+        for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            // Tests may, and the reference calculates with numbers of its own.
+            let is_exempt = path.ends_with("tests.rs") || path.ends_with("reference");
+            if path.is_dir() && !is_exempt {
+                found.extend(elementary_calls(&path));
+            } else if !is_exempt {
+                let text = std::fs::read_to_string(&path).unwrap();
+                let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+                let lines = code.lines().filter(|line| calls.iter().any(|call| line.contains(call.as_str())));
+                found.extend(lines.map(|line| format!("{}: {line}", path.display())));
+            }
+        }
+        found
+    }
+
+    #[test]
+    fn elementary_functions_have_the_same_bits_everywhere() {
+        let calls = elementary_calls(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"));
+        assert!(calls.is_empty(), "{calls:#?}");
     }
 
     #[test]

@@ -3,6 +3,7 @@
 
 use crate::model::Point;
 use crate::model::curve::{Curve, ReachedDisc};
+use crate::model::elementary::hypot;
 use crate::model::path::{Param, Path};
 use crate::model::team::Team;
 
@@ -24,9 +25,9 @@ impl Reach {
     /// min(sqrt(r^2 - link^2 / 4), r - inset) from it and its points half a width less.
     pub fn rearmost(&self, path: &Path, team: &Team, limit: f64) -> Option<Param> {
         let half = 0.5 * team.longest_link();
-        let disc = self.radius + limit + half.max(team.hole_inset).hypot(0.5 * team.width);
+        let disc = self.radius + limit + hypot(half.max(team.hole_inset), 0.5 * team.width);
         let ring = self.outermost + limit + 0.5 * team.width;
-        let about_origin = ring.hypot(half).max(ring + team.hole_inset);
+        let about_origin = hypot(ring, half).max(ring + team.hole_inset);
         let disc = ReachedDisc { centre: self.centre, radius: disc, about_origin };
         (0..path.segments()).find_map(|segment| {
             let begin = (segment > 0).then(|| path.first(segment));

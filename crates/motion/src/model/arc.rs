@@ -4,6 +4,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower, ReachedDisc, Side};
 use super::double_double::DoubleDouble;
+use super::elementary;
 use super::{Point, Vector};
 
 /// An arc of a circle. Its coordinate is radians turned since its first point.
@@ -39,20 +40,20 @@ impl Arc {
     /// than the diameter.
     #[inline]
     fn angle_over(&self, chord: f64) -> Option<f64> {
-        (chord <= 2.0 * self.radius).then(|| 2.0 * (0.5 * chord / self.radius).asin())
+        (chord <= 2.0 * self.radius).then(|| 2.0 * elementary::asin(0.5 * chord / self.radius))
     }
 }
 
 impl Curve for Arc {
     fn point(&self, at: Coordinate) -> Point {
         // With half angles, short distances keep all their digits.
-        let (sine, cosine) = half(at).sin_cos();
+        let (sine, cosine) = half(at).sine_and_cosine();
         let (along, across) = (2.0 * sine * cosine, 2.0 * sine * sine);
         self.origin + self.radius * (along * self.direction + across * self.inward)
     }
 
     fn tangent(&self, at: Coordinate) -> Vector {
-        let (sine, cosine) = half(at).sin_cos();
+        let (sine, cosine) = half(at).sine_and_cosine();
         let (sine, versine) = (2.0 * sine * cosine, 2.0 * sine * sine);
         self.direction + (sine * self.inward - versine * self.direction)
     }
@@ -93,13 +94,13 @@ impl Curve for Arc {
     fn displacement(&self, from: Coordinate, to: Coordinate) -> Vector {
         // The chord is parallel to the tangent half way.
         let half = 0.5 * to.minus(from);
-        2.0 * self.radius * half.sin() * self.tangent(from.plus(half))
+        2.0 * self.radius * elementary::sin(half) * self.tangent(from.plus(half))
     }
 
     fn link_pose(&self, front: Coordinate, rear: Coordinate, _: f64) -> LinkPose {
         // The chord is parallel to the tangent half way.
         let half = 0.5 * front.minus(rear);
-        let cosine = half.cos();
+        let cosine = elementary::cos(half);
         LinkPose { direction: self.tangent(rear.plus(half)), front_cosine: cosine, rear_cosine: cosine }
     }
 
@@ -132,8 +133,8 @@ impl Curve for Arc {
         // Half the angle that the disc covers, by the law of cosines.
         let cosine = (distance * distance + self.radius * self.radius - disc.radius * disc.radius)
             / (2.0 * distance * self.radius);
-        let half = if cosine.is_finite() { cosine.clamp(-1.0, 1.0).acos() } else { TAU };
-        let towards = offset.dot(&self.direction).atan2(-offset.dot(&self.inward));
+        let half = if cosine.is_finite() { elementary::acos(cosine.clamp(-1.0, 1.0)) } else { TAU };
+        let towards = elementary::atan2(offset.dot(&self.direction), -offset.dot(&self.inward));
         let first = if towards.abs() <= half { 0.0 } else { (towards - half).rem_euclid(TAU) };
         let at = Coordinate { high: first, low: 0.0 };
         (at.minus(last) <= 0.0).then_some(at)

@@ -11,6 +11,7 @@ use std::sync::LazyLock;
 
 use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower, ReachedDisc};
 use super::double_double::DoubleDouble;
+use super::elementary::{asinh, cos, hypot, pow, sin, sin_cos, tan};
 use super::root::{bisect_predicate, increasing_root};
 use super::team::Team;
 use super::{Point, Vector};
@@ -79,9 +80,9 @@ impl Spiral {
             return 0.0;
         }
         let inner = theta - span;
-        let (w, w_inner) = (1f64.hypot(theta), 1f64.hypot(inner));
+        let (w, w_inner) = (hypot(1.0, theta), hypot(1.0, inner));
         let algebraic = span * (w + inner * (theta + inner) / (w + w_inner));
-        let logarithmic = (span * (theta + inner) / (theta * w_inner + inner * w)).asinh();
+        let logarithmic = asinh(span * (theta + inner) / (theta * w_inner + inner * w));
         0.5 * self.radius_per_radian.high * (algebraic + logarithmic)
     }
 
@@ -98,7 +99,7 @@ impl Spiral {
         let twice = 2.0 * metres / a;
         let guess = twice / (theta + (theta * theta - twice).max(0.0).sqrt());
         let span = increasing_root(
-            |span| (self.inward_length(theta, span) - metres, a * 1f64.hypot(theta - span)),
+            |span| (self.inward_length(theta, span) - metres, a * hypot(1.0, theta - span)),
             if metres < 0.0 { 2.0 * guess } else { 0.0 },
             theta,
             guess,
@@ -111,7 +112,7 @@ impl Spiral {
     pub(crate) fn chord_residual(&self, r: f64, link: f64) -> impl Fn(f64) -> (f64, f64) + use<> {
         let a = self.radius_per_radian.high;
         move |d| {
-            let (sine, cosine) = (0.5 * d).sin_cos();
+            let (sine, cosine) = sin_cos(0.5 * d);
             let rise = a * d;
             let outer = r + rise;
             let value = rise.mul_add(rise, (2.0 * r * sine) * (2.0 * outer * sine)) - link * link;
@@ -143,8 +144,8 @@ impl Spiral {
                 }
             }
         };
-        let first = link / r.hypot(a);
-        let second = link / (r + 0.5 * a * first.min(PI)).hypot(a);
+        let first = link / hypot(r, a);
+        let second = link / hypot(r + 0.5 * a * first.min(PI), a);
         Ok(increasing_root(residual, 0.0, high, second))
     }
 
@@ -159,7 +160,7 @@ impl Spiral {
         // theta alone.
         let excess = |theta: f64| match first_chord_maximum(theta) {
             Some(d) => {
-                let square = (0.5 * d).sin().powi(2);
+                let square = sin(0.5 * d).powi(2);
                 let chord_square = d * d + 4.0 * theta * (theta + d) * square;
                 (chord_square - ratio * ratio, 4.0 * (2.0 * theta + d) * square)
             }
@@ -187,10 +188,10 @@ static LEAST_WITH_MAXIMUM: LazyLock<f64> =
 /// H = (1 - theta)(d + theta), and the part of the dip below that shrinks with d.
 fn first_chord_maximum(theta: f64) -> Option<f64> {
     let half_slope = |d: f64| {
-        let sine = (0.5 * d).sin();
-        d + 2.0 * theta * sine * sine + theta * (theta + d) * d.sin()
+        let sine = sin(0.5 * d);
+        d + 2.0 * theta * sine * sine + theta * (theta + d) * sin(d)
     };
-    let curvature = |d: f64| 1.0 + 2.0 * theta * d.sin() + theta * (theta + d) * d.cos();
+    let curvature = |d: f64| 1.0 + 2.0 * theta * sin(d) + theta * (theta + d) * cos(d);
     if curvature(PI) >= 0.0 {
         return None;
     }
@@ -207,22 +208,22 @@ impl Curve for Spiral {
             Direction::Inward => self.radius(at),
             Direction::Outward => -self.radius(at),
         };
-        let (sine, cosine) = at.sin_cos();
+        let (sine, cosine) = at.sine_and_cosine();
         Point::new(r * cosine, r * sine)
     }
 
     fn tangent(&self, at: Coordinate) -> Vector {
         let (r, a) = (self.radius(at), self.radius_per_radian.high);
-        let (sine, cosine) = at.sin_cos();
+        let (sine, cosine) = at.sine_and_cosine();
         // dp/dtheta = a e_r + r e_phi, and theta decreases. Turned by half a turn and travelled the other way, the outward
         // spiral has the same tangent.
-        Vector::new(r * sine - a * cosine, -a * sine - r * cosine) / r.hypot(a)
+        Vector::new(r * sine - a * cosine, -a * sine - r * cosine) / hypot(r, a)
     }
 
     /// (2 + theta^2) / (a (1 + theta^2)^(3/2)), which falls outward.
     fn curvature(&self, at: Coordinate) -> f64 {
         let square = at.high * at.high;
-        (2.0 + square) / (self.radius_per_radian.high * (1.0 + square).powf(1.5))
+        (2.0 + square) / (self.radius_per_radian.high * pow(1.0 + square, 1.5))
     }
 
     fn arc_length(&self, from: Coordinate, to: Coordinate) -> f64 {
@@ -248,7 +249,7 @@ impl Curve for Spiral {
     }
 
     fn rate(&self, at: Coordinate) -> f64 {
-        self.sign() * (self.radius_per_radian.high * 1f64.hypot(at.high))
+        self.sign() * (self.radius_per_radian.high * hypot(1.0, at.high))
     }
 
     fn contains(&self, at: Coordinate) -> bool {
@@ -294,7 +295,7 @@ impl Curve for Spiral {
             Direction::Inward => at.high + LONGEST_STEP,
             Direction::Outward => at.high,
         };
-        a * a * (1.0 + theta * theta) + distance * a * 2f64.hypot(theta)
+        a * a * (1.0 + theta * theta) + distance * a * hypot(2.0, theta)
     }
 
     fn longest_step(&self) -> f64 {
@@ -311,7 +312,7 @@ impl Curve for Spiral {
     /// and it continues to hold. The rear cosine is positive there, and the front one (see `pose`) is larger.
     fn is_steady(&self, front: Coordinate, rear: Coordinate) -> bool {
         let d = front.minus(rear);
-        self.direction == Direction::Outward && d < PI && (0.5 * d).tan() < rear.high
+        self.direction == Direction::Outward && d < PI && tan(0.5 * d) < rear.high
     }
 
     /// From theta = max(1, link / a) outward sin(d/2) <= link / (2 r) <= 1/2.

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use super::{Direction, Spiral};
 use crate::model::curve::{Coordinate, Curve, ReachedDisc};
+use crate::model::elementary;
 use crate::model::root::bisect_predicate;
 use crate::model::team::Team;
 
@@ -73,8 +74,8 @@ impl Spiral {
         if width > body {
             return f64::NEG_INFINITY;
         }
-        let lean = (1.03 * longest / r).min((0.5 * width).atan2(hole_inset));
-        let along = body - 2.0 * hole_inset * lean.cos() - width * lean.sin();
+        let lean = (1.03 * longest / r).min(elementary::atan2(0.5 * width, hole_inset));
+        let along = body - 2.0 * hole_inset * elementary::cos(lean) - width * elementary::sin(lean);
         if 1.03 * team.length() / r < TAU / 3.0 {
             return along;
         }

@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use super::{Direction, Spiral};
 use crate::model::Vector;
 use crate::model::curve::{Coordinate, Follower, LinkPose};
+use crate::model::elementary::{hypot, sin_cos};
 use crate::model::root::increasing_root;
 
 /// A step shorter than this part of the angle is the last of a Newton iteration: the next is below the last digit.
@@ -20,18 +21,18 @@ impl Spiral {
         let a = self.radius_per_radian();
         let r = self.radius(inner);
         let outer = r + a * d;
-        let (half_sine, half_cosine) = (0.5 * d).sin_cos();
+        let (half_sine, half_cosine) = sin_cos(0.5 * d);
         let (square, sine) = (2.0 * half_sine * half_sine, 2.0 * half_sine * half_cosine);
         // Inner minus outer handle: (r - r' cos d) e_r - r' sin d e_phi.
         let radial = (outer * square - a * d) / link;
         let around = -outer * sine / link;
-        let (polar_sine, polar_cosine) = inner.sin_cos();
+        let (polar_sine, polar_cosine) = inner.sine_and_cosine();
         let direction =
             Vector::new(radial * polar_cosine - around * polar_sine, radial * polar_sine + around * polar_cosine);
         // Both cosines from t = -(a e_r + r e_phi) / sqrt(a^2 + r^2) in the frame of the handle concerned.
         let common = a * a * d + r * outer * sine;
-        let inner_cosine = (common - a * outer * square) / (link * r.hypot(a));
-        let outer_cosine = (common + a * r * square) / (link * outer.hypot(a));
+        let inner_cosine = (common - a * outer * square) / (link * hypot(r, a));
+        let outer_cosine = (common + a * r * square) / (link * hypot(outer, a));
         // Turned by half a turn and travelled the other way, the outward spiral has the inward one's links, ends
         // exchanged.
         match self.direction() {
@@ -50,7 +51,7 @@ impl Spiral {
         }
         let (a, r) = (self.radius_per_radian(), self.radius(front));
         let residual = |d: f64| {
-            let (sine, cosine) = (0.5 * d).sin_cos();
+            let (sine, cosine) = sin_cos(0.5 * d);
             let (rise, inner) = (a * d, r - a * d);
             let value = rise.mul_add(rise, (2.0 * r * sine) * (2.0 * inner * sine)) - link * link;
             let slope = 2.0 * a * rise - 4.0 * r * a * sine * sine + 4.0 * r * inner * sine * cosine;
@@ -58,7 +59,7 @@ impl Spiral {
         };
         let high = behind.min(FRAC_PI_2);
         if residual(high).0 >= 0.0 {
-            Follower::Behind(increasing_root(residual, 0.0, high, link / r.hypot(a)))
+            Follower::Behind(increasing_root(residual, 0.0, high, link / hypot(r, a)))
         } else if behind <= FRAC_PI_2 {
             Follower::AllNearer
         } else {
@@ -75,9 +76,9 @@ impl Spiral {
         let (radius_per_radian, sign) = if self.direction() == Direction::Inward { (-a, -1.0) } else { (a, 1.0) };
         // Along the rows of a table, the rounding of the square would add up.
         let (square, low) = (link * link, link.mul_add(link, -(link * link)));
-        let mut d = gap / r.hypot(a);
+        let mut d = gap / hypot(r, a);
         for _ in 0..20 {
-            let (sine, cosine) = (0.5 * d).sin_cos();
+            let (sine, cosine) = sin_cos(0.5 * d);
             let rise = radius_per_radian * d;
             let other = r + rise;
             let value = (2.0 * r * sine).mul_add(2.0 * other * sine, -square) + rise.mul_add(rise, -low);

@@ -16,6 +16,7 @@ use super::track::{Node, Track};
 use crate::linkage;
 use crate::model::Vector;
 use crate::model::curve::Curve;
+use crate::model::elementary::hypot;
 use crate::model::path::Param;
 use crate::model::team::Team;
 
@@ -226,7 +227,7 @@ impl BandBuilder<'_> {
     fn error(&self, half: f64, nodes: [&Node; 5], index: usize, chain: &NodeChain) -> f64 {
         let mut polynomials = polynomials(half, nodes);
         // The size of the slope's next power, had it fallen off as the last one did.
-        let power = |power: usize| power as f64 * polynomials[0][power].hypot(polynomials[1][power]);
+        let power = |power: usize| power as f64 * hypot(polynomials[0][power], polynomials[1][power]);
         let neglected = LARGEST_NODAL * power(5) * (power(5) / power(4)).min(1.0);
         let dropped: [f64; 3] = std::array::from_fn(|quantity| {
             let Lengths { coordinate, heading } = self.lengths;
@@ -245,7 +246,7 @@ impl BandBuilder<'_> {
             miss = miss.max((self.track.displacement(middle.at, node.at) - found).norm());
             turn = turn.max((within_half_turn(node.heading - middle.heading) - horner(&heading, beta).0).abs());
         }
-        let dropped_place = dropped[0].hypot(dropped[1]);
+        let dropped_place = hypot(dropped[0], dropped[1]);
         let truncated = neglected + 25.0 * dropped_place;
         let worst = ((miss + dropped_place) / allowed)
             .max((turn + dropped[2]) / allowed_heading)

@@ -130,7 +130,10 @@ fn fitted(span: f64, rear_of: impl Fn(f64) -> Option<f64>) -> Option<Vec<f64>> {
             equations[(row, column)] = rear.powi(column as i32 + 1) - front.powi(column as i32 + 1);
         }
     }
-    let ones = DVector::from_element(FITTED_PLACES, 1.0);
-    let solution = equations.svd(true, true).solve(&ones, 1e-15).ok()?;
+    // By QR, since the singular values of nalgebra take hypotenuses from the C library.
+    let factors = equations.qr();
+    let mut ones = DVector::from_element(FITTED_PLACES, 1.0);
+    factors.q_tr_mul(&mut ones);
+    let solution = factors.r().solve_upper_triangular(&ones.rows(0, FITTED_DEGREE).clone_owned())?;
     Some(solution.iter().copied().collect())
 }

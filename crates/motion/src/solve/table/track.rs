@@ -7,6 +7,7 @@
 use crate::linkage;
 use crate::model::Vector;
 use crate::model::curve::{Coordinate, Curve};
+use crate::model::elementary;
 use crate::model::path::{Param, Path};
 
 /// A path with the coordinates at which its segments join.
@@ -146,7 +147,7 @@ impl<'a> Track<'a> {
         let (front_cosine, rear_cosine) = (direction.dot(&front.1), direction.dot(&rear.1));
         let speed_ratio = front_cosine / rear_cosine;
         let turning = direction.perp(&(front.1 - speed_ratio * rear.1));
-        let heading = direction.y.atan2(direction.x);
+        let heading = elementary::atan2(direction.y, direction.x);
         (rear_cosine > 0.0).then_some(Pose { heading, speed_ratio, heading_per_metre: turning / link })
     }
 
