@@ -5,13 +5,14 @@ use astro_float::{BigFloat, Consts, RoundingMode, Sign};
 use fastrand::Rng;
 use num_bigint::BigInt;
 
+use super::cases;
 use crate::elementary;
 use crate::interval::{BITS, Interval, Vector};
 
 /// Random operations of each kind on intervals.
-const OPERATIONS: usize = if cfg!(debug_assertions) { 2_000 } else { 100_000 };
-/// Random arguments of each elementary function.
-const ARGUMENTS: usize = if cfg!(debug_assertions) { 50 } else { 2_000 };
+fn operations() -> usize {
+    cases(100_000, 2_000)
+}
 
 /// An exact binary number: `integer` times 2^`exponent`.
 #[derive(Clone, Debug)]
@@ -83,7 +84,7 @@ fn assert_holds(interval: &Interval, exact: &Exact, what: &str) {
 #[test]
 fn sums_and_products_hold_the_exact_result() {
     let mut random = Rng::with_seed(1);
-    for _ in 0..OPERATIONS {
+    for _ in 0..operations() {
         let ((a, of_a), (b, of_b)) = (interval(&mut random), interval(&mut random));
         let (sum, difference, product) = (&a + &b, &a - &b, &a * &b);
         let (square, size, most, least) = (a.square(), a.abs(), a.max(&b), a.min(&b));
@@ -107,7 +108,7 @@ fn sums_and_products_hold_the_exact_result() {
 fn quotients_and_roots_hold_the_exact_result() {
     let mut random = Rng::with_seed(2);
     let mut quotients = 0;
-    for _ in 0..OPERATIONS {
+    for _ in 0..operations() {
         let ((a, of_a), (b, of_b)) = (interval(&mut random), interval(&mut random));
         let quotient = &a / &b;
         if !(b.is_positive() || b.is_negative()) {
@@ -134,7 +135,7 @@ fn quotients_and_roots_hold_the_exact_result() {
             assert!(width.is_at_most(&allowed), "root of {a:?}");
         }
     }
-    assert!(quotients > OPERATIONS / 4, "{quotients}");
+    assert!(quotients > operations() / 4, "{quotients}");
 }
 
 /// Doubles are taken over exactly, or held where they are subnormal.
@@ -143,7 +144,7 @@ fn doubles_are_exact() {
     let mut random = Rng::with_seed(3);
     let some = [0.0, -0.0, 1.0, 5e-324, f64::MIN_POSITIVE, f64::MAX, f64::MIN, 2f64.powi(-1060) * 3.0];
     let any = std::iter::repeat_with(|| f64::from_bits(random.u64(..))).filter(|number| number.is_finite());
-    for number in some.into_iter().chain(any.take(OPERATIONS)) {
+    for number in some.into_iter().chain(any.take(operations())) {
         let interval = Interval::new(number);
         let bits = number.to_bits();
         let exponent = ((bits >> 52) & 0x7ff) as i64;
@@ -196,7 +197,7 @@ fn compare(
     mut reference: impl FnMut(&BigFloat) -> BigFloat,
 ) {
     let mut random = Rng::with_seed(4);
-    for _ in 0..ARGUMENTS {
+    for _ in 0..cases(2_000, 50) {
         let x = argument(&mut random);
         let value = Exact::new(&reference(&BigFloat::from_f64(x, 512)));
         let enclosure = computed(&Interval::new(x));

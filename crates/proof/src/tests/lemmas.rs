@@ -2,6 +2,7 @@
 
 use fastrand::Rng;
 
+use super::cases;
 use crate::boards::{Board, covers, is_inside_ring};
 use crate::capsule::{Capsule, Pair};
 use crate::interval::{Interval, Vector};
@@ -170,7 +171,7 @@ fn boards_are_apart_or_not() {
     let scene = turnaround();
     let mut random = Rng::with_seed(2);
     let (mut apart, mut overlapping) = (0, 0);
-    for _ in 0..if cfg!(debug_assertions) { 500 } else { 5_000 } {
+    for _ in 0..cases(5_000, 500) {
         let length = scene.team.link(1).rough();
         let place = |random: &mut Rng| ([random.f64() * 3.0, random.f64() * 3.0], random.f64() * 7.0);
         let placed = [place(&mut random), place(&mut random)];
