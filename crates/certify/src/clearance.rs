@@ -3,12 +3,12 @@
 
 use super::boards::MovingBoard;
 use super::capsule::{Span, Spanned};
-use super::carriers::{Carriers, Knots, knots_of};
+use super::first_order::When;
+use super::first_order_step::{FirstOrderStep, StepPoints, step_points};
+use super::grid::GridPoint;
 use super::interval::Interval;
-use super::knot::Knot;
 use super::lines::Links;
 use super::path::{Curve, ExactPath, Place};
-use super::relative::When;
 use super::search::{LEAST, path_end};
 use super::step::{Chain, Claim, Listed, Obstacle, PADS};
 use bench_dragon_messages::state::EventKind;
@@ -100,7 +100,7 @@ struct Upper {
 /// The steps of one search.
 pub(super) struct Descent<'a> {
     chain: Chain<'a>,
-    at: Knot,
+    at: GridPoint,
     links: Links,
     covered: bool,
     step: f64,
@@ -124,7 +124,7 @@ impl<'a> Descent<'a> {
     /// Steps from the start to `end`, metres of travel.
     pub fn new(chain: Chain<'a>, end: f64, most_steps: u64) -> Self {
         let step = 0.25 * chain.team.shortest_link();
-        let at = Knot::at(Place(0, 0.0), 0.0);
+        let at = GridPoint::at(Place(0, 0.0), 0.0);
         let mut descent = Self {
             chain,
             at,
@@ -138,23 +138,24 @@ impl<'a> Descent<'a> {
             floor: None,
         };
         let before = -LEAST * (1.0 + descent.chain.path.length());
-        descent.at = descent.beside(0.0, -1.0, |travelled| travelled.hi <= 0.0).unwrap_or_else(|| descent.knot(before));
+        descent.at =
+            descent.beside(0.0, -1.0, |travelled| travelled.hi <= 0.0).unwrap_or_else(|| descent.grid_point(before));
         descent
     }
 
     /// The nearest knot to one side of a place of the head of which something is sure.
-    fn beside(&self, travelled: f64, side: f64, holds: impl Fn(Interval) -> bool) -> Option<Knot> {
+    fn beside(&self, travelled: f64, side: f64, holds: impl Fn(Interval) -> bool) -> Option<GridPoint> {
         let Chain { path, exact, .. } = &self.chain;
         let least = f64::EPSILON * (1.0 + path.length());
-        let mut knots = (0..40).map(|power| Knot::new(path, exact, travelled + side * least * 2f64.powi(power)));
-        knots.find(|knot| holds(exact.travelled(knot.head)))
+        let mut points = (0..40).map(|power| GridPoint::new(path, exact, travelled + side * least * 2f64.powi(power)));
+        points.find(|point| holds(exact.travelled(point.head)))
     }
 
     /// The least clearance from the start to `target`.
     fn least(
         mut self,
         hint: &LeastClearance,
-        target: &Knot,
+        target: &GridPoint,
         progress: &mut dyn FnMut(f64),
     ) -> Option<ClearanceEnclosure> {
         let until = self.descend(hint, target, progress)?;
@@ -168,12 +169,12 @@ impl<'a> Descent<'a> {
         hint: &LeastClearance,
         progress: &mut dyn FnMut(f64),
     ) -> Option<ClearanceEnclosure> {
-        let target = self.knot(self.end);
+        let target = self.grid_point(self.end);
         if let Some(until) = self.descend(hint, &target, progress)? {
             return Some(self.enclosed(self.upper?, Some(until)));
         }
         let is_shown = BEFORE_LOCK.iter().any(|before| {
-            let target = self.knot(lock.travelled - before);
+            let target = self.grid_point(lock.travelled - before);
             // As near as can be shown.
             let _ = self.at.travelled < target.travelled && self.go_to(&target, progress).is_some();
             self.stays_to_lock(lock)
@@ -183,13 +184,18 @@ impl<'a> Descent<'a> {
     }
 
     /// Goes to `target`, or returns how far it came; `None` where nothing is known of the hint.
-    fn descend(&mut self, hint: &LeastClearance, target: &Knot, progress: &mut dyn FnMut(f64)) -> Option<Option<f64>> {
+    fn descend(
+        &mut self,
+        hint: &LeastClearance,
+        target: &GridPoint,
+        progress: &mut dyn FnMut(f64),
+    ) -> Option<Option<f64>> {
         let end = self.end;
         let inside = |travelled: Interval| travelled.lo >= 0.0 && travelled.hi <= end;
         let side = if hint.travelled < 0.5 * end { 1.0 } else { -1.0 };
-        let knot = self.beside(hint.travelled.clamp(0.0, end), side, inside)?;
+        let point = self.beside(hint.travelled.clamp(0.0, end), side, inside)?;
         let benches = [hint.bench_a, hint.bench_b].map(|bench| bench as usize);
-        self.upper = Some(self.upper_between(knot.clone(), knot, benches)?);
+        self.upper = Some(self.upper_between(point.clone(), point, benches)?);
         Some(self.go_to(target, progress))
     }
 
@@ -200,7 +206,7 @@ impl<'a> Descent<'a> {
         let most = TOUCH * self.chain.team.shortest_link();
         let least = 2.0 * (lock.travelled - self.at.travelled).max(BEFORE_LOCK[2]);
         (0..40).map(|power| least * 2f64.powi(power)).take_while(|beyond| *beyond < most).any(|beyond| {
-            let mut to = self.knot(lock.travelled + beyond);
+            let mut to = self.grid_point(lock.travelled + beyond);
             let (chain, at, mut end) = (&self.chain, &mut self.at, to.clone());
             let Some(mut handles) = chain.spans(at, &mut to, link) else { return false };
             let Some(last) = chain.spans(&mut to, &mut end, link) else { return false };
@@ -215,9 +221,9 @@ impl<'a> Descent<'a> {
     fn are_apart_behind(&self, handles: Vec<Spanned>, window: Span, pads: f64) -> bool {
         let chain = &self.chain;
         let [mut from, mut to] = [window.0, window.1].map(|place| {
-            let mut knot = Knot::at(place, self.at.travelled);
-            knot.handles = vec![knot.handles[0]; handles.len()];
-            knot
+            let mut point = GridPoint::at(place, self.at.travelled);
+            point.handles = vec![point.handles[0]; handles.len()];
+            point
         });
         // Lemma 4, where it is handle 1 that is lost.
         let is_covered = handles.len() == 2 && chain.start.is_some_and(|start| chain.exact.in_order(start, window.0));
@@ -251,7 +257,7 @@ impl<'a> Descent<'a> {
     }
 
     /// Whether no two boards touch, and no link locks, from the start to `target`.
-    pub fn stays_clear_to(mut self, target: &Knot, progress: &mut dyn FnMut(f64)) -> bool {
+    pub fn stays_clear_to(mut self, target: &GridPoint, progress: &mut dyn FnMut(f64)) -> bool {
         self.floor = Some(0.0);
         self.go_to(target, progress).is_none()
     }
@@ -277,9 +283,9 @@ impl<'a> Descent<'a> {
         let far = TOUCH * self.chain.team.shortest_link();
         let overlapping =
             (0..40).map(|power| 1e-12 * 2f64.powi(power)).take_while(|beyond| *beyond < far).find_map(|beyond| {
-                let knot = self.knot(event.travelled + beyond);
-                let upper = self.upper_between(knot.clone(), knot.clone(), benches)?;
-                (upper.value < 0.0).then_some(knot)
+                let point = self.grid_point(event.travelled + beyond);
+                let upper = self.upper_between(point.clone(), point.clone(), benches)?;
+                (upper.value < 0.0).then_some(point)
             })?;
         until = until.or_else(|| self.go_to(&overlapping, progress));
         self.upper = Some(touch);
@@ -292,28 +298,29 @@ impl<'a> Descent<'a> {
     }
 
     /// The clearance of two boards with the head anywhere between two places, from above.
-    fn upper_between(&self, mut from: Knot, mut to: Knot, benches: [usize; 2]) -> Option<Upper> {
+    fn upper_between(&self, mut from: GridPoint, mut to: GridPoint, benches: [usize; 2]) -> Option<Upper> {
         let mut middle = from.clone();
         PADS.iter().find_map(|pads| {
-            let mut carriers = Carriers::new(&self.chain, &knots_of(&mut from, &mut middle, &mut to), *pads);
-            while carriers.listed.handles.len() <= benches[1] + 1 {
-                carriers.extend(knots_of(&mut from, &mut middle, &mut to), Links::All).ok()?;
+            let mut first_order =
+                FirstOrderStep::new(&self.chain, &step_points(&mut from, &mut middle, &mut to), *pads);
+            while first_order.listed.handles.len() <= benches[1] + 1 {
+                first_order.extend(step_points(&mut from, &mut middle, &mut to), Links::All).ok()?;
             }
-            let [one, other] = benches.map(|bench| carriers.board(bench));
+            let [one, other] = benches.map(|bench| first_order.board(bench));
             Some(Upper { value: one.at_most(&other, When::Always), travelled: to.travelled, benches })
         })
     }
 
     /// Goes to a knot, or as far as it can be shown that nothing is nearer than the least that is known: then returns how
     /// far.
-    fn go_to(&mut self, target: &Knot, progress: &mut dyn FnMut(f64)) -> Option<f64> {
+    fn go_to(&mut self, target: &GridPoint, progress: &mut dyn FnMut(f64)) -> Option<f64> {
         let least = LEAST_STEP * (1.0 + self.chain.path.length());
         let longest = self.chain.team.shortest_link();
         while self.at.head != target.head {
             let remaining = target.travelled - self.at.travelled;
             let length = self.step.min(remaining);
             let mut to =
-                if self.step >= 0.9 * remaining { target.clone() } else { self.knot(self.at.travelled + length) };
+                if self.step >= 0.9 * remaining { target.clone() } else { self.grid_point(self.at.travelled + length) };
             self.steps += 1;
             let given_up = match self.show(&mut to) {
                 Ok(()) => {
@@ -356,15 +363,15 @@ impl<'a> Descent<'a> {
         self.floor.or(self.upper.map(|upper| upper.value - WIDTH)).unwrap_or(f64::NEG_INFINITY)
     }
 
-    pub fn knot(&self, travelled: f64) -> Knot {
-        Knot::new(self.chain.path, &self.chain.exact, travelled)
+    pub fn grid_point(&self, travelled: f64) -> GridPoint {
+        GridPoint::new(self.chain.path, &self.chain.exact, travelled)
     }
 
     /// Shows a step from where the search is, and what follows for the next.
-    fn show(&mut self, to: &mut Knot) -> Result<(), Refused> {
-        let mut middle = self.knot(0.5 * self.at.travelled + 0.5 * to.travelled);
+    fn show(&mut self, to: &mut GridPoint) -> Result<(), Refused> {
+        let mut middle = self.grid_point(0.5 * self.at.travelled + 0.5 * to.travelled);
         let mut from = std::mem::replace(&mut self.at, to.clone());
-        let shown = self.show_between(&mut Knots { from: &mut from, middle: &mut middle, to });
+        let shown = self.show_between(&mut StepPoints { from: &mut from, middle: &mut middle, to });
         self.at = from;
         let (body_forward, start, second) = shown?;
         self.chain.start.get_or_insert(start.1);
@@ -380,10 +387,10 @@ impl<'a> Descent<'a> {
     }
 
     /// Whether every link behind the head's goes forward, and the spans of handles 1 and 2.
-    fn show_between(&self, knots: &mut Knots) -> Result<(bool, Span, Option<Span>), Refused> {
+    fn show_between(&self, points: &mut StepPoints) -> Result<(bool, Span, Option<Span>), Refused> {
         let mut refused = None;
         for pads in PADS {
-            match self.show_with(knots, pads) {
+            match self.show_with(points, pads) {
                 Err(Refused { obstacle: Obstacle::Link(link), .. }) => {
                     refused = refused.or(Some(Refused { obstacle: Obstacle::Link(link), nearer: None }));
                 }
@@ -393,31 +400,34 @@ impl<'a> Descent<'a> {
         Err(refused.unwrap_or(Refused { obstacle: Obstacle::Link(0), nearer: None }))
     }
 
-    fn show_with(&self, knots: &mut Knots, pads: f64) -> Result<(bool, Span, Option<Span>), Refused> {
-        let mut carriers = Carriers::new(&self.chain, knots, pads);
-        while carriers.listed.handles.len() <= self.chain.team.benches && !self.is_enough(&carriers.listed, self.links)
+    fn show_with(&self, points: &mut StepPoints, pads: f64) -> Result<(bool, Span, Option<Span>), Refused> {
+        let mut first_order = FirstOrderStep::new(&self.chain, points, pads);
+        while first_order.listed.handles.len() <= self.chain.team.benches
+            && !self.is_enough(&first_order.listed, self.links)
         {
-            let knots = knots_of(knots.from, knots.middle, knots.to);
-            carriers.extend(knots, self.links).map_err(|obstacle| Refused { obstacle, nearer: None })?;
+            let points = step_points(points.from, points.middle, points.to);
+            first_order.extend(points, self.links).map_err(|obstacle| Refused { obstacle, nearer: None })?;
         }
         if self.looks_at_boards() {
-            self.boards_are_apart(&carriers.listed, Some(&carriers), self.links).map_err(|benches| {
-                let [one, other] = benches.map(|bench| carriers.board(bench.min(carriers.listed.handles.len() - 2)));
-                let travelled = self.chain.exact.travelled(carriers.at);
-                let inside =
-                    travelled.lo >= 0.0 && travelled.hi <= self.end && benches[1] + 1 < carriers.listed.handles.len();
+            self.boards_are_apart(&first_order.listed, Some(&first_order), self.links).map_err(|benches| {
+                let [one, other] =
+                    benches.map(|bench| first_order.board(bench.min(first_order.listed.handles.len() - 2)));
+                let travelled = self.chain.exact.travelled(first_order.at);
+                let inside = travelled.lo >= 0.0
+                    && travelled.hi <= self.end
+                    && benches[1] + 1 < first_order.listed.handles.len();
                 let nearer = inside
                     .then(|| Upper {
                         value: one.at_most(&other, When::Middle),
-                        travelled: knots.middle.travelled,
+                        travelled: points.middle.travelled,
                         benches,
                     })
                     .filter(|nearer| self.upper.is_some_and(|upper| nearer.value < upper.value - 1e-3 * WIDTH));
                 Refused { obstacle: Obstacle::Pair(benches[0], benches[1]), nearer }
             })?;
         }
-        let handles = &carriers.listed.handles;
-        Ok((carriers.listed.body_forward, handles[1].span, handles.get(2).map(|second| second.span)))
+        let handles = &first_order.listed.handles;
+        Ok((first_order.listed.body_forward, handles[1].span, handles.get(2).map(|second| second.span)))
     }
 
     /// Whether the handles that are listed are all that a step needs.
@@ -438,15 +448,20 @@ impl<'a> Descent<'a> {
 
     /// Shows that no two boards come as near as the least that is known, all of them or those with board 0 or 1; or two
     /// of which it cannot be shown.
-    fn boards_are_apart(&self, listed: &Listed, carriers: Option<&Carriers>, links: Links) -> Result<(), [usize; 2]> {
+    fn boards_are_apart(
+        &self,
+        listed: &Listed,
+        first_order: Option<&FirstOrderStep>,
+        links: Links,
+    ) -> Result<(), [usize; 2]> {
         let (chain, benches, threshold) = (&self.chain, self.chain.team.benches, self.threshold());
         let count = listed.handles.len() - 1;
         let boards: Vec<_> = (0..count).map(|bench| chain.board(&listed.handles, bench)).collect();
         let is_spiral = matches!(chain.exact.segments[0].curve, Curve::Inward { .. });
         let firsts = if links == Links::All { count } else { count.min(2) };
         let far = threshold.max(0.0);
-        let are_apart = |[a, b]: [usize; 2]| match carriers {
-            Some(carriers) => carriers.are_apart([a, b], threshold),
+        let are_apart = |[a, b]: [usize; 2]| match first_order {
+            Some(first_order) => first_order.are_apart([a, b], threshold),
             None => boards[a].is_apart_by(threshold, &boards[b]),
         };
         for (a, board) in boards[..firsts].iter().enumerate() {
@@ -461,7 +476,7 @@ impl<'a> Descent<'a> {
                 }
             }
             let next = count.max(a + 2);
-            if next < benches && !beyond && !self.is_apart_from_rest((a, board), listed, carriers, next) {
+            if next < benches && !beyond && !self.is_apart_from_rest((a, board), listed, first_order, next) {
                 return Err([a, next]);
             }
         }
@@ -477,7 +492,7 @@ impl<'a> Descent<'a> {
         &self,
         (a, board): (usize, &MovingBoard),
         listed: &Listed,
-        carriers: Option<&Carriers>,
+        first_order: Option<&FirstOrderStep>,
         next: usize,
     ) -> bool {
         let threshold = self.threshold();
@@ -485,9 +500,9 @@ impl<'a> Descent<'a> {
             return listed.is_beyond(threshold.max(0.0), board, listed.handles.len() - 1);
         }
         board.is_further_than(threshold.max(0.0), &listed.straight_run(next))
-            || match carriers {
-                Some(carriers) => {
-                    carriers.board(a).is_further_than(threshold, &carriers.straight_run(next), When::Always)
+            || match first_order {
+                Some(first_order) => {
+                    first_order.board(a).is_further_than(threshold, &first_order.straight_run(next), When::Always)
                 }
                 None => board.is_apart_by(threshold, &listed.straight_run(next)),
             }

@@ -7,18 +7,18 @@
 
 mod boards;
 mod capsule;
-mod carriers;
 mod clearance;
 mod elementary;
+mod first_order;
+mod first_order_step;
+mod grid;
 mod interval;
-mod knot;
 mod lines;
 mod link;
 mod lock;
 mod path;
 mod pitch;
 pub mod plan;
-mod relative;
 mod search;
 pub mod speed;
 mod step;
@@ -27,7 +27,7 @@ use std::io;
 
 pub use capsule::Span;
 pub use clearance::{ClearanceEnclosure, MOST_CLEARANCE_STEPS, enclose_least_clearance};
-pub use lines::{FORMAT, Line, Links, Outcome, Status, Step};
+pub use lines::{CertificateLine, CertifiedEvent, FORMAT, Links, Status, Step};
 pub use path::Place;
 
 use bench_dragon_motion::Motion;
@@ -70,9 +70,9 @@ pub fn certify(
     timeline: &Timeline,
     scene: &str,
     most_steps: u64,
-    write: &mut dyn FnMut(&Line) -> io::Result<()>,
+    write: &mut dyn FnMut(&CertificateLine) -> io::Result<()>,
     progress: &mut dyn FnMut(f64),
-) -> Result<Vec<Outcome>, CertifyError> {
+) -> Result<Vec<CertifiedEvent>, CertifyError> {
     let events: Vec<Event> = timeline.events().iter().map(|timed| timed.event).collect();
     let given = Given {
         scene,
@@ -83,7 +83,7 @@ pub fn certify(
         events: &events,
         most_steps,
     };
-    search::Search::new(given, write).run(progress)
+    search::CertificateSearch::new(given, write).run(progress)
 }
 
 #[cfg(test)]

@@ -22,7 +22,7 @@ pub enum Links {
 /// A line of a certificate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
-pub enum Line<'a> {
+pub enum CertificateLine<'a> {
     /// The first line.
     Certificate {
         /// [`FORMAT`].
@@ -79,7 +79,7 @@ pub enum Line<'a> {
     /// The last step has come to the path's end.
     PathEnd,
     /// What follows for one kind of event.
-    Result(Outcome),
+    Result(CertifiedEvent),
 }
 
 /// A step of the head, and what holds all the while.
@@ -101,7 +101,7 @@ pub struct Step {
 
 /// What is proved of one kind of event.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Outcome {
+pub struct CertifiedEvent {
     /// The kind.
     #[serde(serialize_with = "name")]
     pub event: EventKind,

@@ -2,8 +2,8 @@
 //! `docs/proofs.md`. Only [`super`] uses it.
 
 use super::capsule::{Span, Spanned};
+use super::grid::{GridPoint, place, span};
 use super::interval::Interval;
-use super::knot::{Knot, place, span};
 use super::link::{all_nearer, one_place_within};
 use super::path::Place;
 use super::step::Chain;
@@ -20,7 +20,7 @@ const LOCK_HALVINGS: u32 = 12;
 impl Chain<'_> {
     /// Places behind and ahead of the follower of a link that it cannot pass while the front is in `front`, and between
     /// which there is none for any front in `last`.
-    pub fn lock_window(&self, at: &mut Knot, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
+    pub fn lock_window(&self, at: &mut GridPoint, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
         let Chain { path, exact, team, links, .. } = self;
         at.extend_to(link + 1, path, team).ok()?;
         let (before, rear) = (at.handles[link].param, at.handles[link + 1].param);
@@ -59,7 +59,7 @@ impl Chain<'_> {
 
     /// Where the follower of a link stays while the front is in `front`, until it is lost, if the link is lost with the front
     /// in `last`, at the end of that.
-    pub fn until_lock(&self, at: &mut Knot, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
+    pub fn until_lock(&self, at: &mut GridPoint, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
         let exact = &self.exact;
         let begins = self.spans(&mut at.clone(), &mut at.clone(), link + 1)?[link + 1].span;
         let window = self.lock_window(at, link, front, last).or_else(|| {
@@ -77,7 +77,7 @@ impl Chain<'_> {
 
     /// A place ahead of the follower of a link that is nearer than the link for all of `front`, and one ahead of that which
     /// is further away for all of `last`.
-    pub fn lock_jump(&self, at: &mut Knot, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
+    pub fn lock_jump(&self, at: &mut GridPoint, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
         let Chain { path, exact, team, links, .. } = self;
         at.extend_to(link + 1, path, team).ok()?;
         let rear = at.handles[link + 1].param;

@@ -10,8 +10,8 @@ use super::boards::Shape;
 use super::capsule::Span;
 use super::clearance::Descent;
 use super::elementary::{pi, sin_cos};
+use super::grid::GridPoint;
 use super::interval::Interval;
-use super::knot::Knot;
 use super::lines::Links;
 use super::path::{ExactPath, Place};
 use super::step::{Chain, Claim, Listed, PADS, links_of};
@@ -55,7 +55,7 @@ impl Pitches<'_> {
         // The path and the team serve to guess where handles are.
         let [wide, narrow] = [from, to].map(|pitch| Path::spiral(pitch, theta / std::f64::consts::TAU));
         let handle = benches[1] + 1;
-        let mut ends = [Knot::at(Place(0, theta), 0.0), Knot::at(Place(0, theta), 0.0)];
+        let mut ends = [GridPoint::at(Place(0, theta), 0.0), GridPoint::at(Place(0, theta), 0.0)];
         let [first, last] = &mut ends;
         if first.extend_to(handle, &wide, team).is_err() || last.extend_to(handle, &narrow, team).is_err() {
             return false;
@@ -142,7 +142,7 @@ pub(crate) fn reaches(team: &Team, pitch: f64, radius: f64, most_steps: u64, pro
     let exact = ExactPath::new(&description);
     let a = Interval::point(pitch).over(pi() * 2.0);
     let theta = Interval::point(radius).over(a).lo;
-    let end = Knot::at(Place(0, theta), exact.travelled(Place(0, theta)).middle());
+    let end = GridPoint::at(Place(0, theta), exact.travelled(Place(0, theta)).middle());
     let travelled = end.travelled;
     let descent = Descent::new(Chain::new(&path, exact, team), travelled, most_steps).after_all_further_out();
     begin <= (a * descent.head().1).lo && descent.stays_clear_to(&end, progress)

@@ -4,9 +4,9 @@
 use std::io;
 
 use super::capsule::Spanned;
+use super::grid::{GridPoint, place};
 use super::interval::Interval;
-use super::knot::{Knot, place};
-use super::lines::{Line, Links, Outcome, Status};
+use super::lines::{CertificateLine, CertifiedEvent, Links, Status};
 use super::path::{ExactPath, Place};
 use super::step::{Chain, Claim, Obstacle, Shown};
 use super::{CertifyError, Given};
@@ -27,12 +27,12 @@ const SHRINK: f64 = 0.5;
 /// How near an event, in links, a step that cannot be shown is taken to be in the way of the event's own proof.
 const NEAR: f64 = 1e-3;
 
-pub(super) struct Search<'a, 'w> {
+pub(super) struct CertificateSearch<'a, 'w> {
     given: Given<'a>,
     chain: Chain<'a>,
-    write: &'w mut dyn FnMut(&Line) -> io::Result<()>,
+    write: &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>,
     /// Where the last step ended.
-    at: Knot,
+    at: GridPoint,
     links: Links,
     /// Claims that steps still make.
     moving: bool,
@@ -60,22 +60,23 @@ impl From<io::Error> for Halt {
 
 const KINDS: [EventKind; 4] = [EventKind::Contact, EventKind::Stall, EventKind::Lock, EventKind::PathEnd];
 
-impl<'a, 'w> Search<'a, 'w> {
-    pub fn new(given: Given<'a>, write: &'w mut dyn FnMut(&Line) -> io::Result<()>) -> Self {
+impl<'a, 'w> CertificateSearch<'a, 'w> {
+    pub fn new(given: Given<'a>, write: &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>) -> Self {
         let exact = ExactPath::new(given.description);
         let chain = Chain::new(given.path, exact, given.team);
         // A motion that begins earlier passes through all that this one does.
         let before = -LEAST * (1.0 + given.path.length());
-        let at = Knot::new(given.path, &chain.exact, before);
+        let at = GridPoint::new(given.path, &chain.exact, before);
         let step = 0.25 * given.team.shortest_link();
         let (links, proofs) = (Links::All, [const { None }; 4]);
         Self { given, chain, write, at, links, moving: true, clear: true, covered: true, proofs, step, steps: 0 }
     }
 
     /// Writes the certificate and returns what it proves.
-    pub fn run(mut self, progress: &mut dyn FnMut(f64)) -> Result<Vec<Outcome>, CertifyError> {
+    pub fn run(mut self, progress: &mut dyn FnMut(f64)) -> Result<Vec<CertifiedEvent>, CertifyError> {
         let (version, scene) = (env!("CARGO_PKG_VERSION"), self.given.scene);
-        (self.write)(&Line::Certificate { format: super::FORMAT, version, scene }).map_err(CertifyError::Write)?;
+        (self.write)(&CertificateLine::Certificate { format: super::FORMAT, version, scene })
+            .map_err(CertifyError::Write)?;
         let stuck = match self.motion(progress) {
             Ok(()) => None,
             Err(Halt::Error(error)) => return Err(error),
@@ -86,19 +87,19 @@ impl<'a, 'w> Search<'a, 'w> {
             Some(Status::Proved { time_lo, .. }) => Some(time_lo),
             _ => None,
         };
-        let outcomes = KINDS.map(|event| {
+        let events = KINDS.map(|event| {
             let found = self.proofs[event as usize].take();
             let status = found.unwrap_or_else(|| match (&stuck, event) {
                 (Some(because), _) => Status::Undecided { time_lo: until, because: because.clone() },
                 (None, EventKind::PathEnd) => Status::None { time_lo: None },
                 (None, _) => Status::None { time_lo: lock },
             });
-            Outcome { event, status }
+            CertifiedEvent { event, status }
         });
-        for outcome in &outcomes {
-            (self.write)(&Line::Result(outcome.clone())).map_err(CertifyError::Write)?;
+        for event in &events {
+            (self.write)(&CertificateLine::Result(event.clone())).map_err(CertifyError::Write)?;
         }
-        Ok(outcomes.into())
+        Ok(events.into())
     }
 
     /// The whole motion, event by event.
@@ -111,8 +112,8 @@ impl<'a, 'w> Search<'a, 'w> {
                 EventKind::PathEnd => {
                     let beyond = path_end(&self.chain.exact, self.given.path);
                     self.go_to(event.travelled - self.around(), None, &mut progress)?;
-                    self.go_to_knot(&beyond, None, &mut progress)?;
-                    (self.write)(&Line::PathEnd)?;
+                    self.go_to_point(&beyond, None, &mut progress)?;
+                    (self.write)(&CertificateLine::PathEnd)?;
                     self.proofs[EventKind::PathEnd as usize] = Some(self.at_path_end());
                 }
                 kind => {
@@ -141,8 +142,8 @@ impl<'a, 'w> Search<'a, 'w> {
         Interval { lo: (time.lo - slack).max(0.0), hi: (time.hi + slack).max(0.0) }
     }
 
-    fn knot(&self, travelled: f64) -> Knot {
-        Knot::new(self.chain.path, &self.chain.exact, travelled)
+    fn grid_point(&self, travelled: f64) -> GridPoint {
+        GridPoint::new(self.chain.path, &self.chain.exact, travelled)
     }
 
     fn at_path_end(&self) -> Status {
@@ -162,24 +163,32 @@ impl<'a, 'w> Search<'a, 'w> {
             .map(move |far| at + far)
     }
 
-    /// See [`Search::go_to_knot`].
+    /// See [`CertificateSearch::go_to_point`].
     fn go_to(&mut self, travelled: f64, event: Option<&Event>, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
         if travelled <= self.at.travelled {
             return Ok(());
         }
-        let target = self.knot(travelled);
-        self.go_to_knot(&target, event, progress)
+        let target = self.grid_point(travelled);
+        self.go_to_point(&target, event, progress)
     }
 
     /// Goes in steps to a knot, or so near to an event that a step cannot be shown for its sake. A claim that cannot be
     /// shown at any length of the step is given up.
-    fn go_to_knot(&mut self, target: &Knot, event: Option<&Event>, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+    fn go_to_point(
+        &mut self,
+        target: &GridPoint,
+        event: Option<&Event>,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<(), Halt> {
         let least = 0.01 * LEAST * (1.0 + self.given.path.length());
         let longest = self.given.team.shortest_link();
         while self.at.head != target.head {
             let remaining = target.travelled - self.at.travelled;
-            let mut to =
-                if self.step >= 0.9 * remaining { target.clone() } else { self.knot(self.at.travelled + self.step) };
+            let mut to = if self.step >= 0.9 * remaining {
+                target.clone()
+            } else {
+                self.grid_point(self.at.travelled + self.step)
+            };
             let claim = Claim { links: self.links, moving: self.moving, clear: self.clear };
             match self.chain.show(&mut self.at, &mut to, claim) {
                 Ok(shown) => {
@@ -206,7 +215,7 @@ impl<'a, 'w> Search<'a, 'w> {
         Ok(())
     }
 
-    fn accept(&mut self, to: Knot, shown: Shown) -> Result<(), Halt> {
+    fn accept(&mut self, to: GridPoint, shown: Shown) -> Result<(), Halt> {
         let Shown { step, body_forward } = shown;
         let exact = &self.chain.exact;
         if self.chain.start.is_none() {
@@ -220,7 +229,7 @@ impl<'a, 'w> Search<'a, 'w> {
         {
             self.links = Links::Front;
         }
-        (self.write)(&Line::Step(step))?;
+        (self.write)(&CertificateLine::Step(step))?;
         self.at = to;
         self.steps += 1;
         if self.steps > self.given.most_steps {
@@ -274,7 +283,7 @@ impl<'a, 'w> Search<'a, 'w> {
 
     /// Boards that overlap before anything has moved.
     fn overlap_at_start(&mut self, event: &Event) -> Result<(), Halt> {
-        let (from, mut to) = (self.at.clone(), self.knot(LEAST * (1.0 + self.given.path.length())));
+        let (from, mut to) = (self.at.clone(), self.grid_point(LEAST * (1.0 + self.given.path.length())));
         self.clear = false;
         let status = if self.touch(event, from, &mut to)? {
             let [bench_a, bench_b] = [event.bench_a, event.bench_b].map(|bench| bench.map(|bench| bench as usize));
@@ -287,13 +296,13 @@ impl<'a, 'w> Search<'a, 'w> {
         Ok(())
     }
 
-    /// Writes that two boards have a point in common with the head between two knots, if that can be shown.
-    fn touch(&mut self, event: &Event, mut from: Knot, to: &mut Knot) -> Result<bool, Halt> {
+    /// Writes that two boards have a point in common with the head between two points, if that can be shown.
+    fn touch(&mut self, event: &Event, mut from: GridPoint, to: &mut GridPoint) -> Result<bool, Halt> {
         let benches = [event.bench_a, event.bench_b].map(|bench| bench.unwrap_or(0) as usize);
         let Some(handles) = self.chain.spans(&mut from, to, benches[1] + 1) else { return Ok(false) };
         let Some(point) = self.chain.common_point(&handles, benches) else { return Ok(false) };
         let spans = handles[1..].iter().map(|handle| handle.span).collect();
-        (self.write)(&Line::Contact { benches, from: from.head, to: to.head, spans, point })?;
+        (self.write)(&CertificateLine::Contact { benches, from: from.head, to: to.head, spans, point })?;
         Ok(true)
     }
 
@@ -336,7 +345,7 @@ impl<'a, 'w> Search<'a, 'w> {
                 |handles: &Vec<Spanned>| handles[link].capsule.product(&handles[link + 1].capsule, false).is_negative();
             if let Some(handles) = handles.filter(stalled) {
                 let (head, spans) = (self.at.head, handles[1..].iter().map(|handle| handle.span).collect());
-                (self.write)(&Line::Stall { link, from: head, to: head, spans })?;
+                (self.write)(&CertificateLine::Stall { link, from: head, to: head, spans })?;
                 self.proofs[EventKind::Stall as usize] = Some(self.proved(earliest, head, event.bench_a, None));
                 return Ok(());
             }
@@ -349,7 +358,7 @@ impl<'a, 'w> Search<'a, 'w> {
     fn lock(&mut self, event: &Event) -> Result<(), Halt> {
         let link = event.bench_a.unwrap_or(0) as usize;
         for travelled in self.beyond(event) {
-            let mut to = self.knot(travelled);
+            let mut to = self.grid_point(travelled);
             let Some(handles) = self.chain.spans(&mut self.at, &mut to, link) else { continue };
             let mut end = to.clone();
             let Some(last) = self.chain.spans(&mut to, &mut end, link) else { continue };
@@ -361,7 +370,8 @@ impl<'a, 'w> Search<'a, 'w> {
                 continue;
             }
             let spans = |handles: &[Spanned]| handles[1..].iter().map(|handle| handle.span).collect();
-            let line = Line::Lock { link, to: to.head, spans: spans(&handles), last: spans(&last), window, jump };
+            let line =
+                CertificateLine::Lock { link, to: to.head, spans: spans(&handles), last: spans(&last), window, jump };
             (self.write)(&line)?;
             self.proofs[EventKind::Lock as usize] = Some(self.proved(self.at.head, to.head, event.bench_a, None));
             return Ok(());
@@ -374,11 +384,11 @@ impl<'a, 'w> Search<'a, 'w> {
 }
 
 /// A knot at the path's end or beyond it.
-pub(super) fn path_end(exact: &ExactPath, path: &Path) -> Knot {
+pub(super) fn path_end(exact: &ExactPath, path: &Path) -> GridPoint {
     let length = path.length();
     let end = place(path.param_at(length));
     let beyond = exact.moved(end, LEAST * (1.0 + length));
     let inward = matches!(exact.segments[beyond.0].curve, super::path::Curve::Inward { .. });
     let head = if inward { Place(beyond.0, 0.0) } else { beyond };
-    Knot::at(head, length)
+    GridPoint::at(head, length)
 }

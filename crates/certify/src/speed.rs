@@ -10,8 +10,8 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use self::step::{Bounds, Speeds};
+use super::grid::{GridPoint, place};
 use super::interval::Interval;
-use super::knot::{Knot, place};
 use super::path::{ExactPath, Place};
 use super::step::Chain;
 use bench_dragon_motion::Motion;
@@ -53,27 +53,27 @@ impl GreatestRatio {
 }
 
 /// A step of the head that may hold what is faster.
-struct Step {
+struct OpenStep {
     upper: f64,
     from: f64,
     to: f64,
 }
 
-impl PartialEq for Step {
+impl PartialEq for OpenStep {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
 
-impl Eq for Step {}
+impl Eq for OpenStep {}
 
-impl PartialOrd for Step {
+impl PartialOrd for OpenStep {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl Ord for Step {
+impl Ord for OpenStep {
     fn cmp(&self, other: &Self) -> Ordering {
         self.upper.total_cmp(&other.upper).then(other.from.total_cmp(&self.from))
     }
@@ -84,17 +84,17 @@ impl Ord for Step {
 pub fn greatest_ratio(motion: &Motion, travelled: f64, tolerance: f64, progress: &mut dyn FnMut(f64)) -> GreatestRatio {
     let exact = ExactPath::new(motion.description());
     let speeds = Speeds { chain: Chain::new(motion.path(), exact, motion.team()) };
-    Search { speeds, end: travelled, least: LEAST * (1.0 + motion.path().length()) }.run(tolerance, progress)
+    RatioSearch { speeds, end: travelled, least: LEAST * (1.0 + motion.path().length()) }.run(tolerance, progress)
 }
 
-struct Search<'a> {
+struct RatioSearch<'a> {
     speeds: Speeds<'a>,
     end: f64,
     /// Metres that doubles tell apart.
     least: f64,
 }
 
-impl Search<'_> {
+impl RatioSearch<'_> {
     fn run(&self, tolerance: f64, progress: &mut dyn FnMut(f64)) -> GreatestRatio {
         // The head itself.
         let mut best =
@@ -103,10 +103,10 @@ impl Search<'_> {
         let from = self.beyond(0.0, -1.0, |place| exact.travelled(place).hi <= 0.0);
         let to = self.beyond(self.end, 1.0, |place| exact.travelled(place).lo >= self.end);
         let Some((from, to)) = from.zip(to) else { return GreatestRatio { hi: f64::INFINITY, ..best } };
-        let mut open = BinaryHeap::from([Step { upper: f64::INFINITY, from, to }]);
+        let mut open = BinaryHeap::from([OpenStep { upper: f64::INFINITY, from, to }]);
         let (mut settled, mut handles) = (1.0f64, 0);
         let enough = |best: &GreatestRatio, upper: f64| upper <= best.lo * (1.0 + tolerance);
-        while let Some(Step { upper, from, to }) = open.pop() {
+        while let Some(OpenStep { upper, from, to }) = open.pop() {
             let middle = 0.5 * from + 0.5 * to;
             let done = enough(&best, upper);
             if done || handles > MOST_HANDLES || to - from < self.least {
@@ -127,7 +127,7 @@ impl Search<'_> {
                 if enough(&best, upper) {
                     settled = settled.max(upper);
                 } else {
-                    open.push(Step { upper, from, to });
+                    open.push(OpenStep { upper, from, to });
                 }
             }
             let wide = (open.peek().map_or(settled, |step| step.upper) / best.lo - 1.0).max(tolerance);
@@ -139,19 +139,20 @@ impl Search<'_> {
     /// Metres of travel a little to one side, of whose place it is sure.
     fn beyond(&self, travelled: f64, side: f64, is_beyond: impl Fn(Place) -> bool) -> Option<f64> {
         let mut others = (0..40).map(|power| travelled + side * self.least * 2f64.powi(power));
-        others.find(|other| is_beyond(self.knot(*other).head))
+        others.find(|other| is_beyond(self.grid_point(*other).head))
     }
 
     fn bounds(&self, from: f64, to: f64) -> Option<Bounds> {
-        let [mut from, mut middle, mut to] = [from, 0.5 * from + 0.5 * to, to].map(|travelled| self.knot(travelled));
+        let [mut from, mut middle, mut to] =
+            [from, 0.5 * from + 0.5 * to, to].map(|travelled| self.grid_point(travelled));
         self.speeds.over(&mut from, &mut middle, &mut to)
     }
 
-    fn knot(&self, travelled: f64) -> Knot {
+    fn grid_point(&self, travelled: f64) -> GridPoint {
         let Chain { path, exact, .. } = &self.speeds.chain;
         if travelled <= self.end {
-            return Knot::new(path, exact, travelled);
+            return GridPoint::new(path, exact, travelled);
         }
-        Knot::at(exact.moved(place(path.param_at(self.end)), travelled - self.end), travelled)
+        GridPoint::at(exact.moved(place(path.param_at(self.end)), travelled - self.end), travelled)
     }
 }

@@ -2,8 +2,8 @@
 
 use super::boards::{MovingBoard, Shape};
 use super::capsule::{Span, Spanned, moved_back};
+use super::grid::{GridPoint, span};
 use super::interval::Interval;
-use super::knot::{Knot, span};
 use super::lines::{Links, Step};
 use super::link::{Front, follower_within};
 use super::path::{Curve, ExactPath, Place};
@@ -86,8 +86,8 @@ impl<'a> Chain<'a> {
         self.links[bench.min(1)]
     }
 
-    /// Shows a claim over the step between two knots, or tells what stands in the way.
-    pub fn show(&self, from: &mut Knot, to: &mut Knot, claim: Claim) -> Result<Shown, Obstacle> {
+    /// Shows a claim over the step between two points, or tells what stands in the way.
+    pub fn show(&self, from: &mut GridPoint, to: &mut GridPoint, claim: Claim) -> Result<Shown, Obstacle> {
         let mut unlinked = None;
         for pads in PADS {
             match self.show_with(from, to, claim, pads) {
@@ -99,7 +99,7 @@ impl<'a> Chain<'a> {
         Err(Obstacle::Link(unlinked.unwrap_or(0)))
     }
 
-    fn show_with(&self, from: &mut Knot, to: &mut Knot, claim: Claim, pads: f64) -> Result<Shown, Obstacle> {
+    fn show_with(&self, from: &mut GridPoint, to: &mut GridPoint, claim: Claim, pads: f64) -> Result<Shown, Obstacle> {
         let mut listed = Listed::new(self, Span(from.head, to.head), pads);
         while listed.handles.len() <= self.team.benches && !listed.is_enough(claim) {
             listed.extend(from, to, claim)?;
@@ -113,16 +113,16 @@ impl<'a> Chain<'a> {
         Ok(Shown { step, body_forward: listed.body_forward })
     }
 
-    /// Handles 0 to `handle` between two knots, if Lemma 1 holds for every link between them.
-    pub fn spans(&self, from: &mut Knot, to: &mut Knot, handle: usize) -> Option<Vec<Spanned>> {
+    /// Handles 0 to `handle` between two points, if Lemma 1 holds for every link between them.
+    pub fn spans(&self, from: &mut GridPoint, to: &mut GridPoint, handle: usize) -> Option<Vec<Spanned>> {
         self.spans_until(from, to, |handles| handles.len() > handle)
     }
 
-    /// Handles from 0 on between two knots, until they are enough, if Lemma 1 holds for every link between them.
+    /// Handles from 0 on between two points, until they are enough, if Lemma 1 holds for every link between them.
     pub fn spans_until(
         &self,
-        from: &mut Knot,
-        to: &mut Knot,
+        from: &mut GridPoint,
+        to: &mut GridPoint,
         enough: impl Fn(&[Spanned]) -> bool,
     ) -> Option<Vec<Spanned>> {
         let claim = Claim { links: Links::All, moving: false, clear: false };
@@ -172,7 +172,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         Self { chain, handles, pad: 0.0, pads, body_forward: true }
     }
 
-    /// Goes on behind handles that are enclosed already, the last of them in exactly the span between two knots.
+    /// Goes on behind handles that are enclosed already, the last of them in exactly the span between two points.
     pub fn behind(chain: &'c Chain<'a>, handles: Vec<Spanned>, pads: f64) -> Self {
         Self { chain, handles, pad: 0.0, pads, body_forward: true }
     }
@@ -219,7 +219,7 @@ impl<'c, 'a> Listed<'c, 'a> {
     }
 
     /// Encloses one handle more.
-    pub fn extend(&mut self, from: &mut Knot, to: &mut Knot, claim: Claim) -> Result<(), Obstacle> {
+    pub fn extend(&mut self, from: &mut GridPoint, to: &mut GridPoint, claim: Claim) -> Result<(), Obstacle> {
         let Chain { path, exact, team, start, .. } = self.chain;
         let link = self.handles.len() - 1;
         let solved = from.extend_to(link + 1, path, team).and_then(|()| to.extend_to(link + 1, path, team));

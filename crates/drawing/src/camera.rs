@@ -74,7 +74,7 @@ impl StageBox {
 
 /// A rectangle of the sheet in its own units, y downward.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
+pub struct Viewport {
     /// Its left edge.
     pub left: f64,
     /// Its upper edge.
@@ -85,7 +85,7 @@ pub struct Frame {
     pub height: f64,
 }
 
-impl Frame {
+impl Viewport {
     /// Its right edge.
     pub fn right(&self) -> f64 {
         self.left + self.width
@@ -101,7 +101,7 @@ impl Frame {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
     /// Where on the sheet.
-    pub frame: Frame,
+    pub frame: Viewport,
     /// The point of the stage in the middle of the frame.
     pub centre: Point,
     /// Units of the sheet for a metre.
@@ -110,7 +110,7 @@ pub struct Camera {
 
 impl Camera {
     /// A camera that shows all of a box, and more of the stage where the frame has another shape.
-    pub fn showing(shown: &StageBox, frame: Frame) -> Self {
+    pub fn showing(shown: &StageBox, frame: Viewport) -> Self {
         let scale = (frame.width / shown.width()).min(frame.height / shown.height());
         Self { frame, centre: shown.centre(), scale }
     }

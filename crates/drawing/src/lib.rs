@@ -26,7 +26,7 @@ use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::solve::Chain;
 use bench_dragon_motion::timeline::Timeline;
 use benches::{ColourScale, Speeds};
-use camera::{Camera, Frame, StageBox};
+use camera::{Camera, StageBox, Viewport};
 pub use look::{Framing, Length, Look, Surroundings, Theme};
 use marks::{Happened, Tense};
 use palette::Palette;
@@ -99,7 +99,7 @@ impl<'a> Drawing<'a> {
             }
             Surroundings::Caption | Surroundings::Nothing => {
                 let height = look.sheet_height().unwrap_or(shape * WIDTH);
-                (Frame { left: 0.0, top: 0.0, width: WIDTH, height }, height)
+                (Viewport { left: 0.0, top: 0.0, width: WIDTH, height }, height)
             }
         };
         let camera = Camera::showing(&shown, frame);

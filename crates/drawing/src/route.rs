@@ -125,7 +125,7 @@ fn spiral(data: &mut String, direction: Direction, pitch: f64, (from, to): (f64,
 
 #[cfg(test)]
 mod tests {
-    use super::super::camera::{Frame, StageBox};
+    use super::super::camera::{StageBox, Viewport};
     use super::*;
     use bench_dragon_motion::Method;
     use bench_dragon_motion::model::curve::Side;
@@ -135,7 +135,7 @@ mod tests {
     const TEAM: Team = Team { benches: 20, head_length: 3.41, body_length: 2.2, width: 0.3, hole_inset: 0.275 };
 
     fn camera(width: f64) -> Camera {
-        let frame = Frame { left: 0.0, top: 0.0, width: 1000.0, height: 1000.0 };
+        let frame = Viewport { left: 0.0, top: 0.0, width: 1000.0, height: 1000.0 };
         Camera::showing(&StageBox::around(Point::origin(), width, width), frame)
     }
 
@@ -175,7 +175,7 @@ mod tests {
         let description = PathDescription::Spiral { pitch: 0.55, start_turn: 2000.0 };
         let motion = Motion::new(description, TEAM, 1.0, Method::Newton).unwrap();
         assert_eq!(data(&motion, &camera(1000.0)), "");
-        let frame = Frame { left: 0.0, top: 0.0, width: 1000.0, height: 1000.0 };
+        let frame = Viewport { left: 0.0, top: 0.0, width: 1000.0, height: 1000.0 };
         let near = Camera::showing(&StageBox::around(Point::new(1000.0, 0.0), 4.0, 4.0), frame);
         let turns = curves(&data(&motion, &near)).len() as f64 / CURVES_PER_TURN;
         assert!((7.0..12.0).contains(&turns), "{turns} turns");

@@ -4,7 +4,7 @@
 use svg::node::element::{Definitions, Group, LinearGradient, Path, Rectangle, Stop, Text};
 
 use super::benches::ColourScale;
-use super::camera::{Camera, Frame};
+use super::camera::{Camera, Viewport};
 use super::marks::Happened;
 use super::palette::Palette;
 use super::{FACE, WIDTH, rounded, text};
@@ -38,9 +38,9 @@ pub fn margins(rows: usize) -> (f64, f64) {
 }
 
 /// The frame of a sheet of a height, with so many rows in the legend.
-pub fn frame(height: f64, rows: usize) -> Frame {
+pub fn frame(height: f64, rows: usize) -> Viewport {
     let (above, below) = margins(rows);
-    Frame { left: LEFT, top: above, width: frame_width(), height: height - above - below }
+    Viewport { left: LEFT, top: above, width: frame_width(), height: height - above - below }
 }
 
 /// How wide the frame is.
@@ -107,7 +107,7 @@ pub fn axes(camera: &Camera, palette: &Palette) -> Group {
 }
 
 /// A frame as an element.
-pub fn outline(frame: Frame) -> Rectangle {
+pub fn outline(frame: Viewport) -> Rectangle {
     let corner = Rectangle::new().set("x", rounded(frame.left, 3)).set("y", rounded(frame.top, 3));
     corner.set("width", rounded(frame.width, 3)).set("height", rounded(frame.height, 3))
 }
@@ -198,7 +198,7 @@ fn gradient(palette: &Palette) -> Definitions {
 /// Words in the picture, with a rim of the ground's colour so that they are read over boards.
 pub fn label(content: &str, (x, y): (f64, f64), colour: &str, camera: &Camera, palette: &Palette) -> Group {
     let half = 0.5 * width_of(content, 16.0) + 6.0;
-    let Frame { left, top, .. } = camera.frame;
+    let Viewport { left, top, .. } = camera.frame;
     let x = x.min(camera.frame.right() - half).max(left + half);
     let y = y.min(camera.frame.bottom() - 10.0).max(top + 20.0);
     let place = |colour| words(content, (x, y + 5.0), 16, colour).set("text-anchor", "middle").set("font-weight", 600);

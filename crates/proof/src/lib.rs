@@ -29,8 +29,8 @@ use std::io::{self, BufRead, Read};
 use serde::Serialize;
 
 use self::events::{Events, LockShown};
-use self::lines::Line;
-pub use self::lines::{EventKind, Outcome, Status};
+use self::lines::ParsedLine;
+pub use self::lines::{EventKind, ProvedEvent, Status};
 use self::path::Span;
 use self::scene::Scene;
 use self::steps::{Step, Steps};
@@ -48,7 +48,7 @@ pub struct Proved {
     /// The version of the program that wrote it.
     pub version: String,
     /// Contact, stall, lock and path end, in this order.
-    pub results: Vec<Outcome>,
+    pub results: Vec<ProvedEvent>,
     /// Steps checked.
     pub steps: u64,
     /// Links checked, in all steps.
@@ -107,7 +107,7 @@ pub fn verify(mut lines: impl BufRead, progress: &mut dyn FnMut(u64)) -> Result<
         }
         bytes += read as u64;
         progress(bytes);
-        let parsed: Line = serde_json::from_slice(&text).map_err(|error| form(error.to_string()))?;
+        let parsed: ParsedLine = serde_json::from_slice(&text).map_err(|error| form(error.to_string()))?;
         match (&mut checker, parsed) {
             (None, first) => checker = Some(Checker::begin(first).map_err(form)?),
             (Some(checker), parsed) => {
@@ -131,8 +131,8 @@ struct Checker {
 }
 
 impl Checker {
-    fn begin(first: Line) -> Result<Self, String> {
-        let Line::Certificate { format, version, scene: text } = first else {
+    fn begin(first: ParsedLine) -> Result<Self, String> {
+        let ParsedLine::Certificate { format, version, scene: text } = first else {
             return Err("the first line is not that of a certificate".to_owned());
         };
         if format != FORMAT {
@@ -143,22 +143,22 @@ impl Checker {
         Ok(Self { scene, steps: Steps::new(), events: Events::default(), proved })
     }
 
-    fn add(&mut self, line: Line) -> Result<(), String> {
+    fn add(&mut self, line: ParsedLine) -> Result<(), String> {
         let Self { scene, steps, events, proved } = self;
-        let is_result = matches!(line, Line::Result(_));
+        let is_result = matches!(line, ParsedLine::Result(_));
         if !is_result && (events.finish.is_some() || !proved.results.is_empty()) {
             return Err("nothing but results can follow a lock, the path's end or a result".to_owned());
         }
         match line {
-            Line::Certificate { .. } => Err("a second first line".to_owned()),
-            Line::Step { links, from, to, moving, clear, spans } => {
+            ParsedLine::Certificate { .. } => Err("a second first line".to_owned()),
+            ParsedLine::Step { links, from, to, moving, clear, spans } => {
                 steps.add(scene, Step { links, head: Span(from, to), moving, clear, spans })
             }
-            Line::Contact { benches, from, to, spans, point } => {
+            ParsedLine::Contact { benches, from, to, spans, point } => {
                 events.add_contact(scene, steps, benches, Span(from, to), &spans, point)
             }
-            Line::Stall { link, from, to, spans } => events.add_stall(scene, steps, link, Span(from, to), &spans),
-            Line::Lock { link, to, spans, last, window, jump } => {
+            ParsedLine::Stall { link, from, to, spans } => events.add_stall(scene, steps, link, Span(from, to), &spans),
+            ParsedLine::Lock { link, to, spans, last, window, jump } => {
                 let shown = match (window, jump) {
                     (Some(window), None) => LockShown::Vanishes(window),
                     (None, Some(jump)) => LockShown::Jumps(jump),
@@ -166,8 +166,8 @@ impl Checker {
                 };
                 events.add_lock(scene, steps, (link, to), (&spans, &last), shown)
             }
-            Line::PathEnd {} => events.add_path_end(scene, steps),
-            Line::Result(outcome) => {
+            ParsedLine::PathEnd {} => events.add_path_end(scene, steps),
+            ParsedLine::Result(outcome) => {
                 results::check(scene, steps, events, &outcome, &proved.results)?;
                 proved.results.push(outcome);
                 Ok(())

@@ -7,7 +7,7 @@ use super::path::{Place, Span};
 /// A line.
 #[derive(Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
-pub(super) enum Line {
+pub(super) enum ParsedLine {
     Certificate {
         format: u32,
         version: String,
@@ -45,7 +45,7 @@ pub(super) enum Line {
         jump: Option<Span>,
     },
     PathEnd {},
-    Result(Outcome),
+    Result(ProvedEvent),
 }
 
 /// Which links a step is about.
@@ -85,7 +85,7 @@ pub enum Status {
 /// What a certificate proves of one kind of event.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Outcome {
+pub struct ProvedEvent {
     /// Which event.
     pub event: EventKind,
     /// How much of it.

@@ -2,7 +2,7 @@
 
 use super::events::{Events, Finish};
 use super::interval::Interval;
-use super::lines::{EventKind, Outcome, Status};
+use super::lines::{EventKind, ProvedEvent, Status};
 use super::path::Place;
 use super::scene::Scene;
 use super::steps::Steps;
@@ -28,15 +28,15 @@ pub(super) fn check(
     scene: &Scene,
     steps: &Steps,
     events: &Events,
-    outcome: &Outcome,
-    earlier: &[Outcome],
+    outcome: &ProvedEvent,
+    earlier: &[ProvedEvent],
 ) -> Result<(), String> {
     let Some(expected) = ORDER.get(earlier.len()) else { return Err("a result too many".to_owned()) };
     if outcome.event != *expected {
         return Err("the results are not contact, stall, lock and path_end in this order".to_owned());
     }
     let known = known(scene, steps, events, *expected);
-    let Outcome { time_lo, time_hi, bench_a, bench_b, .. } = outcome;
+    let ProvedEvent { time_lo, time_hi, bench_a, bench_b, .. } = outcome;
     let begins = |lo: f64| lo.is_finite() && lo >= 0.0 && Interval::new(lo).is_at_most(&known.not_before);
     match (outcome.status, time_lo, time_hi) {
         (Status::None, lo, None) if known.never && bench_a.is_none() && bench_b.is_none() => {

@@ -188,19 +188,19 @@ fn display_moments(end: f64, display_rate: f64) -> Vec<f64> {
 }
 
 /// Where the handles are at one moment.
-struct Moment {
+struct DisplaySample {
     time: f64,
     chain: Chain,
 }
 
 /// The safe solver's chains. Always with velocities: they carry a moment over the rounding of the clock.
-fn truth(scene: &Scene, times: &[f64]) -> Result<Vec<Moment>, String> {
+fn truth(scene: &Scene, times: &[f64]) -> Result<Vec<DisplaySample>, String> {
     let exact = scene.motion.with_method(Method::Newton).map_err(|error| error.to_string())?;
     let mut solver = exact.solver(Velocities::Computed).solver;
     let solved = times.iter().map(|&time| {
         let mut chain = Chain::new(scene.team().handles());
         solve(solver.as_mut(), time, &mut chain)?;
-        Ok(Moment { time, chain })
+        Ok(DisplaySample { time, chain })
     });
     solved.collect()
 }
@@ -210,9 +210,9 @@ fn solve(solver: &mut dyn Solver, time: f64, chain: &mut Chain) -> Result<(), St
 }
 
 /// Metres below which errors are rounding, as [`super::Measurement::noise`].
-fn noise(scene: &Scene, truth: &[Moment]) -> f64 {
+fn noise(scene: &Scene, truth: &[DisplaySample]) -> f64 {
     let head_speed = scene.motion.head_speed();
-    let of_moment = |Moment { time, chain }: &Moment| {
+    let of_moment = |DisplaySample { time, chain }: &DisplaySample| {
         let of_handle = |handle: usize| {
             let reach = chain.x[handle].hypot(chain.y[handle]) + head_speed * time;
             8.0 * f64::EPSILON * reach * (chain.speed[handle] / head_speed).abs().max(1.0)
@@ -247,7 +247,7 @@ impl Stream {
     }
 
     /// The largest error of a reader over all moments, in both precisions, metres.
-    fn errors(&mut self, reader: Reader, delay: f64, truth: &[Moment]) -> Result<[f64; 2], String> {
+    fn errors(&mut self, reader: Reader, delay: f64, truth: &[DisplaySample]) -> Result<[f64; 2], String> {
         let mut worst = [0.0; 2];
         let mut shown = Vec::new();
         for moment in truth {

@@ -100,7 +100,7 @@ struct Candidate {
 }
 
 /// The truth at one moment.
-struct Moment {
+struct ReferenceSample {
     time: f64,
     handles: Vec<ReferenceHandle>,
 }
@@ -136,7 +136,7 @@ fn reference(scene: &Scene) -> Result<Reference, String> {
 
 /// The reference at all moments. At the lock itself there is a solution only up to rounding, so the last moment is a
 /// thousandth of a second earlier.
-fn truth(scene: &Scene, end: f64, progress: &mut dyn FnMut(f64)) -> Result<Vec<Moment>, String> {
+fn truth(scene: &Scene, end: f64, progress: &mut dyn FnMut(f64)) -> Result<Vec<ReferenceSample>, String> {
     let last_second = 1f64.min(0.5 * end);
     let spread = (0..SPREAD_MOMENTS).map(|k| (end - last_second) * k as f64 / SPREAD_MOMENTS as f64);
     let last = (0..LAST_SECOND_MOMENTS)
@@ -151,19 +151,19 @@ fn truth(scene: &Scene, end: f64, progress: &mut dyn FnMut(f64)) -> Result<Vec<M
     })
 }
 
-fn moments(scene: &Scene, times: &[f64], progress: &mut dyn FnMut(f64)) -> Result<Vec<Moment>, String> {
+fn moments(scene: &Scene, times: &[f64], progress: &mut dyn FnMut(f64)) -> Result<Vec<ReferenceSample>, String> {
     let mut reference = reference(scene)?;
     let mut moments = Vec::with_capacity(times.len());
     for &time in times {
         let handles = reference.handles(time).map_err(|none| format!("the reference at {time} s: {none}"))?;
-        moments.push(Moment { time, handles });
+        moments.push(ReferenceSample { time, handles });
         progress(moments.len() as f64 / times.len() as f64);
     }
     Ok(moments)
 }
 
 /// What rounding does to a pose by itself, at most: see [`Measurement::noise`].
-fn noise(scene: &Scene, moments: &[Moment]) -> f64 {
+fn noise(scene: &Scene, moments: &[ReferenceSample]) -> f64 {
     let speed = scene.motion.head_speed();
     let of_handle = |time: f64, handle: &ReferenceHandle| {
         let reach = handle.x.high.hypot(handle.y.high) + speed * time;
@@ -207,7 +207,7 @@ fn contact_errors(scene: &Scene, timeline: &Timeline) -> Result<Option<ContactEr
     Ok(Some(ContactErrors { exact, paper }))
 }
 
-fn measured(scene: &Scene, mut candidate: Candidate, moments: &[Moment], noise: f64, end: f64) -> Measurement {
+fn measured(scene: &Scene, mut candidate: Candidate, moments: &[ReferenceSample], noise: f64, end: f64) -> Measurement {
     let errors = errors(scene, &mut candidate, moments);
     let mut times = frame_times(scene, candidate.solver.as_mut(), end);
     times.sort_unstable();
@@ -253,7 +253,7 @@ struct Errors {
     link: f64,
 }
 
-fn errors(scene: &Scene, candidate: &mut Candidate, moments: &[Moment]) -> Errors {
+fn errors(scene: &Scene, candidate: &mut Candidate, moments: &[ReferenceSample]) -> Errors {
     let mut chain = Chain::new(scene.team().handles());
     let mut worst = Errors::default();
     for moment in moments {

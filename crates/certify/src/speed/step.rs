@@ -2,8 +2,8 @@
 //! `docs/proofs.md`. In: two places of the head. Out: bounds. Only [`super`] uses it.
 
 use super::super::capsule::{Capsule, Span, Spanned};
+use super::super::grid::{GridPoint, param, span};
 use super::super::interval::{Interval, cross, dot, minus, norm, scaled};
-use super::super::knot::{Knot, param, span};
 use super::super::link::follower_within;
 use super::super::path::{Curve, Place};
 use super::super::step::Chain;
@@ -53,7 +53,7 @@ pub(super) struct Speeds<'a> {
 
 impl Speeds<'_> {
     /// The bounds over the step from one place of the head to another, if they can be enclosed.
-    pub fn over(&self, from: &mut Knot, middle: &mut Knot, to: &mut Knot) -> Option<Bounds> {
+    pub fn over(&self, from: &mut GridPoint, middle: &mut GridPoint, to: &mut GridPoint) -> Option<Bounds> {
         let exact = &self.chain.exact;
         if !(exact.in_order(from.head, middle.head) && exact.in_order(middle.head, to.head)) {
             return None;

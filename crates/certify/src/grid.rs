@@ -17,14 +17,14 @@ pub(super) struct Handle {
 
 /// The head at one place, and as many handles as were needed.
 #[derive(Debug, Clone)]
-pub(super) struct Knot {
+pub(super) struct GridPoint {
     /// Metres of travel, nearly.
     pub travelled: f64,
     pub head: Place,
     pub handles: Vec<Handle>,
 }
 
-impl Knot {
+impl GridPoint {
     pub fn new(path: &Path, exact: &ExactPath, travelled: f64) -> Self {
         let param = path.param_at(travelled);
         let place = place(param);
@@ -61,7 +61,7 @@ pub(super) fn place(param: Param) -> Place {
     Place(param.segment(), param.coordinate().high)
 }
 
-/// The span of a handle between two knots, `pad` metres longer at both ends.
+/// The span of a handle between two points, `pad` metres longer at both ends.
 pub(super) fn span(exact: &ExactPath, one: Param, other: Param, pad: f64) -> Span {
     let (one, other) = (place(one), place(other));
     let (first, last) = if exact.in_order(one, other) { (one, other) } else { (other, one) };

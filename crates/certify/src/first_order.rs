@@ -11,7 +11,7 @@ use bench_dragon_motion::model::separation::{closest_points_board_board, separat
 
 /// A handle while the head is `tau` metres from the middle of a step: at `point + tau velocity`, but for an error.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Moving {
+pub(super) struct FirstOrderHandle {
     /// The point of a place m.
     point: Vector,
     /// The tangent there.
@@ -47,9 +47,9 @@ pub(super) type Direction = [f64; 2];
 
 /// A board carried by two handles.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Carried {
-    front: Moving,
-    rear: Moving,
+pub(super) struct FirstOrderBoard {
+    front: FirstOrderHandle,
+    rear: FirstOrderHandle,
     link: Interval,
     half_length: Interval,
     half_width: Interval,
@@ -63,7 +63,7 @@ struct Linear {
     error: Interval,
 }
 
-impl Moving {
+impl FirstOrderHandle {
     /// The head, which is at `middle` in the middle of a step of `half_step` metres to either side.
     pub fn head(path: &ExactPath, span: &Spanned, middle: Place, half_step: f64) -> Self {
         Self::new(path, span, middle, Interval::ONE, 0.0, half_step)
@@ -153,8 +153,8 @@ fn meet(one: Interval, other: Interval) -> Option<Interval> {
     (lo <= hi).then_some(Interval { lo, hi })
 }
 
-impl Carried {
-    pub fn new(shape: &Shape, front: Moving, rear: Moving, link: Interval, half_step: f64) -> Self {
+impl FirstOrderBoard {
+    pub fn new(shape: &Shape, front: FirstOrderHandle, rear: FirstOrderHandle, link: Interval, half_step: f64) -> Self {
         let half_length = link * 0.5 + shape.inset;
         Self { front, rear, link, half_length, half_width: shape.half_width, half_step }
     }
@@ -242,7 +242,7 @@ impl Carried {
         let middle = plus(front.point, rear.point).map(|sum| sum * 0.5);
         let point = plus(middle, plus(scaled(at, along), scaled([-at[1], at[0]], aside)));
         let half = if when == When::Middle { 0.0 } else { self.half_step };
-        let off = |handle: &Moving| handle.error(when) + norm(handle.velocity) * half;
+        let off = |handle: &FirstOrderHandle| handle.error(when) + norm(handle.velocity) * half;
         (point, (off(front) + off(rear)) * (Interval::point(0.5) + along.abs() + aside.abs()))
     }
 

@@ -2,48 +2,52 @@
 //! [`super::clearance`] uses it.
 
 use super::capsule::Span;
-use super::knot::{Knot, place};
+use super::first_order::{FirstOrderBoard, FirstOrderHandle, When};
+use super::grid::{GridPoint, place};
 use super::lines::Links;
 use super::path::{Curve, Place};
-use super::relative::{Carried, Moving, When};
 use super::step::{Chain, Claim, Listed, Obstacle};
 
 /// The knots of a step.
-pub(super) struct Knots<'k> {
-    pub from: &'k mut Knot,
-    pub middle: &'k mut Knot,
-    pub to: &'k mut Knot,
+pub(super) struct StepPoints<'k> {
+    pub from: &'k mut GridPoint,
+    pub middle: &'k mut GridPoint,
+    pub to: &'k mut GridPoint,
 }
 
 /// The same knots for as long as they are lent.
-pub(super) fn knots_of<'k>(from: &'k mut Knot, middle: &'k mut Knot, to: &'k mut Knot) -> Knots<'k> {
-    Knots { from, middle, to }
+pub(super) fn step_points<'k>(
+    from: &'k mut GridPoint,
+    middle: &'k mut GridPoint,
+    to: &'k mut GridPoint,
+) -> StepPoints<'k> {
+    StepPoints { from, middle, to }
 }
 
 /// The handles of a step, and how they move.
-pub(super) struct Carriers<'c, 'a> {
+pub(super) struct FirstOrderStep<'c, 'a> {
     chain: &'c Chain<'a>,
     pub listed: Listed<'c, 'a>,
-    moving: Vec<Moving>,
+    handles: Vec<FirstOrderHandle>,
     /// Where the head is in the middle.
     pub at: Place,
     half_step: f64,
 }
 
-impl<'c, 'a> Carriers<'c, 'a> {
-    pub fn new(chain: &'c Chain<'a>, Knots { from, middle, to }: &Knots, pads: f64) -> Self {
+impl<'c, 'a> FirstOrderStep<'c, 'a> {
+    pub fn new(chain: &'c Chain<'a>, StepPoints { from, middle, to }: &StepPoints, pads: f64) -> Self {
         let exact = &chain.exact;
         let listed = Listed::new(chain, Span(from.head, to.head), pads);
         // Rounding may put the middle outside the two; any place between them will do.
         let inside = exact.in_order(from.head, middle.head) && exact.in_order(middle.head, to.head);
         let at = if inside { middle.head } else { from.head };
         let half_step = exact.length(from.head, at).max(exact.length(at, to.head));
-        let moving = vec![Moving::head(exact, &listed.handles[0], at, half_step)];
-        Self { chain, listed, moving, at, half_step }
+        let handles = vec![FirstOrderHandle::head(exact, &listed.handles[0], at, half_step)];
+        Self { chain, listed, handles, at, half_step }
     }
 
     /// Encloses one handle more.
-    pub fn extend(&mut self, Knots { from, middle, to }: Knots, links: Links) -> Result<(), Obstacle> {
+    pub fn extend(&mut self, StepPoints { from, middle, to }: StepPoints, links: Links) -> Result<(), Obstacle> {
         let Chain { path, exact, team, .. } = self.chain;
         let link = self.listed.handles.len() - 1;
         self.listed.extend(from, to, Claim { links, moving: false, clear: false })?;
@@ -51,15 +55,15 @@ impl<'c, 'a> Carriers<'c, 'a> {
         let at = place(middle.handles[link + 1].param);
         let spans = (&self.listed.handles[link], &self.listed.handles[link + 1]);
         let length = self.chain.link(link);
-        let follower = self.moving[link].follower(exact, spans, at, length, self.half_step);
-        self.moving.push(follower.ok_or(Obstacle::Link(link))?);
+        let follower = self.handles[link].follower(exact, spans, at, length, self.half_step);
+        self.handles.push(follower.ok_or(Obstacle::Link(link))?);
         Ok(())
     }
 
     /// The board of a bench.
-    pub fn board(&self, bench: usize) -> Carried {
-        let (front, rear, link) = (self.moving[bench], self.moving[bench + 1], self.chain.link(bench));
-        Carried::new(&self.chain.shape, front, rear, link, self.half_step)
+    pub fn board(&self, bench: usize) -> FirstOrderBoard {
+        let (front, rear, link) = (self.handles[bench], self.handles[bench + 1], self.chain.link(bench));
+        FirstOrderBoard::new(&self.chain.shape, front, rear, link, self.half_step)
     }
 
     /// Whether two boards stay further apart than `threshold`.
@@ -79,12 +83,12 @@ impl<'c, 'a> Carriers<'c, 'a> {
     }
 
     /// The boards from `first` to the last, all on the line on which the last listed handle is.
-    pub fn straight_run(&self, first: usize) -> Carried {
-        let last = self.moving.len() - 1;
+    pub fn straight_run(&self, first: usize) -> FirstOrderBoard {
+        let last = self.handles.len() - 1;
         let link = self.chain.links[1];
-        let back = |handles: usize| self.moving[last].moved_back(link * handles as f64);
+        let back = |handles: usize| self.handles[last].moved_back(link * handles as f64);
         let benches = self.chain.team.benches;
         let length = link * (benches - first) as f64;
-        Carried::new(&self.chain.shape, back(first - last), back(benches - last), length, self.half_step)
+        FirstOrderBoard::new(&self.chain.shape, back(first - last), back(benches - last), length, self.half_step)
     }
 }
