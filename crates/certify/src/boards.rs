@@ -1,5 +1,5 @@
-//! Lemmas 2 and 3 of `docs/proofs.md`: boards that are apart over a step, and Lemma 5: boards that have a point in common.
-//! Only [`super`] uses it.
+//! Lemmas 2 and 3 of `docs/proofs.md`: boards that are apart over a step, and Lemma 5: boards that have a point in
+//! common. Only [`super`] uses it.
 
 use super::capsule::Capsule;
 use super::interval::{Interval, Vector, cross, dot, minus, norm, norm_squared};
@@ -42,8 +42,8 @@ impl Shape {
         let along = minus(front.point, rear.point).map(Interval::middle);
         let length = along[0].hypot(along[1]);
         let share = self.inset.over(link);
-        // Any point is s of the way between the handles, s in [-e, 1 + e], and half a width aside; the middle of the two
-        // handles moves no more than both do.
+        // Any point is s of the way between the handles, s in [-e, 1 + e], and half a width aside; the middle of the
+        // two handles moves no more than both do.
         let slack = [front, rear]
             .iter()
             .fold(Interval::ZERO, |sum, capsule| sum + Interval::point(capsule.half) + Interval::point(capsule.radius));
@@ -74,7 +74,7 @@ impl Shape {
 }
 
 impl MovingBoard {
-    /// Whether two boards are proved to be further apart than `metres`, not below 0, by the circles about them.
+    /// Returns true if two boards are proved to be further apart than `metres`, not below 0, by the circles about them.
     pub fn is_further_than(&self, metres: f64, other: &Self) -> bool {
         let between = [0, 1].map(|axis| Interval::point(self.centre[axis]) - Interval::point(other.centre[axis]));
         let apart = norm_squared(between);
@@ -82,12 +82,12 @@ impl MovingBoard {
         reach.square().is_below(apart)
     }
 
-    /// Whether two boards are proved to be apart.
+    /// Returns true if two boards are proved to be apart.
     pub fn is_apart_from(&self, other: &Self) -> bool {
         self.is_apart_by(0.0, other)
     }
 
-    /// Whether two boards are proved to be further apart than `metres`; below 0: to overlap less deeply.
+    /// Returns true if two boards are proved to be further apart than `metres`; below 0: to overlap less deeply.
     pub fn is_apart_by(&self, metres: f64, other: &Self) -> bool {
         if self.is_further_than(metres.max(0.0), other) {
             return true;
@@ -143,7 +143,7 @@ impl MovingBoard {
         axis + self.half_width * across.over(self.link).min(Interval::point(length))
     }
 
-    /// Whether a point is proved to be in the board at every moment of the step.
+    /// Returns true if a point is proved to be in the board at every moment of the step.
     pub fn holds(&self, point: Vector) -> bool {
         let slack =
             |capsule: &Capsule| Interval::within((Interval::point(capsule.half) + Interval::point(capsule.radius)).hi);

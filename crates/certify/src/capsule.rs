@@ -1,4 +1,5 @@
-//! Spans of the path and the capsules that hold their points. See "Capsules" in `docs/proofs.md`. Only [`super`] uses it.
+//! Spans of the path and the capsules that hold their points. See "Capsules" in `docs/proofs.md`. Only [`super`] uses
+//! it.
 
 use serde::Serialize;
 

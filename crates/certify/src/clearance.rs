@@ -1,5 +1,5 @@
-//! The least clearance of a show between two numbers: steps of the head over which no two boards can be nearer, and one place
-//! at which two are as near. Only [`super`] uses it. Lemma 6 of `docs/proofs.md`.
+//! The least clearance of a show between two numbers: steps of the head over which no two boards can be nearer, and one
+//! place at which two are as near. Only [`super`] uses it. Lemma 6 of `docs/proofs.md`.
 
 use super::boards::MovingBoard;
 use super::capsule::{Span, Spanned};
@@ -30,8 +30,8 @@ const LEAST_STEP: f64 = 1e-14;
 /// Metres, as a share of the way, by which the show's end may be off by rounding.
 const END_SLACK: f64 = 1e-13;
 
-/// Metres before a lock to which a show is searched that ends with it, in turn: the nearer, the less the handle that is lost
-/// can still move.
+/// Metres before a lock to which a show is searched that ends with it, in turn: the nearer, the less the handle that is
+/// lost can still move.
 const BEFORE_LOCK: [f64; 3] = [1e-9, 3e-11, 1e-12];
 
 /// How far behind a contact, in links, boards are expected to overlap surely.
@@ -61,8 +61,8 @@ pub struct ClearanceEnclosure {
 
 /// Encloses the least clearance of all pairs of boards which share no handle, from the start until the show freezes at
 /// `freeze`: within a nanometre, unless the search gives up after `most_steps`. `hint` is what the ordinary search has
-/// found, which only tells where to look. `progress` gets the share of the way that is done, from 0 to 1. `None` where not
-/// even the hint can be shown.
+/// found, which only tells where to look. `progress` gets the share of the way that is done, from 0 to 1. `None` where
+/// not even the hint can be shown.
 pub fn enclose_least_clearance(
     motion: &Motion,
     freeze: &TimedEvent,
@@ -199,8 +199,8 @@ impl<'a> Descent<'a> {
         Some(self.go_to(target, progress))
     }
 
-    /// Whether no two boards are nearer than the least that is known from here to a lock: the handle that is lost there stays
-    /// until then between two places that it cannot pass, and those behind it follow.
+    /// Returns true if no two boards are nearer than the least that is known from here to a lock: the handle that is
+    /// lost there stays until then between two places that it cannot pass, and those behind it follow.
     fn stays_to_lock(&mut self, lock: &Event) -> bool {
         let link = lock.bench_a.unwrap_or(0) as usize;
         let most = TOUCH * self.chain.team.shortest_link();
@@ -216,8 +216,8 @@ impl<'a> Descent<'a> {
         })
     }
 
-    /// Whether all boards are apart while the last of some handles is anywhere in a window, and those before it in their
-    /// spans.
+    /// Returns true if all boards are apart while the last of some handles is anywhere in a window, and those before it
+    /// in their spans.
     fn are_apart_behind(&self, handles: Vec<Spanned>, window: Span, pads: f64) -> bool {
         let chain = &self.chain;
         let [mut from, mut to] = [window.0, window.1].map(|place| {
@@ -242,9 +242,9 @@ impl<'a> Descent<'a> {
         self.chain.exact.travelled(self.at.head).lo.max(0.0)
     }
 
-    /// The same steps on an inward spiral alone, where it is known that no two boards touch and no link locks with the head,
-    /// or with the front handle of any other link, at the first place or further out: then the first two links are enough
-    /// from there on ("The least pitch" in `docs/proofs.md`).
+    /// The same steps on an inward spiral alone, where it is known that no two boards touch and no link locks with the
+    /// head, or with the front handle of any other link, at the first place or further out: then the first two links
+    /// are enough from there on ("The least pitch" in `docs/proofs.md`).
     pub fn after_all_further_out(mut self) -> Self {
         self.links = Links::Front;
         self.chain.start = Some(Place(0, f64::INFINITY));
@@ -256,7 +256,7 @@ impl<'a> Descent<'a> {
         self.at.head
     }
 
-    /// Whether no two boards touch, and no link locks, from the start to `target`.
+    /// Returns true if no two boards touch, and no link locks, from the start to `target`.
     pub fn stays_clear_to(mut self, target: &GridPoint, progress: &mut dyn FnMut(f64)) -> bool {
         self.floor = Some(0.0);
         self.go_to(target, progress).is_none()
@@ -311,8 +311,8 @@ impl<'a> Descent<'a> {
         })
     }
 
-    /// Goes to a knot, or as far as it can be shown that nothing is nearer than the least that is known: then returns how
-    /// far.
+    /// Goes to a knot, or as far as it can be shown that nothing is nearer than the least that is known: then returns
+    /// how far.
     fn go_to(&mut self, target: &GridPoint, progress: &mut dyn FnMut(f64)) -> Option<f64> {
         let least = LEAST_STEP * (1.0 + self.chain.path.length());
         let longest = self.chain.team.shortest_link();
@@ -386,7 +386,7 @@ impl<'a> Descent<'a> {
         Ok(())
     }
 
-    /// Whether every link behind the head's goes forward, and the spans of handles 1 and 2.
+    /// Returns true if every link behind the head's goes forward, and the spans of handles 1 and 2.
     fn show_between(&self, points: &mut StepPoints) -> Result<(bool, Span, Option<Span>), Refused> {
         let mut refused = None;
         for pads in PADS {
@@ -430,7 +430,7 @@ impl<'a> Descent<'a> {
         Ok((first_order.listed.body_forward, handles[1].span, handles.get(2).map(|second| second.span)))
     }
 
-    /// Whether the handles that are listed are all that a step needs.
+    /// Returns true if the handles that are listed are all that a step needs.
     fn is_enough(&self, listed: &Listed, links: Links) -> bool {
         let last = listed.handles.len() - 1;
         if last < 2 {
@@ -487,7 +487,7 @@ impl<'a> Descent<'a> {
         Ok(())
     }
 
-    /// Whether a board is apart from those from `next` on, which are not listed.
+    /// Returns true if a board is apart from those from `next` on, which are not listed.
     fn is_apart_from_rest(
         &self,
         (a, board): (usize, &MovingBoard),

@@ -19,8 +19,8 @@ pub(super) fn pi() -> Interval {
 
 /// Sine and cosine of a double.
 ///
-/// x = k pi / 2 + y with |y| <= 0.79; then the series of y to y^19 and y^20, whose remainders are below the first term left
-/// out, 0.79^21 / 21! < 2e-22 (the terms alternate and fall).
+/// x = k pi / 2 + y with |y| <= 0.79; then the series of y to y^19 and y^20, whose remainders are below the first term
+/// left out, 0.79^21 / 21! < 2e-22 (the terms alternate and fall).
 pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     if x.is_nan() || x.abs() > GREATEST_ARGUMENT {
         let any = Interval::within(1.0);
@@ -62,8 +62,8 @@ fn alternating(s: Interval, quotients: &[f64]) -> Interval {
 
 /// Arctangent of what is not negative.
 ///
-/// atan x = 2 atan(x / (1 + sqrt(1 + x^2))), four times: then x < 0.0985 and the series to x^17 leaves less than
-/// x 0.0985^18 / 19 < x 5e-20.
+/// atan x = 2 atan(x / (1 + sqrt(1 + x^2))), four times: then x < 0.0985 and the series to x^17 leaves less than x
+/// 0.0985^18 / 19 < x 5e-20.
 pub(super) fn atan(x: Interval) -> Interval {
     let mut reduced = x;
     for _ in 0..4 {
@@ -81,8 +81,8 @@ pub(super) fn atan(x: Interval) -> Interval {
 
 /// Natural logarithm of what is positive.
 ///
-/// x = 2^k m with m from the root of 1/2 to that of 2; ln m = 2 atanh z, z = (m - 1) / (m + 1), |z| < 0.172; the series to
-/// z^21 leaves less than z^23 / 23 / (1 - z^2) < 1e-18 z.
+/// x = 2^k m with m from the root of 1/2 to that of 2; ln m = 2 atanh z, z = (m - 1) / (m + 1), |z| < 0.172; the series
+/// to z^21 leaves less than z^23 / 23 / (1 - z^2) < 1e-18 z.
 pub(super) fn ln(x: Interval) -> Interval {
     let Interval { lo, hi } = x;
     Interval { lo: ln_of(lo).lo, hi: ln_of(hi).hi }

@@ -1,5 +1,5 @@
-//! Lemma 6 of `docs/proofs.md`: handles that move together with the head, to the first order, and the clearance of two boards
-//! that they carry, over a step and at its middle. Only [`super`] uses it.
+//! Lemma 6 of `docs/proofs.md`: handles that move together with the head, to the first order, and the clearance of two
+//! boards that they carry, over a step and at its middle. Only [`super`] uses it.
 
 use super::boards::Shape;
 use super::capsule::Spanned;
@@ -88,8 +88,8 @@ impl FirstOrderHandle {
         Self { velocity: scaled(self.tangent, Interval::point(middle)), rate, still, error, ..self }
     }
 
-    /// The handle behind this one, near `place` in the middle of the step. `None` where the bounds come out infinite, or
-    /// the place is not in the handle's span.
+    /// The handle behind this one, near `place` in the middle of the step. `None` where the bounds come out infinite,
+    /// or the place is not in the handle's span.
     pub fn follower(
         &self,
         path: &ExactPath,
@@ -177,8 +177,8 @@ impl FirstOrderBoard {
         Linear { at: minus(front.point, rear.point), by: minus(front.velocity, rear.velocity), error }
     }
 
-    /// The gap between this board and another along a direction that keeps to this one: within the interval at each
-    /// of those moments.
+    /// The gap between this board and another along a direction that keeps to this one: within the interval at each of
+    /// those moments.
     pub fn gap(&self, other: &Self, direction: Direction, when: When) -> Interval {
         let along = self.along(when);
         let normal = Linear { at: turned(along.at, direction), by: turned(along.by, direction), error: along.error };
@@ -232,8 +232,8 @@ impl FirstOrderBoard {
             + Interval::within(error.hi)
     }
 
-    /// A point of the board, `along` and `aside` of its middle: where it is in the middle of the step, and how far it may be
-    /// from there.
+    /// A point of the board, `along` and `aside` of its middle: where it is in the middle of the step, and how far it
+    /// may be from there.
     fn point(&self, (along, aside): (f64, f64), when: When) -> (Vector, Interval) {
         let Linear { at, .. } = self.along(when);
         let Self { front, rear, link, half_length, half_width, .. } = self;
@@ -267,8 +267,8 @@ impl FirstOrderBoard {
         (norm(minus(own, its)) + own_error + its_error).hi
     }
 
-    /// Whether two boards are proved to stay further apart than `metres` at those moments: along the direction in which they
-    /// are furthest apart in the middle of the step, or another of those that doubles find.
+    /// Returns true if two boards are proved to stay further apart than `metres` at those moments: along the direction
+    /// in which they are furthest apart in the middle of the step, or another of those that doubles find.
     pub fn is_further_than(&self, metres: f64, other: &Self, when: When) -> bool {
         let boards = [self.in_doubles(), other.in_doubles()];
         let separated = separation_board_board(&boards[0], &boards[1]);

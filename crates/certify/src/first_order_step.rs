@@ -1,5 +1,5 @@
-//! The handles and boards of a step of the head, enclosed by Lemma 1 and moving together by Lemma 6 of `docs/proofs.md`. Only
-//! [`super::clearance`] uses it.
+//! The handles and boards of a step of the head, enclosed by Lemma 1 and moving together by Lemma 6 of
+//! `docs/proofs.md`. Only [`super::clearance`] uses it.
 
 use super::capsule::Span;
 use super::first_order::{FirstOrderBoard, FirstOrderHandle, When};
@@ -66,14 +66,14 @@ impl<'c, 'a> FirstOrderStep<'c, 'a> {
         FirstOrderBoard::new(&self.chain.shape, front, rear, link, self.half_step)
     }
 
-    /// Whether two boards stay further apart than `threshold`.
+    /// Returns true if two boards stay further apart than `threshold`.
     pub fn are_apart(&self, [a, b]: [usize; 2], threshold: f64) -> bool {
         let when = if self.are_on_one_circle(a, b) { When::Middle } else { When::Always };
         self.board(a).is_further_than(threshold, &self.board(b), when)
     }
 
-    /// Whether all handles from those of one board to those of another stay on one arc: then the boards keep their
-    /// distance.
+    /// Returns true if all handles from those of one board to those of another stay on one arc: then the boards keep
+    /// their distance.
     fn are_on_one_circle(&self, a: usize, b: usize) -> bool {
         let handles = &self.listed.handles;
         let (first, last) = (handles[a].span, handles[b + 1].span);

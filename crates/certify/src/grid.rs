@@ -1,4 +1,5 @@
-//! Where handles are with the head at one place, in doubles: what the search guesses its spans from. Nothing rests on it.
+//! Where handles are with the head at one place, in doubles: what the search guesses its spans from. Nothing rests on
+//! it.
 
 use super::capsule::Span;
 use super::path::{ExactPath, Place};

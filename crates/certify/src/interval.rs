@@ -1,8 +1,9 @@
 //! Real numbers held between two doubles.
 //!
 //! Every operation rounds its lower end down and its upper end up, by one unit in the last place more than IEEE 754
-//! arithmetic can be off in any rounding mode: nothing here depends on the mode in force. Ends may be infinite; where an
-//! operation has no meaning (a division by an interval that holds 0) the result is the whole line. Only [`super`] uses it.
+//! arithmetic can be off in any rounding mode: nothing here depends on the mode in force. Ends may be infinite; where
+//! an operation has no meaning (a division by an interval that holds 0) the result is the whole line. Only [`super`]
+//! uses it.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
@@ -55,7 +56,7 @@ impl Interval {
         self.hi < 0.0
     }
 
-    /// Whether every number here is below every number there.
+    /// Returns true if every number here is below every number there.
     pub fn is_below(self, other: Self) -> bool {
         self.hi < other.lo
     }

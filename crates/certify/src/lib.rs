@@ -1,9 +1,9 @@
 //! Events with a proof: enclosures of every handle over steps of the head, rounded outward, from which it follows when
 //! contact, stall, lock and the path's end happen for the first time, or that they do not.
 //!
-//! In: a scene's motion, its events as the ordinary search found them, its text. Out: the lines of a certificate, and what
-//! they prove. The `events` command calls it; `proof` checks what it writes, with code of its own. The ordinary search only
-//! tells where to look: what it has missed makes the proof fail. Lemmas and file: `docs/proofs.md`.
+//! In: a scene's motion, its events as the ordinary search found them, its text. Out: the lines of a certificate, and
+//! what they prove. The `events` command calls it; `proof` checks what it writes, with code of its own. The ordinary
+//! search only tells where to look: what it has missed makes the proof fail. Lemmas and file: `docs/proofs.md`.
 
 mod boards;
 mod capsule;
@@ -60,8 +60,8 @@ pub(crate) struct Given<'a> {
     most_steps: u64,
 }
 
-/// Certifies the events of a motion. `scene` is the text that states it. Each line of the certificate is given to `write`;
-/// `progress` gets the share of the motion that is done, from 0 to 1. After `most_steps` the search gives up.
+/// Certifies the events of a motion. `scene` is the text that states it. Each line of the certificate is given to
+/// `write`; `progress` gets the share of the motion that is done, from 0 to 1. After `most_steps` the search gives up.
 ///
 /// # Errors
 /// [`CertifyError::Write`]

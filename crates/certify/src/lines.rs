@@ -1,4 +1,5 @@
-//! The lines of a certificate: see "The file" in `docs/proofs.md`. The search writes them, a command prints its results.
+//! The lines of a certificate: see "The file" in `docs/proofs.md`. The search writes them, a command prints its
+//! results.
 
 use serde::Serialize;
 
@@ -127,8 +128,8 @@ pub enum Status {
     },
     /// There is none before the motion ends.
     None {
-        /// Simulated seconds: what is meant where a lock ends the motion, which happens after that. `None` where the path's
-        /// end does, and for the path's end itself.
+        /// Simulated seconds: what is meant where a lock ends the motion, which happens after that. `None` where the
+        /// path's end does, and for the path's end itself.
         #[serde(skip_serializing_if = "Option::is_none")]
         time_lo: Option<f64>,
     },

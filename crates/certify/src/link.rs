@@ -31,8 +31,8 @@ pub(super) fn follower_within(path: &ExactPath, front: &Spanned, rear: &Spanned,
     near.then_some(sign)
 }
 
-/// The front product's sign, if for every place of `front` exactly one place of `rear`, neither of its ends, is proved to be
-/// at the distance: the follower, unless a nearer place is.
+/// The front product's sign, if for every place of `front` exactly one place of `rear`, neither of its ends, is proved
+/// to be at the distance: the follower, unless a nearer place is.
 pub(super) fn one_place_within(path: &ExactPath, front: &Spanned, rear: &Spanned, link: Interval) -> Option<Front> {
     let (u, x) = (&front.capsule, &rear.capsule);
     if !path.in_order(rear.span.1, front.span.0) || !u.product(x, true).is_positive() {
@@ -54,7 +54,7 @@ pub(super) fn one_place_within(path: &ExactPath, front: &Spanned, rear: &Spanned
     holds.then_some(sign)
 }
 
-/// Whether every place of a stretch is proved to be of kind (a) or (b).
+/// Returns true if every place of a stretch is proved to be of kind (a) or (b).
 pub(super) fn nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Interval, halvings: u32) -> bool {
     let Span(first, last) = stretch;
     if path.turning(first, front.span.1) < QUARTER {
@@ -70,15 +70,15 @@ pub(super) fn nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Int
         && nearer(path, front, Span(middle, last), link, halvings - 1)
 }
 
-/// Whether all places of a stretch are proved to be nearer than the link to all of `front`, in one piece: by Taylor's
-/// formula along the stretch.
+/// Returns true if all places of a stretch are proved to be nearer than the link to all of `front`, in one piece: by
+/// Taylor's formula along the stretch.
 fn is_nearer(stretch: &Capsule, front: &Spanned, link: Interval) -> bool {
     let Capsule { point, half, radius, .. } = front.capsule;
     let spread = Interval::within((Interval::point(half) + Interval::point(radius)).hi);
     stretch.distance_squared(point.map(|part| part + spread)).is_below(link.square())
 }
 
-/// Whether all places of a stretch are proved to be nearer than the link to all of `front`.
+/// Returns true if all places of a stretch are proved to be nearer than the link to all of `front`.
 pub(super) fn all_nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Interval, halvings: u32) -> bool {
     if is_nearer(&Capsule::new(path, stretch), front, link) {
         return true;

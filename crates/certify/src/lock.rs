@@ -57,8 +57,8 @@ impl Chain<'_> {
         })
     }
 
-    /// Where the follower of a link stays while the front is in `front`, until it is lost, if the link is lost with the front
-    /// in `last`, at the end of that.
+    /// Where the follower of a link stays while the front is in `front`, until it is lost, if the link is lost with the
+    /// front in `last`, at the end of that.
     pub fn until_lock(&self, at: &mut GridPoint, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
         let exact = &self.exact;
         let begins = self.spans(&mut at.clone(), &mut at.clone(), link + 1)?[link + 1].span;
@@ -75,8 +75,8 @@ impl Chain<'_> {
         (exact.in_order(window.0, begins.0) && exact.in_order(begins.1, window.1)).then_some(window)
     }
 
-    /// A place ahead of the follower of a link that is nearer than the link for all of `front`, and one ahead of that which
-    /// is further away for all of `last`.
+    /// A place ahead of the follower of a link that is nearer than the link for all of `front`, and one ahead of that
+    /// which is further away for all of `last`.
     pub fn lock_jump(&self, at: &mut GridPoint, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
         let Chain { path, exact, team, links, .. } = self;
         at.extend_to(link + 1, path, team).ok()?;

@@ -40,7 +40,7 @@ pub(super) struct ExactPath {
 const FAR: f64 = f64::INFINITY;
 
 impl Curve {
-    /// Whether the coordinate grows with travel.
+    /// Returns true if the coordinate grows with travel.
     fn grows(&self) -> bool {
         !matches!(self, Self::Inward { .. })
     }
@@ -98,7 +98,8 @@ impl Curve {
         }
     }
 
-    /// How fast that changes between two coordinates, 1/m per metre of travel: theta (theta^2 + 4) / (a^2 w^6) downwards.
+    /// How fast that changes between two coordinates, 1/m per metre of travel: theta (theta^2 + 4) / (a^2 w^6)
+    /// downwards.
     fn bend_rate(&self, one: f64, other: f64) -> Interval {
         match *self {
             Self::Inward { a } | Self::Outward { a } => {
@@ -202,12 +203,13 @@ impl ExactPath {
         &self.segments[place.0].curve
     }
 
-    /// Whether `x` comes before `y` on the way, or is the same.
+    /// Returns true if `x` comes before `y` on the way, or is the same.
     pub fn in_order(&self, x: Place, y: Place) -> bool {
         x.0 < y.0 || x.0 == y.0 && if self.curve(x).grows() { x.1 <= y.1 } else { x.1 >= y.1 }
     }
 
-    /// Whether a place is strictly inside its segment; the last one goes on beyond its end, but not through a centre.
+    /// Returns true if a place is strictly inside its segment; the last one goes on beyond its end, but not through a
+    /// centre.
     pub fn is_inside(&self, Place(segment, at): Place) -> bool {
         let Some(Segment { curve, begin, end, .. }) = self.segments.get(segment) else { return false };
         let last = segment + 1 == self.segments.len();
@@ -270,8 +272,8 @@ impl ExactPath {
         Place(segment, if curve.grows() { end.lo.next_down() } else { end.hi.next_up() })
     }
 
-    /// A place between two: half way on one segment, else the end of the earlier one's segment or the begin of the later
-    /// one's. `None` where there is none.
+    /// A place between two: half way on one segment, else the end of the earlier one's segment or the begin of the
+    /// later one's. `None` where there is none.
     pub fn between(&self, x: Place, y: Place) -> Option<Place> {
         if x.0 == y.0 {
             let middle = 0.5 * x.1 + 0.5 * y.1;

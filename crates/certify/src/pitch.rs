@@ -1,8 +1,9 @@
-//! Teams on inward spirals: boards that overlap with each of the pitches between two, and a pitch with which none touch, from
-//! however far the head comes. Only [`super`] uses it; [`crate::plan`] calls what it exports. "The least pitch" and Lemma 8 in
-//! `docs/proofs.md`.
+//! Teams on inward spirals: boards that overlap with each of the pitches between two, and a pitch with which none
+//! touch, from however far the head comes. Only [`super`] uses it; [`crate::plan`] calls what it exports. "The least
+//! pitch" and Lemma 8 in `docs/proofs.md`.
 //!
-//! With the spiral's a = pitch / 2 pi as the unit of length every spiral is the same, and the team's lengths are intervals.
+//! With the spiral's a = pitch / 2 pi as the unit of length every spiral is the same, and the team's lengths are
+//! intervals.
 
 mod far;
 
@@ -40,12 +41,12 @@ impl Pitches<'_> {
         Interval { lo: self.from, hi: self.to }.over(pi() * 2.0)
     }
 
-    /// Whether with each of them the head is further than `radius` metres from the centre.
+    /// Returns true if with each of them the head is further than `radius` metres from the centre.
     pub fn are_outside(&self, radius: f64) -> bool {
         Interval::point(radius).over(self.radius_per_radian()).is_below(Interval::point(self.theta))
     }
 
-    /// Whether with each of them the two boards are proved to overlap.
+    /// Returns true if with each of them the two boards are proved to overlap.
     pub fn all_overlap(&self) -> bool {
         let Self { team, from, to, theta, benches } = *self;
         if benches[0] + 2 > benches[1] || benches[1] >= team.benches {
@@ -80,13 +81,14 @@ impl Pitches<'_> {
 /// Pieces of three quarters of a turn that are looked at for a lock.
 const MOST_PIECES: u32 = 10_000;
 
-/// Whether it is proved that the head's link locks before the head, coming from far outside, is `radius` metres from the
-/// centre, with every pitch from one to another.
+/// Returns true if it is proved that the head's link locks before the head, coming from far outside, is `radius` metres
+/// from the centre, with every pitch from one to another.
 pub(crate) fn head_locks(team: &Team, (from, to): (f64, f64), radius: f64) -> bool {
     let radians = |metres: Interval, pitch: f64| metres.over(Interval::point(pitch).over(pi() * 2.0));
     let theta = Interval::point(radians(Interval::point(radius), from).hi);
     let square = radians(links_of(team)[0], to).square();
-    // The greatest of D = theta^2 + (theta + delta)^2 - 2 theta (theta + delta) cos delta over pieces, by Taylor's formula.
+    // The greatest of D = theta^2 + (theta + delta)^2 - 2 theta (theta + delta) cos delta over pieces, by Taylor's
+    // formula.
     let mut pieces = vec![(0.0, 1.5 * pi().hi)];
     let mut looked_at = 0;
     while let Some((first, last)) = pieces.pop() {
@@ -115,8 +117,9 @@ pub(crate) fn head_locks(team: &Team, (from, to): (f64, f64), radius: f64) -> bo
     Interval::ONE.is_below(theta)
 }
 
-/// Metres from the centre beyond which no two boards touch and no link locks, wherever further out the head is: little more
-/// than the least for which Lemma 8 shows that, if not below `radius`. `None` where it shows it of none that is sensible.
+/// Metres from the centre beyond which no two boards touch and no link locks, wherever further out the head is: little
+/// more than the least for which Lemma 8 shows that, if not below `radius`. `None` where it shows it of none that is
+/// sensible.
 pub(crate) fn clear_beyond(team: &Team, pitch: f64, radius: f64) -> Option<f64> {
     far::least_radius(team, pitch, radius)
 }
@@ -124,9 +127,9 @@ pub(crate) fn clear_beyond(team: &Team, pitch: f64, radius: f64) -> Option<f64> 
 /// Turns from which on no steps are tried: what a scene may have.
 const MOST_TURNS: f64 = 1e7;
 
-/// Whether it is proved that a team whose head comes in on a spiral of this pitch, from however far, has no two boards that
-/// touch and no link that locks until its front handle is `radius` metres from the centre. `progress` gets the share of the
-/// way that is done.
+/// Returns true if it is proved that a team whose head comes in on a spiral of this pitch, from however far, has no two
+/// boards that touch and no link that locks until its front handle is `radius` metres from the centre. `progress` gets
+/// the share of the way that is done.
 pub(crate) fn reaches(team: &Team, pitch: f64, radius: f64, most_steps: u64, progress: &mut dyn FnMut(f64)) -> bool {
     let Some(begin) = clear_beyond(team, pitch, radius) else { return false };
     if begin <= radius {

@@ -1,8 +1,8 @@
 //! Answers for the choreographer: the least pitch with which a team still reaches a radius, and the greatest speed at
 //! which no handle is too fast.
 //!
-//! In: a team or a scene. Out: two numbers between which the answer is, proved, with where it is decided. The `plan` command
-//! prints them.
+//! In: a team or a scene. Out: two numbers between which the answer is, proved, with where it is decided. The `plan`
+//! command prints them.
 
 mod pitch;
 mod speed;

@@ -1,5 +1,5 @@
-//! The search: steps of the head from the start to the end of the motion, halved where their claims cannot be shown, and
-//! at each event that the ordinary search has found, the lines that show it. Only [`super`] uses it.
+//! The search: steps of the head from the start to the end of the motion, halved where their claims cannot be shown,
+//! and at each event that the ordinary search has found, the lines that show it. Only [`super`] uses it.
 
 use std::io;
 
@@ -37,7 +37,7 @@ pub(super) struct CertificateSearch<'a, 'w> {
     /// Claims that steps still make.
     moving: bool,
     clear: bool,
-    /// Whether Lemma 4 may still be used.
+    /// True if Lemma 4 may still be used.
     covered: bool,
     proofs: [Option<Status>; 4],
     /// Metres of the next step that is tried.

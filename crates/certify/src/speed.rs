@@ -35,7 +35,7 @@ pub struct GreatestRatio {
     pub travelled: f64,
     /// A speed of it there that is meant, between what is proved of it.
     pub ratio: f64,
-    /// Whether `hi` is within the tolerance of `lo`.
+    /// True if `hi` is within the tolerance of `lo`.
     pub proved: bool,
     /// Steps of the head that were enclosed.
     pub steps: u64,

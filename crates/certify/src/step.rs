@@ -36,7 +36,7 @@ pub(super) enum Obstacle {
 }
 
 impl Obstacle {
-    /// Whether an event of a kind is what stands in the way.
+    /// Returns true if an event of a kind is what stands in the way.
     pub fn is_of(self, kind: EventKind) -> bool {
         match self {
             Self::Pair(..) => kind == EventKind::Contact,
@@ -50,7 +50,7 @@ impl Obstacle {
 /// A step that holds.
 pub(super) struct Shown {
     pub step: Step,
-    /// Whether every link behind the head's surely goes forward.
+    /// True if every link behind the head's surely goes forward.
     pub body_forward: bool,
 }
 
@@ -91,7 +91,8 @@ impl<'a> Chain<'a> {
         let mut unlinked = None;
         for pads in PADS {
             match self.show_with(from, to, claim, pads) {
-                // Where spans that are wider are long enough for the links, it is something else that stands in the way.
+                // Where spans that are wider are long enough for the links, it is something else that stands in the
+                // way.
                 Err(Obstacle::Link(link)) => unlinked = unlinked.or(Some(link)),
                 other => return other,
             }
@@ -162,7 +163,7 @@ pub(super) struct Listed<'c, 'a> {
     pub handles: Vec<Spanned>,
     pad: f64,
     pads: f64,
-    /// Whether every link behind the head's surely goes forward.
+    /// True if every link behind the head's surely goes forward.
     pub body_forward: bool,
 }
 
@@ -177,7 +178,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         Self { chain, handles, pad: 0.0, pads, body_forward: true }
     }
 
-    /// Whether a handle is on a straight line without a beginning.
+    /// Returns true if a handle is on a straight line without a beginning.
     pub fn is_on_line(&self, handle: usize) -> bool {
         let Chain { exact, .. } = self.chain;
         self.handles[handle].span.1.0 == 0 && matches!(exact.segments[0].curve, Curve::Line { .. })
@@ -196,14 +197,15 @@ impl<'c, 'a> Listed<'c, 'a> {
         self.is_beyond(0.0, &self.chain.board(&self.handles, board), from_handle)
     }
 
-    /// Whether all boards whose handles are this one or behind it are further than `metres` from one further in.
+    /// Returns true if all boards whose handles are this one or behind it are further than `metres` from one further
+    /// in.
     pub fn is_beyond(&self, metres: f64, inner: &MovingBoard, from_handle: usize) -> bool {
         let Chain { shape, links, .. } = self.chain;
         shape.innermost(self.ring(from_handle), links[1])
             > (Interval::point(shape.outermost(inner)) + Interval::point(metres)).hi
     }
 
-    /// Whether the handles that are listed are all that the claim needs.
+    /// Returns true if the handles that are listed are all that the claim needs.
     fn is_enough(&self, claim: Claim) -> bool {
         let last = self.handles.len() - 1;
         if last < 2 {

@@ -58,7 +58,8 @@ fn a_million_operations_hold_what_192_bits_find() {
     let mut random = Random(1);
     for _ in 0..170_000 {
         let (a, b) = (random.interval(), random.interval());
-        // The ends are where rounding could lose something; what is between them follows for operations that are monotone.
+        // The ends are where rounding could lose something; what is between them follows for operations that are
+        // monotone.
         let x = if random.bits().is_multiple_of(2) { a.lo } else { a.hi };
         let y = if random.bits().is_multiple_of(2) { b.lo } else { b.hi };
         let (p, q) = (exact(x), exact(y));

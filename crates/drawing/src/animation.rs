@@ -72,8 +72,8 @@ impl Score {
 }
 
 impl Drawing<'_> {
-    /// One SVG that shows the chains of times that stand equally far apart, at least two of them, one after the other in
-    /// real time, and begins again.
+    /// One SVG that shows the chains of times that stand equally far apart, at least two of them, one after the other
+    /// in real time, and begins again.
     pub fn animated(&self, moments: &[(f64, Chain)]) -> String {
         let palette = self.look.theme.palette();
         let [(from, _), .., (until, last)] = moments else { return String::new() };

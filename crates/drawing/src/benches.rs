@@ -55,9 +55,9 @@ pub struct ColourScale {
     pub least: f64,
     /// Metres per second at its fast end.
     pub greatest: f64,
-    /// Whether some handles are slower still.
+    /// True if some handles are slower still.
     pub some_below: bool,
-    /// Whether some handles are faster still.
+    /// True if some handles are faster still.
     pub some_above: bool,
 }
 
@@ -88,8 +88,8 @@ pub fn seen(team: &Team, chain: &Chain, view: &StageBox) -> Vec<(usize, Board)> 
     boards.filter(|(_, board)| extent(board).meets(view)).collect()
 }
 
-/// The pairs of benches, of those given, whose boards overlap, and by how many metres; the lower bench first. Boards that
-/// share a handle never count.
+/// The pairs of benches, of those given, whose boards overlap, and by how many metres; the lower bench first. Boards
+/// that share a handle never count.
 pub fn overlapping(boards: &[(usize, Board)], tolerance: f64) -> Vec<(usize, usize, f64)> {
     // Sorted by their left ends: only those that begin before a board ends can overlap it.
     let mut sorted: Vec<(StageBox, usize, &Board)> =
@@ -151,8 +151,8 @@ pub fn outline(board: &Board, colour: &str, units: f64, camera: &Camera) -> Poly
     outline.set("stroke", colour).set("stroke-width", camera.metres(units)).set("stroke-linejoin", "round")
 }
 
-/// Chevrons in the direction of travel, light on dark or dark on light whatever the board's colour; on a board too narrow
-/// for them a single larger one at its front.
+/// Chevrons in the direction of travel, light on dark or dark on light whatever the board's colour; on a board too
+/// narrow for them a single larger one at its front.
 pub fn head_sign(board: &Board, camera: &Camera, palette: &Palette) -> Group {
     let (length, width) = (board.half_length, board.half_width);
     let place = |along: f64, across: f64| board.centre + along * board.axis + across * board.across();

@@ -51,12 +51,12 @@ impl StageBox {
         Self::around(self.centre(), self.width() + 2.0 * margin, self.height() + 2.0 * margin)
     }
 
-    /// Whether a point lies in it.
+    /// Returns true if a point lies in it.
     pub fn contains(&self, point: Point) -> bool {
         (self.least.x..=self.greatest.x).contains(&point.x) && (self.least.y..=self.greatest.y).contains(&point.y)
     }
 
-    /// Whether two boxes have a point in common.
+    /// Returns true if two boxes have a point in common.
     pub fn meets(&self, other: &Self) -> bool {
         self.least.x <= other.greatest.x
             && other.least.x <= self.greatest.x

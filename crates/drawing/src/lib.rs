@@ -1,10 +1,10 @@
 //! The stage as a picture: a moment of a motion as SVG text, and a stretch of it as one SVG that moves.
 //!
-//! In: a motion, its events, chains at times, a [`Look`]. Out: text. Pure. `draw` calls it; the plots of `trade` and of the
-//! soak report take their colours from [`palette`].
+//! In: a motion, its events, chains at times, a [`Look`]. Out: text. Pure. `draw` calls it; the plots of `trade` and of
+//! the soak report take their colours from [`palette`].
 //!
-//! The stage is drawn in metres, y upward, within a group whose transform puts it on the sheet, and clipped at the frame:
-//! whoever opens the file in an editor finds true coordinates.
+//! The stage is drawn in metres, y upward, within a group whose transform puts it on the sheet, and clipped at the
+//! frame: whoever opens the file in an editor finds true coordinates.
 
 pub mod animation;
 mod benches;

@@ -1,4 +1,5 @@
-//! How a picture looks: its colours, what it shows, what stands about that, its size. What `draw` reads from its options.
+//! How a picture looks: its colours, what it shows, what stands about that, its size. What `draw` reads from its
+//! options.
 
 use super::WIDTH;
 use super::palette::{self, Palette};

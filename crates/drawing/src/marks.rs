@@ -14,7 +14,7 @@ use bench_dragon_motion::timeline::{TimedEvent, Timeline};
 /// Seconds about an event that are its own time: a time typed with six decimals is still the event's.
 const NOW: f64 = 1e-6;
 
-/// Whether an event is now or was before.
+/// True if an event is now or was before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tense {
     /// It is now.
@@ -28,7 +28,7 @@ pub enum Tense {
 pub struct Happened {
     /// The event.
     pub timed: TimedEvent,
-    /// Whether that is now.
+    /// True if that is now.
     pub tense: Tense,
 }
 
@@ -63,8 +63,8 @@ impl Happened {
         sentence + " (counting from 1)"
     }
 
-    /// The mark at the place of the event: of a contact a ring and a cross, of a stall a diamond, of a lock a square. In
-    /// the colour of danger where it is now, quiet where it was.
+    /// The mark at the place of the event: of a contact a ring and a cross, of a stall a diamond, of a lock a square.
+    /// In the colour of danger where it is now, quiet where it was.
     pub fn sign(&self, (x, y): (f64, f64), palette: &Palette) -> Group {
         let colour = match self.tense {
             Tense::Present => palette.danger,

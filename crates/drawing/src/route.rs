@@ -107,7 +107,8 @@ fn spiral(data: &mut String, direction: Direction, pitch: f64, (from, to): (f64,
     }
     let steps = ((to - from) / TAU * CURVES_PER_TURN).ceil();
     let step = (to - from) / steps;
-    // The handles of a circle's cubic (4/3 tan(step / 4) of its radius) in place of a third of the step: three digits more.
+    // The handles of a circle's cubic (4/3 tan(step / 4) of its radius) in place of a third of the step: three digits
+    // more.
     let handle = 4.0 / 3.0 * (0.25 * step).tan();
     let at = |theta: f64| {
         // d/dtheta of a theta e(theta) is a e + a theta e'.

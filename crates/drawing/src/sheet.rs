@@ -1,5 +1,5 @@
-//! What stands about the stage on the sheet: the title, the axes, and a legend of what is in the picture, all outside the
-//! frame, so that nothing of the stage is covered.
+//! What stands about the stage on the sheet: the title, the axes, and a legend of what is in the picture, all outside
+//! the frame, so that nothing of the stage is covered.
 
 use svg::node::element::{Definitions, Group, LinearGradient, Path, Rectangle, Stop, Text};
 
@@ -22,9 +22,9 @@ const BOTTOM: f64 = 14.0;
 pub struct Contents<'a> {
     /// The ends of the colour scale, metres per second, where any board is coloured by it.
     pub scale: Option<ColourScale>,
-    /// Whether the head's signs are in the frame.
+    /// True if the head's signs are in the frame.
     pub head: bool,
-    /// Whether the tail's are.
+    /// True if the tail's are.
     pub tail: bool,
     /// What the outlined boards do, if any are outlined.
     pub outlined: Option<&'static str>,

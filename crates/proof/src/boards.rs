@@ -81,7 +81,7 @@ impl<'a> Board<'a> {
         self.compass[direction].get_or_init(|| self.extent(&Axis::new(COMPASS[direction])))
     }
 
-    /// Whether Lemma 2 shows the two boards to be apart.
+    /// Returns true if Lemma 2 shows the two boards to be apart.
     pub fn is_apart_from(&self, other: &Self) -> bool {
         let apart = |n: [f64; 2]| -self.rough.extent(n) - other.rough.extent([-n[0], -n[1]]);
         let fixed = (0..8).map(|direction| (direction, apart(COMPASS[direction])));
@@ -191,8 +191,8 @@ impl Rough {
     }
 }
 
-/// Lemma 3, *Ring*: whether boards whose handles are at most `reach` metres from the centre of the spiral are apart from
-/// all body boards whose handles are on it, at least `ring` from its centre.
+/// Lemma 3, *Ring*: whether boards whose handles are at most `reach` metres from the centre of the spiral are apart
+/// from all body boards whose handles are on it, at least `ring` from its centre.
 pub(super) fn is_inside_ring(team: &Team, reach: &Interval, ring: &Interval) -> bool {
     let half_link = team.link(1) * Interval::new(0.5);
     let half_width = &team.width * Interval::new(0.5);
@@ -204,7 +204,7 @@ pub(super) fn is_inside_ring(team: &Team, reach: &Interval, ring: &Interval) -> 
     outer.is_below(&inner)
 }
 
-/// Whether a point is in a board wherever its handles are in their spans (Lemma 5, *Contact*).
+/// Returns true if a point is in a board wherever its handles are in their spans (Lemma 5, *Contact*).
 pub(super) fn covers(board: &Board, point: &Vector) -> bool {
     let all = |capsule: &Capsule| {
         let along = capsule.tangent.scaled(&capsule.half.around_zero());

@@ -42,14 +42,14 @@ impl Chain {
         self.capsules.len() - 1
     }
 
-    /// Whether the last handle is on segment 0, a line: then so are all behind it (Lemma 3, *Line*).
+    /// Returns true if the last handle is on segment 0, a line: then so are all behind it (Lemma 3, *Line*).
     pub fn ends_on_line(&self, scene: &Scene) -> bool {
         let Span(_, latest) = self.capsules[self.last()].span;
         latest.0 == 0 && scene.path.is_line(0)
     }
 }
 
-/// Whether a span is one: two places strictly inside segments, in order.
+/// Returns true if a span is one: two places strictly inside segments, in order.
 pub(super) fn span_is_one(scene: &Scene, Span(lo, hi): Span) -> Result<(), String> {
     for Place(segment, coordinate) in [lo, hi] {
         if !scene.path.has(Place(segment, coordinate)) {

@@ -68,8 +68,8 @@ fn series(angle: &Interval) -> (Interval, Interval) {
     (sum(1) * angle, sum(0))
 }
 
-/// z + s z^3 / 3 + z^5 / 5 + s z^7 / 7 + ..., s being `sign`: the arc tangent for -1, its hyperbolic twin for 1. What is
-/// left out is at most |z|^(2 n + 1) / (1 - z^2), n terms being taken.
+/// z + s z^3 / 3 + z^5 / 5 + s z^7 / 7 + ..., s being `sign`: the arc tangent for -1, its hyperbolic twin for 1. What
+/// is left out is at most |z|^(2 n + 1) / (1 - z^2), n terms being taken.
 fn odd_series(z: &Interval, sign: f64) -> Interval {
     if !z.abs().is_below(&Interval::new(0.34)) {
         return Interval::new(0.0) / Interval::new(0.0);

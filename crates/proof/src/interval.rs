@@ -30,8 +30,8 @@ enum Side {
 }
 
 impl Interval {
-    /// The interval of a single number, exactly; but for the numbers below 1e-307, which `astro-float` does not take over
-    /// right: they are held between the least that it does and its negative.
+    /// The interval of a single number, exactly; but for the numbers below 1e-307, which `astro-float` does not take
+    /// over right: they are held between the least that it does and its negative.
     pub fn new(number: f64) -> Self {
         if number.is_subnormal() {
             return Self::new(f64::MIN_POSITIVE).around_zero();
@@ -70,27 +70,27 @@ impl Interval {
         self.lo.is_nan() || self.hi.is_nan()
     }
 
-    /// Whether every number here is less than every number there.
+    /// Returns true if every number here is less than every number there.
     pub fn is_below(&self, other: &Self) -> bool {
         self.hi < other.lo
     }
 
-    /// Whether no number here is greater than any number there.
+    /// Returns true if no number here is greater than any number there.
     pub fn is_at_most(&self, other: &Self) -> bool {
         self.hi <= other.lo
     }
 
-    /// Whether every number is greater than 0.
+    /// Returns true if every number is greater than 0.
     pub fn is_positive(&self) -> bool {
         !self.is_not_a_number() && self.lo.is_positive() && !self.lo.is_zero()
     }
 
-    /// Whether every number is less than 0.
+    /// Returns true if every number is less than 0.
     pub fn is_negative(&self) -> bool {
         !self.is_not_a_number() && self.hi.is_negative() && !self.hi.is_zero()
     }
 
-    /// Whether no number is less than 0.
+    /// Returns true if no number is less than 0.
     pub fn is_not_negative(&self) -> bool {
         !self.is_not_a_number() && self.side() == Side::NotNegative
     }
@@ -168,8 +168,8 @@ fn smaller(a: &BigFloat, b: &BigFloat) -> BigFloat {
     if b < a { b.clone() } else { a.clone() }
 }
 
-/// Numbers below and above the root of a number that is not negative: whatever s > 0 is, the root lies between s and
-/// x / s. Near the root, one step of Newton's method brings the two together.
+/// Numbers below and above the root of a number that is not negative: whatever s > 0 is, the root lies between s and x
+/// / s. Near the root, one step of Newton's method brings the two together.
 fn root(x: &BigFloat) -> (BigFloat, BigFloat) {
     if x.is_zero() {
         return (zero(), zero());

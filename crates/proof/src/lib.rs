@@ -1,5 +1,5 @@
-//! The checker of certificates of events: what docs/proofs.md says of a file, and nothing else. `verify`,
-//! `check --certificate` and `view --certificate` call it.
+//! The checker of certificates of events: what docs/proofs.md says of a file, and nothing else. `verify`, `check
+//! --certificate` and `view --certificate` call it.
 //!
 //! In: the lines of a certificate. Out: what it proves, or the first line that does not follow. It uses no other room:
 //! no geometry, no parsing and no solver of the program, only that page, which it has in common with the search.

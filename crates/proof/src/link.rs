@@ -5,8 +5,8 @@ use super::elementary;
 use super::interval::{Interval, Vector};
 use super::path::{Path, Place, Span};
 
-/// Stretches of the path that are tested for one link before it is refused that all its places are nearer: some seconds.
-/// A certificate that the search has written needs a few.
+/// Stretches of the path that are tested for one link before it is refused that all its places are nearer: some
+/// seconds. A certificate that the search has written needs a few.
 pub(super) const MOST_STRETCHES: usize = 100_000;
 
 /// Checks Lemma 1: for each place of `front` the follower lies in `rear` and is continuous. Returns the front product.
@@ -54,7 +54,7 @@ fn over_front(front: &Capsule, x: &Vector) -> Interval {
     from.norm_squared() + slack(front, &slope, &distance).around_zero()
 }
 
-/// Whether D(u, x) > l^2 for all u of the front.
+/// Returns true if D(u, x) > l^2 for all u of the front.
 pub(super) fn is_farther(path: &Path, front: &Capsule, x: Place, squared: &Interval) -> bool {
     squared.is_below(&over_front(front, &path.at(x).point))
 }
@@ -65,7 +65,8 @@ fn slack(capsule: &Capsule, slope: &Interval, distance: &Interval) -> Interval {
     (Interval::new(2.0) * slope + (Interval::new(1.0) + curvature * distance) * half) * half
 }
 
-/// Whether D(u, x) < l^2 for all u of the front and all x of a stretch, by Taylor's formula about the middles of both.
+/// Returns true if D(u, x) < l^2 for all u of the front and all x of a stretch, by Taylor's formula about the middles
+/// of both.
 fn is_stretch_nearer(pair: &Pair, squared: &Interval) -> bool {
     let Pair { front, rear, distance, .. } = pair;
     // At most |g(u, m_x)| for all u of the front.
@@ -73,8 +74,8 @@ fn is_stretch_nearer(pair: &Pair, squared: &Interval) -> bool {
     (over_front(front, &rear.point) + slack(rear, &slope, distance)).is_below(squared)
 }
 
-/// Whether D < l^2 for all places of the front and all of the span, which is halved until so many stretches have been
-/// looked at.
+/// Returns true if D < l^2 for all places of the front and all of the span, which is halved until so many stretches
+/// have been looked at.
 pub(super) fn is_all_nearer(path: &Path, front: &Capsule, span: Span, squared: &Interval, left: &mut usize) -> bool {
     if !is_one_left(left) {
         return false;

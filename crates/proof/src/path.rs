@@ -202,7 +202,7 @@ impl Path {
         }
     }
 
-    /// Whether the place is certainly at the end of the path or beyond it.
+    /// Returns true if the place is certainly at the end of the path or beyond it.
     pub fn is_at_end(&self, place: Place) -> bool {
         match &self.path_end {
             PathEnd::Coordinate(end) if place.0 + 1 == self.segments.len() => {
@@ -214,7 +214,7 @@ impl Path {
         }
     }
 
-    /// Whether the place is certainly not beyond the end of the path.
+    /// Returns true if the place is certainly not beyond the end of the path.
     pub fn is_within(&self, place: Place) -> bool {
         match &self.path_end {
             PathEnd::Coordinate(end) if place.0 + 1 == self.segments.len() => {
@@ -230,8 +230,8 @@ impl Path {
         matches!(self.segments[segment].curve, Curve::Inward { .. })
     }
 
-    /// Whether the place is one: a number strictly inside a segment. The centre of a spiral that is the whole path is
-    /// one as well: it is no junction.
+    /// Returns true if the place is one: a number strictly inside a segment. The centre of a spiral that is the whole
+    /// path is one as well: it is no junction.
     pub fn has(&self, place: Place) -> bool {
         let Some(segment) = self.segments.get(place.0).filter(|_| place.1.is_finite()) else { return false };
         if self.segments.len() == 1 {
@@ -250,12 +250,12 @@ impl Path {
         a.0.cmp(&b.0).then(if self.falls(a.0) { along.reverse() } else { along })
     }
 
-    /// Whether a is before b or the same.
+    /// Returns true if a is before b or the same.
     pub fn in_order(&self, a: Place, b: Place) -> bool {
         self.order(a, b) != Ordering::Greater
     }
 
-    /// Whether the segment is a line.
+    /// Returns true if the segment is a line.
     pub fn is_line(&self, segment: usize) -> bool {
         matches!(self.segments[segment].curve, Curve::Line { .. })
     }

@@ -16,7 +16,7 @@ struct Known {
     not_before: Interval,
     /// Seconds by which it has happened, and the benches.
     by: Option<(Interval, Option<usize>, Option<usize>)>,
-    /// Whether it does not happen before the motion ends.
+    /// True if it does not happen before the motion ends.
     never: bool,
 }
 

@@ -25,7 +25,7 @@ pub(super) struct Steps {
     /// Where the last moving step, and the last clear one, came to.
     pub moving_end: Option<Place>,
     pub clear_end: Option<Place>,
-    /// Whether all steps were.
+    /// True if all steps were.
     pub all_moving: bool,
     pub all_clear: bool,
     /// Spans of the last step.

@@ -158,7 +158,7 @@ impl LevelTracker {
         if event_is_near || boards_are_near { Level::Approaching } else { Level::Clear }
     }
 
-    /// Whether another second of wall time has passed since the level was announced.
+    /// Returns true if another second of wall time has passed since the level was announced.
     fn second_is_over(&mut self, tick: u64) -> bool {
         let seconds = ((tick - self.announced_tick) as f64 / self.rate) as u64;
         let over = seconds > self.seconds_counted;

@@ -1,8 +1,8 @@
 //! The show clock: from ticks and commands to simulated time.
 //!
 //! Pure, and from integers: sim0 + time_scale * (tick - tick0) / rate, with a new (sim0, tick0, time_scale) at each
-//! command and each loop, never accumulated: nothing drifts, and the same ticks with the same commands give the same bits.
-//! Called by the show.
+//! command and each loop, never accumulated: nothing drifts, and the same ticks with the same commands give the same
+//! bits. Called by the show.
 
 #[cfg(test)]
 mod tests;
@@ -20,7 +20,7 @@ pub struct ShowTime {
     pub sim_time: f64,
     /// Simulated seconds per second, as in force: 0 while paused or held, unchanged once the show has ended.
     pub time_scale: f64,
-    /// Whether simulated time advances.
+    /// True if simulated time advances.
     pub playback: PlaybackState,
     /// Jumps of simulated time so far: loops, seeks, restarts.
     pub epoch: u32,
@@ -35,7 +35,7 @@ pub struct ShowTime {
 pub struct CueTime {
     /// Simulated seconds.
     pub time: f64,
-    /// Whether the show pauses there and waits for [`Command::Go`].
+    /// True if the show pauses there and waits for [`Command::Go`].
     pub pauses: bool,
 }
 
@@ -66,7 +66,7 @@ pub struct ShowClock {
     /// The tick at which a step is over.
     step_end: Option<u64>,
     step_outcome: Option<Code>,
-    /// Whether the pause is one that [`Command::Go`] ends.
+    /// True if the pause is one that [`Command::Go`] ends.
     waits: bool,
     epoch: u32,
     shows_played: u64,

@@ -1,5 +1,5 @@
-//! Conversions from frames, chains, alerts and motions to the message layouts. Every type is destructured in full, so that a
-//! new field cannot be lost.
+//! Conversions from frames, chains, alerts and motions to the message layouts. Every type is destructured in full, so
+//! that a new field cannot be lost.
 
 use crate::alerts::Alert;
 use crate::{Frame, Outcome, ReachedCue, Show};
@@ -83,8 +83,8 @@ pub fn handle_pose(chain: &Chain, handle: usize) -> HandlePose {
     HandlePose { x: x[handle], y: y[handle], heading: heading[handle], vx: vx[handle], vy: vy[handle] }
 }
 
-/// Returns the poses of all handles of a chain, the head first. The iterator zips the arrays, which saves a bounds check per
-/// handle: writing a frame takes a third to a sixth of the time.
+/// Returns the poses of all handles of a chain, the head first. The iterator zips the arrays, which saves a bounds
+/// check per handle: writing a frame takes a third to a sixth of the time.
 pub fn handle_poses(chain: &Chain) -> impl ExactSizeIterator<Item = HandlePose> {
     let Chain { x, y, heading, speed: _, vx, vy } = chain;
     let places = x.iter().zip(y).zip(heading);
@@ -124,8 +124,8 @@ impl Decimation {
     }
 }
 
-/// Makes `frame` the one of a message, without alerts, cues and commands. What a message does not have is left as it is:
-/// signed speeds, and what is counted over a run.
+/// Makes `frame` the one of a message, without alerts, cues and commands. What a message does not have is left as it
+/// is: signed speeds, and what is counted over a run.
 ///
 /// # Errors
 /// The name of the field whose number this layout does not know; `frame` is not usable then.
@@ -238,8 +238,8 @@ pub fn control_response(id: u64, outcome: &Outcome) -> ControlResponse {
     ControlResponse { id, tick, sim_time, time_scale, code, playback, cue, reserved: 0 }
 }
 
-/// Returns the stage of a motion with the events and cues of its show. `scene_hash` is BLAKE3 of the scene's text, or zeros
-/// without a text.
+/// Returns the stage of a motion with the events and cues of its show. `scene_hash` is BLAKE3 of the scene's text, or
+/// zeros without a text.
 pub fn stage(run_id: u64, stamp_ns: u64, scene_hash: [u8; SCENE_HASH_BYTES], motion: &Motion, show: &Show) -> Stage {
     let Team { benches, head_length, body_length, width, hole_inset } = *motion.team();
     let mut path = [StageSegment::default(); MOST_SEGMENTS];

@@ -36,11 +36,12 @@ pub struct Frame {
     pub tick: u64,
     /// Simulated seconds since the start of the scene.
     pub sim_time: f64,
-    /// Simulated seconds per second of wall time, as in force: 0 while paused or held, unchanged once the show has ended.
+    /// Simulated seconds per second of wall time, as in force: 0 while paused or held, unchanged once the show has
+    /// ended.
     pub time_scale: f64,
     /// The latest event passed, or `Approaching`, or `Moving`.
     pub state: FrameState,
-    /// Whether simulated time advances.
+    /// True if simulated time advances.
     pub playback: PlaybackState,
     /// Where every handle is.
     pub chain: Chain,
@@ -95,7 +96,7 @@ pub struct ReachedCue {
     pub number: u32,
     /// Simulated seconds at which it is.
     pub time: f64,
-    /// Whether the show waits there for [`Command::Go`].
+    /// True if the show waits there for [`Command::Go`].
     pub pauses: bool,
     /// Its name.
     pub name: Arc<str>,
@@ -114,7 +115,7 @@ pub struct Outcome {
     pub time_scale: f64,
     /// Simulated seconds per second while the show plays; kept through a pause.
     pub playing_rate: f64,
-    /// Whether simulated time advances.
+    /// True if simulated time advances.
     pub playback: PlaybackState,
     /// The latest cue passed, from 1.
     pub cue: u32,
@@ -142,7 +143,7 @@ pub struct Show {
     missing_cues: Vec<String>,
     /// What the next frame reports of commands.
     commands: Vec<CommandRecord>,
-    /// Whether a step has begun whose end no frame has reported.
+    /// True if a step has begun whose end no frame has reported.
     stepping: bool,
     frame: Frame,
 }

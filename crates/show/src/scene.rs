@@ -116,7 +116,7 @@ pub struct Scene {
     pub alerts: Option<AlertRules>,
     /// Frames per second.
     pub rate: f64,
-    /// Whether velocities are computed.
+    /// True if velocities are computed.
     pub velocities: Velocities,
     /// The service of poses in single precision beside that of whole frames; `None` where the scene asks for none.
     pub single_precision: Option<SinglePrecision>,
@@ -160,7 +160,7 @@ impl Scene {
         self.motion.team()
     }
 
-    /// Whether a show of this scene stops at a contact: it computes none without alerts.
+    /// Returns true if a show of this scene stops at a contact: it computes none without alerts.
     pub fn stops_at_contact(&self) -> bool {
         self.alerts.is_some() && self.on_contact == OnContact::Stop
     }

@@ -1,5 +1,5 @@
-//! What looking for collisions costs on a scene: the live clearance and all pairs per frame, the exact search and sampled
-//! ones. Called by [`super::measure`] only.
+//! What looking for collisions costs on a scene: the live clearance and all pairs per frame, the exact search and
+//! sampled ones. Called by [`super::measure`] only.
 
 use std::time::Instant;
 

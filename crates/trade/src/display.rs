@@ -1,9 +1,9 @@
-//! The error at the moment of display against bytes per second: what a publishing rate buys for readers that hold,
-//! that interpolate linearly, and that interpolate by Hermite.
+//! The error at the moment of display against bytes per second: what a publishing rate buys for readers that hold, that
+//! interpolate linearly, and that interpolate by Hermite.
 //!
 //! In: a scene, its timeline, a display. Out: one [`DisplayMeasurement`] per reader, rate and precision. The stream is
-//! simulated: every frame arrives at its deadline, so that transport adds neither delay nor jitter. Nothing here reads a
-//! clock; the same scene gives the same errors.
+//! simulated: every frame arrives at its deadline, so that transport adds neither delay nor jitter. Nothing here reads
+//! a clock; the same scene gives the same errors.
 
 use serde::Serialize;
 
@@ -114,7 +114,7 @@ pub struct DisplayMeasurement {
     pub precision: Precision,
     /// Share of a core that computing the frames takes, without transport.
     pub cpu_share: f64,
-    /// Whether no other has both fewer bytes per second and a smaller error; errors below the noise are equal.
+    /// True if no other has both fewer bytes per second and a smaller error; errors below the noise are equal.
     pub on_front: bool,
 }
 
@@ -337,8 +337,8 @@ fn show(
     time
 }
 
-/// The largest distance of a handle from where it is `later` seconds after a chain's moment, metres. What lies within the
-/// rounding of the clock is no longer than the velocity times that, to 1e-17 m.
+/// The largest distance of a handle from where it is `later` seconds after a chain's moment, metres. What lies within
+/// the rounding of the clock is no longer than the velocity times that, to 1e-17 m.
 fn distance(chain: &Chain, later: f64, shown: &[HandlePose]) -> f64 {
     let of_handle = |(handle, pose): (usize, &HandlePose)| {
         let x = chain.x[handle] + later * chain.vx[handle];

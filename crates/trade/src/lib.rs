@@ -1,7 +1,7 @@
 //! Accuracy against cost, measured: every solver on one scene and this machine, against the high-precision reference.
 //!
-//! In: a scene and its timeline. Out: one [`Measurement`] per solver. The `trade` command prints and draws them, and what
-//! [`display`] measures: the error at the moment of display against bytes per second.
+//! In: a scene and its timeline. Out: one [`Measurement`] per solver. The `trade` command prints and draws them, and
+//! what [`display`] measures: the error at the moment of display against bytes per second.
 
 mod candidates;
 mod collision;
@@ -40,7 +40,7 @@ pub struct Measurement {
     pub solver: String,
     /// The requested accuracy, metres; `None` for a solver that is not chosen by its accuracy.
     pub accuracy: Option<f64>,
-    /// Whether the wish is met wherever the motion itself does not multiply roundings by more; see
+    /// True if the wish is met wherever the motion itself does not multiply roundings by more; see
     /// [`Measurement::noise`].
     pub meets: Option<bool>,
     /// Nanoseconds per frame, the median over the show, without what reading the clock costs.
@@ -69,7 +69,7 @@ pub struct Measurement {
     /// What collisions cost on this scene; stands with the first solver only.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub collision: Vec<CollisionMeasurement>,
-    /// Whether no other solver is both faster and more exact; errors below the noise are equal.
+    /// True if no other solver is both faster and more exact; errors below the noise are equal.
     pub on_front: bool,
 }
 

@@ -36,7 +36,7 @@ pub(super) fn least_radius(team: &Team, pitch: f64, radius: f64) -> Option<f64> 
     Some(outside)
 }
 
-/// Whether the lemma holds for all handles at least `radius` metres from the centre.
+/// Returns true if the lemma holds for all handles at least `radius` metres from the centre.
 fn holds(team: &Team, pitch: f64, radius: f64) -> bool {
     let a = Interval::point(pitch).over(pi() * 2.0);
     let r = Interval::point(radius);
@@ -61,8 +61,7 @@ fn holds(team: &Team, pitch: f64, radius: f64) -> bool {
     if !left.is_positive() || !(aside * 2.0 * most_turned).is_below(body * left) {
         return false;
     }
-    // 2. No boards a turn apart: the team is too short.
-    // A number of benches below 2^53 is a double.
+    // 2. No boards a turn apart: the team is too short. A number of benches below 2^53 is a double.
     let length = head + body * (team.benches - 1) as f64;
     if (pi() * length + body * 3.0).is_below(pi() * r * 6.0) {
         return true;

@@ -1,7 +1,8 @@
-//! The least pitch between two numbers, proved: with every pitch up to the one boards overlap, with the other none touch.
+//! The least pitch between two numbers, proved: with every pitch up to the one boards overlap, with the other none
+//! touch.
 //!
-//! In: a team, a radius. Out: the two numbers. "The least pitch" in `docs/proofs.md` says why it holds; the ordinary search
-//! ([`super::trial`]) only tells where to look.
+//! In: a team, a radius. Out: the two numbers. "The least pitch" in `docs/proofs.md` says why it holds; the ordinary
+//! search ([`super::trial`]) only tells where to look.
 
 use std::f64::consts::TAU;
 
@@ -12,20 +13,21 @@ use bench_dragon_motion::model::team::Team;
 use bench_dragon_show::scene::Accepted;
 
 /// The least pitch of an inward spiral with which the front handle of a team's head comes to a radius: from however far
-/// outside it comes in, before it is there no two boards touch that share no handle, and no link locks. Of pitches above
-/// `value_hi` nothing is said: with some of them boards may overlap.
+/// outside it comes in, before it is there no two boards touch that share no handle, and no link locks. Of pitches
+/// above `value_hi` nothing is said: with some of them boards may overlap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeastPitch {
-    /// Metres per turn: with every pitch from `from` up to this, two boards overlap or a link locks before the radius is
-    /// reached. `from` itself where that is shown of none.
+    /// Metres per turn: with every pitch from `from` up to this, two boards overlap or a link locks before the radius
+    /// is reached. `from` itself where that is shown of none.
     pub value_lo: f64,
     /// Metres per turn: with this pitch the radius is reached. `None` where that is shown of none.
     pub value_hi: Option<f64>,
-    /// Metres per turn: the least pitch that is looked at, half of the boards' width or, where that is more, a millimetre.
+    /// Metres per turn: the least pitch that is looked at, half of the boards' width or, where that is more, a
+    /// millimetre.
     pub from: f64,
     /// Two boards that overlap with pitches up to `value_lo`; `None` where a link locks, or nothing is shown.
     pub overlap: Option<Overlap>,
-    /// Whether `value_lo` and `value_hi` are within a nanometre; otherwise the search was given up.
+    /// True if `value_lo` and `value_hi` are within a nanometre; otherwise the search was given up.
     pub proved: bool,
     /// Intervals of pitches into which those from `from` to `value_lo` are divided.
     pub intervals: u64,
@@ -55,7 +57,8 @@ const MOST_STEPS: u64 = 100_000;
 /// Pitches that the search may propose.
 const MOST_PROPOSALS: u32 = 8;
 
-/// The least share of a pitch that an interval is, the share at first, and what an interval that is shown does to the next.
+/// The least share of a pitch that an interval is, the share at first, and what an interval that is shown does to the
+/// next.
 const LEAST_SHARE: f64 = 1e-14;
 const FIRST_SHARE: f64 = 1e-4;
 const GROWTH: f64 = 1.1;
@@ -146,7 +149,7 @@ struct Blocked<'a> {
     radius: f64,
     /// All from the first up to this one.
     pitch: f64,
-    /// Whether the head's link locks with the last of them.
+    /// True if the head's link locks with the last of them.
     locks: bool,
     /// The boards last found.
     deepest: Option<Deepest>,
@@ -185,7 +188,8 @@ impl Blocked<'_> {
         }
     }
 
-    /// Whether the two boards are proved to overlap, or the head's link to lock, with all pitches so much further on.
+    /// Returns true if the two boards are proved to overlap, or the head's link to lock, with all pitches so much
+    /// further on.
     fn holds(&self, width: f64) -> bool {
         let (from, to) = (self.pitch, self.pitch + width);
         if self.locks {
@@ -198,8 +202,8 @@ impl Blocked<'_> {
         pitches.are_outside(self.radius) && pitches.all_overlap()
     }
 
-    /// Looks for the same two boards where they overlap most deeply at this pitch, or for others, or a lock, where they have
-    /// come too nearly free. Whether there is anything.
+    /// Looks for the same two boards where they overlap most deeply at this pitch, or for others, or a lock, where they
+    /// have come too nearly free. Whether there is anything.
     fn follow(&mut self) -> bool {
         if let Some(Deepest { pair, depth, head_radius }) = self.deepest
             && !self.locks

@@ -21,7 +21,7 @@ pub struct GreatestSpeed {
     pub handle: u32,
     /// Its speed over the head's then.
     pub ratio: f64,
-    /// Whether the two speeds are as near to each other as was to be; otherwise the search was given up.
+    /// True if the two speeds are as near to each other as was to be; otherwise the search was given up.
     pub proved: bool,
     /// Steps of the head that were enclosed.
     pub steps: u64,
@@ -34,9 +34,9 @@ const TOLERANCE: f64 = 1e-9;
 /// Metres per second from which on the tolerance grows with the limit.
 const LARGE: f64 = 4.0;
 
-/// The greatest constant speed of the head at which no handle ever goes faster than `limit` metres per second, from
-/// the scene's start until its show freezes. `progress` is called now and then with the share of the work that is
-/// done, from 0 to 1.
+/// The greatest constant speed of the head at which no handle ever goes faster than `limit` metres per second, from the
+/// scene's start until its show freezes. `progress` is called now and then with the share of the work that is done,
+/// from 0 to 1.
 ///
 /// A handle's speed over the head's depends on the head's place alone. Its greatest value is enclosed by branch and
 /// bound with intervals ([`greatest_ratio`]); the event at which the show freezes is taken as `timeline` has it.

@@ -1,5 +1,5 @@
-//! What keeps a team from a radius on a spiral of one pitch, by the ordinary search, which samples: it tells the proofs of
-//! [`super::pitch`] where to look.
+//! What keeps a team from a radius on a spiral of one pitch, by the ordinary search, which samples: it tells the proofs
+//! of [`super::pitch`] where to look.
 
 use crate::pitch::clear_beyond;
 use bench_dragon_messages::state::EventKind;
@@ -47,9 +47,9 @@ pub(super) fn obstacle(team: &Team, pitch: f64, radius: f64) -> Option<Obstacle>
 
 /// The least pitch from one on, up to another, with which the search finds nothing in the way; `None` if there is none.
 ///
-/// Each time something is, the two boards that overlap most deeply are followed near that place, in steps of half a percent
-/// of the pitch, until they come free: so pitches that will do are passed over where the two come free and meet again
-/// within one step. `progress` is called now and then.
+/// Each time something is, the two boards that overlap most deeply are followed near that place, in steps of half a
+/// percent of the pitch, until they come free: so pitches that will do are passed over where the two come free and meet
+/// again within one step. `progress` is called now and then.
 pub(super) fn free_from(
     team: &Team,
     (from, to): (f64, f64),
@@ -73,7 +73,7 @@ pub(super) fn free_from(
 }
 
 impl Obstacle {
-    /// Whether an obstacle of another pitch is one of this pitch too.
+    /// Returns true if an obstacle of another pitch is one of this pitch too.
     fn blocks(&self, team: &Team, pitch: f64, radius: f64) -> bool {
         match *self {
             Self::Lock => Trial::near(team, pitch, radius).locks(),

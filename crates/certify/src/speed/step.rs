@@ -72,7 +72,7 @@ impl Speeds<'_> {
         Some(Bounds { upper, fastest, speed, handles })
     }
 
-    /// Whether no handle behind the last of these can be faster than it.
+    /// Returns true if no handle behind the last of these can be faster than it.
     fn is_enough(&self, handles: &[Spanned]) -> bool {
         let (last, benches) = (handles.len() - 1, self.chain.team.benches);
         let Place(segment, at) = handles[last].span.1;
@@ -134,7 +134,7 @@ impl Speeds<'_> {
         })
     }
 
-    /// Whether two handles are on one line or one circle all the while.
+    /// Returns true if two handles are on one line or one circle all the while.
     fn is_rigid(&self, front: &Spanned, rear: &Spanned) -> bool {
         let segment = rear.span.0.0;
         segment == front.span.1.0

@@ -264,8 +264,8 @@ impl RawStep {
     }
 }
 
-/// Whether one Euler step of the paper's rules, of so many metres, ends where a bench is folded back on itself, or at the
-/// centre.
+/// Returns true if one Euler step of the paper's rules, of so many metres, ends where a bench is folded back on itself,
+/// or at the centre.
 pub(super) fn is_folded_after(pitch: f64, start_turn: f64, metres: f64, team: &Team) -> bool {
     let start = TAU * start_turn;
     let theta = start - metres * TAU / (pitch * start);
