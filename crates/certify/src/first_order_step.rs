@@ -1,4 +1,4 @@
-//! The handles and boards of a step of the head, enclosed by Lemma 1 and moving together by Lemma 6 of
+//! Handles and boards over a step of the head: spans by Lemma 1, and first-order enclosures by Lemma 6 of
 //! `docs/proofs.md`. Only [`super::clearance`] uses it.
 
 use super::capsule::Span;
@@ -8,14 +8,14 @@ use super::lines::Links;
 use super::path::{Curve, Place};
 use super::step::{Chain, Claim, Listed, Obstacle};
 
-/// The knots of a step.
+/// The grid points of a step.
 pub(super) struct StepPoints<'k> {
     pub from: &'k mut GridPoint,
     pub middle: &'k mut GridPoint,
     pub to: &'k mut GridPoint,
 }
 
-/// The same knots for as long as they are lent.
+/// Reborrows the grid points of a step.
 pub(super) fn step_points<'k>(
     from: &'k mut GridPoint,
     middle: &'k mut GridPoint,
@@ -24,12 +24,12 @@ pub(super) fn step_points<'k>(
     StepPoints { from, middle, to }
 }
 
-/// The handles of a step, and how they move.
+/// The handles of a step, as spans and as first-order enclosures.
 pub(super) struct FirstOrderStep<'c, 'a> {
     chain: &'c Chain<'a>,
     pub listed: Listed<'c, 'a>,
     handles: Vec<FirstOrderHandle>,
-    /// Where the head is in the middle.
+    /// The place of the head in the middle of the step.
     pub at: Place,
     half_step: f64,
 }
@@ -38,7 +38,7 @@ impl<'c, 'a> FirstOrderStep<'c, 'a> {
     pub fn new(chain: &'c Chain<'a>, StepPoints { from, middle, to }: &StepPoints, pads: f64) -> Self {
         let exact = &chain.exact;
         let listed = Listed::new(chain, Span(from.head, to.head), pads);
-        // Rounding may put the middle outside the two; any place between them will do.
+        // Rounding may put the middle outside; every place between the two is valid.
         let inside = exact.in_order(from.head, middle.head) && exact.in_order(middle.head, to.head);
         let at = if inside { middle.head } else { from.head };
         let half_step = exact.length(from.head, at).max(exact.length(at, to.head));
@@ -46,7 +46,7 @@ impl<'c, 'a> FirstOrderStep<'c, 'a> {
         Self { chain, listed, handles, at, half_step }
     }
 
-    /// Encloses one handle more.
+    /// Encloses one more handle.
     pub fn extend(&mut self, StepPoints { from, middle, to }: StepPoints, links: Links) -> Result<(), Obstacle> {
         let Chain { path, exact, team, .. } = self.chain;
         let link = self.listed.handles.len() - 1;
@@ -60,7 +60,7 @@ impl<'c, 'a> FirstOrderStep<'c, 'a> {
         Ok(())
     }
 
-    /// The board of a bench.
+    /// Returns the board of a bench.
     pub fn board(&self, bench: usize) -> FirstOrderBoard {
         let (front, rear, link) = (self.handles[bench], self.handles[bench + 1], self.chain.link(bench));
         FirstOrderBoard::new(&self.chain.shape, front, rear, link, self.half_step)
@@ -72,8 +72,8 @@ impl<'c, 'a> FirstOrderStep<'c, 'a> {
         self.board(a).is_further_than(threshold, &self.board(b), when)
     }
 
-    /// Returns true if all handles from those of one board to those of another stay on one arc: then the boards keep
-    /// their distance.
+    /// Returns true if all handles of two boards, and the handles between, stay on one arc: then the boards keep their
+    /// distance.
     fn are_on_one_circle(&self, a: usize, b: usize) -> bool {
         let handles = &self.listed.handles;
         let (first, last) = (handles[a].span, handles[b + 1].span);
@@ -82,7 +82,7 @@ impl<'c, 'a> FirstOrderStep<'c, 'a> {
         same && matches!(self.chain.exact.segments[segment].curve, Curve::Arc { .. })
     }
 
-    /// The boards from `first` to the last, all on the line on which the last listed handle is.
+    /// Returns the boards from `first` to the last as one, on the line of the last listed handle.
     pub fn straight_run(&self, first: usize) -> FirstOrderBoard {
         let last = self.handles.len() - 1;
         let link = self.chain.links[1];

@@ -1,5 +1,5 @@
-//! The search: steps of the head from the start to the end of the motion, halved where their claims cannot be shown,
-//! and at each event that the ordinary search has found, the lines that show it. Only [`super`] uses it.
+//! The search for a certificate: steps of the head from the start to the end of the motion. A step whose claims cannot
+//! be shown is halved. At each event of the ordinary search, the search writes the line that proves the event.
 
 use std::io;
 
@@ -14,41 +14,41 @@ use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::model::path::Path;
 
-/// Seconds on each side of an event between which it is proved to be.
+/// Half width of the proved interval of an event, seconds.
 const AROUND: f64 = 3e-10;
 
-/// Metres, as a share of the way, below which doubles tell no places apart.
+/// Distance that doubles can resolve, as a share of the path length in metres.
 pub(super) const LEAST: f64 = 7e-13;
 
-/// What a step that succeeded, and one that did not, do to the length of the next.
+/// Factors of the step length after a step that is shown, and after a step that is not.
 const GROWTH: f64 = 1.3;
 const SHRINK: f64 = 0.5;
 
-/// How near an event, in links, a step that cannot be shown is taken to be in the way of the event's own proof.
+/// Distance from an event, in links, within which a failed step is explained by the event.
 const NEAR: f64 = 1e-3;
 
 pub(super) struct CertificateSearch<'a, 'w> {
     given: Given<'a>,
     chain: Chain<'a>,
     write: &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>,
-    /// Where the last step ended.
+    /// The end of the last step.
     at: GridPoint,
     links: Links,
-    /// Claims that steps still make.
+    /// The claims that steps still make.
     moving: bool,
     clear: bool,
     /// True if Lemma 4 may still be used.
     covered: bool,
     proofs: [Option<Status>; 4],
-    /// Metres of the next step that is tried.
+    /// Length of the next step to try, metres.
     step: f64,
     steps: u64,
 }
 
-/// Why the search cannot go on.
+/// The reason for the end of a search.
 enum Halt {
     Error(CertifyError),
-    /// At the place that it has come to.
+    /// No step from the current place can be shown.
     Stuck(String),
 }
 
@@ -64,7 +64,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
     pub fn new(given: Given<'a>, write: &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>) -> Self {
         let exact = ExactPath::new(given.description);
         let chain = Chain::new(given.path, exact, given.team);
-        // A motion that begins earlier passes through all that this one does.
+        // A motion that begins earlier includes this motion.
         let before = -LEAST * (1.0 + given.path.length());
         let at = GridPoint::new(given.path, &chain.exact, before);
         let step = 0.25 * given.team.shortest_link();
@@ -102,7 +102,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Ok(events.into())
     }
 
-    /// The whole motion, event by event.
+    /// Proves the whole motion, event by event.
     fn motion(&mut self, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
         let end = self.given.events.last().map_or(self.given.path.length(), |event| event.travelled);
         let mut progress = |at: f64| progress((at / end).clamp(0.0, 1.0));
@@ -129,15 +129,15 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Ok(())
     }
 
-    /// Metres on each side of an event.
+    /// Returns the metres on each side of an event.
     fn around(&self) -> f64 {
         (AROUND * self.given.head_speed).min(1e-8).max(LEAST * (1.0 + self.given.path.length()))
     }
 
-    /// Time at a place of the head, from below and above, and never below 0.
+    /// Returns an enclosure of the time at a place of the head, at least 0.
     fn time(&self, place: Place) -> Interval {
         let time = self.chain.exact.travelled(place).over(Interval::point(self.given.head_speed));
-        // Room for the rounding of a `lead_in` that the scene states otherwise.
+        // Covers the rounding of a `lead_in` that the scene gives in other digits.
         let slack = 1e-14 * (1.0 + time.magnitude());
         Interval { lo: (time.lo - slack).max(0.0), hi: (time.hi + slack).max(0.0) }
     }
@@ -153,7 +153,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Status::Proved { time_lo: self.time(before).lo, time_hi: self.time(after).hi, bench_a: None, bench_b: None }
     }
 
-    /// Places at which an event of doubtful digits is tried to be shown, from near to far.
+    /// Returns travels beyond an event, from near to far, at which the search tries to show it.
     fn beyond(&self, event: &Event) -> impl Iterator<Item = f64> + use<> {
         let around = self.around().max(2.0 * (event.travelled - self.at.travelled));
         let (at, most) = (event.travelled, NEAR * self.given.team.shortest_link());
@@ -163,7 +163,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
             .map(move |far| at + far)
     }
 
-    /// See [`CertificateSearch::go_to_point`].
+    /// Goes to a travel: see [`CertificateSearch::go_to_point`].
     fn go_to(&mut self, travelled: f64, event: Option<&Event>, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
         if travelled <= self.at.travelled {
             return Ok(());
@@ -172,8 +172,8 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         self.go_to_point(&target, event, progress)
     }
 
-    /// Goes in steps to a knot, or so near to an event that a step cannot be shown for its sake. A claim that cannot be
-    /// shown at any length of the step is given up.
+    /// Goes in steps to a grid point, or so near to an event that the event prevents a step. A claim that cannot be
+    /// shown with any step length is given up.
     fn go_to_point(
         &mut self,
         target: &GridPoint,
@@ -198,7 +198,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
                 }
                 Err(obstacle) if self.step.min(remaining) > least => {
                     self.step = SHRINK * self.step.min(remaining);
-                    // Turns of handles behind the first are not followed by the links of boards 0 and 1 alone.
+                    // The links of boards 0 and 1 do not show turns of the handles behind.
                     if self.links == Links::Front && obstacle == Obstacle::Stall(1) && !self.moving {
                         self.links = Links::All;
                     }
@@ -238,7 +238,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Ok(())
     }
 
-    /// Drops a claim that cannot be shown here, or the whole search.
+    /// Gives up a claim that cannot be shown here, or the whole search.
     fn give_up(&mut self, obstacle: Obstacle) -> Result<(), Halt> {
         let time_lo = self.time(self.at.head).lo;
         match obstacle {
@@ -281,7 +281,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Status::Proved { time_lo: self.time(from).lo, time_hi: self.time(to).hi, bench_a, bench_b }
     }
 
-    /// Boards that overlap before anything has moved.
+    /// Handles boards that overlap at the start.
     fn overlap_at_start(&mut self, event: &Event) -> Result<(), Halt> {
         let (from, mut to) = (self.at.clone(), self.grid_point(LEAST * (1.0 + self.given.path.length())));
         self.clear = false;
@@ -289,14 +289,15 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
             let [bench_a, bench_b] = [event.bench_a, event.bench_b].map(|bench| bench.map(|bench| bench as usize));
             Status::Proved { time_lo: 0.0, time_hi: 0.0, bench_a, bench_b }
         } else {
-            let because = "the boards that overlap from the start do so too little for doubles".to_owned();
+            let because = "the boards that overlap from the start overlap too little for doubles".to_owned();
             Status::Undecided { time_lo: 0.0, because }
         };
         self.proofs[EventKind::Contact as usize] = Some(status);
         Ok(())
     }
 
-    /// Writes that two boards have a point in common with the head between two points, if that can be shown.
+    /// Writes the contact line if two boards are proved to have a common point while the head is between two grid
+    /// points. Returns true if so.
     fn touch(&mut self, event: &Event, mut from: GridPoint, to: &mut GridPoint) -> Result<bool, Halt> {
         let benches = [event.bench_a, event.bench_b].map(|bench| bench.unwrap_or(0) as usize);
         let Some(handles) = self.chain.spans(&mut from, to, benches[1] + 1) else { return Ok(false) };
@@ -321,7 +322,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
                 return Ok(());
             }
         }
-        let because = "whether the boards that come so near do touch cannot be shown with doubles".to_owned();
+        let because = "doubles cannot tell whether the boards touch that come so near".to_owned();
         let status = Status::Undecided { time_lo: self.time(earliest).lo, because };
         self.proofs[EventKind::Contact as usize] = Some(status);
         Ok(())
@@ -350,7 +351,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
                 return Ok(());
             }
         }
-        let because = "whether the link that comes so near a stall does stall cannot be shown with doubles".to_owned();
+        let because = "doubles cannot tell whether the link stalls that comes so near a stall".to_owned();
         self.proofs[EventKind::Stall as usize] = Some(Status::Undecided { time_lo: self.time(earliest).lo, because });
         Ok(())
     }
@@ -376,14 +377,11 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
             self.proofs[EventKind::Lock as usize] = Some(self.proved(self.at.head, to.head, event.bench_a, None));
             return Ok(());
         }
-        Err(Halt::Stuck(format!(
-            "whether bench {} (counting from 1) locks there cannot be shown with doubles",
-            link + 1
-        )))
+        Err(Halt::Stuck(format!("doubles cannot tell whether bench {} (counting from 1) locks there", link + 1)))
     }
 }
 
-/// A knot at the path's end or beyond it.
+/// Returns a grid point at the path's end or beyond it.
 pub(super) fn path_end(exact: &ExactPath, path: &Path) -> GridPoint {
     let length = path.length();
     let end = place(path.param_at(length));
