@@ -1,8 +1,8 @@
-//! The checker of certificates of events: what docs/proofs.md says of a file, and nothing else. `verify`, `check
+//! The checker of certificates of events: the rules of docs/proofs.md, and nothing else. `verify`, `check
 //! --certificate` and `view --certificate` call it.
 //!
-//! In: the lines of a certificate. Out: what it proves, or the first line that does not follow. It uses no other room:
-//! no geometry, no parsing and no solver of the program, only that page, which it has in common with the search.
+//! In: the lines of a certificate. Out: its proved events, or the first line that does not follow. It depends on no
+//! other crate of this workspace: it shares neither geometry, parsing nor solver with the search, only that page.
 
 mod boards;
 mod capsule;
@@ -16,10 +16,6 @@ mod path;
 mod results;
 mod scene;
 mod steps;
-/// Returns BLAKE3 of a scene's text, the name under which the messages of a show and a certificate mean the same scene.
-pub fn scene_hash(text: &str) -> [u8; 32] {
-    *blake3::hash(text.as_bytes()).as_bytes()
-}
 
 #[cfg(test)]
 mod tests;
@@ -35,53 +31,58 @@ use self::path::Span;
 use self::scene::Scene;
 use self::steps::{Step, Steps};
 
-/// The form of the file.
+/// The version of the file format.
 const FORMAT: u32 = 1;
-/// Bytes of the longest line.
+/// Limit of the length of a line, bytes.
 const LONGEST_LINE: u64 = 1 << 28;
 
-/// What a certificate proves.
+/// The content of a valid certificate.
 #[derive(Debug, Clone, Serialize)]
 pub struct Proved {
-    /// The text of the scene that it is about.
+    /// The text of its scene.
     pub scene: String,
-    /// The version of the program that wrote it.
+    /// The version of the program that wrote the certificate.
     pub version: String,
-    /// Contact, stall, lock and path end, in this order.
+    /// The results for contact, stall, lock and path end, in this order.
     pub results: Vec<ProvedEvent>,
-    /// Steps checked.
+    /// Number of steps checked.
     pub steps: u64,
-    /// Links checked, in all steps.
+    /// Number of links checked, in all steps.
     pub links: u64,
-    /// Pairs of boards checked, in all steps.
+    /// Number of pairs of boards checked, in all steps.
     pub pairs: u64,
 }
 
-/// Why a file proves nothing.
+/// The reason to refuse a file.
 #[derive(Debug, thiserror::Error)]
 pub enum Refused {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("{0}")]
     Unreadable(io::Error),
-    /// It has not the form of a certificate.
+    /// The file has not the form of a certificate.
     #[error("line {line}: {problem}")]
     Form {
         /// The line, from 1.
         line: u64,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
-    /// It has the form of one, but a line does not follow from those before it.
+    /// The form is right, but a line does not follow from the lines before it.
     #[error("line {line}: {problem}")]
     DoesNotFollow {
         /// The line, from 1.
         line: u64,
-        /// What does not follow.
+        /// The condition that does not follow.
         problem: String,
     },
 }
 
-/// The text of the scene that a certificate is about, from its first line. Nothing else of it is checked.
+/// Returns BLAKE3 of a scene's text. The messages of a show and a certificate identify a scene by it.
+pub fn scene_hash(text: &str) -> [u8; 32] {
+    *blake3::hash(text.as_bytes()).as_bytes()
+}
+
+/// Returns the text of a certificate's scene from the first line. The rest is not checked.
 ///
 /// # Errors
 /// [`Refused::Form`] for a line that is not the first of a certificate.
@@ -91,10 +92,10 @@ pub fn scene_of(first_line: &[u8]) -> Result<String, Refused> {
     Ok(Checker::begin(parsed).map_err(form)?.proved.scene)
 }
 
-/// Checks a certificate. `progress` is told how many bytes have been read.
+/// Checks a certificate. `progress` receives the number of bytes read.
 ///
 /// # Errors
-/// [`Refused`]: the first line that is wrong.
+/// [`Refused`] for the first wrong line.
 pub fn verify(mut lines: impl BufRead, progress: &mut dyn FnMut(u64)) -> Result<Proved, Refused> {
     let mut bytes = 0;
     let mut checker: Option<Checker> = None;
@@ -122,7 +123,7 @@ pub fn verify(mut lines: impl BufRead, progress: &mut dyn FnMut(u64)) -> Result<
     }
 }
 
-/// A certificate as far as it has been checked.
+/// The state of the check.
 struct Checker {
     scene: Scene,
     steps: Steps,

@@ -6,7 +6,7 @@ use crate::interval::Interval;
 use crate::step::links_of;
 use bench_dragon_motion::model::team::Team;
 
-/// Number of times that the longest link or the radius, the greater of the two, is doubled to find a radius for which
+/// Limit of doublings of the longest link or the radius, the greater of the two, to find a radius for which
 /// the lemma holds.
 const MOST_DOUBLINGS: u32 = 30;
 

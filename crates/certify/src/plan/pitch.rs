@@ -113,8 +113,8 @@ fn decided(
         let done = blocked.pitch >= target;
         if done && proposed.is_none() {
             return Err(PlanError(format!(
-                "the team reaches {radius} m with no pitch from {from:.9} m to {greatest:.3} m: with every one two boards \
-                 overlap, or a link locks, before"
+                "the team reaches {radius} m with no pitch from {from:.9} m to {greatest:.3} m: with every one two \
+                 boards overlap, or a link locks, before"
             )));
         }
         // Boards that come free before the proposed pitch may be the answer.

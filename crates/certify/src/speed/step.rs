@@ -195,7 +195,7 @@ impl Speeds<'_> {
             let rate = front.rate * ratio + front.ratio.square() * rate;
             let ratio = intersection(front.ratio * ratio, rear.speed + Interval::within(half) * rate)?;
             front = Speed { ratio, rate };
-            // This also holds for NaN.
+            // Also true for NaN.
             if !ratio.magnitude().is_finite() {
                 return None;
             }
