@@ -31,7 +31,7 @@ pub(super) fn check(
     outcome: &ProvedEvent,
     earlier: &[ProvedEvent],
 ) -> Result<(), String> {
-    let Some(expected) = ORDER.get(earlier.len()) else { return Err("there are more than four results".to_owned()) };
+    let Some(expected) = ORDER.get(earlier.len()) else { return Err("a result too many, expected four".to_owned()) };
     if outcome.event != *expected {
         return Err("the results are not contact, stall, lock and path_end in this order".to_owned());
     }

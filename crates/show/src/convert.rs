@@ -124,8 +124,8 @@ impl Decimation {
     }
 }
 
-/// Makes `frame` the one of a message, without alerts, cues and commands. What a message does not have is left as it
-/// is: signed speeds, and what is counted over a run.
+/// Makes `frame` the one of a message, without alerts, cues and commands. What a message does not have is left as it is:
+/// signed speeds, and what is counted over a run.
 ///
 /// # Errors
 /// The name of the field whose number this layout does not know; `frame` is not usable then.
