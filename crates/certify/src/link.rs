@@ -31,8 +31,8 @@ pub(super) fn follower_within(path: &ExactPath, front: &Spanned, rear: &Spanned,
     near.then_some(sign)
 }
 
-/// Returns the sign of the front product if, for every place of `front`, exactly one place of `rear`, not an end of it,
-/// is proved to be at the link's distance. It is the follower unless a nearer place is at that distance.
+/// Returns the sign of the front product if, for every place of `front`, exactly one inner place of `rear` is proved to
+/// be at the link's distance. That place is the follower unless a nearer place is at the distance.
 pub(super) fn one_place_within(path: &ExactPath, front: &Spanned, rear: &Spanned, link: Interval) -> Option<Front> {
     let (u, x) = (&front.capsule, &rear.capsule);
     if !path.in_order(rear.span.1, front.span.0) || !u.product(x, true).is_positive() {
@@ -70,8 +70,8 @@ pub(super) fn nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Int
         && nearer(path, front, Span(middle, last), link, halvings - 1)
 }
 
-/// Returns true if all places of a stretch are proved to be nearer than the link to all of `front`, in one piece, by
-/// Taylor's formula along the stretch.
+/// Returns true if all places of a stretch are proved to be nearer than the link to all of `front`. Taylor's formula is
+/// applied to the whole stretch.
 fn is_nearer(stretch: &Capsule, front: &Spanned, link: Interval) -> bool {
     let Capsule { point, half, radius, .. } = front.capsule;
     let spread = Interval::within((Interval::point(half) + Interval::point(radius)).hi);

@@ -1,6 +1,5 @@
-//! Proofs for teams on inward spirals: boards that overlap with every pitch of an interval, and a pitch with which no
-//! boards touch, from any distance of the head. [`crate::plan`] calls it. "The least pitch" and Lemma 8 in
-//! `docs/proofs.md`.
+//! Proofs for teams that come in on inward spirals from any distance: boards overlap with every pitch of an interval,
+//! or no boards touch with one pitch. [`crate::plan`] calls it. "The least pitch" and Lemma 8 in `docs/proofs.md`.
 //!
 //! With the spiral's a = pitch / 2 pi as the unit of length, all spirals are equal and the team's lengths are
 //! intervals.
@@ -81,8 +80,8 @@ impl Pitches<'_> {
 /// Limit of pieces, three quarters of a turn at first, that are searched for a lock.
 const MOST_PIECES: u32 = 10_000;
 
-/// Returns true if, with every pitch of an interval, the head's link is proved to lock while the head comes in from far
-/// outside, before it is `radius` metres from the centre.
+/// Returns true if the head's link is proved to lock with every pitch of an interval: while the head comes in from far
+/// outside, before it is at `radius`, metres from the centre.
 pub(crate) fn head_locks(team: &Team, (from, to): (f64, f64), radius: f64) -> bool {
     let radians = |metres: Interval, pitch: f64| metres.over(Interval::point(pitch).over(pi() * 2.0));
     let theta = Interval::point(radians(Interval::point(radius), from).hi);
@@ -125,9 +124,9 @@ pub(crate) fn clear_beyond(team: &Team, pitch: f64, radius: f64) -> Option<f64> 
 /// Limit of turns of a scene: no steps are tried beyond.
 const MOST_TURNS: f64 = 1e7;
 
-/// Returns true if a team whose head comes in on a spiral of this pitch, from any distance, is proved to reach
-/// `radius`: until its front handle is `radius` metres from the centre, no two boards touch and no link locks.
-/// `progress` receives the share of the way that is done.
+/// Returns true if a team is proved to reach `radius`, metres from the centre, on a spiral of this pitch from any
+/// distance. Until the head's front handle is there, no two boards touch and no link locks. `progress` receives the
+/// share of the way that is done.
 pub(crate) fn reaches(team: &Team, pitch: f64, radius: f64, most_steps: u64, progress: &mut dyn FnMut(f64)) -> bool {
     let Some(begin) = clear_beyond(team, pitch, radius) else { return false };
     if begin <= radius {

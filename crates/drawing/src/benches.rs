@@ -31,8 +31,9 @@ impl Speeds {
         }
     }
 
-    /// Returns the colour scale, or `None` if no speed is known. It reaches from the negative head speed to three times
-    /// the head speed at most, and to at least a thousandth on either side of it: so rounding has no colour.
+    /// Returns the colour scale, or `None` if no speed is known. It reaches at most from the negative head speed to
+    /// three times the head speed. It reaches at least a thousandth to either side of the head speed, so that rounding
+    /// has no colour.
     pub fn scale(&self, head_speed: f64) -> Option<ColourScale> {
         if self.least > self.greatest {
             return None;

@@ -68,8 +68,8 @@ fn series(angle: &Interval) -> (Interval, Interval) {
     (sum(1) * angle, sum(0))
 }
 
-/// Returns z + s z^3 / 3 + z^5 / 5 + s z^7 / 7 + ..., s being `sign`: the arctangent for -1, its hyperbolic twin for 1.
-/// The remainder after n terms is at most |z|^(2 n + 1) / (1 - z^2).
+/// Returns z + s z^3 / 3 + z^5 / 5 + s z^7 / 7 + ..., with s = `sign`. The sum is the arctangent for -1, its hyperbolic
+/// twin for 1. The remainder after n terms is at most |z|^(2 n + 1) / (1 - z^2).
 fn odd_series(z: &Interval, sign: f64) -> Interval {
     if !z.abs().is_below(&Interval::new(0.34)) {
         return Interval::new(0.0) / Interval::new(0.0);

@@ -181,8 +181,8 @@ fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String
     Ok(pairs + about as u64)
 }
 
-/// Checks Lemma 3, *Line*: the boards `about` are apart from the boards behind the last listed handle, which are on one
-/// line, and the latter are apart from each other.
+/// Checks Lemma 3, *Line*: the boards behind the last listed handle are on one line. The boards `about` are apart from
+/// them, and they are apart from each other.
 fn check_line(scene: &Scene, chain: &Chain, about: &[Board]) -> Result<(), String> {
     let team = &scene.team;
     let last = chain.last();

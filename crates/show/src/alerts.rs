@@ -20,7 +20,7 @@ pub const MOST_PER_FRAME: usize = 3;
 /// hysteresis, a clearance that oscillates about the threshold would make the level flicker.
 const HYSTERESIS_RATIO: f64 = 1.5;
 
-/// Time for which the clearance must stay that wide, as a share of the approach time. The ratio alone is not enough: as
+/// Time for which the clearance must stay that wide, as a share of the approach time. The ratio alone is not enough. As
 /// the paper's head passes from one bench to the next, its clearance rises from 0.050 m to 0.082 m and falls back
 /// within 4 s. It is above 0.075 m for 0.6 s.
 const RELEASE_HOLD: f64 = 0.1;
@@ -30,8 +30,8 @@ const RELEASE_HOLD: f64 = 0.1;
 pub struct Alert {
     /// The level.
     pub level: Level,
-    /// The event of the alert: the next contact, stall or lock while the level is clear or approaching, if there is
-    /// one; else the latest event that has happened.
+    /// The event of the alert. While the level is clear or approaching: the next contact, stall or lock, if any. Else:
+    /// the latest event that has happened.
     pub event: Option<TimedEvent>,
     /// The nearest two boards in the frame; `None` with fewer than three benches.
     pub nearest: Option<PairClearance>,

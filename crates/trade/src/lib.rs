@@ -51,8 +51,8 @@ pub struct Measurement {
     pub frames_timed: usize,
     /// The greatest distance of a handle from its true position, metres.
     pub max_position_error: f64,
-    /// Metres below which errors are rounding: the greatest 8 eps (r + distance travelled) at any sample, times the
-    /// ratio of the handle's speed to the head's if that is above 1. The same for all solvers.
+    /// Metres below which errors are rounding: the greatest 8 eps (r + distance travelled) max(1, ratio of the handle's
+    /// speed to the head's) at any sample. The same for all solvers.
     pub noise: f64,
     /// The greatest relative error of a handle's speed; `None` without velocities.
     pub max_speed_error: Option<f64>,

@@ -104,7 +104,7 @@ fn decided(
         let proposed = propose(next, greatest, &mut |pitch| progress(0.3 * (1.0 - (-0.3 * pitch / from).exp())));
         if proposed == Some(from) && reaches(from, progress) {
             return Err(PlanError(format!(
-                "the team reaches {radius} m with a pitch of {from} m already, the least that is looked at: it is too \
+                "the team reaches {radius} m with a pitch of {from} m already, the least that is tested: it is too \
                  short to meet itself before"
             )));
         }

@@ -47,9 +47,9 @@ pub(super) fn obstacle(team: &Team, pitch: f64, radius: f64) -> Option<Obstacle>
 
 /// Returns the least pitch between two with which the search finds no obstacle; `None` if there is none.
 ///
-/// At an obstacle, the two boards that overlap most deeply are followed near that place, while the pitch grows in steps
-/// of half a percent, until they come free. So a pitch is missed if the two boards come free and meet again within one
-/// step. `progress` receives each pitch.
+/// At an obstacle, the two boards that overlap most deeply are followed near that place until they come free. The pitch
+/// grows in steps of half a percent. So a pitch is missed if the two boards come free and meet again within one step.
+/// `progress` receives each pitch.
 pub(super) fn free_from(
     team: &Team,
     (from, to): (f64, f64),

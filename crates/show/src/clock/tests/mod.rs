@@ -31,7 +31,7 @@ fn magnitude(least: f64, greatest: f64) -> impl Strategy<Value = f64> {
     (least..greatest).prop_map(|exponent| 10f64.powf(exponent))
 }
 
-/// Time scale, rate, start and freeze: a show of a billionth of a second to one of a billion billion years.
+/// Time scale, rate, start and end: a show of a billionth of a second to one of a billion billion years.
 fn shows() -> impl Strategy<Value = (f64, f64, f64, f64)> {
     let start = prop_oneof![Just(0.0), magnitude(-6.0, 20.0)];
     (magnitude(-6.0, 6.0), magnitude(-1.0, 4.3), start, magnitude(-9.0, 27.0))
