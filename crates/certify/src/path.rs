@@ -27,7 +27,7 @@ pub(super) struct Segment {
     pub curve: Curve,
     pub begin: Interval,
     pub end: Interval,
-    /// Travel of the head at the segment's begin, metres; for the first segment, at its end.
+    /// Travel of the head at the segment's start, metres; for the first segment, at its end.
     travelled: Interval,
 }
 
@@ -253,7 +253,7 @@ impl ExactPath {
             return Place(segment, end.hi);
         }
         let beyond = if metres >= 0.0 { self.after(segment) } else { self.before(segment) };
-        // The first segment has no begin to fall off.
+        // The first segment has no beginning to fall off.
         beyond.unwrap_or(Place(segment, begin.middle()))
     }
 
@@ -274,8 +274,8 @@ impl ExactPath {
         Place(segment, if curve.grows() { end.lo.next_down() } else { end.hi.next_up() })
     }
 
-    /// Returns a place between two: the middle on one segment, else the end of the earlier segment or the begin of the
-    /// later one. `None` if there is none.
+    /// Returns a place between two: the middle on one segment, else the end of the earlier segment or the beginning of
+    /// the later one. `None` if there is none.
     pub fn between(&self, x: Place, y: Place) -> Option<Place> {
         if x.0 == y.0 {
             let middle = 0.5 * x.1 + 0.5 * y.1;
@@ -348,7 +348,7 @@ impl ExactPath {
     }
 }
 
-/// Creates a route: a line without a begin up to the start, then the steps.
+/// Creates a route: a line without a beginning up to the start, then the steps.
 fn route(start: Vector, heading_turns: f64, steps: &[RouteStep]) -> ExactPath {
     let (zero, mut turns) = (Interval::ZERO, Interval::point(heading_turns));
     let mut origin = start;

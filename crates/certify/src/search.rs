@@ -64,7 +64,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
     pub fn new(given: Given<'a>, write: &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>) -> Self {
         let exact = ExactPath::new(given.description);
         let chain = Chain::new(given.path, exact, given.team);
-        // A motion that begins earlier includes this motion.
+        // The steps begin a little before the start: a motion that begins earlier includes this one.
         let before = -LEAST * (1.0 + given.path.length());
         let at = GridPoint::new(given.path, &chain.exact, before);
         let step = 0.25 * given.team.shortest_link();

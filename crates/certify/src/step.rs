@@ -182,7 +182,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         Self { chain, handles, pad: 0.0, pads, body_forward: true }
     }
 
-    /// Returns true if a handle is on a straight line without a begin.
+    /// Returns true if a handle is on a straight line without a beginning.
     pub fn is_on_line(&self, handle: usize) -> bool {
         let Chain { exact, .. } = self.chain;
         self.handles[handle].span.1.0 == 0 && matches!(exact.segments[0].curve, Curve::Line { .. })

@@ -171,7 +171,7 @@ impl Events {
                     return Err("the jump is not between the rear's span and the front's".to_owned());
                 }
                 if !cannot_be_at(w) {
-                    return Err("the begin of the jump may be at the link's length (Lemma 5)".to_owned());
+                    return Err("the beginning of the jump may be at the link's length (Lemma 5)".to_owned());
                 }
                 if !link::is_farther(path, front_at_end, y, &squared) {
                     return Err("the end of the jump may be too near in the end (Lemma 5)".to_owned());

@@ -164,7 +164,7 @@ pub(super) enum PathEnd {
 /// The whole path.
 pub(super) struct Path {
     segments: Vec<Segment>,
-    /// Metres from the start to each segment's begin; for the first segment, to its end.
+    /// Metres from the start to each segment's start; for the first segment, to its end.
     travelled: Vec<Interval>,
     path_end: PathEnd,
     /// Metres from the start to the path's end.

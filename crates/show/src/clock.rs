@@ -56,7 +56,8 @@ pub struct ShowClock {
     end_hold: Option<u64>,
     /// The cues in the order of their times.
     cues: Vec<CueTime>,
-    /// The simulated time at the begin of the current stretch, with its tick; the current time while time stands still.
+    /// The simulated time at the beginning of the current stretch, with its tick; the current time while time stands
+    /// still.
     sim0: f64,
     tick0: u64,
     time_scale: f64,
@@ -250,7 +251,7 @@ impl ShowClock {
         self.unclamped(tick - self.tick0).min(self.freeze_time)
     }
 
-    /// Returns the simulated time `ticks` ticks after the begin of the stretch, as if the show had no end.
+    /// Returns the simulated time `ticks` ticks after the beginning of the stretch, as if the show had no end.
     fn unclamped(&self, ticks: u64) -> f64 {
         self.sim0 + self.time_scale * ticks as f64 / self.rate
     }
@@ -261,8 +262,8 @@ impl ShowClock {
         self.ended_tick = tick.saturating_add(self.ticks_to_end());
     }
 
-    /// Returns the ticks from the begin of this stretch to the first tick at or past the end. Bisection is exact: the
-    /// rounded time of a tick never falls.
+    /// Returns the ticks from the beginning of this stretch to the first tick at or past the end. Bisection is exact:
+    /// the rounded time of a tick never falls.
     fn ticks_to_end(&self) -> u64 {
         let (mut low, mut high) = (0, u64::MAX);
         while low < high {

@@ -133,16 +133,16 @@ pub struct Show {
     /// Greatest overlap in metres that rounding explains before a contact; `None` if the solver does not follow the
     /// searched motion.
     overlap_tolerance: Option<f64>,
-    /// The time of the last solution, and true if the chain moves then.
+    /// The time requested for the chain, and true if the chain moves then.
     solved: Option<(f64, bool)>,
-    /// The time of the chain; NaN before the first solution.
+    /// The time of the solution; NaN before the first.
     solved_at: f64,
     /// The cues in the order of their times.
     cues: Vec<ReachedCue>,
     missing_cues: Vec<String>,
     /// The command records of the next frame.
     commands: Vec<CommandRecord>,
-    /// True after the begin of a step until a frame reports its end.
+    /// True after the beginning of a step until a frame reports its end.
     stepping: bool,
     frame: Frame,
 }
@@ -268,7 +268,7 @@ impl Show {
 
     /// Computes the frame of a tick: time, chain, clearance, state, alerts, cues.
     ///
-    /// Ticks must increase, and may skip. The same ticks with the same commands give the same bits.
+    /// Ticks must increase; some may be skipped. The same ticks with the same commands give the same bits.
     pub fn frame(&mut self, tick: u64) -> &Frame {
         let ShowTime { sim_time, time_scale, playback, epoch, shows_played, cues_passed } = self.clock.advance(tick);
         let jumped = epoch != self.frame.epoch;
