@@ -240,7 +240,7 @@ fn a_show_that_ends_and_begins_approaching_counts_down_through_the_loop() {
 }
 
 #[test]
-fn a_restart_decides_the_level_anew() {
+fn a_restart_decides_the_level_again() {
     let contact = [(EventKind::Contact, 20.0), (EventKind::Stall, 30.0)];
     let mut run = Run::new(10.0, &contact);
     assert_eq!(run.levels(0, 25.0, WIDE), [Level::Contact]);
