@@ -3,7 +3,7 @@
 
 use std::hint::black_box;
 
-use bench_dragon::certify::{Line, certify};
+use bench_dragon::certify::{CertificateLine, certify};
 use bench_dragon::client::connection::{Connection, Subscription, Wake};
 use bench_dragon::messages::control::Command;
 use bench_dragon::motion::Method;
@@ -208,7 +208,8 @@ fn certificate() {
     let timeline = motion.timeline_without_contact();
     let mut lines = Vec::new();
     let mut search = |steps: u64| {
-        let mut write = |line: &Line| Ok(serde_json::to_writer(&mut lines, line).map(|()| lines.push(b'\n'))?);
+        let mut write =
+            |line: &CertificateLine| Ok(serde_json::to_writer(&mut lines, line).map(|()| lines.push(b'\n'))?);
         certify(&motion, &timeline, &text, steps, &mut write, &mut |_| ()).unwrap();
     };
     counted(&mut search, STEPS);
