@@ -177,19 +177,19 @@ impl LogPublisher {
 
 impl Publisher for LogPublisher {
     fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
-        let Outgoing { header, frame, .. } = outgoing;
+        let Outgoing { header, chain, commands, .. } = outgoing;
         let tick = header.tick;
         if self.shared.missing_from.load(Ordering::Relaxed) != NEVER {
             return Ok(());
         }
-        let handles = frame.chain.handles();
+        let handles = chain.handles();
         self.frame_words = words_of(handles);
-        let (room, of_commands) = (self.queue.slots(), frame.commands.len() * RECORD_WORDS);
+        let (room, of_commands) = (self.queue.slots(), commands.len() * RECORD_WORDS);
         if room < of_commands + RECORD_WORDS {
             self.shared.missing_from.store(tick, Ordering::Release);
             return Ok(());
         }
-        for record in &frame.commands {
+        for record in commands {
             let code = |code: Code| code as u64;
             self.push_record(match *record {
                 CommandRecord::Given { command, code: answered } => {
@@ -206,7 +206,7 @@ impl Publisher for LogPublisher {
         let mut words = [FRAME, tick, handles as u64, 0, 0, 0, 0, 0, 0, 0, 0];
         words[FRAME_WORDS - HEADER_WORDS..].copy_from_slice(&header_words(header));
         self.push(&words.map(f64::from_bits));
-        columns(&frame.chain).iter().for_each(|column| self.push(column));
+        columns(chain).iter().for_each(|column| self.push(column));
         Ok(())
     }
 

@@ -304,14 +304,14 @@ impl BackgroundPublisher {
 
 impl Publisher for BackgroundPublisher {
     fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
-        for alert in outgoing.alerts() {
-            // A thread that is 256 alerts behind has other troubles than this one.
-            let _ = self.alerts.push(alert);
+        let Outgoing { header, chain, alerts, cues, .. } = outgoing;
+        for alert in alerts {
+            // Dropped if the thread is 256 alerts behind.
+            let _ = self.alerts.push(*alert);
         }
-        for cue in outgoing.cues() {
-            let _ = self.cues.push(cue);
+        for cue in cues {
+            let _ = self.cues.push(*cue);
         }
-        let Outgoing { header, frame, .. } = outgoing;
         if !self.due(header.tick) {
             return Ok(());
         }
@@ -322,7 +322,7 @@ impl Publisher for BackgroundPublisher {
             return Ok(());
         };
         snapshot.header = FrameHeader { sent_ns: monotonic_ns(), ..*header };
-        for (slot, pose) in snapshot.handles.iter_mut().zip(handle_poses(&frame.chain)) {
+        for (slot, pose) in snapshot.handles.iter_mut().zip(handle_poses(chain)) {
             *slot = pose;
         }
         let _ = self.filled.push(snapshot);
