@@ -57,9 +57,31 @@ pub struct Outgoing<'a> {
 impl<'a> Outgoing<'a> {
     /// Creates a frame without alerts and cues.
     pub fn new(header: &'a FrameHeader, frame: &'a Frame) -> Self {
-        let Frame { shows_played, unforeseen_contacts, unsolved_frames, .. } = *frame;
-        let counts = ShowCounts { shows_played, unforeseen_contacts, unsolved_frames };
-        Self { header, chain: &frame.chain, alerts: &[], cues: &[], commands: &frame.commands, counts }
+        let Frame {
+            // These are in the header.
+            tick: _,
+            sim_time: _,
+            time_scale: _,
+            state: _,
+            playback: _,
+            min_clearance: _,
+            epoch: _,
+            cue: _,
+            // These become messages first: `show_source`.
+            alerts: _,
+            cues: _,
+            chain,
+            commands,
+            shows_played,
+            unforeseen_contacts,
+            unsolved_frames,
+        } = frame;
+        let counts = ShowCounts {
+            shows_played: *shows_played,
+            unforeseen_contacts: *unforeseen_contacts,
+            unsolved_frames: *unsolved_frames,
+        };
+        Self { header, chain, alerts: &[], cues: &[], commands, counts }
     }
 }
 

@@ -277,13 +277,14 @@ impl QueuedFrame {
 
     /// Takes the contents of a recorded frame that is due in the period `due`.
     fn fill(&mut self, recorded: Recorded, due: u64) -> Result<(), ReadError> {
-        let Recorded { frame: HandlePoses { frame: header, poses, .. }, alerts, cues } = recorded;
+        let Recorded { frame: HandlePoses { header: _, frame: header, poses }, alerts, cues } = recorded;
         let unknown = |field| ReadError::Frame(format!("whose {field} this version does not know"));
         header.frame_state().ok_or_else(|| unknown("state"))?;
         self.playback = header.playback_state().ok_or_else(|| unknown("playback"))?;
         (self.due, self.alerts, self.cues) = (due, alerts, cues);
         self.header = FrameHeader { handles: poses.len() as u32, reserved: 0, ..header };
-        let Chain { x, y, heading, vx, vy, .. } = &mut self.chain;
+        // A recording holds no signed speeds: they keep their zeros.
+        let Chain { x, y, heading, speed: _, vx, vy } = &mut self.chain;
         for numbers in [&mut *x, &mut *y, &mut *heading, &mut *vx, &mut *vy] {
             numbers.clear();
         }

@@ -89,7 +89,18 @@ struct Iceoryx2 {
 /// # Errors
 /// [`TransportError::BadInput`] for a name that iceoryx2 cannot take.
 pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError> {
-    let TransportConfig { name, handles, alerts, cues, single_precision, queue, subscribers, stage, .. } = *config;
+    let TransportConfig {
+        name,
+        handles,
+        alerts,
+        cues,
+        single_precision,
+        queue,
+        subscribers,
+        ros2: _,
+        loop_rate: _,
+        stage,
+    } = *config;
     service_name(name, "poses")?;
     stale_files::spawn_reaper();
     let mut config = PublisherConfig {
