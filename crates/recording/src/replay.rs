@@ -20,7 +20,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use super::mcap::reader::{Contents, ReadError, Recording};
 use bench_dragon_messages::control::{Code, Command};
 use bench_dragon_messages::state::PlaybackState;
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, QUEUE_BYTES};
 use bench_dragon_motion::solve::Chain;
 use bench_dragon_publisher::live::{FrameSource, Outgoing, Period, ShowCounts};
 use bench_dragon_ros2_messages::HandlePoses;
@@ -30,9 +30,8 @@ use pass::{Pass, Recorded, Start};
 
 /// Seconds of frames that are read ahead.
 const QUEUED_SECONDS: f64 = 2.0;
-/// The least of frames in that queue, and the memory that more may take.
+/// The least number of frames in that queue.
 const QUEUED_FRAMES: usize = 4;
-const QUEUED_BYTES: usize = 64_000_000;
 /// How often the thread looks for room in the queue.
 const ROOM_INTERVAL: Duration = Duration::from_millis(2);
 /// How often it is looked for the first frame: once a replay.
@@ -174,7 +173,7 @@ impl Prepared {
     }
 
     fn frames_ahead(&self, handles: usize) -> usize {
-        let affordable = QUEUED_BYTES / (handles.max(1) * size_of::<HandlePose>());
+        let affordable = QUEUE_BYTES / (handles.max(1) * size_of::<HandlePose>());
         ((self.rate * QUEUED_SECONDS) as usize).min(affordable).max(QUEUED_FRAMES)
     }
 
