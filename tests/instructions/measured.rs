@@ -13,11 +13,12 @@ use bench_dragon::motion::solve::table::{FollowerTable, Instructions};
 use bench_dragon::motion::solve::{Chain, Solver, Velocities};
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::proof;
+use bench_dragon::publisher::live::Publisher;
 use bench_dragon::publisher::live::control::{Door, Doors, door};
-use bench_dragon::publisher::live::{Outgoing, Publisher};
+use bench_dragon::publisher::live::show_source::{FrameMessages, ShowSource};
 use bench_dragon::publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
 use bench_dragon::show::alerts::LevelTracker;
-use bench_dragon::show::convert::{Stamps, frame_header, stage};
+use bench_dragon::show::convert::{Stamps, stage};
 use bench_dragon::show::scene::{Scene, SceneText};
 use bench_dragon::show::{Frame, Playback, Show};
 
@@ -107,7 +108,8 @@ fn clearance(monitor: ClearanceMonitor, table: FollowerTable, handles: usize) {
 
 /// What the loop works with, and a subscriber that takes what comes.
 struct Step {
-    show: Show,
+    show: ShowSource,
+    messages: FrameMessages,
     timeline: Timeline,
     rules: LevelTracker,
     frame: Frame,
@@ -138,7 +140,8 @@ impl Step {
         let frame = show.frame(0).clone();
         let (port, door) = door();
         Self {
-            show,
+            show: ShowSource::new(show),
+            messages: FrameMessages::new(0),
             timeline: timeline.clone(),
             rules,
             frame,
@@ -150,8 +153,7 @@ impl Step {
     }
 
     fn publish(&mut self) {
-        let header = frame_header(&self.frame, STAMPS);
-        self.publisher.publish(Outgoing::new(&header, &self.frame)).unwrap();
+        self.publisher.publish(self.messages.of(&self.frame, STAMPS)).unwrap();
     }
 
     /// What has come since the last time, as a subscriber takes it that is in time.
@@ -185,7 +187,7 @@ fn step(scene: &Scene, timeline: &Timeline) {
         on,
         |on, number| {
             on.door.answer();
-            on.show.frame(number);
+            on.show.show.frame(number);
             on.door.send(Command::Rate(1.0)).unwrap();
         },
         Step::poll,
@@ -193,9 +195,7 @@ fn step(scene: &Scene, timeline: &Timeline) {
     part("whole step", on, Step::receive, |on, number| {
         let tick = CALLS + number;
         on.doors.take_one(&mut on.show, tick);
-        let frame = on.show.frame(tick);
-        let header = frame_header(frame, STAMPS);
-        on.publisher.publish(Outgoing::new(&header, frame)).unwrap();
+        on.publisher.publish(on.show.outgoing(tick, STAMPS)).unwrap();
         on.doors.finish_step(&mut on.show, tick);
     });
 }

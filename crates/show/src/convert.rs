@@ -124,32 +124,6 @@ impl Decimation {
     }
 }
 
-/// Makes `frame` the one of a message, without alerts, cues and commands. What a message does not have is left as it is:
-/// signed speeds, and what is counted over a run.
-///
-/// # Errors
-/// The name of the field whose number this layout does not know; `frame` is not usable then.
-pub fn read_frame(header: &FrameHeader, poses: &[HandlePose], frame: &mut Frame) -> Result<(), &'static str> {
-    frame.state = header.frame_state().ok_or("state")?;
-    frame.playback = header.playback_state().ok_or("playback")?;
-    let FrameHeader { tick, sim_time, time_scale, min_clearance, epoch, cue, .. } = *header;
-    frame.tick = tick;
-    (frame.sim_time, frame.time_scale, frame.min_clearance) = (sim_time, time_scale, min_clearance);
-    (frame.epoch, frame.cue) = (epoch, cue);
-    let Chain { x, y, heading, vx, vy, .. } = &mut frame.chain;
-    for numbers in [&mut *x, y, heading, vx, vy] {
-        numbers.clear();
-    }
-    for pose in poses {
-        x.push(pose.x);
-        y.push(pose.y);
-        heading.push(pose.heading);
-        vx.push(pose.vx);
-        vy.push(pose.vy);
-    }
-    Ok(())
-}
-
 /// The header fields that alerts and cues repeat.
 struct FrameStamp {
     run_id: u64,
