@@ -75,7 +75,7 @@ impl Record {
                 return self.fault(fault);
             }
         };
-        let name = Command::NAMES[answered.command.number_and_value().0 as usize];
+        let name = answered.command.name();
         let code = answer.result().map_or("unknown", Code::name);
         *conducted.answers.entry(name.to_owned()).or_default().entry(code.to_owned()).or_default() += 1;
         if let Err(expected) = allowed {
@@ -157,8 +157,7 @@ fn jumps_due(answered: &Answered, before: &FrameHeader) -> u32 {
 }
 
 fn description(command: Command) -> String {
-    let (number, value) = command.number_and_value();
-    format!("{} {value}", Command::NAMES[number as usize])
+    format!("{} {}", command.name(), command.number_and_value().1)
 }
 
 fn answer_in_words(answer: &ControlResponse) -> String {
