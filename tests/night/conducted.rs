@@ -1,12 +1,12 @@
-//! The show as the design promises it: periods counted one by one, commands executed as the table of commands says.
+//! A model of the promised show: periods counted one by one, commands executed by the table of commands.
 //!
-//! Shares nothing with the show's own clock, which computes each period from the beginning of its stretch, but the
+//! The model shares with the show's own clock, which computes each period from the beginning of its stretch, only the
 //! formula of the contract: sim0 + rate * (tick - tick0) / frame rate, a new (sim0, tick0, rate) at each command.
 
 use bench_dragon::messages::control::{Code, Command};
 use bench_dragon::messages::state::PlaybackState;
 
-/// A cue, by the time at which it is.
+/// A cue, by its time.
 #[derive(Clone, Copy)]
 pub struct CueAt {
     pub time: f64,
@@ -20,7 +20,7 @@ enum Mode {
     Held,
 }
 
-/// A show that counts.
+/// A show that counts periods.
 pub struct Conducted {
     pub rate: f64,
     pub start: f64,
@@ -33,7 +33,7 @@ pub struct Conducted {
     tick0: u64,
     scale: f64,
     mode: Mode,
-    /// Periods that a step has left.
+    /// Remaining periods of a step.
     step: Option<u64>,
     waits: bool,
     periods_at_end: u64,
@@ -43,7 +43,7 @@ pub struct Conducted {
     /// Cues reached, each with the number of the show that reached it.
     reached: Vec<(u64, usize)>,
     pub step_outcome: Option<Code>,
-    /// Whether a command has begun the alerts anew.
+    /// True if a command has restarted the alerts.
     pub jumped_by_command: bool,
 }
 
@@ -107,14 +107,14 @@ impl Conducted {
         }
     }
 
-    /// The cues reached since the last time; of shows that were wholly passed in between, none are announced.
+    /// Returns the cues reached since the last call; cues of shows passed entirely in between are not announced.
     pub fn take_reached(&mut self, first_show: u64) -> Vec<usize> {
         let last_show = self.shows_played;
         let shown = self.reached.drain(..).filter(|(show, _)| *show == first_show || *show == last_show);
         shown.map(|(_, cue)| cue).collect()
     }
 
-    /// Counts on to the period `tick`.
+    /// Counts up to the period `tick`.
     pub fn count_to(&mut self, tick: u64) {
         while self.tick < tick {
             let at_end = self.sim_time() >= self.freeze && self.end_hold.is_none() && self.step.is_none();
@@ -186,7 +186,7 @@ impl Conducted {
         Code::Done
     }
 
-    /// Obeys a command at the beginning of the present period; `None` for a step that has begun.
+    /// Executes a command at the beginning of the present period; returns `None` for a step that has begun.
     pub fn execute(&mut self, command: Command) -> Option<Code> {
         let (now, held) = (self.sim_time(), self.mode == Mode::Held);
         let code = match command {

@@ -5,22 +5,22 @@ use bench_dragon::publisher::live::{Counts, End};
 
 use crate::world::{SECOND_NS, World, same};
 
-/// A deadline is rounded to a nanosecond, here and there.
+/// Rounding of a deadline to a nanosecond, on both sides.
 const ROUNDING_NS: f64 = 2.0;
-/// The loop heeds its stop flag ten times a second.
+/// The loop checks its stop flag ten times a second.
 const HEEDED_NS: u64 = SECOND_NS / 10;
 
-/// What has become of the periods so far.
+/// The count of periods so far.
 pub struct Pace {
     rate: f64,
-    /// When the first period began.
+    /// The start of the first period.
     begin_ns: u64,
-    /// The period that is to come if nothing is late.
+    /// The next period, if nothing is late.
     next_tick: u64,
     pub frames: u64,
     pub skipped: u64,
     pub overruns: u64,
-    /// The least and the most by which the present frame can be late.
+    /// The least and the greatest possible lateness of the present frame.
     pub lateness_ns: (u64, u64),
     frames_at_stop: Option<u64>,
 }
@@ -39,7 +39,7 @@ impl Pace {
         }
     }
 
-    /// The loop's first look at its clock is where its periods begin.
+    /// The periods begin at the loop's first read of its clock.
     fn begin(&mut self, world: &World) {
         self.begin_ns = world.first_read_ns.get().expect("the loop has read its clock");
     }
@@ -49,7 +49,7 @@ impl Pace {
         self.begin_ns as f64 + tick as f64 / self.rate * 1e9
     }
 
-    /// Doubles of that size are so far apart.
+    /// Distance of neighbouring doubles of that size.
     fn tolerance(&self, tick: u64) -> f64 {
         ROUNDING_NS + 4.0 * f64::EPSILON * self.deadline(tick)
     }
@@ -76,7 +76,7 @@ impl Pace {
         self.frames_at_stop = self.frames_at_stop.or(stopped);
     }
 
-    /// The header of the frame that goes out.
+    /// The header of a frame that is sent.
     pub fn frame_goes_out(&mut self, world: &World, header: &FrameHeader, run_id: u64) {
         same("the run and the sequence", (header.run_id, header.sequence), (run_id, self.frames));
         same("the period", header.tick, self.next_tick);
@@ -92,7 +92,7 @@ impl Pace {
 
     /// The loop has ended.
     pub fn ended(&mut self, world: &World, counts: &Counts, periods: Option<u64>) {
-        // A loop that is stopped at once has had no frame.
+        // A loop that is stopped at once has sent no frame.
         self.begin(world);
         let elapsed = counts.frames + counts.skipped;
         same("the frames", counts.frames, self.frames);

@@ -1,4 +1,4 @@
-//! No private word stands in sources, tests, examples or documents where the field has a word of its own.
+//! No private word is in sources, tests, examples or documents if the field has a standard word.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -52,13 +52,13 @@ const PRIVATE: [(&str, &str); 40] = [
     ("UNDER_WAY", "MAX_IN_FLIGHT"),
 ];
 
-/// All files below a folder.
+/// Returns all files below a folder.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
 }
 
-/// Whether a file is text that people write: code and documents, not pictures and not records of measurements.
+/// Returns true for a text file that people write: code and documents, not pictures and records of measurements.
 fn is_written(path: &Path) -> bool {
     let written = ["rs", "py", "js", "css", "md", "toml"];
     path.extension().is_some_and(|extension| written.iter().any(|written| extension == *written))
@@ -73,7 +73,7 @@ fn no_private_word_is_left() {
     let pages = ["ARCHITECTURE.md", "CONTRIBUTING.md"].map(PathBuf::from);
     let (mut read, mut found) = (0, Vec::new());
     for file in folders.chain(pages) {
-        // This file lists them.
+        // This file lists the words.
         if !is_written(&file) || file.ends_with("repository/words.rs") {
             continue;
         }
