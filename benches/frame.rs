@@ -300,7 +300,7 @@ mod floor {
         }
     }
 
-    /// Cody and Waite's reduction and the polynomials of fdlibm.
+    /// Returns sine and cosine by Cody and Waite's reduction and the polynomials of fdlibm.
     #[inline(always)]
     #[allow(clippy::excessive_precision, reason = "the digits as published")]
     fn sine_cosine(angle: f64) -> (f64, f64) {

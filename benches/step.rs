@@ -4,8 +4,8 @@
 //!
 //! Then the step of the paper's team again, beside the same step with one and with two empty command queues.
 //!
-//! And the step of the paper's team at 10 kHz, beside the same step with a log of the run (`run --log`), and the log's
-//! work after the step.
+//! And the step of the paper's team at 10 kHz, without and with a log of the run (`run --log`), and the log's work
+//! after the step.
 //!
 //! `cargo bench --bench step`, or with some numbers of benches: `cargo bench --bench step -- 223 100000`, or the
 //! command queues alone: `cargo bench --bench step -- doors`, or the log: `cargo bench --bench step -- log`
@@ -179,7 +179,7 @@ fn measure_doors() {
     let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
     let (mut publisher, connection) =
         publisher_and_subscriber(&format!("bench_{}_doors", std::process::id()), &scene, &show);
-    // The outer ends stay: a queue without a sender takes another branch.
+    // The outer ends stay: a queue without a sender behaves differently.
     let (mut doors, outer): (Vec<Doors>, Vec<Vec<Door>>) = (0..3)
         .map(|count| {
             let (ports, outer): (Vec<_>, Vec<_>) = (0..count).map(|_| door()).unzip();

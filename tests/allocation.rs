@@ -1,5 +1,5 @@
-//! The loop itself allocates nothing after its first frame. Allocations are counted over the whole loop, with the real
-//! shared memory, the real ROS 2 publisher and the log, across a contact and a loop of the show.
+//! The loop itself allocates nothing after its first frame. Allocations are counted over the whole loop, across a
+//! contact and a loop of the show. The shared memory, the ROS 2 publisher and the log are real.
 //!
 //! iceoryx2 0.10.0 keeps the state of each loaned sample in an `Rc`, made by `loan` and freed by `send`: one small
 //! allocation for every frame and every alert, which its interface does not avoid. The test demands exactly these.

@@ -81,7 +81,7 @@ fn stalls_in_tight_bends_are_found() {
     }
 }
 
-/// N3: past a stall a handle goes out and comes back within one step of the search; a contact 8 mm deep lies between.
+/// N3: past a stall a handle moves out and back within one step of the search; a contact 8 mm deep lies between.
 #[test]
 fn a_contact_past_a_stall_is_found() {
     let scene = scene("missed_contact");

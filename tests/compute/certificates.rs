@@ -1,6 +1,6 @@
 //! The proofs of `certify`, compared with figures of 15 digits that were computed with 50, and with the ordinary search
-//! on every scene at hand and on random ones. They also hold in the processor's other rounding modes. `verify` checks
-//! the same certificates with code of its own: tests/commands/certify.
+//! on given and random scenes. They also hold in the processor's other rounding modes. `verify` checks the same
+//! certificates with separate code: tests/commands/certify.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -80,8 +80,8 @@ fn the_paper_scene_is_enclosed_to_a_nanosecond() {
 #[test]
 fn every_scene_of_the_repository_agrees() {
     let long = std::env::var_os("BENCH_DRAGON_LONG").is_some();
-    // The search gives up, and says so, for handles at distances that no double can tell from the link's, paths of 1e10
-    // metres, and boards that stay a fraction of a millimetre apart for a kilometre. A U-turn hardly narrower than a
+    // The search gives up, and reports that: handles at distances that no double can tell from the link's, paths of
+    // 1e10 metres, boards that stay a fraction of a millimetre apart for a kilometre. A U-turn hardly narrower than a
     // link takes 150,000 steps.
     let given_up = [
         "bigspeed",

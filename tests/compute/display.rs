@@ -34,7 +34,7 @@ fn the_errors_are_what_an_independent_program_measured() {
         let single = find(&all, Reader::Hermite, rate, Precision::Single).max_position_error;
         println!("{rate} Hz: hold {hold:.1e}, linear {linear:.1e}, hermite {hermite:.1e}, single {single:.1e} m");
         assert!(hermite < linear && linear < hold, "{rate} Hz: {hermite:e} {linear:e} {hold:e}");
-        // The error of hold is the age of the head's pose; no handle is much faster there.
+        // The error of hold is the head's way in a period; no handle is much faster there.
         assert!(hold > 0.9 / rate && hold < 1.1 / rate, "{rate} Hz: {hold:e}");
         // Single precision adds half a unit in the last place of 32 bits beyond 8 m, in both coordinates, from both
         // ends.

@@ -20,7 +20,7 @@ use targets::{TARGETS, Target};
 
 /// One case in this many begins with a kept input: those are larger, and slow.
 const KEPT: u32 = 64;
-/// Number of changed inputs that are kept as starts of later cases.
+/// Changed inputs per initial input that are kept as starts of later cases.
 const CHANGES_KEPT: usize = 3;
 
 /// The name of the threads that run cases.

@@ -298,7 +298,7 @@ pub fn http_get(url: &str, accept: &str) -> String {
     http_get_as(url, address, accept)
 }
 
-/// The same, with a request for another host name.
+/// Returns the same, with a request for another host name.
 pub fn http_get_as(url: &str, host: &str, accept: &str) -> String {
     let (address, path) = url.strip_prefix("http://").unwrap().split_once('/').unwrap();
     let answer = || -> std::io::Result<String> {

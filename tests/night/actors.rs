@@ -77,7 +77,7 @@ impl Actor for Background {
     }
 }
 
-/// A clock that stands still, for a step that takes no time.
+/// A clock without progress, for a step that takes no time.
 pub struct Frozen<'a>(pub &'a World);
 
 impl bench_dragon::client::clock::Clock for Frozen<'_> {

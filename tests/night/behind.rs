@@ -1,4 +1,4 @@
-//! The queue of a transport with a thread of its own, and the fake of that transport.
+//! The queue of a transport with a separate thread, and a fake of that transport.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -44,7 +44,7 @@ impl Behind {
         }
     }
 
-    /// A frame with its head at `x` has been sent.
+    /// Records a sent frame with its head at `x`, and its alerts and cues.
     pub fn published(&mut self, header: &FrameHeader, x: f64, alerts: &[(u64, u32)], cues: &[(u64, u32)]) {
         self.alerts.extend(alerts.iter().take(MOST_ALERTS - self.alerts.len()));
         self.cues.extend(cues.iter().take(self.most_cues - self.cues.len()));
@@ -60,7 +60,7 @@ impl Behind {
         }
     }
 
-    /// The thread has read the queues.
+    /// Checks that the thread has emptied the queues.
     pub fn emptied(&mut self, deliveries: Deliveries) {
         same("messages left in the queues", (self.frames.len(), self.alerts.len(), self.cues.len()), (0, 0, 0));
         self.was_full = false;

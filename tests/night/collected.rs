@@ -72,7 +72,7 @@ impl Collected {
         }
     }
 
-    /// A frame has been sent.
+    /// Records a sent frame.
     pub fn frame(&mut self, sample: Expected, announcements: impl IntoIterator<Item = Announced>) {
         if self.samples.len() < self.most.0 {
             self.samples.push_back(sample);
@@ -110,12 +110,12 @@ impl Collected {
         same("what is printed", Some(seen), self.announcements.pop_front());
     }
 
-    /// The queues have been emptied.
+    /// Asserts that the queues are empty.
     pub fn emptied(&self) {
         same("messages left in the queues", (self.samples.len(), self.announcements.len()), (0, 0));
     }
 
-    /// The thread has done a step: a status has been sent for every full second.
+    /// Checks after a step of the thread that a status has been sent for every full second.
     pub fn reported(&self, now_ns: u64) {
         let second = |at_ns: u64| (at_ns - self.began_ns) / SECOND_NS;
         if self.latest.is_some() {
@@ -123,7 +123,7 @@ impl Collected {
         }
     }
 
-    /// A status was made at `now_ns`.
+    /// Checks a status that was made at `now_ns`.
     pub fn status(&mut self, status: &LoopStatus, now_ns: u64) {
         let Some(of) = self.latest else { panic!("{status:?} of no frame") };
         let seen = (status.tick, status.sequence, status.skipped, status.overruns, status.shows_played);

@@ -75,7 +75,7 @@ impl Conducted {
         show
     }
 
-    /// The same show, played at another rate from its beginning.
+    /// Returns the same show, played at another rate from its beginning.
     pub fn at_rate(mut self, scale: f64) -> Self {
         self.scale = scale;
         self
@@ -167,7 +167,7 @@ impl Conducted {
         }
     }
 
-    /// A new stretch.
+    /// Begins a new stretch.
     fn begin(&mut self, time: f64) {
         (self.sim0, self.tick0, self.periods_at_end) = (time, self.tick, 0);
     }

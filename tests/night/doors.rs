@@ -49,7 +49,7 @@ impl Entrance {
         Self { doors, next: 0, executed: None, present: None, step: None, answer: None }
     }
 
-    /// A command was sent to a queue.
+    /// Records a command that was sent to a queue.
     pub fn sent(&mut self, door: usize, command: Command, result: Result<u64, Code>) {
         let at = &mut self.doors[door];
         if at.open() >= MOST_WAITING {
@@ -62,7 +62,7 @@ impl Entrance {
         }
     }
 
-    /// A command is executed at the beginning of the period `tick`.
+    /// Checks a command that is executed at the beginning of the period `tick`.
     pub fn executed(&mut self, tick: u64, command: Command) {
         assert!(self.executed < Some(tick), "a second command in the period {tick}");
         self.executed = Some(tick);
@@ -76,7 +76,7 @@ impl Entrance {
         self.present = Some((door, ticket));
     }
 
-    /// The show has answered the command; `None` for a step that has begun.
+    /// Records the show's answer to the command; `None` for a step that has begun.
     pub fn answered(&mut self, outcome: Option<Outcome>) {
         let (door, ticket) = self.present.take().expect("a command");
         match outcome {
@@ -88,34 +88,34 @@ impl Entrance {
         }
     }
 
-    /// A step is complete, or was cancelled.
+    /// Records the answer to a step that is complete, or was cancelled.
     pub fn step_is_over(&mut self, outcome: Outcome) {
         let (door, ticket) = self.step.take().expect("a step");
         self.doors[door].given.push_back((ticket, outcome));
     }
 
-    /// The command of this period has been executed, and the step that it cancelled is answered.
+    /// Records the answer of the executed command, after the answer to the step that it cancelled.
     pub fn settle(&mut self) {
         if let Some((door, ticket, outcome)) = self.answer.take() {
             self.doors[door].given.push_back((ticket, outcome));
         }
     }
 
-    /// The frame of the period `tick` is about to be computed: no command may wait without reason.
+    /// Checks before the frame of the period `tick` that no command waits without reason.
     pub fn frame_begins(&mut self, tick: u64) {
         self.settle();
         let in_vain = self.executed != Some(tick) && self.doors.iter().any(|door| !door.waiting.is_empty());
         assert!(!in_vain, "a command waits and none is executed in the period {tick}");
     }
 
-    /// A client has taken an answer from a queue.
+    /// Checks an answer that a client has taken from a queue.
     pub fn taken(&mut self, door: usize, answer: &Answer) {
         let at = &mut self.doors[door];
         at.taken += 1;
         same("the answer", Some((answer.ticket, answer.outcome)), at.given.pop_front());
     }
 
-    /// All answers have been taken, and the loop has ended.
+    /// Checks the number of unanswered commands, after the end of the loop and the last answer.
     pub fn ended(&self) {
         let open: usize = self.doors.iter().map(AtDoor::open).sum();
         let waiting: usize = self.doors.iter().map(|door| door.waiting.len()).sum();

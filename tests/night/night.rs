@@ -177,7 +177,7 @@ impl Cast {
         }
     }
 
-    /// The loop has ended: messages in flight arrive, and all counts are compared.
+    /// Delivers the messages in flight after the end of the loop, and compares all counts.
     fn settle(self, plan: &Plan, counts: &Counts) -> Tally {
         let Self { world, oracle, collected, collector, thread, doors, subscribers } = self;
         oracle.borrow_mut().pace.ended(&world, counts, plan.periods);

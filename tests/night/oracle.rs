@@ -82,7 +82,7 @@ impl Oracle {
         self.show.count_to(tick);
     }
 
-    /// A frame is sent, complete except for the time of sending.
+    /// Checks a frame before it is sent, complete except for the time of sending.
     pub fn frame_goes_out(&mut self, world: &World, outgoing: Outgoing<'_>) {
         let header = outgoing.header;
         world.note("frame", [header.tick as f64, header.sim_time]);
@@ -113,7 +113,7 @@ impl Oracle {
         expected.into_iter().map(|level| (header.tick, level as u32)).collect()
     }
 
-    /// The state is the latest event passed, or else the level.
+    /// Checks the state: the latest event passed, or else the level.
     fn check_state(&self, header: &FrameHeader) {
         let passed = self.events.iter().rfind(|(time, _)| *time <= header.sim_time);
         let near = self.levels.as_ref().is_some_and(|levels| levels.current() == Some(Level::Approaching));
@@ -125,7 +125,7 @@ impl Oracle {
         same("the state", header.frame_state(), Some(expected));
     }
 
-    /// The shared memory has the frame, and the next transport gets it.
+    /// Records that the shared memory has the frame; the next transport gets it.
     pub fn frame_was_sent(&mut self, world: &World, header: &FrameHeader) {
         self.sent_ns = world.now_ns();
         let (x, alerts, cues) = self.queued.take().expect("a frame");
@@ -134,13 +134,13 @@ impl Oracle {
         }
     }
 
-    /// A new subscriber gets the kept alert.
+    /// Checks the kept alert that a new subscriber gets.
     pub fn late_subscriber(&self, level: Option<u32>) {
         let now = self.levels.as_ref().and_then(Levels::current).map(|level| level as u32);
         same("the level that a late subscriber gets", level, now);
     }
 
-    /// Every transport has taken the frame, and the loop makes its sample.
+    /// Records that every transport has taken the frame; the loop makes its sample.
     pub fn frame_is_out(&mut self, world: &World, subscribers: u32) {
         self.pace.frame_is_out();
         let (header, announcements) = self.sample.take().expect("a frame");

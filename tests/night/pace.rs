@@ -39,17 +39,17 @@ impl Pace {
         }
     }
 
-    /// The periods begin at the loop's first read of its clock.
+    /// Sets the beginning of the periods: the loop's first read of its clock.
     fn begin(&mut self, world: &World) {
         self.begin_ns = world.first_read_ns.get().expect("the loop has read its clock");
     }
 
-    /// start + tick / rate.
+    /// Returns start + tick / rate.
     fn deadline(&self, tick: u64) -> f64 {
         self.begin_ns as f64 + tick as f64 / self.rate * 1e9
     }
 
-    /// Distance of neighbouring doubles of that size.
+    /// Returns the distance of some doubles of that size, with the rounding to a nanosecond.
     fn tolerance(&self, tick: u64) -> f64 {
         ROUNDING_NS + 4.0 * f64::EPSILON * self.deadline(tick)
     }
@@ -60,7 +60,7 @@ impl Pace {
         self.next_tick = tick;
     }
 
-    /// A frame of the period `tick` is about to be computed.
+    /// Checks the time of a frame of the period `tick` before its computation.
     pub fn frame_begins(&mut self, world: &World, tick: u64) {
         self.begin(world);
         assert!(tick >= self.next_tick, "period {tick}, where {} or a later one is due", self.next_tick);
@@ -76,7 +76,7 @@ impl Pace {
         self.frames_at_stop = self.frames_at_stop.or(stopped);
     }
 
-    /// The header of a frame that is sent.
+    /// Checks the header of a frame that is sent.
     pub fn frame_goes_out(&mut self, world: &World, header: &FrameHeader, run_id: u64) {
         same("the run and the sequence", (header.run_id, header.sequence), (run_id, self.frames));
         same("the period", header.tick, self.next_tick);
@@ -90,7 +90,7 @@ impl Pace {
         self.next_tick += 1;
     }
 
-    /// The loop has ended.
+    /// Checks the counts after the end of the loop.
     pub fn ended(&mut self, world: &World, counts: &Counts, periods: Option<u64>) {
         // A loop that is stopped at once has sent no frame.
         self.begin(world);

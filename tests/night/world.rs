@@ -135,7 +135,7 @@ impl World {
         self.next_due_ns.set(self.next_due_ns.get().min(due_ns));
     }
 
-    /// Time passes for the loop; the actors run meanwhile.
+    /// Advances the loop's time; the actors run meanwhile.
     fn advance_to(&self, until_ns: u64) {
         while self.next_due_ns.get() <= until_ns {
             let (index, due_ns) = {
@@ -153,7 +153,7 @@ impl World {
         self.now_ns.set(self.now_ns().max(until_ns));
     }
 
-    /// The loop's thread is delayed.
+    /// Delays the loop's thread.
     pub fn spend(&self, ns: u64) {
         if ns > 0 {
             self.advance_to(self.now_ns() + ns);
@@ -162,7 +162,7 @@ impl World {
         }
     }
 
-    /// The loop is known to be awake.
+    /// Records that the loop is awake.
     pub fn is_awake(&self) {
         self.awake_ns.set(self.now_ns());
     }

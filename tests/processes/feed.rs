@@ -100,8 +100,8 @@ fn a_publisher_restarted_between_two_polls_is_a_new_run() {
     }
 }
 
-/// A publisher that starts when the feed is about to find that the one before has gone, 200 ms after its last frame, is
-/// selected from its first frames on.
+/// A publisher starts when the feed is about to find that the one before has gone, 200 ms after its last frame. The
+/// feed selects the new publisher from its first frames on.
 #[test]
 fn a_publisher_that_is_started_again_at_any_moment_is_followed_at_once() {
     const RATE: u64 = 100;

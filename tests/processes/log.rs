@@ -41,7 +41,7 @@ fn proved(log: &Path) -> Value {
     line
 }
 
-/// The same for a run whose end the log contains, with its summary.
+/// Verifies the log of a run with its end, compares it with the summary, and returns the line.
 fn proved_whole(log: &Path, summary: &Value) -> Value {
     let line = proved(log);
     for field in ["frames", "skipped"] {

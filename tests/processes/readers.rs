@@ -13,7 +13,7 @@ fn numbers(line: &Value, field: &str) -> Vec<f64> {
     line[field].as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
 }
 
-/// Ten frames a second, read by a Python process that displays at random times.
+/// Tests ten frames a second in a Python process that displays at random times.
 fn python_reader(transport: &str, modules: &[&str]) {
     if !can_run(python_modules(modules)) {
         return;

@@ -59,13 +59,13 @@ impl Default for Sending<'_> {
 }
 
 impl Sending<'_> {
-    /// pypsn decodes the paper's team: every tracker of every frame equals the shared memory.
+    /// Asserts that pypsn decodes the paper's team: every tracker of every frame equals the shared memory.
     fn of_the_paper(&self) {
         let publish = || publisher(self.name, &["--start", "250", "--time-scale", "2", "--duration", "600"]);
         self.is_heard(publish, 224, 30);
     }
 
-    /// pypsn decodes a publisher of `handles` handles, with at least `least` frames that are equal.
+    /// Asserts that pypsn decodes a publisher of `handles` handles, with at least `least` frames that are equal.
     fn is_heard(&self, publish: impl FnOnce() -> Process, handles: u64, least: u64) {
         if !can_run(python_modules(&["iceoryx2", "numpy", "pypsn"])) {
             return;

@@ -116,7 +116,7 @@ fn far_peer(machines: &Machines) -> Vec<Value> {
     text(&output.stdout).lines().map(object).collect()
 }
 
-/// The show crosses whichever machine was first, its death is noticed on both machines, and a new show crosses too.
+/// Tests that the show crosses whichever machine was first, and a new show too, and that both notice its death.
 fn lives_and_deaths(machines: &Machines) {
     // No event is near: there is one alert, at the start.
     let run = ["run", "--json", "--rate", "60", "--start", "100"];

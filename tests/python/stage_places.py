@@ -160,7 +160,7 @@ def long_scene():
 
 
 def five_thousand_boards_are_drawn():
-    """Each board is where a chain on the spiral, computed here, has it; the space between the turns is empty."""
+    """Each board is on a chain on the spiral that is computed here; the space between the turns is empty."""
     middles, links = chain(100.0)
     with long_scene() as scene, server() as url, publisher("--scene", scene, "--start", "100", "--time-scale", "1e-6", "--rate", "5"), browser(viewport={"width": 1920, "height": 1080}) as (page, complaints):
         for address in ("", "show,nolabels"):

@@ -100,7 +100,7 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs
         "handles",
         "poses",
     ];
-    // On a busy machine four seconds were too short for one of the two late messages.
+    // On a busy machine four seconds were too short for one of the two late topics.
     let output = Process::start(&mut peer("late", "10", &topics)).output_within(40);
     let lines = json_lines(&output);
     assert!(!lines.is_empty(), "{}", text(&output.stderr));

@@ -132,7 +132,7 @@ fn cues_path_clock_and_transforms_are_those_of_the_show() {
     assert!(compared > 2, "{compared} transforms are of a frame that came");
 }
 
-/// Returns the alerts of `joins` subscribers, one after the other: the time of the first, and all of them.
+/// Returns for `joins` subscribers, one after the other, the time of creation and all alerts.
 fn joined(name: &str, joins: u32, further: &[&str]) -> Vec<(u64, Vec<u64>)> {
     let mut command = python();
     command.args(["tests/python/ros2_joins.py", "--name", &unique(name), "--joins", &joins.to_string()]);

@@ -257,7 +257,7 @@ impl Path {
         path
     }
 
-    /// Begins with a curve without beginning, whose length is counted from its end at coordinate `last`.
+    /// Adds a first curve without beginning, whose length is counted from its end at coordinate `last`.
     fn begin_with(&mut self, curve: Curve, last: f64, anchor_s: f64) {
         let first = if let Curve::Line { .. } = curve { f64::NEG_INFINITY } else { f64::INFINITY };
         let begin = f64::NEG_INFINITY;

@@ -83,7 +83,7 @@ fn at_some_time(subjects: impl Strategy<Value = Subject>) -> impl Strategy<Value
     })
 }
 
-/// Random subjects: every solver at a random time, the velocities as central differences, and the number of table
+/// Tests random subjects: every solver at a random time, the velocities as central differences, and the share of table
 /// frames.
 fn random_subjects(cases: u32, subjects: impl Strategy<Value = (Subject, f64)>, least_share_of_tables: f64) {
     let long = std::env::var("BENCH_DRAGON_LONG").is_ok_and(|value| value == "1");

@@ -108,7 +108,7 @@ fn assert_short_numbers(line: &str) {
     assert!(longest <= 9 && !line.contains("e-16") && !line.contains("e-17"), "{line}");
 }
 
-/// Benches count from 1 in sentences, and the sentence states it.
+/// Asserts that a sentence has the event's values, counts benches from 1, and states that.
 fn assert_sentence(scene: &SceneFile, event: &Value, line: &str) {
     let kind = event["event"].as_str().unwrap();
     assert!(line.trim_start().starts_with(kind), "{}: {line}", scene.name);

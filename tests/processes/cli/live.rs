@@ -224,7 +224,7 @@ fn a_name_before_or_after_the_subcommand_is_the_services_name() {
     assert!(number(heard.last().unwrap(), "received") > 0, "{heard:?}");
     let heard = watch(&["--duration", "1"]);
     assert!(heard.iter().all(|line| line["state"] == "waiting"), "another name: {heard:?}");
-    // A second publisher of that name, named after the subcommand, is turned away.
+    // A second publisher of that name, named after the subcommand, is refused.
     let mut after = place.program();
     after.args(["run", "--json", "--duration", "1", "--name", "lion", "--scene"]).arg(&scene.path);
     let output = Process::start(&mut after).output_within(300);

@@ -30,7 +30,7 @@ impl Bytes {
         f64::from_bits(self.u64(at))
     }
 
-    /// Run id, a field of every message.
+    /// Returns the run id, a field of every message.
     pub fn run_id(&self) -> u64 {
         self.u64(0)
     }

@@ -164,7 +164,7 @@ fn is_command(span: &str) -> bool {
     command == "tests/run" || command.contains(' ') && (PROGRAMS.contains(&first) || first.ends_with(".py"))
 }
 
-/// A comment begins with `# `, so `'http://127.0.0.1:8080/#show'` is no comment.
+/// Returns a line without its comment, which begins with `# `: `'http://127.0.0.1:8080/#show'` has none.
 fn without_comment(line: &str) -> &str {
     if line.starts_with("# ") { "" } else { line.split(" # ").next().unwrap_or_default().trim_end() }
 }

@@ -55,7 +55,7 @@ impl Terminal {
         status.code().ok_or_else(|| self.report(&format!("ended by signal {:?}", status.signal())))
     }
 
-    /// Ctrl-C, which reaches every process of the terminal.
+    /// Sends Ctrl-C to every process of the terminal and returns the exit code.
     pub fn interrupt(&mut self) -> Result<i32, String> {
         if self.ended().is_none() {
             self.signal(Signal::SIGINT);

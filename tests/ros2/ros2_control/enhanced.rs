@@ -89,7 +89,7 @@ where
     answer
 }
 
-/// As [`first_call`], in the mapping of `rmw_fastrtps_cpp`; an answer must come.
+/// Calls as [`first_call`] does, in the mapping of `rmw_fastrtps_cpp`; an answer must come.
 pub fn enhanced<Request, Response>(name: &str, service: &str, kind: (&str, &str), request: Request) -> Response
 where
     Request: Serialize + DeserializeOwned + Clone + 'static,
