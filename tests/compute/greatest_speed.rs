@@ -1,5 +1,5 @@
-//! The greatest speed of a handle as `plan speed` encloses it, compared with the safe solver at thousands of places,
-//! the reference of 38 digits and a table of 50 digits. None of these uses intervals, lemmas or the search.
+//! The greatest speed of a handle as `plan speed` encloses it. It is compared with the safe solver at thousands of
+//! places, the reference of 38 digits and a table of 50 digits. None of these uses intervals, lemmas or the search.
 
 use crate::tables;
 

@@ -93,7 +93,7 @@ fn a_loop_begins_again_where_it_began() {
     assert_eq!((again.state, again.playback), (FrameState::Approaching, PlaybackState::Playing));
     let stamps = Stamps { run_id: 1, sequence: 30, stamp_ns: 2, deadline_ns: 3 };
     let [before, after] = [&first, again].map(|frame| frame_header(frame, stamps));
-    assert_eq!((before.epoch, after.epoch), (0, 1), "who interpolates starts anew");
+    assert_eq!((before.epoch, after.epoch), (0, 1), "the epoch tells readers to restart their interpolation");
     assert_eq!((after.tick, after.sequence, after.handles, after.time_scale), (30, 30, 224, 1.0));
 }
 

@@ -43,7 +43,7 @@ impl Process {
     pub fn stop(&self) {
         self.signal(nix::sys::signal::Signal::SIGSTOP);
         let tasks = format!("/proc/{}/task", self.id());
-        wait_until("every thread stands still", || {
+        wait_until("every thread is stopped", || {
             std::fs::read_dir(&tasks).unwrap().flatten().all(|task| {
                 let stat = std::fs::read_to_string(task.path().join("stat")).unwrap_or_default();
                 // The state follows the name, which is in parentheses.
@@ -275,7 +275,7 @@ pub fn python() -> Command {
 pub fn example(name: &str) -> Command {
     let target = std::env::current_exe().unwrap();
     let file = target.ancestors().nth(2).unwrap().join("examples").join(name);
-    assert!(file.exists(), "{} is not there: `cargo build --release --examples` builds it", file.display());
+    assert!(file.exists(), "{} does not exist: `cargo build --release --examples` builds it", file.display());
     Command::new(file)
 }
 

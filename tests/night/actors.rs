@@ -233,7 +233,7 @@ impl Subscriber {
     fn test(&mut self, world: &World) {
         let now = self.instant(world);
         match self.liveness.test(now, || true) {
-            Some(Change::Gone) => panic!("a publisher that lives is taken for dead"),
+            Some(Change::Gone) => panic!("a live publisher is reported dead"),
             Some(Change::Silent) => {
                 let quiet_s = (world.now_ns() - self.latest_ns) as f64 / 1e9;
                 assert!(quiet_s >= f64::max(0.5, 3.0 / self.rate) - 1e-6, "silent after {quiet_s} s");

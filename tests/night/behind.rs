@@ -64,7 +64,7 @@ impl Behind {
     pub fn emptied(&mut self, deliveries: Deliveries) {
         same("messages left in the queues", (self.frames.len(), self.alerts.len(), self.cues.len()), (0, 0, 0));
         self.was_full = false;
-        same("what was delivered", deliveries, self.delivered);
+        same("the delivered messages", deliveries, self.delivered);
     }
 
     fn frame(&mut self, header: &FrameHeader, handles: &[HandlePose]) {

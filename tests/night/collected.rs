@@ -107,7 +107,7 @@ impl Collected {
             Announcement::Alert { alert, .. } => (alert.tick, "alert", alert.level),
             Announcement::Cue(cue) => (cue.tick, "cue", cue.number),
         };
-        same("what is printed", Some(seen), self.announcements.pop_front());
+        same("the printed announcement", Some(seen), self.announcements.pop_front());
     }
 
     /// Asserts that the queues are empty.

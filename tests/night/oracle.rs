@@ -77,7 +77,7 @@ impl Oracle {
         self.began_ns = (world.awake_ns.get(), world.now_ns());
         self.pace.frame_begins(world, tick);
         // A step that a command cancels is answered before the command.
-        same("a step that a command broke off", self.show.step_outcome, None);
+        same("a step that a command cancelled", self.show.step_outcome, None);
         self.entrance.frame_begins(tick);
         self.show.count_to(tick);
     }

@@ -194,7 +194,7 @@ impl World {
         };
         usual.unwrap_or_else(|| {
             let ns = self.delay_ns();
-            self.fault("the loop is held up, s", ns);
+            self.fault("the loop is delayed, s", ns);
             ns
         })
     }

@@ -159,7 +159,7 @@ fn a_question_that_is_refused_answers_nothing() {
         assert_eq!(answers(&[Action::Toggle], || (), name), [(0, "state: too_many".to_owned())]);
         return;
     }
-    panic!("the door is never full");
+    panic!("the command queue is never full");
 }
 
 /// A step that lasts longer than the client waits for any other answer.

@@ -230,7 +230,7 @@ def main():
         if service not in clients:
             clients[service] = Client(participant, arguments.name, service, arguments.bare)
             if not clients[service].ready(60):
-                sys.exit(f"nobody serves {service}")
+                sys.exit(f"no server for {service}")
         print(json.dumps({"call": call, "response": clients[service].call(text, arguments.seconds)}), flush=True)
 
 

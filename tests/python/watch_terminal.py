@@ -104,7 +104,7 @@ class Terminal:
     def rows(self):
         """Returns the rows down to the cursor, including those that have scrolled out of the top."""
         shown = [row.rstrip() for row in self.screen.display]
-        assert not any(shown[self.screen.cursor.y :]), "something stands behind the cursor:\n" + "\n".join(shown)
+        assert not any(shown[self.screen.cursor.y :]), "text follows the cursor:\n" + "\n".join(shown)
         scrolled = ["".join(row[column].data for column in range(self.columns)) for row in self.screen.history.top]
         return [row.rstrip() for row in scrolled] + shown[: self.screen.cursor.y]
 

@@ -71,7 +71,7 @@ fn verdict(printed: &Printed) -> Verdict {
     }
     match line_for(text, NEEDS) {
         Some((_, programs)) if !programs.split(' ').all(is_installed) => {
-            return Verdict::NotRun(format!("needs {programs}, not all of which are here"));
+            return Verdict::NotRun(format!("needs {programs}, which are not all installed"));
         }
         _ => (),
     }
@@ -146,7 +146,7 @@ fn every_command_of_the_pages_runs() {
     let commands = Vec::from_iter(sections.flat_map(|section| &section.commands));
     assert!(commands.len() > 100, "{} commands on {} pages", commands.len(), pages.len());
     assert_lists_are_met(&commands);
-    if !can_run(root("give each page a network of its own"))
+    if !can_run(root("give each page a separate network"))
         || !can_run(python_modules(&["iceoryx2", "numpy", "cyclonedds", "websockets", "mcap", "mcap_ros2"]))
     {
         return;

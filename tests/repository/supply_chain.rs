@@ -99,7 +99,7 @@ fn no_crate_is_there_twice_but_those_that_are_listed() {
         let begins: Vec<u64> = version.split('.').map(|number| number.parse().unwrap()).collect();
         let before = old.len();
         old.retain(|(other, version)| other != name || !version.starts_with(&begins));
-        assert!(old.len() < before, "deny.toml lists {listed}, which is there no more");
+        assert!(old.len() < before, "deny.toml lists {listed}, which no longer exists");
     }
     assert!(old.is_empty(), "not in deny.toml: {old:?}");
 }

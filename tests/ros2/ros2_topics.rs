@@ -129,7 +129,7 @@ fn cues_path_clock_and_transforms_are_those_of_the_show() {
             assert!(error.sin().abs() < 1e-9 && error.cos() > 0.0, "{transform} and {handle}");
         }
     }
-    assert!(compared > 2, "{compared} transforms are of a frame that came");
+    assert!(compared > 2, "{compared} transforms belong to a received frame");
 }
 
 /// Returns for `joins` subscribers, one after the other, the time of creation and all alerts.

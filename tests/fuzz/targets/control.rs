@@ -99,7 +99,7 @@ fn run(data: &[u8]) -> bool {
         doors.finish_step(&mut show, tick);
         while let Some(Answer { ticket, outcome }) = door.answer() {
             let of_ticket =
-                sent.iter().position(|(sent, ..)| *sent == ticket).expect("an answer to what was sent, once");
+                sent.iter().position(|(sent, ..)| *sent == ticket).expect("one answer to a command that was sent");
             let (_, id, command, instead) = sent.remove(of_ticket);
             let code = instead.unwrap_or(outcome.code);
             let response: ControlResponse = control_response(id, &Outcome { code, ..outcome });

@@ -96,7 +96,7 @@ fn check_accepted(lines: &[Line], verdict: &Verdict) {
         return;
     }
     let end = rest.iter().position(|line| matches!(line, Line::End { .. } | Line::Stopped { .. }));
-    assert!(end.is_none_or(|at| at + 1 == rest.len()), "something stands behind the end: {rest:?}");
+    assert!(end.is_none_or(|at| at + 1 == rest.len()), "lines follow the end: {rest:?}");
     assert_eq!(verdict.complete, matches!(rest.last(), Some(Line::End { .. })), "{rest:?}");
     // Each tick comes once, in order.
     let (mut next, mut frames, mut skipped, mut lost, mut seconds) = (0, 0, 0, 0, 0);
@@ -157,7 +157,7 @@ fn check_same(show: &ShowLine, lines: &[Line]) {
             Line::Second(SecondLine { to, .. }) => {
                 again.play_to(to + 1, true);
                 let own = again.second();
-                assert_eq!(serde_json::to_value(&own).ok(), serde_json::to_value(line).ok(), "said to be the same");
+                assert_eq!(serde_json::to_value(&own).ok(), serde_json::to_value(line).ok(), "reported as the same");
             }
             _ => (),
         }

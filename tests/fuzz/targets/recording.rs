@@ -65,10 +65,10 @@ fn run(data: &[u8]) -> bool {
 
 /// Asserts that mending a mended file changes nothing, and that mending keeps exactly the messages of whole chunks.
 fn check_mended(recovered: &Recovered, mended: &[u8], whole: Option<&[Known]>) {
-    let (again, _) = mend(mended).expect("what was mended is a recording");
+    let (again, _) = mend(mended).expect("a mended file is a recording");
     assert!(again.whole && again.damaged == 0 && again.lost_bytes == 0, "{again:?} after {recovered:?}");
     assert_eq!((again.messages, again.attachments), (recovered.messages, recovered.attachments), "{recovered:?}");
-    let read = MessageStream::new(mended).expect("what was mended has an end");
+    let read = MessageStream::new(mended).expect("a mended file has an end");
     let kept: Vec<Known> = (read.filter_map(Result::ok))
         .map(|Message { sequence, log_time, publish_time, data, .. }| {
             let data = data.into_owned();
@@ -78,7 +78,7 @@ fn check_mended(recovered: &Recovered, mended: &[u8], whole: Option<&[Known]>) {
     assert_eq!(kept.len() as u64, recovered.messages);
     let Some(whole) = whole else { return };
     let mut left = whole.iter();
-    assert!(kept.iter().all(|kept| left.any(|message| message == kept)), "kept what is in no chunk: {recovered:?}");
+    assert!(kept.iter().all(|kept| left.any(|message| message == kept)), "kept a message of no chunk: {recovered:?}");
     let of_known_channels = whole.len() as u64 - recovered.unknown.min(whole.len() as u64);
     assert!(recovered.damaged > 0 || recovered.messages == of_known_channels, "{recovered:?} of {}", whole.len());
 }

@@ -63,16 +63,12 @@ pub const INSTEAD: &[(&str, &str, &str)] = &[
     ("--duration 60 ", "--duration 2 ", "shorter"),
     ("--duration 40s", "--duration 2", "shorter"),
     ("--seconds 60", "--seconds 2", "shorter"),
-    ("--rate RATE", "--rate 60", "a number of the reader's"),
-    ("--name NAME", "--name mine", "a name of the reader's"),
-    ("--scene FILE", "--scene config/school.toml", "a scene of the reader's"),
-    (
-        "events --certify FILE",
-        "--scene tests/scenes/tiny_1.toml events --certify proof.jsonl",
-        "a file of the reader's",
-    ),
-    ("verify FILE", "verify proof.jsonl", "a file of the reader's"),
-    ("--plot FILE.svg", "--plot trade.svg", "a file of the reader's"),
+    ("--rate RATE", "--rate 60", "the reader's own number"),
+    ("--name NAME", "--name mine", "the reader's own name"),
+    ("--scene FILE", "--scene config/school.toml", "the reader's own scene"),
+    ("events --certify FILE", "--scene tests/scenes/tiny_1.toml events --certify proof.jsonl", "the reader's own file"),
+    ("verify FILE", "verify proof.jsonl", "the reader's own file"),
+    ("--plot FILE.svg", "--plot trade.svg", "the reader's own file"),
 ];
 
 const LIGHT_SCENE: &str = "sed '/^\\[publish\\]/a precision = \"f32\"' config/paper.toml > light.toml";

@@ -98,7 +98,7 @@ struct Block {
 
 fn is_shell(language: &str, page: &str, line: u32) -> bool {
     let known = language == "sh" || OTHER_LANGUAGES.contains(&language);
-    assert!(known, "{page}:{line}: a block is marked sh, or else what it holds: \"{language}\"");
+    assert!(known, "{page}:{line}: a block is marked sh, or with its language: \"{language}\"");
     language == "sh"
 }
 

@@ -19,7 +19,7 @@ pub fn look_up(root: &Path, command: &str) -> Result<(), String> {
     }
     let is_there = |name: &&str| name.split("::").all(|part| text.contains(part));
     match names.into_iter().find(|name| !is_there(name)) {
-        Some(name) => Err(format!("{command}: nothing there is called {name}")),
+        Some(name) => Err(format!("{command}: no test or benchmark has the name {name}")),
         None => Ok(()),
     }
 }
