@@ -1,8 +1,8 @@
-//! The loop allocates nothing of its own after its first frame: counted over its whole body, with the real shared
-//! memory, the real ROS 2 publisher and the log, across a contact and a loop of the show.
+//! The loop itself allocates nothing after its first frame. Allocations are counted over the whole loop, across a
+//! contact and a loop of the show. The shared memory, the ROS 2 publisher and the log are real.
 //!
-//! iceoryx2 0.10.0 keeps the bookkeeping of each loaned sample in an `Rc`, made by `loan` and freed by `send`: one small
-//! allocation for every frame and every alert, which its interface leaves no way round. The test demands exactly those.
+//! iceoryx2 0.10.0 keeps the state of each loaned sample in an `Rc`, made by `loan` and freed by `send`: one small
+//! allocation for every frame and every alert, which its interface does not avoid. The test demands exactly these.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -28,7 +28,7 @@ thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
 }
 
-/// The system's allocator, counting each thread's calls.
+/// The system's allocator, with a count of each thread's calls.
 struct Counting;
 
 // SAFETY: every call goes to the system's allocator unchanged; counting touches a thread-local number that is
@@ -53,11 +53,11 @@ fn allocations() -> u64 {
     ALLOCATIONS.with(Cell::get)
 }
 
-/// Frames after which the run is over, however long the machine takes for them: three showings and more.
+/// Frames after which the run ends, however long the machine takes for them: more than three rounds of the show.
 const FRAMES: u64 = 1000;
 
-/// A show that remembers what had been allocated when its second frame was computed, and which states it showed. It
-/// sets the stop flag with its last frame.
+/// A show that records the number of allocations at its second frame, and the states that it showed. It sets the stop
+/// flag with its last frame.
 struct Watched<'a> {
     show: ShowSource,
     stop: &'a AtomicBool,
@@ -139,7 +139,7 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     for (name, deliveries) in transports.into_iter().filter_map(|transport| transport.finish()) {
         assert!(deliveries.frames > 0, "{name}: {deliveries:?}");
     }
-    // Without these the test would prove nothing about alerts, contacts and loops.
+    // Without these the test would not cover alerts, contacts and loops.
     assert_eq!(counts.frames, FRAMES);
     assert!(watched.states[FrameState::Approaching as usize] > 0 && watched.states[FrameState::Contact as usize] > 0);
     assert!(watched.shows_played >= 2, "{}", watched.shows_played);

@@ -1,4 +1,4 @@
-//! One night: everybody is put in place, the real loop runs, and the accounts are settled.
+//! One night: the actors start, the real loop runs, and the final counts are checked.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -27,7 +27,7 @@ use crate::world::{Trace, World, same};
 /// A queue's oracle, and the thread at its other end.
 type Thread = (Rc<RefCell<Behind>>, Rc<RefCell<Worker<Network>>>);
 
-/// Everybody but the loop.
+/// All actors and models, without the loop.
 struct Cast {
     world: Rc<World>,
     oracle: Rc<RefCell<Oracle>>,
@@ -83,7 +83,7 @@ pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
         quiet_maintenance: 1000,
         maintained: None,
     };
-    // First, so that a full memory is seen before the others have the frame.
+    // First, so that a full memory is noticed before other transports have the frame.
     publishers.insert(0, Box::new(shared_memory));
     let cast = Cast { world, oracle, collected, collector, thread, doors, subscribers };
     cast.enter(&plan, stage);
@@ -104,7 +104,7 @@ pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
     cast.settle(&plan, &counts)
 }
 
-/// A transport with a thread of its own: its ends go to the loop and to the statistics.
+/// Adds a transport with a separate thread: its ends go to the loop and to the statistics.
 fn thread(
     plan: &Plan,
     stage: &Stage,
@@ -142,7 +142,7 @@ fn oracle(
 }
 
 impl Cast {
-    /// Everybody takes their place.
+    /// Adds all actors to the world.
     fn enter(&self, plan: &Plan, stage: &Stage) {
         let Self { world, .. } = self;
         let soon = |ns: u64| plan.begin_ns + 1 + world.random.borrow_mut().below(ns);
@@ -179,7 +179,7 @@ impl Cast {
         }
     }
 
-    /// The loop has ended: what is on its way arrives, and everything adds up.
+    /// Delivers the messages in flight after the end of the loop, and compares all counts.
     fn settle(self, plan: &Plan, counts: &Counts) -> Tally {
         let Self { world, oracle, collected, collector, thread, doors, subscribers } = self;
         oracle.borrow_mut().pace.ended(&world, counts, plan.periods);
@@ -189,7 +189,7 @@ impl Cast {
         last.report(now_ns, true, |status| bench_dragon::messages::LoopStatus { stamp_ns: now_ns, ..status });
         collected.borrow().ended(&last.summary(), counts.frames);
         if let Some((behind, worker)) = thread {
-            // Nobody else runs now.
+            // No other actor runs now.
             worker.borrow_mut().send(&Frozen(&world));
             behind.borrow_mut().emptied(worker.borrow().deliveries());
         }

@@ -2,9 +2,9 @@
 
 use bench_dragon::messages::control::{Code, Command, CommandEntry, CommandValue};
 
-const LAYOUTS: &str = include_str!("../crates/messages/src/layouts/control.rs");
-const PYTHON: &str = include_str!("../examples/python/conduct.py");
-const CONDUCTING: &str = include_str!("../docs/conducting.md");
+const LAYOUTS: &str = include_str!("../../crates/messages/src/layouts/control.rs");
+const PYTHON: &str = include_str!("../../examples/python/conduct.py");
+const CONDUCTING: &str = include_str!("../../docs/conducting.md");
 
 /// Returns the text of `file` between `begin` and the next `end`.
 fn between<'a>(file: &'a str, begin: &str, end: &str) -> &'a str {
