@@ -16,8 +16,7 @@ fn crates(features: &[&str]) -> BTreeSet<String> {
 
 #[test]
 fn a_library_without_the_command_line_needs_none_of_its_crates() {
-    let heavy =
-        ["axum", "tokio", "plotters", "svg", "clap", "indicatif", "crossterm", "env_logger", "ros2-client", "rustdds"];
+    let heavy = ["axum", "tokio", "plotters", "svg", "clap", "indicatif", "env_logger", "ros2-client", "rustdds"];
     let all = crates(&[]);
     assert!(heavy.iter().all(|name| all.contains(*name)), "{all:?}");
     let library = crates(&["--no-default-features"]);
