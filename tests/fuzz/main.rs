@@ -5,8 +5,8 @@
 //! and `BENCH_DRAGON_FUZZ_SEED` choose how many, and others. An input that fails is written to the folder for temporary
 //! files, and belongs into `tests/fuzz/corpus` once what it found is mended.
 
-#[path = "../processes/mod.rs"]
-mod processes;
+#[path = "../harness/mod.rs"]
+mod harness;
 mod targets;
 
 use std::any::Any;
@@ -83,7 +83,7 @@ fn written(target: &Target, input: &[u8]) -> PathBuf {
 fn fuzz(name: &str) {
     count_panics();
     let target = TARGETS.iter().find(|target| target.name == name).unwrap();
-    let times = if processes::long() { 100 } else { 1 };
+    let times = if harness::long() { 100 } else { 1 };
     let cases = setting("BENCH_DRAGON_FUZZ_CASES").unwrap_or(times * target.cases);
     let mut random = Rng::with_seed(setting("BENCH_DRAGON_FUZZ_SEED").unwrap_or(1));
     let corpus: Vec<Vec<u8>> = kept(name).into_iter().map(|(_, input)| input).collect();

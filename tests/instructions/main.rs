@@ -10,15 +10,15 @@
 //! and commits the baseline. Another compiler or C library moves counts by some percent with nobody to blame: beside a
 //! baseline of other tools a part fails only at 25 %.
 
+#[path = "../harness/mod.rs"]
+mod harness;
 mod measured;
-#[path = "../processes/mod.rs"]
-mod processes;
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
-use processes::{Process, aloud, not_run, text};
+use harness::{Process, aloud, not_run, text};
 use serde::{Deserialize, Serialize};
 
 const BASELINE: &str = "tests/instructions/baseline.toml";

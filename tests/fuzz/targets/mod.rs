@@ -15,9 +15,9 @@ pub mod page;
 pub mod recording;
 pub mod scene;
 
-#[path = "../../certify/changes.rs"]
+#[path = "../../commands/certify/changes.rs"]
 mod changes;
-#[path = "../../certify/truth.rs"]
+#[path = "../../commands/certify/truth.rs"]
 mod truth;
 
 use std::time::Duration;

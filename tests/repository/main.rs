@@ -1,0 +1,10 @@
+//! The repository itself: pages, generated files, manifests, dependencies, words.
+
+mod features;
+#[path = "../harness/mod.rs"]
+mod harness;
+mod msgs;
+mod newcomer;
+mod rooms;
+mod supply_chain;
+mod words;
