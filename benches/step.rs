@@ -17,6 +17,7 @@ use bench_dragon::client::connection::{Connection, Subscription, Wake};
 use bench_dragon::client::shared_memory::{node, service_name};
 use bench_dragon::messages::{FrameHeader, HandlePose};
 use bench_dragon::publisher::live::control::{Door, Doors, door};
+use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::publisher::live::{Outgoing, Publisher};
 use bench_dragon::publisher::log;
 use bench_dragon::publisher::log::arithmetic::Arithmetic;
@@ -176,9 +177,10 @@ fn measure_doors() {
     let scene = scene(223);
     let playback = Playback { start: START, ..Playback::of(&scene) };
     let timeline = scene.motion.timeline(&mut |_| ());
-    let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
+    let show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
     let (mut publisher, connection) =
         publisher_and_subscriber(&format!("bench_{}_doors", std::process::id()), &scene, &show);
+    let mut show = ShowSource::new(show);
     // The outer ends stay: a queue without a sender behaves differently.
     let (mut doors, outer): (Vec<Doors>, Vec<Vec<Door>>) = (0..3)
         .map(|count| {
@@ -199,9 +201,7 @@ fn measure_doors() {
                 tick += 1;
                 timed(&mut times[count], || {
                     doors.take_one(&mut show, tick);
-                    let frame = show.frame(tick);
-                    let header = frame_header(frame, stamps(tick));
-                    publisher.publish(Outgoing::new(&header, frame)).expect("no other process uses this service");
+                    publisher.publish(show.outgoing(tick, stamps(tick))).expect("no other process uses this service");
                     doors.finish_step(&mut show, tick);
                 });
                 drain(&connection);

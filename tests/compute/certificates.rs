@@ -5,7 +5,7 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use bench_dragon::certify::{MOST_STEPS, Outcome, Status, certify};
+use bench_dragon::certify::{CertifiedEvent, MOST_STEPS, Status, certify};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::show::scene::Scene;
@@ -20,14 +20,14 @@ const STEPS: u64 = 30_000;
 const STEPS_IN_VAIN: u64 = 1000;
 
 /// Returns the outcomes of a scene, contact first, and the ordinary events.
-fn outcomes(scene: &Scene, most_steps: u64) -> (Vec<Outcome>, Timeline) {
+fn outcomes(scene: &Scene, most_steps: u64) -> (Vec<CertifiedEvent>, Timeline) {
     let timeline = scene.motion.timeline(&mut |_| ());
     let outcomes = certify(&scene.motion, &timeline, "", most_steps, &mut |_| Ok(()), &mut |_| ()).unwrap();
     assert_eq!(outcomes.iter().map(|outcome| outcome.event).collect::<Vec<_>>(), KINDS);
     (outcomes, timeline)
 }
 
-fn proved(outcome: &Outcome) -> (f64, f64) {
+fn proved(outcome: &CertifiedEvent) -> (f64, f64) {
     match outcome.status {
         Status::Proved { time_lo, time_hi, .. } => (time_lo, time_hi),
         ref other => panic!("{:?}: {other:?}", outcome.event),
@@ -35,7 +35,7 @@ fn proved(outcome: &Outcome) -> (f64, f64) {
 }
 
 /// Returns the contradictions to the ordinary search, and the number of kinds of events that were not decided.
-fn compared(outcomes: &[Outcome], timeline: &Timeline) -> (Vec<String>, usize) {
+fn compared(outcomes: &[CertifiedEvent], timeline: &Timeline) -> (Vec<String>, usize) {
     let (mut wrong, mut undecided) = (Vec::new(), 0);
     for outcome in outcomes {
         let ordinary = timeline.find(outcome.event).map(|timed| timed.time);

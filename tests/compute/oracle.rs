@@ -128,8 +128,13 @@ fn the_program_agrees_with_brute_force() {
         return;
     }
     let seed = number_from("BENCH_DRAGON_ORACLE_SEED").unwrap_or(1);
-    let long = std::env::var_os("BENCH_DRAGON_LONG").is_some();
-    let scenes = number_from("BENCH_DRAGON_ORACLE_SCENES").unwrap_or(if long { 10_000 } else { 200 }) as usize;
+    let is = |name: &str, value: &str| std::env::var(name).is_ok_and(|given| given == value);
+    let scenes = match number_from("BENCH_DRAGON_ORACLE_SCENES") {
+        Some(scenes) => scenes as usize,
+        None if is("BENCH_DRAGON_LONG", "1") => 10_000,
+        None if is("BENCH_DRAGON_CASES", "few") => 50,
+        None => 200,
+    };
     let (next, tally) = (AtomicUsize::new(0), Mutex::new(Tally::default()));
     std::thread::scope(|scope| {
         for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {

@@ -3,7 +3,7 @@
 
 use std::hint::black_box;
 
-use bench_dragon::certify::{Line, certify};
+use bench_dragon::certify::{CertificateLine, certify};
 use bench_dragon::client::connection::{Connection, Subscription, Wake};
 use bench_dragon::messages::control::Command;
 use bench_dragon::motion::Method;
@@ -13,11 +13,12 @@ use bench_dragon::motion::solve::table::{FollowerTable, Instructions};
 use bench_dragon::motion::solve::{Chain, Solver, Velocities};
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::proof;
+use bench_dragon::publisher::live::Publisher;
 use bench_dragon::publisher::live::control::{Door, Doors, door};
-use bench_dragon::publisher::live::{Outgoing, Publisher};
+use bench_dragon::publisher::live::show_source::{FrameMessages, ShowSource};
 use bench_dragon::publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
 use bench_dragon::show::alerts::LevelTracker;
-use bench_dragon::show::convert::{Stamps, frame_header, stage};
+use bench_dragon::show::convert::{Stamps, stage};
 use bench_dragon::show::scene::{Scene, SceneText};
 use bench_dragon::show::{Frame, Playback, Show};
 
@@ -108,7 +109,8 @@ fn clearance(monitor: ClearanceMonitor, table: FollowerTable, handles: usize) {
 
 /// State of the loop, and a subscriber that receives its messages.
 struct Step {
-    show: Show,
+    show: ShowSource,
+    messages: FrameMessages,
     timeline: Timeline,
     rules: LevelTracker,
     frame: Frame,
@@ -139,7 +141,8 @@ impl Step {
         let frame = show.frame(0).clone();
         let (port, door) = door();
         Self {
-            show,
+            show: ShowSource::new(show),
+            messages: FrameMessages::new(0),
             timeline: timeline.clone(),
             rules,
             frame,
@@ -151,8 +154,7 @@ impl Step {
     }
 
     fn publish(&mut self) {
-        let header = frame_header(&self.frame, STAMPS);
-        self.publisher.publish(Outgoing::new(&header, &self.frame)).unwrap();
+        self.publisher.publish(self.messages.of(&self.frame, STAMPS)).unwrap();
     }
 
     /// Receives the messages since the last call, as a subscriber that keeps up does.
@@ -186,7 +188,7 @@ fn step(scene: &Scene, timeline: &Timeline) {
         on,
         |on, number| {
             on.door.answer();
-            on.show.frame(number);
+            on.show.show.frame(number);
             on.door.send(Command::Rate(1.0)).unwrap();
         },
         Step::poll,
@@ -194,9 +196,7 @@ fn step(scene: &Scene, timeline: &Timeline) {
     part("whole step", on, Step::receive, |on, number| {
         let tick = CALLS + number;
         on.doors.take_one(&mut on.show, tick);
-        let frame = on.show.frame(tick);
-        let header = frame_header(frame, STAMPS);
-        on.publisher.publish(Outgoing::new(&header, frame)).unwrap();
+        on.publisher.publish(on.show.outgoing(tick, STAMPS)).unwrap();
         on.doors.finish_step(&mut on.show, tick);
     });
 }
@@ -210,7 +210,8 @@ fn certificate() {
     let timeline = motion.timeline_without_contact();
     let mut lines = Vec::new();
     let mut search = |steps: u64| {
-        let mut write = |line: &Line| Ok(serde_json::to_writer(&mut lines, line).map(|()| lines.push(b'\n'))?);
+        let mut write =
+            |line: &CertificateLine| Ok(serde_json::to_writer(&mut lines, line).map(|()| lines.push(b'\n'))?);
         certify(&motion, &timeline, &text, steps, &mut write, &mut |_| ()).unwrap();
     };
     counted(&mut search, STEPS);

@@ -35,6 +35,7 @@ use world::Trace;
 /// Seeds of nights that once failed.
 const KEPT: &str = include_str!("seeds.txt");
 const HOURS: f64 = 10_000.0;
+const FEW_HOURS: f64 = 1_000.0;
 const LONG_HOURS: f64 = 1_000_000.0;
 /// First seed of the long run, so that it repeats no night of the short run.
 const LONG_SEEDS: u64 = 1 << 32;
@@ -74,8 +75,13 @@ fn the_promises_hold_in_every_night() {
         let seed = seed.split_whitespace().next().and_then(|seed| seed.parse().ok()).expect("a seed a line");
         play(seed, &stages);
     }
-    let long = std::env::var("BENCH_DRAGON_LONG").is_ok_and(|value| value == "1");
-    let hours = number("BENCH_DRAGON_NIGHT_HOURS").unwrap_or(if long { LONG_HOURS } else { HOURS });
+    let is = |name: &str, value: &str| std::env::var(name).is_ok_and(|given| given == value);
+    let hours = match number("BENCH_DRAGON_NIGHT_HOURS") {
+        Some(hours) => hours,
+        None if is("BENCH_DRAGON_LONG", "1") => LONG_HOURS,
+        None if is("BENCH_DRAGON_CASES", "few") => FEW_HOURS,
+        None => HOURS,
+    };
     let first = if hours > HOURS { LONG_SEEDS } else { 0 };
     let total = play_for(hours, first);
     println!("{total}");

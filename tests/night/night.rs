@@ -5,6 +5,7 @@ use std::rc::Rc;
 use std::time::Instant;
 
 use bench_dragon::publisher::live::control::{Door, Doors, door};
+use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::publisher::live::statistics::{Collector, Run, queues_of};
 use bench_dragon::publisher::live::{Counts, End, LoopOptions, Publisher, StatusPublisher, run_loop};
 use bench_dragon::publisher::transports::background::{self, BackgroundConfig, Worker};
@@ -87,7 +88,8 @@ pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
     let cast = Cast { world, oracle, collected, collector, thread, doors, subscribers };
     cast.enter(&plan, stage);
 
-    let mut frames = Checked { show, world: Rc::clone(&cast.world), oracle: Rc::clone(&cast.oracle) };
+    let mut frames =
+        Checked { show: ShowSource::new(show), world: Rc::clone(&cast.world), oracle: Rc::clone(&cast.oracle) };
     let options = LoopOptions { run_id, rate: plan.rate, periods: plan.periods };
     let mut doors = Doors::new(ports);
     let World { stop, .. } = &*cast.world;

@@ -10,8 +10,10 @@ use std::rc::Rc;
 use bench_dragon::messages::FrameHeader;
 use bench_dragon::messages::control::Command;
 use bench_dragon::messages::state::{FrameState, Level};
-use bench_dragon::publisher::live::{Frames, Outgoing, Period};
-use bench_dragon::show::{Outcome, Show};
+use bench_dragon::publisher::live::show_source::ShowSource;
+use bench_dragon::publisher::live::{FrameSource, Outgoing, Period};
+use bench_dragon::show::Outcome;
+use bench_dragon::show::convert::Stamps;
 
 use crate::behind::Behind;
 use crate::collected::{Announced, Collected, Expected};
@@ -92,24 +94,24 @@ impl Oracle {
         same("the time scale", header.time_scale, show.time_scale());
         same("playback", header.playback_state(), Some(show.playback()));
         same("the epoch and the cue", (header.epoch, header.cue), (show.epoch, show.passed as u32));
-        let cues: Numbered = outgoing.cues().map(|cue| (cue.tick, cue.number)).collect();
+        let cues: Numbered = outgoing.cues.iter().map(|cue| (cue.tick, cue.number)).collect();
         let reached = show.take_reached(self.shows_played);
         same("cues", &cues, &reached.iter().map(|cue| (header.tick, *cue as u32 + 1)).collect());
-        let alerts: Numbered = outgoing.alerts().map(|alert| (alert.tick, alert.level)).collect();
+        let alerts: Numbered = outgoing.alerts.iter().map(|alert| (alert.tick, alert.level)).collect();
         same("alerts", &alerts, &self.expected_alerts(header));
         self.check_state(header);
         (self.epoch, self.shows_played) = (self.show.epoch, self.show.shows_played);
         let mut tally = world.tally.borrow_mut();
         (tally.alerts, tally.cues) = (tally.alerts + alerts.len() as u64, tally.cues + cues.len() as u64);
-        self.queued = Some((outgoing.frame.chain.x[0], alerts.clone(), cues.clone()));
+        self.queued = Some((outgoing.chain.x[0], alerts.clone(), cues.clone()));
         let of = |what, list: Numbered| list.into_iter().map(move |(tick, number)| (tick, what, number));
         self.sample = Some((*header, of("alert", alerts).chain(of("cue", cues)).collect()));
     }
 
     fn expected_alerts(&mut self, header: &FrameHeader) -> Numbered {
-        let anew = std::mem::take(&mut self.show.jumped_by_command);
+        let by_command = std::mem::take(&mut self.show.jumped_by_command);
         let Some(levels) = &mut self.levels else { return Vec::new() };
-        let expected = levels.expected(header, header.epoch != self.epoch, anew);
+        let expected = levels.expected(header, header.epoch != self.epoch, by_command);
         expected.into_iter().map(|level| (header.tick, level as u32)).collect()
     }
 
@@ -176,16 +178,16 @@ impl Oracle {
 
 /// The real show, between the loop and the oracle.
 pub struct Checked {
-    pub show: Show,
+    pub show: ShowSource,
     pub world: Rc<World>,
     pub oracle: Rc<RefCell<Oracle>>,
 }
 
-impl Frames for Checked {
-    fn frame(&mut self, tick: u64) -> Period<'_> {
+impl FrameSource for Checked {
+    fn frame(&mut self, tick: u64, stamps: Stamps) -> Period<'_> {
         self.oracle.borrow_mut().frame_begins(&self.world, tick);
         self.world.spend(self.world.cost_ns());
-        self.show.frame(tick).into()
+        self.show.frame(tick, stamps)
     }
 
     fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {

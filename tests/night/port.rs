@@ -101,7 +101,7 @@ impl Publisher for SharedMemory {
         }
         *room -= 1;
         oracle.borrow_mut().frame_goes_out(world, outgoing);
-        self.level = outgoing.alerts().last().map(|alert| alert.level).or(self.level);
+        self.level = outgoing.alerts.last().map(|alert| alert.level).or(self.level);
         world.spend(world.cost_ns());
         let header = FrameHeader { sent_ns: world.now_ns(), ..*outgoing.header };
         for receiver in self.receivers.list.borrow().iter() {

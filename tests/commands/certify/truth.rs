@@ -1,10 +1,10 @@
 //! Certificates of scenes, and the ordinary search's results for the same scenes. Shared by the tests of certificates
 //! and their fuzz target.
 
-use bench_dragon::certify::{self, Line};
+use bench_dragon::certify::{self, CertificateLine};
 use bench_dragon::messages::state::EventKind as Kind;
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::proof::{EventKind, Outcome, Status};
+use bench_dragon::proof::{EventKind, ProvedEvent, Status};
 use bench_dragon::show::scene::Scene;
 use serde_json::Value;
 
@@ -29,7 +29,7 @@ pub fn certificate(text: &str) -> Vec<Value> {
     let scene = Scene::parse(text, "scene.toml", "scene").unwrap();
     let timeline = scene.motion.timeline(&mut |_| {});
     let mut lines = Vec::new();
-    let mut write = |line: &Line| {
+    let mut write = |line: &CertificateLine| {
         lines.push(serde_json::to_value(line).unwrap());
         Ok::<(), std::io::Error>(())
     };
@@ -38,7 +38,7 @@ pub fn certificate(text: &str) -> Vec<Value> {
 }
 
 /// Returns true if the claim about an event agrees with the ordinary search.
-pub fn is_true(outcome: &Outcome, timeline: &Timeline) -> bool {
+pub fn is_true(outcome: &ProvedEvent, timeline: &Timeline) -> bool {
     let kind = match outcome.event {
         EventKind::Contact => Kind::Contact,
         EventKind::Stall => Kind::Stall,

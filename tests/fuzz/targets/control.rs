@@ -11,6 +11,7 @@ use bench_dragon::messages::state::PlaybackState;
 use bench_dragon::messages::{ControlRequest, ControlResponse};
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::publisher::live::control::{Answer, Doors, door};
+use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::ros2::Mapping;
 use bench_dragon::show::convert::control_response;
 use bench_dragon::show::scene::{AtEnd, OnContact, Scene};
@@ -57,7 +58,8 @@ fn run(data: &[u8]) -> bool {
         paused: bit(4),
         start: if bit(5) { 3.0 } else { 0.0 },
     };
-    let mut show = Show::new(scene, timeline.clone(), playback).expect("a start before the end");
+    let show = Show::new(scene, timeline.clone(), playback).expect("a start before the end");
+    let mut show = ShowSource::new(show);
     let (port, mut door) = door();
     let mut doors = Doors::new(vec![port]);
     let (mut tick, mut epoch, mut held_at) = (0u64, 0u32, None);
@@ -79,7 +81,7 @@ fn run(data: &[u8]) -> bool {
         let before = tick;
         tick = tick.saturating_add(if periods < 200 { periods + 1 } else { 1 << (periods - 200).min(40) });
         doors.take_one(&mut show, tick);
-        let frame = show.frame(tick);
+        let frame = show.show.frame(tick);
         assert!((0.0..=20.0).contains(&frame.sim_time), "{} s at tick {tick}", frame.sim_time);
         assert!(frame.chain.x.iter().chain(&frame.chain.y).all(|number| number.is_finite()));
         // After more periods the epoch may have wrapped around.

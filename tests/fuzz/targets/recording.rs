@@ -7,10 +7,11 @@ use std::os::fd::AsRawFd;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use bench_dragon::publisher::live::{Frames, Period};
+use bench_dragon::publisher::live::{FrameSource, Outgoing, Period};
 use bench_dragon::recording::mcap::reader::{Item, Recording, frame_of};
 use bench_dragon::recording::mcap::recover::{RecoverError, Recovered, check_magic, recover};
 use bench_dragon::recording::replay::{Pace, Prepared, ReplayOptions};
+use bench_dragon::show::convert::Stamps;
 use bench_dragon::show::scene::Accepted;
 use fastrand::Rng;
 use mcap::records::MessageHeader;
@@ -130,6 +131,9 @@ impl Sent {
     }
 }
 
+/// The stamps of every frame.
+const STAMPS: Stamps = Stamps { run_id: 0, sequence: 0, stamp_ns: 0, deadline_ns: 0 };
+
 /// Plays a file as the command does, at the speed of reading.
 fn play(file: &Path, sent: Option<&Sent>) {
     let options = ReplayOptions { pace: Pace::Even(RATE), start: None, looping: false };
@@ -146,13 +150,13 @@ fn play(file: &Path, sent: Option<&Sent>) {
     let mut last = None;
     let (mut frames, mut alerts, mut cues, mut over) = (Vec::new(), 0, 0, false);
     for tick in 0..MOST_PERIODS {
-        match replay.frame(tick) {
-            Period::Frame(frame, messages) => {
-                assert_eq!((frame.tick, frame.chain.handles()), (tick, handles));
+        match replay.frame(tick, STAMPS) {
+            Period::Frame(Outgoing { header, chain, alerts: some_alerts, cues: some_cues, .. }) => {
+                assert_eq!((header.tick, chain.handles()), (tick, handles));
                 assert!(last.replace(tick).is_none_or(|last| last < tick));
-                frames.push(frame.sim_time.to_bits());
-                alerts += messages.alerts.len();
-                cues += messages.cues.len();
+                frames.push(header.sim_time.to_bits());
+                alerts += some_alerts.len();
+                cues += some_cues.len();
             }
             Period::Empty => std::thread::sleep(Duration::from_micros(20)),
             Period::Over => {

@@ -5,9 +5,10 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
-use bench_dragon::publisher::live::{Frames, Period};
+use bench_dragon::publisher::live::{FrameSource, Period};
 use bench_dragon::recording::mcap::reader::ReadError;
 use bench_dragon::recording::replay::{Pace, Prepared, ReplayOptions};
+use bench_dragon::show::convert::Stamps;
 use mcap::{Message, Schema};
 
 use crate::harness::{Process, can_run, json_lines, python, python_modules, text};
@@ -174,10 +175,11 @@ fn with_a_handle_less(message: Message<'_>) -> Message<'_> {
 fn contents(file: &Path, expected_failure: Option<&mut bool>) -> Result<Vec<(u64, u64)>, ReadError> {
     let options = ReplayOptions { pace: Pace::Even(100.0), start: None, looping: false };
     let (mut replay, thread) = Prepared::open(file, options)?.begin()?;
+    const STAMPS: Stamps = Stamps { run_id: 0, sequence: 0, stamp_ns: 0, deadline_ns: 0 };
     let mut frames = Vec::new();
     for tick in 0.. {
-        match replay.frame(tick) {
-            Period::Frame(frame, _) => frames.push((frame.sim_time.to_bits(), frame.chain.x[0].to_bits())),
+        match replay.frame(tick, STAMPS) {
+            Period::Frame(frame) => frames.push((frame.header.sim_time.to_bits(), frame.chain.x[0].to_bits())),
             Period::Empty => std::thread::yield_now(),
             Period::Over => break,
         }

@@ -1,11 +1,11 @@
-//! What a monitor knows of a publisher: rate, gaps, latency, state, alert. In: the events of a [`feed`](super::feed).
+//! What a monitor knows of a publisher: rate, gaps, latency, state, alert. In: the events of a [`feed`](bench_dragon_client::feed).
 //! Out: an [`IntervalReport`] whenever one is wanted. Called by `watch`.
 
 use std::time::Instant;
 
 use hdrhistogram::Histogram;
 
-use super::feed::FeedEvent;
+use bench_dragon_client::feed::FeedEvent;
 use bench_dragon_messages::state::FrameState;
 use bench_dragon_messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus};
 
@@ -128,7 +128,7 @@ impl Monitor {
     }
 
     /// Takes in whether the publisher's clock is that of this process, as
-    /// [`Feed::shares_clock`](super::feed::Feed::shares_clock) has it; nothing changes where there is no publisher.
+    /// [`Feed::shares_clock`](bench_dragon_client::feed::Feed::shares_clock) has it; nothing changes where there is no publisher.
     pub fn clock(&mut self, shares_clock: Option<bool>) {
         self.shares_clock = shares_clock.unwrap_or(self.shares_clock);
     }
