@@ -93,7 +93,7 @@ fn measure(benches: usize) {
     let mut choice = scene.motion.solver(scene.velocities);
     let mut monitor = scene.motion.clearance_monitor(&choice);
     let name = format!("bench_{}_{benches}", std::process::id());
-    let (mut publisher, connection) = publisher_and_subscriber(&name, &scene, &show);
+    let (mut publisher, mut connection) = publisher_and_subscriber(&name, &scene, &show);
     let mut frame = show.frame(0).clone();
 
     // Copies as many bytes into samples of a service of the same kind.
@@ -128,7 +128,7 @@ fn measure(benches: usize) {
                     let header = frame_header(frame, stamps(tick));
                     publisher.publish(Outgoing::new(&header, frame)).expect("no other process uses this service");
                 });
-                drain(&connection);
+                drain(&mut connection);
             }
         }
         for tick in ticks.clone() {
@@ -139,7 +139,7 @@ fn measure(benches: usize) {
             timed(&mut times.publish, || {
                 publisher.publish(Outgoing::new(&header, &frame)).expect("no other process uses this service")
             });
-            drain(&connection);
+            drain(&mut connection);
         }
         for tick in ticks.clone() {
             let time = START + tick as f64 / 60.0;
@@ -178,7 +178,7 @@ fn measure_doors() {
     let playback = Playback { start: START, ..Playback::of(&scene) };
     let timeline = scene.motion.timeline(&mut |_| ());
     let show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
-    let (mut publisher, connection) =
+    let (mut publisher, mut connection) =
         publisher_and_subscriber(&format!("bench_{}_doors", std::process::id()), &scene, &show);
     let mut show = ShowSource::new(show);
     // The outer ends stay: a queue without a sender behaves differently.
@@ -204,7 +204,7 @@ fn measure_doors() {
                     publisher.publish(show.outgoing(tick, stamps(tick))).expect("no other process uses this service");
                     doors.finish_step(&mut show, tick);
                 });
-                drain(&connection);
+                drain(&mut connection);
             }
             timed(&mut takes[count], || {
                 for _ in 0..POLLS {
@@ -234,7 +234,7 @@ fn measure_log() {
     let playback = Playback { start: START, rate: 10_000.0, ..Playback::of(&scene) };
     let timeline = scene.motion.timeline(&mut |_| ());
     let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
-    let (mut publisher, connection) =
+    let (mut publisher, mut connection) =
         publisher_and_subscriber(&format!("bench_{}_log", std::process::id()), &scene, &show);
     let file = std::env::temp_dir().join(format!("bench_dragon_step_{}.jsonl", std::process::id()));
     let line = ShowLine::new(&SceneText::paper(), &playback, Arithmetic::of(&scene), show.solver_reason(), (1, 0));
@@ -262,7 +262,7 @@ fn measure_log() {
         if logged {
             timed(&mut after, || logging.prepare());
         }
-        drain(&connection);
+        drain(&mut connection);
     }
     log.finish();
     let whole = outcome.failure().is_none();
@@ -278,7 +278,7 @@ fn stamps(sequence: u64) -> Stamps {
 }
 
 /// Receives all waiting messages, as a subscriber that keeps up does.
-fn drain(connection: &Connection) {
+fn drain(connection: &mut Connection) {
     connection.frames(|header, handles| {
         black_box((header.sequence, handles[0].x));
     });

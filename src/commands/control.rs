@@ -23,40 +23,43 @@ pub struct ControlArguments {
 
 #[derive(Debug, Clone, Copy, PartialEq, clap::Subcommand)]
 enum Action {
-    /// Print how the show stands
+    #[command(about = help(0))]
     State,
-    /// Simulated time stands still; frames go out at full rate
+    #[command(about = help(1))]
     Pause,
-    /// Simulated time advances again
+    #[command(about = help(2))]
     Resume,
     /// Pause a show that plays, resume one that is paused
     Toggle,
-    /// Simulated seconds per second of wall time from now on
-    #[command(allow_negative_numbers = true)]
+    #[command(about = help(3), allow_negative_numbers = true)]
     Rate {
         /// 1e-6 to 1e6
         rate: f64,
     },
-    /// To a simulated time
-    #[command(allow_negative_numbers = true)]
+    #[command(about = help(4), allow_negative_numbers = true)]
     Seek {
         /// Seconds since the start of the scene
         time: f64,
     },
-    /// So many periods, then paused again
+    #[command(about = help(5))]
     Step {
         /// Periods of the loop
         #[arg(default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1 << 53))]
         periods: u64,
     },
-    /// To the start of the show
+    #[command(about = help(6))]
     Restart,
-    /// Stand still until released, whatever else is commanded
+    #[command(about = help(7))]
     Hold,
-    /// From hold to paused
+    #[command(about = help(8))]
     Release,
-    /// On from a cue that pauses, or from --paused
+    #[command(about = help(9))]
     Go,
+}
+
+/// Returns the help of the command of a number.
+fn help(number: usize) -> &'static str {
+    Command::TABLE[number].help
 }
 
 /// The line of `control --json`.

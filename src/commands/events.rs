@@ -9,7 +9,7 @@ use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
 use bench_dragon::show::scene::Scene;
 use serde::Serialize;
 
-use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar, search_timeline};
+use super::{CommandError, Common, Output, expect_exact_motion, figure, not_writable, progress_bar, search_timeline};
 
 /// Arguments of `events`.
 #[derive(Debug, clap::Args)]
@@ -100,8 +100,8 @@ fn certified(
 ) -> Result<Vec<CertifiedEvent>, CommandError> {
     expect_exact_motion(scene)?;
     let shown = file.display();
-    let refused = |error| CommandError::BadInput(format!("{shown}: {error}, expected a file to write"));
-    let mut writer = BufWriter::new(std::fs::File::create(file).map_err(refused)?);
+    let created = std::fs::File::create(file).map_err(|error| not_writable(&shown, &error))?;
+    let mut writer = BufWriter::new(created);
     let bar = progress_bar(1000, common).with_message("proving");
     let mut write = |line: &certify::CertificateLine| {
         serde_json::to_writer(&mut writer, line).map_err(io::Error::from)?;

@@ -8,7 +8,6 @@
 mod actors;
 mod behind;
 mod collected;
-mod conducted;
 mod doors;
 mod levels;
 mod night;

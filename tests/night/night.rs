@@ -11,11 +11,11 @@ use bench_dragon::publisher::live::{Counts, End, LoopOptions, Publisher, StatusP
 use bench_dragon::publisher::transports::background::{self, BackgroundConfig, Worker};
 use bench_dragon::show::scene::AtEnd;
 use bench_dragon::show::{Playback, Show};
+use bench_dragon_testing::model::{Formula, Model, ModelCue, ModelShow};
 
 use crate::actors::{Background, Controller, Frozen, Statistics, Statuses, Stopper, Subscriber, WallClock};
 use crate::behind::{Behind, Network};
 use crate::collected::Collected;
-use crate::conducted::{Conducted, CueAt};
 use crate::levels::Levels;
 use crate::oracle::{Checked, Oracle};
 use crate::plan::{Plan, Stage};
@@ -132,13 +132,13 @@ fn oracle(
     thread: Option<&Thread>,
 ) -> Oracle {
     let Playback { rate, start, at_end, end_hold, paused, time_scale, .. } = plan.playback;
-    let cues = show.cues().iter().map(|cue| CueAt { time: cue.time, pauses: cue.pauses }).collect();
+    let cues = show.cues().iter().map(|cue| ModelCue { time: cue.time, pauses: cue.pauses }).collect();
     let end_hold = (at_end == AtEnd::Loop).then(|| (end_hold * rate).round() as u64);
-    let conducted =
-        Conducted::new(rate, start, stage.freeze(&plan.playback), end_hold, cues, paused).at_rate(time_scale);
+    let model = ModelShow { start, end: stage.freeze(&plan.playback), end_hold, cues };
+    let model = Model::new(model, Formula::new(rate), time_scale, paused);
     let levels = stage.rules().map(|rules| Levels::new(rules, rate));
     let behind = thread.map(|(behind, _)| Rc::clone(behind));
-    Oracle::new(run_id, conducted, levels, stage.events(), plan.doors.len(), Rc::clone(collected), behind)
+    Oracle::new(run_id, (rate, model), levels, stage.events(), plan.doors.len(), Rc::clone(collected), behind)
 }
 
 impl Cast {

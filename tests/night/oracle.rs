@@ -14,10 +14,10 @@ use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::publisher::live::{FrameSource, Outgoing, Period};
 use bench_dragon::show::Outcome;
 use bench_dragon::show::convert::Stamps;
+use bench_dragon_testing::model::{Formula, Model};
 
 use crate::behind::Behind;
 use crate::collected::{Announced, Collected, Expected};
-use crate::conducted::Conducted;
 use crate::doors::Entrance;
 use crate::levels::Levels;
 use crate::pace::Pace;
@@ -29,7 +29,7 @@ type Numbered = Vec<(u64, u32)>;
 pub struct Oracle {
     pub run_id: u64,
     pub pace: Pace,
-    pub show: Conducted,
+    pub show: Model<Formula>,
     pub levels: Option<Levels>,
     /// Every event, in order: the state depends on it.
     pub events: Vec<(f64, FrameState)>,
@@ -50,7 +50,7 @@ pub struct Oracle {
 impl Oracle {
     pub fn new(
         run_id: u64,
-        show: Conducted,
+        (rate, show): (f64, Model<Formula>),
         levels: Option<Levels>,
         events: Vec<(f64, FrameState)>,
         doors: usize,
@@ -59,7 +59,7 @@ impl Oracle {
     ) -> Self {
         Self {
             run_id,
-            pace: Pace::new(show.rate),
+            pace: Pace::new(rate),
             show,
             levels,
             events,
@@ -89,13 +89,13 @@ impl Oracle {
         let header = outgoing.header;
         world.note("frame", [header.tick as f64, header.sim_time]);
         self.pace.frame_goes_out(world, header, self.run_id);
-        let Self { show, .. } = self;
+        let show = &self.show;
         same("the time", header.sim_time.to_bits(), show.sim_time().to_bits());
         same("the time scale", header.time_scale, show.time_scale());
         same("playback", header.playback_state(), Some(show.playback()));
         same("the epoch and the cue", (header.epoch, header.cue), (show.epoch, show.passed as u32));
         let cues: Numbered = outgoing.cues.iter().map(|cue| (cue.tick, cue.number)).collect();
-        let reached = show.take_reached(self.shows_played);
+        let reached = announced(&mut self.show, self.shows_played);
         same("cues", &cues, &reached.iter().map(|cue| (header.tick, *cue as u32 + 1)).collect());
         let alerts: Numbered = outgoing.alerts.iter().map(|alert| (alert.tick, alert.level)).collect();
         same("alerts", &alerts, &self.expected_alerts(header));
@@ -174,6 +174,13 @@ impl Oracle {
         same("its rates", (outcome.time_scale, outcome.playing_rate), (show.time_scale(), show.playing_rate()));
         same("its playback and cue", (outcome.playback, outcome.cue), (show.playback(), show.passed as u32));
     }
+}
+
+/// The cues reached since the last frame; of shows that were wholly passed in between, none are announced.
+fn announced(show: &mut Model<Formula>, first_show: u64) -> Vec<usize> {
+    let last_show = show.shows_played;
+    let shown = show.reached.drain(..).filter(|(number, _)| *number == first_show || *number == last_show);
+    shown.map(|(_, cue)| cue).collect()
 }
 
 /// The real show, between the loop and the oracle.

@@ -46,8 +46,7 @@ fn answers(actions: &[Action], between: impl FnOnce(), name: &str) -> Vec<(usize
     let conductor = Conductor::start(&unique(name), move |number: usize, conducted| {
         let word = match conducted {
             Ok((command, response)) => {
-                let name = Conduct::NAMES[command.number_and_value().0 as usize];
-                format!("{name}: {}", response.result().unwrap().name())
+                format!("{}: {}", command.name(), response.result().unwrap().name())
             }
             Err(ControlError::Overtaken) => "overtaken".to_owned(),
             Err(error) => error.to_string(),

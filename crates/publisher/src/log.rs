@@ -311,7 +311,7 @@ impl LogReader {
                 continue;
             }
             record.commit_all();
-            let code = |number: u64| Code::ALL.get(number as usize).copied();
+            let code = |number: u64| u32::try_from(number).ok().and_then(Code::of_number);
             match kind {
                 LOST => writer.lost(tick),
                 STEP_FINISHED => code(third).into_iter().for_each(|code| {

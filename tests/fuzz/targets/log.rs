@@ -145,7 +145,7 @@ fn check_same(show: &ShowLine, lines: &[Line]) {
     for line in lines {
         match line {
             Line::Command { tick, command, value, .. } => {
-                let number = Command::NAMES.iter().position(|name| name == command).expect("a command") as u32;
+                let number = Command::named(command).expect("a command").number;
                 let command = Command::of_number(number, value.unwrap_or(f64::NAN)).expect("a command");
                 again.command(*tick, command);
             }
@@ -379,7 +379,7 @@ fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
                     1 => Line::Lost { from, to },
                     2 => Line::Stopped { tick },
                     _ => {
-                        let command = (*one(&Command::NAMES, random)).to_owned();
+                        let command = one(&Command::TABLE, random).name.to_owned();
                         Line::Command { tick, command, value: Some(3.0), code: Some("done".to_owned()) }
                     }
                 };
