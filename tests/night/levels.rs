@@ -35,8 +35,8 @@ impl Levels {
         self.announced.map(|(level, _)| level)
     }
 
-    /// Returns the levels of the alerts that must go with a frame. `new_epoch`: time has jumped; `by_command`: a command
-    /// caused the jump.
+    /// Returns the levels of the alerts that must go with a frame. `new_epoch`: time has jumped; `by_command`: a
+    /// command caused the jump.
     pub fn expected(&mut self, header: &FrameHeader, new_epoch: bool, by_command: bool) -> Vec<Level> {
         if by_command {
             self.announced = None;
