@@ -176,7 +176,7 @@ impl Oracle {
     }
 }
 
-/// The cues reached since the last frame; of shows that were wholly passed in between, none are announced.
+/// Returns the cues reached since the last frame; cues of shows passed entirely in between are not announced.
 fn announced(show: &mut Model<Formula>, first_show: u64) -> Vec<usize> {
     let last_show = show.shows_played;
     let shown = show.reached.drain(..).filter(|(number, _)| *number == first_show || *number == last_show);

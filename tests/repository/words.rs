@@ -77,7 +77,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
 }
 
-/// Whether a file is text that people write: code and documents, not pictures and not records of measurements.
+/// Returns true for a text file that people write: code and documents, not pictures and records of measurements.
 fn is_written(path: &Path) -> bool {
     let written = ["rs", "py", "js", "css", "md", "toml"];
     path.extension().is_some_and(|extension| written.iter().any(|written| extension == *written))
