@@ -19,7 +19,7 @@ pub struct GreatestSpeed {
     pub value_hi: f64,
     /// Simulated seconds of the scene, at its own speed, at which the handle has the speed `ratio`.
     pub time: f64,
-    /// The handle, counted from 0. A faster handle could only be faster by the distance of the two speeds.
+    /// The fastest handle, counted from 0. Another handle may be faster only within the gap between the two speeds.
     pub handle: u32,
     /// Ratio of its speed to the head's at that time.
     pub ratio: f64,
