@@ -1,5 +1,5 @@
-//! The motion: a team on a path at a speed, followed by a method. It alone decides what a show computes: which solver and
-//! why, which events, the live clearance, the time of a travelled distance, the outline to draw.
+//! The motion: a team on a path at a speed, followed by a method. It alone decides what a show computes: which solver
+//! and why, which events, the live clearance, the time of a travelled distance, the outline to draw.
 //!
 //! In: what a scene states. The show, the plans and the commands call it; no other module distinguishes the kinds of
 //! path.
@@ -118,7 +118,7 @@ const NO_TABLE: &str = "there is no table for this team and path";
 
 /// What was measured of a table, for people.
 fn measured(selection: &Selection, requested: f64) -> String {
-    let Selection { table, accuracy, error, moments, made_in, .. } = selection;
+    let Selection { table, accuracy, error, test_points, made_in, .. } = selection;
     let target = if !selection.meets() {
         format!("the best there is for the {requested:e} m requested")
     } else if selection.is_at_the_floor() {
@@ -129,7 +129,7 @@ fn measured(selection: &Selection, requested: f64) -> String {
         format!("for the {requested:e} m requested")
     };
     format!(
-        "{error:.1e} m measured against newton at {moments} moments, {target}; {:.0} bytes a handle, {:.2} of the most \
+        "{error:.1e} m measured against newton at {test_points} moments, {target}; {:.0} bytes a handle, {:.2} of the most \
          exact table's, {} kB, made in {:.0} ms",
         table.bytes_per_handle(),
         table.relative_cost(),
@@ -196,8 +196,8 @@ impl Motion {
         instructions.is_available().then_some(Self { instructions, ..self })
     }
 
-    /// Metres by which the links of this motion's frames may be off, besides 1e-12 of their length and the rounding of the
-    /// handles' coordinates.
+    /// Metres by which the links of this motion's frames may be off, besides 1e-12 of their length and the rounding of
+    /// the handles' coordinates.
     pub fn link_tolerance(&self) -> f64 {
         // Both ends of a link may be off by the rounding of a product and of a sum, in both coordinates.
         let rounding = 4.0 * f64::EPSILON * self.path.largest_summand(self.team.length());
@@ -279,8 +279,8 @@ impl Motion {
         }
     }
 
-    /// Metres by which a link can be off its length, beyond rounding: the paper's bisection stops at an angle, and along an
-    /// arc of radius r a chord changes by at most r for each radian.
+    /// Metres by which a link can be off its length, beyond rounding: the paper's bisection stops at an angle, and
+    /// along an arc of radius r a chord changes by at most r for each radian.
     pub(crate) fn link_error(&self) -> f64 {
         match (self.method, self.path.as_spiral()) {
             (Method::Paper(rules), Some((spiral, start))) => {
@@ -291,8 +291,8 @@ impl Motion {
         }
     }
 
-    /// A table for the clearance of frames that come from another solver: the most exact one, or where that would be too
-    /// large, a coarse one.
+    /// A table for the clearance of frames that come from another solver: the most exact one, or where that would be
+    /// too large, a coarse one.
     fn table_for_clearance(&self) -> Option<FollowerTable> {
         let exact = || FollowerTable::new(&self.path, self.team, self.head_speed, Velocities::Omitted);
         let coarse = || {
@@ -387,8 +387,8 @@ impl Motion {
         found.end.unwrap_or(Event { kind: path_end, travelled, bench_a: None, bench_b: None, place: None })
     }
 
-    /// The time of an event. That of a lock is never past the lock when it is multiplied by the speed again: there handles
-    /// would have jumped.
+    /// The time of an event. That of a lock is never past the lock when it is multiplied by the speed again: there
+    /// handles would have jumped.
     fn time_of(&self, event: &Event) -> f64 {
         let time = self.time_at(event.travelled);
         let is_past = event.kind == EventKind::Lock && self.travelled_at(time) > event.travelled;

@@ -34,9 +34,9 @@ pub fn link_pose(path: &Path, front: Param, rear: Param, link: f64) -> LinkPose 
 
 /// The first place from `from` backward that is `link` metres from `front`, all between the two being nearer.
 ///
-/// The square of the distance from `front` grows from a place by at most 2 slope h + bound h^2 over the next h units back
-/// (see [`Curve::second_derivative_bound`]), so no place before that reaches the square of the link is at the distance: each
-/// step goes there. Steps never pass the first place sought and double its digits once near.
+/// The square of the distance from `front` grows from a place by at most 2 slope h + bound h^2 over the next h units
+/// back (see [`Curve::second_derivative_bound`]), so no place before that reaches the square of the link is at the
+/// distance: each step goes there. Steps never pass the first place sought and double its digits once near.
 fn march(path: &Path, from: Param, front: Point, link: f64) -> Result<Param, NoFollower> {
     let mut param = from;
     for _ in 0..MOST_STEPS {

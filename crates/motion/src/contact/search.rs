@@ -29,7 +29,7 @@ pub(super) fn first_contact(
     to: f64,
     budget: &mut Budget,
 ) -> Result<Found<Event>, NoFollower> {
-    let mut search = Search::new(chain, Goal::Contact, budget);
+    let mut search = AdvancementSearch::new(chain, Goal::Contact, budget);
     let outcome = if chain.team.benches < 3 { Ok(None) } else { search.contact(from, to) };
     let searched_until = search.searched_until(&outcome, to)?;
     Ok(Found { value: outcome.ok().flatten(), searched_until })
@@ -42,7 +42,7 @@ pub(super) fn least_clearance(
     to: f64,
     budget: &mut Budget,
 ) -> Result<Found<LeastClearance>, NoFollower> {
-    let mut search = Search::new(chain, Goal::Least, budget);
+    let mut search = AdvancementSearch::new(chain, Goal::Least, budget);
     let outcome = if chain.team.benches < 3 { Ok(()) } else { search.least(from, to) };
     let searched_until = search.searched_until(&outcome, to)?;
     Ok(Found { value: search.best, searched_until })
@@ -55,7 +55,7 @@ enum Goal {
     Least,
 }
 
-pub(super) struct Search<'s, 'a, 'b> {
+pub(super) struct AdvancementSearch<'s, 'a, 'b> {
     pub(super) chain: &'s ConservativeAdvancement<'a>,
     goal: Goal,
     pub(super) budget: &'s mut Budget<'b>,
@@ -70,7 +70,7 @@ pub(super) struct Search<'s, 'a, 'b> {
     searched_until: f64,
 }
 
-impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
+impl<'s, 'a, 'b> AdvancementSearch<'s, 'a, 'b> {
     fn new(chain: &'s ConservativeAdvancement<'a>, goal: Goal, budget: &'s mut Budget<'b>) -> Self {
         Self {
             chain,

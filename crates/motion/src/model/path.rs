@@ -268,8 +268,8 @@ impl Path {
         rest + between + self.segment(to).arc_length(self.segments[to.segment].anchor, to.at)
     }
 
-    /// Metres: the largest number to which the points of lines and arcs are added up, for handles up to `behind` metres behind
-    /// the start. Points that lie nearer to the origin of coordinates are rounded as that number is.
+    /// Metres: the largest number to which the points of lines and arcs are added up, for handles up to `behind` metres
+    /// behind the start. Points that lie nearer to the origin of coordinates are rounded as that number is.
     pub fn largest_summand(&self, behind: f64) -> f64 {
         let of = |placed: &Placed| {
             let length = placed.end - placed.begin.max(-behind);

@@ -66,7 +66,8 @@ impl Relative {
     }
 }
 
-/// A lower bound of [`signed_distance_board_board`] from the circles about the boards, for callers that can skip a pair.
+/// A lower bound of [`signed_distance_board_board`] from the circles about the boards, for callers that can skip a
+/// pair.
 pub fn circle_bound_board_board(a: &Board, b: &Board) -> f64 {
     (b.centre - a.centre).norm() - (a.circle_radius() + b.circle_radius())
 }

@@ -1,7 +1,7 @@
 //! The Archimedean spiral r = a theta, a = pitch / 2 pi, travelled inward (clockwise, theta decreasing) or outward.
 //!
-//! The path and the linkage call it. All formulas are derived in the polar frame of a handle, so that none subtracts two
-//! positions that are nearly the same.
+//! The path and the linkage call it. All formulas are derived in the polar frame of a handle, so that none subtracts
+//! two positions that are nearly the same.
 
 mod bounds;
 mod links;
@@ -38,8 +38,8 @@ pub struct Spiral {
 const LONGEST_STEP: f64 = 0.5;
 
 impl Spiral {
-    /// A spiral of `pitch` metres per turn, which must be positive and finite; the scene, which knows the user's file and
-    /// line, refuses others.
+    /// A spiral of `pitch` metres per turn, which must be positive and finite; the scene, which knows the user's file
+    /// and line, refuses others.
     pub fn new(pitch: f64, direction: Direction) -> Self {
         debug_assert!(pitch > 0.0);
         // a = pitch / 2 pi to 32 digits: 2 pi is itself a sum of two doubles.
@@ -156,8 +156,8 @@ impl Spiral {
     /// at most one theta has it equal to the link.
     pub fn fold(&self, link: f64) -> Option<f64> {
         let ratio = link / self.radius_per_radian.high;
-        // How much the square of the first maximum exceeds that of the link, over a^2, and its slope: at the maximum, that by
-        // theta alone.
+        // How much the square of the first maximum exceeds that of the link, over a^2, and its slope: at the maximum,
+        // that by theta alone.
         let excess = |theta: f64| match first_chord_maximum(theta) {
             Some(d) => {
                 let square = sin(0.5 * d).powi(2);
@@ -215,8 +215,8 @@ impl Curve for Spiral {
     fn tangent(&self, at: Coordinate) -> Vector {
         let (r, a) = (self.radius(at), self.radius_per_radian.high);
         let (sine, cosine) = at.sine_and_cosine();
-        // dp/dtheta = a e_r + r e_phi, and theta decreases. Turned by half a turn and travelled the other way, the outward
-        // spiral has the same tangent.
+        // dp/dtheta = a e_r + r e_phi, and theta decreases. Turned by half a turn and travelled the other way, the
+        // outward spiral has the same tangent.
         Vector::new(r * sine - a * cosine, -a * sine - r * cosine) / hypot(r, a)
     }
 
@@ -346,8 +346,8 @@ impl Curve for Spiral {
 mod tests {
     use super::*;
 
-    /// The chords from `theta` on a spiral of radius theta to all places up to a turn outward, in small steps: the greatest
-    /// before they first shrink, or `None` where they grow all the time.
+    /// The chords from `theta` on a spiral of radius theta to all places up to a turn outward, in small steps: the
+    /// greatest before they first shrink, or `None` where they grow all the time.
     fn greatest_before_shrinking(theta: f64) -> Option<f64> {
         let place = |phi: f64| Point::new(phi * phi.cos(), phi * phi.sin());
         let chords: Vec<f64> =

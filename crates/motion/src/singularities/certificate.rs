@@ -6,7 +6,8 @@
 //! **Notation.** Front handle at travel s in [s0, s1], h = s1 - s0; a place u behind it; P the path, T its tangent;
 //! D(s, u) = |P(s) - P(u)|; L the link; k the greatest curvature of the path in the stretch concerned.
 //!
-//! **Continuous.** For fixed u, d2(D^2)/ds^2 = 2 (1 + (P(s) - P(u)) . P''(s)) lies within 2 (1 -+ k D), so over the step
+//! **Continuous.** For fixed u, d2(D^2)/ds^2 = 2 (1 + (P(s) - P(u)) . P''(s)) lies within 2 (1 -+ k D), so over the
+//! step
 //!   D^2 <= max(ends) + max(0, k D - 1) h^2 / 4   and   D^2 >= min(ends) - (1 + k D) h^2 / 4.
 //! 1. With the first bound, every place from the front handle back to a place `near` is nearer than L throughout the
 //!    step: D <= s - u as far as that is less than L, from there in steps back that D^2 cannot use up
@@ -22,10 +23,10 @@
 //! follower passes it: the follower map has a discontinuity in the step.
 //!
 //! **Turns.** With the rear cosine at least c, and m = max |f| over the step, the rear handle is at most m / c times as
-//! fast as the front one and the link turns by at most (1 + m / c) / L per metre, so |f'| <= k + (1 + m / c) / L, and
-//! m itself is at most max(ends) + |f'| h / 2. Then f has no zero where |f0| + |f1| > max |f'| h. Further, with signed
-//! curvature K and normal n, f' = K n . b + (1 - f^2 - v t . t') / L, |v| <= m / c, t and t' the parts of the two tangents
-//! across the link: where this keeps its sign, f has at most one zero.
+//! fast as the front one and the link turns by at most (1 + m / c) / L per metre, so |f'| <= k + (1 + m / c) / L, and m
+//! itself is at most max(ends) + |f'| h / 2. Then f has no zero where |f0| + |f1| > max |f'| h. Further, with signed
+//! curvature K and normal n, f' = K n . b + (1 - f^2 - v t . t') / L, |v| <= m / c, t and t' the parts of the two
+//! tangents across the link: where this keeps its sign, f has at most one zero.
 //!
 //! All these bounds tighten in proportion to the step, and what they have to beat (f, c, and how much a nearer point
 //! lacks) falls in proportion to the distance from a singular configuration, even where all of them vanish at once: the
@@ -141,8 +142,8 @@ impl Link<'_> {
         Some(self.segment_end(at)).filter(|end| is_steady && *end > at.front)
     }
 
-    /// Whether a step, during which the front handle is on one segment, is proven to be continuous and to hold no turn of
-    /// the rear handle, or one where the front cosines at its ends differ in sign.
+    /// Whether a step, during which the front handle is on one segment, is proven to be continuous and to hold no turn
+    /// of the rear handle, or one where the front cosines at its ends differ in sign.
     pub fn is_certain(&self, before: &Configuration, after: &Configuration) -> bool {
         let curvature = self.front_curvature(before, after);
         self.least_rear_cosine(before, after, curvature.most)
@@ -308,8 +309,8 @@ impl Link<'_> {
     }
 }
 
-/// Places between two followers at which a proof of a jump is tried. Nearly all of them serve: up to the further follower
-/// everything is nearer than the link, in one of the two configurations at least.
+/// Places between two followers at which a proof of a jump is tried. Nearly all of them serve: up to the further
+/// follower everything is nearer than the link, in one of the two configurations at least.
 const JUMP_SAMPLES: i32 = 32;
 
 /// By how much the square of a distance of at most `reach` can exceed its values at both ends of a step of the front

@@ -1,10 +1,10 @@
 //! A link on the inward spiral: its lock in closed form, its turns by bisection, however many turns the spiral has.
 //!
-//! In: a link whose path begins with an inward spiral. Out: the lock and the turns on that segment. Only the trace calls
-//! it.
+//! In: a link whose path begins with an inward spiral. Out: the lock and the turns on that segment. Only the trace
+//! calls it.
 //!
-//! **Lock.** The chord for fixed d grows with theta and up to its first maximum with d, so no nearer point ever comes to
-//! be at the link's distance, and the follower vanishes only at the fold (`Spiral::fold`).
+//! **Lock.** The chord for fixed d grows with theta and up to its first maximum with d, so no nearer point ever comes
+//! to be at the link's distance, and the follower vanishes only at the fold (`Spiral::fold`).
 //!
 //! **Turns.** With theta the front handle's angle and d the follower's from there, the front cosine has the sign of
 //! N = d + (theta + d) sin d (theta - t), t = tan(d/2), that is of sin d times g = theta^2 - (t - d) theta + d cot d.
@@ -13,8 +13,8 @@
 //!   g_d = (1 - t^2)/2 theta + cot d - d / sin^2 d < 0, so theta(d) grows. Inward d grows as theta falls, so the link
 //!   comes to the curve once: the stall.
 //! - pi <= d <= 3 pi/2: g > 0 and sin d < 0, the link is stalled.
-//! - 3 pi/2 < d < 2 pi: again one positive zero, at most sqrt(d |cot d|), so that (1 - t^2)/2 theta < d / sin^2 d and it
-//!   too grows with d: the link comes to that curve at most once, where the stall ends.
+//! - 3 pi/2 < d < 2 pi: again one positive zero, at most sqrt(d |cot d|), so that (1 - t^2)/2 theta < d / sin^2 d and
+//!   it too grows with d: the link comes to that curve at most once, where the stall ends.
 //!
 //! Before a fold d < 2 pi; without one the link is shorter than the pitch, and so d, which is link / a at the centre.
 //! From theta = max(1, link / a) outward sin(d/2) <= link / (2 r) <= 1/2, and there is neither.

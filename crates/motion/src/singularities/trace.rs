@@ -1,13 +1,15 @@
 //! A link of one length as its front handle goes along the path: where the rear handle turns round, where it locks.
 //!
-//! In: a link and where its front handle starts. Out: turns and end, in metres of travel of the front handle. The search
-//! advances it step by step. A step that is not certain is halved, the earlier half first, down to the resolution.
+//! In: a link and where its front handle starts. Out: turns and end, in metres of travel of the front handle. The
+//! search advances it step by step. A step that is not certain is halved, the earlier half first, down to the
+//! resolution.
 //!
 //! **At the resolution.** A stretch that cannot be resolved begins where a step of a few units in the last place is not
-//! certain; each further step in it may be as long as the stretch is already, since near a degenerate configuration what
-//! rounding hides is in proportion to the distance from it. Over the whole stretch a jump is looked for, and the signs of
-//! the front cosine at its ends are compared. A lock is a proven jump, found to the last digit; all else is a graze.
-//! Jumps of less than some 1e-8 links and pairs of turns within one such stretch are below what doubles can resolve.
+//! certain; each further step in it may be as long as the stretch is already, since near a degenerate configuration
+//! what rounding hides is in proportion to the distance from it. Over the whole stretch a jump is looked for, and the
+//! signs of the front cosine at its ends are compared. A lock is a proven jump, found to the last digit; all else is a
+//! graze. Jumps of less than some 1e-8 links and pairs of turns within one such stretch are below what doubles can
+//! resolve.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -149,8 +151,9 @@ impl<'a> LinkTrace<'a> {
         configuration
     }
 
-    /// What a link costs besides, in links solved, whose handles have a winding way between them: the search for the rear
-    /// handle and the proof that it is the first go all of it, in small steps where places are nearly as far as the link.
+    /// What a link costs besides, in links solved, whose handles have a winding way between them: the search for the
+    /// rear handle and the proof that it is the first go all of it, in small steps where places are nearly as far as
+    /// the link.
     fn winding(&self, at: &Configuration) -> u64 {
         let links = (at.front - at.rear) / self.link.length;
         // A path that bends by half a turn at most is no longer than pi / 2 links; not a number is 0.

@@ -1,4 +1,5 @@
-//! The cheapest solver: a table of where a chain of equal links stands, made once, in which every frame is interpolated.
+//! The cheapest solver: a table of where a chain of equal links stands, made once, in which every frame is
+//! interpolated.
 //!
 //! In: the time. Out: the chain, as exact as the safe solver's, on any path that begins with a straight line or an
 //! inward spiral. A frame of the table does not depend on the ones before. The table is as good as it was found to be
@@ -22,7 +23,7 @@ mod track;
 use std::sync::Arc;
 
 use head::{HeadBuilder, HeadTable};
-use kernel::{Moment, within_half_turn};
+use kernel::{FrameInput, within_half_turn};
 use packed::PackedRows;
 pub(crate) use packed::{Allowed, Format};
 pub(crate) use rows::Tolerance;
@@ -294,10 +295,10 @@ impl FollowerTable {
     #[inline(always)]
     fn interpolate_wanted<const FUSED: bool, const VELOCITIES: bool>(&self, travelled: f64, chain: &mut Chain) {
         let sample = self.head.at(travelled);
-        let moment = Moment { alpha: sample.alpha, alpha_per_second: sample.alpha_per_metre * self.head_speed };
+        let input = FrameInput { alpha: sample.alpha, alpha_per_second: sample.alpha_per_metre * self.head_speed };
         match &self.packed {
-            Some(packed) => single_kernel::write::<FUSED, VELOCITIES>(packed, &moment, chain),
-            None => kernel::write::<FUSED, VELOCITIES>(&self.rows, &moment, chain),
+            Some(packed) => single_kernel::write::<FUSED, VELOCITIES>(packed, &input, chain),
+            None => kernel::write::<FUSED, VELOCITIES>(&self.rows, &input, chain),
         }
         let last = chain.handles() - 1;
         chain.heading[last] = chain.heading[last - 1];
