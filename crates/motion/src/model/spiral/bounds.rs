@@ -1,4 +1,4 @@
-//! Bounds of where boards on a spiral can be, and how far they can move relative to each other.
+//! Bounds of the places of boards on a spiral, and of their relative motion.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,7 @@ use crate::model::root::bisect_predicate;
 use crate::model::team::Team;
 
 impl Spiral {
-    /// Returns the first place from which a board can reach into the disc. Where an inward spiral ends outside the
+    /// Returns the first place from which a board can reach into the disc. If an inward spiral ends outside the
     /// circle about the origin, but not beyond the disc, a board may still lie across its end.
     pub(super) fn first_in_disc(
         &self,
@@ -69,7 +69,7 @@ impl Spiral {
     ///   whole turns, are apart by more than 0.49 r where |p| > 1/2, and otherwise by pitch r / hypot(r, 1.02 a) >=
     ///   0.999 pitch. This case is impossible where the whole team turns by less.
     fn board_clearance_bound(&self, team: &Team, r: f64) -> f64 {
-        let Team { hole_inset, width, benches: _, head_length: _, body_length: _ } = *team;
+        let Team { hole_inset, width, .. } = *team;
         let (longest, body) = (team.longest_link(), team.link(1));
         if width > body {
             return f64::NEG_INFINITY;
