@@ -127,8 +127,8 @@ impl ClearanceMonitor {
         Self { table: table_of_bounds, ..Self::without_table(team, 2.0 * table.accuracy()) }
     }
 
-    /// Creates a monitor for chains of `team` with any handles, if no link differs from its length by more than
-    /// `link_error` metres or the rounding of exact motion.
+    /// Creates a monitor for chains of `team` with any handles. The error of every link must be at most `link_error`
+    /// metres or the rounding of exact motion.
     pub fn without_table(team: Team, link_error: f64) -> Self {
         Self {
             team,
@@ -149,8 +149,7 @@ impl ClearanceMonitor {
                 table.memory_bytes().div_ceil(1000),
                 1e3 * table.made_in().as_secs_f64()
             ),
-            None => "by a search among all boards in every frame, because the table of bounds would exceed its limits"
-                .to_owned(),
+            None => "by a search among all boards in every frame, since there is no table of bounds".to_owned(),
         }
     }
 

@@ -7,7 +7,8 @@
 //!
 //! **How far handles move.** Handle 1 turns round only if the head is at a head turn, handle k + 1 only if handle k
 //! turns round or is at a body turn. So the two configurations at the ends of a step and the followers of the turns
-//! between determine the path that each handle k passes over, forth and back (`displacement`); m_k is its length.
+//! between determine how each handle moves. The path that handle k passes over, forth and back, has the length m_k
+//! (`displacement`).
 //!
 //! **How far boards move.** A point of a board is rear + s (front - rear) + w n, n the link's unit normal, s in
 //! [-e, 1 + e], e = inset / link, |w| <= width / 2. With handle velocities u and v, n turns at most at the rate
@@ -18,7 +19,7 @@
 //! **Why nothing is skipped.** Assume that at some time of a step the clearance of a pair is x <= `limit`, limit >= 0.
 //! Take the nearest points P and Q of the two boards at that time, or a common point if they overlap: they are at most
 //! `limit` apart. At the ends of the step the *same* two points of the boards are at least as far apart as the
-//! clearances there, and their paths before and after that time together are those of the step. So c_start + c_end <= 2
+//! clearances there. Their paths before and after that time together are those of the step. So c_start + c_end <= 2
 //! limit + B, B = C_a + C_b, and a pair that violates this stays above the limit during the whole step. (C need not be
 //! additive over sub-steps: the lengths of the paths of P and Q are.) For a limit below 0 there may be no such common
 //! pair of points: clearance is the largest gap over all directions, so along the best direction at either end two
@@ -28,19 +29,20 @@
 //! **Seen from the chain.** All this holds in any frame that moves rigidly. If all handles from the first to the last
 //! of a pair stay on one line or circle, so do their distances along it, and B = 0. On one spiral, take the frame that
 //! turns about the centre with handle i and moves outward by a d theta_i, in a fixed direction e of the frame. With
-//! psi_k = theta_k - theta_i, the velocity of handle k in it is a d psi_k outward, r_k d psi_k around, and a d theta_i
-//! times the difference between the outward direction at handle k and e, at most the angle between them. While the
-//! handles from i to k go the same way, psi_k is monotone, so that the ends of the step determine these lengths. The
-//! angle of each link is monotone, too: (t . b) sqrt(a^2 + r^2) is larger at its outer handle than at its inner one, by
-//! 2 a (r + r') sin^2(d / 2) / link, so the outer handle turns less.
+//! psi_k = theta_k - theta_i, handle k moves in it by a d psi_k outward, by r_k d psi_k around, and by a d theta_i
+//! times the difference between its outward direction and e. This difference is at most the angle between them. While
+//! the handles from i to k go the same way, psi_k is monotone, so that the ends of the step determine these lengths.
+//! The angle of each link is monotone, too: (t . b) sqrt(a^2 + r^2) is larger at its outer handle than at its inner
+//! one, by 2 a (r + r') sin^2(d / 2) / link, so the outer handle turns less.
 //!
 //! **Which pairs.** Every link behind the first has one length, so the place of handle i >= 1 determines all places
 //! behind it: a pair (i, i + k) is where (1, 1 + k) is when handle 1 is at that place. Let S be the first place of
 //! handle 1. A handle i that is at or ahead of S is behind handle 1, which has come from S without a jump: handle 1 was
 //! at the place of handle i before, and so was the pair (1, 1 + k). So pairs without boards 0 and 1 matter only in
 //! steps in which handle 2 is somewhere behind S, in either direction of motion. A pair does not matter if its front
-//! handles are both behind the quiet place, where no two boards ever come within the limit, nor while the whole team
-//! keeps its shape. Followers are solved only as far back as they can reach the boards that matter (`reach`).
+//! handles are both behind the quiet place, where no two boards ever come within the limit. No pair matters while the
+//! whole team keeps its shape. Followers are solved only as far back as they can reach the boards that matter
+//! (`reach`).
 
 mod broad_phase;
 mod configuration;
@@ -93,7 +95,8 @@ pub struct ConservativeAdvancement<'a> {
 
 impl<'a> ConservativeAdvancement<'a> {
     /// Creates the searches for `team` on `path`. `head_turns` are the metres of travel of the head at which handle 1
-    /// turns round, `body_turns` those of any body link's front handle at which its rear handle does, both in order.
+    /// turns round. `body_turns` are the metres of travel of a body link's front handle at which its rear handle does.
+    /// Both are in order.
     pub fn new(path: &'a Path, team: &'a Team, head_turns: &[f64], body_turns: &[f64]) -> Self {
         let places = |turns: &[f64]| turns.iter().map(|travelled| path.param_at(*travelled)).collect();
         let mut curves = Vec::with_capacity(path.segments());
@@ -105,10 +108,10 @@ impl<'a> ConservativeAdvancement<'a> {
         Self { path, team, head_turns: places(head_turns), body_turns: places(body_turns), curves }
     }
 
-    /// Finds the first contact while the head goes from one place to another, metres of travel: the first place at
-    /// which a signed distance is 0 or less, to the last digits, the deepest of the pairs that touch there, and the
-    /// touching point. Boards that overlap at `from` are a contact there: the deepest pair, at the centre of its
-    /// overlap.
+    /// Finds the first contact while the head goes from one place to another, metres of travel: the first place, to the
+    /// last digits, at which a signed distance is 0 or less. The event has the deepest of the pairs that touch there,
+    /// and the touching point. Boards that overlap at `from` are a contact there: the deepest pair, at the centre of
+    /// its overlap.
     ///
     /// # Errors
     /// [`NoFollower`] if a configuration strictly inside the motion cannot be solved.

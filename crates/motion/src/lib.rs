@@ -130,8 +130,8 @@ fn measured(selection: &Selection, requested: f64) -> String {
         format!("for the {requested:e} m requested")
     };
     format!(
-        "{error:.1e} m measured against newton at {test_points} moments, {target}; {:.0} bytes a handle, {:.2} of the most \
-         exact table's, {} kB, made in {:.0} ms",
+        "{error:.1e} m measured against newton at {test_points} moments, {target}; {:.0} bytes a handle, {:.2} of the \
+         most exact table's, {} kB, made in {:.0} ms",
         table.bytes_per_handle(),
         table.relative_cost(),
         table.memory_bytes().div_ceil(1000),

@@ -1,4 +1,4 @@
-//! Links on a path: the follower, which is the handle at the rear end of a link, and how the link lies across the path.
+//! Links on a path: the follower, which is the handle at the rear end of a link, and the link's pose.
 //!
 //! In: a path, the place of a link's front handle, the link's length. Out: the rear handle's place and the link's pose.
 //! Solvers and events call it.

@@ -3,11 +3,11 @@
 //!
 //! If the second handle stands at T(alpha), the next ones stand at T(alpha + 1), T(alpha + 2) and so on: see
 //! [`crate::solve::table::rows`]. So the distances of a body bench to those behind it depend on the alpha of its front
-//! handle alone. Every row of T is divided into [`CELLS`] equal cells, so that while one handle is in a cell, the next
-//! is in the same cell of the next row. Each (row, cell) has a list of the benches that can be near, with a proven
-//! lower bound of the signed distance to each (see [`super::moving`]), in ascending order; the last entry stands for
-//! all others. Far behind, where boards hardly move against each other while all advance by a link, one list is valid
-//! for all cells of a row.
+//! handle alone. Every row of T is divided into [`CELLS`] equal cells. While one handle is in a cell, the next is in
+//! the same cell of the next row. Each (row, cell) has a list of the benches that can be near. It has a proven lower
+//! bound of the signed distance to each (see [`super::moving`]), in ascending order; the last entry stands for all
+//! others. Far behind, where boards hardly move against each other while all advance by a link, one list is valid for
+//! all cells of a row.
 //!
 //! The rows are grouped into blocks. The least bound of each block is also kept cell by cell, so that those of a whole
 //! chain are adjacent in memory: a frame reads only the blocks whose least bound is within its limit.

@@ -27,8 +27,8 @@ const MOST_MOVED: f64 = 100.0;
 /// For every bench a lower bound of its distance to those behind it, carried from frame to frame.
 ///
 /// If no handle is farther than D from its earlier place, no point of a board is farther than [`corner_reach`] times D
-/// (a little more if links have errors), and no two boards are nearer by more than twice that. So an earlier bound,
-/// less this amount for all movement since, still holds.
+/// (a little more if links have errors). No two boards are nearer by more than twice that. So an earlier bound, less
+/// this amount for all movement since, still holds.
 #[derive(Debug, Clone)]
 pub(super) struct CarriedBounds {
     /// The handles of the previous frame.

@@ -1,5 +1,4 @@
-//! The foremost part of a team at one place of the head, solved as far back as the search needs, and its pairs of
-//! boards that are near each other.
+//! The foremost part of a team at one place of the head, solved as far back as the search needs, and its near pairs.
 
 use crate::event::Budget;
 use crate::linkage::{NoFollower, follower, link_pose};
@@ -75,7 +74,7 @@ impl Configuration {
         pairs.iter().map(|&pair| (self.clearance(pair), pair)).min_by(|one, other| one.0.total_cmp(&other.0))
     }
 
-    /// Returns all pairs of the foremost boards whose circle bound is at most `motion`, found with a grid whose cells
+    /// Returns all pairs of the foremost boards whose circle bound is at most `motion`. A grid finds them; its cells
     /// are as wide as the longest board plus `motion`.
     pub fn near_pairs(&self, benches: usize, motion: f64) -> Vec<Pair> {
         let boards = &self.boards[..benches];

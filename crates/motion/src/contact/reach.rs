@@ -21,8 +21,8 @@ impl Reach {
     /// board whose front handle is behind this place cannot.
     ///
     /// No point of a board is further than hypot(max(link / 2, inset), width / 2) from the nearer one of its handles.
-    /// On an inward spiral, where a board's handles are both at least r from the origin, its axis is at least
-    /// min(sqrt(r^2 - link^2 / 4), r - inset) from it and its points half a width less.
+    /// On an inward spiral, let both handles of a board be at least r from the origin. Then its axis is at least
+    /// min(sqrt(r^2 - link^2 / 4), r - inset) from the origin, and its points half a width less.
     pub fn rearmost(&self, path: &Path, team: &Team, limit: f64) -> Option<Param> {
         let half = 0.5 * team.longest_link();
         let disc = self.radius + limit + hypot(half.max(team.hole_inset), 0.5 * team.width);
@@ -37,7 +37,7 @@ impl Reach {
     }
 }
 
-/// Returns the place of the first segment behind which no two boards that share no handle ever come to within `limit`
+/// Returns the place of the first segment behind which no two boards without a common handle come within `limit`
 /// metres, if one is known.
 pub(super) fn quiet_place(path: &Path, team: &Team, limit: f64) -> Option<Param> {
     let at = path.segment_at(0).quiet_place(team, limit, path.last(0))?;

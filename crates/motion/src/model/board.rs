@@ -67,7 +67,7 @@ impl Board {
     /// With p = rear + s (front - rear) + w n, s in [-inset / link, 1 + inset / link], |w| <= width / 2 and n the unit
     /// normal of the link: the handles' displacements u and v, at most D, move the first two terms by |(1 - s) u + s
     /// v|, at most (|1 - s| + |s|) D <= (1 + 2 inset / link) D. The link keeps its length and its vector changes by at
-    /// most 2 D, so its unit normal changes by at most 2 D / link, and the last term by at most (width / link) D.
+    /// most 2 D. So its unit normal changes by at most 2 D / link, and the last term by at most (width / link) D.
     pub fn displacement_factor(link: f64, hole_inset: f64, width: f64) -> f64 {
         1.0 + 2.0 * hole_inset / link + width / link
     }

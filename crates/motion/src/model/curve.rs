@@ -1,12 +1,12 @@
 //! [`Curve`]: the contract of every curve that a path is made of. Units and formulas of a curve are in its own file.
 //!
-//! A curve has a coordinate of its own (metres on a line, radians on an arc, the polar angle on a spiral), kept as two
-//! doubles, so that a place far along has lost no digits. Its coordinate may grow or fall in the direction of travel.
+//! Every curve has a coordinate: metres on a line, radians on an arc, the polar angle on a spiral. It is kept as two
+//! doubles, so that a place far along loses no digits. Its coordinate may grow or fall in the direction of travel.
 //!
-//! **A new kind of curve** needs a file beside `line` and `arc` with its `impl Curve`, a variant of
-//! [`Segment`](super::segment::Segment), a constructor and an outline in `path`, and a variant of `description`. No
-//! other code of this crate distinguishes kinds of curves: `model` has a test of that. The methods with a default have
-//! one that is valid for every curve; the default of a bound costs time only.
+//! **A new kind of curve** needs a file beside `line` and `arc` with its `impl Curve`. It also needs a variant of
+//! [`Segment`](super::segment::Segment) and of `description`, and a constructor and an outline in `path`. No other code
+//! of this crate distinguishes kinds of curves: `model` has a test of that. The methods with a default have one that is
+//! valid for every curve; the default of a bound costs time only.
 
 use super::double_double::DoubleDouble;
 use super::team::Team;
@@ -29,7 +29,7 @@ pub enum Side {
 #[error("no point behind on the path is one link away")]
 pub struct NoFollower;
 
-/// How a link lies across the path at its two handles.
+/// The direction of a link and its angles with the path at its two handles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkPose {
     /// The link's unit direction b, from its rear handle to its front one.
@@ -68,7 +68,7 @@ impl Follower {
     }
 }
 
-/// What boards can reach: no point of a board with a handle outside the disc is within the limit of the boards
+/// The reach of a search: a board with its nearer handle outside the disc is farther than the limit from the boards
 /// searched.
 #[derive(Debug, Clone, Copy)]
 pub struct ReachedDisc {
@@ -183,7 +183,7 @@ pub trait Curve {
         f64::INFINITY
     }
 
-    /// Returns true if the distance from `front` is known to grow all the way back to `rear`.
+    /// Returns true if the distance from `front` is known to grow everywhere back to `rear`.
     fn distance_grows(&self, _front: Coordinate, _rear: Coordinate) -> bool {
         false
     }

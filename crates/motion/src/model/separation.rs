@@ -6,8 +6,8 @@
 //! - [`signed_distance_board_board`] (its points: [`closest_points_board_board`]): the Euclidean distance apart, the
 //!   separation overlapping.
 //!
-//! Positions are subtracted before anything else, so that the error is a few units in the last place of the boards'
-//! size and of their distance, plus what the centres themselves have lost. Swapping the boards gives the same bits.
+//! Positions are subtracted first. So the error is a few units in the last place of the boards' size and of their
+//! distance, plus the rounding of the centres. Swapping the boards gives the same bits.
 
 use super::board::Board;
 use super::{Point, Vector};
@@ -74,8 +74,8 @@ pub fn circle_bound_board_board(a: &Board, b: &Board) -> f64 {
 
 /// Returns the signed separation by the separating axis theorem, metres: never more than the clearance.
 ///
-/// The normals of the Minkowski difference's edges are those of the boards, so the largest of the four gaps is minus
-/// the least translation when all are negative (Ericson, Real-Time Collision Detection, section 4.4).
+/// The normals of the Minkowski difference's edges are those of the boards. So the largest of the four gaps is minus
+/// the least translation if all are negative (Ericson, Real-Time Collision Detection, section 4.4).
 #[inline]
 pub fn separation_board_board(a: &Board, b: &Board) -> f64 {
     let (along_a, across_a) = Relative::new(b, a).gaps(a, b);

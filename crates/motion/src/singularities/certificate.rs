@@ -21,15 +21,15 @@
 //! **Jump.** Where a place strictly between the two followers is nearer than L throughout, by the first bound, no
 //! follower passes it: the follower map has a discontinuity in the step.
 //!
-//! **Turns.** With the rear cosine at least c, and m = max |f| over the step, the rear handle is at most m / c times as
-//! fast as the front one and the link turns by at most (1 + m / c) / L per metre, so |f'| <= k + (1 + m / c) / L, and m
-//! itself is at most max(ends) + |f'| h / 2. Then f has no zero where |f0| + |f1| > max |f'| h. Further, with signed
-//! curvature K and normal n, f' = K n . b + (1 - f^2 - v t . t') / L, |v| <= m / c, t and t' the parts of the two
-//! tangents across the link: where this keeps its sign, f has at most one zero.
+//! **Turns.** Let f be the front cosine, the rear cosine at least c, and m = max |f| over the step. The rear handle is
+//! at most m / c times as fast as the front one and the link turns by at most (1 + m / c) / L per metre. So |f'| <= k +
+//! (1 + m / c) / L, and m is at most max(ends) + |f'| h / 2. Then f has no zero where |f0| + |f1| > max |f'| h.
+//! Further, with signed curvature K and normal n, f' = K n . b + (1 - f^2 - v t . t') / L, |v| <= m / c, t and t' the
+//! parts of the two tangents across the link: where this keeps its sign, f has at most one zero.
 //!
-//! All these bounds tighten in proportion to the step. The quantities that they must not exceed (f, c, and the
-//! difference of a nearer point's distance to L) fall in proportion to the distance from a singular configuration, even
-//! where all of them vanish at once: the steps shrink in geometric progression towards it.
+//! All these bounds tighten in proportion to the step. The quantities that they must not exceed are f, c, and the
+//! difference of a nearer point's distance to L. These fall in proportion to the distance from a singular
+//! configuration, even where all of them vanish at once: the steps shrink in geometric progression towards it.
 
 use crate::linkage::{NoFollower, follower, link_pose};
 use crate::model::curve::Curve;
@@ -133,16 +133,16 @@ impl Link<'_> {
         self.path.end_of(at.front_param.segment)
     }
 
-    /// Returns the metres of travel of the front handle up to which no link with both handles on its segment stalls or
-    /// locks, if this is known to be the segment's end.
+    /// Returns the end of the segment, metres of travel of the front handle, if the link is known not to stall or lock
+    /// before it.
     pub fn steady_until(&self, at: &Configuration) -> Option<f64> {
         let (front, rear) = (at.front_param, at.rear_param);
         let is_steady = front.segment == rear.segment && self.path.segment(front).is_steady(front.at, rear.at);
         Some(self.segment_end(at)).filter(|end| is_steady && *end > at.front)
     }
 
-    /// Returns true if a step, during which the front handle is on one segment, is proven to be continuous and to
-    /// contain no turn of the rear handle, or one turn if the front cosines at its ends differ in sign.
+    /// Returns true if a step with the front handle on one segment is proven to be continuous with a known number of
+    /// turns of the rear handle: one turn if the front cosines at the ends differ in sign, else none.
     pub fn is_certain(&self, before: &Configuration, after: &Configuration) -> bool {
         let curvature = self.front_curvature(before, after);
         self.least_rear_cosine(before, after, curvature.most)
@@ -204,9 +204,9 @@ impl Link<'_> {
         }
     }
 
-    /// Returns an upper bound of the change of q per metre of the rear handle between two places, `apart` metres from
-    /// each other, with distances up to `reach`: |q_u| = |K n . (P(s) - P(u)) - 1|. On one segment it follows from the
-    /// values at the corners and their rates of change, |K (K q + n . T(s))| at most.
+    /// Returns an upper bound of |q_u| = |K n . (P(s) - P(u)) - 1|, the change of q per metre of the rear handle
+    /// between two places. They are `apart` metres from each other, with distances up to `reach`. On one segment it
+    /// follows from the values at the corners and their rates of change, |K (K q + n . T(s))| at most.
     fn largest_second_derivative(&self, ends: [&Distances; 2], apart: f64, step: f64, reach: f64) -> f64 {
         let [far, near] = ends;
         let curvature = far.curvature.max(near.curvature);

@@ -3,11 +3,12 @@
 //! In: a link whose path begins with an inward spiral. Out: the lock and the turns on that segment. Only the trace
 //! calls it.
 //!
-//! **Lock.** The chord for fixed d grows with theta and up to its first maximum with d, so no nearer point ever reaches
+//! **Lock.** The chord for fixed d grows with theta and up to its first maximum with d. So no nearer point ever reaches
 //! the link's distance, and the follower vanishes only at the fold (`Spiral::fold`).
 //!
-//! **Turns.** With theta the front handle's angle and d the follower's from there, the front cosine has the sign of
-//! N = d + (theta + d) sin d (theta - t), t = tan(d/2), that is of sin d times g = theta^2 - (t - d) theta + d cot d.
+//! **Turns.** Let theta be the front handle's angle, d the angle from there to the follower, and t = tan(d/2). The
+//! front cosine has the sign of N = d + (theta + d) sin d (theta - t). This is the sign of sin d times g = theta^2 - (t
+//! - d) theta + d cot d.
 //! - d <= pi/2: cot d >= 0 and t < d, so g > 0: the link is not stalled.
 //! - pi/2 < d < pi: d cot d < 0, so g has one positive zero theta(d). There g_theta > 0 and
 //!   g_d = (1 - t^2)/2 theta + cot d - d / sin^2 d < 0, so theta(d) grows. Inward d grows as theta falls, so the link

@@ -351,7 +351,10 @@ proptest! {
     }
 
     #[test]
-    fn chains_on_turnarounds(pitch in 0.2f64..3.0, radius in 0.1f64..4.0, ratio in 0.3f64..3.0, lead in 0.0f64..5.0, head in 0.3f64..2.0, body in 0.3f64..2.0) {
+    fn chains_on_turnarounds(
+        pitch in 0.2f64..3.0, radius in 0.1f64..4.0, ratio in 0.3f64..3.0, lead in 0.0f64..5.0,
+        head in 0.3f64..2.0, body in 0.3f64..2.0,
+    ) {
         let path = Path::turnaround(pitch, radius, ratio, lead, 10.0).unwrap();
         let team = team(6, head + 0.55, body + 0.55);
         if search(&path, &team).end.unwrap().travelled > 0.0 {
@@ -365,7 +368,9 @@ proptest! {
     }
 
     #[test]
-    fn turnarounds_agree_with_sampling(pitch in 0.1f64..3.0, radius in 0.3f64..4.0, ratio in 0.3f64..3.0, link in 0.3f64..2.0) {
+    fn turnarounds_agree_with_sampling(
+        pitch in 0.1f64..3.0, radius in 0.3f64..4.0, ratio in 0.3f64..3.0, link in 0.3f64..2.0,
+    ) {
         let path = Path::turnaround(pitch, radius, ratio, 5.0, 10.0).unwrap();
         if LinkTrace::new(Link { path: &path, length: link }, Some(0.0)).unwrap().at().front >= 0.0 {
             check(&path, link);

@@ -5,10 +5,10 @@
 //! search advances it step by step. An uncertain step is halved, the earlier half first, down to the resolution.
 //!
 //! **At the resolution.** An unresolved stretch begins where a step of a few units in the last place is uncertain. Each
-//! further step in it may be as long as the stretch is already, because near a degenerate configuration rounding hides
-//! a distance in proportion to the distance from it. Over the whole stretch a jump is searched, and the signs of the
-//! front cosine at its ends are compared. A lock is a proven jump, found to the last digit; everything else is a graze.
-//! Jumps of less than about 1e-8 links and pairs of turns within one such stretch are below the resolution of doubles.
+//! further step in it may be as long as the stretch is already: near a degenerate configuration, the effect of rounding
+//! grows in proportion to the distance from it. Over the whole stretch a jump is searched, and the signs of the front
+//! cosine at its ends are compared. A lock is a proven jump, found to the last digit; everything else is a graze. Jumps
+//! of less than about 1e-8 links and pairs of turns within one such stretch are below the resolution of doubles.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -151,8 +151,8 @@ impl<'a> LinkTrace<'a> {
     }
 
     /// Returns the additional cost of a link, in links solved, if the path between its handles is winding. The search
-    /// for the rear handle and the proof that it is the first cover this whole path, in small steps where places are
-    /// nearly as far as the link.
+    /// for the rear handle and the proof that it is the first cover this whole path. Their steps are small where places
+    /// are nearly as far as the link.
     fn winding(&self, at: &Configuration) -> u64 {
         let links = (at.front - at.rear) / self.link.length;
         // A path that bends by half a turn at most is at most pi / 2 links long; NaN becomes 0.

@@ -124,8 +124,8 @@ pub struct FollowerTable {
 pub(crate) const EXACT_ACCURACY: f64 = 1e-9;
 
 impl FollowerTable {
-    /// Makes a solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve, as exact
-    /// as doubles allow, with the fastest instructions of this processor.
+    /// Makes a solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve. It is as
+    /// exact as doubles allow and uses the fastest instructions of this processor.
     ///
     /// Returns `None` if there is no such table: for a single bench, for a team so long that the table would exceed its
     /// limit, and if the table is not exact even at the start.

@@ -22,8 +22,8 @@ fn parry_distance(a: &Board, b: &Board, size: f64) -> f64 {
     query::distance(&pose_a, &shape(a), &pose_b, &shape(b)).unwrap().distance * size
 }
 
-/// The translation along our deepest pair separates the boards, and no tried direction needs less (by parry, whose own
-/// depths are wrong if a corner is nearer to another edge than to the one it crossed).
+/// The translation along our deepest pair separates the boards, and no tried direction needs less, by parry. Parry's
+/// own depths are wrong if a corner is nearer to another edge than to the edge that it crossed.
 fn check_depth(a: &Board, b: &Board, ours: f64, size: f64) {
     let (on_a, on_b) = closest_points_board_board(a, b);
     let out = (on_a - on_b).normalize();

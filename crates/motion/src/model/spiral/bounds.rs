@@ -50,11 +50,11 @@ impl Spiral {
         Some(Coordinate { high, low: 0.0 })
     }
 
-    /// Returns a lower bound of the clearance of two boards that share no handle, with all handles at least `r` from
-    /// the centre of an inward spiral, r >= 5 max(link + inset + width, pitch); it grows with r.
+    /// Returns a lower bound of the clearance of two boards without a common handle, all handles at least `r` from the
+    /// centre of an inward spiral. It needs r >= 5 max(link + inset + width, pitch) and grows with r.
     ///
     /// There theta > 31, so that the curvature is at most 1.002 / r, and chord and arc differ by less than 1 %: the
-    /// tangent turns by at most tau = 1.03 link / r <= 0.21 along one link, and a chord leans by at most half of that
+    /// tangent turns by at most tau = 1.03 link / r <= 0.21 along one link. A chord leans by at most half of that
     /// against the tangent at its end. Let the path between the outermost handles of benches i and i + k turn by phi.
     ///
     /// - k = 2: both links lean by psi <= tau against the one between them. Along that one the gap is
@@ -91,8 +91,8 @@ impl Spiral {
         other.minus(one).abs() * (radius * radius + a * a).sqrt()
     }
 
-    /// Returns how far a handle moves in the frame that turns about the centre with the reference handle and moves
-    /// outward with it, along the direction of the reference handle's follower, metres.
+    /// Returns an upper bound of a handle's displacement, metres, in the frame of the reference handle. The frame turns
+    /// about the centre with that handle and moves outward with it, along the direction of its follower.
     pub(super) fn seen_from_polar_frame(
         &self,
         (first, last): (Coordinate, Coordinate),

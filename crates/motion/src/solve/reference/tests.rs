@@ -44,8 +44,8 @@ fn length(vector: &RealVector) -> Real {
     vector.dot(vector).sqrt()
 }
 
-/// Returns the largest error of position over the handle's speed, if that is above 1, and of speed, relative, at each
-/// time of a table whose clock begins `before` seconds after the motion.
+/// Returns the largest errors at each time of a table whose clock begins `before` seconds after the motion: of position
+/// over the handle's speed, if that is above 1, and of speed, relative.
 fn errors(reference: &mut Reference, rows: &[Row], before: f64) -> Vec<(f64, f64, f64)> {
     let frames = rows.chunk_by(|a, b| a.time == b.time);
     let errors = frames.map(|rows| {
@@ -102,8 +102,8 @@ fn decimal(text: &str) -> Real {
 /// In centimetres, every number of both scenes is a double: the digits of the tables can be compared.
 const CENTIMETRES: Team = Team { benches: 223, head_length: 341.0, body_length: 220.0, width: 30.0, hole_inset: 27.5 };
 
-/// Returns the largest error in metres of a reference in centimetres at whole seconds of a table whose x is in a column
-/// and whose clock begins `before` seconds after the motion; and the number of rows.
+/// Returns the largest error of a reference in centimetres at whole seconds of a table, metres, and the number of rows.
+/// The table has x in a column; its clock begins `before` seconds after the motion.
 fn error_in_centimetres(description: &PathDescription, text: &str, column: usize, before: f64) -> (f64, usize) {
     let mut reference = Reference::new(CENTIMETRES, description, 100.0).unwrap();
     let (mut now, mut seats, mut worst, mut rows) = (f64::NAN, Vec::new(), 0f64, 0);

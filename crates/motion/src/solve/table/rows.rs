@@ -6,10 +6,10 @@
 //! Ger, Iterative Functional Equations, 1990.)
 //!
 //! The whole part of alpha is a *row*, counted from the front of the table backward; its fraction is a *phase*. The
-//! rows are grouped into bands, and the phases of each band are cut into pieces. Every piece holds, for every row of
-//! the band, the coordinates of the handle and the direction of the link it leads as polynomials of beta, -1 to 1 over
-//! the piece. Where a handle or its follower crosses a junction of the path, T has a kink in its second derivative;
-//! since T takes whole links to followers, all kinks of one junction have one phase, and pieces end there.
+//! rows are grouped into bands, and the phases of each band are cut into pieces. Every piece holds polynomials of beta,
+//! -1 to 1 over the piece, for every row of the band: of the handle's coordinates and of the direction of the link it
+//! leads. Where a handle or its follower crosses a junction of the path, T has a kink in its second derivative; since T
+//! takes whole links to followers, all kinks of one junction have one phase, and pieces end there.
 //!
 //! Made by [`super::band`]. Read by the frame and by the clearance.
 

@@ -1,4 +1,4 @@
-//! Places along a path relative to each other, to the last digit at any distance from the origin, and the step from a
+//! Places along a path relative to each other, to the last digit at any distance from the origin. And the step from a
 //! handle to the handle ahead.
 //!
 //! In: a path and places on it. Out: displacements, places at a link's distance, [`Node`]s. Used only to make the
@@ -18,8 +18,8 @@ pub(super) struct Track<'a> {
     last: Vec<Coordinate>,
 }
 
-/// Place of one handle of a chain of equal links, and its change with alpha, the number of links (and fractions of one)
-/// behind a fixed place of the chain.
+/// Place of one handle of a chain of equal links, and its change with alpha. Alpha is the number of links, with
+/// fraction, behind a fixed place of the chain.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Node {
     pub at: Param,
@@ -31,7 +31,7 @@ pub(super) struct Node {
     pub heading_rate: f64,
 }
 
-/// How a link lies, from the rear handle to the front one, and how it turns.
+/// The pose and the turning of a link, from its rear handle to its front one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pose {
     pub heading: f64,
