@@ -123,7 +123,7 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     transports.push(log::open(&folder.path().join("log"), line, scene.team().handles()).unwrap().0);
     let mut publishers: Vec<_> = transports.iter_mut().map(|transport| transport.publisher().unwrap()).collect();
     let subscription = Subscription::new(&name, Wake::OnFrame).unwrap();
-    let connection = subscription.connect().unwrap().unwrap();
+    let mut connection = subscription.connect().unwrap().unwrap();
     let (reports, _inbox) = queues();
     let (port, _door) = door();
     let mut doors = Doors::new(vec![port]);

@@ -5,7 +5,7 @@ mod processes;
 
 use std::time::{Duration, Instant};
 
-use bench_dragon::client::control::conductor::{Action, Conductor};
+use bench_dragon::client::control::command_client::{Action, CommandClient};
 use bench_dragon::client::control::{ControlError, Controller, PendingCommand};
 use bench_dragon::messages::control::Command as Conduct;
 use nix::sys::signal::Signal;
@@ -43,7 +43,7 @@ fn done(name: &str, arguments: &[&str]) -> Value {
 /// Numbers of actions in the order in which they were answered, and in a word what became of each.
 fn answers(actions: &[Action], between: impl FnOnce(), name: &str) -> Vec<(usize, String)> {
     let (sender, receiver) = std::sync::mpsc::channel();
-    let conductor = Conductor::start(&unique(name), move |number: usize, conducted| {
+    let conductor = CommandClient::start(&unique(name), move |number: usize, conducted| {
         let word = match conducted {
             Ok((command, response)) => {
                 format!("{}: {}", command.name(), response.result().unwrap().name())

@@ -6,9 +6,9 @@
 //! one WebSocket for each publisher; `wire` is its layout on the way. `origin` is who may connect, `gate` who may command,
 //! and how; `certificates` is what is proved of which scene.
 
+mod authorization;
 mod browser;
 mod certificates;
-mod gate;
 pub(crate) mod origin;
 mod reader;
 mod wire;
@@ -24,7 +24,7 @@ use axum::Router;
 use axum::body::Bytes;
 use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::ws::{Utf8Bytes, WebSocketUpgrade};
-use axum::extract::{Query, Request, State as Shared};
+use axum::extract::{Query, Request, State as Served};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Redirect, Response};
@@ -33,19 +33,19 @@ use tokio::sync::watch;
 use tower_http::services::ServeDir;
 
 use super::http::Listening;
+use authorization::Authorization;
+pub use authorization::Token;
 use bench_dragon_client::connection::Wake;
-use bench_dragon_client::feed::{Feed, FeedOptions, Frames};
+use bench_dragon_client::feed::{Delivery, Feed, FeedOptions};
 use bench_dragon_client::shared_memory::{OpenError, service_name};
 pub use certificates::{Certificate, Proofs, SceneHash};
-use gate::Gate;
-pub use gate::Token;
 use origin::Admission;
 pub use origin::AllowedOrigin;
 
 /// Browsers send requests of a few letters.
 const MAX_REQUEST_BYTES: usize = 1024;
 /// Each frame that woke the server would cost the publisher more than the frame itself.
-const FEED: FeedOptions = FeedOptions { wake: Wake::Never, frames: Frames::Newest };
+const FEED: FeedOptions = FeedOptions { wake: Wake::Never, frames: Delivery::Newest };
 
 /// The newest of everything a browser needs, each as it goes over the wire; empty where there is none.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -80,7 +80,7 @@ struct Channel {
     name: String,
     pictures: watch::Receiver<Picture>,
     /// `None` where nobody may command.
-    gate: Option<Arc<Gate>>,
+    authorization: Option<Arc<Authorization>>,
 }
 
 /// How the stage picture is served.
@@ -158,13 +158,13 @@ pub fn serve<Refused: From<ViewError>>(
     let loopback = address.ip().is_loopback();
     let needs_token = control && (!loopback || !origins.is_empty());
     let token = if needs_token { Some(Token::random().map_err(ViewError::from)?) } else { None };
-    let gate = |name: &str| control.then(|| Gate::new(name, token.clone()).map(Arc::new)).transpose();
-    let gates = names.iter().map(|name| gate(name)).collect::<Result<Vec<_>, _>>().map_err(listen)?;
+    let authorization = |name: &str| control.then(|| Authorization::new(name, token.clone()).map(Arc::new)).transpose();
+    let authorizations = names.iter().map(|name| authorization(name)).collect::<Result<Vec<_>, _>>().map_err(listen)?;
     ready(&Ready { address, token: token.clone() })?;
     let (mut channels, mut readers) = (Vec::new(), Vec::new());
-    for (name, gate) in names.iter().zip(gates) {
+    for (name, authorization) in names.iter().zip(authorizations) {
         let (sender, pictures) = watch::channel(Picture::default());
-        channels.push(Channel { name: name.clone(), pictures, gate });
+        channels.push(Channel { name: name.clone(), pictures, authorization });
         let (name, proofs, stop) = (name.clone(), Arc::clone(&proofs), Arc::clone(stop));
         readers.push(std::thread::spawn(move || {
             let read = Feed::new(&name, FEED).map(|feed| reader::read(feed, &name, &proofs, &sender, &stop));
@@ -210,11 +210,11 @@ fn router(server: Server, pages: Option<&Path>) -> Router {
         .route("/camera.js", file("text/javascript; charset=utf-8", include_str!("view/camera.js")))
         .route("/dragon.js", file("text/javascript; charset=utf-8", include_str!("view/dragon.js")))
         .route("/drawing.js", file("text/javascript; charset=utf-8", include_str!("view/drawing.js")))
-        .route("/hands.js", file("text/javascript; charset=utf-8", include_str!("view/hands.js")))
         .route("/hermite.js", file("text/javascript; charset=utf-8", include_str!("view/hermite.js")))
         .route("/marks.js", file("text/javascript; charset=utf-8", include_str!("view/marks.js")))
         .route("/palette.js", file("text/javascript; charset=utf-8", include_str!("view/palette.js")))
         .route("/panel.js", file("text/javascript; charset=utf-8", include_str!("view/panel.js")))
+        .route("/pointer_input.js", file("text/javascript; charset=utf-8", include_str!("view/pointer_input.js")))
         .route("/publishers.js", get(move || async move { served("text/javascript; charset=utf-8", names) }))
         .route("/roster.js", file("text/javascript; charset=utf-8", include_str!("view/roster.js")))
         .route("/show.js", file("text/javascript; charset=utf-8", include_str!("view/show.js")))
@@ -249,7 +249,7 @@ fn served(kind: &'static str, text: impl IntoResponse) -> Response {
 }
 
 /// A file of the user's own. A foreign name that resolves to this machine gets none.
-async fn own_page(Shared(server): Shared<Server>, request: Request, next: Next) -> Response {
+async fn own_page(Served(server): Served<Server>, request: Request, next: Next) -> Response {
     if !server.admission.allows_host(text_of(request.headers(), header::HOST)) {
         return (StatusCode::FORBIDDEN, "this server has another name").into_response();
     }
@@ -265,7 +265,7 @@ fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
 }
 
 async fn frames(
-    Shared(server): Shared<Server>,
+    Served(server): Served<Server>,
     headers: HeaderMap,
     Query(query): Query<Vec<(String, String)>>,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,

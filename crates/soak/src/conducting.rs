@@ -16,7 +16,7 @@ const CLIENT_LIFETIME: Duration = Duration::from_secs(5);
 
 /// Who conducts, and what came of it.
 pub struct Conducting {
-    conductor: Child,
+    load_generator: Child,
     state: ProcessState,
     conducted: Option<Conducted>,
     clients: Vec<(Child, Instant)>,
@@ -28,7 +28,7 @@ impl Conducting {
     /// Starts the conductor, and the clients.
     pub(super) fn start(plan: &Plan, conduct: &ConductPlan, sender: &Sender<ProcessEvent>) -> std::io::Result<Self> {
         let mut conducting = Self {
-            conductor: plan.spawn_conductor(conduct, sender)?,
+            load_generator: plan.spawn_load_generator(conduct, sender)?,
             state: ProcessState::Running,
             conducted: None,
             clients: Vec::new(),
@@ -73,7 +73,7 @@ impl Conducting {
     pub(super) fn end(&mut self) {
         if self.state == ProcessState::Running {
             self.state = ProcessState::Ending;
-            signal(&self.conductor, Signal::SIGTERM);
+            signal(&self.load_generator, Signal::SIGTERM);
         }
         for (client, _) in &mut self.clients {
             self.clients_lost += u64::from(matches!(client.try_wait(), Ok(Some(_))));
@@ -89,7 +89,7 @@ impl Conducting {
 
     /// All processes that may still run.
     pub(super) fn children(&mut self) -> impl Iterator<Item = &mut Child> {
-        self.clients.iter_mut().map(|(client, _)| client).chain([&mut self.conductor])
+        self.clients.iter_mut().map(|(client, _)| client).chain([&mut self.load_generator])
     }
 
     /// What the conductor has counted; `None` if it never reported.

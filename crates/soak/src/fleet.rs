@@ -45,7 +45,7 @@ pub enum FleetError {
     SubscriberEnded(String),
     /// Whoever conducts did not begin.
     #[error("the conductor did not begin within {} s", START_TIMEOUT.as_secs())]
-    NoConductor,
+    NoLoadGenerator,
     /// Frames did not come.
     #[error("not every subscriber received a frame within {} s", START_TIMEOUT.as_secs())]
     NoFrames,
@@ -101,7 +101,7 @@ impl Fleet {
         fleet.wait_for_frames(proceed)?;
         if let Some(conduct) = &fleet.plan.conduct {
             fleet.conducting = Some(Conducting::start(&fleet.plan, conduct, &fleet.sender)?);
-            fleet.wait_for_conductor(proceed)?;
+            fleet.wait_for_load_generator(proceed)?;
         }
         fleet.began = Instant::now();
         Ok(fleet)
@@ -131,12 +131,12 @@ impl Fleet {
     }
 
     /// It searches the scene for events before it reports for the first time.
-    fn wait_for_conductor(&mut self, proceed: &dyn Fn() -> bool) -> Result<(), FleetError> {
+    fn wait_for_load_generator(&mut self, proceed: &dyn Fn() -> bool) -> Result<(), FleetError> {
         let deadline = Instant::now() + START_TIMEOUT;
         while proceed() && self.conducting.as_ref().is_some_and(|conducting| conducting.conducted().is_none()) {
             self.poll(Duration::from_millis(50))?;
             if self.publisher_ended.is_some() || Instant::now() > deadline {
-                return Err(FleetError::NoConductor);
+                return Err(FleetError::NoLoadGenerator);
             }
         }
         Ok(())
@@ -162,7 +162,7 @@ impl Fleet {
                 let had_ended = member.child.try_wait()?.is_some();
                 member.child.kill()?;
                 member.child.wait()?;
-                let next = member.incarnations + 1;
+                let next = member.starts + 1;
                 member.replace(self.plan.spawn_subscriber(index, member.role, next, &self.sender)?, had_ended);
             }
         }
@@ -184,14 +184,14 @@ impl Fleet {
 
     fn handle(&mut self, event: ProcessEvent) {
         match event {
-            ProcessEvent::Observed { member, incarnation, observation } => {
-                self.members[member].observed(incarnation, *observation);
+            ProcessEvent::Observed { member, start, observation } => {
+                self.members[member].observed(start, *observation);
             }
-            ProcessEvent::Ended { member, incarnation } => self.members[member].ended(incarnation),
+            ProcessEvent::Ended { member, start } => self.members[member].ended(start),
             ProcessEvent::Conducted(conducted) => {
                 self.conducting.iter_mut().for_each(|conducting| conducting.counted((*conducted).clone()));
             }
-            ProcessEvent::ConductorEnded => self.conducting.iter_mut().for_each(Conducting::ended),
+            ProcessEvent::LoadGeneratorEnded => self.conducting.iter_mut().for_each(Conducting::ended),
             ProcessEvent::Summary(summary) => self.summary = Some(*summary),
             ProcessEvent::Stderr(line) => self.stderr.push(line),
         }

@@ -7,13 +7,13 @@
 
 pub mod conduct;
 pub mod conducting;
+mod conformance;
 pub mod figures;
 pub mod fleet;
 pub mod histograms;
 pub mod history;
 pub mod limits;
 pub mod member;
-mod obedience;
 pub mod observation;
 pub mod observer;
 mod plots;

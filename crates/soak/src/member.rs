@@ -52,7 +52,7 @@ pub struct Member {
     /// What it is for.
     pub role: Role,
     /// Processes it has been so far.
-    pub incarnations: u64,
+    pub starts: u64,
     /// The present one's state.
     pub state: ProcessState,
     /// Former incarnations that had ended by themselves.
@@ -73,7 +73,7 @@ impl Member {
         Self {
             label,
             role,
-            incarnations: 1,
+            starts: 1,
             state: ProcessState::Running,
             lost: 0,
             child,
@@ -89,23 +89,23 @@ impl Member {
         self.lost += u64::from(had_ended);
         self.past = self.seen();
         self.present = Observation::default();
-        self.incarnations += 1;
+        self.starts += 1;
         self.state = ProcessState::Running;
         self.spawned = Instant::now();
         self.child = child;
     }
 
     /// Takes in what an incarnation has seen. What a former one still had in its pipe is left out.
-    pub fn observed(&mut self, incarnation: u64, observation: Observation) {
-        if incarnation == self.incarnations {
+    pub fn observed(&mut self, start: u64, observation: Observation) {
+        if start == self.starts {
             self.fresh = Latencies::worst(self.fresh, observation.second);
             self.present = observation;
         }
     }
 
     /// Takes in that the process of an incarnation has ended.
-    pub fn ended(&mut self, incarnation: u64) {
-        if incarnation == self.incarnations {
+    pub fn ended(&mut self, start: u64) {
+        if start == self.starts {
             self.state = match self.state {
                 ProcessState::Ending => ProcessState::Ended,
                 _ => ProcessState::EndedByItself,
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn incarnations_add_up_and_a_former_one_is_not_heard_any_more() {
+    fn starts_add_up_and_a_former_one_is_not_heard_any_more() {
         let mut member = member();
         let seen = |received| Observation { received, ..Observation::default() };
         member.observed(1, seen(10));
@@ -172,7 +172,7 @@ mod tests {
         member.ended(1);
         member.observed(2, seen(7));
         assert_eq!((member.seen().received, member.present().received), (17, 7));
-        assert_eq!((member.state, member.incarnations), (ProcessState::Running, 2));
+        assert_eq!((member.state, member.starts), (ProcessState::Running, 2));
         member.replace(process(), true);
         member.state = ProcessState::Ended;
         assert_eq!(member.failed(), 1, "one ended by itself and was started again");

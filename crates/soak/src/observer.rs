@@ -5,7 +5,7 @@
 
 use hdrhistogram::Histogram;
 
-use super::obedience::Obedience;
+use super::conformance::ConformanceCheck;
 use super::observation::{Latencies, Observation};
 use bench_dragon_client::feed::FeedEvent;
 use bench_dragon_messages::{FrameHeader, HandlePose, LoopStatus, Stage};
@@ -50,7 +50,7 @@ pub struct Observer {
     /// The first frame of the present run.
     first: FrameHeader,
     previous: Option<FrameHeader>,
-    obedience: Obedience,
+    conformance: ConformanceCheck,
     second: Histograms,
     total: Histograms,
 }
@@ -71,7 +71,7 @@ impl Observer {
             link_tolerance,
             first: FrameHeader::default(),
             previous: None,
-            obedience: Obedience::default(),
+            conformance: ConformanceCheck::default(),
             second: Histograms::new(),
             total: Histograms::new(),
         }
@@ -85,7 +85,7 @@ impl Observer {
             FeedEvent::Frame { header, handles, missed } => {
                 self.seen.missed += missed;
                 self.frame(header, handles, received_ns);
-                self.check_obedience(header, handles);
+                self.check_conformance(header, handles);
             }
             FeedEvent::Alert(_) => self.seen.alerts += 1,
             FeedEvent::Status(status) => self.status(status),
@@ -158,12 +158,12 @@ impl Observer {
         self.seen.phase_error_ns = self.seen.phase_error_ns.max(error);
     }
 
-    fn check_obedience(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
+    fn check_conformance(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
         self.seen.epoch = header.epoch;
         // Without the rate no time can be checked.
         let Some(status) = self.seen.status else { return };
         self.seen.times_checked += 1;
-        if let Err(fault) = self.obedience.check(header, handles, status.rate) {
+        if let Err(fault) = self.conformance.check(header, handles, status.rate) {
             self.seen.disobedient += 1;
             self.seen.disobedience.get_or_insert(fault);
         }

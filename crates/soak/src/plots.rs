@@ -18,7 +18,7 @@ fn colour(hex: &str) -> RGBColor {
 }
 
 /// A line of a plot.
-pub struct Line {
+pub struct PlotLine {
     /// What it is.
     pub label: String,
     /// Seconds since the start, and values.
@@ -36,7 +36,7 @@ pub enum Scale {
 
 /// A plot of some lines over time as HTML: what each colour means, and an `<svg>` element. `None` if there is nothing to
 /// plot.
-pub fn plot(unit: &str, scale: Scale, lines: &[Line]) -> Option<String> {
+pub fn plot(unit: &str, scale: Scale, lines: &[PlotLine]) -> Option<String> {
     let points = || lines.iter().flat_map(|line| &line.points);
     let last = points().map(|point| point.0).fold(f64::NAN, f64::max);
     let most = points().map(|point| point.1).fold(f64::NAN, f64::max);
@@ -69,9 +69,9 @@ pub fn plot(unit: &str, scale: Scale, lines: &[Line]) -> Option<String> {
 }
 
 /// What each colour means. Above the plot, where it hides no line.
-fn legend(lines: &[Line]) -> String {
+fn legend(lines: &[PlotLine]) -> String {
     // A picture of its own, so that the rules that make plots dark make it dark too.
-    let key = |(line, (colour, _)): (&Line, &(&str, &str))| {
+    let key = |(line, (colour, _)): (&PlotLine, &(&str, &str))| {
         format!(
             "<span><svg width=\"18\" height=\"10\"><rect y=\"3\" width=\"18\" height=\"4\" fill=\"{colour}\"/></svg> {}</span>\n",
             escaped(&line.label)
@@ -98,7 +98,7 @@ fn draw<'a, Y>(
     chart: &mut ChartContext<'a, SVGBackend<'a>, Cartesian2d<plotters::coord::types::RangedCoordf64, Y>>,
     unit: &str,
     time: &str,
-    lines: &[Line],
+    lines: &[PlotLine],
     (seconds, floor): (f64, f64),
 ) -> Option<()>
 where
@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn plots_are_svg_and_nothing_gives_none() {
-        let line = |points| Line { label: "a & b".to_owned(), points };
+        let line = |points| PlotLine { label: "a & b".to_owned(), points };
         for scale in [Scale::Linear, Scale::Logarithmic] {
             assert_eq!(plot("us", scale, &[line(Vec::new())]), None);
             let html = plot("us", scale, &[line(vec![(0.0, 0.0), (1.0, 0.0)])]).unwrap();

@@ -45,13 +45,13 @@ pub struct ConductPlan {
 /// What a process has printed, or that it has ended.
 pub(super) enum ProcessEvent {
     /// A subscriber has printed what it has seen.
-    Observed { member: usize, incarnation: u64, observation: Box<Observation> },
+    Observed { member: usize, start: u64, observation: Box<Observation> },
     /// A subscriber has closed its standard output.
-    Ended { member: usize, incarnation: u64 },
+    Ended { member: usize, start: u64 },
     /// The conductor has printed what it has counted.
     Conducted(Box<Conducted>),
     /// The conductor has closed its standard output.
-    ConductorEnded,
+    LoadGeneratorEnded,
     /// The publisher has printed its summary.
     Summary(Box<RunSummary>),
     /// The publisher has printed a line on standard error.
@@ -84,12 +84,12 @@ impl Plan {
         Ok(child)
     }
 
-    /// Starts an incarnation of a member.
+    /// Starts the process of a member.
     pub(super) fn spawn_subscriber(
         &self,
         member: usize,
         role: Role,
-        incarnation: u64,
+        start: u64,
         sender: &Sender<ProcessEvent>,
     ) -> std::io::Result<Child> {
         let mut command = self.command("soak-subscriber");
@@ -104,9 +104,9 @@ impl Plan {
             let observations = lines(stdout).filter_map(|line| serde_json::from_str(&line).ok());
             for observation in observations {
                 // Nobody receives any more where the test has ended.
-                let _ = sender.send(ProcessEvent::Observed { member, incarnation, observation: Box::new(observation) });
+                let _ = sender.send(ProcessEvent::Observed { member, start, observation: Box::new(observation) });
             }
-            let _ = sender.send(ProcessEvent::Ended { member, incarnation });
+            let _ = sender.send(ProcessEvent::Ended { member, start });
         });
         Ok(child)
     }
@@ -114,7 +114,7 @@ impl Plan {
 
 impl Plan {
     /// Starts the process that sends commands.
-    pub(super) fn spawn_conductor(
+    pub(super) fn spawn_load_generator(
         &self,
         conduct: &ConductPlan,
         sender: &Sender<ProcessEvent>,
@@ -132,7 +132,7 @@ impl Plan {
             for conducted in lines(stdout).filter_map(|line| serde_json::from_str(&line).ok()) {
                 let _ = sender.send(ProcessEvent::Conducted(Box::new(conducted)));
             }
-            let _ = sender.send(ProcessEvent::ConductorEnded);
+            let _ = sender.send(ProcessEvent::LoadGeneratorEnded);
         });
         Ok(child)
     }

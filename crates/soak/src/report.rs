@@ -11,7 +11,7 @@ use super::fleet::Fleet;
 use super::history::History;
 use super::member::{Member, Role};
 use super::observation::{Latencies, Observation};
-use super::plots::{Line, Scale, escaped, plot};
+use super::plots::{PlotLine, Scale, escaped, plot};
 use super::verdict::LimitCheck;
 use bench_dragon_drawing::palette::dark_rules;
 use bench_dragon_publisher::live::Deliveries;
@@ -52,7 +52,7 @@ pub struct Report {
     pub history: History,
 }
 
-/// What a subscriber saw in all its incarnations.
+/// The observation of a subscriber, over all its starts.
 #[derive(Debug, Serialize)]
 pub struct SubscriberReport {
     /// Its name.
@@ -97,7 +97,7 @@ impl SubscriberReport {
         let report = |member: &Member| Self {
             label: member.label.clone(),
             role: member.role,
-            incarnations: member.incarnations,
+            incarnations: member.starts,
             seen: Observation { second: None, ..member.seen() },
         };
         fleet.members().iter().map(report).collect()
@@ -234,7 +234,7 @@ impl Report {
     }
 
     fn plots(&self) -> String {
-        let line = |label: &str, column: &str, scale: f64| Line {
+        let line = |label: &str, column: &str, scale: f64| PlotLine {
             label: label.to_owned(),
             points: self.history.column(column).into_iter().map(|(at, value)| (at, value / scale)).collect(),
         };
@@ -244,7 +244,7 @@ impl Report {
                 .into_iter()
                 .collect::<Vec<_>>()
         };
-        let of_each = |column: &str, scale: f64| -> Vec<Line> {
+        let of_each = |column: &str, scale: f64| -> Vec<PlotLine> {
             let labels = self.subscribers.iter().map(|subscriber| &subscriber.label);
             labels.map(|label| line(label, &column_of(label, column), scale)).collect()
         };
@@ -277,7 +277,7 @@ impl Report {
             ("Open file descriptors".to_owned(), "", Scale::Linear, vec![line("open", "file_descriptors", 1.0)]),
             ("Shows played".to_owned(), "", Scale::Linear, vec![line("shows", "shows_played", 1.0)]),
         ]);
-        let section = |(title, unit, scale, lines): (String, &str, Scale, Vec<Line>)| {
+        let section = |(title, unit, scale, lines): (String, &str, Scale, Vec<PlotLine>)| {
             let picture = plot(unit, scale, &lines).unwrap_or_else(|| "<p>Nothing was measured.</p>".to_owned());
             format!("<h2>{title}</h2>\n{picture}\n")
         };

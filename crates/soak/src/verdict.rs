@@ -70,12 +70,12 @@ impl LimitCheck {
 
 /// All limits together.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Verdict {
+pub struct SoakVerdict {
     /// Each of them.
     pub checks: Vec<LimitCheck>,
 }
 
-impl Verdict {
+impl SoakVerdict {
     /// The verdict on a fleet that has finished.
     pub fn of(fleet: &Fleet, limits: &Limits) -> Self {
         let steady: Vec<_> = fleet.members().iter().filter(|member| member.role == Role::Steady).collect();
@@ -114,7 +114,7 @@ impl Verdict {
             count("processes that ended by themselves or hung", 0.0, lost(fleet)),
         ]);
         if let Some(conducting) = fleet.conducting() {
-            let of_conductor = |value: fn(&Conducted) -> u64| {
+            let of_load = |value: fn(&Conducted) -> u64| {
                 // Who sent nothing has tested nothing.
                 let conducted = conducting.conducted().filter(|conducted| conducted.sent > 0);
                 conducted.map_or(f64::NAN, |conducted| value(conducted) as f64)
@@ -122,9 +122,9 @@ impl Verdict {
             checks.extend([
                 count("frames that disobey the commands", 0.0, of_all(|seen| seen.disobedient)),
                 count("jumps of simulated time too many or too few", 0.0, wrong_jumps(&steady, conducting)),
-                count("answers that the command table does not allow", 0.0, of_conductor(|conducted| conducted.wrong)),
-                count("answers that their frames contradict", 0.0, of_conductor(|conducted| conducted.contradicted)),
-                count("commands that were not answered", 0.0, of_conductor(|conducted| conducted.lost)),
+                count("answers that the command table does not allow", 0.0, of_load(|conducted| conducted.wrong)),
+                count("answers that their frames contradict", 0.0, of_load(|conducted| conducted.contradicted)),
+                count("commands that were not answered", 0.0, of_load(|conducted| conducted.lost)),
             ]);
         }
         Self { checks }

@@ -1,4 +1,4 @@
-//! What can go wrong with iceoryx2's services, each in one sentence that names a remedy.
+//! The errors of iceoryx2's services, each in one sentence that names a remedy.
 
 use ::iceoryx2::port::publisher::PublisherCreateError;
 use ::iceoryx2::prelude::ServiceName;
@@ -9,10 +9,10 @@ use ::iceoryx2::service::builder::publish_subscribe::{
 use super::MOST_PUBLISHERS;
 use super::memory::SHARED_MEMORY;
 
-/// Why the shared memory cannot be used.
+/// The reason why the shared memory cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// iceoryx2 has no services of such a name.
+    /// iceoryx2 refuses the name.
     #[error("the name is \"{name}\", expected a name for services of iceoryx2: not empty, at most {most} bytes")]
     Name {
         /// The name given.
@@ -20,7 +20,7 @@ pub enum OpenError {
         /// The most bytes a name may have.
         most: usize,
     },
-    /// Somebody publishes under this name already.
+    /// Another publisher runs under this name.
     #[error("another publisher is running under the name \"{0}\": stop it, or choose another name for this one")]
     AlreadyPublished(String),
     /// A service has as many publishers as it admits.
@@ -38,7 +38,7 @@ pub enum OpenError {
     NoRoom {
         /// Frames in a queue.
         queue: usize,
-        /// Subscribers that may come.
+        /// The most subscribers.
         subscribers: usize,
         /// Bytes needed.
         needed: u64,
@@ -80,7 +80,7 @@ pub enum OpenError {
          another name"
     )]
     OtherAttributes(String),
-    /// A program has opened a service before its publisher, with limits of its own.
+    /// A program has opened a service before its publisher, with other limits.
     #[error(
         "the service \"{0}\" exists with lower limits than this scene asks for: a program that was started before the show \
          has made it, such as a tunnel that listens to it; start that after the show"
@@ -102,12 +102,12 @@ pub enum OpenError {
     Failed {
         /// The service.
         service: String,
-        /// What iceoryx2 reports.
+        /// The error of iceoryx2.
         reason: String,
     },
 }
 
-/// Returns why a service of messages cannot be opened.
+/// Returns the error of a service that cannot be opened.
 pub fn service_error(service: &ServiceName, error: PublishSubscribeOpenOrCreateError) -> OpenError {
     use PublishSubscribeOpenError as Open;
     if matches!(error, PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(Open::HangsInCreation)) {
@@ -133,7 +133,7 @@ pub fn service_error(service: &ServiceName, error: PublishSubscribeOpenOrCreateE
     }
 }
 
-/// Returns why a publisher's port cannot be made.
+/// Returns the error of a publisher's port that cannot be created.
 pub fn port_error(name: &str, service: &str, error: PublisherCreateError) -> OpenError {
     match error {
         PublisherCreateError::ExceedsMaxSupportedPublishers => {
@@ -143,12 +143,12 @@ pub fn port_error(name: &str, service: &str, error: PublisherCreateError) -> Ope
     }
 }
 
-/// Returns the error of a service whose maker has not finished it.
+/// Returns the error of a service whose creator has not finished it.
 pub fn incomplete(name: &str, service: &str) -> OpenError {
     OpenError::Incomplete(format!("{name}/{service}"))
 }
 
-/// Returns the error that has no remedy of its own.
+/// Returns the error without a specific remedy.
 pub fn failed(name: &str, service: &str, error: impl std::fmt::Debug) -> OpenError {
     OpenError::Failed { service: format!("{name}/{service}"), reason: format!("{error:?}") }
 }

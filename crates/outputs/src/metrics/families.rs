@@ -1,8 +1,8 @@
-//! Which figures are served, under which names. In: what a [`Monitor`](bench_dragon_client::monitor::Monitor) knows. Out:
-//! families of samples. Pure.
+//! The figures that are served, and their names. In: the report of a [`Monitor`](bench_dragon_client::monitor::Monitor).
+//! Out: families of samples. Pure.
 //!
-//! Names and units follow Prometheus ("Metric and label naming"): seconds, bytes, metres, `_total` for what is counted.
-//! Every sample has the publisher's name as its label `name`; the run is a label of one of them only, since each new value
+//! Names and units follow Prometheus ("Metric and label naming"): seconds, bytes, metres, `_total` for counts.
+//! Every sample has the publisher's name as its label `name`. Only one sample has the run as a label, since each new value
 //! of a label makes a new series.
 
 use super::exposition::{Family, Kind};
@@ -10,7 +10,7 @@ use bench_dragon_client::monitor::{IntervalReport, Presence};
 use bench_dragon_messages::state::{FrameState, PlaybackState};
 use bench_dragon_messages::{CollisionAlert, FrameHeader, LoopStatus};
 
-/// All families of the publisher `name`. Those of a publisher that is not there have no samples.
+/// Returns all families of the publisher `name`. Without a running publisher most of them have no samples.
 pub fn families(name: &str, report: &IntervalReport) -> Vec<Family> {
     let families = Families { name };
     let mut all = families.of_this_process(report);
@@ -26,7 +26,7 @@ pub fn families(name: &str, report: &IntervalReport) -> Vec<Family> {
     all
 }
 
-/// The families of several publishers as one list, in which each family stands once with the samples of all.
+/// Returns the families of several publishers as one list: each family once, with the samples of all publishers.
 pub fn joined(publishers: impl IntoIterator<Item = Vec<Family>>) -> Vec<Family> {
     let mut all: Vec<Family> = Vec::new();
     for family in publishers.into_iter().flatten() {
@@ -48,7 +48,7 @@ impl Families<'_> {
         [("name", self.name.to_owned())].into_iter().chain(further).collect()
     }
 
-    /// A family of one sample.
+    /// Returns a family of one sample.
     fn one(
         &self,
         name: &'static str,
@@ -68,7 +68,7 @@ impl Families<'_> {
         self.one(name, Kind::Gauge, None, help, value)
     }
 
-    /// One sample for each of several states, 1 for the one that holds.
+    /// Returns one sample for each of several states, 1 for the present state.
     fn states<'a>(
         &self,
         name: &'static str,
@@ -190,7 +190,7 @@ impl Families<'_> {
         ]
     }
 
-    /// Nanoseconds as quantiles: 0.5, 0.99, 1 of the last second; 0.5, 0.99, 0.999, 1 of the run.
+    /// Returns nanoseconds as quantiles: 0.5, 0.99, 1 of the last second; 0.5, 0.99, 0.999, 1 of the run.
     fn summary(&self, name: &'static str, help: &'static str, second: [u64; 3], run: [u64; 4]) -> Family {
         let sample =
             |window, quantile, ns: u64| (self.labels(&[("window", window), ("quantile", quantile)]), ns as f64 / 1e9);

@@ -11,7 +11,7 @@ use futures_util::{Sink, SinkExt, StreamExt};
 use tokio::sync::{mpsc, watch};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout};
 
-use super::gate::Visitor;
+use super::authorization::Visitor;
 use super::{Channel, Picture, wire};
 use bench_dragon_client::clock::monotonic_ns;
 
@@ -24,10 +24,10 @@ const TIMEOUT: Duration = Duration::from_secs(30);
 
 /// Serves a browser one publisher until it goes. `gap` is the least time between two frames.
 pub(super) async fn serve(socket: WebSocket, channel: Channel, gap: Duration) {
-    let Channel { mut pictures, gate, .. } = channel;
+    let Channel { mut pictures, authorization, .. } = channel;
     let (mut sink, mut stream) = socket.split();
     let (sender, mut answers) = mpsc::unbounded_channel();
-    let mut visitor = Visitor::new(gate.as_deref(), sender);
+    let mut visitor = Visitor::new(authorization.as_deref(), sender);
     let permission = visitor.permission().map(text);
     if !matches!(timeout(TIMEOUT, send(&mut sink, permission.into_iter().collect())).await, Ok(Ok(()))) {
         return;

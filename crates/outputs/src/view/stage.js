@@ -7,7 +7,7 @@ import { benchAt } from "./boards.js";
 import { Camera } from "./camera.js";
 import { Dragon } from "./dragon.js";
 import { Ground, draw } from "./drawing.js";
-import { attach } from "./hands.js";
+import { attach } from "./pointer_input.js";
 import { identityOf, paletteOf } from "./palette.js";
 import { element, put, showBench, showFigures, showNames, showProofs, showSituation } from "./panel.js";
 import { publishers } from "./publishers.js";

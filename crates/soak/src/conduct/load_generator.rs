@@ -13,7 +13,7 @@ use super::record::{Answered, Record};
 use bench_dragon_client::clock::monotonic_ns;
 use bench_dragon_client::connection::Wake;
 use bench_dragon_client::control::{ControlError, Controller};
-use bench_dragon_client::feed::{Feed, FeedEvent, FeedOptions, Frames};
+use bench_dragon_client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use bench_dragon_client::shared_memory::OpenError;
 use bench_dragon_messages::ControlResponse;
 use bench_dragon_messages::control::{Code, Command};
@@ -41,7 +41,7 @@ pub fn conduct<Failed: From<OpenError>>(
     stop: &AtomicBool,
     report: &mut dyn FnMut(Conducted) -> Result<(), Failed>,
 ) -> Result<(), Failed> {
-    let mut feed = Feed::new(name, FeedOptions { wake: Wake::Never, frames: Frames::All })?;
+    let mut feed = Feed::new(name, FeedOptions { wake: Wake::Never, frames: Delivery::All })?;
     let mut record = Record::new(seed, rate);
     report(record.conducted())?;
     let Some(facts) = wait_for_stage(&mut feed, &mut record, stop)? else { return report(record.conducted()) };

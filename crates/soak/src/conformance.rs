@@ -12,7 +12,7 @@ const PERIODS_TOLERANCE: f64 = 0.01;
 
 /// What is known of the frames so far.
 #[derive(Debug, Default)]
-pub(super) struct Obedience {
+pub(super) struct ConformanceCheck {
     /// The frame at which the present stretch began: one of the same epoch, playback and time scale.
     anchor: FrameHeader,
     previous: Option<FrameHeader>,
@@ -22,7 +22,7 @@ pub(super) struct Obedience {
     end: Option<f64>,
 }
 
-impl Obedience {
+impl ConformanceCheck {
     /// Checks a frame of a publisher at so many frames per second.
     ///
     /// # Errors

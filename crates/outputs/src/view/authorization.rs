@@ -1,6 +1,6 @@
 //! The way from browsers to `<name>/control`: who may command, what a message commands, and the answer to it.
 //!
-//! In: the text of a message. Out: JSON. A [`Gate`] is there only where the user asked for control; its conductor has a
+//! In: the text of a message. Out: JSON. A [`Authorization`] is there only where the user asked for control; its conductor has a
 //! thread of its own, so that no command keeps a picture waiting. Called by the server and by `browser`.
 
 use serde::Deserialize;
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use subtle::ConstantTimeEq;
 use tokio::sync::mpsc::UnboundedSender;
 
-use bench_dragon_client::control::conductor::{Action, Conducted, Conductor};
+use bench_dragon_client::control::command_client::{Action, ActionResult, CommandClient};
 use bench_dragon_client::control::refusal;
 use bench_dragon_messages::control::{Code, Command};
 use bench_dragon_messages::state::PlaybackState;
@@ -55,22 +55,22 @@ impl Token {
 }
 
 /// A server's way to `<name>/control`.
-pub(super) struct Gate {
-    conductor: Conductor<Tag>,
+pub(super) struct Authorization {
+    client: CommandClient<Tag>,
     token: Option<Token>,
 }
 
-impl Gate {
+impl Authorization {
     /// A gate to the publisher of `name`, for whoever has the token, or for everybody where there is none.
     ///
     /// # Errors
     /// The system has no thread left.
     pub(super) fn new(name: &str, token: Option<Token>) -> std::io::Result<Self> {
-        let conductor = Conductor::start(name, |Tag { id, answers }, conducted| {
+        let client = CommandClient::start(name, |Tag { id, answers }, result| {
             // A browser that has gone needs no answer.
-            let _ = answers.send(answer(&id, conducted));
+            let _ = answers.send(answer(&id, result));
         })?;
-        Ok(Self { conductor, token })
+        Ok(Self { client, token })
     }
 
     /// Whether those who have given no token may command.
@@ -81,7 +81,7 @@ impl Gate {
 
 /// One browser at the gate.
 pub(super) struct Visitor<'a> {
-    gate: Option<&'a Gate>,
+    authorization: Option<&'a Authorization>,
     allowed: bool,
     answers: UnboundedSender<String>,
     /// Commands whose answers have not come.
@@ -105,13 +105,13 @@ enum Request {
 
 impl<'a> Visitor<'a> {
     /// A browser that has given nothing yet; what becomes of its commands goes to `answers`.
-    pub(super) fn new(gate: Option<&'a Gate>, answers: UnboundedSender<String>) -> Self {
-        Self { gate, allowed: gate.is_some_and(Gate::is_open), answers, unanswered: 0 }
+    pub(super) fn new(authorization: Option<&'a Authorization>, answers: UnboundedSender<String>) -> Self {
+        Self { authorization, allowed: authorization.is_some_and(Authorization::is_open), answers, unanswered: 0 }
     }
 
     /// The message about whether this browser may command; none where nobody may.
     pub(super) fn permission(&self) -> Option<String> {
-        self.gate?;
+        self.authorization?;
         let reason = (!self.allowed).then_some("commands need the token of the address that view printed");
         Some(json!({"type": "control", "allowed": self.allowed, "reason": reason}).to_string())
     }
@@ -122,24 +122,24 @@ impl<'a> Visitor<'a> {
             Ok(request) => request,
             Err(_) => return Some(refused(&Value::Null, EXPECTED)),
         };
-        match (request, self.gate) {
+        match (request, self.authorization) {
             (Request::Command { id, .. }, None) => Some(refused(&id, OFF)),
             (Request::Token { .. }, None) => Some(refused(&Value::Null, OFF)),
-            (Request::Token { token }, Some(gate)) => {
-                self.allowed = gate.token.as_ref().is_none_or(|right| right.is(&token));
+            (Request::Token { token }, Some(authorization)) => {
+                self.allowed = authorization.token.as_ref().is_none_or(|right| right.is(&token));
                 self.permission()
             }
             (Request::Command { id, .. }, Some(_)) if !self.allowed => {
                 Some(refused(&id, "commands need the token of the address that view printed"))
             }
-            (Request::Command { command, value, id }, Some(gate)) => match action(&command, value) {
+            (Request::Command { command, value, id }, Some(authorization)) => match action(&command, value) {
                 Err(sentence) => Some(refused(&id, sentence)),
-                Ok(action) => self.pass_on(gate, id, action),
+                Ok(action) => self.pass_on(authorization, id, action),
             },
         }
     }
 
-    fn pass_on(&mut self, gate: &Gate, id: Value, action: Action) -> Option<String> {
+    fn pass_on(&mut self, authorization: &Authorization, id: Value, action: Action) -> Option<String> {
         let too_many = "too many commands are waiting";
         // A hold is accepted always: one more than all others.
         let most = if action == Action::Send(Command::Hold) { MOST_UNANSWERED + 1 } else { MOST_UNANSWERED };
@@ -147,7 +147,7 @@ impl<'a> Visitor<'a> {
             return Some(refused(&id, too_many));
         }
         let tag = Tag { id: id.clone(), answers: self.answers.clone() };
-        match gate.conductor.request(tag, action) {
+        match authorization.client.request(tag, action) {
             Ok(()) => {
                 self.unanswered += 1;
                 None
@@ -180,9 +180,9 @@ fn refused(id: &Value, sentence: &str) -> String {
 }
 
 /// What became of a command.
-fn answer(id: &Value, conducted: Conducted) -> String {
-    let (command, response) = match conducted {
-        Ok(conducted) => conducted,
+fn answer(id: &Value, result: ActionResult) -> String {
+    let (command, response) = match result {
+        Ok(done) => done,
         Err(error) => return refused(id, &error.to_string()),
     };
     json!({"type": "answer", "id": id, "command": command.name(),

@@ -49,8 +49,8 @@ fn frames(list: &[(u64, u64, Command)]) -> Vec<(FrameHeader, Vec<HandlePose>)> {
 }
 
 fn faults(frames: &[(FrameHeader, Vec<HandlePose>)]) -> Vec<String> {
-    let mut obedience = Obedience::default();
-    frames.iter().filter_map(|(header, handles)| obedience.check(header, handles, RATE).err()).collect()
+    let mut conformance = ConformanceCheck::default();
+    frames.iter().filter_map(|(header, handles)| conformance.check(header, handles, RATE).err()).collect()
 }
 
 proptest! {
