@@ -148,6 +148,11 @@ impl From<io::Error> for CommandError {
     }
 }
 
+/// Returns the error for a `file` that cannot be created.
+pub fn not_writable(file: impl std::fmt::Display, error: &io::Error) -> CommandError {
+    CommandError::BadInput(format!("{file}: {error}, expected a file to write"))
+}
+
 /// Where a command's result goes: standard output, or a file that the user named.
 pub struct Output {
     writer: BufWriter<Box<dyn Write>>,
@@ -164,8 +169,8 @@ impl Output {
     /// # Errors
     /// Bad input: the file cannot be written.
     pub fn file(file: &Path) -> Result<Self, CommandError> {
-        let refused = |error| CommandError::BadInput(format!("{}: {error}, expected a file to write", file.display()));
-        Ok(Self { writer: BufWriter::new(Box::new(File::create(file).map_err(refused)?)) })
+        let created = File::create(file).map_err(|error| not_writable(file.display(), &error))?;
+        Ok(Self { writer: BufWriter::new(Box::new(created)) })
     }
 
     /// Writes a line.

@@ -1,12 +1,12 @@
 //! A bench dragon, live: where every handle of a coiling chain of benches is, published at a fixed rate.
 //!
-//! This library is the crates of the workspace under one name. Without the feature `cli` it is [`messages`] and [`client`]:
+//! This library is the crates of the workspace under one name. Without the feature `library` it is [`messages`] and [`client`]:
 //! all that a subscriber compiles. `ARCHITECTURE.md` draws how the crates depend on each other.
 //!
 //! - [`messages`]: layouts, states, commands and JSON of what a publisher and its subscribers exchange.
 //! - [`client`]: follow, interpolate and command a running publisher.
 //!
-//! With the feature `cli`:
+//! With the feature `library`, which the program needs:
 //!
 //! - `motion`: the path, the solvers, the events, the clearance. Pure.
 //! - `show`: the scene file, checked, and its frames by tick. Deterministic.
@@ -23,29 +23,29 @@
 #[cfg(all(feature = "jazzy", feature = "humble"))]
 compile_error!("choose one ROS 2 distribution: `--no-default-features --features cli,humble` for Humble");
 
-#[cfg(feature = "cli")]
+#[cfg(feature = "library")]
 pub use bench_dragon_certify as certify;
 pub use bench_dragon_client as client;
-#[cfg(feature = "cli")]
+#[cfg(feature = "library")]
 pub use bench_dragon_drawing as drawing;
 pub use bench_dragon_messages as messages;
-#[cfg(feature = "cli")]
+#[cfg(feature = "library")]
 pub use bench_dragon_motion as motion;
-#[cfg(feature = "cli")]
+#[cfg(feature = "library")]
 pub use bench_dragon_outputs as outputs;
-#[cfg(feature = "cli")]
+#[cfg(feature = "library")]
 pub use bench_dragon_proof as proof;
-#[cfg(feature = "cli")]
+#[cfg(feature = "library")]
 pub use bench_dragon_publisher as publisher;
-#[cfg(feature = "cli")]
+#[cfg(feature = "library")]
 pub use bench_dragon_recording as recording;
 #[cfg(feature = "ros2")]
 pub use bench_dragon_ros2 as ros2;
-#[cfg(feature = "cli")]
+#[cfg(feature = "library")]
 pub use bench_dragon_ros2_messages as ros2_messages;
-#[cfg(feature = "cli")]
+#[cfg(feature = "library")]
 pub use bench_dragon_show as show;
-#[cfg(feature = "cli")]
+#[cfg(feature = "library")]
 pub use bench_dragon_soak as soak;
-#[cfg(feature = "cli")]
+#[cfg(feature = "library")]
 pub use bench_dragon_trade as trade;

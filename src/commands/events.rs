@@ -3,13 +3,13 @@
 use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
-use bench_dragon::certify::{self, CertifyError, MOST_STEPS, Outcome, Status};
+use bench_dragon::certify::{self, CertifiedEvent, CertifyError, MOST_STEPS, Status};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
 use bench_dragon::show::scene::Scene;
 use serde::Serialize;
 
-use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar, search_timeline};
+use super::{CommandError, Common, Output, expect_exact_motion, figure, not_writable, progress_bar, search_timeline};
 
 /// Arguments of `events`.
 #[derive(Debug, clap::Args)]
@@ -97,13 +97,13 @@ fn certified(
     text: &str,
     file: &Path,
     common: &Common,
-) -> Result<Vec<Outcome>, CommandError> {
+) -> Result<Vec<CertifiedEvent>, CommandError> {
     expect_exact_motion(scene)?;
     let shown = file.display();
-    let refused = |error| CommandError::BadInput(format!("{shown}: {error}, expected a file to write"));
-    let mut writer = BufWriter::new(std::fs::File::create(file).map_err(refused)?);
+    let created = std::fs::File::create(file).map_err(|error| not_writable(&shown, &error))?;
+    let mut writer = BufWriter::new(created);
     let bar = progress_bar(1000, common).with_message("proving");
-    let mut write = |line: &certify::Line| {
+    let mut write = |line: &certify::CertificateLine| {
         serde_json::to_writer(&mut writer, line).map_err(io::Error::from)?;
         writer.write_all(b"\n")
     };

@@ -20,7 +20,7 @@ use bench_dragon::ros2_messages::settings::Topic;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use super::{CommandError, Common, Output, progress_bar, stop_on_signals, wall_seconds};
+use super::{CommandError, Common, Output, not_writable, progress_bar, stop_on_signals, wall_seconds};
 
 /// Frames that may wait in the shared memory before they are looked for, where its queue is the shortest.
 const UNREAD_FRAMES: f64 = 2.0;
@@ -269,11 +269,11 @@ fn mend(common: &Common, file: &Path, arguments: &RecordArguments) -> Result<(),
 /// The sentence for a file that cannot be made.
 fn refused(file: &Path, error: &io::Error) -> CommandError {
     let shown = file.display();
-    CommandError::BadInput(if error.kind() == io::ErrorKind::AlreadyExists {
-        format!("{shown} exists, expected another file, or --force to replace it")
+    if error.kind() == io::ErrorKind::AlreadyExists {
+        CommandError::BadInput(format!("{shown} exists, expected another file, or --force to replace it"))
     } else {
-        format!("{shown}: {error}, expected a file to write")
-    })
+        not_writable(shown, error)
+    }
 }
 
 /// A topic by its name, for clap.

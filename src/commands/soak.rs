@@ -25,7 +25,7 @@ use indicatif::ProgressBar;
 use nix::sys::signal::{SigSet, Signal};
 
 use super::realtime_scheduling::RealtimeScheduling;
-use super::{CommandError, Common, Output, progress_bar, stop_on_signals, wall_seconds};
+use super::{CommandError, Common, Output, not_writable, progress_bar, stop_on_signals, wall_seconds};
 
 /// How long a slow subscriber sleeps: longer than a queue of 64 frames lasts at 60 Hz.
 const SLOW_PAUSE: Duration = Duration::from_millis(1500);
@@ -266,10 +266,8 @@ impl ReportFiles {
     fn create(stem: &Path) -> Result<Self, CommandError> {
         let create = |end: &str| {
             let name = with_end(stem, end);
-            File::create(&name).map_err(|error| {
-                let file = Path::new(&name).display();
-                CommandError::BadInput(format!("--report: {file}: {error}, expected a file to write"))
-            })
+            let shown = format!("--report: {}", Path::new(&name).display());
+            File::create(&name).map_err(|error| not_writable(shown, &error))
         };
         // The publisher makes these again.
         [HISTOGRAMS, LOG].into_iter().try_for_each(|end| create(end).map(drop))?;

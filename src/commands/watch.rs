@@ -11,17 +11,16 @@ use anstyle::Style;
 use bench_dragon::client::clock::monotonic_ns;
 use bench_dragon::client::connection::Wake;
 use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
-use bench_dragon::client::monitor::{IntervalReport, Latency, Monitor, Presence};
 use bench_dragon::client::polling::Obstacle;
 use bench_dragon::messages::json::{AlertObject, CueObject};
 use bench_dragon::messages::sentence::{Figures, alert_sentence, cue_sentence, time_until};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::messages::state::{FrameState, Level, PlaybackState, Severity};
 use bench_dragon::messages::{CollisionAlert, LoopStatus};
-use crossterm::terminal::{Clear, ClearType, DisableLineWrap, EnableLineWrap, size};
-use crossterm::{cursor, execute};
+use bench_dragon::outputs::monitor::{IntervalReport, Latency, Monitor, Presence};
 use keys::{KEY_INTERVAL, KeyOutcome, Keyboard};
 use serde::Serialize;
+use terminal_size::{Width, terminal_size};
 
 use super::{CommandError, Common, severity_colour, shows_colour, stop_on_signals, wall_seconds};
 
@@ -45,6 +44,11 @@ struct IntervalLine {
     missed: u64,
     latency_ns: Option<Latency>,
 }
+
+/// Escape sequences of a terminal (ECMA-48, and DEC's private mode 7).
+const DISABLE_LINE_WRAP: &str = "\x1b[?7l";
+const ENABLE_LINE_WRAP: &str = "\x1b[?7h";
+const CLEAR_BELOW_CURSOR: &str = "\x1b[J";
 
 /// Where an alert's words begin on the terminal: behind its time.
 const INDENT: &str = "              ";
@@ -163,9 +167,9 @@ impl Screen<'_> {
     /// Draws the last report below all events.
     fn draw(&self, output: &mut impl Write) -> std::io::Result<()> {
         // A wrapped line would take two rows, and the next report would clear one too few.
-        execute!(output, DisableLineWrap)?;
+        write!(output, "{DISABLE_LINE_WRAP}")?;
         self.drawn.iter().try_for_each(|line| writeln!(output, "{line}"))?;
-        execute!(output, EnableLineWrap)
+        write!(output, "{ENABLE_LINE_WRAP}")
     }
 
     /// Clears the last report from the terminal.
@@ -173,8 +177,8 @@ impl Screen<'_> {
         if self.drawn.is_empty() {
             return Ok(());
         }
-        let rows = self.drawn.len() as u16;
-        execute!(output, cursor::MoveToPreviousLine(rows), Clear(ClearType::FromCursorDown))
+        // To the start of the report's first row.
+        write!(output, "\x1b[{}F{CLEAR_BELOW_CURSOR}", self.drawn.len())
     }
 
     /// Prints what a person wants to know at once; a machine gets the alerts and the cues.
@@ -218,7 +222,7 @@ impl Screen<'_> {
         }
         self.clear_previous(&mut output)?;
         // Some terminals do not know their size.
-        let columns = size().ok().filter(|(columns, _)| *columns > 0).map_or(80, |(columns, _)| columns.into());
+        let columns = terminal_size().map_or(80, |(Width(columns), _)| columns.into());
         writeln!(output, "{}", textwrap::fill(line, textwrap::Options::new(columns).subsequent_indent(INDENT)))?;
         self.draw(&mut output)?;
         Ok(output.flush()?)

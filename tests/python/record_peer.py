@@ -1,11 +1,11 @@
-"""Keeps all that an independent subscriber gets, and compares it with recordings of the same show.
+"""Keeps all messages of an independent subscriber, and compares them with recordings of the same show.
 
     record_peer.py subscribe --name NAME --kept FILE
     record_peer.py compare --name NAME --kept FILE --recordings FILE...
 
-`subscribe` prints `ready`, then `frame` at the first frame, and ends when a publisher has come and gone: FILE then holds the
-bytes of every message. `compare` decodes every message of every topic of the recordings with mcap-ros2-support, and the
-same files with rosbags; it prints how many there are by topic, or fails.
+`subscribe` prints `ready`, then `frame` at the first frame, and ends when a publisher has come and gone: FILE then
+holds the bytes of every message. `compare` decodes every message of every topic of the recordings with
+mcap-ros2-support, and the same files with rosbags; it prints their number by topic, or fails.
 """
 
 import argparse
@@ -85,7 +85,7 @@ def subscribe(name, kept):
 
 
 def same(decoded, expected, where):
-    """Every field of a ctypes structure in a decoded message, bit for bit but for what is no number."""
+    """Asserts that a decoded message has every field of a ctypes structure, bit for bit except for NaN."""
     for field, _ in expected._fields_:
         ours, theirs = getattr(expected, field), getattr(decoded, field)
         equal(theirs, ours, f"{where}.{field}")
@@ -114,7 +114,7 @@ def stamped(message, stamp_ns, where):
 
 
 def at(pose, handle, where):
-    """A pose lies where a handle does and turns as it does."""
+    """Asserts that a pose has the place and heading of a handle."""
     position, turn = pose.position, pose.orientation
     assert (position.x, position.y, position.z) == (handle.x, handle.y, 0.0), where
     assert (turn.x, turn.y) == (0.0, 0.0) and turn.w >= 0.0, where
@@ -138,7 +138,7 @@ class Comparison:
         if kind not in KINDS and kind not in ("/diagnostics", "path"):
             self.first = self.first or stamp_ns
             if stamp_ns < self.frames[0][0].stamp_ns:
-                return  # Whoever polls more often has a publisher's first frames.
+                return  # A process that polls more often has a publisher's first frames.
         index = len(self.seen[topic])
         self.seen[topic].append(stamp_ns)
         where = f"{topic} {index}"
@@ -243,7 +243,7 @@ def compare(name, kept, recordings):
         if kind in KINDS:
             assert len(seen) == len(comparison.seldom[kind]), (topic, len(seen), len(comparison.seldom[kind]))
         elif kind == "markers":
-            # They begin with the stage, for which a subscriber may have to wait.
+            # Markers begin with the stage, for which a subscriber may have to wait.
             assert len(seen) > len(stamps) / 2 and seen == stamps[-len(seen) :], f"{len(seen)} of {len(stamps)} markers"
         elif kind not in ("/diagnostics", "path"):
             assert seen == stamps, f"{topic}: {len(seen)} of {len(stamps)} frames"
@@ -252,7 +252,7 @@ def compare(name, kept, recordings):
 
 
 def with_rosbags(recordings, sizes):
-    """Opens the recordings by themselves, reads every message, and compares the definitions of the standard types."""
+    """Opens the recordings alone, reads every message, and compares the definitions of the standard types."""
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 

@@ -8,6 +8,5 @@ pub mod connection;
 pub mod control;
 pub mod feed;
 pub mod hermite;
-pub mod monitor;
 pub mod polling;
 pub mod shared_memory;

@@ -5,5 +5,6 @@
 mod http;
 pub mod keys;
 pub mod metrics;
+pub mod monitor;
 pub mod send;
 pub mod view;

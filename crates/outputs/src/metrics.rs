@@ -23,9 +23,9 @@ use families::{families, joined};
 
 use super::http::Listening;
 use super::view::origin::Admission;
+use crate::monitor::Monitor;
 use bench_dragon_client::clock::monotonic_ns;
 use bench_dragon_client::feed::{Delivery, FeedEvent};
-use bench_dragon_client::monitor::Monitor;
 use bench_dragon_client::polling::{Handler, poll_until};
 use bench_dragon_client::shared_memory::{OpenError, service_name};
 

@@ -1,10 +1,10 @@
 //! The live stage picture: reads the frames of one publisher or several and serves them to browsers, with the page that draws
 //! them.
 //!
-//! Called by the `view` command. `reader` reads a publisher's shared memory on a thread of its own, since ports cannot leave
-//! the thread that made them, and hands the newest picture over; `browser` sends it to one browser at that one's pace, over
-//! one WebSocket for each publisher; `wire` is its layout on the way. `origin` is who may connect, `gate` who may command,
-//! and how; `certificates` is what is proved of which scene.
+//! Called by the `view` command. `reader` reads a publisher's shared memory on a separate thread, since ports cannot leave the
+//! thread that created them, and hands over the newest picture. `browser` sends the picture to one browser at its pace, over
+//! one WebSocket for each publisher; `wire` is its layout. `origin` decides which pages may connect, `authorization` which
+//! browsers may command; `certificates` has the proofs of scenes.
 
 mod authorization;
 mod browser;
@@ -44,25 +44,25 @@ pub use origin::AllowedOrigin;
 
 /// Browsers send requests of a few letters.
 const MAX_REQUEST_BYTES: usize = 1024;
-/// Each frame that woke the server would cost the publisher more than the frame itself.
+/// Waking the server at each frame would cost the publisher more than the frame itself.
 const FEED: FeedOptions = FeedOptions { wake: Wake::Never, frames: Delivery::Newest };
 
-/// The newest of everything a browser needs, each as it goes over the wire; empty where there is none.
+/// The newest messages that a browser needs, each in its wire format; empty if there is none.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Picture {
     /// Set while there is no publisher.
     waiting: Utf8Bytes,
     stage: Utf8Bytes,
     alert: Utf8Bytes,
-    /// The latest cues, each with its number among all that have come to this server, so that none is left out.
+    /// The latest cues, each with its number among all cues of this server, so that none is left out.
     cues: Arc<[(u64, Utf8Bytes)]>,
     frame: Bytes,
-    /// Whether frames are stamped by the clock of this machine; `None` while there is no publisher.
+    /// True if frames are stamped by the clock of this machine; `None` while there is no publisher.
     shares_clock: Option<bool>,
 }
 
 impl Picture {
-    /// No publisher, and the reason where there is one that cannot be used.
+    /// Returns the picture without a publisher, with the reason if a publisher cannot be used.
     fn waiting(reason: Option<&str>) -> Self {
         Self { waiting: wire::waiting(reason).into(), ..Self::default() }
     }
@@ -74,46 +74,46 @@ struct Server {
     admission: Arc<Admission>,
 }
 
-/// What a browser is served of one publisher.
+/// The data of one publisher that browsers are served.
 #[derive(Clone)]
 struct Channel {
     name: String,
     pictures: watch::Receiver<Picture>,
-    /// `None` where nobody may command.
+    /// `None` if no browser may command.
     authorization: Option<Arc<Authorization>>,
 }
 
-/// How the stage picture is served.
+/// The options of the server.
 #[derive(Debug, Clone)]
 pub struct ViewOptions {
-    /// Where to listen; port 0 takes any free one.
+    /// The address to listen at; port 0 takes any free port.
     pub address: SocketAddr,
-    /// Whether browsers may conduct the show.
+    /// True if browsers may send commands.
     pub control: bool,
-    /// Pages of other places that are let in.
+    /// The admitted origins of other pages.
     pub origins: Vec<AllowedOrigin>,
     /// A folder that is served below `/pages/`.
     pub pages: Option<PathBuf>,
-    /// What is proved of which scenes; it may grow while pages are served.
+    /// The proofs of scenes; they may grow while pages are served.
     pub proofs: Arc<Proofs>,
 }
 
-/// What browsers need to connect.
+/// The data that browsers need to connect.
 #[derive(Debug, Clone)]
 pub struct Ready {
-    /// Where the server listens.
+    /// The address of the server.
     pub address: SocketAddr,
-    /// What whoever conducts has to give, where that is needed: as soon as more than this machine's own page is let in.
+    /// The token for commands. It is needed if more than this machine's own page is admitted.
     pub token: Option<Token>,
 }
 
-/// Why the stage picture could not be served.
+/// The reason why the stage picture cannot be served.
 #[derive(Debug, thiserror::Error)]
 pub enum ViewError {
     /// The publisher's services cannot be used.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// The address cannot be listened on.
+    /// The server cannot listen at the address.
     #[error(
         "cannot serve the stage picture at {address}: {source}; choose a free port with --port and an address of this \
          machine with --listen"
@@ -121,18 +121,18 @@ pub enum ViewError {
     Listen {
         /// The address given.
         address: SocketAddr,
-        /// What the system reported.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// The folder of pages is none.
+    /// The folder of pages cannot be read.
     #[error("--pages {}: {source}, expected a folder", folder.display())]
     Pages {
         /// The folder given.
         folder: PathBuf,
-        /// What the system reported.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// No token can be made.
+    /// No token can be created.
     #[error("the system has no random numbers for a token: {0}")]
     Token(#[from] getrandom::Error),
 }
@@ -181,7 +181,7 @@ pub fn serve<Refused: From<ViewError>>(
     Ok(read.map_err(ViewError::from)?)
 }
 
-/// A file of the user's folder; a name that no file can have is that of none.
+/// Returns a file of the user's folder; not found for a name that no file can have.
 async fn own_file<B>(found: impl Future<Output = io::Result<Response<B>>>) -> Response
 where
     Response<B>: IntoResponse,
@@ -230,14 +230,14 @@ fn router(server: Server, pages: Option<&Path>) -> Router {
         .with_state(server)
 }
 
-/// The module that tells the page whose dragons it draws.
+/// Returns the module with the names of the publishers that the page draws.
 fn publishers_module(channels: &[Channel]) -> String {
     let names: Vec<_> = channels.iter().map(|channel| &channel.name).collect();
     // JSON is JavaScript.
     format!("export const publishers = {};\n", serde_json::json!(names))
 }
 
-/// A file of the page, which fetches nothing from anywhere else.
+/// Returns a file of the page, which loads nothing from other servers.
 fn served(kind: &'static str, text: impl IntoResponse) -> Response {
     let headers = [
         (header::CONTENT_TYPE, kind),
@@ -248,7 +248,7 @@ fn served(kind: &'static str, text: impl IntoResponse) -> Response {
     (headers, text).into_response()
 }
 
-/// A file of the user's own. A foreign name that resolves to this machine gets none.
+/// Returns a file of the user. A foreign name that resolves to this machine is refused.
 async fn own_page(Served(server): Served<Server>, request: Request, next: Next) -> Response {
     if !server.admission.allows_host(text_of(request.headers(), header::HOST)) {
         return (StatusCode::FORBIDDEN, "this server has another name").into_response();
@@ -296,7 +296,7 @@ async fn frames(
     }
 }
 
-/// The least time between two frames at a `rate` that was asked for, none without one; `None` for a rate that cannot be.
+/// Returns the least time between two frames at a requested `rate`, zero without a rate; `None` for an invalid rate.
 fn gap(rate: Option<&str>) -> Option<Duration> {
     match rate.map(str::parse::<f64>) {
         None => Some(Duration::ZERO),

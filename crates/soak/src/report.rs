@@ -17,11 +17,10 @@ use bench_dragon_drawing::palette::dark_rules;
 use bench_dragon_publisher::live::Deliveries;
 use bench_dragon_publisher::live::statistics::RunSummary;
 
-/// The name of the report's JSON, whose schema is docs/soak-report.schema.json. A change that a reader of the former one
-/// would not survive raises the number.
+/// The name of the report's JSON, whose schema is docs/soak-report.schema.json. An incompatible change raises the number.
 pub const SCHEMA: &str = "bench_dragon/soak/1";
 
-/// All that is known of a soak test.
+/// The results of a soak test.
 #[derive(Debug, Serialize)]
 pub struct Report {
     /// [`SCHEMA`].
@@ -34,19 +33,19 @@ pub struct Report {
     pub command: Vec<String>,
     /// The version of this program.
     pub version: &'static str,
-    /// Where it ran.
+    /// The machine of the test.
     pub machine: Machine,
     /// CLOCK_REALTIME in seconds when it began.
     pub began_at: u64,
-    /// Wall time from all subscribers' receiving to the end, seconds.
+    /// Wall time from the first frame of all subscribers to the end, seconds.
     pub seconds: f64,
-    /// The summary that the publisher printed at its end; null if it did not end in good order.
+    /// The summary that the publisher printed at its end; null if it did not end properly.
     pub publisher: Option<RunSummary>,
-    /// What each subscriber saw.
+    /// The observation of each subscriber.
     pub subscribers: Vec<SubscriberReport>,
-    /// What was commanded and answered; null where nobody conducted.
+    /// The counts of commands and answers; null without `--conduct`.
     pub conducted: Option<Conducted>,
-    /// Further clients of the control service that were killed amid a request.
+    /// Further clients of the control service that were killed during a request.
     pub clients_killed: u64,
     /// Figures over time; of several seconds in a row the greatest.
     pub history: History,
@@ -57,11 +56,11 @@ pub struct Report {
 pub struct SubscriberReport {
     /// Its name.
     pub label: String,
-    /// What it was for.
+    /// Its role.
     pub role: Role,
-    /// Processes it has been.
+    /// The number of its processes.
     pub incarnations: u64,
-    /// Counts and latencies; those of the last second are left out.
+    /// Counts and latencies, without those of the last second.
     pub seen: Observation,
 }
 
@@ -77,7 +76,7 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// This one.
+    /// Returns this machine.
     pub fn this() -> Self {
         let processors = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
         let name = processors.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
@@ -92,7 +91,7 @@ impl Machine {
 }
 
 impl SubscriberReport {
-    /// Those of a fleet.
+    /// Returns the reports of a fleet's subscribers.
     pub fn all(fleet: &Fleet) -> Vec<Self> {
         let report = |member: &Member| Self {
             label: member.label.clone(),
@@ -105,7 +104,7 @@ impl SubscriberReport {
 }
 
 impl Report {
-    /// Lines for people: the verdict, each limit, each subscriber.
+    /// Returns lines of text: the verdict, each limit, each subscriber.
     pub fn lines(&self) -> Vec<String> {
         let mut lines = vec![format!("{} after {:.1} s", self.verdict, self.seconds)];
         lines.extend(self.checks.iter().map(|check| format!("  {}", check.line())));
@@ -131,7 +130,7 @@ impl Report {
         lines
     }
 
-    /// Sentences about what was commanded, and the first disobedience of each subscriber.
+    /// Returns sentences about the commands, and the first fault that each subscriber found.
     fn conducting(&self) -> impl Iterator<Item = String> {
         let conducted = self.conducted.iter().flat_map(Conducted::lines);
         let killed = (self.clients_killed > 0)
@@ -143,7 +142,7 @@ impl Report {
         conducted.chain(killed).chain(disobedience)
     }
 
-    /// A sentence for each transport of the publisher that counts what it delivers.
+    /// Returns a sentence for each transport of the publisher with counters.
     fn deliveries(&self) -> impl Iterator<Item = String> {
         self.publisher.iter().flat_map(|summary| &summary.deliveries).map(
             |(name, Deliveries { frames, skipped, discarded })| {
@@ -152,7 +151,7 @@ impl Report {
         )
     }
 
-    /// One page that needs nothing else.
+    /// Returns the report as one page without other files.
     pub fn html(&self) -> String {
         let mut page = String::new();
         let plots = self.plots();
@@ -216,7 +215,7 @@ impl Report {
         )
     }
 
-    /// What was commanded, a row for each command; nothing where nobody conducted.
+    /// Returns a table of the commands, a row for each; empty without `--conduct`.
     fn section_on_conducting(&self) -> String {
         let Some(conducted) = &self.conducted else { return String::new() };
         let codes: BTreeSet<_> = conducted.answers.values().flat_map(|codes| codes.keys()).collect();
@@ -285,7 +284,7 @@ impl Report {
     }
 }
 
-/// Light, and dark where the browser prefers that; what is wider than a phone scrolls by itself.
+/// Light, or dark if the browser prefers dark; elements wider than a phone scroll separately.
 const STYLE: &str = ":root{color-scheme:light dark;--ground:#fbfaf7;--ink:#16181d;--line:#d9d5cb;--good:#00734f;--bad:#c2001f}\
                      @media(prefers-color-scheme:dark){:root{--ground:#0b0d11;--ink:#f2f0ea;--line:#2a2f39;--good:#1fb8a6;--bad:#ff4a5f}}\
                      body{font:15px/1.45 system-ui,sans-serif;max-width:960px;margin:2em auto;padding:0 1em;background:var(--ground);color:var(--ink)}\

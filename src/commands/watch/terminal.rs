@@ -1,7 +1,6 @@
 //! The terminal while keys are read: each key at once and without an echo, and as it was before on every way out.
 //!
-//! Keys are read here and not by crossterm, whose reader waits for the rest of a sequence of which a part has come, and
-//! for ever at the end of input: the display must go on.
+//! The rest of an incomplete sequence is not waited for: the display must continue.
 //!
 //! Signals of the terminal (Ctrl-C) and the end of lines stay as they are. Called by `watch`, and by the handler that
 //! ends the program where shared memory is full.

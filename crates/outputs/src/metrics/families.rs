@@ -1,4 +1,4 @@
-//! The figures that are served, and their names. In: the report of a [`Monitor`](bench_dragon_client::monitor::Monitor).
+//! The figures that are served, and their names. In: the report of a [`Monitor`](crate::monitor::Monitor).
 //! Out: families of samples. Pure.
 //!
 //! Names and units follow Prometheus ("Metric and label naming"): seconds, bytes, metres, `_total` for counts.
@@ -6,7 +6,7 @@
 //! of a label makes a new series.
 
 use super::exposition::{Family, Kind};
-use bench_dragon_client::monitor::{IntervalReport, Presence};
+use crate::monitor::{IntervalReport, Presence};
 use bench_dragon_messages::state::{FrameState, PlaybackState};
 use bench_dragon_messages::{CollisionAlert, FrameHeader, LoopStatus};
 
@@ -252,8 +252,8 @@ impl Families<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::monitor::Monitor;
     use bench_dragon_client::feed::FeedEvent;
-    use bench_dragon_client::monitor::Monitor;
     use bench_dragon_messages::state::Level;
 
     #[test]

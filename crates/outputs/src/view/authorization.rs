@@ -1,7 +1,7 @@
-//! The way from browsers to `<name>/control`: who may command, what a message commands, and the answer to it.
+//! The commands of browsers to `<name>/control`: their authorization, their parsing, and their answers.
 //!
-//! In: the text of a message. Out: JSON. A [`Authorization`] is there only where the user asked for control; its conductor has a
-//! thread of its own, so that no command keeps a picture waiting. Called by the server and by `browser`.
+//! In: the text of a message. Out: JSON. An [`Authorization`] exists only with `--control`. Its command client has a separate
+//! thread, so that no command delays a picture. Called by the server and by `browser`.
 
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -22,18 +22,18 @@ const OFF: &str = "this server was started without --control: it takes no comman
 const EXPECTED: &str = "expected JSON such as {\"command\":\"seek\",\"value\":400}; the commands are toggle, state, pause, \
                         resume, rate, seek, step, restart, hold, release and go, of which rate and seek have a value";
 
-/// Where an answer goes, and the sender's own number for the command.
+/// The channel of an answer, and the browser's number of the command.
 pub(super) struct Tag {
     id: Value,
     answers: UnboundedSender<String>,
 }
 
-/// What whoever commands has to give.
+/// The token that authorizes commands.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Token(String);
 
 impl Token {
-    /// A new one.
+    /// Creates a random token.
     ///
     /// # Errors
     /// The system has no random numbers.
@@ -43,25 +43,25 @@ impl Token {
         Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
     }
 
-    /// Its letters.
+    /// Returns its letters.
     pub fn as_str(&self) -> &str {
         &self.0
     }
 
-    /// Whether a text is this token, in a time that does not depend on how much of it is right.
+    /// Returns true if a text is this token, in a time that does not depend on the matching letters.
     fn is(&self, text: &str) -> bool {
         self.0.as_bytes().ct_eq(text.as_bytes()).into()
     }
 }
 
-/// A server's way to `<name>/control`.
+/// The authorization for `<name>/control`, and the client that sends the commands.
 pub(super) struct Authorization {
     client: CommandClient<Tag>,
     token: Option<Token>,
 }
 
 impl Authorization {
-    /// A gate to the publisher of `name`, for whoever has the token, or for everybody where there is none.
+    /// Creates the authorization for the publisher of `name`: for browsers with the token, or for all browsers without a token.
     ///
     /// # Errors
     /// The system has no thread left.
@@ -73,13 +73,13 @@ impl Authorization {
         Ok(Self { client, token })
     }
 
-    /// Whether those who have given no token may command.
+    /// Returns true if browsers may command without a token.
     pub(super) fn is_open(&self) -> bool {
         self.token.is_none()
     }
 }
 
-/// One browser at the gate.
+/// One browser.
 pub(super) struct Visitor<'a> {
     authorization: Option<&'a Authorization>,
     allowed: bool,
@@ -88,7 +88,7 @@ pub(super) struct Visitor<'a> {
     pub(super) unanswered: usize,
 }
 
-/// What a browser may send.
+/// A message of a browser.
 #[derive(Deserialize)]
 #[serde(untagged, deny_unknown_fields)]
 enum Request {
@@ -104,19 +104,19 @@ enum Request {
 }
 
 impl<'a> Visitor<'a> {
-    /// A browser that has given nothing yet; what becomes of its commands goes to `answers`.
+    /// Creates a browser that has sent no token yet; the results of its commands go to `answers`.
     pub(super) fn new(authorization: Option<&'a Authorization>, answers: UnboundedSender<String>) -> Self {
         Self { authorization, allowed: authorization.is_some_and(Authorization::is_open), answers, unanswered: 0 }
     }
 
-    /// The message about whether this browser may command; none where nobody may.
+    /// Returns the message that this browser may command or not; `None` if no browser may.
     pub(super) fn permission(&self) -> Option<String> {
         self.authorization?;
         let reason = (!self.allowed).then_some("commands need the token of the address that view printed");
         Some(json!({"type": "control", "allowed": self.allowed, "reason": reason}).to_string())
     }
 
-    /// Takes in a message; the response that can be given at once. The other is on its way to `answers`.
+    /// Handles a message. Returns a response if one is ready; other responses go to `answers`.
     pub(super) fn receive(&mut self, text: &str) -> Option<String> {
         let request = match serde_json::from_str(text) {
             Ok(request) => request,
@@ -141,7 +141,7 @@ impl<'a> Visitor<'a> {
 
     fn pass_on(&mut self, authorization: &Authorization, id: Value, action: Action) -> Option<String> {
         let too_many = "too many commands are waiting";
-        // A hold is accepted always: one more than all others.
+        // A hold is always accepted: one more than all others.
         let most = if action == Action::Send(Command::Hold) { MOST_UNANSWERED + 1 } else { MOST_UNANSWERED };
         if self.unanswered >= most {
             return Some(refused(&id, too_many));
@@ -157,7 +157,7 @@ impl<'a> Visitor<'a> {
     }
 }
 
-/// What a command's name and value ask for.
+/// Returns the action of a command's name and value.
 fn action(name: &str, value: Option<f64>) -> Result<Action, &'static str> {
     if name == "toggle" {
         return Ok(Action::Toggle);
@@ -174,12 +174,12 @@ fn action(name: &str, value: Option<f64>) -> Result<Action, &'static str> {
     }
 }
 
-/// The response to what never reaches the publisher.
+/// Returns the response to a command that never reaches the publisher.
 fn refused(id: &Value, sentence: &str) -> String {
     json!({"type": "answer", "id": id, "code": null, "sentence": sentence}).to_string()
 }
 
-/// What became of a command.
+/// Returns the answer to a command.
 fn answer(id: &Value, result: ActionResult) -> String {
     let (command, response) = match result {
         Ok(done) => done,

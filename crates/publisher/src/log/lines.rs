@@ -173,7 +173,24 @@ impl ShowLine {
             "loop" => AtEnd::Loop,
             _ => return None,
         };
-        let Self { start, time_scale, rate, end_hold, paused, .. } = *self;
+        let Self {
+            format: _,
+            version: _,
+            arithmetic: _,
+            solver: _,
+            run_id: _,
+            stamp_ns: _,
+            rate,
+            start,
+            time_scale,
+            on_contact: _,
+            at_end: _,
+            end_hold,
+            paused,
+            scene_file: _,
+            scene_stem: _,
+            scene: _,
+        } = *self;
         Some(Playback { start, time_scale, rate, on_contact, at_end, end_hold, paused })
     }
 

@@ -18,9 +18,9 @@ use bench_dragon_client::shared_memory::OpenError;
 use bench_dragon_messages::ControlResponse;
 use bench_dragon_messages::control::{Code, Command};
 
-/// How long the publisher may take to answer.
+/// The time limit of an answer.
 const TIMEOUT: Duration = Duration::from_secs(10);
-/// How long the control service may take to appear.
+/// The time limit of the publisher's start.
 const START_TIMEOUT: Duration = Duration::from_secs(30);
 /// The interval at which frames are read.
 const READ_INTERVAL: Duration = Duration::from_millis(1);
@@ -29,7 +29,7 @@ const STEP_INTERVAL: Duration = Duration::from_millis(1);
 /// How long to wait for the last frames.
 const END_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Conducts the publisher of `name`, of `rate` frames per second, until `stop` is set. Reports its counts at the
+/// Sends commands to the publisher of `name`, of `rate` frames per second, until `stop` is set. Reports its counts at the
 /// beginning, once a second, and at the end.
 ///
 /// # Errors
@@ -123,7 +123,7 @@ struct LoadGenerator<'a> {
     lost: bool,
     steps: Sender<u64>,
     step_replies: Receiver<Reply>,
-    /// Whether a step has no answer yet.
+    /// True if a step has no answer yet.
     stepping: bool,
     events: &'a Sender<Answered>,
 }

@@ -1,0 +1,70 @@
+//! Grid points of the search: the handles for one place of the head, in doubles. They are the starting guess of the
+//! spans; correctness does not depend on them.
+
+use super::capsule::Span;
+use super::path::{ExactPath, Place};
+use bench_dragon_motion::linkage::{NoFollower, follower, link_pose};
+use bench_dragon_motion::model::path::{Param, Path};
+use bench_dragon_motion::model::team::Team;
+
+/// A handle at a grid point.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Handle {
+    pub param: Param,
+    /// Cosines at the front and at the rear of the link that ends at this handle.
+    pub front_cosine: f64,
+    pub rear_cosine: f64,
+}
+
+/// A place of the head, and as many handles as were needed.
+#[derive(Debug, Clone)]
+pub(super) struct GridPoint {
+    /// Travel in metres, approximate.
+    pub travelled: f64,
+    pub head: Place,
+    pub handles: Vec<Handle>,
+}
+
+impl GridPoint {
+    pub fn new(path: &Path, exact: &ExactPath, travelled: f64) -> Self {
+        let param = path.param_at(travelled);
+        let place = place(param);
+        let tiny = 1e-14 * (1.0 + travelled.abs());
+        let head = if exact.is_inside(place) { place } else { exact.moved(place, tiny) };
+        Self::at(head, travelled)
+    }
+
+    pub fn at(head: Place, travelled: f64) -> Self {
+        let handle = Handle { param: param(head), front_cosine: 1.0, rear_cosine: 1.0 };
+        Self { travelled, head, handles: vec![handle] }
+    }
+
+    /// Solves handles up to `handle`.
+    pub fn extend_to(&mut self, handle: usize, path: &Path, team: &Team) -> Result<(), NoFollower> {
+        while self.handles.len() <= handle {
+            let link = self.handles.len() - 1;
+            let (front, length) = (self.handles[link].param, team.link(link));
+            let rear = follower(path, front, length)?;
+            let pose = link_pose(path, front, rear, length);
+            self.handles.push(Handle { param: rear, front_cosine: pose.front_cosine, rear_cosine: pose.rear_cosine });
+        }
+        Ok(())
+    }
+}
+
+/// Returns the parameter of a place.
+pub(super) fn param(place: Place) -> Param {
+    Param::new(place.0, bench_dragon_motion::model::curve::Coordinate { high: place.1, low: 0.0 })
+}
+
+/// Returns the place nearest to a parameter.
+pub(super) fn place(param: Param) -> Place {
+    Place(param.segment(), param.coordinate().high)
+}
+
+/// Returns the span of a handle between two grid points, `pad` metres longer at both ends.
+pub(super) fn span(exact: &ExactPath, one: Param, other: Param, pad: f64) -> Span {
+    let (one, other) = (place(one), place(other));
+    let (first, last) = if exact.in_order(one, other) { (one, other) } else { (other, one) };
+    Span(exact.moved(first, -pad), exact.moved(last, pad))
+}

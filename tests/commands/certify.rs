@@ -1,0 +1,89 @@
+//! Certificates of events, made by the search and checked by `proof`: certificates of scenes with every kind of event
+//! are accepted and agree with the ordinary search. A changed certificate is refused, or is still true.
+//!
+//! `BENCH_DRAGON_LONG=1` makes a thousand changes in place of some dozens, and adds larger scenes.
+
+use crate::harness;
+
+mod changes;
+mod tampering;
+mod truth;
+
+use bench_dragon::proof::{Proved, Refused, Status, verify};
+use serde_json::Value;
+use truth::{certificate, is_true, timeline};
+
+fn scene_text(name: &str) -> String {
+    let config = format!("config/{name}.toml");
+    std::fs::read_to_string(&config).or_else(|_| std::fs::read_to_string(format!("tests/scenes/{name}.toml"))).unwrap()
+}
+
+fn check(lines: &[Value]) -> Result<Proved, Refused> {
+    let text: String = lines.iter().map(|line| format!("{line}\n")).collect();
+    verify(text.as_bytes(), &mut |_| {})
+}
+
+/// Certificates are accepted, decide what they can, and agree with the ordinary search.
+#[test]
+fn certificates_are_proofs() {
+    let mut scenes = vec![("missed_contact", 4), ("tailoff", 4), ("pieces_46", 4), ("alertloop", 4), ("tight_158", 4)];
+    if harness::long() {
+        scenes.extend([("paper", 4), ("school", 4), ("wide", 4), ("procession", 4), ("tiny_2", 4), ("straight200", 4)]);
+    }
+    for (name, least) in scenes {
+        let text = scene_text(name);
+        let proved = check(&certificate(&text)).unwrap_or_else(|refused| panic!("{name}: {refused}"));
+        let timeline = timeline(&text).unwrap();
+        assert!(proved.results.iter().all(|outcome| is_true(outcome, &timeline)), "{name}: {:?}", proved.results);
+        let decided = proved.results.iter().filter(|outcome| outcome.status != Status::Undecided).count();
+        assert!(decided >= least, "{name}: {:?}", proved.results);
+        assert_eq!(proved.scene, text);
+    }
+}
+
+/// Returns the output, the error output and the exit code of the program.
+fn program(arguments: &[&str]) -> (String, String, Option<i32>) {
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(arguments).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (text(output.stdout), text(output.stderr), output.status.code())
+}
+
+/// A certificate is made, checked, refused after a change of one digit, and printed for its own scene only.
+#[test]
+fn the_program_makes_and_checks_certificates() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("proof.jsonl");
+    let (file, scene) = (file.to_str().unwrap(), "tests/scenes/missed_contact.toml");
+    let (lines, errors, code) = program(&["--scene", scene, "--json", "events", "--certify", file]);
+    assert_eq!((errors.as_str(), code), ("", Some(0)));
+    let events: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    for event in &events {
+        let [time, lo, hi] = ["time", "time_lo", "time_hi"].map(|key| event[key].as_f64().unwrap());
+        assert!(lo <= time && time <= hi && hi - lo < 1e-8, "{event}");
+    }
+    assert_eq!(events.len(), 3);
+    let (said, _, code) = program(&["verify", file]);
+    assert!(code == Some(0) && said.contains("contact: proved between 37.145313188"), "{said}");
+    let (said, _, code) = program(&["check", "--scene", scene, "--certificate", file]);
+    assert!(code == Some(0) && said.contains("lock: proved that there is none"), "{said}");
+    let (_, said, code) = program(&["check", "--scene", "config/school.toml", "--certificate", file]);
+    assert!(code == Some(2) && said.contains("another text"), "{said}");
+
+    let text = std::fs::read_to_string(file).unwrap();
+    std::fs::write(file, text.replace("\"time_hi\":37.1453", "\"time_hi\":37.1452")).unwrap();
+    let (_, said, code) = program(&["verify", file]);
+    assert!(code == Some(1) && said.contains("does not follow"), "{said}");
+    std::fs::write(file, &text[..text.len() / 2]).unwrap();
+    let (_, said, code) = program(&["check", "--scene", scene, "--certificate", file]);
+    assert!(code == Some(2) || code == Some(1), "{said}");
+
+    let exact = std::fs::read_to_string("config/school.toml").unwrap();
+    let paper = folder.path().join("paper.toml");
+    std::fs::write(&paper, exact.replace("head_speed = 1.0", "solver = \"paper\"\nhead_speed = 1.0")).unwrap();
+    let (_, said, code) = program(&["--scene", paper.to_str().unwrap(), "events", "--certify", file]);
+    assert!(code == Some(2) && said.contains("only exact motion can be certified"), "{said}");
+    for question in [&["check", "--prove"][..], &["plan", "speed", "--max-handle-speed", "2"]] {
+        let (_, said, code) = program(&[&["--scene", paper.to_str().unwrap()], question].concat());
+        assert!(code == Some(2) && said.contains("only exact motion can be certified"), "{question:?} {said}");
+    }
+}

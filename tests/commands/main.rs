@@ -1,0 +1,8 @@
+//! Commands of the program that publish nothing: their output, their files, their refusals.
+
+mod bad_input;
+mod certify;
+mod draw;
+mod hard_scenes;
+#[path = "../harness/mod.rs"]
+mod harness;

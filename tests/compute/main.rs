@@ -1,0 +1,19 @@
+//! Results of the library against independent sources: tables of 50 digits, brute force, other implementations.
+//! These tests start no program, so that they can be built with debug assertions and overflow checks.
+
+mod accuracy;
+mod certificates;
+mod display;
+mod events;
+mod greatest_speed;
+#[path = "../harness/mod.rs"]
+mod harness;
+mod least_clearance;
+mod oracle;
+mod paths;
+mod scene;
+mod show;
+mod solvers;
+#[path = "../truth/tables.rs"]
+mod tables;
+mod truth;

@@ -1,0 +1,394 @@
+//! Real processes for tests: each ends by a deadline or with its test. Shared by the tests that start processes.
+
+#![allow(dead_code, reason = "not every test file uses all of it")]
+
+pub mod hosts;
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+/// The user id of a user without rights.
+const NOBODY: u32 = 65534;
+
+/// A process that does not outlive its test.
+pub struct Process(Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+impl Process {
+    pub fn start(command: &mut Command) -> Self {
+        Self(command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap())
+    }
+
+    pub fn id(&self) -> u32 {
+        self.0.id()
+    }
+
+    pub fn signal(&self, signal: nix::sys::signal::Signal) {
+        nix::sys::signal::kill(nix::unistd::Pid::from_raw(self.0.id() as i32), signal).unwrap();
+    }
+
+    /// Stops the process. `kill` returns before the signal takes effect; this returns once every thread is stopped.
+    pub fn stop(&self) {
+        self.signal(nix::sys::signal::Signal::SIGSTOP);
+        let tasks = format!("/proc/{}/task", self.id());
+        wait_until("every thread is stopped", || {
+            std::fs::read_dir(&tasks).unwrap().flatten().all(|task| {
+                let stat = std::fs::read_to_string(task.path().join("stat")).unwrap_or_default();
+                // The state follows the name, which is in parentheses.
+                stat.is_empty() || stat.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with('T'))
+            })
+        });
+    }
+
+    /// Closes the reading end of standard output, as `| head` does after its last line.
+    pub fn close_stdout(&mut self) {
+        drop(self.0.stdout.take());
+    }
+
+    /// Closes the reading end of standard error.
+    pub fn close_stderr(&mut self) {
+        drop(self.0.stderr.take());
+    }
+
+    /// Returns the lines of standard output as they come; `output_within` must not be called afterwards.
+    pub fn lines(&mut self) -> Lines {
+        let (sender, lines) = channel();
+        let stdout = self.0.stdout.take().unwrap();
+        std::thread::spawn(move || {
+            let lines = BufReader::new(stdout).lines().map_while(Result::ok);
+            lines.take_while(|line| sender.send(line.clone()).is_ok()).for_each(drop);
+        });
+        Lines(lines)
+    }
+
+    /// Returns the first line that the process prints within `seconds`.
+    pub fn first_line_within(&mut self, seconds: u64) -> String {
+        let mut output = BufReader::new(self.0.stdout.take().unwrap());
+        let (sender, receiver) = channel();
+        std::thread::spawn(move || {
+            let mut line = String::new();
+            let _ = output.read_line(&mut line);
+            let _ = sender.send(line);
+            // A closed pipe would end the process.
+            let _ = std::io::copy(&mut output, &mut std::io::sink());
+        });
+        receiver.recv_timeout(Duration::from_secs(seconds)).unwrap()
+    }
+
+    /// Returns the output of the process, which must end by itself within `seconds`; without standard output after
+    /// [`first_line_within`](Self::first_line_within).
+    pub fn output_within(mut self, seconds: u64) -> Output {
+        let deadline = Instant::now() + Duration::from_secs(seconds);
+        // Read while waiting: a full pipe would stop the process.
+        let [stdout, stderr] =
+            [std::thread::spawn(reading(self.0.stdout.take())), std::thread::spawn(reading(self.0.stderr.take()))];
+        let status = loop {
+            if let Some(status) = self.0.try_wait().unwrap() {
+                break status;
+            }
+            assert!(Instant::now() < deadline, "the process did not end within {seconds} s");
+            std::thread::sleep(Duration::from_millis(10));
+        };
+        Output { status, stdout: stdout.join().unwrap(), stderr: stderr.join().unwrap() }
+    }
+}
+
+/// Lines that a process prints while it runs.
+pub struct Lines(Receiver<String>);
+
+impl Lines {
+    /// Returns the next line that contains `what`, which must come within `seconds`; earlier lines are dropped.
+    pub fn until(&self, what: &str, seconds: u64) -> String {
+        // The last of these lines is the requested one.
+        self.all_until(what, seconds).pop().unwrap()
+    }
+
+    /// Returns the lines up to and including the next one that contains `what`, which must come within `seconds`.
+    pub fn all_until(&self, what: &str, seconds: u64) -> Vec<String> {
+        self.all_until_one(|line| line.contains(what), what, seconds)
+    }
+
+    /// Returns the lines up to and including the next one that `is_it` accepts, which must come within `seconds`.
+    pub fn all_until_one(&self, is_it: impl Fn(&str) -> bool, what: &str, seconds: u64) -> Vec<String> {
+        let deadline = Instant::now() + Duration::from_secs(seconds);
+        let mut lines = Vec::new();
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            lines.push(self.0.recv_timeout(left).unwrap_or_else(|_| panic!("no \"{what}\" within {seconds} s")));
+            if lines.last().is_some_and(|line| is_it(line)) {
+                return lines;
+            }
+        }
+    }
+
+    /// Returns all lines until the process ends, which must happen within `seconds`.
+    pub fn rest(&self, seconds: u64) -> Vec<String> {
+        let deadline = Instant::now() + Duration::from_secs(seconds);
+        let mut lines = Vec::new();
+        loop {
+            use std::sync::mpsc::RecvTimeoutError;
+            match self.0.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+                Ok(line) => lines.push(line),
+                Err(RecvTimeoutError::Disconnected) => return lines,
+                Err(RecvTimeoutError::Timeout) => panic!("the process did not end within {seconds} s"),
+            }
+        }
+    }
+}
+
+/// A setting of a scene with which a subscriber loses nothing while a busy machine does not run it. The default queue
+/// lasts a third of a second at 200 Hz, this queue two and a half seconds.
+pub const LONG_QUEUE: &str = "queue = 500";
+
+/// A separate iceoryx2: processes of other places are not visible, and stale files can be counted.
+pub struct Place {
+    folder: tempfile::TempDir,
+    prefix: String,
+}
+
+impl Place {
+    pub fn new(name: &str) -> Self {
+        let (folder, prefix) = (tempfile::tempdir().unwrap(), format!("{}_", unique(name)));
+        std::fs::create_dir(folder.path().join("config")).unwrap();
+        let settings = format!("[global]\nroot-path = \"{}/root/\"\nprefix = \"{prefix}\"\n", folder.path().display());
+        std::fs::write(folder.path().join("config/iceoryx2.toml"), settings).unwrap();
+        Self { folder, prefix }
+    }
+
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Returns the program in this place, under its usual name.
+    pub fn program(&self) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+        command.current_dir(self.folder());
+        command
+    }
+
+    /// Returns the paper's scene with these further publish settings.
+    pub fn scene_publishing(&self, settings: &str) -> PathBuf {
+        let scene = include_str!("../../config/paper.toml").replace("[publish]", &format!("[publish]\n{settings}"));
+        let file = self.folder().join("scene.toml");
+        std::fs::write(&file, scene).unwrap();
+        file
+    }
+
+    /// Runs the program in this place as the user without rights, from a copy that this user may read.
+    pub fn as_nobody(&self, arguments: &[&str]) -> Output {
+        let copy = self.folder().join("bench-dragon");
+        if !copy.exists() {
+            copy_program(&copy);
+            std::fs::set_permissions(self.folder(), std::fs::Permissions::from_mode(0o755)).unwrap();
+        }
+        let mut command = Command::new("setpriv");
+        command.args([&format!("--reuid={NOBODY}"), &format!("--regid={NOBODY}"), "--clear-groups"]);
+        command.arg(copy).args(arguments).current_dir(self.folder());
+        Process::start(&mut command).output_within(300)
+    }
+
+    /// Returns the files that exist in this place.
+    pub fn left_behind(&self) -> Vec<PathBuf> {
+        let mut files = self.shared_memory();
+        files.extend(files_below(&self.folder().join("root")));
+        files
+    }
+
+    fn shared_memory(&self) -> Vec<PathBuf> {
+        let files = std::fs::read_dir("/dev/shm").unwrap().flatten();
+        let ours = files.filter(|file| file.file_name().to_string_lossy().starts_with(&self.prefix));
+        ours.map(|file| file.path()).collect()
+    }
+
+    /// Fails if ended processes have left more than the one small file that iceoryx2 always leaves.
+    pub fn assert_clean(&self) {
+        self.assert_clean_but_for(0);
+    }
+
+    /// Fails if ended processes have left more than that file and `others` further files.
+    pub fn assert_clean_but_for(&self, others: usize) {
+        let files = self.left_behind();
+        assert!(files.len() <= 1 + others, "{} files are left behind: {files:#?}", files.len());
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.shared_memory().iter().for_each(|file| drop(std::fs::remove_file(file)));
+    }
+}
+
+fn files_below(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let below = |file: PathBuf| if file.is_dir() { files_below(&file) } else { vec![file] };
+    entries.flatten().flat_map(|entry| below(entry.path())).collect()
+}
+
+fn reading(pipe: Option<impl Read>) -> impl FnOnce() -> Vec<u8> {
+    move || {
+        let mut bytes = Vec::new();
+        if let Some(mut pipe) = pipe {
+            pipe.read_to_end(&mut bytes).unwrap();
+        }
+        bytes
+    }
+}
+
+/// Copies the program in another process. In this process, children of other threads would inherit the file open for
+/// writing, and the copy could not be started.
+pub fn copy_program(to: &Path) {
+    let copied = Command::new("cp").arg(env!("CARGO_BIN_EXE_bench-dragon")).arg(to).status().unwrap();
+    assert!(copied.success());
+}
+
+/// Returns the program with a service name that no other test has.
+pub fn program(name: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    command.args(["--name", &unique(name)]);
+    command
+}
+
+pub fn unique(name: &str) -> String {
+    format!("test_{}_{name}", std::process::id())
+}
+
+pub fn python() -> Command {
+    let interpreter = std::env::var_os("BENCH_DRAGON_PYTHON").unwrap_or("python3".into());
+    let mut command = Command::new(interpreter);
+    command.current_dir(env!("CARGO_MANIFEST_DIR"));
+    command
+}
+
+/// Returns an example; cargo builds the examples with all tests, and not with one test file.
+pub fn example(name: &str) -> Command {
+    let target = std::env::current_exe().unwrap();
+    let file = target.ancestors().nth(2).unwrap().join("examples").join(name);
+    assert!(file.exists(), "{} does not exist: `cargo build --release --examples` builds it", file.display());
+    Command::new(file)
+}
+
+pub fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+pub fn json_lines(output: &Output) -> Vec<Value> {
+    text(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+pub fn summary(output: &Output) -> Value {
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    json_lines(output).pop().unwrap()
+}
+
+/// Returns the answer of a server of this machine, header and body, or nothing if it does not answer.
+pub fn http_get(url: &str, accept: &str) -> String {
+    let (address, _) = url.strip_prefix("http://").unwrap().split_once('/').unwrap();
+    http_get_as(url, address, accept)
+}
+
+/// Returns the same, with a request for another host name.
+pub fn http_get_as(url: &str, host: &str, accept: &str) -> String {
+    let (address, path) = url.strip_prefix("http://").unwrap().split_once('/').unwrap();
+    let answer = || -> std::io::Result<String> {
+        let mut stream = std::net::TcpStream::connect(address)?;
+        stream.set_read_timeout(Some(Duration::from_secs(60)))?;
+        write!(stream, "GET /{path} HTTP/1.1\r\nHost: {host}\r\nAccept: {accept}\r\nConnection: close\r\n\r\n")?;
+        let mut text = String::new();
+        stream.read_to_string(&mut text)?;
+        Ok(text)
+    };
+    answer().unwrap_or_default()
+}
+
+fn is_set(variable: &str) -> bool {
+    std::env::var_os(variable).is_some_and(|value| value == "1")
+}
+
+/// Returns true if tests that take minutes are requested.
+pub fn long() -> bool {
+    is_set("BENCH_DRAGON_LONG")
+}
+
+/// Prints a line that is visible even if the test passes: libtest captures `println!` and `eprintln!` only.
+pub fn aloud(line: &str) {
+    let _ = std::io::stderr().write_all(format!("{line}\n").as_bytes());
+}
+
+/// Reports that the current test, or a part of it, does not run. If every test must run (`BENCH_DRAGON_REQUIRE_ALL=1`,
+/// which `tests/run` sets), that is a failure.
+pub fn not_run(why: &str) {
+    let thread = std::thread::current();
+    let test = thread.name().unwrap_or("a test");
+    aloud(&format!("NOT RUN: {test}: {why}"));
+    assert!(!is_set("BENCH_DRAGON_REQUIRE_ALL"), "{test} did not run: {why}");
+}
+
+/// Returns true if a test's requirement is met; otherwise reports the reason.
+#[must_use]
+pub fn can_run(requirement: Result<(), String>) -> bool {
+    requirement.inspect_err(|why| not_run(why)).is_ok()
+}
+
+/// Requires modules of the tests' Python (`BENCH_DRAGON_PYTHON`, or `python3`).
+pub fn python_modules(modules: &[&str]) -> Result<(), String> {
+    let code = "import importlib.util, sys; print(*[m for m in sys.argv[1:] if not importlib.util.find_spec(m)])";
+    let found = python().args(["-c", code]).args(modules).output();
+    let output = found.map_err(|error| format!("no Python ({error})"))?;
+    let missing = text(&output.stdout);
+    if output.status.success() && missing.trim().is_empty() {
+        Ok(())
+    } else {
+        Err(format!("Python has no {}; tests/run installs it", missing.trim()))
+    }
+}
+
+/// Requires the browser that `tests/python/stage_picture.py` starts.
+pub fn chromium() -> Result<(), String> {
+    let program = Path::new("/usr/bin/chromium");
+    if program.exists() { Ok(()) } else { Err(format!("no {}; tests/run installs it", program.display())) }
+}
+
+pub fn is_root() -> bool {
+    std::fs::metadata("/proc/self").unwrap().uid() == 0
+}
+
+/// Requires the rights of root.
+pub fn root(what_for: &str) -> Result<(), String> {
+    if is_root() { Ok(()) } else { Err(format!("only root can {what_for}")) }
+}
+
+/// Waits until a condition holds, for a minute at most.
+pub fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while !holds() {
+        assert!(Instant::now() < deadline, "not within a minute: {what}");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+pub fn wait(seconds: f64) {
+    std::thread::sleep(Duration::from_secs_f64(seconds));
+}
+
+pub fn scene_file(name: &str, replacements: &[(&str, &str)]) -> PathBuf {
+    let mut scene = include_str!("../../config/paper.toml").to_owned();
+    for (from, to) in replacements {
+        assert!(scene.contains(from));
+        scene = scene.replace(from, to);
+    }
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{}.toml", unique(name)));
+    std::fs::write(&file, scene).unwrap();
+    file
+}

@@ -1,0 +1,222 @@
+//! The feed of every subscriber command, with real publishers that come and go between its polls.
+//!
+//! Every wait has a deadline, and no test asserts a speed.
+
+use crate::harness;
+
+use std::time::{Duration, Instant};
+
+use bench_dragon::client::connection::Wake;
+use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
+use bench_dragon::messages::{FrameHeader, Stage};
+use bench_dragon::publisher::live::{Outgoing, Publisher};
+use bench_dragon::publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
+use bench_dragon::show::convert::stage;
+use bench_dragon::show::scene::Scene;
+use bench_dragon::show::{Playback, Show};
+use harness::{Process, program, summary, unique, wait};
+use nix::sys::signal::Signal::SIGKILL;
+
+/// Events handed over by a feed, in order: frames by their run and sequence, and the number missed before each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Seen {
+    Started(u64),
+    Frame { run_id: u64, sequence: u64, missed: u64 },
+    Silent,
+    Gone,
+}
+
+fn poll(feed: &mut Feed, seen: &mut Vec<Seen>) {
+    let polled = feed.poll(Duration::from_millis(20), &mut |event| match event {
+        FeedEvent::Started { run_id } => seen.push(Seen::Started(run_id)),
+        FeedEvent::Frame { header, handles, missed } => {
+            assert_eq!(header.handles as usize, handles.len());
+            seen.push(Seen::Frame { run_id: header.run_id, sequence: header.sequence, missed });
+        }
+        FeedEvent::Silent => seen.push(Seen::Silent),
+        FeedEvent::Gone => seen.push(Seen::Gone),
+        FeedEvent::Stage(_) | FeedEvent::Alert(_) | FeedEvent::Cue(_) | FeedEvent::Status(_) => (),
+    });
+    polled.unwrap();
+}
+
+fn poll_until(feed: &mut Feed, seen: &mut Vec<Seen>, condition: impl Fn(&[Seen]) -> bool) {
+    let deadline = Instant::now() + Duration::from_secs(300);
+    while !condition(seen) {
+        assert!(Instant::now() < deadline, "{seen:?}");
+        poll(feed, seen);
+    }
+}
+
+fn publisher(name: &str, arguments: &[&str]) -> Process {
+    let mut command = program(name);
+    Process::start(command.args(["run", "--json", "--scene", "tests/scenes/noalerts.toml"]).args(arguments))
+}
+
+fn runs(seen: &[Seen]) -> Vec<u64> {
+    let run = |one: &Seen| if let Seen::Started(run_id) = one { Some(*run_id) } else { None };
+    seen.iter().filter_map(run).collect()
+}
+
+/// Returns the first and the last sequence of a run, the number of frames received, and the number missed.
+fn span(seen: &[Seen], of: u64) -> (u64, u64, u64, u64) {
+    let frames: Vec<_> = seen
+        .iter()
+        .filter_map(|one| match one {
+            Seen::Frame { run_id, sequence, missed } if *run_id == of => Some((*sequence, *missed)),
+            _ => None,
+        })
+        .collect();
+    let missed = frames.iter().map(|(_, missed)| missed).sum();
+    (frames.first().unwrap().0, frames.last().unwrap().0, frames.len() as u64, missed)
+}
+
+#[test]
+fn a_publisher_restarted_between_two_polls_is_a_new_run() {
+    for frames in [Delivery::All, Delivery::Newest] {
+        let name = format!("restart_{frames:?}");
+        let mut feed = Feed::new(&unique(&name), FeedOptions { wake: Wake::OnFrame, frames }).unwrap();
+        let mut seen = Vec::new();
+        let first = publisher(&name, &["--rate", "100", "--duration", "2"]);
+        poll_until(&mut feed, &mut seen, |seen| seen.len() > 10);
+        let published = summary(&first.output_within(300))["frames"].as_u64().unwrap();
+        let second = publisher(&name, &["--rate", "100"]);
+        // The feed is not polled until the second publisher publishes, which another process reports.
+        let mut monitor = Process::start(program(&name).args(["watch", "--json"]));
+        monitor.lines().until("\"state\":\"moving\"", 300);
+        drop(monitor);
+        poll_until(&mut feed, &mut seen, |seen| runs(seen).len() > 1 && seen.len() > 20);
+        second.signal(SIGKILL);
+        poll_until(&mut feed, &mut seen, |seen| seen.contains(&Seen::Gone));
+        let [one, other] = runs(&seen)[..] else { panic!("{seen:?}") };
+        assert_ne!(one, other);
+        for run in [one, other] {
+            let (first, last, received, missed) = span(&seen, run);
+            assert_eq!(received + missed, last - first + 1, "{seen:?}");
+            assert!(run == other || last < published, "{seen:?}");
+        }
+        assert_eq!(seen.iter().filter(|one| **one == Seen::Gone).count(), 1, "{seen:?}");
+        assert_eq!(seen.last(), Some(&Seen::Gone), "{seen:?}");
+    }
+}
+
+/// A publisher starts when the feed is about to find that the one before has gone, 200 ms after its last frame. The
+/// feed selects the new publisher from its first frames on.
+#[test]
+fn a_publisher_that_is_started_again_at_any_moment_is_followed_at_once() {
+    const RATE: u64 = 100;
+    let mut feed = Feed::new(&unique("again"), FeedOptions { wake: Wake::OnFrame, frames: Delivery::All }).unwrap();
+    let mut seen = Vec::new();
+    let delays = [0, 40, 80, 120, 160, 200, 250, 400].map(Duration::from_millis);
+    for delay in delays {
+        let publisher = publisher("again", &["--rate", &RATE.to_string(), "--duration", "2"]);
+        let ending = std::thread::spawn(move || publisher.output_within(300));
+        while !ending.is_finished() {
+            poll(&mut feed, &mut seen);
+        }
+        assert!(ending.join().unwrap().status.success());
+        let ended = Instant::now();
+        while ended.elapsed() < delay {
+            poll(&mut feed, &mut seen);
+        }
+    }
+    poll_until(&mut feed, &mut seen, |seen| seen.last() == Some(&Seen::Gone));
+    assert_eq!(runs(&seen).len(), delays.len(), "{seen:?}");
+    for run in runs(&seen) {
+        let (first, last, received, missed) = span(&seen, run);
+        assert_eq!((received, missed), (last - first + 1, 0), "{seen:?}");
+        // The feed has half of the frames, however slowly the publisher began; an earlier version ignored the publisher
+        // for seconds.
+        assert!(first < RATE, "{first}: {seen:?}");
+    }
+    let of_frame = |one: &Seen| if let Seen::Frame { run_id, .. } = one { Some(*run_id) } else { None };
+    for (at, _) in seen.iter().enumerate().filter(|(_, one)| **one == Seen::Gone) {
+        let before = seen[..at].iter().rev().find_map(of_frame);
+        assert!(seen[at..].iter().find_map(of_frame).is_none_or(|after| Some(after) != before), "{seen:?}");
+    }
+}
+
+#[test]
+fn the_newest_frame_is_one_a_poll_and_the_rest_is_counted() {
+    let mut feed = Feed::new(&unique("newest"), FeedOptions { wake: Wake::Never, frames: Delivery::Newest }).unwrap();
+    let publisher = publisher("newest", &["--rate", "500"]);
+    let mut seen = Vec::new();
+    poll_until(&mut feed, &mut seen, |seen| !seen.is_empty());
+    for _ in 0..20 {
+        wait(0.03);
+        let before = seen.len();
+        poll(&mut feed, &mut seen);
+        assert!(seen.len() <= before + 1, "{seen:?}");
+    }
+    let [run] = runs(&seen)[..] else { panic!("{seen:?}") };
+    let (first, last, received, missed) = span(&seen, run);
+    assert_eq!(received + missed, last - first + 1, "{seen:?}");
+    assert!(missed > received, "{seen:?}");
+    drop(publisher);
+}
+
+fn opened(name: &str, scene: &Scene, cues: usize, stage: Stage) -> SharedMemoryPublisher {
+    let config = PublisherConfig {
+        name: name.to_owned(),
+        handles: scene.team().handles(),
+        single_precision: None,
+        queue: 64,
+        subscribers: 2,
+        alerts: false,
+        cues,
+        stage,
+    };
+    SharedMemoryPublisher::open(&config).unwrap()
+}
+
+/// A process that keeps the services of a scene with few cues open does not block a scene with more.
+#[test]
+fn a_scene_with_more_cues_finds_its_services_open() {
+    let scene = Scene::paper();
+    let show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    let name = unique("more_cues");
+    let open = |cues| opened(&name, &scene, cues, stage(cues as u64, 0, [0; 32], &scene.motion, &show));
+    let _few = open(3);
+    let _more = open(40);
+}
+
+/// Of two publishers the first sends no frames, and has a stage. Nothing is taken for the show's data before a frame
+/// has come, and the show's stage comes before that frame.
+#[test]
+fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {
+    let scene = Scene::paper();
+    let mut show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    let name = unique("beside");
+    let stages = [7, 8].map(|run_id| stage(run_id, 0, [0; 32], &scene.motion, &show));
+    let [mut bystander, mut sender] = stages.map(|stage| opened(&name, &scene, 0, stage));
+    let mut feed = Feed::new(&name, FeedOptions { wake: Wake::Never, frames: Delivery::All }).unwrap();
+    let mut runs = Vec::new();
+    let mut poll = |runs: &mut Vec<(&'static str, u64)>| {
+        let polled = feed.poll(Duration::from_millis(20), &mut |event| match event {
+            FeedEvent::Stage(stage) => runs.push(("stage", stage.run_id)),
+            FeedEvent::Started { run_id } => runs.push(("started", run_id)),
+            FeedEvent::Frame { header, .. } => runs.push(("frame", header.run_id)),
+            other => panic!("{other:?}"),
+        });
+        polled.unwrap();
+    };
+    for _ in 0..20 {
+        bystander.maintain();
+        sender.maintain();
+        poll(&mut runs);
+    }
+    assert_eq!(runs, []);
+    let deadline = Instant::now() + Duration::from_secs(300);
+    let mut sequence = 0;
+    while runs.len() < 10 {
+        assert!(Instant::now() < deadline, "{runs:?}");
+        let header = FrameHeader { run_id: 8, sequence, handles: 224, ..FrameHeader::default() };
+        sender.publish(Outgoing::new(&header, show.frame(sequence))).unwrap();
+        bystander.maintain();
+        sender.maintain();
+        poll(&mut runs);
+        sequence += 1;
+    }
+    assert_eq!(runs[..3], [("stage", 8), ("started", 8), ("frame", 8)]);
+    assert!(runs[3..].iter().all(|one| *one == ("frame", 8)), "{runs:?}");
+}

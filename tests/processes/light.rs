@@ -1,0 +1,104 @@
+//! The service of poses in single precision, as a subscriber in Python receives it: each frame is the frame of
+//! `<name>/poses` rounded. Without `precision = "f32"` there is no such service.
+
+use crate::harness;
+
+use bench_dragon::client::shared_memory::{node, service_name};
+use bench_dragon::messages::{FrameHeader, HandlePose32, LoopStatus};
+use harness::{Process, can_run, json_lines, program, python, python_modules, scene_file, summary, text, unique, wait};
+use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
+use serde_json::Value;
+
+/// Returns a scene whose queues hold all frames by which a subscriber falls behind.
+fn scene(name: &str, publish: &str) -> std::path::PathBuf {
+    scene_file(name, &[("[publish]", &format!("[publish]\nqueue = 480\n{publish}"))])
+}
+
+/// Returns the output of `check` for a scene, or of `run` when it starts.
+fn said(name: &str, scene: &std::path::Path, arguments: &[&str]) -> String {
+    let output = Process::start(program(name).arg("--scene").arg(scene).args(arguments)).output_within(300);
+    text(&output.stdout) + &text(&output.stderr)
+}
+
+fn every_frame_is_the_whole_one_rounded(every: usize, velocities: bool, expected: &[usize]) {
+    if !can_run(python_modules(&["iceoryx2", "numpy"])) {
+        return;
+    }
+    let name = format!("light{every}");
+    let scene = scene(&name, &format!("precision = \"f32\"\nevery = {every}"));
+    if !velocities {
+        let text = std::fs::read_to_string(&scene).unwrap();
+        std::fs::write(&scene, text.replace("velocities = true", "velocities = false")).unwrap();
+    }
+    let peer = Process::start(python().args(["tests/python/light_peer.py", "--name", &unique(&name)]));
+    let mut run = program(&name);
+    run.arg("--scene").arg(&scene).args(["run", "--json", "--rate", "50", "--start", "409", "--duration", "5"]);
+    let frames = summary(&Process::start(&mut run).output_within(300))["frames"].as_u64().unwrap();
+    let output = peer.output_within(300);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let compared: Value = json_lines(&output).pop().unwrap();
+    assert!(compared["compared"].as_u64().unwrap() > 20, "{compared} of {frames} frames");
+    assert_eq!(compared["last"], frames - 1, "the last frame arrived too");
+    let handles: Vec<_> = compared["handles"].as_array().unwrap().iter().map(|it| it.as_u64().unwrap()).collect();
+    assert_eq!(handles, expected.iter().map(|handle| *handle as u64).collect::<Vec<_>>());
+}
+
+#[test]
+fn all_handles_are_those_of_the_whole_frame_rounded() {
+    every_frame_is_the_whole_one_rounded(1, true, &Vec::from_iter(0..224));
+}
+
+#[test]
+fn one_handle_in_seven_and_the_tail_are_those_of_the_whole_frame_rounded() {
+    let mut handles: Vec<_> = (0..224).step_by(7).collect();
+    handles.push(223);
+    every_frame_is_the_whole_one_rounded(7, false, &handles);
+}
+
+#[test]
+fn head_and_tail_remain_where_the_team_is_smaller_than_the_step() {
+    every_frame_is_the_whole_one_rounded(1000, true, &[0, 223]);
+}
+
+#[test]
+fn nothing_is_there_unasked() {
+    let name = "light_off";
+    let scene = scene(name, "precision = \"f64\"\nevery = 1");
+    let mut run = program(name);
+    run.arg("--scene").arg(&scene).args(["run", "--json", "--start", "300", "--duration", "60"]);
+    let _publisher = Process::start(&mut run);
+    let node = node().unwrap();
+    let status = service_name(&unique(name), "status").unwrap();
+    let is_there = || node.service_builder(&status).publish_subscribe::<LoopStatus>().open().is_ok();
+    // The publisher creates this service last.
+    assert!(
+        (0..600).any(|_| is_there() || {
+            wait(0.1);
+            false
+        }),
+        "a minute has passed without a publisher"
+    );
+    let poses32 = service_name(&unique(name), "poses32").unwrap();
+    let opened =
+        node.service_builder(&poses32).publish_subscribe::<[HandlePose32]>().user_header::<FrameHeader>().open();
+    assert_eq!(opened.err(), Some(PublishSubscribeOpenError::DoesNotExist));
+    assert!(!said(name, &scene, &["check"]).contains("poses32"));
+}
+
+#[test]
+fn check_and_run_name_the_service_and_the_example_reads_it() {
+    if !can_run(python_modules(&["iceoryx2", "numpy"])) {
+        return;
+    }
+    let name = "light_said";
+    let scene = scene(name, "precision = \"f32\"\nevery = 7");
+    let checked = said(name, &scene, &["check"]);
+    assert!(checked.contains("poses32 has one handle in 7 and the tail, in f32"), "{checked}");
+    let arguments = ["examples/python/subscribe.py", "--light", "--json", "--seconds", "20", "--name", &unique(name)];
+    let mut example = Process::start(python().args(arguments));
+    let started = said(name, &scene, &["run", "--rate", "50", "--start", "300", "--duration", "2"]);
+    assert!(started.contains("/poses32 (one handle in 7 and the tail, in f32)"), "{started}");
+    let line: Value = serde_json::from_str(&example.lines().until("frame", 300)).unwrap();
+    assert_eq!((&line["type"], &line["handles"]), (&"frame".into(), &33.into()), "{line}");
+    assert!(line["head"][0].as_f64().unwrap().abs() < 9.0, "{line}");
+}

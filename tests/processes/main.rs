@@ -1,0 +1,22 @@
+//! The program as users start it: publishers, subscribers and commands in separate processes.
+
+mod cli;
+mod conductor;
+mod control;
+mod faults;
+mod feed;
+#[path = "../harness/mod.rs"]
+mod harness;
+mod light;
+mod live;
+mod log;
+mod metrics;
+mod readers;
+mod record;
+mod replay;
+mod second_publisher;
+mod send;
+mod soak;
+mod transports;
+mod tunnel;
+mod watch;

@@ -1,0 +1,11 @@
+//! The repository itself: pages, generated files, manifests, dependencies, words.
+
+mod command_table;
+mod features;
+#[path = "../harness/mod.rs"]
+mod harness;
+mod msgs;
+mod newcomer;
+mod rooms;
+mod supply_chain;
+mod words;

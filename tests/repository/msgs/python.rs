@@ -1,0 +1,148 @@
+//! `examples/python/bench_dragon_messages.py`: generated down to a line, written by hand below it.
+
+use crate::msgs::render::{ENUMS, NOTICE, Target, comment, targets, wrapped};
+use crate::msgs::source::{Docs, Enumeration, Kind, Layout, Source, links, without_links};
+
+/// First line of the part that is written by hand.
+pub const BY_HAND: &str = "# From here on written by hand.\n";
+
+const HEAD: &str = r#""""The memory layouts of bench-dragon's messages, once, for every Python subscriber.
+
+Each class is what iceoryx2 compares with the publisher's type: its name ends in the layout's version, so that a
+publisher with another layout is refused. `HANDLE_POSE` and `HANDLE_POSE_32` are the numpy views
+of a frame's handles.
+"""
+
+import ctypes
+
+import numpy as np
+
+"#;
+
+const BASE: &str = r#"
+
+class _Message(ctypes.Structure):
+    LAYOUT = 1
+
+    @classmethod
+    def type_name(cls) -> str:
+        return f"bench_dragon/{cls.__name__}/{cls.LAYOUT}"
+"#;
+
+/// Returns the generated part, with [`BY_HAND`] as its last line.
+pub fn module(source: &Source) -> String {
+    let mut text = format!("{NOTICE}# What stands below MESSAGES is written by hand.\n{HEAD}");
+    let names: Vec<_> = source.layouts.iter().map(|layout| layout.name.as_str()).collect();
+    let mut groups = Vec::new();
+    for target in targets(source, &names) {
+        match target {
+            Target::Constant(constant) if constant.is_on_the_wire => {
+                let docs = comment(&plain(source, None, &constant.docs), "");
+                text += &format!("{docs}{} = 0x{:08X}\n", constant.name, constant.value);
+            }
+            Target::Group(prefix) => groups.push(prefix),
+            _ => {}
+        }
+    }
+    for names in &ENUMS {
+        let item = source.enumeration(names.rust).unwrap();
+        text += "\n";
+        text += &if names.rust == "EventKind" { events(source, item) } else { states(source, names.python, item) };
+    }
+    for prefix in groups {
+        text += &format!("\n# The values of {}.\n", held_by(source, &format!("{prefix}*")));
+        text += &format!("{}S = (\n", prefix.trim_end_matches('_'));
+        for (number, constant) in source.group(prefix).into_iter().enumerate() {
+            assert_eq!(constant.value, number as u64, "{} is not in order", constant.name);
+            text += &comment(&plain(source, None, &constant.docs), "    ");
+            text += &format!("    \"{}\",\n", constant.name[prefix.len()..].to_lowercase());
+        }
+        text += ")\n";
+    }
+    text += BASE;
+    for layout in &source.layouts {
+        text += &class(source, layout);
+    }
+    let is_part = |name: &str| source.layouts.iter().flat_map(|layout| &layout.fields).any(|it| it.kind.holds(name));
+    let sent: Vec<_> = names.into_iter().filter(|name| !is_part(name)).collect();
+    text + &format!("\n\nMESSAGES = ({})\n\n{BY_HAND}", sent.join(", "))
+}
+
+/// Returns the fields whose comments have this link.
+fn held_by(source: &Source, link: &str) -> String {
+    let fields = source.layouts.iter().flat_map(|layout| layout.fields.iter().map(move |field| (layout, field)));
+    let fields = fields.filter(|(_, field)| field.docs.iter().any(|text| links(text).any(|found| found == link)));
+    fields.map(|(layout, field)| format!("`{}.{}`", layout.name, field.name)).collect::<Vec<_>>().join(", ")
+}
+
+impl Kind {
+    /// Returns true if this layout is part of the module.
+    fn holds(&self, layout: &str) -> bool {
+        match self {
+            Kind::Layout(name) => name == layout,
+            Kind::Array(element, _) => element.holds(layout),
+            Kind::Number(_) | Kind::Text(_) => false,
+        }
+    }
+}
+
+fn states(source: &Source, name: &str, item: &Enumeration) -> String {
+    let mut text = format!("{}{name} = (\n", comment(&plain(source, None, &item.docs), ""));
+    for variant in &item.variants {
+        text += &comment(&plain(source, None, &variant.docs), "    ");
+        text += &format!("    \"{}\",\n", variant.name);
+    }
+    text + ")\n"
+}
+
+fn events(source: &Source, item: &Enumeration) -> String {
+    let mut text = "# What an alert may be about, by the number of the state that the event leads to.\n".to_owned();
+    text += "EVENTS = {\n    # No event.\n    0: None,\n";
+    for kind in &item.variants {
+        text += &comment(&plain(source, None, &kind.docs), "    ");
+        text += &format!("    {}: \"{}\",\n", kind.number, kind.name);
+    }
+    text + "}\n"
+}
+
+fn class(source: &Source, layout: &Layout) -> String {
+    let mut text = format!("\n\nclass {}(_Message):\n", layout.name);
+    let docs: Vec<_> = plain(source, Some(layout), &layout.docs).iter().map(|text| wrapped(text, "    ")).collect();
+    let docs = docs.join("\n");
+    // The quotes are on a separate line after a text of more than one line.
+    let one_line = docs.trim();
+    if docs.lines().count() == 1 && one_line.len() + 10 <= 120 {
+        text += &format!("    \"\"\"{one_line}\"\"\"\n");
+    } else {
+        text += &format!("    \"\"\"{one_line}\n    \"\"\"\n");
+    }
+    text += &format!("\n    LAYOUT = {}\n    _fields_ = [\n", layout.version);
+    for field in &layout.fields {
+        text += &comment(&plain(source, Some(layout), &field.docs), "        ");
+        text += &format!("        (\"{}\", {}),\n", field.name, type_name(&field.kind));
+    }
+    text + "    ]\n"
+}
+
+/// Returns comments in the words of Python.
+fn plain(source: &Source, own: Option<&Layout>, docs: &Docs) -> Docs {
+    let words = |link: &str| match Target::of(source, link) {
+        Target::Enum(names) => format!("`{}`", names.python),
+        Target::Field(layout, field) if own.is_some_and(|own| own.name == layout) => format!("`{field}`"),
+        Target::Field(layout, field) => format!("`{layout}.{field}`"),
+        Target::Layout(layout) => format!("`{layout}`"),
+        Target::Constant(constant) if constant.is_on_the_wire => format!("`{}`", constant.name),
+        Target::Constant(constant) => constant.value.to_string(),
+        Target::Group(prefix) => format!("`{}S`", prefix.trim_end_matches('_')),
+    };
+    docs.iter().map(|text| without_links(text, words)).collect()
+}
+
+fn type_name(kind: &Kind) -> String {
+    match kind {
+        Kind::Number(primitive) => format!("ctypes.{}", primitive.ctypes),
+        Kind::Text(bytes) => format!("ctypes.c_uint8 * {bytes}"),
+        Kind::Layout(name) => name.clone(),
+        Kind::Array(element, length) => format!("{} * {length}", type_name(element)),
+    }
+}

@@ -1,0 +1,78 @@
+//! The crates depend on each other as the table of ARCHITECTURE.md states, and boundaries that the compiler does not
+//! check are kept.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use toml::Table;
+
+/// Returns the crates of the workspace, by their folder.
+fn crates() -> Vec<String> {
+    let folders = std::fs::read_dir("crates").unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<_> = folders.filter(|name| Path::new(&format!("crates/{name}/Cargo.toml")).exists()).collect();
+    names.sort();
+    names
+}
+
+/// Returns the crates of this workspace that a manifest names among its dependencies.
+fn dependencies(name: &str) -> BTreeSet<String> {
+    let manifest: Table = std::fs::read_to_string(format!("crates/{name}/Cargo.toml")).unwrap().parse().unwrap();
+    let normal = manifest.get("dependencies").and_then(|table| table.as_table()).cloned().unwrap_or_default();
+    normal.keys().filter_map(|key| key.strip_prefix("bench-dragon-")).map(str::to_owned).collect()
+}
+
+/// Returns all Rust files below a folder.
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let below = |path: PathBuf| match path.is_dir() {
+        true => sources(&path),
+        false => Vec::from_iter((path.extension().is_some_and(|ext| ext == "rs")).then_some(path)),
+    };
+    entries.flat_map(below).collect()
+}
+
+#[test]
+fn the_architecture_page_lists_every_crate_with_its_dependencies() {
+    let page = include_str!("../../ARCHITECTURE.md");
+    let rows = page.lines().filter_map(|line| line.strip_prefix("| `")?.strip_suffix(" |")?.split_once("` | "));
+    let listed: BTreeMap<String, BTreeSet<String>> = rows
+        .filter_map(|(name, rest)| {
+            let (_, depends) = rest.rsplit_once(" | ")?;
+            let names = depends.split('`').skip(1).step_by(2).map(str::to_owned).collect();
+            Some((name.to_owned(), names))
+        })
+        .filter(|(name, _)| Path::new(&format!("crates/{name}")).exists())
+        .collect();
+    let found: BTreeMap<_, _> = crates().into_iter().map(|name| (name.clone(), dependencies(&name))).collect();
+    assert!(found.len() >= 12, "{found:?}");
+    assert_eq!(listed, found);
+}
+
+/// The checker of certificates shares no code with the search that writes them. Its manifest names no crate of this
+/// workspace, so the compiler rejects shared code.
+#[test]
+fn the_checker_stands_alone() {
+    assert_eq!(dependencies("proof"), BTreeSet::new());
+}
+
+/// No program depends on the crate `testing`.
+#[test]
+fn no_crate_depends_on_the_testing_crate() {
+    assert!(crates().iter().all(|name| !dependencies(name).contains("testing")));
+}
+
+/// A new kind of curve is added in the model: no other code distinguishes the kinds of a segment.
+#[test]
+fn only_the_model_knows_the_kinds_of_a_segment() {
+    let files = crates().into_iter().flat_map(|name| sources(Path::new(&format!("crates/{name}/src"))));
+    let mut seen = 0;
+    for file in files.chain(sources(Path::new("src"))) {
+        let matches = std::fs::read_to_string(&file).unwrap().matches("Segment::").count();
+        if file.starts_with("crates/motion/src/model") || file.starts_with("crates/proof") {
+            seen += matches;
+        } else {
+            assert_eq!(matches, 0, "{}", file.display());
+        }
+    }
+    assert!(seen > 10, "{seen} matches in the model");
+}

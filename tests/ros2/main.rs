@@ -1,0 +1,7 @@
+//! ROS 2 topics and services, with Cyclone DDS and ros2-client as peers.
+
+#[path = "../harness/mod.rs"]
+mod harness;
+mod ros2;
+mod ros2_control;
+mod ros2_topics;

@@ -1,0 +1,190 @@
+//! The ROS 2 topics of standard types, and the cues, as a Cyclone DDS subscriber receives them.
+#![cfg(feature = "ros2")]
+
+use crate::harness;
+
+use std::process::Command;
+
+use harness::{Process, can_run, json_lines, long, program, python, python_modules, scene_file, summary, text, unique};
+use serde_json::Value;
+
+/// Returns a Cyclone DDS process that prints its messages of these topics.
+fn peer(name: &str, seconds: &str, topics: &[&str]) -> Command {
+    let mut command = python();
+    command.args(["tests/python/ros2_peer.py", "--name", &unique(name), "--seconds", seconds]);
+    topics.iter().for_each(|topic| {
+        command.args(["--topic", topic]);
+    });
+    command
+}
+
+/// Returns the messages of a topic.
+fn messages<'a>(lines: &'a [Value], topic: &str) -> Vec<&'a Value> {
+    lines.iter().filter(|line| line["topic"] == topic).map(|line| &line["message"]).collect()
+}
+
+#[test]
+fn cues_path_clock_and_transforms_are_those_of_the_show() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    // Two frames a second over ROS 2, and three cues within a sixth of a second.
+    let scene = scene_file("shown", &[]);
+    let of_scene = std::fs::read_to_string(&scene).unwrap();
+    let cues = [(50.35, "first"), (50.4, "second"), (50.45, "third")];
+    let cues = cues.map(|(at, name)| format!("[[cues]]\nname = \"{name}\"\nat = {at}\n")).concat();
+    let topics = "[publish.ros2]\nrate = 2.0\ntopics = [\"handles\", \"cues\", \"path\", \"clock\", \"tf\"]\n";
+    std::fs::write(&scene, format!("{of_scene}\n{topics}\n{cues}")).unwrap();
+    let mut run = program("shown");
+    run.args(["--scene", scene.to_str().unwrap(), "run", "--json", "--paused", "--start", "50.25"]);
+    // /clock and /tf belong to the whole domain.
+    let publisher = Process::start(run.args(["--duration", "300"]).env("ROS_DOMAIN_ID", "9"));
+    let topics = ["handles", "clock", "tf", "path:reliable:transient_local", "cues:reliable:transient_local"];
+    let mut subscriber = Process::start(peer("shown", "300", &topics).args(["--domain", "9"]));
+    let printed = subscriber.lines();
+    let mut lines: Vec<Value> = Vec::new();
+    let until = |lines: &mut Vec<Value>, enough: &dyn Fn(&[Value]) -> bool| {
+        while !enough(lines) {
+            lines.push(serde_json::from_str(&printed.until("", 60)).unwrap());
+        }
+    };
+    until(&mut lines, &|lines| topics[..4].iter().all(|topic| !messages(lines, topic).is_empty()));
+    let go = program("shown").args(["control", "go"]).output().unwrap();
+    assert!(go.status.success(), "{}", text(&go.stderr));
+    let latest = |lines: &[Value]| messages(lines, topics[4]).last().is_some_and(|cue| cue["number"] == 3);
+    until(&mut lines, &latest);
+    let so_far = messages(&lines, "clock").len();
+    until(&mut lines, &|lines| messages(lines, "clock").len() > so_far + 2 && messages(lines, "tf").len() > so_far + 2);
+    // A late subscriber gets the latest cue, and the path.
+    let late = Process::start(peer("shown", "2", &topics[3..]).args(["--domain", "9"])).output_within(60);
+    let late = json_lines(&late);
+    assert!(latest(&late) && !messages(&late, topics[3]).is_empty(), "{late:?}");
+    publisher.signal(nix::sys::signal::Signal::SIGINT);
+    let summary = summary(&publisher.output_within(60));
+    assert!(summary["ros2"]["frames"].as_u64().unwrap() * 10 < summary["frames"].as_u64().unwrap(), "{summary}");
+
+    let number = |value: &Value| value.as_f64().unwrap();
+    let mut cues = messages(&lines, topics[4]);
+    // The first subscriber gets the message in effect twice, in case it was still being discovered.
+    cues.dedup();
+    let names: Vec<_> = cues.iter().map(|cue| (cue["number"].clone(), cue["name"].clone())).collect();
+    assert_eq!(names, [(1, "first"), (2, "second"), (3, "third")].map(|(number, name)| (number.into(), name.into())));
+    for (cue, at) in cues.iter().zip([50.35, 50.4, 50.45]) {
+        let late = number(&cue["sim_time"]) - at;
+        assert!(number(&cue["cue_time"]) == at && late >= 0.0, "{cue}");
+        let stamp = &cue["header"]["stamp"];
+        let nanoseconds = stamp["sec"].as_u64().unwrap() * 1_000_000_000 + stamp["nanosec"].as_u64().unwrap();
+        assert_eq!((cue["stamp_ns"].as_u64(), &cue["pauses"]), (Some(nanoseconds), &0.into()), "{cue}");
+    }
+
+    // The whole spiral: r = pitch theta / 2 pi, from 16 turns to the centre, clockwise.
+    let path = messages(&lines, topics[3])[0];
+    assert_eq!(path["header"]["frame_id"], "stage");
+    let poses = path["poses"].as_array().unwrap();
+    let position = |pose: &Value| ["x", "y"].map(|axis| number(&pose["pose"]["position"][axis]));
+    let (mut theta, mut before) = (16.0 * std::f64::consts::TAU, position(&poses[0]));
+    let (centre, spiral) = poses.split_last().unwrap();
+    for pose in spiral {
+        let [x, y] = position(pose);
+        let turned = (before[0] * y - before[1] * x).atan2(before[0] * x + before[1] * y);
+        assert!(turned <= 0.0 && turned > -0.1, "{pose}");
+        (theta, before) = (theta + turned, [x, y]);
+        assert!((x.hypot(y) - 0.55 * theta / std::f64::consts::TAU).abs() < 1e-9, "{pose}");
+    }
+    assert!(theta > 0.0 && theta < 0.1 && position(centre).iter().all(|x| x.abs() < 1e-12), "{theta} before {centre}");
+    let [z, w] = ["z", "w"].map(|part| number(&poses[0]["pose"]["orientation"][part]));
+    let slope = -1.0 / (16.0 * std::f64::consts::TAU);
+    assert!((2.0 * z.atan2(w) - (slope - std::f64::consts::FRAC_PI_2)).abs() < 1e-4, "{}", poses[0]);
+
+    // Paused, then from tick to tick.
+    let clock = messages(&lines, "clock");
+    let times: Vec<f64> = clock
+        .iter()
+        .map(|message| number(&message["clock"]["sec"]) + number(&message["clock"]["nanosec"]) * 1e-9)
+        .collect();
+    assert!(times[0] == 50.25 && times.is_sorted() && times[times.len() - 1] > 51.0, "{times:?}");
+    for time in times {
+        let ticks = (time - 50.25) * 60.0;
+        assert!((ticks - ticks.round()).abs() < 1e-6, "{time} is between two frames");
+    }
+
+    // Head and tail as in the frame of the same stamp.
+    let mut compared = 0;
+    for message in messages(&lines, "tf") {
+        let transforms = message["transforms"].as_array().unwrap();
+        let stamp = &transforms[0]["header"]["stamp"];
+        let Some(frame) = messages(&lines, "handles").into_iter().find(|frame| frame["header"]["stamp"] == *stamp)
+        else {
+            continue;
+        };
+        compared += 1;
+        let handles = frame["poses"].as_array().unwrap();
+        assert_eq!(transforms.len(), 2);
+        for (transform, (end, handle)) in transforms.iter().zip([("head", &handles[0]), ("tail", &handles[3])]) {
+            assert_eq!(transform["header"], frame["header"]);
+            assert_eq!(transform["child_frame_id"], format!("{}/{end}", unique("shown")));
+            let (place, turn) = (&transform["transform"]["translation"], &transform["transform"]["rotation"]);
+            assert_eq!((&place["x"], &place["y"], &place["z"]), (&handle["x"], &handle["y"], &0.0.into()));
+            let error = 2.0 * number(&turn["z"]).atan2(number(&turn["w"])) - number(&handle["heading"]);
+            assert!(error.sin().abs() < 1e-9 && error.cos() > 0.0, "{transform} and {handle}");
+        }
+    }
+    assert!(compared > 2, "{compared} transforms belong to a received frame");
+}
+
+/// Returns for `joins` subscribers, one after the other, the time of creation and all alerts.
+fn joined(name: &str, joins: u32, further: &[&str]) -> Vec<(u64, Vec<u64>)> {
+    let mut command = python();
+    command.args(["tests/python/ros2_joins.py", "--name", &unique(name), "--joins", &joins.to_string()]);
+    let output = Process::start(command.args(further)).output_within(30 + 5 * u64::from(joins));
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let joined = json_lines(&output).into_iter().map(|join| {
+        let alerts = join["alerts"].as_array().unwrap().iter().map(|alert| alert["stamp_ns"].as_u64().unwrap());
+        (join["made_ns"].as_u64().unwrap(), alerts.collect())
+    });
+    joined.collect()
+}
+
+/// A countdown raises an alert each second. A new subscriber gets the alert in effect and no earlier one, whether
+/// earlier subscribers have left or there were none. Beside a subscriber that stays, the current alert is the last of
+/// those it gets at once.
+#[test]
+fn a_late_subscriber_gets_the_current_alert_and_none_before_it() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let countdown = ("approach_time = 10.0", "approach_time = 1000.0");
+    let scene = scene_file("countdown", &[countdown, ("accuracy = 1e-9", "solver = \"newton\"")]);
+    let mut run = program("countdown");
+    run.args(["--scene", scene.to_str().unwrap(), "run", "--ros2", "--quiet", "--rate", "30"]);
+    let mut watch = Process::start(program("countdown").args(["watch", "--json"]));
+    let printed = watch.lines();
+    let _publisher = Process::start(&mut run);
+    let mut published: Vec<u64> = Vec::new();
+    let mut publish_until = |instant: u64| {
+        while published.last().is_none_or(|stamp| *stamp < instant) {
+            let alert: Value = serde_json::from_str(&printed.until("\"type\":\"alert\"", 60)).unwrap();
+            published.push(alert["stamp_ns"].as_str().unwrap().parse().unwrap());
+        }
+        published.clone()
+    };
+    // Alerts without a subscriber on ROS 2.
+    let first = publish_until(0)[0];
+    publish_until(first + 3_000_000_000);
+    let joins = if long() { 50 } else { 12 };
+    for (made, alerts) in joined("countdown", joins, &[]) {
+        let published = publish_until(made.max(alerts[0]));
+        // An alert that was stamped just before may still be in flight.
+        let current = published.iter().rfind(|stamp| **stamp + 200_000_000 < made).unwrap();
+        assert!(alerts[0] >= *current, "{} ms old", (current - alerts[0]) / 1_000_000);
+    }
+    // A subscriber that does not request earlier messages gets none of them.
+    for (made, alerts) in joined("countdown", joins / 4, &["--volatile"]) {
+        assert!(alerts.first() > Some(&made), "{alerts:?} of before {made}");
+    }
+    for (made, alerts) in joined("countdown", joins / 4, &["--beside"]) {
+        let published = publish_until(made.max(alerts[alerts.len() - 1]));
+        let current = published.iter().rfind(|stamp| **stamp + 200_000_000 < made).unwrap();
+        assert!(alerts.is_sorted() && alerts.last() >= Some(current), "{alerts:?}");
+    }
+}
