@@ -73,7 +73,8 @@ impl Controller {
     /// Creates a controller of the publisher of `name`, which runs already.
     ///
     /// # Errors
-    /// [`ControlError::NoPublisher`] or [`ControlError::Elsewhere`], or [`ControlError::Open`] if the service cannot be used.
+    /// [`ControlError::NoPublisher`] or [`ControlError::Elsewhere`], or [`ControlError::Open`] if the service cannot be
+    /// used.
     pub fn new(name: &str) -> Result<Self, ControlError> {
         let service = service_name(name, "control")?;
         check_room_to_subscribe()?;
@@ -169,7 +170,8 @@ impl PendingCommand {
     /// Returns the response, if it has come.
     ///
     /// # Errors
-    /// [`ControlError::NoPublisher`] if no publisher received the request, [`ControlError::Ended`] if the publisher has ended.
+    /// [`ControlError::NoPublisher`] if no publisher received the request, [`ControlError::Ended`] if the publisher has
+    /// ended.
     pub fn poll(&self) -> Result<Option<ControlResponse>, ControlError> {
         // Read before the response, which may have been the publisher's last action.
         let awaited = self.pending.is_connected();

@@ -1,8 +1,8 @@
 //! The feed of a publisher's services, through any number of publishers: the base of every subscriber command.
 //!
-//! In: the services of a name, over [`connection`](super::connection). Out: a [`FeedEvent`] for each message
-//! and each change. Only this file connects, opens services that appear later, distinguishes a silent publisher from a dead
-//! one ([`liveness`]), and finds gaps and new runs ([`sequence`]). `watch`, the stage picture and the subscribers of the
+//! In: the services of a name, over [`connection`](super::connection). Out: a [`FeedEvent`] for each message and each
+//! change. Only this file connects, opens services that appear later, distinguishes a silent publisher from a dead one
+//! ([`liveness`]), and finds gaps and new runs ([`sequence`]). `watch`, the stage picture and the subscribers of the
 //! soak test call [`Feed::poll`] in a loop and handle the events.
 
 pub mod liveness;
@@ -20,7 +20,8 @@ use sequence::SequenceTracker;
 const CONNECT_INTERVAL: Duration = Duration::from_millis(20);
 /// The interval at which missing services are opened.
 const OPEN_INTERVAL: Duration = Duration::from_millis(100);
-/// How long a publisher may send nothing while no show runs here: statuses and, over a tunnel, stages come once a second.
+/// How long a publisher may send nothing while no show runs here: statuses and, over a tunnel, stages come once a
+/// second.
 const QUIET: Duration = Duration::from_millis(1500);
 
 /// The frames since the last poll that are handed over.
@@ -55,7 +56,8 @@ pub enum FeedEvent<'a> {
         header: &'a FrameHeader,
         /// Its handles, head first.
         handles: &'a [HandlePose],
-        /// Frames of the run between the previous frame and this one that were not handed over: lost, or skipped by [`Delivery::Newest`].
+        /// Frames of the run between the previous frame and this one that were not handed over: lost, or skipped by
+        /// [`Delivery::Newest`].
         missed: u64,
     },
     /// The stage, at the start of each run.
@@ -68,8 +70,8 @@ pub enum FeedEvent<'a> {
     Status(&'a LoopStatus),
     /// The publisher is alive and has stopped sending. The next frame ends that.
     Silent,
-    /// The publisher has ended or died, and all its messages have been handed over. Or it is the silent end of a tunnel, and a
-    /// show has begun on this machine.
+    /// The publisher has ended or died, and all its messages have been handed over. Or it is the silent end of a
+    /// tunnel, and a show has begun on this machine.
     Gone,
 }
 
@@ -159,13 +161,13 @@ impl Feed {
         })
     }
 
-    /// Waits for messages, at most `timeout`, and passes all of them to `handle`, but at most as many frames as the queue
-    /// holds. May return sooner and without messages. It also connects and tests the publisher, so call it in a loop, at
-    /// least a few times a second.
+    /// Waits for messages, at most `timeout`, and passes all of them to `handle`, but at most as many frames as the
+    /// queue holds. May return sooner and without messages. It also connects and tests the publisher, so call it in a
+    /// loop, at least a few times a second.
     ///
     /// # Errors
-    /// [`OpenError`] if the services exist and cannot be used. The feed has closed them then, and the next call connects
-    /// again: the obstacle may have gone.
+    /// [`OpenError`] if the services exist and cannot be used. The feed has closed them then, and the next call
+    /// connects again: the obstacle may have gone.
     pub fn poll(&mut self, timeout: Duration, handle: &mut dyn FnMut(FeedEvent<'_>)) -> Result<(), OpenError> {
         let Some(connected) = &mut self.connected else { return self.connect(timeout) };
         connected.connection.wait(timeout.min(OPEN_INTERVAL));
@@ -187,8 +189,8 @@ impl Feed {
             None => (),
             Some(Change::Silent) => handle(FeedEvent::Silent),
             Some(Change::Gone) => {
-                // Messages sent between the reading above and its end are still in the queues, perhaps before messages of
-                // the next publisher.
+                // Messages sent between the reading above and its end are still in the queues, perhaps before messages
+                // of the next publisher.
                 connected.receive(self.frames, &mut self.sequence, handle);
                 if !is_alive(&connected.connection) {
                     if connected.received {
@@ -209,8 +211,8 @@ impl Feed {
         Ok(())
     }
 
-    /// Returns true if the publisher's clock is that of this process, so that latencies can be computed; `None` while there is
-    /// no publisher. For another publisher the value is right after the poll that brings its first frame.
+    /// Returns true if the publisher's clock is that of this process, so that latencies can be computed; `None` while
+    /// there is no publisher. For another publisher the value is right after the poll that brings its first frame.
     pub fn shares_clock(&self) -> Option<bool> {
         self.connected.as_ref().map(|connected| connected.shares_clock)
     }
@@ -246,15 +248,15 @@ impl Feed {
     }
 }
 
-/// Returns true if the deadlines are of this machine's clock: the service names the clock, and a show runs here. Services
-/// can outlive the show that created them, and a tunnel then sends another machine's frames through them.
+/// Returns true if the deadlines are of this machine's clock: the service names the clock, and a show runs here.
+/// Services can outlive the show that created them, and a tunnel then sends another machine's frames through them.
 fn shares_clock(subscription: &Subscription, connection: &Connection) -> bool {
     connection.names_clock() && subscription.show_is_here()
 }
 
 impl Connected {
-    /// Hands over the messages in the queues: the stage first, since it describes the frames, and frames before their alerts
-    /// and cues.
+    /// Hands over the messages in the queues: the stage first, since it describes the frames, and frames before their
+    /// alerts and cues.
     fn receive(&mut self, frames: Delivery, sequence: &mut SequenceTracker, handle: &mut dyn FnMut(FeedEvent<'_>)) {
         let Self {
             connection,

@@ -1,8 +1,9 @@
 //! The handles at the moment of display: cubic Hermite interpolation between the frames of a stream.
 //!
-//! In: frames as they come, and a moment of CLOCK_MONOTONIC. Out: positions, headings and velocities at that moment, also
-//! between frames. The display runs a period behind the stream, at any rate. The error falls with the fourth power of the
-//! frames' distance (de Boor, A Practical Guide to Splines, IV.6: h^4 / 384 times the greatest fourth derivative).
+//! In: frames as they come, and a moment of CLOCK_MONOTONIC. Out: positions, headings and velocities at that moment,
+//! also between frames. The display runs a period behind the stream, at any rate. The error falls with the fourth power
+//! of the frames' distance (de Boor, A Practical Guide to Splines, IV.6: h^4 / 384 times the greatest fourth
+//! derivative).
 
 use std::collections::VecDeque;
 
@@ -60,14 +61,15 @@ pub struct HermiteReader {
 }
 
 impl HermiteReader {
-    /// Creates a reader that keeps the latest `keep` frames, at least two. A display that runs `d` seconds behind a stream of
-    /// `r` frames per second needs d r + 2.
+    /// Creates a reader that keeps the latest `keep` frames, at least two. A display that runs `d` seconds behind a
+    /// stream of `r` frames per second needs d r + 2.
     pub fn new(keep: usize) -> Self {
         Self { frames: VecDeque::with_capacity(keep.max(2)), keep: keep.max(2) }
     }
 
-    /// Adds the next frame of a stream, and drops the frames of another run. A frame of another machine has a `deadline_ns` of
-    /// that machine's clock, which cannot be compared with moments here: replace it by the time of arrival.
+    /// Adds the next frame of a stream, and drops the frames of another run. A frame of another machine has a
+    /// `deadline_ns` of that machine's clock, which cannot be compared with moments here: replace it by the time of
+    /// arrival.
     pub fn push(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
         if self.frames.back().is_some_and(|last| last.header.run_id != header.run_id) {
             self.frames.clear();
@@ -86,12 +88,12 @@ impl HermiteReader {
         self.frames.back().map(|frame| &frame.header)
     }
 
-    /// Fills `handles` with the poses at a moment, CLOCK_MONOTONIC in nanoseconds, and returns its simulated time in seconds.
-    /// Returns `None` if no frame has come. There is no interpolation before the oldest kept frame, after the newest, and at
-    /// a jump of simulated time: there the nearest earlier frame, or the oldest, is returned.
+    /// Fills `handles` with the poses at a moment, CLOCK_MONOTONIC in nanoseconds, and returns its simulated time in
+    /// seconds. Returns `None` if no frame has come. There is no interpolation before the oldest kept frame, after the
+    /// newest, and at a jump of simulated time: there the nearest earlier frame, or the oldest, is returned.
     ///
-    /// Headings follow from the positions, as in the frames. Without velocities in the stream the path between two frames is
-    /// a straight line.
+    /// Headings follow from the positions, as in the frames. Without velocities in the stream the path between two
+    /// frames is a straight line.
     pub fn at(&self, monotonic_ns: u64, handles: &mut Vec<HandlePose>) -> Option<f64> {
         let after = self.frames.partition_point(|frame| frame.header.deadline_ns <= monotonic_ns);
         let before = self.frames.get(after.saturating_sub(1))?;

@@ -1,7 +1,8 @@
-//! The loop of a subscriber that polls, for `send` and `metrics`. In: the events of a [`Feed`] of each publisher. Out: calls
-//! of a [`Handler`].
+//! The loop of a subscriber that polls, for `send` and `metrics`. In: the events of a [`Feed`] of each publisher. Out:
+//! calls of a [`Handler`].
 //!
-//! Waking this process at each frame would cost the publisher more than it saves here; polling costs the publisher nothing.
+//! Waking this process at each frame would cost the publisher more than it saves here; polling costs the publisher
+//! nothing.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -34,8 +35,8 @@ impl Obstacle {
 pub trait Handler {
     /// Handles an event of a publisher, given by its place in the list of names, from 0.
     fn handle(&mut self, publisher: usize, event: FeedEvent<'_>);
-    /// Handles the clock of a running publisher: `shares_clock` is true if it is that of this process. Called before the first
-    /// frame and after each poll. Handlers that compare no moments can ignore it.
+    /// Handles the clock of a running publisher: `shares_clock` is true if it is that of this process. Called before
+    /// the first frame and after each poll. Handlers that compare no moments can ignore it.
     fn clock(&mut self, _publisher: usize, _shares_clock: bool) {}
     /// Does periodic work, after every poll.
     fn polled(&mut self, now: Instant);
@@ -51,10 +52,10 @@ struct Source {
 /// Calls a handler with the events of the services of each name, through any number of publishers, until `stop` is set.
 ///
 /// # Errors
-/// [`OpenError`] for a name that iceoryx2 refuses, or if this process may not use the shared memory. Services that become
-/// unusable later are tried again while the others are polled; the log names the reason once. One thread polls all: a
-/// service whose publisher was killed while creating it delays the others. The delay lasts as long as iceoryx2 waits for
-/// the service, at each attempt until the service's files have been removed.
+/// [`OpenError`] for a name that iceoryx2 refuses, or if this process may not use the shared memory. Services that
+/// become unusable later are tried again while the others are polled; the log names the reason once. One thread polls
+/// all: a service whose publisher was killed while creating it delays the others. The delay lasts as long as iceoryx2
+/// waits for the service, at each attempt until the service's files have been removed.
 pub fn poll_until(
     stop: &AtomicBool,
     names: &[String],

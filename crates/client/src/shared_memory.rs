@@ -12,8 +12,8 @@ use ::iceoryx2::prelude::*;
 pub use error::{OpenError, failed, incomplete, port_error, service_error};
 pub use memory::{SHARED_MEMORY, check_room_to_subscribe, free_bytes, reserve_pages};
 
-/// Publishers that a service admits: the show's, and the end of a tunnel to other machines, which opens a publisher and a
-/// subscriber of every service.
+/// Publishers that a service admits: the show's, and the end of a tunnel to other machines, which opens a publisher and
+/// a subscriber of every service.
 pub const MOST_PUBLISHERS: usize = 2;
 /// The attribute of a service of frames with the name of its publisher's clock
 /// ([`monotonic_clock_name`](crate::clock::monotonic_clock_name)). Tunnels between machines create services without it.
@@ -34,8 +34,8 @@ pub fn service_name(name: &str, service: &str) -> Result<ServiceName, OpenError>
 /// Creates a node that leaves signals to this program.
 ///
 /// # Errors
-/// [`OpenError::AnotherUsers`] if the folder belongs to another user, [`OpenError::Failed`] if iceoryx2 fails for another
-/// reason.
+/// [`OpenError::AnotherUsers`] if the folder belongs to another user, [`OpenError::Failed`] if iceoryx2 fails for
+/// another reason.
 pub fn node() -> Result<Node<ipc::Service>, OpenError> {
     stale_files::remove_unfinished_files();
     let made = NodeBuilder::new().signal_handling_mode(SignalHandlingMode::Disabled).create::<ipc::Service>();

@@ -1,14 +1,14 @@
 //! The memory layouts that publishers write and subscribers in any language read.
 //!
 //! Depends on nothing but serde and iceoryx2's [`ZeroCopySend`]: states, levels and kinds are plain numbers here, and
-//! `convert` of the crate `show` fills them in, and the accessors of this crate give them their types. Everything is little-endian, `#[repr(C)]` and without
-//! implicit padding. A type's name ends in the version of its layout, so that a subscriber built for another layout is
-//! refused instead of reading nonsense.
+//! `convert` of the crate `show` fills them in, and the accessors of this crate give them their types. Everything is
+//! little-endian, `#[repr(C)]` and without implicit padding. A type's name ends in the version of its layout, so that a
+//! subscriber built for another layout is refused instead of reading nonsense.
 //!
 //! `msgs/msg` and `examples/python/bench_dragon_messages.py` are generated from this file, doc comments included, by
-//! `BENCH_DRAGON_WRITE=1 cargo test --test msgs`. The comments are therefore for readers of all three languages. Facts of
-//! iceoryx2 alone stand in a paragraph that begins with "Over iceoryx2", which `msgs/msg` leaves out. A link to a constant
-//! or to an enum of [`state`](crate::state) gives the ROS 2 message those constants.
+//! `BENCH_DRAGON_WRITE=1 cargo test --test msgs`. The comments are therefore for readers of all three languages. Facts
+//! of iceoryx2 alone stand in a paragraph that begins with "Over iceoryx2", which `msgs/msg` leaves out. A link to a
+//! constant or to an enum of [`state`](crate::state) gives the ROS 2 message those constants.
 
 mod control;
 mod stage;
@@ -54,13 +54,13 @@ pub struct HandlePose {
     pub vy: f64,
 }
 
-/// The position and velocity of one handle, in half the bytes: the numbers of [`HandlePose`], each rounded to the nearest
-/// single-precision float. The error along each axis is at most 6e-8 of the distance from the centre (0.5 um at 8 m, 0.06
-/// mm at 1 km).
+/// The position and velocity of one handle, in half the bytes: the numbers of [`HandlePose`], each rounded to the
+/// nearest single-precision float. The error along each axis is at most 6e-8 of the distance from the centre (0.5 um at
+/// 8 m, 0.06 mm at 1 km).
 ///
-/// Over iceoryx2 the payload of `<name>/poses32`, a service that a scene can request, is a slice of these, the head first:
-/// one handle in `every`, and the tail. The service's attribute `every` holds that number: the pose with the index `i` is
-/// of the handle `i * every`, the last pose of the last handle.
+/// Over iceoryx2 the payload of `<name>/poses32`, a service that a scene can request, is a slice of these, the head
+/// first: one handle in `every`, and the tail. The service's attribute `every` holds that number: the pose with the
+/// index `i` is of the handle `i * every`, the last pose of the last handle.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/HandlePose32/1")]
 #[repr(C)]
@@ -195,8 +195,8 @@ pub struct CollisionAlert {
     pub bench_a: u32,
     /// The second of the nearest two benches, or [`NO_BENCH`].
     pub bench_b: u32,
-    /// The kind of the event: one of [`EventKind`](crate::state::EventKind), with the number of the frame's state that it
-    /// leads to; 0 if there is no event.
+    /// The kind of the event: one of [`EventKind`](crate::state::EventKind), with the number of the frame's state that
+    /// it leads to; 0 if there is no event.
     pub event: u32,
     /// The bench that stalls or locks, or the first of two that touch, or [`NO_BENCH`].
     pub event_bench_a: u32,

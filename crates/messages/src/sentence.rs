@@ -1,7 +1,7 @@
 //! Alerts in words, for people. Benches are counted from 1, and the sentence states this.
 //!
-//! In: a [`CollisionAlert`] and the number of benches. Out: a sentence. Called by `run`, `watch` and the stage picture's
-//! server, so that all of them print the same.
+//! In: a [`CollisionAlert`] and the number of benches. Out: a sentence. Called by `run`, `watch` and the stage
+//! picture's server, so that all of them print the same.
 
 use super::layouts::{CollisionAlert, Cue};
 use crate::state::EventKind;
@@ -90,7 +90,8 @@ fn coming(alert: &CollisionAlert, kind: EventKind, benches: u32, figures: Figure
     format!("{}: {who} at {}{when}", kind.name(), place(alert))
 }
 
-/// Returns the wall time until `seconds` simulated seconds have passed, at the rate in force; none while the show stands still.
+/// Returns the wall time until `seconds` simulated seconds have passed, at the rate in force; none while the show
+/// stands still.
 pub fn time_until(simulated_seconds: f64, time_scale: f64) -> String {
     if time_scale > 0.0 { format!("in {:.1} s", simulated_seconds / time_scale) } else { "not while paused".to_owned() }
 }
@@ -195,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn an_alert_about_nothing_names_nobody() {
+    fn an_alert_about_nothing_names_no_bench() {
         let nothing = CollisionAlert::default();
         assert_eq!(alert_sentence(&nothing, 2, SHOWN), "no contact, stall or lock ahead");
     }

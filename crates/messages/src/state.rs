@@ -1,10 +1,10 @@
 //! The state of a frame, the level of an alert and the playback state: each a type without impossible values.
 //!
-//! Only this file has the [`Severity`] of each: colours, signs and diagnostics follow from the severity, and not from the
-//! list of states.
+//! Only this file has the [`Severity`] of each: colours, signs and diagnostics follow from the severity, and not from
+//! the list of states.
 //!
-//! On the wire the values of each type are numbered in their order, from 0. The constants in `msgs/msg` and in the Python
-//! layouts are generated from this file, doc comments included: see [`layouts`](crate::layouts).
+//! On the wire the values of each type are numbered in their order, from 0. The constants in `msgs/msg` and in the
+//! Python layouts are generated from this file, doc comments included: see [`layouts`](crate::layouts).
 
 /// The kinds of events. Their order is that in which two events at one time are listed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -1,5 +1,5 @@
-//! The figures of a publisher: rate, gaps, latency, state, alert. In: the events of a [`feed`](bench_dragon_client::feed). Out: an
-//! [`IntervalReport`] on request. Called by `watch` and `metrics`.
+//! The figures of a publisher: rate, gaps, latency, state, alert. In: the events of a
+//! [`feed`](bench_dragon_client::feed). Out: an [`IntervalReport`] on request. Called by `watch` and `metrics`.
 
 use std::time::Instant;
 
@@ -127,7 +127,8 @@ impl Monitor {
         }
     }
 
-    /// Sets `shares_clock`, as [`Feed::shares_clock`](bench_dragon_client::feed::Feed::shares_clock) returns it; `None` changes nothing.
+    /// Sets `shares_clock`, as [`Feed::shares_clock`](bench_dragon_client::feed::Feed::shares_clock) returns it; `None`
+    /// changes nothing.
     pub fn clock(&mut self, shares_clock: Option<bool>) {
         self.shares_clock = shares_clock.unwrap_or(self.shares_clock);
     }

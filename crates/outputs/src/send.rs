@@ -1,7 +1,8 @@
 //! Outputs to other machines: trackers for lighting desks ([`psn_sender`]) and OSC messages ([`osc_sender`]).
 //!
-//! Each is a subscriber of each publisher, in a separate process. This file has their common part: it decides which frames
-//! are due, and when frames have stopped. In: the events of a feed. Out: UDP datagrams. Called by the command `send`.
+//! Each is a subscriber of each publisher, in a separate process. This file has their common part: it decides which
+//! frames are due, and when frames have stopped. In: the events of a feed. Out: UDP datagrams. Called by the command
+//! `send`.
 
 pub mod axes;
 pub mod network;
@@ -22,7 +23,8 @@ use bench_dragon_messages::FrameHeader;
 pub const STOPPED_AFTER: Duration = Duration::from_secs(2);
 
 /// Selects the frames that are due, at a limited rate: the first frame of each interval, by the frames' deadlines. A
-/// publisher of at most that rate has every frame sent, even late ones. The frames of a faster publisher are evenly spread.
+/// publisher of at most that rate has every frame sent, even late ones. The frames of a faster publisher are evenly
+/// spread.
 #[derive(Debug, Clone, Copy)]
 pub struct Pace {
     rate: f64,

@@ -58,7 +58,7 @@ impl Conducted {
                 self.refused_as_expected, self.wrong, self.lost, self.compared, self.contradicted
             ),
         ];
-        for (what, percentiles) in [("obeyed", self.applied_ns), ("answered", self.answered_ns)] {
+        for (what, percentiles) in [("executed", self.applied_ns), ("answered", self.answered_ns)] {
             let Some(Percentiles { p50, p99, max, .. }) = percentiles else { continue };
             let figures = [("p50", p50), ("p99", p99), ("max", max)].map(|(name, ns)| {
                 format!("{name} {:.2} ms ({:.1} periods)", ns as f64 / 1e6, ns as f64 / self.period_ns)

@@ -1,5 +1,5 @@
-//! The check that each frame follows from the frame before. Time stands still while paused or held, and advances at the rate
-//! in force while playing. The epoch changes exactly at jumps of simulated time.
+//! The check that each frame follows from the frame before. Time stands still while paused or held, and advances at the
+//! rate in force while playing. The epoch changes exactly at jumps of simulated time.
 //!
 //! In: the frames of a publisher that loops without a hold at its end, as the soak test starts it. A frame is checked
 //! against earlier frames, never against the commands. Called by the [`observer`](super::observer).
@@ -122,8 +122,8 @@ impl ConformanceCheck {
         }
     }
 
-    /// Returns true if a time before the expected one has a reason: the end, a cue that pauses, or a step that ended within
-    /// skipped periods.
+    /// Returns true if a time before the expected one has a reason: the end, a cue that pauses, or a step that ended
+    /// within skipped periods.
     fn stops_early(
         &mut self,
         before: &FrameHeader,

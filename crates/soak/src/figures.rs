@@ -1,5 +1,5 @@
-//! A row of figures a second of a soak test: of the publisher from its status and from /proc, of each subscriber from its
-//! observation. In: a [`Fleet`]. Out: a row for the [`history`](super::history), whose columns the report plots.
+//! A row of figures a second of a soak test: of the publisher from its status and from /proc, of each subscriber from
+//! its observation. In: a [`Fleet`]. Out: a row for the [`history`](super::history), whose columns the report plots.
 
 use super::fleet::Fleet;
 use super::observation::{Latencies, Status};

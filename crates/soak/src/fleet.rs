@@ -1,8 +1,8 @@
 //! The processes of a soak test: one publisher, and subscribers that keep up, are slow, or die and return.
 //!
-//! In: a [`Plan`], and the output of the processes. Out: the observations of the subscribers, the counts of the publisher.
-//! Used by the command `soak`, which calls [`Fleet::poll`] often and takes a row of [`figures`](super::figures) once a
-//! second.
+//! In: a [`Plan`], and the output of the processes. Out: the observations of the subscribers, the counts of the
+//! publisher. Used by the command `soak`, which calls [`Fleet::poll`] often and takes a row of
+//! [`figures`](super::figures) once a second.
 
 use std::process::{Child, ExitStatus};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -55,7 +55,7 @@ pub enum FleetError {
 pub struct Fleet {
     plan: Plan,
     publisher: Child,
-    /// How the publisher ended, if it has.
+    /// The exit status of the publisher, if it has ended.
     publisher_ended: Option<ExitStatus>,
     /// True if it ended without a signal from the soak test.
     publisher_ended_early: bool,
@@ -245,7 +245,8 @@ impl Fleet {
         Some(held)
     }
 
-    /// Returns the growth of the publisher's resident memory after [`SETTLING`], in bytes; `None` if the test was shorter.
+    /// Returns the growth of the publisher's resident memory after [`SETTLING`], in bytes; `None` if the test was
+    /// shorter.
     pub fn resident_growth(&self) -> Option<u64> {
         self.settled_bytes.map(|settled| self.most_bytes_after - settled)
     }

@@ -1,9 +1,10 @@
 //! `soak --report`: the distributions of wake-up lateness and step cost as an HdrHistogram interval log.
 //!
-//! In: the samples of the loop, on the statistics thread. Out: a text file of format version 1.3, two lines for each ten
-//! seconds, with the tags `lateness` and `step`, values in nanoseconds, each histogram encoded as V2 and compressed.
-//! HistogramLogProcessor, HistogramLogAnalyzer and the readers of HdrHistogram's ports read it. The sum over all lines of a
-//! tag is the distribution of the percentiles in the run's summary. The command `run` calls it for `soak`.
+//! In: the samples of the loop, on the statistics thread. Out: a text file of format version 1.3, two lines for each
+//! ten seconds, with the tags `lateness` and `step`, values in nanoseconds, each histogram encoded as V2 and
+//! compressed. HistogramLogProcessor, HistogramLogAnalyzer and the readers of HdrHistogram's ports read it. The sum
+//! over all lines of a tag is the distribution of the percentiles in the run's summary. The command `run` calls it for
+//! `soak`.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -73,7 +74,8 @@ impl<W: Write> HistogramLog<W> {
         self.durations.record(sample, (1e9 / self.rate) as u64);
     }
 
-    /// Writes the last interval. Returns the reason why the log is incomplete, as a sentence, or `None` if it is complete.
+    /// Writes the last interval. Returns the reason why the log is incomplete, as a sentence, or `None` if it is
+    /// complete.
     pub fn finish(mut self) -> Option<String> {
         self.close_interval();
         self.failure
@@ -86,8 +88,8 @@ impl<W: Write> HistogramLog<W> {
         if lateness.is_empty() {
             return;
         }
-        // A builder without comments and times writes no header. Writing to memory, and serializing a histogram within its
-        // bounds, cannot fail.
+        // A builder without comments and times writes no header. Writing to memory, and serializing a histogram within
+        // its bounds, cannot fail.
         if let Ok(mut log) = IntervalLogWriterBuilder::new().begin_log_with(&mut self.text, &mut self.serializer) {
             for (tag, histogram) in [("lateness", lateness), ("step", step)] {
                 let written = log.write_histogram(histogram, begins, length, Tag::new(tag));

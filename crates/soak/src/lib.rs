@@ -1,9 +1,9 @@
 //! The soak test: a publisher and its subscribers as processes, observed for hours, and a verdict.
 //!
 //! The command `soak` starts a [`fleet`] of processes. Each subscriber process runs an [`observer`] and prints its
-//! [`observation`]. With `--conduct` a [load generator](conduct) sends commands. [`figures`] go into a [`history`] of bounded
-//! size, a [`verdict`] checks [`limits`], and a [`report`] shows them. The checks use the frames that subscribers received, the
-//! publisher's status stream and summary, and /proc.
+//! [`observation`]. With `--conduct` a [load generator](conduct) sends commands. [`figures`] go into a [`history`] of
+//! bounded size, a [`verdict`] checks [`limits`], and a [`report`] shows them. The checks use the frames that
+//! subscribers received, the publisher's status stream and summary, and /proc.
 
 pub mod conduct;
 pub mod conducting;

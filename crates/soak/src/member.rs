@@ -128,8 +128,8 @@ impl Member {
         self.fresh.take()
     }
 
-    /// Returns the number of its processes that ended without a signal from the soak test, or did not end after one. Call it
-    /// after the fleet has finished.
+    /// Returns the number of its processes that ended without a signal from the soak test, or did not end after one.
+    /// Call it after the fleet has finished.
     pub fn failed(&self) -> u64 {
         self.lost + u64::from(self.state != ProcessState::Ended)
     }

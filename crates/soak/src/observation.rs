@@ -1,7 +1,7 @@
 //! The observation of a subscriber process, which the process prints once a second and the soak test reads.
 //!
-//! In: counts and percentiles from the [`observer`](super::observer). Out: JSON through a pipe; sums over the processes of a
-//! subscriber. Used by the [`fleet`](super::fleet), the verdict and the report.
+//! In: counts and percentiles from the [`observer`](super::observer). Out: JSON through a pipe; sums over the processes
+//! of a subscriber. Used by the [`fleet`](super::fleet), the verdict and the report.
 
 use serde::{Deserialize, Serialize};
 
@@ -52,8 +52,8 @@ pub struct Observation {
 }
 
 impl Observation {
-    /// Returns the observation of two processes of a subscriber together, `self` the former one. Latencies are the worse of
-    /// the two.
+    /// Returns the observation of two processes of a subscriber together, `self` the former one. Latencies are the
+    /// worse of the two.
     pub fn joined(&self, later: &Self) -> Self {
         Self {
             received: self.received + later.received,

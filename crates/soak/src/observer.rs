@@ -139,7 +139,8 @@ impl Observer {
         let Some(skipped) = periods.checked_sub(frames) else { return false };
         self.seen.skipped += skipped;
         if frames == 1 {
-            // The skipped periods count as late frames that came with this one: otherwise the wait would count only once.
+            // The skipped periods count as late frames that came with this one: otherwise the wait would count only
+            // once.
             let period_ns = span_ns / periods;
             for period in 1..=skipped.min(MOST_LATE_PERIODS) {
                 let latency_ns = received_ns.saturating_sub(header.deadline_ns - period * period_ns);

@@ -34,7 +34,8 @@ pub enum Scale {
     Logarithmic,
 }
 
-/// Returns a plot of lines over time as HTML: a legend, and an `<svg>` element. Returns `None` if there is nothing to plot.
+/// Returns a plot of lines over time as HTML: a legend, and an `<svg>` element. Returns `None` if there is nothing to
+/// plot.
 pub fn plot(unit: &str, scale: Scale, lines: &[PlotLine]) -> Option<String> {
     let points = || lines.iter().flat_map(|line| &line.points);
     let last = points().map(|point| point.0).fold(f64::NAN, f64::max);

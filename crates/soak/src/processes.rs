@@ -1,4 +1,5 @@
-//! Starts, signals and reads the processes of a soak test: a thread for each pipe turns its lines into events. Called by the [`fleet`](super::fleet).
+//! Starts, signals and reads the processes of a soak test: a thread for each pipe turns its lines into events. Called
+//! by the [`fleet`](super::fleet).
 
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Read};
@@ -58,7 +59,8 @@ pub(super) enum ProcessEvent {
 }
 
 impl Plan {
-    /// Returns a command for this program in another process group, so that Ctrl-C on the terminal reaches the soak test only.
+    /// Returns a command for this program in another process group, so that Ctrl-C on the terminal reaches the soak
+    /// test only.
     fn command(&self, subcommand: &str) -> Command {
         let mut command = Command::new(&self.program);
         command.args(&self.common).arg(subcommand).args(["--end-with-parent", &std::process::id().to_string()]);

@@ -17,7 +17,8 @@ use bench_dragon_drawing::palette::dark_rules;
 use bench_dragon_publisher::live::Deliveries;
 use bench_dragon_publisher::live::statistics::RunSummary;
 
-/// The name of the report's JSON, whose schema is docs/soak-report.schema.json. An incompatible change raises the number.
+/// The name of the report's JSON, whose schema is docs/soak-report.schema.json. An incompatible change raises the
+/// number.
 pub const SCHEMA: &str = "bench_dragon/soak/1";
 
 /// The results of a soak test.
@@ -134,7 +135,7 @@ impl Report {
     fn conducting(&self) -> impl Iterator<Item = String> {
         let conducted = self.conducted.iter().flat_map(Conducted::lines);
         let killed = (self.clients_killed > 0)
-            .then(|| format!("{} clients of the control service were killed amid a request", self.clients_killed));
+            .then(|| format!("{} clients of the control service were killed during a request", self.clients_killed));
         let disobedience =
             self.subscribers.iter().filter(|_| self.conducted.is_some()).filter_map(|subscriber| {
                 Some(format!("{}: {}", subscriber.label, subscriber.seen.disobedience.as_ref()?))

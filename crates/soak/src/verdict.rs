@@ -151,8 +151,9 @@ fn missed(fleet: &Fleet, steady: &[&Member]) -> f64 {
     steady.iter().map(of).sum::<u64>() as f64
 }
 
-/// Returns the number of steady subscribers that disagree with the publisher. Either frames and skipped periods do not add up
-/// to the last received tick, or there was more than one run, or more than a second's frames were not compared with the stage.
+/// Returns the number of steady subscribers that disagree with the publisher. Either frames and skipped periods do not
+/// add up to the last received tick, or there was more than one run, or more than a second's frames were not compared
+/// with the stage.
 fn disagreements(fleet: &Fleet, steady: &[&Member]) -> f64 {
     let Some(summary) = fleet.summary() else { return f64::NAN };
     let disagrees = |member: &&&Member| {
@@ -168,8 +169,8 @@ fn disagreements(fleet: &Fleet, steady: &[&Member]) -> f64 {
     steady.iter().filter(disagrees).count() as f64
 }
 
-/// Returns the difference between the jumps that steady subscribers counted and the expected jumps: those commanded and those
-/// by which the show began again. Unknown without the last status.
+/// Returns the difference between the jumps that steady subscribers counted and the expected jumps: those commanded and
+/// those by which the show began again. Unknown without the last status.
 fn wrong_jumps(steady: &[&Member], conducting: &Conducting) -> f64 {
     let Some(conducted) = conducting.conducted() else { return f64::NAN };
     let of = |member: &&Member| {

@@ -19,8 +19,8 @@ use bench_dragon_messages::state::PlaybackState;
 const POLL_INTERVAL: Duration = Duration::from_micros(500);
 /// Time without a command after which the service is closed, so that another publisher can create it again.
 const IDLE: Duration = Duration::from_secs(1);
-/// Commands that may be pending at once, and holds besides: the service admits 8 of a client, and one requests the state
-/// during a step.
+/// Commands that may be pending at once, and holds besides: the service admits 8 of a client, and one requests the
+/// state during a step.
 const MOST_PENDING: usize = 4;
 const MOST_HOLDS: usize = 3;
 /// Commands that may be unanswered, sent or not.
@@ -173,8 +173,8 @@ impl<Tag, Handle: FnMut(Tag, ActionResult)> CommandThread<Tag, Handle> {
         self.pending.iter_mut().for_each(|pending| pending.overtaken = pending.action != HOLD);
     }
 
-    /// Returns the next action that may be sent now. An action that depends on the state delays all later actions except a
-    /// hold.
+    /// Returns the next action that may be sent now. An action that depends on the state delays all later actions
+    /// except a hold.
     fn next_waiting(&mut self) -> Option<(Tag, Action)> {
         let is_hold = self.waiting.front()?.1 == HOLD;
         if !is_hold && self.pending.iter().any(|pending| !matches!(pending.action, Action::Send(_))) {

@@ -1,5 +1,5 @@
-//! The liveness of a publisher that sends no frames: silent or gone. The caller passes the time and the test, so that nothing
-//! here waits. Called by the feed after every read.
+//! The liveness of a publisher that sends no frames: silent or gone. The caller passes the time and the test, so that
+//! nothing here waits. Called by the feed after every read.
 
 use std::time::{Duration, Instant};
 
@@ -50,8 +50,8 @@ impl Liveness {
         }
     }
 
-    /// Tests the publisher with `is_alive` if a test is due, and returns the change. A silence is reported once, until frames
-    /// come again.
+    /// Tests the publisher with `is_alive` if a test is due, and returns the change. A silence is reported once, until
+    /// frames come again.
     pub fn test(&mut self, now: Instant, is_alive: impl FnOnce() -> bool) -> Option<Change> {
         let since = |then| now.saturating_duration_since(then);
         if since(self.last_frame) < LIVENESS_INTERVAL || since(self.last_test) < LIVENESS_INTERVAL {

@@ -47,7 +47,7 @@ pub enum OpenError {
     },
     /// A service stays incomplete.
     #[error(
-        "the service \"{0}\" is incomplete and nobody completes it: stop every program that uses it, or choose another \
+        "the service \"{0}\" is incomplete and no process completes it: stop every program that uses it, or choose another \
          name"
     )]
     Incomplete(String),

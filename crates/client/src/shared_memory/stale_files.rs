@@ -1,13 +1,14 @@
-//! Stale files of processes that were killed during their start. iceoryx2 cleans up after killed processes whenever a node
-//! is created or dropped, but 0.10.0 fails at files that such a process had not finished:
+//! Stale files of processes that were killed during their start. iceoryx2 cleans up after killed processes whenever a
+//! node is created or dropped, but 0.10.0 fails at files that such a process had not finished:
 //!
 //! - in a node's folder: it cannot remove the folder, leaves the whole dead node, and fails again each time;
 //! - in shared memory: it waits without end for the file to be finished, and so does the program that created the node;
 //! - among the services: every later attempt to open that service fails.
 //!
 //! A program that creates a node calls [`remove_unfinished_files`] before, and [`spawn_reaper`] on a thread that is not
-//! real-time. The mode of a file shows that it is unfinished: its creator sets the mode last. A file that is still being
-//! created is left alone. On a busy disk this takes seconds, since iceoryx2 syncs the files of nodes and services.
+//! real-time. The mode of a file shows that it is unfinished: its creator sets the mode last. A file that is still
+//! being created is left alone. On a busy disk this takes seconds, since iceoryx2 syncs the files of nodes and
+//! services.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -37,8 +38,8 @@ enum Life {
     NotKnownDead,
 }
 
-/// Removes unfinished files of dead nodes, so that iceoryx2 can remove the rest, and nodes that were never listed. Files
-/// that cannot be removed stay.
+/// Removes unfinished files of dead nodes, so that iceoryx2 can remove the rest, and nodes that were never listed.
+/// Files that cannot be removed stay.
 pub fn remove_unfinished_files() {
     let config = Config::global_config();
     let mut nodes = BTreeMap::new();
@@ -82,7 +83,8 @@ pub fn spawn_reaper() {
     });
 }
 
-/// Removes files that have been unfinished for long; `seen` has the time since when, independent of the file system's clock.
+/// Removes files that have been unfinished for long; `seen` has the time since when, independent of the file system's
+/// clock.
 fn remove_what_stays_unfinished(seen: &mut BTreeMap<PathBuf, Instant>) {
     let config = Config::global_config();
     let prefix = config.global.prefix.to_string();
@@ -113,8 +115,8 @@ fn with_mode(folder: &Path, mode: u32) -> Vec<PathBuf> {
     entries(folder).into_iter().filter(has_mode).collect()
 }
 
-/// Returns true if a process has a file open for writing, as its creator has until the file is finished; others open it to
-/// read. Only root sees the processes of other users.
+/// Returns true if a process has a file open for writing, as its creator has until the file is finished; others open it
+/// to read. Only root sees the processes of other users.
 fn is_being_written(file: &Path) -> bool {
     let identity = |file: &Path| file.metadata().map(|of| (of.dev(), of.ino())).ok();
     let Some(file) = identity(file) else { return false };
@@ -141,7 +143,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_node_that_is_not_listed_yet_stays_while_somebody_makes_it() {
+    fn a_node_that_is_not_listed_yet_stays_while_a_process_makes_it() {
         // This makes the folder of all nodes, as iceoryx2 has it.
         let _node = super::super::node().unwrap();
         let nodes = Config::global_config().global.node_dir().to_string();

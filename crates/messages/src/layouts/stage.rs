@@ -44,7 +44,8 @@ pub struct StageSegment {
 }
 
 impl StageSegment {
-    /// Returns the name of its kind: `line`, `arc`, `inward_spiral`, `outward_spiral`, or `unknown` for a later layout's.
+    /// Returns the name of its kind: `line`, `arc`, `inward_spiral`, `outward_spiral`, or `unknown` for a later
+    /// layout's.
     pub fn kind_name(&self) -> &'static str {
         match self.kind {
             SEGMENT_LINE => "line",
@@ -150,8 +151,8 @@ pub struct Stage {
     pub events: u32,
     /// The number of cues in the show; the first [`MOST_CUES`] of them are listed.
     pub cues: u32,
-    /// BLAKE3 of the scene's text, as `verify` prints it of a certificate: the proofs of that text hold for this show. All
-    /// zero if it is not known.
+    /// BLAKE3 of the scene's text, as `verify` prints it of a certificate: the proofs of that text hold for this show.
+    /// All zero if it is not known.
     pub scene_hash: [u8; SCENE_HASH_BYTES],
     /// The segments of the path in the order of travel; those not in use are zero.
     pub path: [StageSegment; MOST_SEGMENTS],

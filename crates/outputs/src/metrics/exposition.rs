@@ -1,5 +1,5 @@
-//! Metrics as text, in the two formats that Prometheus reads: OpenMetrics 1.0 and Prometheus 0.0.4. In: families of samples.
-//! Out: text. Pure.
+//! Metrics as text, in the two formats that Prometheus reads: OpenMetrics 1.0 and Prometheus 0.0.4. In: families of
+//! samples. Out: text. Pure.
 
 use std::fmt::Write;
 

@@ -1,9 +1,9 @@
 //! The figures that are served, and their names. In: the report of a [`Monitor`](crate::monitor::Monitor).
 //! Out: families of samples. Pure.
 //!
-//! Names and units follow Prometheus ("Metric and label naming"): seconds, bytes, metres, `_total` for counts.
-//! Every sample has the publisher's name as its label `name`. Only one sample has the run as a label, since each new value
-//! of a label makes a new series.
+//! Names and units follow Prometheus ("Metric and label naming"): seconds, bytes, metres, `_total` for counts. Every
+//! sample has the publisher's name as its label `name`. Only one sample has the run as a label, since each new value of
+//! a label makes a new series.
 
 use super::exposition::{Family, Kind};
 use crate::monitor::{IntervalReport, Presence};

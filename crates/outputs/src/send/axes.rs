@@ -1,4 +1,5 @@
-//! From the stage's axes to a receiver's. In: the axes that a user chose. Out: vectors and rotations in those axes. Pure.
+//! From the stage's axes to a receiver's. In: the axes that a user chose. Out: vectors and rotations in those axes.
+//! Pure.
 
 use std::str::FromStr;
 
@@ -7,8 +8,8 @@ const NAMES: [&str; 3] = ["x", "y", "up"];
 
 /// The stage's axes that are the receiver's first, second and third axis, each perhaps reversed.
 ///
-/// The stage's own are right-handed, seen from above as on paper: x to the right, y away from the audience, up towards the
-/// reader. The axes of PosiStageNet (x right, y up, z depth) are `x,up,y`, the default.
+/// The stage's own are right-handed, seen from above as on paper: x to the right, y away from the audience, up towards
+/// the reader. The axes of PosiStageNet (x right, y up, z depth) are `x,up,y`, the default.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axes([Axis; 3]);
 
@@ -35,9 +36,9 @@ impl Axes {
         })
     }
 
-    /// Returns a turn by `heading` radians from x towards y as axis times angle, in the receiver's axes. There, as everywhere, a
-    /// positive turn about the first axis is from the second towards the third, so that axes of the other handedness
-    /// reverse it.
+    /// Returns a turn by `heading` radians from x towards y as axis times angle, in the receiver's axes. There, as
+    /// everywhere, a positive turn about the first axis is from the second towards the third, so that axes of the other
+    /// handedness reverse it.
     pub fn rotation(&self, heading: f64) -> [f64; 3] {
         let sign = self.handedness();
         self.vector([0.0, 0.0, sign * heading])

@@ -1,8 +1,8 @@
 //! The OSC messages (Open Sound Control 1.0), one function for each address. In: the messages of a publisher. Out: OSC
 //! messages whose arguments always have the same types. Pure; called by the [`sender`](super::osc_sender).
 //!
-//! `docs/sending.md` lists the addresses. Users set up desks by hand, so handles and benches count from 1. The number of no
-//! bench is -1. The number of no time or no clearance is [`NEVER`], which is above every threshold of a desk.
+//! `docs/sending.md` lists the addresses. Users set up desks by hand, so handles and benches count from 1. The number
+//! of no bench is -1. The number of no time or no clearance is [`NEVER`], which is above every threshold of a desk.
 
 use rosc::encoder::encode;
 use rosc::{OscBundle, OscMessage, OscPacket, OscTime, OscType};
@@ -40,8 +40,8 @@ impl Addresses {
         OscMessage { addr: format!("{}/{address}", self.prefix), args }
     }
 
-    /// `/alert ,sisffffiii`: the level and its number, the event, simulated seconds until the event, the clearance, the place
-    /// and the benches of the event, the latest cue.
+    /// `/alert ,sisffffiii`: the level and its number, the event, simulated seconds until the event, the clearance, the
+    /// place and the benches of the event, the latest cue.
     pub fn alert(&self, alert: &CollisionAlert, cue: u32) -> OscMessage {
         let level = alert.alert_level().map_or("unknown", Level::name);
         let event = alert.event_kind().map_or("none", EventKind::name);
@@ -117,8 +117,8 @@ impl State {
     }
 }
 
-/// Returns the wall time until the next event, in seconds, with its name; `None` if no event is ahead, and while time stands
-/// still.
+/// Returns the wall time until the next event, in seconds, with its name; `None` if no event is ahead, and while time
+/// stands still.
 pub fn next_event(stage: &Stage, header: &FrameHeader) -> Option<(f64, &'static str)> {
     let plays = header.playback_state() == Some(PlaybackState::Playing) && header.time_scale > 0.0;
     let ahead = |time: f64| time > header.sim_time && time <= stage.freeze_time;
@@ -165,7 +165,7 @@ mod tests {
     use bench_dragon_messages::{SceneName, StageEvent};
 
     #[test]
-    fn an_alert_about_nothing_fires_no_threshold_and_names_nobody() {
+    fn an_alert_about_nothing_fires_no_threshold_and_names_no_bench() {
         let message = Addresses::new("bench_dragon").alert(&CollisionAlert::default(), 0);
         assert_eq!(message.addr, "/bench_dragon/alert");
         let (never, none) = (OscType::Float(1e6), OscType::Int(-1));

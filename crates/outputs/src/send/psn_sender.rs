@@ -1,8 +1,8 @@
 //! Trackers for lighting desks: their choice, their times, and their state while no frames come. In: the events of the
 //! feeds of one publisher or several. Out: datagrams by [`psn`](super::psn). Called by `send psn`.
 //!
-//! A receiver takes the trackers of the latest frame as present. So each frame has the trackers of all publishers, each with
-//! the time of its position. There is one count of frames: a desk would mix the counts of two senders.
+//! A receiver takes the trackers of the latest frame as present. So each frame has the trackers of all publishers, each
+//! with the time of its position. There is one count of frames: a desk would mix the counts of two senders.
 
 use std::time::{Duration, Instant};
 
@@ -72,7 +72,8 @@ pub enum Notice {
 pub struct PsnSummary {
     /// Frames that were sent, each with the newest of every publisher.
     pub frames: u64,
-    /// Frames of publishers that came too soon after a sent frame, or were replaced by newer ones before they were sent.
+    /// Frames of publishers that came too soon after a sent frame, or were replaced by newer ones before they were
+    /// sent.
     pub passed_over: u64,
     /// Frames sent with status 0 while none came.
     pub stopped_frames: u64,

@@ -49,7 +49,8 @@ impl Source {
         }
     }
 
-    /// Returns the deadline of a frame, CLOCK_MONOTONIC of this machine in ns; the present moment for a frame of another machine.
+    /// Returns the deadline of a frame, CLOCK_MONOTONIC of this machine in ns; the present moment for a frame of
+    /// another machine.
     pub(super) fn made_ns(&self, header: &FrameHeader) -> u64 {
         if self.shares_clock { header.deadline_ns } else { monotonic_ns() }
     }
@@ -80,8 +81,8 @@ impl Source {
         self.arrivals.stopped_since(now).filter(|_| self.is_known())
     }
 
-    /// Chooses the trackers of a new team. Returns a sentence for each kind of handles that is left out, or `None` if the team
-    /// is known.
+    /// Chooses the trackers of a new team. Returns a sentence for each kind of handles that is left out, or `None` if
+    /// the team is known.
     pub(super) fn meet(&mut self, handles: u32, selection: &Selection) -> Option<Vec<String>> {
         if self.team.as_ref().is_some_and(|team| team.handles == handles) {
             return None;
@@ -137,8 +138,8 @@ impl Source {
         }
     }
 
-    /// Limits this frame to `room` trackers. Returns the rest of the room, and the number of trackers left out, if that has
-    /// changed and is not zero.
+    /// Limits this frame to `room` trackers. Returns the rest of the room, and the number of trackers left out, if that
+    /// has changed and is not zero.
     pub(super) fn fit(&mut self, room: usize) -> (usize, Option<usize>) {
         let sent = self.trackers.len().min(room);
         let has_changed = self.sent.replace(sent) != Some(sent);

@@ -1,5 +1,5 @@
-//! The handles that are sent, and their trackers. In: the user's choice and the size of a team. Out: handles, numbers, names.
-//! Pure.
+//! The handles that are sent, and their trackers. In: the user's choice and the size of a team. Out: handles, numbers,
+//! names. Pure.
 
 use std::str::FromStr;
 
@@ -92,8 +92,8 @@ impl Numbers {
         Self { first, last: u16::MAX, of: None }
     }
 
-    /// Returns the numbers of several publishers, whose heads' numbers are `step` apart even if some do not run. Returns `None`
-    /// for more publishers than numbers.
+    /// Returns the numbers of several publishers, whose heads' numbers are `step` apart even if some do not run.
+    /// Returns `None` for more publishers than numbers.
     pub fn of_several(names: &[String], first: u16, step: u16) -> Option<Vec<Self>> {
         let starts = (0..names.len()).map(|place| {
             let start = u64::from(first) + place as u64 * u64::from(step);

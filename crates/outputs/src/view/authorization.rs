@@ -1,7 +1,7 @@
 //! The commands of browsers to `<name>/control`: their authorization, their parsing, and their answers.
 //!
-//! In: the text of a message. Out: JSON. An [`Authorization`] exists only with `--control`. Its command client has a separate
-//! thread, so that no command delays a picture. Called by the server and by `browser`.
+//! In: the text of a message. Out: JSON. An [`Authorization`] exists only with `--control`. Its command client has a
+//! separate thread, so that no command delays a picture. Called by the server and by `browser`.
 
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -61,7 +61,8 @@ pub(super) struct Authorization {
 }
 
 impl Authorization {
-    /// Creates the authorization for the publisher of `name`: for browsers with the token, or for all browsers without a token.
+    /// Creates the authorization for the publisher of `name`: for browsers with the token, or for all browsers without
+    /// a token.
     ///
     /// # Errors
     /// The system has no thread left.

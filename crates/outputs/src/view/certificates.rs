@@ -1,7 +1,8 @@
 //! Certificates of events, checked while pages are served, and their proofs.
 //!
-//! In: files of `events --certify`. Out: the proofs of a scene, by the hash of its text, after [`proof`] has checked its
-//! certificate. The command opens and checks the files; the reader of each publisher looks up the proofs of its stage.
+//! In: files of `events --certify`. Out: the proofs of a scene, by the hash of its text, after [`proof`] has checked
+//! its certificate. The command opens and checks the files; the reader of each publisher looks up the proofs of its
+//! stage.
 
 use std::collections::HashMap;
 use std::fs::File;

@@ -1,5 +1,5 @@
-//! The admission to the WebSocket: this server's page, programs, and the pages that the user admits. Called by the server,
-//! and by the server of `metrics` for the host.
+//! The admission to the WebSocket: this server's page, programs, and the pages that the user admits. Called by the
+//! server, and by the server of `metrics` for the host.
 
 use std::net::IpAddr;
 use std::str::FromStr;
@@ -44,12 +44,12 @@ pub(crate) struct Admission {
 }
 
 impl Admission {
-    /// Returns true if a WebSocket may be opened: by an admitted page, by this server's page, or by a program, which sends no
-    /// origin.
+    /// Returns true if a WebSocket may be opened: by an admitted page, by this server's page, or by a program, which
+    /// sends no origin.
     ///
-    /// This server's page is a page over http whose origin is the requested host. Behind a proxy with TLS the page's origin
-    /// begins with https. The proxy's headers are not trusted, since any client can send them: such an origin must be
-    /// admitted by name.
+    /// This server's page is a page over http whose origin is the requested host. Behind a proxy with TLS the page's
+    /// origin begins with https. The proxy's headers are not trusted, since any client can send them: such an origin
+    /// must be admitted by name.
     pub(crate) fn allows(&self, origin: Option<&str>, host: Option<&str>) -> bool {
         if origin.is_some_and(|origin| self.origins.iter().any(|allowed| allowed.0.eq_ignore_ascii_case(origin))) {
             return true;

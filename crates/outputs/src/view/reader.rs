@@ -12,8 +12,8 @@ use bench_dragon_client::feed::{Feed, FeedEvent};
 use bench_dragon_messages::{LoopStatus, Stage};
 use bench_dragon_proof::ProvedEvent;
 
-/// The interval of polls: some browsers draw 240 times a second, none needs more. Waking this thread at each frame would cost
-/// the publisher more than the frame itself.
+/// The interval of polls: some browsers draw 240 times a second, none needs more. Waking this thread at each frame
+/// would cost the publisher more than the frame itself.
 const POLL_INTERVAL: Duration = Duration::from_millis(4);
 /// The time before the next attempt if the services cannot be used.
 const RETRY_INTERVAL: Duration = Duration::from_millis(200);
@@ -61,7 +61,7 @@ struct Reader<'a> {
     publisher: String,
     proofs: &'a Proofs,
     stage: Option<Stage>,
-    /// What is proved of the scene of that stage.
+    /// The proofs of the scene of that stage.
     proved: Option<Arc<[ProvedEvent]>>,
     /// The scene for which the log has the warning that no certificate is for it.
     unproved: Option<SceneHash>,

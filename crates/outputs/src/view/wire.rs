@@ -55,7 +55,8 @@ pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
     bytes
 }
 
-/// Returns the stage, the name of its publisher and, when they are known, the scene's name and the proofs of its events.
+/// Returns the stage, the name of its publisher and, when they are known, the scene's name and the proofs of its
+/// events.
 pub(super) fn stage(stage: &Stage, publisher: &str, scene: Option<&str>, proved: Option<&[ProvedEvent]>) -> String {
     #[derive(Serialize)]
     struct StageMessage<'a> {
@@ -82,7 +83,8 @@ fn state(state: FrameState) -> Value {
         "sentence": state_sentence(state)})
 }
 
-/// Returns an alert with its severity and its sentence, in a team of `benches` benches; the page shows the figures beside it.
+/// Returns an alert with its severity and its sentence, in a team of `benches` benches; the page shows the figures
+/// beside it.
 pub(super) fn alert(alert: &CollisionAlert, benches: u32) -> String {
     #[derive(Serialize)]
     struct AlertMessage {
@@ -107,8 +109,8 @@ pub(super) fn waiting(reason: Option<&str>) -> String {
     json!({"type": "waiting", "reason": reason}).to_string()
 }
 
-/// Returns the response to `clock`: CLOCK_MONOTONIC, the clock of the frames' stamps; `None` if they have another machine's
-/// clock, or if no frames come.
+/// Returns the response to `clock`: CLOCK_MONOTONIC, the clock of the frames' stamps; `None` if they have another
+/// machine's clock, or if no frames come.
 pub(super) fn clock(monotonic_ns: Option<u64>) -> String {
     json!({"type": "clock", "monotonic_ns": monotonic_ns.map(Exact)}).to_string()
 }

@@ -26,11 +26,11 @@ const START_TIMEOUT: Duration = Duration::from_secs(30);
 const READ_INTERVAL: Duration = Duration::from_millis(1);
 /// The interval at which the state is requested until a step has begun.
 const STEP_INTERVAL: Duration = Duration::from_millis(1);
-/// How long to wait for the last frames.
+/// The time limit of the last frames.
 const END_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Sends commands to the publisher of `name`, of `rate` frames per second, until `stop` is set. Reports its counts at the
-/// beginning, once a second, and at the end.
+/// Sends commands to the publisher of `name`, of `rate` frames per second, until `stop` is set. Reports its counts at
+/// the beginning, once a second, and at the end.
 ///
 /// # Errors
 /// [`OpenError`] if its frames cannot be read, and the errors of `report`.

@@ -1,5 +1,5 @@
-//! The counts of a load generator: answers by kind, faults, latencies, and the comparison of each answer with the frame of its
-//! tick.
+//! The counts of a load generator: answers by kind, faults, latencies, and the comparison of each answer with the frame
+//! of its tick.
 
 use std::collections::VecDeque;
 
@@ -94,8 +94,8 @@ impl Record {
         }
     }
 
-    /// Returns the periods of the step that ended with the frame at `place`. Returns `None` if a frame of
-    /// the step is missing, or if it may have begun in the period of a cue that pauses, without a frame that stands still.
+    /// Returns the periods of the step that ended with the frame at `place`. Returns `None` if a frame of the step is
+    /// missing, or if it may have begun in the period of a cue that pauses, without a frame that stands still.
     fn length_of_step(&self, place: usize) -> Option<u64> {
         let mut place = place;
         let mut periods = 0;
@@ -211,7 +211,8 @@ fn is_jump(answered: &Answered, answer: &ControlResponse) -> bool {
     matches!(answered.command, Command::Seek(_) | Command::Restart) && answer.result() == Some(Code::Done)
 }
 
-/// Returns the expected growth of `epoch` after the frame before: by a seek, by a restart, and after the end of the show.
+/// Returns the expected growth of `epoch` after the frame before: by a seek, by a restart, and after the end of the
+/// show.
 fn jumps_due(answered: &Answered, before: &FrameHeader) -> u32 {
     let commanded = answered.answer.as_ref().is_ok_and(|(answer, _)| is_jump(answered, answer));
     let begins_again = before.playback_state() == Some(PlaybackState::Ended);
