@@ -39,8 +39,8 @@ pub enum ControlError {
     NoPublisher(String),
     /// Frames come, and no show on this machine takes commands.
     #[error(
-        "no show runs under the name \"{0}\" on this machine, and a tunnel that brings its frames from another carries no \
-         commands: conduct it there"
+        "no show runs under the name \"{0}\" on this machine, and a tunnel that brings its frames from another machine \
+         carries no commands: send them there"
     )]
     Elsewhere(String),
     /// The publisher has ended or was killed before it answered.

@@ -52,15 +52,15 @@ pub enum OpenError {
     )]
     Incomplete(String),
     /// There is no room even for bookkeeping.
-    #[error("{SHARED_MEMORY} has {free} bytes left, which is too little: remove what fills it, or make it larger")]
+    #[error("{SHARED_MEMORY} has {free} bytes left, which is too little: remove files from it, or make it larger")]
     Full {
         /// Bytes left.
         free: u64,
     },
     /// The services on this machine belong to another user.
     #[error(
-        "{folder} belongs to another user, who keeps all others out: run as that user, or build every program that is to \
-         take part with the feature any_user"
+        "{folder} belongs to another user and is closed to others: run as that user, or build all programs with the \
+         feature any_user"
     )]
     AnotherUsers {
         /// The folder that cannot be entered.
@@ -69,7 +69,7 @@ pub enum OpenError {
     /// A service of this name exists with other properties.
     #[error(
         "the service \"{0}\" exists with another layout of its messages, or with other limits: a program of another \
-         version of bench-dragon has it open; stop that or take the same version for both, or choose another \
+         version of bench-dragon has it open; stop that program, use the same version for both, or choose another \
          name"
     )]
     Incompatible(String),
@@ -83,13 +83,13 @@ pub enum OpenError {
     /// A program has opened a service before its publisher, with other limits.
     #[error(
         "the service \"{0}\" exists with lower limits than this scene asks for: a program that was started before the show \
-         has made it, such as a tunnel that listens to it; start that after the show"
+         has created it, such as a tunnel; start that program after the show"
     )]
     OtherLimits(String),
     /// The service admits no more subscribers.
     #[error(
         "\"{service}\" has {most} subscribers, which is as many as its publisher admits (publish.subscribers in its \
-         scene): end one first, or raise that and start the publisher again"
+         scene): end one first, or raise the limit and restart the publisher"
     )]
     TooManySubscribers {
         /// The service.

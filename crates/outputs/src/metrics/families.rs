@@ -136,14 +136,14 @@ impl Families<'_> {
             ),
             self.count(
                 "bench_dragon_unsolved_frames",
-                "Frames without a solution, which repeated the one before.",
+                "Frames without a solution, which repeated the frame before.",
                 status.unsolved_frames,
             ),
             self.one(
                 "bench_dragon_requested_rate_hertz",
                 Kind::Gauge,
                 Some("hertz"),
-                "The rate that was asked for.",
+                "The requested rate.",
                 status.rate,
             ),
             self.one(
@@ -155,7 +155,7 @@ impl Families<'_> {
             ),
             self.summary(
                 "bench_dragon_wakeup_lateness_seconds",
-                "How late the loop woke, in the last second and in the whole run; quantile 1 is the maximum.",
+                "Wake-up lateness of the loop, in the last second and in the whole run; quantile 1 is the maximum.",
                 [status.lateness_p50_second, status.lateness_p99_second, status.lateness_max_second],
                 [
                     status.lateness_p50_total,
@@ -166,7 +166,7 @@ impl Families<'_> {
             ),
             self.summary(
                 "bench_dragon_step_seconds",
-                "What a step of the loop cost, in the last second and in the whole run; quantile 1 is the maximum.",
+                "Cost of a step of the loop, in the last second and in the whole run; quantile 1 is the maximum.",
                 [status.step_p50_second, status.step_p99_second, status.step_max_second],
                 [status.step_p50_total, status.step_p99_total, status.step_p999_total, status.step_max_total],
             ),
@@ -217,13 +217,13 @@ impl Families<'_> {
             ),
             self.states(
                 "bench_dragon_state",
-                "What the dragon is doing: 1 for the present state.",
+                "State of the dragon: 1 for the present state.",
                 FrameState::ALL.into_iter().map(FrameState::name),
                 state,
             ),
             self.states(
                 "bench_dragon_playback",
-                "Whether simulated time advances: 1 for the present state.",
+                "Playback state: 1 for the present state.",
                 PlaybackState::ALL.into_iter().map(PlaybackState::name),
                 playback,
             ),
@@ -233,7 +233,7 @@ impl Families<'_> {
                 "bench_dragon_clearance_meters",
                 Kind::Gauge,
                 Some("meters"),
-                "Distance of the nearest two boards that share no handle, negative where they overlap.",
+                "Distance of the nearest two boards that share no handle, negative if they overlap.",
                 header.min_clearance,
             ));
         }

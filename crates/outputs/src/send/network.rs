@@ -76,8 +76,8 @@ impl Outlet {
             let address = destination.address;
             let failure = self.socket.send_to(datagram, address).err();
             match (&failure, destination.failing) {
-                (Some(error), false) => log::warn!("nothing can be sent to {address} ({error}); it is tried on"),
-                (None, true) => log::warn!("{address} can be sent to again"),
+                (Some(error), false) => log::warn!("cannot send to {address} ({error}); sending is tried again"),
+                (None, true) => log::warn!("sending to {address} works again"),
                 _ => (),
             }
             destination.failing = failure.is_some();

@@ -128,8 +128,7 @@ impl Reader<'_> {
         };
         if self.unproved.replace(stage.scene_hash) != Some(stage.scene_hash) {
             log::warn!(
-                "\"{}\" shows a scene with another text than that of any certificate (BLAKE3 {}): its page says nothing \
-                 of proofs",
+                "\"{}\" shows a scene whose text no certificate has (BLAKE3 {}): its page shows no proofs",
                 self.publisher,
                 stage.scene_hash_digits().as_deref().unwrap_or("not known")
             );
