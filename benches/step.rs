@@ -201,7 +201,7 @@ fn measure_doors() {
                 tick += 1;
                 timed(&mut times[count], || {
                     doors.take_one(&mut show, tick);
-                    publisher.publish(show.outgoing(tick, stamps(tick))).expect("nobody else uses this service");
+                    publisher.publish(show.outgoing(tick, stamps(tick))).expect("no other process uses this service");
                     doors.finish_step(&mut show, tick);
                 });
                 drain(&mut connection);

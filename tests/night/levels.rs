@@ -35,13 +35,13 @@ impl Levels {
         self.announced.map(|(level, _)| level)
     }
 
-    /// Returns the levels of the alerts that must go with a frame. `new_epoch`: time has jumped; `anew`: a command
-    /// caused the jump.
-    pub fn expected(&mut self, header: &FrameHeader, new_epoch: bool, anew: bool) -> Vec<Level> {
-        if anew {
+    /// Returns the levels of the alerts that must go with a frame. `new_epoch`: time has jumped; `by_command`: a
+    /// command caused the jump.
+    pub fn expected(&mut self, header: &FrameHeader, new_epoch: bool, by_command: bool) -> Vec<Level> {
+        if by_command {
             self.announced = None;
         }
-        if new_epoch || anew {
+        if new_epoch || by_command {
             (self.before, self.apart_since) = (None, None);
         }
         let now = header.sim_time;

@@ -109,9 +109,9 @@ impl Oracle {
     }
 
     fn expected_alerts(&mut self, header: &FrameHeader) -> Numbered {
-        let anew = std::mem::take(&mut self.show.jumped_by_command);
+        let by_command = std::mem::take(&mut self.show.jumped_by_command);
         let Some(levels) = &mut self.levels else { return Vec::new() };
-        let expected = levels.expected(header, header.epoch != self.epoch, anew);
+        let expected = levels.expected(header, header.epoch != self.epoch, by_command);
         expected.into_iter().map(|level| (header.tick, level as u32)).collect()
     }
 
@@ -176,7 +176,7 @@ impl Oracle {
     }
 }
 
-/// The cues reached since the last frame; of shows that were wholly passed in between, none are announced.
+/// Returns the cues reached since the last frame; cues of shows passed entirely in between are not announced.
 fn announced(show: &mut Model<Formula>, first_show: u64) -> Vec<usize> {
     let last_show = show.shows_played;
     let shown = show.reached.drain(..).filter(|(number, _)| *number == first_show || *number == last_show);

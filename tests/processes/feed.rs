@@ -125,8 +125,8 @@ fn a_publisher_that_is_started_again_at_any_moment_is_followed_at_once() {
     for run in runs(&seen) {
         let (first, last, received, missed) = span(&seen, run);
         assert_eq!((received, missed), (last - first + 1, 0), "{seen:?}");
-        // The feed has half of the frames, however slowly the publisher began; an earlier version ignored the publisher
-        // for seconds.
+        // At least half of the frames arrive, however slowly the publisher began; an earlier version ignored it for
+        // seconds.
         assert!(first < RATE, "{first}: {seen:?}");
     }
     let of_frame = |one: &Seen| if let Seen::Frame { run_id, .. } = one { Some(*run_id) } else { None };

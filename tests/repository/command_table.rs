@@ -1,4 +1,4 @@
-//! The table of commands, against every file that repeats its numbers and names: none of them may drift.
+//! The table of commands, compared with every file that repeats its numbers and names.
 
 use bench_dragon::messages::control::{Code, Command, CommandEntry, CommandValue};
 

@@ -60,17 +60,17 @@ pub struct ClearanceEnclosure {
 }
 
 /// Encloses the least clearance of all pairs of boards that share no handle, from the start until the show ends at
-/// `freeze`. The enclosure is a nanometre wide, unless the search gives up after `most_steps`. `hint` is the result of
+/// `show_end`. The enclosure is a nanometre wide, unless the search gives up after `most_steps`. `hint` is the result of
 /// the ordinary search; it only suggests where to search. `progress` receives the share that is done, from 0 to 1.
 /// Returns `None` if not even the hint can be shown.
 pub fn enclose_least_clearance(
     motion: &Motion,
-    freeze: &TimedEvent,
+    show_end: &TimedEvent,
     hint: &LeastClearance,
     most_steps: u64,
     progress: &mut dyn FnMut(f64),
 ) -> Option<ClearanceEnclosure> {
-    let (path, event) = (motion.path(), &freeze.event);
+    let (path, event) = (motion.path(), &show_end.event);
     let chain = Chain::new(path, ExactPath::new(motion.description()), motion.team());
     let slack = END_SLACK * (1.0 + path.length());
     match event.kind {

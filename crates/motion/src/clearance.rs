@@ -1,8 +1,8 @@
-//! Which two boards of a chain are nearest: all pairs as the reference, and the live way that tests few of them.
+//! The nearest two boards of a chain: by all pairs as the reference, and by the live method that tests few of them.
 //!
-//! In: a [`Chain`] and its [`Team`]. Out: the nearest pair. The show calls it where a scene has alerts. Pairs that
-//! share a handle never count. Both ways evaluate a pair with the same function on the same numbers, so they agree to
-//! the last bit.
+//! In: a [`Chain`] and its [`Team`]. Out: the nearest pair. The show calls it if a scene has alerts. Pairs that share a
+//! handle never count. Both methods evaluate a pair with the same function on the same numbers, so they agree to the
+//! last bit.
 
 mod bounds;
 mod cells;
@@ -22,7 +22,7 @@ use crate::model::team::Team;
 use crate::solve::Chain;
 use crate::solve::table::FollowerTable;
 use bounds::BoundTable;
-use search::{CarriedBounds, Search};
+use search::{CarriedBounds, ClearanceSearch};
 
 /// The nearest two boards that share no handle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,14 +39,15 @@ pub struct PairClearance {
     pub point_b: Point,
 }
 
-/// The board of one bench of a chain. Panics if there is no such bench.
+/// Returns the board of one bench of a chain. Panics if there is no such bench.
 #[inline]
 pub fn board(chain: &Chain, team: &Team, bench: usize) -> Board {
     let handle = |k: usize| Point::new(chain.x[k], chain.y[k]);
     Board::from_handles(handle(bench), handle(bench + 1), team.hole_inset, team.width)
 }
 
-/// The nearest two boards, by testing all pairs; of several, the lowest (a, b). `None` under three benches.
+/// Returns the nearest two boards by testing all pairs; of equal ones the lowest (a, b). `None` for fewer than three
+/// benches.
 pub fn least_clearance_all_pairs(chain: &Chain, team: &Team) -> Option<PairClearance> {
     let mut nearest = Nearest::NONE;
     for a in 0..team.benches {
@@ -84,23 +85,23 @@ impl Nearest {
     }
 }
 
-/// How much work a monitor has done.
+/// The work done by a monitor.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ClearanceCounters {
-    /// Chains looked at.
+    /// Chains processed.
     pub frames: u64,
     /// Pairs of boards tested for their distance.
     pub pairs: u64,
-    /// Chains that needed a search among all their boards: the table did not serve.
+    /// Chains that needed a search among all their boards because the table did not apply.
     pub searches: u64,
 }
 
-/// The live way: the same answer as [`least_clearance_all_pairs`], from a few pairs.
+/// The live method: the same result as [`least_clearance_all_pairs`], from a few pairs.
 ///
-/// The last nearest pair's clearance now is a first limit. Where a table serves, only those pairs are tested whose
-/// bound is within it: most often none. Its bounds hold for every frame alike, so that no jump of the show can mislead
-/// it. Where no table serves, every bench carries a bound from frame to frame, lowered by how far the handles have
-/// moved. All memory is reserved by the constructor.
+/// The present clearance of the previous nearest pair is the first limit. With a table, only pairs whose bound is
+/// within the limit are tested: most often none. The bounds hold for every frame, so that jumps of the show do no harm.
+/// Without a table, every bench carries a bound from frame to frame, lowered by the displacement of the handles. All
+/// memory is reserved by the constructor.
 #[derive(Debug, Clone)]
 pub struct ClearanceMonitor {
     team: Team,
@@ -113,20 +114,21 @@ pub struct ClearanceMonitor {
     counters: ClearanceCounters,
 }
 
-/// Metres that a link of an exact frame is off at most, and more.
+/// Upper bound of the error of a link of an exact frame, metres.
 const EXACT_LINK_ERROR: f64 = 1e-9;
 
 impl ClearanceMonitor {
-    /// A monitor for chains of `team` whose handles are where motion along `path` has them, as far as `table` promises.
-    /// From the table it makes one of its own, of 128 MB of lists and in some five seconds at most: if that is not enough,
-    /// the monitor does without.
+    /// Creates a monitor for chains of `team` that follow `path` as exactly as `table` promises.
+    ///
+    /// From the table it makes a table of bounds, of at most 128 MB and in at most about five seconds. If these limits
+    /// do not suffice, the monitor works without it.
     pub fn new(path: &Path, team: Team, table: &FollowerTable) -> Self {
         let table_of_bounds = BoundTable::new(path, &team, table).map(Box::new);
         Self { table: table_of_bounds, ..Self::without_table(team, 2.0 * table.accuracy()) }
     }
 
-    /// A monitor for chains of `team` wherever the handles are, if no link is off its length by more than `link_error`
-    /// metres or the rounding of exact motion.
+    /// Creates a monitor for chains of `team` with any handles, if no link differs from its length by more than
+    /// `link_error` metres or the rounding of exact motion.
     pub fn without_table(team: Team, link_error: f64) -> Self {
         Self {
             team,
@@ -139,7 +141,7 @@ impl ClearanceMonitor {
         }
     }
 
-    /// How the nearest pair is found, for people.
+    /// Describes how the nearest pair is found, for people.
     pub fn description(&self) -> String {
         match &self.table {
             Some(table) => format!(
@@ -147,29 +149,30 @@ impl ClearanceMonitor {
                 table.memory_bytes().div_ceil(1000),
                 1e3 * table.made_in().as_secs_f64()
             ),
-            None => "by a search among all boards in every frame, since a table of bounds cannot be had".to_owned(),
+            None => "by a search among all boards in every frame, because the table of bounds would exceed its limits"
+                .to_owned(),
         }
     }
 
-    /// The clearance of the latest frame.
+    /// Returns the clearance of the latest frame.
     pub fn latest(&self) -> Option<PairClearance> {
         self.latest
     }
 
-    /// How much work has been done so far.
+    /// Returns the work done so far.
     pub fn counters(&self) -> ClearanceCounters {
         self.counters
     }
 
-    /// The nearest two boards of `chain`, whose head has travelled so many metres of the path (NaN where it does not
-    /// follow the path); of several, the lowest (a, b). `None` under three benches.
+    /// Returns the nearest two boards of `chain`, of equal ones the lowest (a, b). The head has travelled `travelled`
+    /// metres of the path; NaN if it does not follow the path. `None` for fewer than three benches.
     pub fn least_clearance(&mut self, chain: &Chain, travelled: f64) -> Option<PairClearance> {
         self.counters.frames += 1;
         self.latest = None;
         if self.team.benches < 3 {
             return None;
         }
-        let mut search = Search::new(chain, &self.team, self.link_error, self.last_pair);
+        let mut search = ClearanceSearch::new(chain, &self.team, self.link_error, self.last_pair);
         let located = self.table.as_ref().and_then(|table| Some((table, table.locate(travelled, self.team.benches)?)));
         let unsettled = match located {
             Some((table, located)) => search.by_table(table, located),
@@ -190,7 +193,7 @@ fn circle_radius(team: &Team, bench: usize) -> f64 {
     hypot(0.5 * team.link(bench) + team.hole_inset, 0.5 * team.width)
 }
 
-/// How far any point of a board moves at most per metre that its handles move.
+/// Returns the greatest displacement of a board's points per metre of displacement of its handles.
 fn corner_reach(team: &Team, bench: usize) -> f64 {
     Board::displacement_factor(team.link(bench), team.hole_inset, team.width)
 }

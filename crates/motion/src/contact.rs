@@ -1,13 +1,13 @@
 //! First contact and least clearance of a motion along any path, by conservative advancement: steps of the head that
-//! are proved to hold none better, halved where they are not.
+//! are proved to contain no nearer pair, and are halved if the proof fails.
 //!
 //! In: a path, a team, the places where handles turn round ([`Singularities`](super::singularities::Singularities)),
 //! two places of the head. Out: an [`Event`] or a [`LeastClearance`], and how far the search came. The timeline,
 //! `check` and `plan pitch` call it.
 //!
-//! **How far handles move.** Handle 1 turns round only where the head is at a head turn, handle k + 1 only where handle
-//! k turns round or is at a body turn. So the two configurations at the ends of a step and the followers of the turns
-//! between determine what path each handle k passes over in it, forth and back (`displacement`); m_k is its length.
+//! **How far handles move.** Handle 1 turns round only if the head is at a head turn, handle k + 1 only if handle k
+//! turns round or is at a body turn. So the two configurations at the ends of a step and the followers of the turns
+//! between determine the path that each handle k passes over, forth and back (`displacement`); m_k is its length.
 //!
 //! **How far boards move.** A point of a board is rear + s (front - rear) + w n, n the link's unit normal, s in
 //! [-e, 1 + e], e = inset / link, |w| <= width / 2. With handle velocities u and v, n turns at most at the rate
@@ -15,33 +15,32 @@
 //! |s| m_i + |1 - s| m_{i+1} + (width / (2 link)) (m_i + m_{i+1}), which for any s is at most
 //! C = max(m_i, m_{i+1}) + (e + width / (2 link)) (m_i + m_{i+1}).
 //!
-//! **Why nothing is skipped.** Let at some moment of a step the clearance of a pair is x <= `limit`, limit >= 0.
-//! Take the nearest points P and Q of the two boards at that moment, or one they share if they overlap: at most `limit`
-//! apart. The *same* two points of the boards are at the ends of the step at least as far apart as the clearances
-//! there, and their paths before and after the moment together are those of the step. So
-//! c_start + c_end <= 2 limit + B, B = C_a + C_b, and a pair that violates this stays above the limit all the step.
-//! (Whether C is additive over sub-steps does not matter: the lengths of the paths of P and Q are.) For a limit below 0
-//! there may be no such common pair of points: clearance is the largest gap over all directions, so along the best
-//! direction at either end some two points bound it, others at one end than at the other. Then C takes m_i + m_{i+1}
-//! in place of their maximum, which is additive. What is uncertain is halved, the earlier half first, down to the last
-//! digits of the distance.
+//! **Why nothing is skipped.** Assume that at some time of a step the clearance of a pair is x <= `limit`, limit >= 0.
+//! Take the nearest points P and Q of the two boards at that time, or a common point if they overlap: they are at most
+//! `limit` apart. At the ends of the step the *same* two points of the boards are at least as far apart as the
+//! clearances there, and their paths before and after that time together are those of the step. So c_start + c_end <= 2
+//! limit + B, B = C_a + C_b, and a pair that violates this stays above the limit during the whole step. (C need not be
+//! additive over sub-steps: the lengths of the paths of P and Q are.) For a limit below 0 there may be no such common
+//! pair of points: clearance is the largest gap over all directions, so along the best direction at either end two
+//! points bound it, and these differ between the ends. Then C takes m_i + m_{i+1} in place of their maximum, which is
+//! additive. Uncertain steps are halved, the earlier half first, down to the last digits of the distance.
 //!
-//! **Seen from the chain.** All this holds in any frame that moves rigidly. Where all handles from the first to the
-//! last of a pair stay on one line or circle, so do their distances along it, and B = 0. On one spiral, take the frame
-//! that turns about the centre with handle i and goes outward by a d theta_i, in one direction e of its own. With
+//! **Seen from the chain.** All this holds in any frame that moves rigidly. If all handles from the first to the last
+//! of a pair stay on one line or circle, so do their distances along it, and B = 0. On one spiral, take the frame that
+//! turns about the centre with handle i and moves outward by a d theta_i, in a fixed direction e of the frame. With
 //! psi_k = theta_k - theta_i, the velocity of handle k in it is a d psi_k outward, r_k d psi_k around, and a d theta_i
 //! times the difference between the outward direction at handle k and e, at most the angle between them. While the
-//! handles from i to k go the same way, psi_k is monotone, so that the ends of the step determine these lengths: the
-//! angle of each link is, for (t . b) sqrt(a^2 + r^2) is larger at its outer handle than at its inner one, by
-//! 2 a (r + r') sin^2(d / 2) / link, so the outer one turns less.
+//! handles from i to k go the same way, psi_k is monotone, so that the ends of the step determine these lengths. The
+//! angle of each link is monotone, too: (t . b) sqrt(a^2 + r^2) is larger at its outer handle than at its inner one, by
+//! 2 a (r + r') sin^2(d / 2) / link, so the outer handle turns less.
 //!
-//! **Which pairs.** Every link behind the first has one length, so the place of handle i >= 1 decides where all behind
-//! it are: a pair (i, i + k) is where (1, 1 + k) is when handle 1 is at that place. Let S be where handle 1 began. A
-//! handle i that is at or ahead of S is behind handle 1, which has come from S without a jump: it was at the place of
-//! handle i before, and so was the pair (1, 1 + k). So pairs without boards 0 and 1 matter only in steps in which
-//! handle 2 is somewhere behind S, whichever way anything goes. Nor does a pair whose front handles are both behind the
-//! quiet place, where no two boards ever come within the limit, nor any while the whole team keeps its shape. Followers
-//! are solved only as far back as they can reach the boards that matter (`reach`).
+//! **Which pairs.** Every link behind the first has one length, so the place of handle i >= 1 determines all places
+//! behind it: a pair (i, i + k) is where (1, 1 + k) is when handle 1 is at that place. Let S be the first place of
+//! handle 1. A handle i that is at or ahead of S is behind handle 1, which has come from S without a jump: handle 1 was
+//! at the place of handle i before, and so was the pair (1, 1 + k). So pairs without boards 0 and 1 matter only in
+//! steps in which handle 2 is somewhere behind S, in either direction of motion. A pair does not matter if its front
+//! handles are both behind the quiet place, where no two boards ever come within the limit, nor while the whole team
+//! keeps its shape. Followers are solved only as far back as they can reach the boards that matter (`reach`).
 
 mod broad_phase;
 mod configuration;
@@ -58,12 +57,12 @@ use crate::model::team::Team;
 use super::event::{Budget, Event};
 use configuration::Configuration;
 
-/// What a search found, and how far it came.
+/// The result of a search, and how far it came.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Found<T> {
-    /// What was found.
+    /// The result.
     pub value: Option<T>,
-    /// Metres of travel of the head up to which that is proved: all that was requested, unless the budget was spent.
+    /// Metres of travel of the head up to which that is proved: the whole request, unless the budget was spent.
     pub searched_until: f64,
 }
 
@@ -84,17 +83,17 @@ pub struct LeastClearance {
 pub struct ConservativeAdvancement<'a> {
     path: &'a Path,
     team: &'a Team,
-    /// Where handle 1 turns round: places of the head.
+    /// Places of the head at which handle 1 turns round.
     head_turns: Vec<Param>,
-    /// Where the rear handle of a body link turns round: places of its front handle.
+    /// Places of the front handle of a body link at which its rear handle turns round.
     body_turns: Vec<Param>,
     /// For each segment the first of the run of lines, or of arcs of one circle, that it belongs to.
     curves: Vec<usize>,
 }
 
 impl<'a> ConservativeAdvancement<'a> {
-    /// The searches for `team` on `path`. `head_turns` are the metres of travel of the head at which handle 1 turns
-    /// round, `body_turns` those of any body link's front handle at which its rear handle does, both in order.
+    /// Creates the searches for `team` on `path`. `head_turns` are the metres of travel of the head at which handle 1
+    /// turns round, `body_turns` those of any body link's front handle at which its rear handle does, both in order.
     pub fn new(path: &'a Path, team: &'a Team, head_turns: &[f64], body_turns: &[f64]) -> Self {
         let places = |turns: &[f64]| turns.iter().map(|travelled| path.param_at(*travelled)).collect();
         let mut curves = Vec::with_capacity(path.segments());
@@ -106,20 +105,21 @@ impl<'a> ConservativeAdvancement<'a> {
         Self { path, team, head_turns: places(head_turns), body_turns: places(body_turns), curves }
     }
 
-    /// The first contact while the head goes from one place to another, metres of travel: the first place at which a
-    /// signed distance is 0 or less, to the last digits, the deepest of the pairs that touch there, and the touching
-    /// point. Boards that overlap at `from` are a contact there: the deepest pair, at the centre of its overlap.
+    /// Finds the first contact while the head goes from one place to another, metres of travel: the first place at
+    /// which a signed distance is 0 or less, to the last digits, the deepest of the pairs that touch there, and the
+    /// touching point. Boards that overlap at `from` are a contact there: the deepest pair, at the centre of its
+    /// overlap.
     ///
     /// # Errors
-    /// [`NoFollower`] where a configuration strictly inside the motion cannot be solved.
+    /// [`NoFollower`] if a configuration strictly inside the motion cannot be solved.
     pub fn first_contact(&self, from: f64, to: f64, budget: &mut Budget) -> Result<Found<Event>, NoFollower> {
         search::first_contact(self, from, to, budget)
     }
 
-    /// The least clearance while the head goes from one place to another; `None` under three benches.
+    /// Finds the least clearance while the head goes from one place to another; `None` for fewer than three benches.
     ///
     /// # Errors
-    /// [`NoFollower`] where a configuration strictly inside the motion cannot be solved.
+    /// [`NoFollower`] if a configuration strictly inside the motion cannot be solved.
     pub fn least_clearance(
         &self,
         from: f64,
@@ -129,8 +129,8 @@ impl<'a> ConservativeAdvancement<'a> {
         search::least_clearance(self, from, to, budget)
     }
 
-    /// The clearance of one pair, and where the head is, at its least within a bracket that holds one minimum. Infinite
-    /// where a configuration cannot be solved.
+    /// Returns the least clearance of one pair within a bracket that holds one minimum, and the head's place there.
+    /// Infinite if a configuration cannot be solved.
     pub fn minimum_of(&self, (a, b): (u32, u32), from: f64, to: f64) -> (f64, f64) {
         let pair = (a as usize, b as usize);
         let clearance = |travelled: f64| {
@@ -143,15 +143,15 @@ impl<'a> ConservativeAdvancement<'a> {
         golden_section_min(clearance, from, to)
     }
 
-    /// Metres of travel of the head up to which the whole team stays on the line or circle on which it is, and so keeps
-    /// its shape; `None` where it is not on one.
+    /// Returns the metres of travel of the head up to which the whole team stays on its line or circle, and so keeps
+    /// its shape; `None` if it is not on one.
     fn rigid_until(&self, travelled: f64) -> Option<f64> {
         let head = self.path.param_at(travelled);
         let segment = self.path.segment(head);
         segment.constant_curvature()?;
         let along = |chord: f64| segment.arc_over(chord);
         let body = (self.team.benches - 1) as f64 * along(self.team.link(1))?;
-        // Room for the rounding of what it sums up.
+        // With a margin for the rounding of the sum.
         let length = (1.0 + 1e-7) * (along(self.team.link(0))? + body);
         let curve = self.curves[head.segment];
         let begin = if curve == 0 { f64::NEG_INFINITY } else { self.path.end_of(curve - 1) };

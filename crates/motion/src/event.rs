@@ -1,11 +1,10 @@
-//! What can happen in a motion, and how far a search for it came. The searches return these; the timeline turns them into
-//! times.
+//! Events of a motion and the budget of a search. The searches return events; the timeline gives them times.
 
 use bench_dragon_messages::state::EventKind;
 
 use crate::model::Point;
 
-/// Something that happens at one place of the head on the path, and so at one time.
+/// An event at one place of the head on the path, and so at one time.
 ///
 /// # Examples
 ///
@@ -23,33 +22,33 @@ use crate::model::Point;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
-    /// What happens.
+    /// Kind of the event.
     pub kind: EventKind,
     /// Metres that the head has travelled along the path since the scene's start.
     pub travelled: f64,
-    /// The first bench concerned: of the two that touch the one nearer the head, or the one that stalls or locks.
+    /// The first bench concerned: of two that touch, the bench nearer the head; else the bench that stalls or locks.
     pub bench_a: Option<u32>,
     /// The second of two benches that touch.
     pub bench_b: Option<u32>,
-    /// Where: the touching point; the rear handle of a stall or lock. `None` for the path's end.
+    /// The touching point, or the rear handle of a stall or lock. `None` for the path's end.
     pub place: Option<Point>,
 }
 
-/// How much a search may still do, and who receives its progress. One unit of work is one link solved, or one pair of
-/// boards tested.
+/// Work that a search may still do, and the receiver of its progress. One unit of work is one link solved or one pair
+/// of boards tested.
 pub struct Budget<'a> {
     left: u64,
     progress: &'a mut dyn FnMut(f64),
 }
 
 impl<'a> Budget<'a> {
-    /// A budget of so many units of work. `progress` is called now and then with the share of the search that is done,
-    /// from 0 to 1.
+    /// Creates a budget of `limit` units of work. `progress` is called at times with the share of the search that is
+    /// done, from 0 to 1.
     pub fn new(limit: u64, progress: &'a mut dyn FnMut(f64)) -> Self {
         Self { left: limit, progress }
     }
 
-    /// Takes some work off the budget; false where there is not that much left, and then nothing is left.
+    /// Subtracts `work` units. Returns false if fewer are left; the budget is then empty.
     #[must_use]
     pub fn spend(&mut self, work: u64) -> bool {
         let enough = work <= self.left;
@@ -57,7 +56,7 @@ impl<'a> Budget<'a> {
         enough
     }
 
-    /// Reports which share of the search is done.
+    /// Reports the share of the search that is done.
     pub fn report(&mut self, share: f64) {
         (self.progress)(share.clamp(0.0, 1.0));
     }

@@ -1,8 +1,9 @@
-//! The motion: a team on a path at a speed, followed by a method. It alone decides what a show computes: which solver and
-//! why, which events, the live clearance, the time of a travelled distance, the outline to draw.
+//! The motion: a team on a path at a speed, with a method to solve it. This crate alone decides what a show computes:
+//! the solver and the reason for it, the events, the live clearance, the time of a travelled distance, the outline to
+//! draw.
 //!
-//! In: what a scene states. The show, the plans and the commands call it; no other module distinguishes the kinds of
-//! path.
+//! In: the numbers of a scene. The show, the plans and the commands call it. Only `model` distinguishes the kinds of
+//! curves.
 
 pub mod clearance;
 pub mod contact;
@@ -31,32 +32,32 @@ use event::{Budget, Event};
 use singularities::Singularities;
 use timeline::{TimedClearance, TimedEvent, Timeline};
 
-/// How the solver is chosen.
+/// The choice of the solver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Method {
-    /// The cheapest solver that is measured to meet this position error, metres.
+    /// The cheapest solver whose measured position error meets this accuracy, metres.
     Accuracy(f64),
     /// Exact motion, each follower bracketed.
     Newton,
-    /// Exact motion, every handle interpolated in a table of where such chains stand.
+    /// Exact motion, every handle interpolated in a table of the chain's places.
     FollowerTable,
     /// The paper's rules, on a spiral.
     Paper(PaperRules),
 }
 
-/// A solver and why it was chosen.
+/// A solver and the reason for its choice.
 pub struct Choice {
     /// The solver.
     pub solver: Box<dyn Solver>,
     /// Its name, its settings and the reason, for people.
     pub reason: String,
-    /// The table that the solver interpolates in, if it does.
+    /// The table of the solver, if it has one.
     table: Option<FollowerTable>,
 }
 
 impl Choice {
-    /// Metres that the clearance of a frame can differ from that of exact motion: twice what a board's points move with
-    /// handles that are as far off as the solver promises.
+    /// Returns the greatest difference, metres, between the clearance of a frame and that of exact motion: twice the
+    /// displacement of a board's points for handles with the error that the solver promises.
     pub fn clearance_error(&self, team: &Team) -> f64 {
         let factor = |link| Board::displacement_factor(link, team.hole_inset, team.width);
         let factor = factor(team.link(0)).max(factor(team.link(1)));
@@ -64,13 +65,13 @@ impl Choice {
     }
 }
 
-/// A motion that cannot be.
+/// A motion that is impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MotionError {
     /// The path has a gap or a corner.
     #[error("the path has a gap: {0}")]
     Disjoint(#[from] Disjoint),
-    /// The paper's rules are for its spiral.
+    /// The path is not the spiral of the paper's rules.
     #[error("the paper's solver follows an inward spiral to its centre and no other path")]
     PaperElsewhere,
 }
@@ -105,20 +106,20 @@ pub struct Motion {
     instructions: Instructions,
 }
 
-/// Units of work after which the search for stall and lock gives up: some ten seconds.
+/// Units of work after which the search for stall and lock gives up: about ten seconds.
 const SINGULARITIES_BUDGET: u64 = 50_000_000;
 
 /// Units of work after which the search for a contact, or for the least clearance, gives up: about half a minute.
 const CONTACT_BUDGET: u64 = 100_000_000;
 
-/// Metres by which a table of its own may be off where the clearance has to make a coarse one.
+/// Accuracy, metres, of the table that the clearance makes if an exact one is too large.
 const CLEARANCE_ACCURACY: f64 = 1e-4;
 
 const NO_TABLE: &str = "there is no table for this team and path";
 
-/// What was measured of a table, for people.
+/// Describes the measured error of a table, for people.
 fn measured(selection: &Selection, requested: f64) -> String {
-    let Selection { table, accuracy, error, moments, made_in, .. } = selection;
+    let Selection { table, accuracy, error, test_points, made_in, .. } = selection;
     let target = if !selection.meets() {
         format!("the best there is for the {requested:e} m requested")
     } else if selection.is_at_the_floor() {
@@ -129,7 +130,7 @@ fn measured(selection: &Selection, requested: f64) -> String {
         format!("for the {requested:e} m requested")
     };
     format!(
-        "{error:.1e} m measured against newton at {moments} moments, {target}; {:.0} bytes a handle, {:.2} of the most \
+        "{error:.1e} m measured against newton at {test_points} moments, {target}; {:.0} bytes a handle, {:.2} of the most \
          exact table's, {} kB, made in {:.0} ms",
         table.bytes_per_handle(),
         table.relative_cost(),
@@ -139,7 +140,7 @@ fn measured(selection: &Selection, requested: f64) -> String {
 }
 
 impl Motion {
-    /// The motion of `team`, its head moving at `head_speed` metres per second along the path.
+    /// Creates the motion of `team`, its head moving at `head_speed` metres per second along the path.
     ///
     /// # Errors
     /// [`MotionError`]
@@ -152,32 +153,32 @@ impl Motion {
         Ok(Self { description, path, team, head_speed, method, instructions })
     }
 
-    /// The numbers of which the path is made.
+    /// Returns the numbers of which the path is made.
     pub fn description(&self) -> &PathDescription {
         &self.description
     }
 
-    /// The path.
+    /// Returns the path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The benches.
+    /// Returns the benches.
     pub fn team(&self) -> &Team {
         &self.team
     }
 
-    /// Metres per second of the head along the curve.
+    /// Returns the speed of the head along the curve, metres per second.
     pub fn head_speed(&self) -> f64 {
         self.head_speed
     }
 
-    /// How the solver is chosen.
+    /// Returns the choice of the solver.
     pub fn method(&self) -> Method {
         self.method
     }
 
-    /// The same motion by another method.
+    /// Returns the same motion with another method.
     ///
     /// # Errors
     /// [`MotionError::PaperElsewhere`]
@@ -186,20 +187,20 @@ impl Motion {
         Ok(Self { instructions: self.instructions, ..other })
     }
 
-    /// The instructions that a table is read with: the fastest this processor has, unless others were requested.
+    /// Returns the instructions that read a table: the fastest of this processor, unless others were requested.
     pub fn instructions(&self) -> Instructions {
         self.instructions
     }
 
-    /// The same motion with other instructions, or `None` where this processor lacks them.
+    /// Returns the same motion with other instructions, or `None` if this processor lacks them.
     pub fn with_instructions(self, instructions: Instructions) -> Option<Self> {
         instructions.is_available().then_some(Self { instructions, ..self })
     }
 
-    /// Metres by which the links of this motion's frames may be off, besides 1e-12 of their length and the rounding of the
-    /// handles' coordinates.
+    /// Returns the greatest error of the links of this motion's frames, metres, besides 1e-12 of their length and the
+    /// rounding of the handles' coordinates.
     pub fn link_tolerance(&self) -> f64 {
-        // Both ends of a link may be off by the rounding of a product and of a sum, in both coordinates.
+        // Each end of a link may have the rounding of a product and of a sum, in both coordinates.
         let rounding = 4.0 * f64::EPSILON * self.path.largest_summand(self.team.length());
         match self.method {
             Method::Accuracy(accuracy) => selection::link_tolerance(&self.team, accuracy) + rounding,
@@ -207,7 +208,8 @@ impl Motion {
         }
     }
 
-    /// Simulated seconds after which the head has travelled so many metres along the path, as the method has it.
+    /// Returns the simulated seconds after which the head has travelled `travelled` metres along the path with this
+    /// method.
     pub fn time_at(&self, travelled: f64) -> f64 {
         match (self.method, self.path.as_spiral()) {
             (Method::Paper(_), Some((spiral, start))) => {
@@ -218,12 +220,12 @@ impl Motion {
         }
     }
 
-    /// What a drawing needs of the path, segment by segment.
+    /// Returns the outline of the path, segment by segment.
     pub fn outline(&self) -> Vec<SegmentOutline> {
         self.path.outline()
     }
 
-    /// The solver, made anew.
+    /// Makes the solver.
     pub fn solver(&self, velocities: Velocities) -> Choice {
         let newton = |reason: String| {
             let newton = Newton::new(self.path.clone(), self.team, self.head_speed, velocities);
@@ -266,8 +268,8 @@ impl Motion {
         Choice { solver: Box::new(table.for_frames()), reason, table: Some(table) }
     }
 
-    /// The live clearance of this motion's frames.
-    /// `choice` is the solver of the same frames, whose table it shares.
+    /// Makes the monitor of the live clearance of this motion's frames. `choice` is the solver of the same frames,
+    /// whose table it shares.
     pub fn clearance_monitor(&self, choice: &Choice) -> ClearanceMonitor {
         let made_here = match (&choice.table, self.method) {
             (Some(_), _) | (None, Method::Paper(_)) => None,
@@ -279,8 +281,8 @@ impl Motion {
         }
     }
 
-    /// Metres by which a link can be off its length, beyond rounding: the paper's bisection stops at an angle, and along an
-    /// arc of radius r a chord changes by at most r for each radian.
+    /// Returns the greatest error of a link, metres, beyond rounding. The paper's bisection stops at an angle, and
+    /// along an arc of radius r a chord changes by at most r per radian.
     pub(crate) fn link_error(&self) -> f64 {
         match (self.method, self.path.as_spiral()) {
             (Method::Paper(rules), Some((spiral, start))) => {
@@ -291,8 +293,8 @@ impl Motion {
         }
     }
 
-    /// A table for the clearance of frames that come from another solver: the most exact one, or where that would be too
-    /// large, a coarse one.
+    /// Makes a table for the clearance of frames from another solver: the most exact one, or a coarse one if the exact
+    /// one would be too large.
     fn table_for_clearance(&self) -> Option<FollowerTable> {
         let exact = || FollowerTable::new(&self.path, self.team, self.head_speed, Velocities::Omitted);
         let coarse = || {
@@ -301,13 +303,13 @@ impl Motion {
         };
         let coarse = || coarse().map(|selection| selection.table);
         match self.method {
-            // There an exact one has been tried.
+            // For these methods an exact table has already failed.
             Method::Accuracy(_) | Method::FollowerTable => coarse(),
             Method::Newton | Method::Paper(_) => exact().or_else(coarse),
         }
     }
 
-    /// Metres that the head has travelled at a time; not a number where the method does not follow the path exactly.
+    /// Returns the metres that the head has travelled at a time; NaN if the method does not follow the path exactly.
     pub fn travelled_at(&self, time: f64) -> f64 {
         match self.method {
             Method::Paper(_) => f64::NAN,
@@ -315,8 +317,8 @@ impl Motion {
         }
     }
 
-    /// All events, contact included. `progress` is called now and then with the share of the search that is done, from
-    /// 0 to 1.
+    /// Returns all events, contact included. `progress` is called at times with the share of the search that is done,
+    /// from 0 to 1.
     pub fn timeline(&self, progress: &mut dyn FnMut(f64)) -> Timeline {
         let found = self.singularities(&mut |share| progress(0.1 * share));
         let end = self.end(&found);
@@ -338,15 +340,15 @@ impl Motion {
         self.timed(events, searched_until)
     }
 
-    /// The events but for the contact, which costs a search.
+    /// Returns the events without the contact, which costs a search.
     pub fn timeline_without_contact(&self) -> Timeline {
         let found = self.singularities(&mut |_| ());
         let end = self.end(&found);
         self.timed(found.stall.into_iter().chain([end]).collect(), found.searched_until)
     }
 
-    /// The least clearance from the start until the show freezes at `freeze`. `None` under three benches. `progress` is
-    /// called as by [`Motion::timeline`].
+    /// Returns the least clearance from the start until the show ends at `freeze`; `None` for fewer than three benches.
+    /// `progress` is called as by [`Motion::timeline`].
     pub fn least_clearance(
         &self,
         timeline: &Timeline,
@@ -357,7 +359,7 @@ impl Motion {
             return None;
         }
         let found = self.singularities(&mut |_| ());
-        // Until boards touch for the first time their clearance is above what it is then.
+        // Before the first contact, every clearance is above that at the contact.
         let from = timeline.find(EventKind::Contact).map_or(0.0, |contact| contact.event.travelled);
         let to = freeze.event.travelled;
         let mut budget = Budget::new(CONTACT_BUDGET, progress);
@@ -370,24 +372,24 @@ impl Motion {
         })
     }
 
-    /// Stall, lock and the turns of the handles.
+    /// Searches for stall, lock and the turns of the handles.
     pub fn singularities(&self, progress: &mut dyn FnMut(f64)) -> Singularities {
         Singularities::search(&self.path, &self.team, &mut Budget::new(SINGULARITIES_BUDGET, progress))
     }
 
-    /// The search for contacts and clearances, given what [`Motion::singularities`] found.
+    /// Returns the search for contacts and clearances, from the result of [`Motion::singularities`].
     pub fn advancement<'a>(&'a self, found: &'a Singularities) -> ConservativeAdvancement<'a> {
         ConservativeAdvancement::new(&self.path, &self.team, &found.head_turns, &found.body_turns)
     }
 
-    /// The lock or path end; where the search gave up before either, the path's end, as far as anyone knows.
+    /// Returns the lock or path end; if the search gave up before either, the path's end.
     fn end(&self, found: &Singularities) -> Event {
         let path_end = EventKind::PathEnd;
         let travelled = self.path.length();
         found.end.unwrap_or(Event { kind: path_end, travelled, bench_a: None, bench_b: None, place: None })
     }
 
-    /// The time of an event. That of a lock is never past the lock when it is multiplied by the speed again: there handles
+    /// Returns the time of an event. The time of a lock, multiplied by the speed, is never past the lock: there handles
     /// would have jumped.
     fn time_of(&self, event: &Event) -> f64 {
         let time = self.time_at(event.travelled);
@@ -395,7 +397,7 @@ impl Motion {
         if is_past { time.next_down() } else { time }
     }
 
-    /// The events with their times, and the time up to which they are all there are.
+    /// Returns the events with their times, and the time up to which they are complete.
     fn timed(&self, events: Vec<Event>, searched_until: f64) -> Timeline {
         let end = events.iter().fold(0.0, |end: f64, event| end.max(event.travelled));
         let timed = events.into_iter().map(|event| TimedEvent { event, time: self.time_of(&event) }).collect();

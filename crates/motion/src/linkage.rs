@@ -32,11 +32,11 @@ pub fn link_pose(path: &Path, front: Param, rear: Param, link: f64) -> LinkPose 
     LinkPose::between((path.point(front), path.tangent(front)), (path.point(rear), path.tangent(rear)))
 }
 
-/// The first place from `from` backward that is `link` metres from `front`, all between the two being nearer.
+/// Returns the first place from `from` backward that is `link` metres from `front`; all places between are nearer.
 ///
-/// The square of the distance from `front` grows from a place by at most 2 slope h + bound h^2 over the next h units back
-/// (see [`Curve::second_derivative_bound`]), so no place before that reaches the square of the link is at the distance: each
-/// step goes there. Steps never pass the first place sought and double its digits once near.
+/// The square of the distance from `front` grows from a place by at most 2 slope h + bound h^2 over the next h units
+/// back (see [`Curve::second_derivative_bound`]). Each step goes to where this bound reaches the square of the link. So
+/// steps never pass the first place sought; near it they double its digits.
 fn march(path: &Path, from: Param, front: Point, link: f64) -> Result<Param, NoFollower> {
     let mut param = from;
     for _ in 0..MOST_STEPS {
@@ -68,7 +68,7 @@ fn march(path: &Path, from: Param, front: Point, link: f64) -> Result<Param, NoF
 /// Steps after which the search for a follower gives up: many more than a path of sensible segments needs.
 const MOST_STEPS: usize = 100_000;
 
-/// Units of the coordinate that a segment has behind a place.
+/// Returns the units of the coordinate that a segment has behind a place.
 fn remaining_behind(path: &Path, param: Param) -> f64 {
     if param.segment == 0 { f64::INFINITY } else { param.at.minus(path.first(param.segment)) }
 }
@@ -79,7 +79,7 @@ mod tests {
     use crate::model::path::tests::any_path;
     use proptest::prelude::*;
 
-    /// Metres back to the first place at the distance, by small steps along the path and bisection; `None` past `most`.
+    /// Returns the metres back to the first place at the distance, by small steps and bisection; `None` past `most`.
     fn first_by_sampling(path: &Path, front: f64, link: f64, most: f64) -> Option<f64> {
         let origin = path.point(path.param_at(front));
         let distance = |back: f64| (path.point(path.param_at(front - back)) - origin).norm();
@@ -110,7 +110,7 @@ mod tests {
             let found = path.arc_length(rear, front);
             prop_assert!(((path.point(rear) - path.point(front)).norm() - link).abs() < 1e-13 * (1.0 + link));
             let pose = link_pose(&path, front, rear, link);
-            // Where the path turns back just short of the link, sampling sees less than it should.
+            // Where the path turns back just short of the link, sampling finds too few places.
             let sampled = first_by_sampling(&path, at, link, 1.5 * found + link);
             let grazing = pose.rear_cosine.abs() < 0.05;
             prop_assert!(sampled.is_some_and(|sampled| found <= sampled + 1e-6 && (grazing || sampled <= found + 1e-6)),

@@ -1,19 +1,19 @@
 //! Singular configurations of the chain: the first stall (dead point) and the lock or path end that ends the motion.
 //!
 //! In: a path and a team. Out: [`Singularities`], in metres of travel of the head. The timeline calls the search once,
-//! before anything moves; the search for contacts cuts its steps at the turning points found here.
+//! before the show; the search for contacts cuts its steps at the turning points found here.
 //!
 //! **Two links are enough.** Let F be the follower map of a body link, from its front handle's travel to its rear
 //! handle's. Handle k + 1 is behind handle k, so no handle after the first is ever further along the path than handle 1
-//! has been; on the first segment, outside the fold, F is continuous however far back. So while F is continuous up to
-//! where handle 1 has been, no body link locks. Before the first stall all handles go forward, so each place is first
-//! reached by the foremost handle that did not start beyond it. The handles that start behind handle 1 are on the first
-//! segment: a straight line, where nothing happens, or an inward spiral, where nothing happens but near its centre
-//! (`inward`); only a start so near makes `Search::body_stall` consider more links. So there are two problems in one
-//! variable, a `LinkTrace` each: the head's link for all places of the head, and a body link for all places that handle
-//! 1 has come to. They are solved in lockstep, and every step is proven to hold nothing unseen (`certificate`) or
-//! halved, down to the resolution of doubles (`trace`). Between two turning points of handle 1 its place is monotone in
-//! the head's, so one is found from the other by bisection.
+//! has been; on the first segment, outside the fold, F is continuous arbitrarily far back. So while F is continuous up
+//! to the furthest place of handle 1, no body link locks. Before the first stall all handles go forward, so each place
+//! is first reached by the foremost handle that did not start beyond it. The handles that start behind handle 1 are on
+//! the first segment: a straight line, without singularities, or an inward spiral, with singularities near its centre
+//! only (`inward`). Only a start near the centre makes `SingularitySearch::body_stall` consider more links. So there
+//! are two problems in one variable, a `LinkTrace` each: the head's link for all places of the head, and a body link
+//! for all places that handle 1 has come to. They are solved in lockstep, and every step is proven to hold nothing
+//! unseen (`certificate`) or halved, down to the resolution of doubles (`trace`). Between two turning points of handle
+//! 1 its place is monotone in the head's, so one is found from the other by bisection.
 
 mod certificate;
 mod inward;
@@ -30,12 +30,12 @@ use super::event::{Budget, Event};
 use certificate::{Configuration, Link};
 use trace::{LinkTrace, TraceEnd};
 
-/// In the last digits before a lock: in so many rounding may make a handle jump, so many more are safe, and before so many none
-/// has jumped.
+/// Units in the last place before a lock: rounding can make a handle jump within the last `JUMP_DIGITS`; `SAFE_DIGITS`
+/// more are a margin; before `UNTOUCHED_DIGITS` no handle jumps.
 const JUMP_DIGITS: u32 = 256;
 const SAFE_DIGITS: u32 = 32;
 const UNTOUCHED_DIGITS: u32 = 1024;
-/// How far a handle goes that jumps, in links: on those digits it goes less towards any other lock.
+/// Least displacement of a handle that jumps, in links: towards any other lock it moves less over those digits.
 const JUMP: f64 = 0.05;
 
 /// The singular configurations of a motion, up to the one that ends it.
@@ -43,9 +43,9 @@ const JUMP: f64 = 0.05;
 pub struct Singularities {
     /// The first stall of any link.
     pub stall: Option<Event>,
-    /// The lock, or the path's end where no link locks. `None` where the search ended before either.
+    /// The lock, or the path's end if no link locks. `None` if the search ended before either.
     pub end: Option<Event>,
-    /// Metres of travel of the head up to which the search is complete: that of `end`, where there is one.
+    /// Metres of travel of the head up to which the search is complete: those of `end`, if there is one.
     pub searched_until: f64,
     /// Metres of travel of the head at which the first link's rear handle turns round, in order.
     pub head_turns: Vec<f64>,
@@ -64,13 +64,13 @@ impl Singularities {
         let Ok((head, body)) = traces else {
             return Self { stall: None, end: None, searched_until: 0.0, head_turns: vec![], body_turns: vec![] };
         };
-        let mut search = Search { path, team, head, body };
+        let mut search = SingularitySearch { path, team, head, body };
         search.run(budget);
         search.conclude()
     }
 }
 
-struct Search<'a> {
+struct SingularitySearch<'a> {
     path: &'a Path,
     team: &'a Team,
     /// In metres of travel of the head.
@@ -79,8 +79,8 @@ struct Search<'a> {
     body: Option<LinkTrace<'a>>,
 }
 
-impl Search<'_> {
-    /// Traces the head's link, and the body link as far as handle 1 has come, until one ends the motion.
+impl SingularitySearch<'_> {
+    /// Traces the head's link, and the body link up to the place of handle 1, until one of them ends the motion.
     fn run(&mut self, budget: &mut Budget) {
         for step in 0u64.. {
             if step % 256 == 0 {
@@ -98,7 +98,7 @@ impl Search<'_> {
         }
     }
 
-    /// Whether handle 1 has come further than the body link is traced.
+    /// Returns true if handle 1 is further than the body link is traced.
     fn body_lags(&self) -> bool {
         self.body.as_ref().is_some_and(|body| body.at().front < self.head.furthest_rear())
     }
@@ -134,12 +134,12 @@ impl Search<'_> {
         Singularities { stall, end, searched_until, head_turns, body_turns }
     }
 
-    /// Metres of travel of handle 1.
+    /// Returns the metres of travel of handle 1.
     fn handle_1(&self, head: f64) -> Option<f64> {
         self.head.link().configuration(head).ok().map(|configuration| configuration.rear)
     }
 
-    /// The head's first travel up to `limit` at which handle 1 has come to `place`.
+    /// Returns the head's first travel up to `limit` at which handle 1 reaches `place`.
     fn handle_1_reaches(&self, place: f64, limit: f64) -> Option<f64> {
         let reached = |head: f64| self.handle_1(head).is_none_or(|at| at >= place);
         if reached(0.0) {
@@ -156,7 +156,7 @@ impl Search<'_> {
         None
     }
 
-    /// The first stall up to `limit` metres of travel of the head.
+    /// Returns the first stall up to `limit` metres of travel of the head.
     fn stall(&self, limit: f64) -> Option<Event> {
         let start = self.head.link().configuration(0.0).ok()?;
         if start.is_stalled() {
@@ -171,7 +171,8 @@ impl Search<'_> {
         }
     }
 
-    /// The first stall of a body link while handle 1 only goes forward, up to `limit`: the head's travel, and the link.
+    /// Returns the first stall of a body link up to `limit`, while handle 1 moves forward only: the head's travel and
+    /// the link.
     fn body_stall(&self, head: &Configuration, limit: f64) -> Option<(f64, usize)> {
         let body = self.body.as_ref()?;
         let innermost = *body.turns().first()?;
@@ -196,7 +197,7 @@ impl Search<'_> {
         first
     }
 
-    /// The head's first travel up to `limit` at which a handle has come to `place`, none having turned round before.
+    /// Returns the head's first travel up to `limit` at which a handle reaches `place`, if no handle turned before.
     fn handle_reaches(&self, handle: usize, place: f64, limit: f64) -> Option<f64> {
         let reached = |head: f64| {
             let body = self.body.as_ref().unwrap_or(&self.head).link();
@@ -214,22 +215,23 @@ impl Search<'_> {
         Event { kind, travelled, bench_a: Some(link as u32), bench_b: None, place }
     }
 
-    /// The place of a lock, or one some digits before it. Where a nearer place of the path comes within the link's reach its rear
-    /// handle jumps there, and frames, which round otherwise than this search, may have jumped some digits earlier.
+    /// Returns the place of a lock, or a place some digits before it. At a lock where a nearer place of the path comes
+    /// within the link's reach the rear handle jumps there. Frames round differently from this search and may jump some
+    /// digits earlier.
     fn before_jump(&self, travelled: f64, link: usize) -> f64 {
         let length = self.team.link(link);
         let place = |digits: u32| travelled - f64::from(digits) * f64::EPSILON * (travelled + length);
         let rear = |digits: u32| self.rear(place(digits), link).map(|rear| self.path.travelled(rear));
-        // Where digits are as large as that, frames show nothing else than jumps.
+        // With digits that large, frames show only jumps.
         let is_fine = travelled - place(UNTOUCHED_DIGITS) < 1e-6 * length && place(UNTOUCHED_DIGITS) >= 0.0;
         let Some(before) = rear(UNTOUCHED_DIGITS).filter(|_| is_fine) else { return travelled };
         let has_jumped = |digits: &u32| rear(*digits).is_some_and(|rear| rear > before + JUMP * length);
-        // From the first on, since rounding is not monotone.
+        // All digits are tested, because rounding is not monotone.
         let first = (0..JUMP_DIGITS).rev().find(has_jumped);
         first.map_or(travelled, |digits| place(digits + SAFE_DIGITS))
     }
 
-    /// The rear handle of a link; where rounding leaves none in the last digits, at the last place before.
+    /// Returns the rear handle of a link; if rounding leaves none in the last digits, that of the last place before.
     fn rear_point(&self, travelled: f64, link: usize) -> Option<Point> {
         let digit = f64::EPSILON * (travelled + self.team.link(link));
         let earlier = (0..40).map(|power| travelled - digit * 2f64.powi(power));
@@ -237,7 +239,7 @@ impl Search<'_> {
         places.find_map(|at| self.rear(at, link)).map(|rear| self.path.point(rear))
     }
 
-    /// The rear handle of a link as frames have it.
+    /// Returns the rear handle of a link as in a frame.
     fn rear(&self, travelled: f64, link: usize) -> Option<Param> {
         let head = self.path.param_at(travelled);
         let follower = |front, link| crate::linkage::follower(self.path, front, self.team.link(link));

@@ -1,7 +1,7 @@
 //! Solvers: from the head's travel to the state of every handle.
 //!
-//! They differ in cost and accuracy and stand behind [`Solver`]; [`crate`] chooses one. Each that is kept lies
-//! on the measured front of error against time, but for the paper's and the reference.
+//! They differ in cost and accuracy and implement [`Solver`]; [`crate`] chooses one. Each lies on the measured Pareto
+//! front of error against time, except the paper's solver and the reference.
 
 pub mod newton;
 pub mod paper;
@@ -31,7 +31,7 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// A chain of `handles` handles, all at the origin and without velocity.
+    /// Creates a chain of `handles` handles, all at the origin and without velocity.
     pub fn new(handles: usize) -> Self {
         let numbers = |value| vec![value; handles];
         Self {
@@ -44,13 +44,13 @@ impl Chain {
         }
     }
 
-    /// The number of handles.
+    /// Returns the number of handles.
     pub fn handles(&self) -> usize {
         self.x.len()
     }
 }
 
-/// Whether a solver is to compute speeds and velocities.
+/// A request to compute speeds and velocities, or to omit them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Velocities {
     /// Compute them.
@@ -77,12 +77,12 @@ pub enum Velocities {
 /// # Ok::<(), bench_dragon_motion::linkage::NoFollower>(())
 /// ```
 pub trait Solver: Send {
-    /// The name by which a scene selects this solver.
+    /// Returns the name by which a scene selects this solver.
     fn name(&self) -> &'static str;
 
     /// Fills `chain` with the state at `time` simulated seconds after the scene's start.
     ///
     /// # Errors
-    /// [`NoFollower`] where the motion has ended in a lock before `time`; `chain` is then unspecified.
+    /// [`NoFollower`] if the motion has ended in a lock before `time`; `chain` is then unspecified.
     fn solve(&mut self, time: f64, chain: &mut Chain) -> Result<(), NoFollower>;
 }

@@ -1,26 +1,27 @@
-//! The events of a motion with their times. [`super::Motion`] makes it; the show, `events`, `solve` and `draw` use it.
+//! The events of a motion with their times. [`super::Motion`] makes a timeline; the show, `events`, `solve` and `draw`
+//! use it.
 
 use super::contact::LeastClearance;
 use super::event::Event;
 use bench_dragon_messages::state::EventKind;
 
-/// An event and when it happens.
+/// An event and its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimedEvent {
-    /// What happens and where.
+    /// Kind and place of the event.
     pub event: Event,
     /// Simulated seconds since the start of the scene.
     pub time: f64,
 }
 
-/// The least clearance of a show and when it is.
+/// The least clearance of a show and its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimedClearance {
-    /// How near, which two, and where the head is then.
+    /// The clearance, its two benches, and the place of the head.
     pub least: LeastClearance,
     /// Simulated seconds since the start of the scene.
     pub time: f64,
-    /// Simulated seconds up to which the search came, where it gave up before its end.
+    /// Simulated seconds up to which the search is complete, if it gave up before its end.
     pub searched_until: Option<f64>,
 }
 
@@ -32,42 +33,43 @@ pub struct Timeline {
 }
 
 impl Timeline {
-    /// The timeline of events in any order, a lock or path end among them. `searched_until` is the simulated time at which a
-    /// search gave up before the motion's end.
+    /// Creates the timeline of events in any order, one of them a lock or path end. `searched_until` is the simulated
+    /// time at which a search gave up before the motion's end.
     pub fn new(mut events: Vec<TimedEvent>, searched_until: Option<f64>) -> Self {
         // At one time, in the order of the kinds.
         events.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.event.kind.cmp(&b.event.kind)));
         Self { events, searched_until }
     }
 
-    /// Without all but the last event.
+    /// Returns the timeline with the last event only.
     pub fn end_only(mut self) -> Self {
         self.events.drain(..self.events.len() - 1);
         self
     }
 
-    /// The events in order of time.
+    /// Returns the events in order of time.
     pub fn events(&self) -> &[TimedEvent] {
         &self.events
     }
 
-    /// Simulated seconds up to which the searches came, where one of them gave up: later events may be missing.
+    /// Returns the simulated seconds up to which the searches are complete, if one gave up: later events may be
+    /// missing.
     pub fn searched_until(&self) -> Option<f64> {
         self.searched_until
     }
 
-    /// The event of a kind, if it happens.
+    /// Returns the event of a kind, if there is one.
     pub fn find(&self, kind: EventKind) -> Option<&TimedEvent> {
         self.events.iter().find(|timed| timed.event.kind == kind)
     }
 
-    /// The lock or path end with which the motion ends.
+    /// Returns the lock or path end with which the motion ends.
     pub fn end(&self) -> &TimedEvent {
         // Every constructor leaves the end in place.
         &self.events[self.events.len() - 1]
     }
 
-    /// The event at which a show freezes: the contact, if it stops there, or the motion's end.
+    /// Returns the event at which a show ends: the contact if it stops there, else the motion's end.
     pub fn freeze(&self, stops_at_contact: bool) -> &TimedEvent {
         self.find(EventKind::Contact).filter(|_| stops_at_contact).unwrap_or(self.end())
     }
@@ -77,19 +79,19 @@ impl Timeline {
         self.events.reserve(1);
     }
 
-    /// Puts a contact that was seen in the place of the one that was foreseen.
+    /// Replaces the predicted contact by a measured one.
     pub fn record_contact(&mut self, contact: TimedEvent) {
         self.events.retain(|timed| timed.event.kind != EventKind::Contact);
         let at = self.events.partition_point(|timed| timed.time <= contact.time).min(self.events.len() - 1);
         self.events.insert(at, contact);
     }
 
-    /// The latest event at or before a time.
+    /// Returns the latest event at or before a time.
     pub fn latest_passed(&self, sim_time: f64) -> Option<&TimedEvent> {
         self.events.iter().rev().find(|timed| timed.time <= sim_time)
     }
 
-    /// The next contact, stall or lock after a time.
+    /// Returns the next contact, stall or lock after a time.
     pub fn next_alertable(&self, sim_time: f64) -> Option<&TimedEvent> {
         self.events.iter().find(|timed| timed.time > sim_time && timed.event.kind != EventKind::PathEnd)
     }

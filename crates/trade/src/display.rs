@@ -162,8 +162,8 @@ pub fn measure(
 
 /// Returns the last whole second before the end of the show, or the end of a show shorter than a second. All rates have
 /// a frame there: so no rate is charged for the last frame, which has another phase at each rate.
-fn last_frame_time(freeze: f64) -> f64 {
-    if freeze >= 1.0 { freeze.floor() } else { freeze }
+fn last_frame_time(end: f64) -> f64 {
+    if end >= 1.0 { end.floor() } else { end }
 }
 
 /// Returns the simulated times of the display samples, in order. Display and stream have separate clocks, so their

@@ -19,7 +19,7 @@ pub struct GreatestSpeed {
     pub value_hi: f64,
     /// Simulated seconds of the scene, at its own speed, at which the handle has the speed `ratio`.
     pub time: f64,
-    /// The handle, counted from 0. A faster handle could only be faster by the distance of the two speeds.
+    /// The fastest handle, counted from 0. Another handle may be faster only within the gap between the two speeds.
     pub handle: u32,
     /// Ratio of its speed to the head's at that time.
     pub ratio: f64,
@@ -50,16 +50,16 @@ pub fn greatest_speed(
     limit: f64,
     progress: &mut dyn FnMut(f64),
 ) -> Result<GreatestSpeed, PlanError> {
-    let freeze = timeline.freeze(scene.stops_at_contact());
-    if freeze.event.kind == EventKind::Lock {
+    let show_end = timeline.freeze(scene.stops_at_contact());
+    if show_end.event.kind == EventKind::Lock {
         return Err(PlanError(format!(
             "the show runs into a lock at {:.9} s: near it a handle goes faster than any limit, or jumps",
-            freeze.time
+            show_end.time
         )));
     }
     // A little less, since the two speeds are rounded away from each other.
     let tolerance = 0.999 * TOLERANCE / limit.clamp(1.0, LARGE);
-    let found = greatest_ratio(&scene.motion, freeze.event.travelled, tolerance, progress);
+    let found = greatest_ratio(&scene.motion, show_end.event.travelled, tolerance, progress);
     let GreatestRatio { handle, travelled, ratio, proved, steps, .. } = found;
     let (value_lo, value_hi) = found.divide(limit);
     let time = scene.motion.time_at(travelled);

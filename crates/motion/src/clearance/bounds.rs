@@ -1,26 +1,26 @@
-//! How near boards can come to those behind them, wherever on the path they are: worked out before the show, so that a
-//! frame need only test the few pairs that can be the nearest.
+//! Lower bounds of the distance of boards to those behind them, for every place on the path. They are computed before
+//! the show, so that a frame tests only the few pairs that can be the nearest.
 //!
-//! Where the second handle stands at T(alpha), the next ones stand at T(alpha + 1), T(alpha + 2) and so on: see
-//! [`crate::solve::table::rows`]. So how near a body bench is to those behind it depends on the alpha of its front
+//! If the second handle stands at T(alpha), the next ones stand at T(alpha + 1), T(alpha + 2) and so on: see
+//! [`crate::solve::table::rows`]. So the distances of a body bench to those behind it depend on the alpha of its front
 //! handle alone. Every row of T is divided into [`CELLS`] equal cells, so that while one handle is in a cell, the next
 //! is in the same cell of the next row. Each (row, cell) has a list of the benches that can be near, with a proven
 //! lower bound of the signed distance to each (see [`super::moving`]), in ascending order; the last entry stands for
-//! all others. Far behind, where boards hardly move against each other while they all go on by a link, one list serves
-//! all cells of a row.
+//! all others. Far behind, where boards hardly move against each other while all advance by a link, one list is valid
+//! for all cells of a row.
 //!
-//! The rows are grouped into blocks. The least bound of each block is kept once more, cell by cell, where those of a
-//! whole chain lie side by side: a frame looks into those blocks only of which that is within its limit.
+//! The rows are grouped into blocks. The least bound of each block is also kept cell by cell, so that those of a whole
+//! chain are adjacent in memory: a frame reads only the blocks whose least bound is within its limit.
 //!
 //! The head's link differs, but while the second handle is in a cell, the head too is near a known quadratic polynomial
-//! of the cell's time. Its list holds while it is so near as was taken for granted, which every frame confirms; past a
-//! stall it is elsewhere, and nothing is known of it.
+//! of the cell's time. Its list is valid while the head is within the assumed error, which every frame checks. Past a
+//! stall the head is elsewhere and has no list.
 //!
-//! In: a path and a team. Out: lists for every frame. Called by the clearance only.
+//! In: a path and a team. Out: lists for every frame. Only the clearance calls it.
 
 use std::time::{Duration, Instant};
 
-use super::cells::{HeadKnot, end_of_near, head_knots, head_track};
+use super::cells::{HeadGridPoint, end_of_near, head_grid_points, head_track};
 use super::lists::{List, ListBuilder};
 use super::moving::{MovingBoard, Quadratic};
 use crate::model::Vector;
@@ -38,24 +38,24 @@ pub(super) const BLOCK: usize = 64;
 /// Rows at the front that always have lists for every cell: the nearest pairs are most often there.
 const FINE_ROWS: usize = 1024;
 
-/// Rows for which the head has lists, at most: some 10 MB.
+/// Greatest number of rows for which the head has lists: about 10 MB.
 const MOST_HEAD_ROWS: usize = 1 << 14;
 
-/// How far the bounds of a block may be below the distances, in links, where one list serves all cells of a row.
+/// Greatest slack of a block's bounds, in links, if one list is used for all cells of a row.
 const MOST_SLACK: f64 = 1e-3;
 
-/// The most work to make a table, in nanoseconds as a present processor does it.
+/// Greatest work to make a table, in nanoseconds on a processor of 2025.
 const MOST_WORK: usize = 5_000_000_000;
 
-/// Bytes of all lists, at most.
+/// Greatest size of all lists, bytes.
 const MOST_BYTES: usize = 128 << 20;
 
 /// Benches that can be near another one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Neighbour {
-    /// Their signed distance is never less, metres.
+    /// Lower bound of their signed distance, metres.
     pub bound: f32,
-    /// How many benches further behind; [`Neighbour::ALL`] for all that the list does not have.
+    /// Number of benches further behind; [`Neighbour::ALL`] for all benches without an entry.
     pub behind: u32,
 }
 
@@ -64,10 +64,10 @@ impl Neighbour {
     pub(super) const UNKNOWN: Self = Self { bound: f32::NEG_INFINITY, behind: Self::ALL };
 }
 
-/// Where the second handle of a frame is.
+/// Place of a frame's second handle in the table.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Located {
-    /// Its row, which is also that of the bench it leads.
+    /// Its row, which is also the row of the bench it leads.
     pub row: usize,
     cell: usize,
     /// -1 to 1 over the cell.
@@ -78,16 +78,16 @@ pub(super) struct Located {
 #[derive(Debug, Clone, Copy)]
 struct HeadCell {
     track: Quadratic,
-    /// Where its list begins.
+    /// Index of the first entry of its list.
     begin: u32,
 }
 
-/// Where a block has its lists.
+/// Places of the lists of a block.
 #[derive(Debug, Clone, Copy)]
 struct Block {
     /// The place of its first row in the table's `bounds` and `begins`, in its first cell.
     begin: usize,
-    /// How many cells have lists of their own.
+    /// Number of cells with separate lists.
     cells: usize,
 }
 
@@ -99,25 +99,25 @@ pub(super) struct BoundTable {
     /// By cell, then by block: the least bound.
     least: Vec<f32>,
     blocks: Vec<Block>,
-    /// By block, then by cell, then by row: the first bound of each list, and where the list begins.
+    /// By block, then by cell, then by row: the first bound of each list, and the index of its first entry.
     bounds: Vec<f32>,
     begins: Vec<u32>,
-    /// By row, then by cell, as far back as the second handle comes.
+    /// By row, then by cell, as far back as the second handle can be.
     heads: Vec<Option<HeadCell>>,
     neighbours: Vec<Neighbour>,
     made_in: Duration,
 }
 
 impl BoundTable {
-    /// The table for a team on a path with its follower table; `None` where it would be too large or too much work.
+    /// Makes the table for a team on a path with its follower table; `None` if it would be too large or too much work.
     pub(super) fn new(path: &Path, team: &Team, follower: &FollowerTable) -> Option<Self> {
         let began = Instant::now();
         let rows = follower.rows().rows();
         if team.benches < 3 || rows == 0 {
             return None;
         }
-        let mut knots = head_knots(path, follower, team.link(1))?;
-        knots.truncate(CELLS * MOST_HEAD_ROWS);
+        let mut grid_points = head_grid_points(path, follower, team.link(1))?;
+        grid_points.truncate(CELLS * MOST_HEAD_ROWS);
         let blocks = rows.div_ceil(BLOCK);
         let mut table = Self {
             follower: follower.without_rows(),
@@ -126,13 +126,14 @@ impl BoundTable {
             blocks: vec![Block { begin: 0, cells: CELLS }; blocks],
             bounds: Vec::new(),
             begins: Vec::new(),
-            heads: vec![None; knots.len()],
+            heads: vec![None; grid_points.len()],
             neighbours: Vec::new(),
             made_in: Duration::ZERO,
         };
         let mut builder = ListBuilder::new(team, rows, follower.accuracy());
         let present = team.benches - 2;
-        let mut fine: Vec<usize> = (0..(FINE_ROWS.max(knots.len() / CELLS + 2)).div_ceil(BLOCK).min(blocks)).collect();
+        let mut fine: Vec<usize> =
+            (0..(FINE_ROWS.max(grid_points.len() / CELLS + 2)).div_ceil(BLOCK).min(blocks)).collect();
         if fine.len() < blocks {
             builder.enter(follower.rows(), (0.0, 1.0), rows);
             for block in (fine.len()..blocks).rev() {
@@ -154,23 +155,24 @@ impl BoundTable {
             builder.enter(follower.rows(), (share(cell), share(cell + 1)), end.min(rows));
             for block in &fine {
                 table.fill(*block, cell, present, &mut builder);
-                table.fill_heads(*block, cell, team, &knots, &mut builder);
+                table.fill_heads(*block, cell, team, &grid_points, &mut builder);
                 within_limits(&builder)?;
             }
         }
         Some(Self { neighbours: builder.neighbours, made_in: began.elapsed(), ..table })
     }
 
-    /// Makes room for so many cells of a block; returns where that is.
+    /// Reserves space for `cells` cells of a block and returns its index.
     fn extend(&mut self, cells: usize) -> usize {
         let begin = self.bounds.len();
-        // What no list fills is never read.
+        // Places without a list are never read.
         self.bounds.resize(begin + cells * BLOCK, f32::INFINITY);
         self.begins.resize(begin + cells * BLOCK, 0);
         begin
     }
 
-    /// Makes lists for all cells of a block at once, if they are close enough; `None` where that is too much work.
+    /// Makes one list per row for all cells of a block. Returns false if their slack is too large, `None` if the work
+    /// is.
     fn fill_with_one_cell(
         &mut self,
         block: usize,
@@ -194,7 +196,7 @@ impl BoundTable {
         Some(false)
     }
 
-    /// Makes the lists of a cell of a block; returns how far the first bound of one can be below the distance.
+    /// Makes the lists of a cell of a block. Returns the greatest slack of a first bound, metres.
     fn fill(&mut self, block: usize, cell: usize, present: usize, builder: &mut ListBuilder) -> f64 {
         let (mut least, mut slack) = (f32::INFINITY, 0.0f64);
         // The last row has no board.
@@ -215,12 +217,14 @@ impl BoundTable {
         block: usize,
         cell: usize,
         team: &Team,
-        knots: &[Option<HeadKnot>],
+        grid_points: &[Option<HeadGridPoint>],
         builder: &mut ListBuilder,
     ) {
         for row in block * BLOCK..((block + 1) * BLOCK).min(self.rows - 1) {
             let flat = row * CELLS + cell;
-            let track = knots.get(flat..flat + 2).and_then(|knots| head_track(knots, self.follower.accuracy()));
+            let track = grid_points
+                .get(flat..flat + 2)
+                .and_then(|grid_points| head_track(grid_points, self.follower.accuracy()));
             if let (Some(track), Some(second)) = (track, builder.handle(row)) {
                 let head = MovingBoard::new(&track, second, team, 0);
                 let List { begin, .. } = builder.of_head(&head, row, row + team.benches - 2);
@@ -229,7 +233,7 @@ impl BoundTable {
         }
     }
 
-    /// Where the second handle is when the head has travelled so many metres; `None` where the table does not know.
+    /// Returns the place of the second handle when the head has travelled `travelled` metres; `None` outside the table.
     pub(super) fn locate(&self, travelled: f64, benches: usize) -> Option<Located> {
         let (Alpha { row, phase }, _) = self.follower.second_handle(travelled)?;
         let cells = phase * CELLS as f64;
@@ -237,22 +241,22 @@ impl BoundTable {
         (row + benches <= self.rows).then_some(Located { row, cell, time: 2.0 * (cells - cell as f64) - 1.0 })
     }
 
-    /// The least bounds of the blocks that have any of these rows.
+    /// Returns the least bounds of the blocks that have any of these rows.
     pub(super) fn least_bounds(&self, located: Located, rows: &std::ops::Range<usize>) -> &[f32] {
         &self.least[located.cell * self.blocks.len()..][rows.start / BLOCK..rows.end.div_ceil(BLOCK)]
     }
 
-    /// The first bounds of the lists of a block, by row.
+    /// Returns the first bounds of the lists of a block, by row.
     pub(super) fn bounds(&self, located: Located, block: usize) -> &[f32] {
         &self.bounds[self.place(block, located.cell)..][..BLOCK]
     }
 
-    /// The list of the bench that the handle of a row leads.
+    /// Returns the list of the bench that the handle of a row leads.
     pub(super) fn of_body(&self, located: Located, row: usize) -> &[Neighbour] {
         &self.neighbours[self.begins[self.place(row / BLOCK, located.cell) + row % BLOCK] as usize..]
     }
 
-    /// The list of the head, counted from the second bench, if the head is at `place`.
+    /// Returns the list of the head at (x, y), counted from the second bench.
     pub(super) fn of_head(&self, located: Located, (x, y): (f64, f64)) -> &[Neighbour] {
         let head = self.heads.get(located.row * CELLS + located.cell).and_then(Option::as_ref);
         let confirmed = head.filter(|head| {
@@ -262,14 +266,14 @@ impl BoundTable {
         &self.neighbours[confirmed.map_or(0, |head| head.begin) as usize..]
     }
 
-    /// The place of the first row of a block in a cell.
+    /// Returns the index of the first row of a block in a cell.
     #[inline]
     fn place(&self, block: usize, cell: usize) -> usize {
         let Block { begin, cells } = self.blocks[block];
         begin + if cells == 1 { 0 } else { cell * BLOCK }
     }
 
-    /// Bytes that it takes.
+    /// Returns the size of the table, bytes.
     pub(super) fn memory_bytes(&self) -> usize {
         size_of_val(self.least.as_slice())
             + size_of_val(self.blocks.as_slice())
@@ -279,13 +283,13 @@ impl BoundTable {
             + size_of_val(self.neighbours.as_slice())
     }
 
-    /// How long it took to make.
+    /// Returns the time it took to make.
     pub(super) fn made_in(&self) -> Duration {
         self.made_in
     }
 }
 
-/// `None` where the lists are too many or too much work.
+/// Returns `None` if the lists are too many or too much work.
 fn within_limits(builder: &ListBuilder) -> Option<()> {
     (builder.work <= MOST_WORK && size_of_val(builder.neighbours.as_slice()) <= MOST_BYTES).then_some(())
 }

@@ -1,5 +1,5 @@
-//! Where the handles and the head are while the second handle is in a cell of the table: quadratic polynomials of the
-//! cell's time, and how far the truth is off. Called by the making of the table only.
+//! Places of the handles and the head while the second handle is in a cell of the table: quadratic polynomials of the
+//! cell's time with error bounds. Used only to make the table.
 
 use super::bounds::CELLS;
 use super::moving::Quadratic;
@@ -9,21 +9,21 @@ use crate::model::path::Path;
 use crate::solve::table::FollowerTable;
 use crate::solve::table::rows::{Band, Rows};
 
-/// The head at the end of a cell.
+/// The head at the boundary of a cell.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct HeadKnot {
+pub(super) struct HeadGridPoint {
     place: Vector,
     /// Its derivative by the cell's time.
     slope: Vector,
-    /// Metres that the place is allowed to be off.
+    /// Error bound of the place, metres.
     error: f64,
 }
 
-/// What the head's place at the end of the first cell is allowed to be off, in links: the path's start is within the cell.
+/// Error bound of the head's place at the end of the first cell, in links: the path's start is within the cell.
 const ERROR_BEHIND_START: f64 = 1e-3;
 
-/// The handles of rows up to `end_row` while their phase goes from `begin` to `end`, and the first row for which T is known
-/// there.
+/// Returns the first row for which T is known while the phase goes from `begin` to `end`, and the handles from this row
+/// up to `end_row`.
 pub(super) fn handles(rows: &Rows, (begin, end): (f64, f64), end_row: usize) -> (usize, Vec<Quadratic>) {
     let front = rows.bands.first().map_or(0, |band| band.first_row);
     let first = ((rows.valid_from - begin).ceil() as usize).max(front);
@@ -37,9 +37,10 @@ pub(super) fn handles(rows: &Rows, (begin, end): (f64, f64), end_row: usize) -> 
     (first, handles)
 }
 
-/// The row behind all that can have a handle within `distance` metres of one of the given rows, at whatever phases.
+/// Returns the row behind all rows that can have a handle within `distance` metres of one of the given rows, at any
+/// phases.
 ///
-/// At any phase a handle is within a link of where it is at phase 0: its follower is the first place at that distance.
+/// At any phase a handle is within a link of its place at phase 0: its follower is the first place at that distance.
 pub(super) fn end_of_near(rows: &Rows, of: impl Fn(usize) -> bool, link: f64, distance: f64) -> usize {
     let valid = |band: &Band| (rows.valid_from.ceil() as usize).max(band.first_row)..band.first_row + band.rows;
     let place = |band: &Band, row: usize| {
@@ -63,7 +64,7 @@ pub(super) fn end_of_near(rows: &Rows, of: impl Fn(usize) -> bool, link: f64, di
     rows.bands.iter().rev().find_map(last).map_or(0, |row| row + 1)
 }
 
-/// A handle while its phase goes from `begin` to `end`, which are in these pieces.
+/// Returns a handle while its phase goes from `begin` to `end`, which are in these pieces.
 fn handle(band: &Band, pieces: std::ops::RangeInclusive<usize>, row: usize, (begin, end): (f64, f64)) -> Quadratic {
     let middle = 0.5 * (begin + end);
     let at = |piece: usize, phase: f64| {
@@ -89,7 +90,7 @@ fn handle(band: &Band, pieces: std::ops::RangeInclusive<usize>, row: usize, (beg
     quadratic
 }
 
-/// A bound of the difference of two polynomials, each on its own interval, given by its middle and half its length.
+/// Returns a bound of the difference of two polynomials, each on an interval given by its middle and half its length.
 fn largest_difference(a: [f64; 6], (middle, half): (f64, f64), b: [f64; 3], (time, half_time): (f64, f64)) -> f64 {
     let mut shifted = a;
     for low in 0..5 {
@@ -108,22 +109,23 @@ fn largest_difference(a: [f64; 6], (middle, half): (f64, f64), b: [f64; 3], (tim
     shifted.iter().map(|coefficient| coefficient.abs()).sum()
 }
 
-/// The head when alpha of the second handle is at the beginning of a cell, by the number of the cell, counted over all
-/// rows; of several places the first. These need not be exact.
-pub(super) fn head_knots(path: &Path, follower: &FollowerTable, link: f64) -> Option<Vec<Option<HeadKnot>>> {
+/// Returns the head when alpha of the second handle is at the beginning of a cell, by the number of the cell over all
+/// rows; of several places the first. The places need not be exact.
+pub(super) fn head_grid_points(path: &Path, follower: &FollowerTable, link: f64) -> Option<Vec<Option<HeadGridPoint>>> {
     let cells = |travelled: f64| {
         let (alpha, rate) = follower.second_handle(travelled)?;
         Some(((alpha.row as f64 + alpha.phase) * CELLS as f64, rate * CELLS as f64))
     };
     let (start, rate) = cells(0.0)?;
-    let mut knots = vec![None; start as usize + 2];
+    let mut grid_points = vec![None; start as usize + 2];
     let longest = link / CELLS as f64;
-    let knot = |travelled: f64, rate: f64, error: f64| {
+    let grid_point = |travelled: f64, rate: f64, error: f64| {
         let param = path.param_at(travelled);
-        HeadKnot { place: path.point(param).coords, slope: path.tangent(param) * (0.5 / rate), error }
+        HeadGridPoint { place: path.point(param).coords, slope: path.tangent(param) * (0.5 / rate), error }
     };
     let behind = (start.floor() + 1.0 - start) / rate;
-    knots[start as usize + 1] = Some(knot(behind.clamp(-longest, longest), rate, ERROR_BEHIND_START * link));
+    grid_points[start as usize + 1] =
+        Some(grid_point(behind.clamp(-longest, longest), rate, ERROR_BEHIND_START * link));
     let mut travelled = 0.0;
     for wanted in (0..=start as usize).rev() {
         while let Some((reached, rate)) = cells(travelled)
@@ -134,15 +136,15 @@ pub(super) fn head_knots(path: &Path, follower: &FollowerTable, link: f64) -> Op
         }
         let Some((reached, rate)) = cells(travelled) else { break };
         travelled += ((wanted as f64 - reached) / rate).clamp(-longest, longest);
-        knots[wanted] = Some(knot(travelled, rate, 0.0));
+        grid_points[wanted] = Some(grid_point(travelled, rate, 0.0));
     }
-    Some(knots)
+    Some(grid_points)
 }
 
-/// How the head goes from one knot to the next: the quadratic next to the cubic of their places and slopes; a frame's
-/// head may be `handle_error` metres from the path.
-pub(super) fn head_track(knots: &[Option<HeadKnot>], handle_error: f64) -> Option<Quadratic> {
-    let [Some(begin), Some(end)] = knots else { return None };
+/// Returns the head between two grid points: the quadratic next to the cubic of their places and slopes. A frame's head
+/// may be `handle_error` metres from the path.
+pub(super) fn head_track(grid_points: &[Option<HeadGridPoint>], handle_error: f64) -> Option<Quadratic> {
+    let [Some(begin), Some(end)] = grid_points else { return None };
     let middle = 0.5 * (begin.place + end.place) + 0.25 * (begin.slope - end.slope);
     let mut track = Quadratic::through(begin.place, middle, end.place);
     let cubic = 0.25 * (begin.slope + end.slope - (end.place - begin.place));

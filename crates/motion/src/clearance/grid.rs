@@ -1,7 +1,7 @@
-//! Points by squares of the stage, so that those near a place are found without looking at the others.
+//! Points by squares of the stage: points near a place are found without testing the others.
 //!
 //! A hash of the square leads to a list of points, linked through an array and in descending order of their numbers.
-//! Different squares can share a list. Called by the clearance only.
+//! Different squares can share a list. Only the clearance uses it.
 
 /// The end of a list.
 const NONE: u32 = u32::MAX;
@@ -19,7 +19,7 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Reserves the memory for points numbered from 0 to less than `points`.
+    /// Reserves the memory for points with numbers from 0 to `points - 1`.
     pub(super) fn new(points: usize) -> Self {
         let lists = (2 * points).next_power_of_two();
         Self {
@@ -45,8 +45,8 @@ impl Grid {
         self.before[point] = std::mem::replace(&mut self.last[list], point as u32);
     }
 
-    /// Calls `visit` for every point from number `from` on that is within `distance` metres of a place; for some twice,
-    /// where two squares share a list.
+    /// Calls `visit` for every point from number `from` on that is within `distance` metres of a place. If two squares
+    /// share a list, it calls `visit` twice for some points.
     #[inline]
     pub(super) fn visit_near(&self, (x, y): (f64, f64), distance: f64, from: usize, mut visit: impl FnMut(usize)) {
         for row in self.square(y - distance)..=self.square(y + distance) {

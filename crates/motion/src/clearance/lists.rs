@@ -1,5 +1,5 @@
-//! The lists of the table: which boards can be near a board throughout a cell, and how near. Called by the making of the
-//! table only.
+//! The lists of the table: which boards can be near a board throughout a cell, and how near. Called by the making of
+//! the table only.
 
 use super::bounds::Neighbour;
 use super::cells::handles;
@@ -13,54 +13,54 @@ use crate::solve::table::rows::Rows;
 /// Entries of a list, at most.
 const MOST_ENTRIES: usize = 24;
 
-/// What is beyond the nearest by more than this, in links, has no entry of its own.
+/// Boards farther than the nearest by more than this, in links, have no entry.
 const ALLOWANCE: f64 = 0.02;
 
-/// Nanoseconds, as a present processor does it, for the handle of a row, for its list, for visiting another board, and
-/// for bounding the distance to it.
+/// Nanoseconds on a processor of 2025 for the handle of a row, for its list, for visiting another board, and for
+/// bounding the distance to it.
 const WORK_OF_HANDLE: usize = 400;
 const WORK_OF_LIST: usize = 300;
 const WORK_OF_VISIT: usize = 15;
 const WORK_OF_BOUND: usize = 250;
 
-/// A list that was made.
+/// A finished list.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct List {
-    /// Where it begins.
+    /// Index of its first entry.
     pub begin: u32,
     /// Its first bound, metres.
     pub bound: f32,
-    /// How far that can be below the distance to the nearest board, metres.
+    /// Greatest difference of the distance to the nearest board and that bound, metres.
     pub slack: f64,
 }
 
 impl List {
-    /// That of which nothing is known.
+    /// The list of a board without known bounds.
     pub(super) const UNKNOWN: Self = Self { begin: 0, bound: f32::NEG_INFINITY, slack: f64::INFINITY };
 }
 
-/// Makes lists for one cell of all rows after the other.
+/// Makes the lists of all rows, cell by cell.
 pub(super) struct ListBuilder<'a> {
     team: &'a Team,
     /// The handles in the cell, from row `first` on.
     handles: Vec<Quadratic>,
     first: usize,
-    /// By row from `first` on: how far its board or one behind goes at most, metres.
+    /// By row from `first` on: greatest travel of its board and of those behind, metres.
     travel_behind: Vec<f64>,
     grid: Grid,
-    /// No list is made where boards may go farther, metres.
+    /// No list is made if boards may move farther, metres.
     longest_reach: f64,
-    /// How far, in metres, a handle of a frame can be from where it should be: twice what T and the frame are off.
+    /// Greatest error of a handle of a frame, metres: twice the errors of T and the frame.
     handle_error: f64,
-    /// No bound is greater. Two benches with one between them are never farther apart than its link, so that in every
-    /// frame some pair is nearer.
+    /// Upper limit of every bound, metres. Two benches with one between them are never farther apart than its link, so
+    /// that in every frame some pair is nearer.
     farthest: f64,
-    /// How many rows behind its own board the nearest one was, in the latest list.
+    /// Rows from a board to its nearest one, in the latest list.
     likely: usize,
     candidates: Vec<(usize, f64)>,
     /// All lists.
     pub neighbours: Vec<Neighbour>,
-    /// Nanoseconds of a present processor so far.
+    /// Nanoseconds of work so far, on a processor of 2025.
     pub work: usize,
 }
 
@@ -82,13 +82,13 @@ impl<'a> ListBuilder<'a> {
         }
     }
 
-    /// Metres between the front handles of two boards that can be in a list together, at most.
+    /// Returns the greatest distance of the front handles of two boards in one list, metres.
     pub(super) fn longest_distance(&self) -> f64 {
         let from_handle = self.team.longest_link() + self.team.hole_inset + self.team.width;
         self.farthest + 2.0 * from_handle
     }
 
-    /// The next cell: phases from `begin` to `end`, rows up to `end_row`.
+    /// Enters the next cell: the phases `phases`, rows up to `end_row`.
     pub(super) fn enter(&mut self, rows: &Rows, phases: (f64, f64), end_row: usize) {
         let (first, handles) = handles(rows, phases, end_row);
         self.work += WORK_OF_HANDLE * handles.len();
@@ -111,7 +111,7 @@ impl<'a> ListBuilder<'a> {
         }
     }
 
-    /// The handle of a row, if it is known throughout the cell.
+    /// Returns the handle of a row, if it is known throughout the cell.
     pub(super) fn handle(&self, row: usize) -> Option<&Quadratic> {
         self.handles.get(row.checked_sub(self.first)?)
     }
@@ -120,7 +120,7 @@ impl<'a> ListBuilder<'a> {
         MovingBoard::new(&self.handles[index], &self.handles[index + 1], self.team, 1)
     }
 
-    /// Makes the list of the board of a row; of the boards behind, all up to row `present` are there whenever it is.
+    /// Makes the list of the board of a row. Whenever this board exists, so do the boards behind up to row `present`.
     pub(super) fn of_body(&mut self, row: usize, present: usize) -> List {
         if row < self.first || row + 1 >= self.first + self.handles.len() {
             return List::UNKNOWN;
@@ -133,20 +133,20 @@ impl<'a> ListBuilder<'a> {
         list
     }
 
-    /// Makes the list of a head's board in front of the handle of a row; as [`ListBuilder::of_body`].
+    /// Makes the list of a head's board in front of the handle of a row, as [`ListBuilder::of_body`].
     pub(super) fn of_head(&mut self, head: &MovingBoard, row: usize, present: usize) -> List {
         self.list(head, row, row + 1, present, usize::MAX)
     }
 
-    /// Makes the list of a board against those from row `from` on, offsets counted from `row`; the one `likely` rows
-    /// behind is probably near.
+    /// Makes the list of a board against those from row `from` on, with offsets counted from `row`. The board `likely`
+    /// rows behind is probably near.
     fn list(&mut self, moving: &MovingBoard, row: usize, from: usize, present: usize, likely: usize) -> List {
         self.work += WORK_OF_LIST;
         let at = moving.middle();
         let radii = at.circle_radius() + circle_radius(self.team, 1);
         let margin_per_error = 2.0 * corner_reach(self.team, 0).max(corner_reach(self.team, 1));
         let allowance = ALLOWANCE * self.team.link(1) + 2.0 * margin_per_error * self.handle_error;
-        // Pairs that may be farther apart than another pair that is there, too, need no entries.
+        // Pairs farther apart than another present pair need no entries.
         let mut limit = self.farthest;
         let mut near = f64::INFINITY;
         let likely = row.saturating_add(likely);
@@ -156,7 +156,7 @@ impl<'a> ListBuilder<'a> {
         }
         let most_travel = self.travel_behind.get(from - self.first).copied().unwrap_or(0.0);
         let reach = radii + limit.max(0.0) + moving.travel + most_travel;
-        // Next to a singular place, nothing that is true is of use.
+        // Next to a singular place the bounds are too weak to help.
         if reach.is_nan() || reach >= self.longest_reach {
             return List::UNKNOWN;
         }

@@ -1,18 +1,20 @@
-//! Boards that move through a cell of the table, and how near two of them can come meanwhile. Called by the making of the
-//! table only.
+//! Boards that move through a cell of the table, and bounds of the distance of two of them. Used only to make the
+//! table.
 //!
-//! **The bound.** Time t runs from -1 to 1 over the cell. Every handle is a quadratic polynomial of t, off by at most an
-//! `error` known in metres; so are the middle of a board and, its link being rigid, its unit axis u. Take any direction w
-//! that is fixed to board a: w = p u + q n with p^2 + q^2 = 1 and n the unit normal of a. Between a and b there is the gap
+//! **The bound.** Time t runs from -1 to 1 over the cell. Every handle is a quadratic polynomial of t with an error of
+//! at most `error` metres; so are the middle of a board and, since its link is rigid, its unit axis u. Take any
+//! direction w that is fixed to board a: w = p u + q n with p^2 + q^2 = 1 and n the unit normal of a. Between a and b
+//! there is the gap
 //!
 //! (c_b - c_a) . w - h_a(w) - L_b |u_b . w| - W_b |n_b . w|,
 //!
 //! with the middles c, half the length L_b and width W_b of b, and h_a(w) = L_a |p| + W_a |q|, which is constant. The
-//! signed distance is the greatest such gap over all w (by the separating axis theorem where the boards overlap), so each
-//! is a lower bound. The gap is the least of four functions, one for each corner of b; each is a sum of products of two
-//! known quadratics. Of every product the powers up to t^2 are kept, the others are bounded by their coefficients; if A
-//! and B are off by e and f, and B is a unit vector, A . B is off by at most e + |A| f. What remains is the least value
-//! of a quadratic between -1 and 1. Sliding along a costs such a bound nothing, whatever the speed.
+//! signed distance is the greatest such gap over all w (by the separating axis theorem where the boards overlap), so
+//! each is a lower bound. The gap is the least of four functions, one for each corner of b; each is a sum of products
+//! of two known quadratics. Of every product the powers up to t^2 are kept, the others are bounded by their
+//! coefficients; if A and B have errors e and f, and B is a unit vector, A . B has an error of at most e + |A| f. The
+//! rest is the least value of a quadratic between -1 and 1. Motion of b along a does not weaken the bound, at any
+//! speed.
 //!
 //! From above the distance is bounded by that of any two points, one fixed to each board.
 
@@ -27,12 +29,12 @@ use crate::model::{Point, Vector};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Quadratic {
     pub terms: [Vector; 3],
-    /// How far the true vector is off, at most.
+    /// Upper bound of the distance to the true vector, in the vector's unit.
     pub error: f64,
 }
 
 impl Quadratic {
-    /// Through three vectors at -1, 0 and 1.
+    /// Creates the quadratic through three vectors at -1, 0 and 1.
     pub(super) fn through(before: Vector, middle: Vector, after: Vector) -> Self {
         Self { terms: [middle, 0.5 * (after - before), 0.5 * (after + before) - middle], error: 0.0 }
     }
@@ -41,22 +43,22 @@ impl Quadratic {
         self.terms[0] + t * (self.terms[1] + t * self.terms[2])
     }
 
-    /// How far the vector goes from where it is at 0, at most.
+    /// Returns an upper bound of the distance of the vector from its value at 0.
     pub(super) fn travel(&self) -> f64 {
         self.terms[1].norm() + self.terms[2].norm() + self.error
     }
 
-    /// From this vector to another.
+    /// Returns the vector from this one to another.
     pub(super) fn to(&self, other: &Self) -> Self {
         other.combine(self, |other, own| other - own, other.error + self.error)
     }
 
-    /// Half way between two vectors.
+    /// Returns the mean of two vectors.
     pub(super) fn half_way(&self, other: &Self) -> Self {
         self.combine(other, |own, other| 0.5 * (own + other), 0.5 * (self.error + other.error))
     }
 
-    /// The greatest length throughout, at most: that of a control point of the quadratic Bezier curve.
+    /// Returns an upper bound of the length: the length of a control point of the quadratic Bezier curve.
     fn greatest_norm(&self) -> f64 {
         let [middle, slope, square] = self.terms;
         let ends = (middle + square + slope).norm_squared().max((middle + square - slope).norm_squared());
@@ -67,7 +69,7 @@ impl Quadratic {
         Self { terms: std::array::from_fn(|power| each(self.terms[power], other.terms[power])), error }
     }
 
-    /// The product with a unit vector: its polynomial, and how far that is off.
+    /// Returns the scalar product with a unit vector: its polynomial and an error bound.
     fn dot(&self, unit: &Self) -> ([f64; 3], f64) {
         let (a, b) = (&self.terms, &unit.terms);
         let dropped = (a[1].dot(&b[2]) + a[2].dot(&b[1])).abs() + a[2].dot(&b[2]).abs();
@@ -82,25 +84,25 @@ fn normal(vector: Vector) -> Vector {
     Vector::new(-vector.y, vector.x)
 }
 
-/// The least value of a quadratic between -1 and 1.
+/// Returns the least value of a quadratic between -1 and 1.
 fn least([constant, slope, square]: [f64; 3]) -> f64 {
     let slope = slope.abs();
     if slope < 2.0 * square { constant - 0.25 * slope * slope / square } else { constant - slope + square }
 }
 
-/// A board on its way through a cell.
+/// A board that moves through a cell.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MovingBoard {
     pub centre: Quadratic,
     axis: Quadratic,
     half_length: f64,
     half_width: f64,
-    /// How far any of its points goes from where it is at 0, at most, metres.
+    /// Upper bound of the distance of its points from their places at 0, metres.
     pub travel: f64,
 }
 
 impl MovingBoard {
-    /// The board of a kind of bench (0 = head) between two handles.
+    /// Creates the board of a kind of bench (0 = head) between two handles.
     pub(super) fn new(front: &Quadratic, rear: &Quadratic, team: &Team, bench: usize) -> Self {
         let link = team.link(bench);
         let error = front.error + rear.error;
@@ -113,15 +115,15 @@ impl MovingBoard {
         }
     }
 
-    /// The board in the middle of the cell, if no handle is off. Its axis is a unit vector even where the handles' distance
-    /// is not quite the link: a direction w of the bound is one in its frame.
+    /// Returns the board in the middle of the cell, for handles without error. Its axis is a unit vector even if the
+    /// handles' distance is not exactly the link: a direction w of the bound is a unit vector in its frame.
     pub(super) fn middle(&self) -> Board {
         let Self { half_length, half_width, .. } = *self;
         let axis = self.axis.terms[0].normalize();
         Board { centre: Point::from(self.centre.terms[0]), axis, half_length, half_width }
     }
 
-    /// The least gap to `other` along the direction that is `along` and `across` in this board's frame.
+    /// Returns the least gap to `other` along the direction (`along`, `across`) of this board's frame.
     fn least_gap(&self, other: &Self, along: f64, across: f64) -> f64 {
         let direction = Quadratic { terms: self.axis.terms.map(|u| along * u + across * normal(u)), ..self.axis };
         let offset = self.centre.to(&other.centre);
@@ -138,20 +140,21 @@ impl MovingBoard {
         nearest - own - offset_off - other.half_length * length_off - other.half_width * width_off
     }
 
-    /// How far a point of `other` goes from where it is at 0, as a point of this board sees it, at most, metres.
+    /// Returns an upper bound of the displacement of a point of `other` from 0, seen from a point of this board,
+    /// metres.
     pub(super) fn relative_travel(&self, other: &Self) -> f64 {
         let turn = |board: &Self| hypot(board.half_length, board.half_width) * board.axis.travel();
         self.centre.to(&other.centre).travel() + turn(self) + turn(other)
     }
 
-    /// A lower and an upper bound of the signed distance to `other` throughout the cell, given where the two are in the
-    /// middle of it: the least gap along the direction in which they are nearest then, and the greatest distance of the
-    /// points that are closest then.
+    /// Returns a lower and an upper bound of the signed distance to `other` throughout the cell, given both boards in
+    /// the middle of the cell: the least gap along the direction in which they are nearest there, and the greatest
+    /// distance of the points that are closest there.
     pub(super) fn distance_bounds(&self, at: &Board, other: &Self, other_at: &Board) -> (f64, f64) {
         let (on_own, on_other) = closest_points_board_board(at, other_at);
         let direction = direction(at, other_at, on_other - on_own);
         let [own, others] = [at, other_at].map(|board| (direction.dot(&board.axis), direction.dot(&board.across())));
-        // An edge's normal is best fixed to that edge's board.
+        // The bound is tightest if an edge's normal is fixed to the board of that edge.
         let least = if own.0.abs().min(own.1.abs()) <= others.0.abs().min(others.1.abs()) {
             self.least_gap(other, own.0, own.1)
         } else {
@@ -160,7 +163,7 @@ impl MovingBoard {
         (least, self.fixed(at, on_own).to(&other.fixed(other_at, on_other)).greatest_norm())
     }
 
-    /// The point fixed to the board that is at `point` when the board is at `at`.
+    /// Returns the point fixed to the board that is at `point` when the board is at `at`.
     fn fixed(&self, at: &Board, point: Point) -> Quadratic {
         let offset = point - at.centre;
         let along = offset.dot(&at.axis).clamp(-self.half_length, self.half_length);
@@ -170,14 +173,14 @@ impl MovingBoard {
     }
 }
 
-/// The direction from `a` to `b` along which the gap between them is greatest, given the way between their closest
-/// points.
+/// Returns the direction from `a` to `b` along which the gap between them is greatest, given the vector between their
+/// closest points.
 fn direction(a: &Board, b: &Board, between: Vector) -> Vector {
     let length = between.norm();
     if length == 0.0 {
         return a.across();
     }
-    // Overlapping boards' deepest points lie the other way.
+    // Between the deepest points of overlapping boards the vector is reversed.
     let sign = if between.dot(&(b.centre - a.centre)) < 0.0 { -1.0 } else { 1.0 };
     between * (sign / length)
 }

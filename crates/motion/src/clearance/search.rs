@@ -1,6 +1,5 @@
-//! The search for the nearest pair of one chain: which pairs are tested, given the bounds of others.
-//!
-//! Called by the clearance only.
+//! The search for the nearest pair of one chain: it tests the pairs that known bounds do not exclude. Only the
+//! clearance calls it.
 
 use std::ops::Range;
 
@@ -12,33 +11,32 @@ use crate::model::separation::{separation_board_board, signed_distance_board_boa
 use crate::model::team::Team;
 use crate::solve::Chain;
 
-/// Numbers that are compared together, so that the processor does several at once.
+/// Numbers that are compared together, so that vector instructions apply.
 const BOUNDS_AT_ONCE: usize = 64;
 const DISTANCES_AT_ONCE: usize = 8;
 
-/// Benches tested against all one by one before a grid is cheaper.
+/// Benches that are tested against all others before a grid is cheaper.
 const MOST_SCANS: usize = 16;
 
-/// How far beyond the limit carried bounds go, in lengths of a body board.
+/// Margin of carried bounds beyond the limit, in lengths of a body board.
 const SKIN: f64 = 0.05;
 
-/// Metres of closing after which carried bounds are made anew, lest rounding add up to more than is allowed for.
+/// Metres of approach after which carried bounds are computed again, so that their rounding stays within its allowance.
 const MOST_MOVED: f64 = 100.0;
 
-/// For every bench, how near it can be to those behind it, carried from frame to frame.
+/// For every bench a lower bound of its distance to those behind it, carried from frame to frame.
 ///
-/// If no handle is farther than D from where it was, no point of a board is farther than [`corner_reach`] times D (a
-/// little more where links are off their length), and no two boards are nearer by more than twice that, however the
-/// handles have moved meanwhile. So what a bench was known to keep clear, less that for all movement since, it still
-/// does.
+/// If no handle is farther than D from its earlier place, no point of a board is farther than [`corner_reach`] times D
+/// (a little more if links have errors), and no two boards are nearer by more than twice that. So an earlier bound,
+/// less this amount for all movement since, still holds.
 #[derive(Debug, Clone)]
 pub(super) struct CarriedBounds {
-    /// The handles in the frame before.
+    /// The handles of the previous frame.
     x: Vec<f64>,
     y: Vec<f64>,
-    /// The most that two boards can have come nearer each other since the beginning, metres.
+    /// Greatest approach of two boards since the beginning, metres.
     closed: f64,
-    /// By bench: a bound, and what `closed` was when it was made.
+    /// By bench: a bound plus the value of `closed` when the bound was made.
     sums: Vec<f64>,
     grid: Grid,
 }
@@ -54,7 +52,7 @@ impl CarriedBounds {
         }
     }
 
-    /// Continues to the handles of a chain.
+    /// Updates the bounds to the handles of a chain.
     fn follow(&mut self, chain: &Chain, team: &Team, link_error: f64) {
         const LANES: usize = 8;
         let (mut most, mut sum) = ([0.0; LANES], [0.0; LANES]);
@@ -71,7 +69,7 @@ impl CarriedBounds {
         let shortened = 1.0 + 2.0 * link_error / team.shortest_link();
         let reach = shortened * corner_reach(team, 0).max(corner_reach(team, 1));
         self.closed += 2.0 * reach * most.into_iter().fold(0.0, f64::max).sqrt();
-        // Not a number is in the sum, too.
+        // NaN appears in the sum, too.
         if !(sum.iter().sum::<f64>() < f64::INFINITY && self.closed < MOST_MOVED) {
             self.closed = 0.0;
             self.sums.fill(f64::NEG_INFINITY);
@@ -80,7 +78,7 @@ impl CarriedBounds {
 }
 
 /// The search for the nearest pair of one chain.
-pub(super) struct Search<'a> {
+pub(super) struct ClearanceSearch<'a> {
     chain: &'a Chain,
     team: &'a Team,
     pub nearest: Nearest,
@@ -94,8 +92,8 @@ pub(super) struct Search<'a> {
     pub tested: u64,
 }
 
-impl<'a> Search<'a> {
-    /// Begins with a pair that is likely to be near.
+impl<'a> ClearanceSearch<'a> {
+    /// Creates a search that has tested the pair `likely`, which is probably near.
     #[inline]
     pub(super) fn new(chain: &'a Chain, team: &'a Team, link_error: f64, likely: Option<(usize, usize)>) -> Self {
         let pair = likely.unwrap_or((0, 2));
@@ -106,12 +104,12 @@ impl<'a> Search<'a> {
         search
     }
 
-    /// Tests the pairs that the table does not exclude. Where it excludes too few, returns the first bench of which the
-    /// pairs are still to be tested.
+    /// Tests the pairs that the table does not exclude. If it excludes too few, returns the first bench whose pairs are
+    /// still to be tested.
     pub(super) fn by_table(&mut self, table: &BoundTable, located: Located) -> Option<usize> {
         let mut scans = 0;
         self.by_list(0, 1, table.of_head(located, (self.chain.x[0], self.chain.y[0])), &mut scans);
-        // The last bench and the last but one have none behind that counts.
+        // Behind the last two benches there is no pair that counts.
         let rows = located.row..located.row + self.team.benches - 3;
         let first_block = rows.start / BLOCK;
         for (chunk, least) in table.least_bounds(located, &rows).chunks(BOUNDS_AT_ONCE).enumerate() {
@@ -131,7 +129,7 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// The same for rows of one block of the table.
+    /// Does the same as [`by_table`](Self::by_table) for rows of one block.
     fn by_block(
         &mut self,
         table: &BoundTable,
@@ -153,7 +151,7 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// Tests `a` against those that its list does not exclude, counted from the bench `from`.
+    /// Tests `a` against the benches that its list does not exclude, counted from the bench `from`.
     fn by_list(&mut self, a: usize, from: usize, list: &[Neighbour], scans: &mut usize) {
         let mut board_a = None;
         for neighbour in list {
@@ -173,7 +171,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Tests the pairs from bench `from` on that the carried bounds do not exclude, and renews these.
+    /// Tests the pairs from bench `from` on that the carried bounds do not exclude, and updates these bounds.
     pub(super) fn by_carried_bounds(&mut self, carried: &mut CarriedBounds, from: usize) {
         carried.follow(self.chain, self.team, self.link_error);
         let skin = SKIN * (self.team.link(1) + 2.0 * self.team.hole_inset);
@@ -199,7 +197,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Puts the benches from one on into a grid whose squares are as large as a search goes.
+    /// Puts the benches from `from` on into a grid whose squares are as large as the search distance.
     fn fill(&self, grid: &mut Grid, from: usize, skin: f64) {
         let Chain { x, y, .. } = self.chain;
         let diameter = 2.0 * self.body_radius();
@@ -209,8 +207,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Tests `a` against every later bench of a grid that can be within the limit; returns a lower bound of its
-    /// distance to all of them, which is at most `skin` beyond the limit.
+    /// Tests `a` against every later bench of a grid that can be within the limit. Returns a lower bound of its
+    /// distance to all of them, at most `skin` beyond the limit.
     fn by_grid(&mut self, grid: &Grid, a: usize, skin: f64) -> f64 {
         let board_a = board(self.chain, self.team, a);
         let centre = (board_a.centre.x, board_a.centre.y);
@@ -221,7 +219,7 @@ impl<'a> Search<'a> {
         bound
     }
 
-    /// The same for every later bench of the chain.
+    /// Does the same as [`by_grid`](Self::by_grid) for every later bench of the chain.
     fn against_all(&mut self, a: usize, skin: f64) -> f64 {
         let Chain { x, y, .. } = self.chain;
         let board_a = board(self.chain, self.team, a);
@@ -244,12 +242,12 @@ impl<'a> Search<'a> {
         bound
     }
 
-    /// The radius of the circle about a body board, metres, at most.
+    /// Returns an upper bound of the radius of the circle about a body board, metres.
     fn body_radius(&self) -> f64 {
         circle_radius(self.team, 1) + 0.5 * self.link_error
     }
 
-    /// Tests a pair if it can be within the limit; returns a lower bound of its distance.
+    /// Tests a pair if it can be within the limit. Returns a lower bound of its distance.
     fn test_unless_culled(&mut self, board_a: &Board, pair: (usize, usize)) -> f64 {
         if pair == self.first.0 {
             return self.first.1;
@@ -258,7 +256,7 @@ impl<'a> Search<'a> {
         if bound <= self.nearest.value { self.test(board_a, pair) } else { bound }
     }
 
-    /// Tests a pair; returns a lower bound of its distance.
+    /// Tests a pair. Returns a lower bound of its distance.
     #[inline]
     fn test(&mut self, board_a: &Board, pair: (usize, usize)) -> f64 {
         self.tested += 1;
@@ -272,8 +270,8 @@ impl<'a> Search<'a> {
         value
     }
 
-    /// A lower bound of the signed distance of `board_a` and bench `b`, from the gaps along `board_a`'s sides and
-    /// without a square root: the half link of `b` is stretched to its half board, and its width taken as if across.
+    /// Returns a lower bound of the signed distance of `board_a` and bench `b`, from the gaps along `board_a`'s sides
+    /// and without a square root: half the link of `b` is scaled to half its board, and its width is taken across.
     fn gap_bound(&self, board_a: &Board, b: usize) -> f64 {
         let Chain { x, y, .. } = self.chain;
         let half_link = (0.5 * (x[b] - x[b + 1]), 0.5 * (y[b] - y[b + 1]));
@@ -284,18 +282,18 @@ impl<'a> Search<'a> {
         let gap_along = along(offset) - along(half_link) * self.board_per_link - board_a.half_length;
         let gap_across = across(offset) - across(half_link) * self.board_per_link - board_a.half_width;
         let rounding = 1e-9 * board_a.half_length + 1e-12 * (offset.0.abs() + x[b].abs() + y[b].abs());
-        // What lies beyond the handles is stretched as the link is.
+        // The board beyond the handles scales with the link.
         let stretched = 0.5 * (self.board_per_link - 1.0) * self.link_error;
         gap_along.max(gap_across) - 0.5 * self.team.width - stretched - rounding
     }
 }
 
-/// Whether any of these bounds is within a limit; several at once.
+/// Returns true if any of these bounds is within a limit.
 fn any_within(bounds: &[f32], limit: f32) -> bool {
     bounds.iter().fold(0, |near, bound| near | u32::from(*bound <= limit)) != 0
 }
 
-/// A limit widened by what solver and rounding can have done to lengths of size `length` and coordinates of size
+/// Returns a limit plus the errors of solver and rounding for lengths of size `length` and coordinates of size
 /// `coordinates`; 0 if negative.
 fn padded(limit: f64, length: f64, coordinates: f64) -> f64 {
     (limit + 1e-9 * length + 1e-12 * coordinates).max(0.0)

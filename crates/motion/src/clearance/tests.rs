@@ -1,4 +1,4 @@
-//! The live way against all pairs, and every bound of the table against the truth.
+//! The live method against all pairs, and every bound of the table against the true distance.
 
 use std::cell::Cell;
 
@@ -22,14 +22,14 @@ fn bound_table(path: &Path, team: &Team) -> Option<BoundTable> {
     BoundTable::new(path, team, &FollowerTable::new(path, *team, 1.0, Velocities::Omitted)?)
 }
 
-/// A monitor with the table of the motion, where there is one.
+/// Returns a monitor with the table of the motion, if there is one.
 fn with_table(path: &Path, team: Team) -> ClearanceMonitor {
     let table = FollowerTable::new(path, team, 1.0, Velocities::Omitted);
     table.map_or_else(|| ClearanceMonitor::without_table(team, 0.0), |table| ClearanceMonitor::new(path, team, &table))
 }
 
-/// Monitors with and without a table against all pairs, one frame after the other, as far as there are chains. Returns
-/// the number of frames and what the first monitor did.
+/// Compares monitors with and without a table with all pairs, frame by frame, for all chains. Returns the number of
+/// frames and the work of the first monitor.
 fn agree(team: Team, path: &Path, travels: &[f64]) -> (usize, ClearanceCounters) {
     let solver = Newton::new(path.clone(), team, 1.0, Velocities::Omitted);
     let mut chain = Chain::new(team.handles());
@@ -83,7 +83,7 @@ fn the_same_as_all_pairs_on_the_known_scenes() {
     }
 }
 
-/// The handle behind the head is pushed out again to where it was, while the head is elsewhere.
+/// The handle behind the head is pushed out again to its earlier place, while the head is elsewhere.
 #[test]
 fn the_same_as_all_pairs_past_a_stall() {
     let four = Team { benches: 4, head_length: 9.5, body_length: 6.5, width: 2.7, hole_inset: 1.1 };
@@ -94,7 +94,7 @@ fn the_same_as_all_pairs_past_a_stall() {
     }
 }
 
-/// A coarse bisection leaves links off their length by centimetres, and more from handle to handle.
+/// A coarse bisection gives links errors of centimetres, and more from handle to handle.
 #[test]
 fn the_same_as_all_pairs_where_links_are_off() {
     let team = team(223, 0.3);
@@ -176,8 +176,8 @@ fn too_few_benches_have_no_clearance() {
     }
 }
 
-/// Checks every bound that the table has for a chain; returns by how much the least bound is below the least distance,
-/// or `None` where the table does not serve.
+/// Checks every bound that the table has for a chain. Returns the difference of the least distance and the least bound,
+/// or `None` outside the table.
 fn check_bounds(table: &BoundTable, path: &Path, team: &Team, travelled: f64) -> Option<f64> {
     let mut chain = Chain::new(team.handles());
     Newton::new(path.clone(), *team, 1.0, Velocities::Omitted).solve_at(travelled, &mut chain).ok()?;
@@ -217,7 +217,7 @@ fn bounds_of_the_paper_scene_are_close() {
     }
 }
 
-/// So far behind that one list serves all cells of a row: on a spiral and on a straight line.
+/// Far behind, where one list serves all cells of a row: on a spiral and on a straight line.
 #[test]
 fn bounds_far_behind_hold_and_are_close() {
     let scenes = [(Path::spiral(0.55, 16.0), [200.37, 311.9]), (procession(), [60.2, 113.3])];
@@ -231,7 +231,8 @@ fn bounds_far_behind_hold_and_are_close() {
     }
 }
 
-/// All pairs of such teams would take long: the search without a table, which other tests compare with them, stands in.
+/// All pairs of such teams would take long. They are compared with the search without a table, which other tests
+/// verify.
 #[test]
 fn large_teams_have_a_table() {
     let team = team(5_000, 0.3);
@@ -280,17 +281,17 @@ fn any_lanes() -> impl Strategy<Value = Path> {
     prop_oneof![2 => any_path(), 1 => hairpin]
 }
 
-/// Frames that follow each other at several rates, at several places.
+/// Successive frames at several rates, at several places.
 fn frames(path: &Path, places: &[f64]) -> Vec<f64> {
     places.iter().flat_map(|place| [0.0, 5e-5, 1e-3, 1.0 / 60.0].map(|by| place * path.length() + by)).collect()
 }
 
-/// So many random cases, or ten times as many where the tests that take minutes are requested.
+/// Returns the number of random cases, ten times as many if the tests that take minutes are requested.
 fn count(cases: usize) -> usize {
     if std::env::var_os("BENCH_DRAGON_LONG").is_some() { 10 * cases } else { cases }
 }
 
-/// Runs a check, which returns how many it did, on random cases; returns the sum.
+/// Runs a check on random cases and returns the sum of its counts.
 fn sum_over_cases<S: Strategy>(cases: usize, strategy: S, check: impl Fn(S::Value) -> usize) -> usize {
     let checked = Cell::new(0);
     let config = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(cases as u32) };
@@ -329,6 +330,6 @@ fn no_boards_are_nearer_than_the_bounds() {
         slacks.inspect(|slack| close.set(close.get() + usize::from(*slack < 0.02 * team.link(1)))).count()
     });
     assert!(checked > 100 * 12 / 2, "{checked} frames had a table");
-    // Bounds of nothing would hold, too.
+    // Without bounds the test would pass, too.
     assert!(close.get() > checked / 2, "{close:?} of {checked} frames had a close bound");
 }

@@ -1,13 +1,13 @@
-//! Which pairs of boards a step of the search must test, and how far back the chain must be solved for them.
+//! The pairs of boards that a step of the search must test, and how far back the chain must be solved for them.
 
 use crate::model::path::Param;
 
 use super::configuration::{Configuration, Halt, Pair};
 use super::displacement::{Displacements, Weights, progress};
-use super::search::Search;
+use super::search::AdvancementSearch;
 
-impl Search<'_, '_, '_> {
-    /// Whether pairs without boards 0 and 1 matter: handle 2 is behind where handle 1 began, or may be within
+impl AdvancementSearch<'_, '_, '_> {
+    /// Returns true if pairs without boards 0 and 1 matter: handle 2 is behind the start of handle 1, or may be within
     /// `excursion` metres of these configurations.
     pub(super) fn all_pairs(&self, ends: &[&Configuration], excursion: f64) -> bool {
         let visited = |at: Param| !self.is_behind(at, self.second_handle, -excursion);
@@ -15,7 +15,7 @@ impl Search<'_, '_, '_> {
         !ends.iter().all(|end| visited(end.places[2])) && !ends.iter().all(|end| quiet(end.places[2]))
     }
 
-    /// Whether a place is behind another by more than `margin` metres.
+    /// Returns true if a place is behind another by more than `margin` metres.
     fn is_behind(&self, place: Param, other: Param, margin: f64) -> bool {
         if margin == 0.0 {
             progress(self.chain.path, place, other) > 0.0
@@ -24,8 +24,8 @@ impl Search<'_, '_, '_> {
         }
     }
 
-    /// The pairs that may be at or below the limit in a step, or without `after` in one configuration. Solves both as
-    /// far back as any board can come near one that matters.
+    /// Returns the pairs that may be at or below the limit in a step, or without `after` in one configuration. Solves
+    /// both as far back as any board can come near one that matters.
     pub(super) fn candidates(
         &mut self,
         before: &mut Configuration,
@@ -68,7 +68,7 @@ impl Search<'_, '_, '_> {
         ends.iter().all(|end| self.is_behind(end.places[handle], place, margin))
     }
 
-    /// Solves both ends of a step to so many benches, and their handles' displacements.
+    /// Solves both ends of a step to `benches` benches, and their handles' displacements.
     fn extend(
         &mut self,
         before: &mut Configuration,

@@ -1,4 +1,4 @@
-//! The foremost part of a team at one place of the head, solved as far back as the search needs, and the pairs of its
+//! The foremost part of a team at one place of the head, solved as far back as the search needs, and its pairs of
 //! boards that are near each other.
 
 use crate::event::Budget;
@@ -8,10 +8,10 @@ use crate::model::path::{Param, Path};
 use crate::model::separation::{circle_bound_board_board, signed_distance_board_board};
 use crate::model::team::Team;
 
-/// Two benches that share no handle, the one nearer the head first.
+/// Two benches without a common handle, the bench nearer the head first.
 pub(super) type Pair = (usize, usize);
 
-/// Why a search ends early.
+/// The reason for an early end of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Halt {
     /// The budget is spent.
@@ -37,7 +37,7 @@ pub(super) struct Configuration {
 }
 
 impl Configuration {
-    /// The head's handle and nothing else.
+    /// Creates a configuration with the head's handle only.
     pub fn new(path: &Path, travelled: f64) -> Self {
         Self { travelled, places: vec![path.param_at(travelled)], boards: Vec::new() }
     }
@@ -60,23 +60,23 @@ impl Configuration {
         Ok(())
     }
 
-    /// The signed distance of two boards, metres.
+    /// Returns the signed distance of two boards, metres.
     pub fn clearance(&self, (a, b): Pair) -> f64 {
         signed_distance_board_board(&self.boards[a], &self.boards[b])
     }
 
-    /// A lower bound of [`clearance`](Self::clearance).
+    /// Returns a lower bound of [`clearance`](Self::clearance).
     pub fn circle_bound(&self, (a, b): Pair) -> f64 {
         circle_bound_board_board(&self.boards[a], &self.boards[b])
     }
 
-    /// The nearest or most deeply overlapping of `pairs`, and its clearance.
+    /// Returns the nearest or most deeply overlapping of `pairs`, and its clearance.
     pub fn deepest(&self, pairs: &[Pair]) -> Option<(f64, Pair)> {
         pairs.iter().map(|&pair| (self.clearance(pair), pair)).min_by(|one, other| one.0.total_cmp(&other.0))
     }
 
-    /// All pairs of the foremost boards whose circle bound is at most `motion`, found with a grid whose cells are as
-    /// wide as the longest board and that motion.
+    /// Returns all pairs of the foremost boards whose circle bound is at most `motion`, found with a grid whose cells
+    /// are as wide as the longest board plus `motion`.
     pub fn near_pairs(&self, benches: usize, motion: f64) -> Vec<Pair> {
         let boards = &self.boards[..benches];
         let cell = boards.iter().map(|board| 2.0 * board.circle_radius()).fold(0.0, f64::max) + motion.max(0.0);
@@ -87,7 +87,7 @@ impl Configuration {
         for (a, board) in boards.iter().enumerate() {
             let (column, row) = key(board);
             for neighbour in column - 1..=column + 1 {
-                // Three neighbouring cells of a column lie side by side in the sorted list.
+                // Three neighbouring cells of a column are adjacent in the sorted list.
                 let from = cells.partition_point(|(key, _)| *key < (neighbour, row - 1));
                 let others = cells[from..].iter().take_while(|(key, _)| *key <= (neighbour, row + 1));
                 let later = others.map(|(_, b)| (a, *b)).filter(|&(a, b)| b >= a + 2);

@@ -1,5 +1,5 @@
-//! How far two boards can move relative to each other while the head goes from one place to another: the bound on which
-//! the search rests. The proof is in the header of [`super`].
+//! Bounds of the relative motion of two boards while the head goes from one place to another. The search rests on these
+//! bounds; the proof is in the header of [`super`].
 
 use crate::event::Budget;
 use crate::linkage::follower;
@@ -13,28 +13,28 @@ use super::ConservativeAdvancement;
 use super::configuration::{Configuration, Halt, Pair};
 use super::reach::Reach;
 
-/// What one handle did in a step.
+/// The motion of one handle in a step.
 #[derive(Debug, Clone, Copy)]
 struct HandleMotion {
-    /// Metres of path that it passed over, forth and back: at least its total variation.
+    /// Metres of path that it passed over, forth and back: an upper bound of its total variation.
     length: f64,
-    /// Handles that are numbered alike all went one way, and the same way, as did all between them.
+    /// Handles with one number, and all handles between them, went one way.
     run: u32,
 }
 
-/// What the handles did in one step of the head, from the first one on.
+/// The motions of the handles in one step of the head, from the first handle on.
 #[derive(Debug, Default)]
 pub(super) struct Displacements {
     handles: Vec<HandleMotion>,
     /// The places at which the last handle turned round in the step, in order.
     turned_at: Vec<Param>,
     forward: Option<bool>,
-    /// A turning place could not be followed back to a handle: from here on nothing is known.
+    /// A turning place has no handle behind: from here on nothing is known.
     unbounded: bool,
 }
 
 impl Displacements {
-    /// Metres by which the handle added last may have left the stretch between its first and its last place.
+    /// Returns the metres by which the handle added last may have left the stretch between its first and last place.
     pub fn excursion(&self) -> f64 {
         match self.handles.last() {
             Some(last) if self.unbounded || !self.turned_at.is_empty() => last.length,
@@ -42,7 +42,7 @@ impl Displacements {
         }
     }
 
-    /// Adds handles, which both configurations hold, until there are `count`.
+    /// Adds handles, which both configurations have, until there are `count`.
     pub fn extend_to(
         &mut self,
         count: usize,
@@ -85,8 +85,8 @@ impl Displacements {
         Ok(())
     }
 
-    /// Where the follower of `handle` turned round: behind each place where the handle itself did, and behind each
-    /// place it passed over where a follower turns.
+    /// Returns the places at which the follower of `handle` turned round: behind each turning place of the handle, and
+    /// behind each place it passed over at which a follower turns.
     fn followers_of_turns(
         &mut self,
         chain: &ConservativeAdvancement,
@@ -125,8 +125,8 @@ impl Displacements {
         Ok(rears.unwrap_or_default())
     }
 
-    /// How much nearer to each other two boards may have come and gone again, metres: B of the proof. `Weights` are
-    /// those for the sign of the clearance that is to be excluded.
+    /// Returns B of the proof: an upper bound of the metres by which two boards came nearer each other and moved apart
+    /// again. `weights` belong to the sign of the clearance that is to be excluded.
     pub fn relative_motion_bound(
         &self,
         chain: &ConservativeAdvancement,
@@ -153,12 +153,12 @@ impl Displacements {
         seen(a).zip(seen(b)).map_or(stage, |(one, other)| stage.min(one + other))
     }
 
-    /// At least the relative motion of any two of the foremost boards, metres.
+    /// Returns an upper bound of the relative motion of any two of the foremost boards, metres.
     pub fn most_relative_motion(&self, chain: &ConservativeAdvancement, benches: usize) -> f64 {
         2.0 * (0..benches).map(|bench| self.on_stage(chain, bench, Weights::Additive)).fold(0.0, f64::max)
     }
 
-    /// The circles that the foremost boards do not leave in the step.
+    /// Returns the circles that the foremost boards do not leave in the step.
     pub fn reach(
         &self,
         chain: &ConservativeAdvancement,
@@ -179,7 +179,7 @@ impl Displacements {
             let far = |board: &Board| (board.centre - centre).norm() + board.circle_radius();
             let out =
                 |board: &Board| board.corners().map(|corner| corner.coords.norm()).into_iter().fold(0.0, f64::max);
-            // What was one board's point at both ends was no further out between than half the way there and back.
+            // A point of a board goes out no further than half its path between its two ends.
             radius = f64::max(radius, 0.5 * (far(first) + far(last) + stage));
             outermost = f64::max(outermost, 0.5 * (out(first) + out(last) + outward));
         }
@@ -192,14 +192,14 @@ impl Displacements {
         self.handles[bench].run == self.handles[bench + 1].run && places.iter().all(|place| place.segment == segment)
     }
 
-    /// How far any point of a board moved on the stage, metres.
+    /// Returns an upper bound of the displacement of a board's points on the stage, metres.
     fn on_stage(&self, chain: &ConservativeAdvancement, bench: usize, weights: Weights) -> f64 {
         weights.board(chain.team, bench, self.handles[bench].length, self.handles[bench + 1].length)
     }
 }
 
-/// Returns how far any point of a board moved, metres, seen from the frame of handle `reference` on the same segment.
-/// `None` if the segment has no such bound.
+/// Returns an upper bound of the displacement of a board's points, metres, seen from the frame of handle `reference` on
+/// the same segment. `None` if the segment has no such bound.
 fn seen_from_frame(
     chain: &ConservativeAdvancement,
     ends: (&Configuration, &Configuration),
@@ -214,22 +214,22 @@ fn seen_from_frame(
     Some(weights.board(chain.team, bench, moved(bench)?, moved(bench + 1)?))
 }
 
-/// The change of a handle's coordinate in a step within one segment.
+/// Returns the change of a handle's coordinate in a step within one segment.
 fn turned((before, after): (&Configuration, &Configuration), handle: usize) -> f64 {
     after.places[handle].at.minus(before.places[handle].at)
 }
 
-/// How the displacements of a board's two handles bound those of its points.
+/// The way in which the displacements of a board's two handles bound those of its points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Weights {
-    /// The most that one point of the board moves: enough where a clearance above zero is to be excluded.
+    /// Upper bound for one point of the board: sufficient to exclude a clearance above zero.
     OnePoint,
     /// A bound that is additive over sub-steps, for overlaps.
     Additive,
 }
 
 impl Weights {
-    /// The weights for a search of clearances at or below `limit`.
+    /// Returns the weights for a search of clearances at or below `limit`.
     pub fn for_limit(limit: f64) -> Self {
         if limit < 0.0 { Self::Additive } else { Self::OnePoint }
     }
@@ -244,8 +244,8 @@ impl Weights {
     }
 }
 
-/// Units of a segment's coordinate from one place to another, positive in the direction of travel; infinite from one
-/// segment to another.
+/// Returns the units of a segment's coordinate from one place to another, positive in the direction of travel; infinite
+/// from one segment to another.
 pub(super) fn progress(path: &Path, from: Param, to: Param) -> f64 {
     match from.segment.cmp(&to.segment) {
         std::cmp::Ordering::Less => f64::INFINITY,
@@ -254,7 +254,7 @@ pub(super) fn progress(path: &Path, from: Param, to: Param) -> f64 {
     }
 }
 
-/// At least the metres of path between two places.
+/// Returns an upper bound of the metres of path between two places.
 fn length_bound(path: &Path, from: Param, to: Param) -> f64 {
     if from.segment != to.segment {
         return path.arc_length(from, to).abs();

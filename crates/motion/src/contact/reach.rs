@@ -1,5 +1,5 @@
-//! How far back along the path anything can come near the foremost boards, and from where on nothing can come near
-//! anything: what a search need not solve.
+//! Limits of the search: how far back along the path a board can come near the foremost boards, and the place behind
+//! which no boards come near each other.
 
 use crate::model::Point;
 use crate::model::curve::{Curve, ReachedDisc};
@@ -7,18 +7,18 @@ use crate::model::elementary::hypot;
 use crate::model::path::{Param, Path};
 use crate::model::team::Team;
 
-/// A circle about some boards, and the one about the origin, the centre of every spiral, that holds them.
+/// A circle about some boards, and the circle about the origin, the centre of every spiral, that holds them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reach {
     pub centre: Point,
     pub radius: f64,
-    /// Metres from the origin to the outermost of them.
+    /// Metres from the origin to the outermost point of the boards.
     pub outermost: f64,
 }
 
 impl Reach {
-    /// The rearmost place of the path from which a board can come within `limit`, 0 or more, of the boards: one whose
-    /// front handle is behind it cannot.
+    /// Returns the rearmost place of the path from which a board can come within `limit`, 0 or more, of the boards. A
+    /// board whose front handle is behind this place cannot.
     ///
     /// No point of a board is further than hypot(max(link / 2, inset), width / 2) from the nearer one of its handles.
     /// On an inward spiral, where a board's handles are both at least r from the origin, its axis is at least

@@ -1,4 +1,4 @@
-//! The search itself: steps of the head, the pairs that matter in each, halving where they are not certain.
+//! The search: steps of the head, the pairs that matter in each, and halving of uncertain steps.
 
 use nalgebra::center;
 
@@ -15,11 +15,11 @@ use super::displacement::{Displacements, progress};
 use super::reach::quiet_place;
 use super::{ConservativeAdvancement, Found, LeastClearance};
 
-/// Within this share of the shortest link, the clearance of one pair is taken to have one minimum: the only part of the
-/// least clearance that is not proved.
+/// Within this share of the shortest link, the clearance of one pair is assumed to have one minimum: the only part of
+/// the least clearance without proof.
 const UNIMODAL_SHARE: f64 = 1e-2;
 
-/// Configurations that a first guess of the least clearance may take.
+/// Greatest number of configurations for a first guess of the least clearance.
 const MOST_GUESSES: f64 = 1000.0;
 
 /// See [`ConservativeAdvancement::first_contact`].
@@ -29,7 +29,7 @@ pub(super) fn first_contact(
     to: f64,
     budget: &mut Budget,
 ) -> Result<Found<Event>, NoFollower> {
-    let mut search = Search::new(chain, Goal::Contact, budget);
+    let mut search = AdvancementSearch::new(chain, Goal::Contact, budget);
     let outcome = if chain.team.benches < 3 { Ok(None) } else { search.contact(from, to) };
     let searched_until = search.searched_until(&outcome, to)?;
     Ok(Found { value: outcome.ok().flatten(), searched_until })
@@ -42,35 +42,35 @@ pub(super) fn least_clearance(
     to: f64,
     budget: &mut Budget,
 ) -> Result<Found<LeastClearance>, NoFollower> {
-    let mut search = Search::new(chain, Goal::Least, budget);
+    let mut search = AdvancementSearch::new(chain, Goal::Least, budget);
     let outcome = if chain.team.benches < 3 { Ok(()) } else { search.least(from, to) };
     let searched_until = search.searched_until(&outcome, to)?;
     Ok(Found { value: search.best, searched_until })
 }
 
-/// What a search is for.
+/// The goal of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Goal {
     Contact,
     Least,
 }
 
-pub(super) struct Search<'s, 'a, 'b> {
+pub(super) struct AdvancementSearch<'s, 'a, 'b> {
     pub(super) chain: &'s ConservativeAdvancement<'a>,
     goal: Goal,
     pub(super) budget: &'s mut Budget<'b>,
     /// The least clearance so far.
     best: Option<LeastClearance>,
-    /// Where handle 1 began: S of the proof.
+    /// Place of handle 1 at the beginning: S of the proof.
     pub(super) second_handle: Param,
-    /// Where the quiet place is, if there is one.
+    /// The quiet place, if there is one.
     pub(super) quiet: Option<Param>,
     /// Metres of travel from which on rounding may prevent a solution: the motion's end may be a lock.
     rounding_from: f64,
     searched_until: f64,
 }
 
-impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
+impl<'s, 'a, 'b> AdvancementSearch<'s, 'a, 'b> {
     fn new(chain: &'s ConservativeAdvancement<'a>, goal: Goal, budget: &'s mut Budget<'b>) -> Self {
         Self {
             chain,
@@ -84,7 +84,7 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
         }
     }
 
-    /// How far the search came with such an outcome.
+    /// Returns how far the search came with this outcome.
     fn searched_until<T>(&self, outcome: &Result<T, Halt>, to: f64) -> Result<f64, NoFollower> {
         match outcome {
             Ok(_) => Ok(to),
@@ -114,12 +114,12 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
         let pairs = self.candidates(&mut start, None)?;
         self.consider(&start, &pairs);
         let to = self.last_solvable(from, to)?;
-        // First a fair guess, then the proof that nothing is below it, or what is.
+        // First a guess, then the proof that no clearance is below it, or a lower clearance.
         self.guess(&start, to)?;
         self.sweep(start, to).map(|_| ())
     }
 
-    /// The configuration with which a search begins.
+    /// Returns the configuration with which a search begins.
     fn begin(&mut self, from: f64) -> Result<Configuration, Halt> {
         self.searched_until = from;
         let mut start = Configuration::new(self.chain.path, from);
@@ -137,7 +137,7 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
         configuration.solve_to(benches, self.chain.path, self.chain.team, self.budget)
     }
 
-    /// The last place up to `to` at which the whole team can be solved.
+    /// Returns the last place up to `to` at which the whole team can be solved.
     fn last_solvable(&mut self, from: f64, to: f64) -> Result<f64, Halt> {
         let size = to.abs() + self.chain.team.longest_link();
         self.rounding_from = to - 1e-9 * size;
@@ -153,8 +153,8 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
         if last >= rounding_from { Ok(last) } else { Err(Halt::NoFollower) }
     }
 
-    /// The clearance at which a pair begins to matter: 0, or what would improve on the least one by more than the
-    /// rounding of two boards there.
+    /// Returns the clearance from which a pair matters: 0, or less than the least one by more than the rounding of two
+    /// boards there.
     pub(super) fn limit(&self, at: &Configuration) -> f64 {
         let size = self.chain.team.longest_link() + at.boards[0].centre.coords.norm();
         match (self.goal, self.best) {
@@ -175,7 +175,7 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
         }
     }
 
-    /// A guess of the least clearance from places of the head no nearer to each other than the shortest link, refined.
+    /// Guesses the least clearance from places of the head at least the shortest link apart, and refines it.
     fn guess(&mut self, start: &Configuration, to: f64) -> Result<(), Halt> {
         let from = start.travelled;
         let count = ((to - from) / self.chain.team.shortest_link()).ceil().min(MOST_GUESSES);
@@ -198,7 +198,7 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
             let mut configuration = Configuration::new(self.chain.path, travelled);
             let pair = (best.bench_a as usize, best.bench_b as usize);
             self.solve(&mut configuration, pair.1 + 1)?;
-            // Not for the last digits of what stays as it is.
+            // A constant clearance is not refined for its last digits.
             if configuration.clearance(pair) < self.limit(&configuration) {
                 self.consider(&configuration, &[pair]);
             }
@@ -207,7 +207,7 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
         Ok(())
     }
 
-    /// Metres of travel of the head before which no pair can begin to matter: the whole team keeps its shape, or is
+    /// Returns the metres of travel of the head before which no new pair matters: the whole team keeps its shape, or is
     /// behind the quiet place.
     fn nothing_new_until(&self, configuration: &Configuration) -> f64 {
         let path = self.chain.path;
@@ -217,7 +217,8 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
         until.fold(configuration.travelled, f64::max)
     }
 
-    /// Goes from `start` to `to` in steps, each as long as was proved at once before, and halves those that were not.
+    /// Goes from `start` to `to` in steps. Each has the length that was proved at once before; uncertain steps are
+    /// halved.
     fn sweep(&mut self, start: Configuration, to: f64) -> Result<Option<Event>, Halt> {
         let (from, shortest) = (start.travelled, self.chain.team.shortest_link());
         let mut step = 0.25 * shortest;
@@ -281,7 +282,8 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
         Ok(None)
     }
 
-    /// The configuration half way; `None` where the doubles are exhausted, or rounding prevents it at the motion's end.
+    /// Returns the configuration half way; `None` if the doubles are exhausted, or rounding prevents it at the motion's
+    /// end.
     fn middle(
         &mut self,
         before: &Configuration,
@@ -299,8 +301,8 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
         }
     }
 
-    /// In a step so short that each pair's clearance has one minimum, drops the pairs whose minimum is in the other
-    /// half.
+    /// Drops the pairs whose minimum is in the other half, if the step is so short that each pair's clearance has one
+    /// minimum.
     fn retain_possible_minima(
         &self,
         half: (&Configuration, &Configuration),
@@ -324,7 +326,7 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
     }
 }
 
-/// The contact of two boards.
+/// Returns the contact of two boards.
 fn contact_event(travelled: f64, (a, b): Pair, place: Point) -> Event {
     let (bench_a, bench_b) = (Some(a as u32), Some(b as u32));
     Event { kind: EventKind::Contact, travelled, bench_a, bench_b, place: Some(place) }

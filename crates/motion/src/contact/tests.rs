@@ -9,7 +9,8 @@ use crate::singularities::Singularities;
 
 const PAPER: Team = Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
 
-/// The searches' answers for the whole of a motion: the contact, the least clearance up to `freeze`, the motion's end.
+/// Returns the results of the searches for a whole motion: the contact, the least clearance up to `freeze`, the
+/// motion's end.
 fn search(path: &Path, team: &Team, freeze: Option<f64>) -> (Option<Event>, Option<LeastClearance>, f64) {
     let mut unreported = |_| {};
     let mut budget = Budget::new(200_000_000, &mut unreported);
@@ -31,7 +32,7 @@ fn all_pairs(path: &Path, team: &Team, travelled: f64) -> f64 {
     at.deepest(&pairs.collect::<Vec<_>>()).unwrap().0
 }
 
-/// Nothing that equally spaced configurations show contradicts the searches.
+/// Checks that equally spaced configurations do not contradict the searches.
 fn check(path: &Path, team: &Team, samples: usize) -> Result<(), TestCaseError> {
     let (contact, least, end) = search(path, team, None);
     let least = least.unwrap();
@@ -173,7 +174,7 @@ proptest! {
     fn sampling_a_turnaround_shows_nothing_better(
         team in any_team(), pitch in 0.5..3.0f64, radius in 1.0..6.0f64, ratio in 0.4..2.5f64, lead in 0.0..20.0f64,
     ) {
-        // Where the arcs are that tight against the links, the approach itself may lock.
+        // With arcs that tight against the links, the approach itself may lock.
         prop_assume!(radius > 0.8 * team.longest_link());
         if let Ok(path) = Path::turnaround(pitch, radius, ratio, lead, team.length()) {
             check(&path, &team, SAMPLES)?;

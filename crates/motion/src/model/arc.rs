@@ -36,8 +36,8 @@ impl Arc {
         self.turning() / self.radius
     }
 
-    /// Returns the angle psi that a chord subtends, radians, from chord = 2 radius sin(psi/2). `None` for a chord longer
-    /// than the diameter.
+    /// Returns the angle psi that a chord subtends, radians, from chord = 2 radius sin(psi/2). `None` for a chord
+    /// longer than the diameter.
     #[inline]
     fn angle_over(&self, chord: f64) -> Option<f64> {
         (chord <= 2.0 * self.radius).then(|| 2.0 * elementary::asin(0.5 * chord / self.radius))

@@ -1,4 +1,4 @@
-//! The rectangle of a board. Separation, clearance and the drawings use it; it knows no team and no path.
+//! The rectangle of a board. Separation, clearance and the drawings use it; it is independent of team and path.
 
 use super::{Point, Vector};
 
@@ -16,8 +16,8 @@ pub struct Board {
 }
 
 impl Board {
-    /// The board whose handles are at `front` and `rear`, two different points, with `hole_inset` metres of board
-    /// beyond each and `width` metres across.
+    /// Creates the board whose handles are at `front` and `rear`, two different points, with `hole_inset` metres of
+    /// board beyond each and `width` metres across.
     pub fn from_handles(front: Point, rear: Point, hole_inset: f64, width: f64) -> Self {
         let along = front - rear;
         let link = along.dot(&along).sqrt();
@@ -29,8 +29,8 @@ impl Board {
         }
     }
 
-    /// The board whose front handle is at `front` and whose rear handle is `link` metres behind it against the unit
-    /// `direction`. Far from the origin this keeps the direction's digits, which two handle points have lost.
+    /// Creates the board whose front handle is at `front` and whose rear handle is `link` metres behind it against the
+    /// unit `direction`. Far from the origin this keeps the direction's digits, which two handle points have lost.
     pub fn from_front(front: Point, direction: Vector, link: f64, hole_inset: f64, width: f64) -> Self {
         Self {
             centre: front - 0.5 * link * direction,
@@ -40,34 +40,34 @@ impl Board {
         }
     }
 
-    /// The unit direction across the board, a quarter turn counter-clockwise from its axis.
+    /// Returns the unit direction across the board, a quarter turn counter-clockwise from its axis.
     pub fn across(&self) -> Vector {
         Vector::new(-self.axis.y, self.axis.x)
     }
 
-    /// The four corners counter-clockwise: front left, rear left, rear right, front right.
+    /// Returns the four corners counter-clockwise: front left, rear left, rear right, front right.
     pub fn corners(&self) -> [Point; 4] {
         self.corners_from_centre().map(|corner| self.centre + corner)
     }
 
-    /// The four corners as displacements from the centre, in the order of [`corners`](Self::corners).
+    /// Returns the four corners as displacements from the centre, in the order of [`corners`](Self::corners).
     pub fn corners_from_centre(&self) -> [Vector; 4] {
         let along = self.half_length * self.axis;
         let across = self.half_width * self.across();
         [along + across, across - along, -along - across, along - across]
     }
 
-    /// Metres from the centre to a corner: the radius of the circle about the board.
+    /// Returns the metres from the centre to a corner: the radius of the circle about the board.
     pub fn circle_radius(&self) -> f64 {
         (self.half_length * self.half_length + self.half_width * self.half_width).sqrt()
     }
 
-    /// How far any point of a board moves at most, per metre that its two handles move at most.
+    /// Returns the greatest displacement of a board's points per metre of displacement of its two handles.
     ///
     /// With p = rear + s (front - rear) + w n, s in [-inset / link, 1 + inset / link], |w| <= width / 2 and n the unit
-    /// normal of the link: the handles' displacements u and v move the first two terms by |(1 - s) u + s v|
-    /// <= (|1 - s| + |s|) D <= (1 + 2 inset / link) D. The link keeps its length and its vector changes by at most 2 D, so
-    /// its unit normal changes by at most 2 D / link, and the last term by at most (width / link) D.
+    /// normal of the link: the handles' displacements u and v, at most D, move the first two terms by |(1 - s) u + s
+    /// v|, at most (|1 - s| + |s|) D <= (1 + 2 inset / link) D. The link keeps its length and its vector changes by at
+    /// most 2 D, so its unit normal changes by at most 2 D / link, and the last term by at most (width / link) D.
     pub fn displacement_factor(link: f64, hole_inset: f64, width: f64) -> f64 {
         1.0 + 2.0 * hole_inset / link + width / link
     }
@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn the_board_of_a_three_four_five_triangle() {
-        // Handles (4, 3) and (0, 0), half a link beyond each, 2 wide: corners counted out by hand.
+        // Handles (4, 3) and (0, 0), half a link beyond each, 2 wide: corners computed by hand.
         let board = Board::from_handles(Point::new(4.0, 3.0), Point::origin(), 2.5, 2.0);
         let by_hand = [(5.4, 5.3), (-2.6, -0.7), (-1.4, -2.3), (6.6, 3.7)];
         for (corner, (x, y)) in board.corners().iter().zip(by_hand) {

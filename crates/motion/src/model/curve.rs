@@ -4,9 +4,9 @@
 //! doubles, so that a place far along has lost no digits. Its coordinate may grow or fall in the direction of travel.
 //!
 //! **A new kind of curve** needs a file beside `line` and `arc` with its `impl Curve`, a variant of
-//! [`Segment`](super::segment::Segment), a constructor and an outline in `path`, and a variant of `description`. No other
-//! code of this crate distinguishes kinds of curves: `model` has a test of that. The methods with a default have one
-//! that is valid for every curve; the default of a bound costs time only.
+//! [`Segment`](super::segment::Segment), a constructor and an outline in `path`, and a variant of `description`. No
+//! other code of this crate distinguishes kinds of curves: `model` has a test of that. The methods with a default have
+//! one that is valid for every curve; the default of a bound costs time only.
 
 use super::double_double::DoubleDouble;
 use super::team::Team;
@@ -68,7 +68,8 @@ impl Follower {
     }
 }
 
-/// What boards can reach: no point of a board with a handle outside the disc is within the limit of the boards searched.
+/// What boards can reach: no point of a board with a handle outside the disc is within the limit of the boards
+/// searched.
 #[derive(Debug, Clone, Copy)]
 pub struct ReachedDisc {
     /// Centre of the disc.
@@ -173,8 +174,8 @@ pub trait Curve {
 
     /// Returns half the greatest second derivative, by the coordinate, of the squared distance to a point F.
     ///
-    /// It holds where that distance is at most `distance` metres and the place at most [`longest_step`](Self::longest_step)
-    /// behind `at`: |p'|^2 + (p - F) . p'' <= |p'|^2 + distance |p''|.
+    /// It holds where that distance is at most `distance` metres and the place at most
+    /// [`longest_step`](Self::longest_step) behind `at`: |p'|^2 + (p - F) . p'' <= |p'|^2 + distance |p''|.
     fn second_derivative_bound(&self, at: Coordinate, distance: f64) -> f64;
 
     /// Returns the greatest step, in units, for which [`second_derivative_bound`](Self::second_derivative_bound) holds.
@@ -198,7 +199,8 @@ pub trait Curve {
         None
     }
 
-    /// Returns the coordinate of the front handle at which a link of `link` metres locks with both handles on the curve.
+    /// Returns the coordinate of the front handle at which a link of `link` metres locks with both handles on the
+    /// curve.
     fn fold(&self, _link: f64) -> Option<f64> {
         None
     }

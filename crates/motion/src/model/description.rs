@@ -1,11 +1,11 @@
-//! A path by the numbers of which it is made, as a scene states them: from them [`Path`] is built in doubles, and the
-//! reference builds its own with more digits.
+//! A path by its numbers in a scene: from them [`Path`] is built in doubles, and the reference builds its path with
+//! more digits.
 
 use super::Point;
 use super::curve::Side;
 use super::path::{Disjoint, Path};
 
-/// What a path is.
+/// The numbers of a path.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PathDescription {
     /// Inward to the centre: see [`Path::spiral`].
@@ -30,11 +30,11 @@ pub enum PathDescription {
     },
     /// Lines and arcs: see [`Path::route`].
     Route {
-        /// Where the head starts.
+        /// Start of the head.
         start: Point,
         /// The direction there, turns counter-clockwise from x.
         heading_turns: f64,
-        /// What follows, in order.
+        /// The segments after the start, in order.
         steps: Vec<RouteStep>,
     },
 }
@@ -53,16 +53,16 @@ pub enum RouteStep {
         side: Side,
         /// Metres.
         radius: f64,
-        /// How far the direction turns, in turns (90 degrees are a quarter).
+        /// Change of direction, in turns (90 degrees are a quarter).
         turns: f64,
     },
 }
 
 impl PathDescription {
-    /// The path in doubles.
+    /// Builds the path in doubles.
     ///
     /// # Errors
-    /// [`Disjoint`] where numbers so extreme are given that rounding leaves a gap.
+    /// [`Disjoint`] if the numbers are so extreme that rounding leaves a gap.
     pub fn path(&self) -> Result<Path, Disjoint> {
         match self {
             Self::Spiral { pitch, start_turn } => Ok(Path::spiral(*pitch, *start_turn)),

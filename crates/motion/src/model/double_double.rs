@@ -1,5 +1,5 @@
-//! Numbers of about 32 digits as the sum of two doubles, for coordinates along a path: far along it, one double would
-//! lose the digits that a link's length needs.
+//! Numbers of about 32 digits as the sum of two doubles, for coordinates along a path: far along it, one double lacks
+//! the digits for a link's length.
 //!
 //! The curves and the reference solver call it.
 
@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 
 use super::elementary;
 
-/// 2 pi minus its nearest double: with it, whole turns come off an angle without losing digits.
+/// 2 pi minus its nearest double: with it, whole turns are subtracted from an angle without losing digits.
 const TAU_LOW: f64 = 2.449_293_598_294_706_4e-16;
 
 /// A number as `high` + `low`.
@@ -17,11 +17,11 @@ const TAU_LOW: f64 = 2.449_293_598_294_706_4e-16;
 pub struct DoubleDouble {
     /// The number, rounded.
     pub high: f64,
-    /// What rounding took away.
+    /// The rounding error of `high`.
     pub low: f64,
 }
 
-/// The rounded sum and its rounding error (Knuth, The Art of Computer Programming, vol. 2, section 4.2.2).
+/// Returns the rounded sum and its rounding error (Knuth, The Art of Computer Programming, vol. 2, section 4.2.2).
 fn two_sum(x: f64, y: f64) -> (f64, f64) {
     let sum = x + y;
     let y_part = sum - x;
@@ -32,42 +32,42 @@ impl DoubleDouble {
     /// Zero.
     pub const ZERO: Self = Self { high: 0.0, low: 0.0 };
 
-    /// The sum of two doubles.
+    /// Returns the sum of two doubles.
     pub fn sum(x: f64, y: f64) -> Self {
         let (high, low) = two_sum(x, y);
         Self { high, low }
     }
 
-    /// The angle of a number of turns, radians.
+    /// Returns the angle of a number of turns, radians.
     pub fn from_turns(turns: f64) -> Self {
         let high = TAU * turns;
         Self::sum(high, TAU.mul_add(turns, -high) + TAU_LOW * turns)
     }
 
-    /// The quotient of two doubles.
+    /// Returns the quotient of two doubles.
     pub fn quotient(dividend: f64, divisor: f64) -> Self {
         let high = dividend / divisor;
         Self { high, low: (-high).mul_add(divisor, dividend) / divisor }
     }
 
-    /// This number and `by`.
+    /// Returns this number plus `by`.
     pub fn plus(self, by: f64) -> Self {
         let (sum, error) = two_sum(self.high, by);
         Self::sum(sum, error + self.low)
     }
 
-    /// This number minus `other`, exact to a few units in the last place of the difference.
+    /// Returns this number minus `other`, exact to a few units in the last place of the difference.
     pub fn minus(self, other: Self) -> f64 {
         let (difference, error) = two_sum(self.high, -other.high);
         difference + (error + (self.low - other.low))
     }
 
-    /// How far a double is from this number.
+    /// Returns the difference of a double and this number.
     pub fn error_of(self, number: f64) -> f64 {
         (number - self.high) - self.low
     }
 
-    /// Sine and cosine of this angle in radians, exact to a few units of 1e-16 up to 1e8 radians.
+    /// Returns sine and cosine of this angle in radians, exact to a few units of 1e-16 up to 1e8 radians.
     pub fn sine_and_cosine(self) -> (f64, f64) {
         let turns = (self.high / TAU).round();
         let product = turns * TAU;

@@ -1,8 +1,8 @@
 //! The path that the handles ride: segments one after the other without a gap or a corner, travelled by arc length. A
 //! spiral is a path of one segment.
 //!
-//! Scenes construct it; the linkage, the solvers and the events travel it. Distance 0 is where the head starts; a path
-//! reaches as far behind its start as any team needs, and ends at [`Path::length`].
+//! Scenes construct it; the linkage, the solvers and the events use it. The head starts at distance 0. A path reaches
+//! as far behind its start as any team needs, and ends at [`Path::length`].
 
 use std::f64::consts::TAU;
 
@@ -23,17 +23,17 @@ pub struct Param {
 }
 
 impl Param {
-    /// The place with this coordinate on a segment, counted from 0.
+    /// Creates the place with this coordinate on a segment, counted from 0.
     pub fn new(segment: usize, coordinate: Coordinate) -> Self {
         Self { segment, at: coordinate }
     }
 
-    /// The segment, counted from 0.
+    /// Returns the segment, counted from 0.
     pub fn segment(&self) -> usize {
         self.segment
     }
 
-    /// The place in the segment's own coordinate: metres on a line or an arc, the polar angle in radians on a spiral.
+    /// Returns the place in the segment's own coordinate: metres on a line, radians on an arc or a spiral.
     pub fn coordinate(&self) -> Coordinate {
         self.at
     }
@@ -51,7 +51,7 @@ pub struct Disjoint {
     pub corner: f64,
 }
 
-/// A segment in its place on the path.
+/// A segment on the path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Placed {
     segment: Segment,
@@ -59,11 +59,11 @@ struct Placed {
     begin: f64,
     /// Metres of travel at which it ends.
     end: f64,
-    /// Its coordinate where it begins, or for the first segment where the head starts or the segment ends, if that is
-    /// earlier; and the metres of travel there.
+    /// Coordinate of its beginning. For the first segment: of the head's start or of the segment's end, whichever is
+    /// earlier. And the metres of travel there.
     anchor: Coordinate,
     anchor_travelled: f64,
-    /// Its coordinate where it ends.
+    /// Coordinate of its end.
     last: Coordinate,
 }
 
@@ -79,12 +79,12 @@ pub struct Path {
     segments: Vec<Placed>,
 }
 
-/// What a drawing needs of a segment.
+/// The outline of a segment, for drawings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SegmentOutline {
-    /// Which curve it is.
+    /// Kind of the curve.
     pub kind: OutlineKind,
-    /// Where it begins.
+    /// Its first point.
     pub start: Point,
     /// Direction of travel there, radians counter-clockwise from x.
     pub heading: f64,
@@ -99,7 +99,7 @@ pub enum OutlineKind {
     Line,
     /// Part of a circle.
     Arc {
-        /// 1/m, positive where it turns left.
+        /// 1/m, positive if it turns left.
         curvature: f64,
     },
     /// Along r = pitch theta / 2 pi; outward, turned by half a turn.
@@ -108,15 +108,16 @@ pub enum OutlineKind {
         direction: Direction,
         /// Metres per turn.
         pitch: f64,
-        /// Polar angle on the unturned spiral where it begins, radians.
+        /// Polar angle of its beginning on the unturned spiral, radians.
         first: f64,
-        /// Polar angle on the unturned spiral where it ends, radians.
+        /// Polar angle of its end on the unturned spiral, radians.
         last: f64,
     },
 }
 
 impl Path {
-    /// Inward along the spiral r = a theta (a = `pitch` / 2 pi) from theta = 2 pi `start_turn` to the centre.
+    /// Creates the path inward along the spiral r = a theta (a = `pitch` / 2 pi) from theta = 2 pi `start_turn` to the
+    /// centre.
     pub fn spiral(pitch: f64, start_turn: f64) -> Self {
         let spiral = Spiral::new(pitch, Direction::Inward);
         let anchor = DoubleDouble::from_turns(start_turn);
@@ -133,16 +134,16 @@ impl Path {
         }
     }
 
-    /// Inward along the spiral r = a theta (a = `pitch` / 2 pi) up to `turn_radius`, through an S of two arcs to the
-    /// opposite point, and outward along the same spiral turned by half a turn. Travel starts `lead_in` metres before
-    /// the turn and ends `lead_out` metres after it.
+    /// Creates the path inward along the spiral r = a theta (a = `pitch` / 2 pi) up to `turn_radius`, through an S of
+    /// two arcs to the opposite point, and outward along the same spiral turned by half a turn. Travel starts `lead_in`
+    /// metres before the turn and ends `lead_out` metres after it.
     ///
     /// With R = `turn_radius` the chords of both arcs lie on the diameter through the two ends and make the same angle
     /// atan(R/a) with the tangents there. So both arcs turn by twice that angle, their radii sum to sqrt(R^2 + a^2),
-    /// and their lengths to 2 sqrt(R^2 + a^2) atan(R/a), whatever `arc_ratio`, the first radius over the second.
+    /// and their lengths to 2 sqrt(R^2 + a^2) atan(R/a), for any `arc_ratio`, the first radius over the second.
     ///
     /// # Errors
-    /// [`Disjoint`] where numbers so extreme are given that rounding leaves a gap.
+    /// [`Disjoint`] if the numbers are so extreme that rounding leaves a gap.
     pub fn turnaround(
         pitch: f64,
         turn_radius: f64,
@@ -180,8 +181,8 @@ impl Path {
         path.joined()
     }
 
-    /// A route that begins at `start` in the direction `heading_turns` turns counter-clockwise from x, with a straight
-    /// line without end behind it. Lines and arcs are added to it one by one.
+    /// Creates a route that begins at `start` in the direction `heading_turns` turns counter-clockwise from x, with an
+    /// infinite straight line behind it. Lines and arcs are added one by one.
     pub fn route(start: Point, heading_turns: f64) -> Route {
         let (sine, cosine) = DoubleDouble::from_turns(heading_turns).sine_and_cosine();
         let segment = Segment::Line(Line { origin: start, direction: Vector::new(cosine, sine) });
@@ -196,7 +197,7 @@ impl Path {
         self.segments.push(Placed { segment, begin, end: begin + length, anchor, anchor_travelled: begin, last });
     }
 
-    /// The path itself where every segment continues the one before it.
+    /// Returns the path if every segment continues the one before it.
     fn joined(self) -> Result<Self, Disjoint> {
         for (index, pair) in self.segments.windows(2).enumerate() {
             let (before, after) = (&pair[0].segment, &pair[1].segment);
@@ -207,7 +208,7 @@ impl Path {
             let corner = atan2(old.perp(&new), old.dot(&new)).abs();
             let sharpest = before.curvature(last).max(after.curvature(first));
             let size = end.coords.norm() + 1.0 / sharpest.max(1.0);
-            // Not a number is no join either.
+            // NaN is no join either.
             if !(gap <= 1e-12 * size && corner <= 1e-12) {
                 return Err(Disjoint { segment: index + 1, gap, corner });
             }
@@ -215,22 +216,22 @@ impl Path {
         Ok(self)
     }
 
-    /// Metres that the head can travel.
+    /// Returns the metres that the head can travel.
     pub fn length(&self) -> f64 {
         self.segments[self.segments.len() - 1].end
     }
 
-    /// The number of segments, with the one that reaches behind the start.
+    /// Returns the number of segments, with the one that reaches behind the start.
     pub fn segments(&self) -> usize {
         self.segments.len()
     }
 
-    /// Metres of travel at which each segment after the first begins.
+    /// Returns the metres of travel at which each segment after the first begins.
     pub fn junctions(&self) -> impl Iterator<Item = f64> + '_ {
         self.segments[1..].iter().map(|placed| placed.begin)
     }
 
-    /// The place `travelled` metres of arc length past the start; clamped to the path's end.
+    /// Returns the place `travelled` metres of arc length past the start, at most the path's end.
     ///
     /// The error is at most 4 eps (r + |travelled|) along the curve, r being the distance from the origin.
     pub fn param_at(&self, travelled: f64) -> Param {
@@ -239,23 +240,23 @@ impl Path {
         Param { segment, at: self.segments[segment].at(travelled) }
     }
 
-    /// Metres of travel at a place.
+    /// Returns the metres of travel at a place.
     pub fn travelled(&self, param: Param) -> f64 {
         let Placed { segment, anchor, anchor_travelled, .. } = &self.segments[param.segment];
         anchor_travelled + segment.arc_length(*anchor, param.at)
     }
 
-    /// The point of a place.
+    /// Returns the point of a place.
     pub fn point(&self, param: Param) -> Point {
         self.segment(param).point(param.at)
     }
 
-    /// The unit tangent of a place, in the direction of travel.
+    /// Returns the unit tangent of a place, in the direction of travel.
     pub fn tangent(&self, param: Param) -> Vector {
         self.segment(param).tangent(param.at)
     }
 
-    /// Metres of arc length from one place to another; negative against the direction of travel.
+    /// Returns the metres of arc length from one place to another, negative against the direction of travel.
     pub fn arc_length(&self, from: Param, to: Param) -> f64 {
         if from.segment == to.segment {
             return self.segment(from).arc_length(from.at, to.at);
@@ -268,8 +269,8 @@ impl Path {
         rest + between + self.segment(to).arc_length(self.segments[to.segment].anchor, to.at)
     }
 
-    /// Metres: the largest number to which the points of lines and arcs are added up, for handles up to `behind` metres behind
-    /// the start. Points that lie nearer to the origin of coordinates are rounded as that number is.
+    /// Returns the largest summand of the points of lines and arcs, metres, for handles up to `behind` metres behind
+    /// the start. Points nearer to the origin of coordinates are rounded as this number is.
     pub fn largest_summand(&self, behind: f64) -> f64 {
         let of = |placed: &Placed| {
             let length = placed.end - placed.begin.max(-behind);
@@ -282,7 +283,8 @@ impl Path {
         self.segments.iter().map(of).fold(0.0, f64::max)
     }
 
-    /// The greatest curvature from one distance of travel to another, 1/m: the tangent turns by no more per metre.
+    /// Returns the greatest curvature between two distances of travel, 1/m: the tangent turns by at most this per
+    /// metre.
     pub fn max_curvature_between(&self, from: f64, to: f64) -> f64 {
         let met = self.segments.iter().filter(|placed| placed.begin <= to && placed.end >= from);
         met.map(|placed| {
@@ -292,7 +294,7 @@ impl Path {
         .fold(0.0, f64::max)
     }
 
-    /// The spiral, and its coordinate where travel starts, of a path that is nothing else.
+    /// Returns the spiral of a path that consists of one spiral only, and its coordinate at the start of travel.
     pub fn as_spiral(&self) -> Option<(&Spiral, Coordinate)> {
         match self.segments.as_slice() {
             [Placed { segment: Segment::Spiral(spiral), anchor, .. }] => Some((spiral, *anchor)),
@@ -300,7 +302,7 @@ impl Path {
         }
     }
 
-    /// What a drawing needs of each segment, in order, from where the head starts.
+    /// Returns the outline of each segment, in order, from the head's start.
     pub fn outline(&self) -> Vec<SegmentOutline> {
         let ahead = self.segments.iter().filter(|placed| placed.end > 0.0);
         ahead
@@ -332,23 +334,24 @@ impl Path {
         &self.segments[index].segment
     }
 
-    /// The coordinate with which a segment begins; of the first segment, of the place from which it is measured.
+    /// Returns the coordinate with which a segment begins; for the first segment, of the place from which it is
+    /// measured.
     pub(crate) fn first(&self, segment: usize) -> Coordinate {
         self.segments[segment].anchor
     }
 
-    /// The coordinate with which a segment ends.
+    /// Returns the coordinate with which a segment ends.
     pub(crate) fn last(&self, segment: usize) -> Coordinate {
         self.segments[segment].last
     }
 
-    /// Metres of travel at which a segment ends.
+    /// Returns the metres of travel at which a segment ends.
     pub(crate) fn end_of(&self, segment: usize) -> f64 {
         self.segments[segment].end
     }
 }
 
-/// A route being built.
+/// A route under construction.
 #[derive(Debug, Clone)]
 pub struct Route {
     path: Path,
@@ -357,13 +360,13 @@ pub struct Route {
 }
 
 impl Route {
-    /// Straight on for `length` metres.
+    /// Adds a straight line of `length` metres.
     pub fn line(self, length: f64) -> Self {
         let line = Line { origin: self.end, direction: self.direction() };
         self.continued(Segment::Line(line), Coordinate { high: length, low: 0.0 }, length, 0.0)
     }
 
-    /// Along a circle of `radius` metres whose centre is on one side, for `turns` turns (90 degrees are a quarter).
+    /// Adds an arc of `radius` metres whose centre is on one side, for `turns` turns (90 degrees are a quarter).
     pub fn arc(self, side: Side, radius: f64, turns: f64) -> Self {
         let arc = Arc::new(self.end, self.direction(), side, radius);
         let turned = if side == Side::Left { turns } else { -turns };
@@ -382,10 +385,10 @@ impl Route {
         self
     }
 
-    /// The path.
+    /// Returns the path.
     ///
     /// # Errors
-    /// [`Disjoint`] where numbers so extreme are given that rounding leaves a gap.
+    /// [`Disjoint`] if the numbers are so extreme that rounding leaves a gap.
     pub fn build(self) -> Result<Path, Disjoint> {
         self.path.joined()
     }

@@ -1,11 +1,9 @@
-//! Root finding in one unknown, written once: a bracketed Newton iteration, and bisection for what has no derivative.
-//!
-//! Called by the paths and by the events.
+//! Root finding in one unknown: a bracketed Newton iteration, and bisection for functions without a derivative.
 
-/// The root of an increasing function within `low..=high`, by Newton's method kept inside a shrinking bracket
+/// Returns the root of an increasing function within `low..=high`, by Newton's method kept inside a shrinking bracket
 /// (rtsafe; Press et al., Numerical Recipes, 3rd ed., section 9.4).
 ///
-/// `function` gives the value and the derivative. The result is as exact as the function's own rounding allows.
+/// `function` returns the value and the derivative. The result is as exact as the function's rounding allows.
 pub fn increasing_root(function: impl Fn(f64) -> (f64, f64), low: f64, high: f64, guess: f64) -> f64 {
     let (mut low, mut high) = (low, high);
     let mut x = guess.clamp(low, high);
@@ -25,7 +23,7 @@ pub fn increasing_root(function: impl Fn(f64) -> (f64, f64), low: f64, high: f64
         let next = if is_within { newton } else { 0.5 * (low + high) };
         let step = (next - x).abs();
         // The second test ends the jitter of the last digits where the function is nearly flat. Halvings are no jitter:
-        // where the root is the bracket's end but for a rounding, nothing else comes.
+        // if the root is the bracket's end up to rounding, every step is a halving.
         if step <= f64::EPSILON * x.abs() || (is_within && step < 1e-10 * x.abs() && step > 0.5 * last_step) {
             return next;
         }
@@ -35,8 +33,8 @@ pub fn increasing_root(function: impl Fn(f64) -> (f64, f64), low: f64, high: f64
     x
 }
 
-/// The place within `low..=high` where `holds` turns from false to true, to the last bit: the least number known to
-/// hold. `holds(low)` is taken to be false and `holds(high)` to be true.
+/// Returns the place within `low..=high` where `holds` changes from false to true, to the last bit: the least number
+/// known to hold. It assumes that `holds(low)` is false and `holds(high)` is true.
 pub fn bisect_predicate(mut holds: impl FnMut(f64) -> bool, low: f64, high: f64) -> f64 {
     let (mut low, mut high) = (low, high);
     // 1,100 halvings exhaust the doubles between any two finite numbers.
@@ -54,8 +52,8 @@ pub fn bisect_predicate(mut holds: impl FnMut(f64) -> bool, low: f64, high: f64)
     high
 }
 
-/// The least value of a function that has one minimum within `low..=high`, and where it is (golden section search;
-/// Kiefer, Sequential minimax search for a maximum, 1953).
+/// Returns the least value of a function that has one minimum within `low..=high`, and its place (golden section
+/// search; Kiefer, Sequential minimax search for a maximum, 1953).
 ///
 /// The value is as exact as the function; the place of a smooth minimum only to half the digits.
 pub fn golden_section_min(mut function: impl FnMut(f64) -> f64, low: f64, high: f64) -> (f64, f64) {
@@ -90,7 +88,7 @@ mod tests {
 
     #[test]
     fn increasing_root_survives_a_guess_from_which_newton_diverges() {
-        // Newton alone, started at 3, leaves arctan for infinity.
+        // Newton alone, started at 3, diverges.
         let root = increasing_root(|x| ((x - 0.5).atan(), 1.0 / (1.0 + (x - 0.5).powi(2))), -10.0, 10.0, 3.0);
         assert!((root - 0.5).abs() < 1e-15);
     }

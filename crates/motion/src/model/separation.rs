@@ -1,4 +1,4 @@
-//! How far apart two boards are. Every value is **positive apart, negative overlapping, zero touching**, in metres.
+//! The distance of two boards. Every value is **positive apart, negative overlapping, zero touching**, in metres.
 //!
 //! - [`separation_board_board`]: the largest gap along an edge normal (the separating axis theorem). Overlapping: minus
 //!   the least translation that parts the boards. Apart: at most the distance, and equal to it unless two corners are
@@ -12,7 +12,7 @@
 use super::board::Board;
 use super::{Point, Vector};
 
-/// One board as the other's frame sees it: its centre along and across, and the cosine and sine of its turn.
+/// One board in the other's frame: its centre along and across, and the cosine and sine of its turn.
 #[derive(Clone, Copy)]
 struct Relative {
     along: f64,
@@ -33,7 +33,7 @@ impl Relative {
         }
     }
 
-    /// The gaps along the frame's two axes between the frame's board and the other.
+    /// Returns the gaps along the frame's two axes between the frame's board and the other.
     fn gaps(&self, own: &Board, other: &Board) -> (f64, f64) {
         let (cosine, sine) = (self.cosine.abs(), self.sine.abs());
         let along = other.half_length * cosine + other.half_width * sine;
@@ -41,7 +41,7 @@ impl Relative {
         (self.along.abs() - (own.half_length + along), self.across.abs() - (own.half_width + across))
     }
 
-    /// The other board's corners in the frame.
+    /// Returns the other board's corners in the frame.
     fn corners(&self, other: &Board) -> [(f64, f64); 4] {
         let (lx, ly) = (other.half_length * self.cosine, other.half_length * self.sine);
         let (wx, wy) = (-other.half_width * self.sine, other.half_width * self.cosine);
@@ -54,7 +54,7 @@ impl Relative {
         ]
     }
 
-    /// The least squared distance from a corner of the other board to the frame's board.
+    /// Returns the least squared distance from a corner of the other board to the frame's board.
     fn nearest_corner_squared(&self, own: &Board, other: &Board) -> f64 {
         let squared = |(x, y): (f64, f64)| {
             let dx = (x.abs() - own.half_length).max(0.0);
@@ -66,12 +66,13 @@ impl Relative {
     }
 }
 
-/// A lower bound of [`signed_distance_board_board`] from the circles about the boards, for callers that can skip a pair.
+/// Returns a lower bound of [`signed_distance_board_board`] from the circles about the boards, for callers that can
+/// skip a pair.
 pub fn circle_bound_board_board(a: &Board, b: &Board) -> f64 {
     (b.centre - a.centre).norm() - (a.circle_radius() + b.circle_radius())
 }
 
-/// The signed separation by the separating axis theorem, metres: never more than the clearance.
+/// Returns the signed separation by the separating axis theorem, metres: never more than the clearance.
 ///
 /// The normals of the Minkowski difference's edges are those of the boards, so the largest of the four gaps is minus
 /// the least translation when all are negative (Ericson, Real-Time Collision Detection, section 4.4).
@@ -82,7 +83,8 @@ pub fn separation_board_board(a: &Board, b: &Board) -> f64 {
     along_a.max(across_a).max(along_b.max(across_b))
 }
 
-/// The clearance, metres: the Euclidean distance apart, minus the least translation that parts the boards overlapping.
+/// Returns the clearance, metres: the Euclidean distance apart, minus the least translation that parts the boards
+/// overlapping.
 ///
 /// The nearest points of two convex polygons that are apart include a corner of one of them.
 #[inline]
@@ -97,7 +99,7 @@ pub fn signed_distance_board_board(a: &Board, b: &Board) -> f64 {
     from_a.min(from_b).sqrt().max(separation)
 }
 
-/// The two closest points, the first on `a`, the second on `b`.
+/// Returns the two closest points, the first on `a`, the second on `b`.
 ///
 /// Overlapping: the deepest pair, a corner inside and the point of the other board's edge through which the least
 /// translation takes it out.
@@ -123,7 +125,7 @@ fn in_stage(board: &Board, along: f64, across: f64) -> Point {
     board.centre + along * board.axis + across * board.across()
 }
 
-/// The squared distance, the point of `own`, and the corner of `other` that is nearest to it.
+/// Returns the least squared distance of a corner of `other` to `own`, the point of `own`, and that corner.
 fn nearest_to_corner(relative: &Relative, own: &Board, other: &Board) -> (f64, Point, Point) {
     let mut best = (f64::INFINITY, own.centre, other.centre);
     for ((x, y), corner) in relative.corners(other).into_iter().zip(other.corners()) {
@@ -138,7 +140,8 @@ fn nearest_to_corner(relative: &Relative, own: &Board, other: &Board) -> (f64, P
     best
 }
 
-/// The point of `own`'s edge and the deepest point of `other` under it, for the smaller overlap along `own`'s axes.
+/// Returns the point of `own`'s edge and the deepest point of `other` under it, for the smaller overlap along `own`'s
+/// axes.
 fn deepest(relative: &Relative, own: &Board, other: &Board) -> (Point, Point) {
     let (along, across) = relative.gaps(own, other);
     let corners = relative.corners(other);
@@ -156,10 +159,10 @@ fn deepest(relative: &Relative, own: &Board, other: &Board) -> (Point, Point) {
     }
 }
 
-/// The centre of area of what two boards have in common; where that is nothing, the middle of their closest points.
+/// Returns the centre of area of the overlap of two boards; without overlap, the middle of their closest points.
 ///
-/// One board clipped by the other's four edges (Sutherland and Hodgman, 1974), then the centroid of the polygon; where
-/// the boards only touch, the middle of the touching points.
+/// One board is clipped by the other's four edges (Sutherland and Hodgman, 1974); the result is the centroid of the
+/// polygon, or the middle of the touching points if the boards only touch.
 pub fn overlap_centre(a: &Board, b: &Board) -> Point {
     let middle = || {
         let (on_a, on_b) = closest_points_board_board(a, b);
@@ -185,14 +188,14 @@ pub fn overlap_centre(a: &Board, b: &Board) -> Point {
         count = clip(&mut polygon, count, normal, offset);
     }
     if count == 0 {
-        // Touching to the last digit, and clipped away by its rounding.
+        // The boards touch to the last digit, and rounding removed the polygon.
         return middle();
     }
     let centre = centroid(&polygon[..count]);
     in_stage(a, centre.x, centre.y)
 }
 
-/// Keeps what of the polygon's first `count` corners lies where `normal` . p <= `offset`; returns the new count.
+/// Keeps the part of the polygon of the first `count` corners with `normal` . p <= `offset`. Returns the new count.
 fn clip(polygon: &mut [Vector; 8], count: usize, normal: Vector, offset: f64) -> usize {
     let before = *polygon;
     let mut kept = 0;

@@ -1,7 +1,6 @@
 //! The Archimedean spiral r = a theta, a = pitch / 2 pi, travelled inward (clockwise, theta decreasing) or outward.
 //!
-//! The path and the linkage call it. All formulas are derived in the polar frame of a handle, so that none subtracts two
-//! positions that are nearly the same.
+//! All formulas are derived in the polar frame of a handle, so that none subtracts two nearly equal positions.
 
 mod bounds;
 mod links;
@@ -16,7 +15,7 @@ use super::root::{bisect_predicate, increasing_root};
 use super::team::Team;
 use super::{Point, Vector};
 
-/// Which way a spiral is travelled.
+/// The direction of travel on a spiral.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
     /// Towards the centre.
@@ -38,8 +37,8 @@ pub struct Spiral {
 const LONGEST_STEP: f64 = 0.5;
 
 impl Spiral {
-    /// A spiral of `pitch` metres per turn, which must be positive and finite; the scene, which knows the user's file and
-    /// line, refuses others.
+    /// Creates a spiral of `pitch` metres per turn, which must be positive and finite: the scene refuses other values
+    /// with file and line.
     pub fn new(pitch: f64, direction: Direction) -> Self {
         debug_assert!(pitch > 0.0);
         // a = pitch / 2 pi to 32 digits: 2 pi is itself a sum of two doubles.
@@ -48,28 +47,28 @@ impl Spiral {
         Self { pitch, radius_per_radian: DoubleDouble { high, low: low - high * tau_low / TAU }, direction }
     }
 
-    /// Metres per turn.
+    /// Returns the metres per turn.
     pub fn pitch(&self) -> f64 {
         self.pitch
     }
 
-    /// Metres of radius per radian: a = pitch / 2 pi.
+    /// Returns the metres of radius per radian: a = pitch / 2 pi.
     pub fn radius_per_radian(&self) -> f64 {
         self.radius_per_radian.high
     }
 
-    /// Which way it is travelled.
+    /// Returns the direction of travel.
     pub fn direction(&self) -> Direction {
         self.direction
     }
 
-    /// Distance of a place from the centre, metres.
+    /// Returns the distance of a place from the centre, metres.
     pub fn radius(&self, at: Coordinate) -> f64 {
         let DoubleDouble { high, low } = self.radius_per_radian;
         at.high.mul_add(high, at.high * low + at.low * high)
     }
 
-    /// Arc length between `theta` and `theta - span`, metres.
+    /// Returns the arc length between `theta` and `theta - span`, metres.
     ///
     /// From s = a/2 (theta w + asinh theta), w = sqrt(1 + theta^2), with both differences written as products of the
     /// span, so that short spans far out keep all digits:
@@ -86,7 +85,7 @@ impl Spiral {
         0.5 * self.radius_per_radian.high * (algebraic + logarithmic)
     }
 
-    /// The place `metres` inward of another, outward where negative; the centre where it is not as far.
+    /// Returns the place `metres` inward of another, outward if negative; the centre if that is nearer.
     fn inward(&self, from: Coordinate, metres: f64) -> Coordinate {
         let (theta, a) = (from.high, self.radius_per_radian.high);
         if metres == 0.0 {
@@ -107,8 +106,8 @@ impl Spiral {
         from.plus(-span)
     }
 
-    /// The residual of the chord from a handle at radius `r` to the point `d` radians outward, and its derivative by d:
-    /// G = (a d)^2 + 4 r (r + a d) sin^2(d/2) - link^2 (law of cosines).
+    /// Returns the residual of the chord from a handle at radius `r` to the point `d` radians outward, and its
+    /// derivative by d: G = (a d)^2 + 4 r (r + a d) sin^2(d/2) - link^2 (law of cosines).
     pub(crate) fn chord_residual(&self, r: f64, link: f64) -> impl Fn(f64) -> (f64, f64) + use<> {
         let a = self.radius_per_radian.high;
         move |d| {
@@ -121,7 +120,7 @@ impl Spiral {
         }
     }
 
-    /// The angle from a handle at radius `r` outward to the first point at the link's distance, radians.
+    /// Returns the angle from a handle at radius `r` outward to the first point at the link's distance, radians.
     pub(crate) fn follower_angle(&self, r: f64, link: f64) -> Result<f64, NoFollower> {
         let a = self.radius_per_radian.high;
         let residual = self.chord_residual(r, link);
@@ -130,7 +129,7 @@ impl Spiral {
             PI
         } else {
             match first_chord_maximum(r / a) {
-                // The chord grows for ever and is at least the radial rise.
+                // The chord grows without limit and is at least the radial rise.
                 None => (link / a).max(PI),
                 Some(maximum) => {
                     let value = residual(maximum).0;
@@ -149,15 +148,15 @@ impl Spiral {
         Ok(increasing_root(residual, 0.0, high, second))
     }
 
-    /// The outermost fold for links of `link` metres: the polar angle at which a front handle's link locks, or `None`
-    /// where the link is so short against the pitch that it never does.
+    /// Returns the outermost fold for links of `link` metres: the polar angle at which a front handle's link locks;
+    /// `None` if the link is so short against the pitch that it never does.
     ///
     /// The first maximum of the chord grows with theta (d(chord^2)/d theta = 4 a^2 (2 theta + d) sin^2(d/2) > 0), so
     /// at most one theta has it equal to the link.
     pub fn fold(&self, link: f64) -> Option<f64> {
         let ratio = link / self.radius_per_radian.high;
-        // How much the square of the first maximum exceeds that of the link, over a^2, and its slope: at the maximum, that by
-        // theta alone.
+        // Returns the excess of the square of the first maximum over that of the link, over a^2, and its slope: at the
+        // maximum, the derivative by theta alone.
         let excess = |theta: f64| match first_chord_maximum(theta) {
             Some(d) => {
                 let square = sin(0.5 * d).powi(2);
@@ -179,13 +178,13 @@ impl Spiral {
 static LEAST_WITH_MAXIMUM: LazyLock<f64> =
     LazyLock::new(|| bisect_predicate(|theta| first_chord_maximum(theta).is_some(), 0.25, 1.0));
 
-/// The angle d at which the chord from theta to theta + d first stops growing, in (pi, 2 pi), or `None` where it
-/// grows for ever. Depends on theta alone.
+/// Returns the angle d at which the chord from theta to theta + d first stops growing, in (pi, 2 pi); `None` if it
+/// grows without limit. It depends on theta alone.
 ///
 /// Half the slope of the squared chord over a^2 is H(d) = d + 2 theta sin^2(d/2) + theta (theta + d) sin d, positive up
-/// to pi. Where H' >= 0 at pi it stays so. Where not, H has one minimum before 2 pi, and a zero exactly when that
-/// minimum is not above zero. Should the first turn have none, no later turn has one: at sin d = -1,
-/// H = (1 - theta)(d + theta), and the part of the dip below that shrinks with d.
+/// to pi. If H' >= 0 at pi, it stays so. If not, H has one minimum before 2 pi, and a zero exactly if that minimum is
+/// not above zero. If the first turn has no zero, no later turn has one: at sin d = -1, H = (1 - theta)(d + theta), and
+/// the part of the dip below that shrinks with d.
 fn first_chord_maximum(theta: f64) -> Option<f64> {
     let half_slope = |d: f64| {
         let sine = sin(0.5 * d);
@@ -215,8 +214,8 @@ impl Curve for Spiral {
     fn tangent(&self, at: Coordinate) -> Vector {
         let (r, a) = (self.radius(at), self.radius_per_radian.high);
         let (sine, cosine) = at.sine_and_cosine();
-        // dp/dtheta = a e_r + r e_phi, and theta decreases. Turned by half a turn and travelled the other way, the outward
-        // spiral has the same tangent.
+        // dp/dtheta = a e_r + r e_phi, and theta decreases. Turned by half a turn and travelled the other way, the
+        // outward spiral has the same tangent.
         Vector::new(r * sine - a * cosine, -a * sine - r * cosine) / hypot(r, a)
     }
 
@@ -346,8 +345,8 @@ impl Curve for Spiral {
 mod tests {
     use super::*;
 
-    /// The chords from `theta` on a spiral of radius theta to all places up to a turn outward, in small steps: the greatest
-    /// before they first shrink, or `None` where they grow all the time.
+    /// Returns the greatest chord, before the chords first shrink, from `theta` on a spiral of radius theta to places
+    /// up to a turn outward, in small steps; `None` if they grow all the time.
     fn greatest_before_shrinking(theta: f64) -> Option<f64> {
         let place = |phi: f64| Point::new(phi * phi.cos(), phi * phi.sin());
         let chords: Vec<f64> =

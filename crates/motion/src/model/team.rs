@@ -1,7 +1,7 @@
-//! The benches of a dragon, without any of the scene file's syntax.
+//! The benches of a dragon, independent of the scene file's syntax.
 
-/// The benches of a dragon. Constructed by the scene, which has checked that every length is positive and that each
-/// board is longer than twice its hole inset.
+/// The benches of a dragon. The scene constructs it and has checked that every length is positive and that each board
+/// is longer than twice its hole inset.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Team {
     /// The number of benches, at least 1; one less than the number of handles.
@@ -17,28 +17,28 @@ pub struct Team {
 }
 
 impl Team {
-    /// The number of handles.
+    /// Returns the number of handles.
     pub fn handles(&self) -> usize {
         self.benches + 1
     }
 
-    /// Metres between the two handles of a bench (0 = head).
+    /// Returns the metres between the two handles of a bench (0 = head).
     pub fn link(&self, bench: usize) -> f64 {
         let board = if bench == 0 { self.head_length } else { self.body_length };
         board - 2.0 * self.hole_inset
     }
 
-    /// Metres of the shorter of the two kinds of links.
+    /// Returns the length of the shorter kind of link, metres.
     pub fn shortest_link(&self) -> f64 {
         self.link(0).min(self.link(1))
     }
 
-    /// Metres of the longer of the two kinds of links.
+    /// Returns the length of the longer kind of link, metres.
     pub fn longest_link(&self) -> f64 {
         self.link(0).max(self.link(1))
     }
 
-    /// Metres from the first handle to the last when the team is stretched.
+    /// Returns the metres from the first handle to the last if the team is stretched.
     pub fn length(&self) -> f64 {
         self.link(0) + self.link(1) * (self.benches - 1) as f64
     }

@@ -1,13 +1,13 @@
-//! What a step of a link's front handle can be proven to hold, from the configurations at its two ends.
+//! Proofs about a step of a link's front handle, from the configurations at its two ends.
 //!
 //! In: a link and two of its configurations. Out: that the follower map is continuous over the step, or that it jumps,
-//! and how often the rear handle can turn round. Only [`super`] calls it.
+//! and the number of turns of the rear handle. Only [`super`] calls it.
 //!
 //! **Notation.** Front handle at travel s in [s0, s1], h = s1 - s0; a place u behind it; P the path, T its tangent;
 //! D(s, u) = |P(s) - P(u)|; L the link; k the greatest curvature of the path in the stretch concerned.
 //!
-//! **Continuous.** For fixed u, d2(D^2)/ds^2 = 2 (1 + (P(s) - P(u)) . P''(s)) lies within 2 (1 -+ k D), so over the step
-//!   D^2 <= max(ends) + max(0, k D - 1) h^2 / 4   and   D^2 >= min(ends) - (1 + k D) h^2 / 4.
+//! **Continuous.** For fixed u, d2(D^2)/ds^2 = 2 (1 + (P(s) - P(u)) . P''(s)) lies within 2 (1 -+ k D). So over the
+//! step D^2 <= max(ends) + max(0, k D - 1) h^2 / 4 and D^2 >= min(ends) - (1 + k D) h^2 / 4.
 //! 1. With the first bound, every place from the front handle back to a place `near` is nearer than L throughout the
 //!    step: D <= s - u as far as that is less than L, from there in steps back that D^2 cannot use up
 //!    ([`Link::nearer_throughout`]). So no nearer point comes to be at the link's distance.
@@ -22,14 +22,14 @@
 //! follower passes it: the follower map has a discontinuity in the step.
 //!
 //! **Turns.** With the rear cosine at least c, and m = max |f| over the step, the rear handle is at most m / c times as
-//! fast as the front one and the link turns by at most (1 + m / c) / L per metre, so |f'| <= k + (1 + m / c) / L, and
-//! m itself is at most max(ends) + |f'| h / 2. Then f has no zero where |f0| + |f1| > max |f'| h. Further, with signed
-//! curvature K and normal n, f' = K n . b + (1 - f^2 - v t . t') / L, |v| <= m / c, t and t' the parts of the two tangents
-//! across the link: where this keeps its sign, f has at most one zero.
+//! fast as the front one and the link turns by at most (1 + m / c) / L per metre, so |f'| <= k + (1 + m / c) / L, and m
+//! itself is at most max(ends) + |f'| h / 2. Then f has no zero where |f0| + |f1| > max |f'| h. Further, with signed
+//! curvature K and normal n, f' = K n . b + (1 - f^2 - v t . t') / L, |v| <= m / c, t and t' the parts of the two
+//! tangents across the link: where this keeps its sign, f has at most one zero.
 //!
-//! All these bounds tighten in proportion to the step, and what they have to beat (f, c, and how much a nearer point
-//! lacks) falls in proportion to the distance from a singular configuration, even where all of them vanish at once: the
-//! steps shrink in geometric progression towards it.
+//! All these bounds tighten in proportion to the step. The quantities that they must not exceed (f, c, and the
+//! difference of a nearer point's distance to L) fall in proportion to the distance from a singular configuration, even
+//! where all of them vanish at once: the steps shrink in geometric progression towards it.
 
 use crate::linkage::{NoFollower, follower, link_pose};
 use crate::model::curve::Curve;
@@ -65,36 +65,36 @@ pub(super) struct Configuration {
 }
 
 impl Configuration {
-    /// Whether the rear handle stands still or goes backward as the front one goes forward.
+    /// Returns true if the rear handle stands still or goes backward as the front one goes forward.
     pub fn is_stalled(&self) -> bool {
         self.front_cosine <= 0.0
     }
 }
 
-/// The curvature of the one segment on which the front handle is during a step.
+/// The curvature of the front handle's segment during a step.
 struct FrontCurvature {
     /// 1/m, not negative.
     least: f64,
     most: f64,
-    /// 1 where the segment turns left, -1 where it turns right.
+    /// 1 if the segment turns left, -1 if it turns right.
     side: f64,
 }
 
-/// From the front handle at both ends of a step to one place behind.
+/// Distances from the front handle at both ends of a step to one place behind.
 struct Distances {
     param: Param,
     /// 1/m, not negative.
     curvature: f64,
     /// The least square of the distance, m^2.
     square: f64,
-    /// The least q = T . (P(s) - P(u)), metres: by how much half the square grows per metre backward.
+    /// The least q = T . (P(s) - P(u)), metres: growth of half the square per metre backward.
     slope: f64,
     /// The greatest |q_u|: half the second derivative of the square by u.
     second_derivative_bound: f64,
 }
 
 impl Link<'_> {
-    /// The link with its front handle after so many metres of travel.
+    /// Returns the link with its front handle after `front` metres of travel.
     ///
     /// # Errors
     /// [`NoFollower`] at or inside the fold of an inward spiral.
@@ -102,7 +102,7 @@ impl Link<'_> {
         self.configuration_at(front, self.path.param_at(front))
     }
 
-    /// The same for a front handle whose place is known.
+    /// Does the same for a front handle whose place is known.
     pub fn configuration_at(&self, front: f64, front_param: Param) -> Result<Configuration, NoFollower> {
         let rear_param = follower(self.path, front_param, self.length)?;
         let pose = link_pose(self.path, front_param, rear_param, self.length);
@@ -118,17 +118,17 @@ impl Link<'_> {
         })
     }
 
-    /// What rounding can make of a place of the front handle, metres.
+    /// Returns the rounding of a place of the front handle, metres.
     pub fn resolution(&self, at: &Configuration) -> f64 {
         8.0 * f64::EPSILON * (at.front.abs() + self.length + at.front_point.coords.norm())
     }
 
-    /// What rounding can make of the square of a distance of about a link, m^2.
+    /// Returns the rounding of the square of a distance of about a link, m^2.
     fn rounding(&self, at: &Configuration) -> f64 {
         16.0 * f64::EPSILON * self.length * (self.length + at.front_point.coords.norm())
     }
 
-    /// Metres of travel of the front handle up to which its segment extends.
+    /// Returns the metres of travel of the front handle at the end of its segment.
     pub fn segment_end(&self, at: &Configuration) -> f64 {
         self.path.end_of(at.front_param.segment)
     }
@@ -141,8 +141,8 @@ impl Link<'_> {
         Some(self.segment_end(at)).filter(|end| is_steady && *end > at.front)
     }
 
-    /// Whether a step, during which the front handle is on one segment, is proven to be continuous and to hold no turn of
-    /// the rear handle, or one where the front cosines at its ends differ in sign.
+    /// Returns true if a step, during which the front handle is on one segment, is proven to be continuous and to
+    /// contain no turn of the rear handle, or one turn if the front cosines at its ends differ in sign.
     pub fn is_certain(&self, before: &Configuration, after: &Configuration) -> bool {
         let curvature = self.front_curvature(before, after);
         self.least_rear_cosine(before, after, curvature.most)
@@ -157,18 +157,19 @@ impl Link<'_> {
         FrontCurvature { least: first.min(last), most: first.max(last), side: segment.turning() }
     }
 
-    /// The least rear cosine over a step that is proven to be continuous; `curvature` is that at the front handle.
+    /// Returns the least rear cosine over a step that is proven to be continuous; `curvature` is that at the front
+    /// handle.
     fn least_rear_cosine(&self, before: &Configuration, after: &Configuration, curvature: f64) -> Option<f64> {
         let (link, step) = (self.length, after.front - before.front);
         let (rear_far, rear_near) = (before.rear.min(after.rear), before.rear.max(after.rear));
         let slope = before.rear_cosine.min(after.rear_cosine) * link;
         let second_derivative_bound =
             |reach: f64| 1.0 + link * self.path.max_curvature_between(rear_far - reach, rear_near + reach);
-        // Where the cosine is so small, rounding decides where the follower is.
+        // With a cosine this small, rounding decides the follower.
         if slope <= 0.0 || slope * slope <= 2.0 * second_derivative_bound(0.0) * self.rounding(before) {
             return None;
         }
-        // How far beyond the two followers: as little as the step needs, as long as rounding allows.
+        // Distance beyond the two followers: as little as the step needs, if rounding allows.
         let least_slack = 0.25 * slope / second_derivative_bound(0.25 * link);
         let slack = (0.25 * slope / second_derivative_bound(0.0)).min((rear_near - rear_far + step).max(least_slack));
         let reach = link + step + (rear_near - rear_far) + 2.0 * slack;
@@ -203,9 +204,9 @@ impl Link<'_> {
         }
     }
 
-    /// The most that q changes per metre of the rear handle between two places, `apart` metres from each other, `reach`
-    /// being the longest distance: |q_u| = |K n . (P(s) - P(u)) - 1|, on one segment from its values at the corners and
-    /// its own rates of change, |K (K q + n . T(s))| at most.
+    /// Returns an upper bound of the change of q per metre of the rear handle between two places, `apart` metres from
+    /// each other, with distances up to `reach`: |q_u| = |K n . (P(s) - P(u)) - 1|. On one segment it follows from the
+    /// values at the corners and their rates of change, |K (K q + n . T(s))| at most.
     fn largest_second_derivative(&self, ends: [&Distances; 2], apart: f64, step: f64, reach: f64) -> f64 {
         let [far, near] = ends;
         let curvature = far.curvature.max(near.curvature);
@@ -218,7 +219,7 @@ impl Link<'_> {
         1.0 + reach * self.path.max_curvature_between(place(far), place(near))
     }
 
-    /// Whether every place from the front handle back to `to` is nearer than the link throughout a step.
+    /// Returns true if every place from the front handle back to `to` is nearer than the link throughout a step.
     ///
     /// The square of the distance grows over the next x metres back by at most 2 slope x + bound x^2.
     fn nearer_throughout(&self, before: &Configuration, after: &Configuration, curvature: f64, to: f64) -> bool {
@@ -258,13 +259,13 @@ impl Link<'_> {
         true
     }
 
-    /// The greatest curvature of a segment from a place back to the segment's beginning.
+    /// Returns the greatest curvature of a segment from a place back to the segment's beginning.
     fn max_curvature_back(&self, segment: usize, from: Param) -> f64 {
         let curve = self.path.segment_at(segment);
         curve.curvature(if curve.tightens() { from.at } else { self.path.first(segment) })
     }
 
-    /// Whether the number of turns in a step is certain: 0 where the front cosines have one sign, else 1.
+    /// Returns true if the number of turns in a step is certain: 0 if the front cosines have one sign, else 1.
     fn turns_are_certain(
         &self,
         before: &Configuration,
@@ -294,7 +295,7 @@ impl Link<'_> {
         most < 1.0 && (least > 0.0 || largest < 0.0)
     }
 
-    /// A place that the rear handle is proven to jump over in a step.
+    /// Returns a place that the rear handle is proven to jump over in a step.
     pub fn jump(&self, before: &Configuration, after: &Configuration) -> Option<f64> {
         let step = after.front - before.front;
         let curvature = self.path.max_curvature_between(before.front, after.front);
@@ -308,12 +309,12 @@ impl Link<'_> {
     }
 }
 
-/// Places between two followers at which a proof of a jump is tried. Nearly all of them serve: up to the further follower
-/// everything is nearer than the link, in one of the two configurations at least.
+/// Places between two followers at which a proof of a jump is tried. Nearly all of them succeed: up to the further
+/// follower every place is nearer than the link, in one of the two configurations at least.
 const JUMP_SAMPLES: i32 = 32;
 
-/// By how much the square of a distance of at most `reach` can exceed its values at both ends of a step of the front
-/// handle.
+/// Returns the greatest excess of the square of a distance of at most `reach` over its values at both ends of a step of
+/// the front handle.
 fn largest_excess(curvature: f64, reach: f64, step: f64) -> f64 {
     0.25 * (curvature * reach - 1.0).max(0.0) * step * step
 }

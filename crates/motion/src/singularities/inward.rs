@@ -1,10 +1,10 @@
-//! A link on the inward spiral: its lock in closed form, its turns by bisection, however many turns the spiral has.
+//! A link on the inward spiral: its lock in closed form, its turns by bisection, for any number of turns of the spiral.
 //!
-//! In: a link whose path begins with an inward spiral. Out: the lock and the turns on that segment. Only the trace calls
-//! it.
+//! In: a link whose path begins with an inward spiral. Out: the lock and the turns on that segment. Only the trace
+//! calls it.
 //!
-//! **Lock.** The chord for fixed d grows with theta and up to its first maximum with d, so no nearer point ever comes to
-//! be at the link's distance, and the follower vanishes only at the fold (`Spiral::fold`).
+//! **Lock.** The chord for fixed d grows with theta and up to its first maximum with d, so no nearer point ever reaches
+//! the link's distance, and the follower vanishes only at the fold (`Spiral::fold`).
 //!
 //! **Turns.** With theta the front handle's angle and d the follower's from there, the front cosine has the sign of
 //! N = d + (theta + d) sin d (theta - t), t = tan(d/2), that is of sin d times g = theta^2 - (t - d) theta + d cot d.
@@ -13,11 +13,11 @@
 //!   g_d = (1 - t^2)/2 theta + cot d - d / sin^2 d < 0, so theta(d) grows. Inward d grows as theta falls, so the link
 //!   comes to the curve once: the stall.
 //! - pi <= d <= 3 pi/2: g > 0 and sin d < 0, the link is stalled.
-//! - 3 pi/2 < d < 2 pi: again one positive zero, at most sqrt(d |cot d|), so that (1 - t^2)/2 theta < d / sin^2 d and it
-//!   too grows with d: the link comes to that curve at most once, where the stall ends.
+//! - 3 pi/2 < d < 2 pi: again one positive zero, at most sqrt(d |cot d|), so that (1 - t^2)/2 theta < d / sin^2 d and
+//!   it too grows with d: the link comes to that curve at most once, where the stall ends.
 //!
 //! Before a fold d < 2 pi; without one the link is shorter than the pitch, and so d, which is link / a at the centre.
-//! From theta = max(1, link / a) outward sin(d/2) <= link / (2 r) <= 1/2, and there is neither.
+//! From theta = max(1, link / a) outward sin(d/2) <= link / (2 r) <= 1/2, and there are neither stalls nor locks.
 
 use std::f64::consts::PI;
 
@@ -27,23 +27,23 @@ use crate::model::root::bisect_predicate;
 
 use super::certificate::{Configuration, Link};
 
-/// What happens to a link while its front handle is on the inward spiral.
+/// The singular configurations of a link while its front handle is on the inward spiral.
 #[derive(Debug, Default)]
 pub(super) struct InwardSingularities {
     /// Metres of travel of the front handle at which the rear one turns round.
     pub turns: Vec<f64>,
-    /// The last place of the front handle at which there is a follower.
+    /// The last place of the front handle with a follower.
     pub lock: Option<f64>,
 }
 
-/// Metres of travel of the front handle up to which no link of this length has a singular configuration.
+/// Returns the metres of travel of the front handle up to which no link of this length has a singular configuration.
 pub(super) fn stall_free_until(link: &Link) -> f64 {
     let end = link.path.end_of(0);
     let free = link.path.segment_at(0).stall_free_until(link.length);
     free.map_or(end, |at| link.path.travelled(Param { segment: 0, at }).min(end))
 }
 
-/// The lock and the turns on the first segment of a link's path.
+/// Returns the lock and the turns on the first segment of a link's path.
 pub(super) fn singularities(link: &Link) -> InwardSingularities {
     let (from, end) = (stall_free_until(link), link.path.end_of(0));
     if from >= end {
@@ -52,7 +52,7 @@ pub(super) fn singularities(link: &Link) -> InwardSingularities {
     let inward = Inward { link, end, fold: link.path.segment_at(0).fold(link.length) };
     let lock = inward.last_solvable(from);
     let to = lock.unwrap_or(end);
-    // Past the curve on which it stalls; past the one on which the stall ends.
+    // Past the curve of the stall; past the curve on which the stall ends.
     let stalled = |travelled: f64| inward.configuration(travelled).is_none_or(|(at, d)| at.is_stalled() || d >= PI);
     let recovered = |travelled: f64| inward.configuration(travelled).is_some_and(|(at, d)| !at.is_stalled() && d >= PI);
     let mut turns = Vec::new();
@@ -82,7 +82,7 @@ impl Inward<'_> {
         }
     }
 
-    /// The configuration and the angle between its handles; `None` at and inside the fold.
+    /// Returns the configuration and the angle between its handles; `None` at and inside the fold.
     fn configuration(&self, travelled: f64) -> Option<(Configuration, f64)> {
         let front = self.param(travelled);
         if self.fold.is_some_and(|fold| front.at.high <= fold) {
@@ -92,7 +92,7 @@ impl Inward<'_> {
         Some((configuration, configuration.rear_param.at.minus(front.at)))
     }
 
-    /// The last place at which there is a follower: the fold, as far as doubles resolve it.
+    /// Returns the last place with a follower: the fold, as far as doubles resolve it.
     fn last_solvable(&self, from: f64) -> Option<f64> {
         let locked = |travelled: f64| self.configuration(travelled).is_none();
         locked(self.end).then(|| bisect_predicate(locked, from, self.end).next_down().max(from))

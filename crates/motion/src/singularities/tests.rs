@@ -47,7 +47,8 @@ fn is_stalled(path: &Path, front: f64, link: f64) -> (bool, f64) {
     (cosine <= 0.0, cosine)
 }
 
-/// Where between two places of the front handle the follower jumps, by halving the interval in which it goes further.
+/// Returns where between two places of the front handle the follower jumps, by halving the interval of the larger
+/// change.
 fn jump_between(path: &Path, link: f64, mut low: f64, mut high: f64) -> Option<f64> {
     let rear = |front| traced_follower(path, front, link);
     let (mut rear_low, mut rear_high) = (rear(low), rear(high));
@@ -99,7 +100,7 @@ fn route() -> Route {
     Path::route(Point::origin(), 0.0)
 }
 
-/// Asserts the first stall and the end, as metres of travel and link, to so many metres.
+/// Asserts the first stall and the end, as metres of travel and link, to `tolerance` metres.
 fn assert_events(path: &Path, team: &Team, stall: Option<(f64, u32)>, end: (f64, Option<u32>), tolerance: f64) {
     let found = search(path, team);
     let at = |event: &Event| (event.travelled, event.bench_a);
@@ -188,7 +189,7 @@ fn u_turns_as_wide_as_the_link_cost_no_more_than_others() {
                 let team = Team { benches: 9, head_length: link, body_length: link, width: 1e-4, hole_inset: 0.0 };
                 let found = Singularities::search(&path, &team, &mut budget);
                 let end = found.end.expect("the budget was spent");
-                // Nearer than some 1e-14 the jump, and then the stall, is below what doubles can resolve.
+                // Nearer than about 1e-14 the jump, and then the stall, is below the resolution of doubles.
                 if power > -14 {
                     let expected = if excess < 0.0 { EventKind::Lock } else { EventKind::PathEnd };
                     assert_eq!(end.kind, expected, "{link} {excess}");
@@ -233,7 +234,7 @@ fn u_turn(link: f64, radius: f64) -> Path {
     Path::route(Point::origin(), 0.0).line(4.0 * link).arc(Side::Left, radius, 0.5).line(10.0 * link).build().unwrap()
 }
 
-/// A narrow lobe to the left of the way, then most of a circle.
+/// A narrow lobe to the left of the path, then most of a circle.
 fn lobe(height: f64, apart: f64, radius: f64) -> Path {
     let small = 0.025002979881674117;
     let path = route().line(2.0).arc(Side::Left, small, 0.25).line(height).arc(Side::Right, small, 0.5).line(height);

@@ -1,13 +1,14 @@
-//! A link of one length as its front handle goes along the path: where the rear handle turns round, where it locks.
+//! A link of one length as its front handle goes along the path: the places where the rear handle turns round, and its
+//! lock.
 //!
-//! In: a link and where its front handle starts. Out: turns and end, in metres of travel of the front handle. The search
-//! advances it step by step. A step that is not certain is halved, the earlier half first, down to the resolution.
+//! In: a link and the start of its front handle. Out: turns and end, in metres of travel of the front handle. The
+//! search advances it step by step. An uncertain step is halved, the earlier half first, down to the resolution.
 //!
-//! **At the resolution.** A stretch that cannot be resolved begins where a step of a few units in the last place is not
-//! certain; each further step in it may be as long as the stretch is already, since near a degenerate configuration what
-//! rounding hides is in proportion to the distance from it. Over the whole stretch a jump is looked for, and the signs of
-//! the front cosine at its ends are compared. A lock is a proven jump, found to the last digit; all else is a graze.
-//! Jumps of less than some 1e-8 links and pairs of turns within one such stretch are below what doubles can resolve.
+//! **At the resolution.** An unresolved stretch begins where a step of a few units in the last place is uncertain. Each
+//! further step in it may be as long as the stretch is already, because near a degenerate configuration rounding hides
+//! a distance in proportion to the distance from it. Over the whole stretch a jump is searched, and the signs of the
+//! front cosine at its ends are compared. A lock is a proven jump, found to the last digit; everything else is a graze.
+//! Jumps of less than about 1e-8 links and pairs of turns within one such stretch are below the resolution of doubles.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -18,38 +19,38 @@ use super::super::event::Budget;
 use super::certificate::{Configuration, Link};
 use super::inward::{self, InwardSingularities};
 
-/// How a trace ends.
+/// The end of a trace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TraceEnd {
     /// The front handle is at the last place at which the link has a follower without a jump.
     Lock,
     /// The front handle is at the path's end.
     PathEnd,
-    /// The follower cannot be computed further on: the link is not traced beyond.
+    /// The follower cannot be computed further on: the trace ends here.
     Undecided,
 }
 
-/// What a bisection to the last digit costs, in links solved.
+/// Cost of a bisection to the last digit, in links solved.
 const BISECTION_WORK: u64 = 64;
 
-/// What each link's length of a winding way costs, in links solved.
+/// Cost of each link's length of a winding path, in links solved.
 const WINDING_WORK: f64 = 32.0;
 
-/// The longest step, in links: what the certificates allow.
+/// The longest step that the certificates allow, in links.
 const LONGEST_STEP: f64 = 0.5;
 
-/// The longest step, in links, that is taken without a proof in a stretch that cannot be resolved.
+/// The longest step, in links, that is taken without a proof in an unresolved stretch.
 const LONGEST_UNRESOLVED: f64 = 1e-6;
 
 /// A link traced along the path.
 pub(super) struct LinkTrace<'a> {
     link: Link<'a>,
     at: Configuration,
-    /// Configurations further on, the nearest last: the ends of steps that were not certain.
+    /// Configurations further on, the nearest last: the ends of uncertain steps.
     ahead: Vec<Configuration>,
-    /// Metres of the next step that is tried.
+    /// Length of the next step, metres.
     step: f64,
-    /// Where the stretch began that could not be resolved.
+    /// Beginning of the unresolved stretch.
     unresolved: Option<Configuration>,
     turns: Vec<f64>,
     furthest_rear: f64,
@@ -59,11 +60,11 @@ pub(super) struct LinkTrace<'a> {
 }
 
 impl<'a> LinkTrace<'a> {
-    /// Traces the path's first segment, where the singular configurations are known in closed form. `start` is where
-    /// the front handle starts, in metres of travel: turns before it are left out.
+    /// Traces the path's first segment, where the singular configurations are known in closed form. `start` is the
+    /// start of the front handle, in metres of travel: turns before it are left out.
     ///
     /// # Errors
-    /// [`NoFollower`] where the follower cannot be computed at the segment's end.
+    /// [`NoFollower`] if the follower cannot be computed at the segment's end.
     pub fn new(link: Link<'a>, start: Option<f64>) -> Result<Self, NoFollower> {
         let InwardSingularities { mut turns, lock } = inward::singularities(&link);
         turns.retain(|turn| start.is_none_or(|start| *turn > start));
@@ -75,32 +76,32 @@ impl<'a> LinkTrace<'a> {
         Ok(Self { link, at, ahead: Vec::new(), step, unresolved: None, turns, furthest_rear, work: 0, end })
     }
 
-    /// The link.
+    /// Returns the link.
     pub fn link(&self) -> &Link<'a> {
         &self.link
     }
 
-    /// How far the link is traced.
+    /// Returns the last traced configuration.
     pub fn at(&self) -> &Configuration {
         &self.at
     }
 
-    /// Metres of travel of the front handle at which the rear one turns round, in order.
+    /// Returns the metres of travel of the front handle at which the rear one turns round, in order.
     pub fn turns(&self) -> &[f64] {
         &self.turns
     }
 
-    /// The furthest that the rear handle has come, metres of travel.
+    /// Returns the furthest place of the rear handle, metres of travel.
     pub fn furthest_rear(&self) -> f64 {
         self.furthest_rear
     }
 
-    /// How the trace has ended; `None` while it can be advanced.
+    /// Returns the end of the trace; `None` while it can be advanced.
     pub fn end(&self) -> Option<TraceEnd> {
         self.end
     }
 
-    /// Tries one step; false where the budget is spent.
+    /// Tries one step. Returns false if the budget is spent.
     pub fn advance(&mut self, budget: &mut Budget) -> bool {
         if self.at.front >= self.link.path.length() {
             self.settle();
@@ -149,15 +150,16 @@ impl<'a> LinkTrace<'a> {
         configuration
     }
 
-    /// What a link costs besides, in links solved, whose handles have a winding way between them: the search for the rear
-    /// handle and the proof that it is the first go all of it, in small steps where places are nearly as far as the link.
+    /// Returns the additional cost of a link, in links solved, if the path between its handles is winding. The search
+    /// for the rear handle and the proof that it is the first cover this whole path, in small steps where places are
+    /// nearly as far as the link.
     fn winding(&self, at: &Configuration) -> u64 {
         let links = (at.front - at.rear) / self.link.length;
-        // A path that bends by half a turn at most is no longer than pi / 2 links; not a number is 0.
+        // A path that bends by half a turn at most is at most pi / 2 links long; NaN becomes 0.
         (WINDING_WORK * (links - FRAC_PI_2).max(0.0)) as u64
     }
 
-    /// Goes to a configuration and chooses the next step: twice as long as this one, if that was not cut short.
+    /// Goes to a configuration and chooses the next step: twice as long as this one, if this one was not cut short.
     fn move_to(&mut self, next: Configuration) {
         self.step = self.step.max(2.0 * (next.front - self.at.front)).min(LONGEST_STEP * self.link.length);
         self.furthest_rear = self.furthest_rear.max(next.rear);
@@ -165,13 +167,13 @@ impl<'a> LinkTrace<'a> {
         self.ahead.pop();
     }
 
-    /// The longest step that may be taken without a proof, metres.
+    /// Returns the longest step that may be taken without a proof, metres.
     fn finest_step(&self) -> f64 {
         let stretch = self.unresolved.map_or(0.0, |start| self.at.front - start.front);
         stretch.min(LONGEST_UNRESOLVED * self.link.length).max(self.link.resolution(&self.at))
     }
 
-    /// Takes a step that is too short to be halved: over a proven jump, which is a lock, or on.
+    /// Takes a step that is too short to be halved: over a proven jump, which is a lock, or further.
     fn cross_unresolved(&mut self, next: Configuration) {
         let at = self.at;
         let start = *self.unresolved.get_or_insert(at);
@@ -198,14 +200,14 @@ impl<'a> LinkTrace<'a> {
         self.end = Some(TraceEnd::Lock);
     }
 
-    /// Ends the stretch that could not be resolved, if there is one.
+    /// Ends the unresolved stretch, if there is one.
     fn settle(&mut self) {
         if let Some(start) = self.unresolved.take() {
             self.record_turn(start, self.at);
         }
     }
 
-    /// Records a turn where the front cosine changes its sign between two configurations.
+    /// Records a turn if the front cosine changes its sign between two configurations.
     fn record_turn(&mut self, before: Configuration, after: Configuration) {
         if before.is_stalled() == after.is_stalled() {
             return;

@@ -1,6 +1,6 @@
 //! The safe solver: exact motion along the arc, each follower found by a bracketed Newton iteration.
 //!
-//! It is right wherever there is an answer, and every faster solver falls back to it.
+//! It is right wherever there is a solution, and every faster solver falls back to it.
 
 use super::{Chain, Solver, Velocities};
 use crate::linkage::{NoFollower, follower, link_pose};
@@ -9,7 +9,7 @@ use crate::model::elementary;
 use crate::model::path::{Param, Path};
 use crate::model::team::Team;
 
-/// One handle after another along the path, each from scratch.
+/// Solves one handle after another along the path, independently of earlier frames.
 #[derive(Debug, Clone)]
 pub struct Newton {
     path: Path,
@@ -19,18 +19,18 @@ pub struct Newton {
 }
 
 impl Newton {
-    /// A solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve.
+    /// Creates a solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve.
     pub fn new(path: Path, team: Team, head_speed: f64, velocities: Velocities) -> Self {
         Self { path, team, head_speed, velocities }
     }
 
-    /// Fills `chain` with the state when the head has travelled so many metres, whatever the time.
+    /// Fills `chain` with the state when the head has travelled `travelled` metres, independent of the time.
     ///
     /// Speeds come from rigidity: both ends of a link have the same velocity along it,
     /// v_{i+1} (t_{i+1} . b_i) = v_i (t_i . b_i).
     ///
     /// # Errors
-    /// [`NoFollower`] where a link is locked; `chain` is then unspecified.
+    /// [`NoFollower`] if a link is locked; `chain` is then unspecified.
     pub fn solve_at(&self, travelled: f64, chain: &mut Chain) -> Result<(), NoFollower> {
         let mut front = self.path.param_at(travelled);
         let mut speed = self.head_speed;
@@ -63,7 +63,7 @@ impl Newton {
     }
 }
 
-/// The angle of a direction in (-pi, pi]: minus pi, which atan2 gives for a negative zero, is turned to pi.
+/// Returns the angle of a direction in (-pi, pi]: minus pi, which atan2 gives for a negative zero, becomes pi.
 pub(super) fn heading(direction: Vector) -> f64 {
     let angle = elementary::atan2(direction.y, direction.x);
     if angle == -std::f64::consts::PI { std::f64::consts::PI } else { angle }

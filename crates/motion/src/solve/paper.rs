@@ -1,11 +1,11 @@
-//! The paper's solver, with its rules and its errors, so that its tables can be reproduced and its cost measured.
+//! The paper's solver, with its rules and its errors, to reproduce its tables and measure its cost.
 //!
-//! Three rules set it apart from exact motion:
-//! - The head's polar angle advances by Euler steps of v dt / r, which forgets the radial part: the head really moves
-//!   at v sqrt(1 + 1/theta^2). A printed time t is the state after t/dt + 1 steps.
+//! Three rules differ from exact motion:
+//! - The head's polar angle advances by Euler steps of v dt / r, without the radial part: the head really moves at v
+//!   sqrt(1 + 1/theta^2). A printed time t is the state after t/dt + 1 steps.
 //! - Each follower is found by bisection on the polar angle (section 3.1, step 3).
-//! - Speeds are the displacement over an interval of 0.2 s, divided by it (equation 4). Differences taken backwards fit
-//!   the printed Table 2, and explain its column of zeros at t = 0.
+//! - Speeds are the displacement over an interval of 0.2 s, divided by it (equation 4). Backward differences fit the
+//!   printed Table 2, and explain its column of zeros at t = 0.
 
 use std::f64::consts::PI;
 
@@ -15,7 +15,7 @@ use crate::model::elementary::{atan2, cos, hypot, sin};
 use crate::model::spiral::Spiral;
 use crate::model::team::Team;
 
-/// The numbers the paper chose, which a scene may change.
+/// The parameters of the paper, which a scene may change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PaperRules {
     /// Seconds of one Euler step of the head.
@@ -45,8 +45,8 @@ pub struct Paper {
 }
 
 impl Paper {
-    /// A solver for `team` on the inward `spiral`, starting at the polar angle `start`, the head moving at a nominal
-    /// `head_speed` metres per second.
+    /// Creates a solver for `team` on the inward `spiral`, starting at the polar angle `start`, the head moving at a
+    /// nominal `head_speed` metres per second.
     pub fn new(
         spiral: Spiral,
         start: f64,
@@ -61,8 +61,8 @@ impl Paper {
     }
 }
 
-/// The head's polar angle by Euler steps; remembers the last one computed, so that a running show pays only for the
-/// steps since. The angle after n steps does not depend on earlier calls.
+/// The head's polar angle by Euler steps. It stores the last angle, so that a running show computes only the steps
+/// since. The angle after n steps does not depend on earlier calls.
 #[derive(Debug, Clone)]
 struct EulerHead {
     start: f64,
@@ -78,7 +78,7 @@ impl EulerHead {
         Self { start, time_step, advance: head_speed * time_step / spiral.radius_per_radian(), steps: 0, theta: start }
     }
 
-    /// The angle at a printed time, radians; 0 once the centre is reached.
+    /// Returns the angle at a printed time, radians; 0 once the centre is reached.
     fn theta_at(&mut self, time: f64) -> f64 {
         let steps = (time / self.time_step).round() as u64 + 1;
         if steps < self.steps {
@@ -97,18 +97,18 @@ impl EulerHead {
     }
 }
 
-/// Seconds after which the paper's head comes from the polar angle `start` to `theta`, as dt goes to 0: from
-/// d theta/dt = -v / (a theta), t = a (theta_0^2 - theta^2) / 2 v.
+/// Returns the seconds after which the paper's head comes from the polar angle `start` to `theta`, as dt goes to 0:
+/// from d theta/dt = -v / (a theta), t = a (theta_0^2 - theta^2) / 2 v.
 pub fn time_of_theta(spiral: &Spiral, start: f64, head_speed: f64, theta: f64) -> f64 {
     0.5 * spiral.radius_per_radian() * (start - theta) * (start + theta) / head_speed
 }
 
-/// The angle to the follower of a handle at `theta` by bisection to `tolerance`, radians.
+/// Finds the angle to the follower of a handle at `theta` by bisection to `tolerance`, radians.
 fn bisected_follower_angle(spiral: &Spiral, theta: f64, link: f64, tolerance: f64) -> Result<f64, NoFollower> {
     let residual = spiral.chord_residual(spiral.radius_per_radian() * theta, link);
     let (mut low, mut high) = (0.0, PI);
     if residual(high).0 < 0.0 {
-        // Beyond half a turn the paper's search has no bracket: leave it to the safe one.
+        // Beyond half a turn the paper's search has no bracket: the safe search applies.
         return spiral.follower_angle(spiral.radius_per_radian() * theta, link);
     }
     while high - low > tolerance {
@@ -162,7 +162,7 @@ impl Solver for Paper {
             let vy = (chain.y[handle] - earlier.y[handle]) / rules.difference_interval;
             chain.vx[handle] = vx;
             chain.vy[handle] = vy;
-            // The paper knows no direction; travel is clockwise, so the sign is that of r x v, turned round.
+            // The paper has no direction; travel is clockwise, so the sign is that of r x v, reversed.
             let turning = chain.y[handle] * vx - chain.x[handle] * vy;
             chain.speed[handle] = if turning < 0.0 { -hypot(vx, vy) } else { hypot(vx, vy) };
         }

@@ -1,9 +1,9 @@
-//! The chain to more than 30 digits, by a method of its own: what the solvers are measured against.
+//! The chain to more than 30 digits, by an independent method: the solvers are measured against it.
 //!
 //! In: a path by the numbers of the scene, a team and a time. Out: every handle as sums of two doubles. Points are
-//! Cartesian, the condition on a follower is the plain distance of two points, nothing is rearranged to save digits:
-//! there are enough of them. It shares nothing with the path, the linkage and the solvers in doubles but their names.
-//! It takes some milliseconds per frame. `trade` and tests call it.
+//! Cartesian, and the condition on a follower is the plain distance of two points; no formula is rearranged to save
+//! digits. It shares only names with the path, the linkage and the solvers in doubles. It takes some milliseconds per
+//! frame. `trade` and tests call it.
 
 mod path;
 mod real;
@@ -38,29 +38,29 @@ pub struct Reference {
     head_speed: f64,
 }
 
-/// A handle in its place on the path.
+/// A handle on the path.
 struct Seat {
     segment: usize,
     place: RealParam,
-    /// What the coordinate gains per second.
+    /// Change of the coordinate per second.
     rate: Real,
 }
 
 impl Reference {
-    /// The reference for `team` on the path of `description`, the head moving at `head_speed` metres per second along
-    /// the curve.
+    /// Creates the reference for `team` on the path of `description`, the head moving at `head_speed` metres per second
+    /// along the curve.
     ///
     /// # Errors
-    /// A sentence where there is no memory for the constants pi and ln 2.
+    /// A sentence if there is no memory for the constants pi and ln 2.
     pub fn new(team: Team, description: &PathDescription, head_speed: f64) -> Result<Self, String> {
         Ok(Self { team, path: RealPath::new(description)?, head_speed })
     }
 
-    /// All handles at `time` simulated seconds, the head first.
+    /// Returns all handles at `time` simulated seconds, the head first.
     ///
     /// # Errors
-    /// [`NoFollower`] where a link has no follower; where its front handle is on an inward spiral, on the first rise of
-    /// the chord.
+    /// [`NoFollower`] if a link has no follower; if its front handle is on an inward spiral, on the first rise of the
+    /// chord.
     pub fn handles(&mut self, time: f64) -> Result<Vec<ReferenceHandle>, NoFollower> {
         Ok(self.seats(time)?.iter().map(|seat| self.handle(seat)).collect())
     }
@@ -89,14 +89,14 @@ impl Reference {
         Ok(seats)
     }
 
-    /// The first place behind at the link's distance: a guess by walking back in doubles, then Newton's method.
+    /// Returns the first place behind at the link's distance: a guess by a walk back in doubles, then Newton's method.
     ///
-    /// The guess is the first one up to the rounding of doubles. That of Newton's method is taken to be the same where
-    /// it is within a millionth of the link and the distance grows backward there.
+    /// The guess is the first place up to the rounding of doubles. The result of Newton's method counts as the same
+    /// place if it is within a millionth of the link and the distance grows backward there.
     fn follower(&mut self, segment: usize, front: &RealParam, link: f64) -> Result<(usize, RealParam), NoFollower> {
         let (mut segment, guess) = self.guess(segment, front, link)?;
         let mut place = self.settled(segment, front, guess.clone(), link)?;
-        // Near a junction the place may be on a neighbour of the segment on which the guess is.
+        // Near a junction the place may be on a segment next to that of the guess.
         for _ in 0..self.path.segments() {
             let Some((neighbour, junction)) = self.neighbour(segment, &place) else { break };
             segment = neighbour;
@@ -120,8 +120,8 @@ impl Reference {
         Err(NoFollower)
     }
 
-    /// Newton's method on the square of the distance from `front`, from a place on a segment, which is taken to
-    /// continue beyond its ends.
+    /// Newton's method on the square of the distance from `front`, from a place on a segment, which continues beyond
+    /// its ends.
     fn settled(
         &mut self,
         segment: usize,
@@ -137,7 +137,7 @@ impl Reference {
             let step = -(excess / (Real::from(2.0) * place.slope.dot(&offset)));
             place = self.path.moved(segment, &place, &step);
             let metres = step.rounded().abs() * place.slope.rounded().norm();
-            // The next step would be the square of this one.
+            // The next step is the square of this one.
             if metres <= 1e-20 * link {
                 return Ok(place);
             }
@@ -145,7 +145,7 @@ impl Reference {
         Err(NoFollower)
     }
 
-    /// Where a place is beyond an end of its segment: the neighbour there and the place on it where the two join.
+    /// Returns the neighbouring segment beyond whose end a place is, and the place on it where the two join.
     fn neighbour(&self, segment: usize, place: &RealParam) -> Option<(usize, RealParam)> {
         let on = self.path.segment(segment);
         let ahead = on.curve.forward() * (&place.at - &on.last.at).rounded();

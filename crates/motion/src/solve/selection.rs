@@ -1,13 +1,13 @@
-//! Selects the table for a requested accuracy: of those measured to meet it on this very path and team, the one that
-//! reads the fewest bytes a handle.
+//! Selects the table for a requested accuracy: the one that reads the fewest bytes per handle of those measured to meet
+//! the accuracy on this path with this team.
 //!
-//! In: the motion and the requested accuracy. Out: a table with what was measured of it. The same request gives the
-//! same table in every run: cost is counted in bytes, never timed. [`crate`] and `trade` call it.
+//! In: the motion and the requested accuracy. Out: a table with its measured error. The same request gives the same
+//! table in every run: cost is counted in bytes, never timed. [`crate`] and `trade` call this module.
 //!
-//! Every candidate starts from one table of T whose own polynomials are off by a sixteenth of the requested accuracy.
-//! What a format loses of them is bounded over all phases while it is made; then frames are compared with the safe
-//! solver's at moments over the whole way, junctions and the last metres of the table included. Half the requested
-//! accuracy is left for what lies between these moments.
+//! Every candidate starts from one table of T whose polynomials have an error of a sixteenth of the requested accuracy.
+//! The loss of a format is bounded over all phases while the format is made. Then frames are compared with the safe
+//! solver's at test points over the whole path, junctions and the last metres of the table included. Half the requested
+//! accuracy is left for the error between test points.
 
 use std::time::{Duration, Instant};
 
@@ -18,41 +18,41 @@ use crate::model::elementary::hypot;
 use crate::model::path::Path;
 use crate::model::team::Team;
 
-/// Moments at which frames are compared, at most: spread over the way; at each junction; and towards the table's end.
-const SPREAD_MOMENTS: usize = 200;
-const JUNCTION_MOMENTS: usize = 60;
-const LAST_MOMENTS: usize = 12;
+/// Greatest numbers of test points: spread over the path, at each junction, and towards the table's end.
+const SPREAD_TEST_POINTS: usize = 200;
+const JUNCTION_TEST_POINTS: usize = 60;
+const LAST_TEST_POINTS: usize = 12;
 
-/// Handles that the safe solver may solve for the comparison: some 0.1 s. Larger teams are compared at fewer moments.
+/// Handles that the safe solver may solve for the comparison, about 0.1 s. Larger teams have fewer test points.
 const MOST_HANDLES: usize = 500_000;
 
-/// Moments, at least.
-const FEWEST_MOMENTS: usize = 4;
+/// The least number of test points.
+const FEWEST_TEST_POINTS: usize = 4;
 
-/// The coarsest accuracy that is used as requested, in links. Coarser ones would make the live clearance test dozens of
-/// pairs a frame, which costs more than the frame itself can save.
+/// The coarsest accuracy that is used as requested, in links. With a coarser one the live clearance would test dozens
+/// of pairs per frame, which costs more than the frame saves.
 const COARSEST: f64 = 1e-3;
 
 /// Requested accuracies up to this, metres, get links to 1e-12 of their length.
 pub const EXACT_LINKS: f64 = 1e-9;
 
-/// Requested accuracies up to this, metres, get the most exact table: rounding along the chain is as much.
+/// Requested accuracies up to this, metres, get the most exact table: rounding along the chain is as large.
 const FINEST: f64 = 2e-12;
 
-/// What speeds may be off, relative to themselves, where links are exact: both ends of a link agree to so much.
+/// The relative error of speeds if links are exact: both ends of a link agree to this.
 const FINEST_SPEED: f64 = 1e-11;
 
-/// Parts of the requested accuracy: for the polynomials of T, for the format, and what may be measured of both.
+/// Parts of the requested accuracy: for the polynomials of T, for the format, and for the measured sum of both.
 const SHARE_OF_ROWS: f64 = 1.0 / 16.0;
 const SHARE_OF_FORMAT: f64 = 3.0 / 8.0;
 const SHARE_MEASURED: f64 = 0.5;
 
-/// Metres by which links may be off, besides rounding, at a requested accuracy: both ends may be off by as much.
+/// Returns the metres by which links may be off, besides rounding, at a requested accuracy: twice that of a handle.
 pub fn link_tolerance(team: &Team, accuracy: f64) -> f64 {
     if accuracy > EXACT_LINKS { 2.0 * accuracy.min(COARSEST * team.shortest_link()) } else { 0.0 }
 }
 
-/// A table and what was measured of it.
+/// A table and its measured error.
 pub struct Selection {
     /// The solver.
     pub table: FollowerTable,
@@ -60,38 +60,37 @@ pub struct Selection {
     pub accuracy: f64,
     /// Metres: the largest distance of a handle from the safe solver's.
     pub error: f64,
-    /// Metres that the measured error may be: what the requested accuracy leaves, or what doubles allow where that is
-    /// more.
+    /// Greatest measured error that is accepted, metres: the share of the requested accuracy, or the rounding of
+    /// doubles if that is more.
     pub allowed: f64,
-    /// Moments at which it was measured.
-    pub moments: usize,
-    /// How long it took to make, all that was tried included, and to measure.
+    /// The number of test points.
+    pub test_points: usize,
+    /// Time to make all candidates and to measure them.
     pub made_in: Duration,
 }
 
 impl Selection {
-    /// Whether the measured error meets the requested accuracy.
+    /// Returns true if the measured error meets the requested accuracy.
     pub fn meets(&self) -> bool {
         self.error <= self.allowed
     }
 
-    /// Whether rounding alone can exceed the requested accuracy where the error is the largest part of what is allowed.
+    /// Returns true if rounding alone can exceed the requested accuracy at the handle with the largest relative error.
     pub fn is_at_the_floor(&self) -> bool {
         self.allowed > self.accuracy
     }
 }
 
-/// The cheapest table for `accuracy` metres, or the most exact one where none is as exact; `None` where there is no
+/// Returns the cheapest table for `accuracy` metres, or the most exact one if none meets it; `None` if there is no
 /// table for this team and path.
 ///
 /// Positions are within max(accuracy, 8 eps (r + distance travelled)); headings within 2 accuracy / link; velocities
-/// within 10 accuracy / link of a handle's speed, so that a tenth of a link's way further on they lead no farther
-/// astray.
+/// within 10 accuracy / link of a handle's speed, so that extrapolation over a tenth of a link adds one accuracy.
 pub fn cheapest(path: &Path, team: Team, head_speed: f64, velocities: Velocities, accuracy: f64) -> Option<Selection> {
     cheapest_with(path, team, head_speed, velocities, accuracy, Instructions::fastest(team.handles()))
 }
 
-/// [`cheapest`] with other instructions; `None` too where this processor lacks them.
+/// Returns [`cheapest`] with other instructions; also `None` if this processor lacks them.
 pub fn cheapest_with(
     path: &Path,
     team: Team,
@@ -111,8 +110,8 @@ pub fn cheapest_with(
     let measurement = ErrorMeasurement::new(path, team, head_speed, &rows);
     let select = |table: FollowerTable| {
         let (error, allowed) = measurement.error(&table, accuracy);
-        let (moments, made_in) = (measurement.moments.len(), began.elapsed());
-        Selection { table: table.promising(accuracy), accuracy, error, allowed, moments, made_in }
+        let (test_points, made_in) = (measurement.test_points.len(), began.elapsed());
+        Selection { table: table.promising(accuracy), accuracy, error, allowed, test_points, made_in }
     };
     if accuracy > EXACT_LINKS {
         let link = team.shortest_link();
@@ -129,11 +128,11 @@ pub fn cheapest_with(
     let selection = select(rows);
     let selection =
         if selection.meets() || tolerance == Tolerance::EXACT { selection } else { select(make(Tolerance::EXACT)?) };
-    // One that is off by more than every table promises is no table.
+    // A larger error than every table promises means that the table is wrong.
     (selection.error <= selection.allowed.max(EXACT_ACCURACY)).then_some(selection)
 }
 
-/// How exact the rows of a table have to be for a requested accuracy.
+/// Returns the tolerance of a table's rows for a requested accuracy.
 fn tolerance(team: &Team, accuracy: f64) -> Tolerance {
     let exact = Tolerance::EXACT;
     if accuracy <= FINEST {
@@ -148,13 +147,14 @@ fn tolerance(team: &Team, accuracy: f64) -> Tolerance {
     }
 }
 
-/// Where the safe solver has the handles at some moments.
+/// The safe solver's handles at the test points.
 struct ErrorMeasurement {
     head_speed: f64,
-    moments: Vec<Moment>,
+    test_points: Vec<TestPoint>,
 }
 
-struct Moment {
+/// The safe solver's chain at one time: seconds, metres.
+struct TestPoint {
     time: f64,
     x: Vec<f64>,
     y: Vec<f64>,
@@ -164,29 +164,29 @@ impl ErrorMeasurement {
     fn new(path: &Path, team: Team, head_speed: f64, table: &FollowerTable) -> Self {
         let times = times(path, &team, head_speed, table.valid_until());
         let newton = Newton::new(path.clone(), team, head_speed, Velocities::Omitted);
-        let solve = |times: &[f64]| -> Vec<Moment> {
+        let solve = |times: &[f64]| -> Vec<TestPoint> {
             let mut chain = Chain::new(team.handles());
             let solved = times.iter().filter_map(|&time| {
                 newton.solve_at(head_speed * time, &mut chain).ok()?;
-                Some(Moment { time, x: chain.x.clone(), y: chain.y.clone() })
+                Some(TestPoint { time, x: chain.x.clone(), y: chain.y.clone() })
             });
             solved.collect()
         };
         let (first, second) = times.split_at(times.len() / 2);
-        let moments = std::thread::scope(|scope| {
+        let test_points = std::thread::scope(|scope| {
             let second = scope.spawn(|| solve(second));
-            let mut moments = solve(first);
-            moments.extend(second.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-            moments
+            let mut test_points = solve(first);
+            test_points.extend(second.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+            test_points
         });
-        Self { head_speed, moments }
+        Self { head_speed, test_points }
     }
 
-    /// The largest error, and what is allowed where it is largest as a part of that, metres.
+    /// Returns the error of the handle with the largest ratio of error to allowed error, and its allowed error, metres.
     fn error(&self, table: &FollowerTable, accuracy: f64) -> (f64, f64) {
         let mut table = table.clone();
         let mut worst = (0.0, SHARE_MEASURED * accuracy);
-        for Moment { time, x, y } in &self.moments {
+        for TestPoint { time, x, y } in &self.test_points {
             let mut chain = Chain::new(x.len());
             if table.solve(*time, &mut chain).is_err() {
                 return (f64::INFINITY, worst.1);
@@ -204,13 +204,13 @@ impl ErrorMeasurement {
     }
 }
 
-/// The times at which frames are compared, seconds, all within the table.
+/// Returns the times of the test points, seconds, all within the table.
 fn times(path: &Path, team: &Team, head_speed: f64, end: f64) -> Vec<f64> {
-    let most = (MOST_HANDLES / team.handles()).max(FEWEST_MOMENTS);
-    let spread = SPREAD_MOMENTS.min(most.div_ceil(2));
+    let most = (MOST_HANDLES / team.handles()).max(FEWEST_TEST_POINTS);
+    let spread = SPREAD_TEST_POINTS.min(most.div_ceil(2));
     let mut times: Vec<f64> = (0..spread).map(|k| end * k as f64 / spread as f64).collect();
-    // Each a quarter of the way that was left before.
-    let last = LAST_MOMENTS.min(most.div_ceil(2));
+    // Each leaves a quarter of the time that the one before left.
+    let last = LAST_TEST_POINTS.min(most.div_ceil(2));
     times.extend((1..=last).map(|k| end * (1.0 - 0.25f64.powi(k as i32))));
     let (head, link) = (team.link(0), team.link(1));
     let crossings = path
@@ -218,7 +218,7 @@ fn times(path: &Path, team: &Team, head_speed: f64, end: f64) -> Vec<f64> {
         .flat_map(|at| [-0.25 * link, 1e-3 * link, 0.5 * link, head, head + 0.4 * link].map(|by| at + by));
     let crossings: Vec<f64> =
         crossings.map(|metres| metres / head_speed).filter(|time| (0.0..end).contains(time)).collect();
-    let wanted = JUNCTION_MOMENTS.min(most.div_ceil(4));
+    let wanted = JUNCTION_TEST_POINTS.min(most.div_ceil(4));
     let step = crossings.len().div_ceil(wanted).max(1);
     times.extend(crossings.into_iter().step_by(step));
     times.sort_by(f64::total_cmp);

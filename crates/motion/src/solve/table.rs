@@ -1,9 +1,9 @@
-//! The cheapest solver: a table of where a chain of equal links stands, made once, in which every frame is interpolated.
+//! The cheapest solver: every frame is interpolated in a table of the places of a chain of equal links, made once.
 //!
 //! In: the time. Out: the chain, as exact as the safe solver's, on any path that begins with a straight line or an
-//! inward spiral. A frame of the table does not depend on the ones before. The table is as good as it was found to be
-//! when it was made; past that, in the last metres before a lock or a stall within the body, the safe solver does the
-//! work, and [`FollowerTable::fallbacks`] counts how often. The show calls it through [`Solver`].
+//! inward spiral. A frame does not depend on earlier frames. The table covers the travel for which it was measured to
+//! be exact. Beyond it, in the last metres before a lock or a stall within the body, the safe solver is used, and
+//! [`FollowerTable::fallbacks`] counts these frames. The show calls the table through [`Solver`].
 
 mod band;
 mod beginning;
@@ -22,7 +22,7 @@ mod track;
 use std::sync::Arc;
 
 use head::{HeadBuilder, HeadTable};
-use kernel::{Moment, within_half_turn};
+use kernel::{FrameInput, within_half_turn};
 use packed::PackedRows;
 pub(crate) use packed::{Allowed, Format};
 pub(crate) use rows::Tolerance;
@@ -42,12 +42,12 @@ pub enum Instructions {
     Avx512,
     /// 256-bit vectors with fused multiply-add.
     Avx2,
-    /// What every processor of the architecture has.
+    /// The instructions of every processor of the architecture.
     Portable,
 }
 
 impl Instructions {
-    /// All code paths that this processor can run, the fastest first.
+    /// Returns all code paths that this processor can run, the fastest first.
     pub fn available() -> Vec<Self> {
         [Self::Avx512, Self::Avx2, Self::Portable]
             .into_iter()
@@ -55,20 +55,20 @@ impl Instructions {
             .collect()
     }
 
-    /// The fastest for frames of so many handles. Large ones wait for memory, and the wider stores then cost a tenth:
-    /// each lies across two cache lines.
+    /// Returns the fastest instructions for frames of `handles` handles. Large frames wait for memory, and 512-bit
+    /// stores, which each cross a cache line, then take a tenth more time.
     pub(crate) fn fastest(handles: usize) -> Self {
         const LARGE: usize = 10_000;
         let fastest = |instructions: &Self| *instructions != Self::Avx512 || handles < LARGE;
         Self::available().into_iter().find(fastest).unwrap_or(Self::Portable)
     }
 
-    /// The instructions of this [`name`](Self::name).
+    /// Returns the instructions of this [`name`](Self::name).
     pub fn of_name(name: &str) -> Option<Self> {
         [Self::Avx512, Self::Avx2, Self::Portable].into_iter().find(|instructions| instructions.name() == name)
     }
 
-    /// The name for people and recordings.
+    /// Returns the name for people and recordings.
     pub fn name(self) -> &'static str {
         match self {
             Self::Avx512 => "AVX-512",
@@ -77,7 +77,7 @@ impl Instructions {
         }
     }
 
-    /// Whether this processor has them.
+    /// Returns true if this processor has these instructions.
     #[cfg(target_arch = "x86_64")]
     pub fn is_available(self) -> bool {
         let avx2 = || is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
@@ -93,7 +93,7 @@ impl Instructions {
         }
     }
 
-    /// Whether this processor has them.
+    /// Returns true if this processor has these instructions.
     #[cfg(not(target_arch = "x86_64"))]
     pub fn is_available(self) -> bool {
         self == Self::Portable
@@ -102,8 +102,7 @@ impl Instructions {
 
 /// A table of the follower map.
 ///
-/// Within the table the same times give the same bits on the same [`Instructions`], whichever frames were solved
-/// before.
+/// Within the table the same times give the same bits on the same [`Instructions`], independent of earlier frames.
 #[derive(Debug, Clone)]
 pub struct FollowerTable {
     head_speed: f64,
@@ -111,30 +110,30 @@ pub struct FollowerTable {
     instructions: Instructions,
     /// Shared, so that a clone costs little.
     rows: Arc<Rows>,
-    /// What frames are read from where it is not the rows.
+    /// The packed rows, if frames are read from them.
     packed: Option<Arc<PackedRows>>,
     head: Arc<HeadTable>,
     newton: Newton,
     fallbacks: u64,
-    /// Metres that its frames are off at most.
+    /// Greatest error of its frames, metres.
     accuracy: f64,
     exact_bytes_per_handle: f64,
 }
 
-/// Metres that the frames of a table as exact as doubles allow are off at most, on any path but the farthest.
+/// Greatest error of the frames of the most exact table, metres, on any path but the farthest.
 pub(crate) const EXACT_ACCURACY: f64 = 1e-9;
 
 impl FollowerTable {
-    /// A solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve, as exact as
-    /// doubles allow, with the fastest instructions this processor has.
+    /// Makes a solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve, as exact
+    /// as doubles allow, with the fastest instructions of this processor.
     ///
-    /// `None` where there is no such table: for a single bench, for a team so long that the table would not fit, and
-    /// where it was found not to be exact even at the start.
+    /// Returns `None` if there is no such table: for a single bench, for a team so long that the table would exceed its
+    /// limit, and if the table is not exact even at the start.
     pub fn new(path: &Path, team: Team, head_speed: f64, velocities: Velocities) -> Option<Self> {
         Self::with_tolerance(path, team, head_speed, velocities, Tolerance::EXACT)
     }
 
-    /// The same at the requested accuracy.
+    /// Does the same at the requested accuracy.
     pub(crate) fn with_tolerance(
         path: &Path,
         team: Team,
@@ -167,38 +166,39 @@ impl FollowerTable {
         })
     }
 
-    /// The same solver with other instructions, or `None` where this processor lacks them.
+    /// Returns the same solver with other instructions, or `None` if this processor lacks them.
     pub fn with_instructions(self, instructions: Instructions) -> Option<Self> {
         instructions.is_available().then_some(Self { instructions, ..self })
     }
 
-    /// The same solver with its frames read from another format; `None` where that would lose more than is allowed.
+    /// Returns the same solver with its frames read from another format; `None` if that would lose more than is
+    /// allowed.
     pub(crate) fn packed(&self, format: Format, allowed: Allowed) -> Option<Self> {
         let packed = PackedRows::new(&self.rows, self.head.foremost_row(), format, allowed)?;
         Some(Self { packed: Some(Arc::new(packed)), ..self.clone() })
     }
 
-    /// The formats that frames can be read from besides the rows, the fewest bytes first.
+    /// Returns the packed formats of frames, the fewest bytes first.
     pub(crate) fn formats() -> [Format; 3] {
         PackedRows::FORMATS
     }
 
-    /// The same solver, with the promise that its frames are off by so many metres at most.
+    /// Returns the same solver with the promise that the error of its frames is at most `accuracy` metres.
     pub(crate) fn promising(self, accuracy: f64) -> Self {
         Self { accuracy: accuracy.max(EXACT_ACCURACY), ..self }
     }
 
-    /// Metres that its frames are off at most, besides what doubles do not hold.
+    /// Returns the greatest error of its frames, metres, besides the rounding of doubles.
     pub fn accuracy(&self) -> f64 {
         self.accuracy
     }
 
-    /// How its coefficients are kept, for people.
+    /// Describes the format of its coefficients, for people.
     pub fn format(&self) -> String {
         self.packed.as_ref().map_or_else(|| "double precision, order 6".to_owned(), |packed| packed.format.to_string())
     }
 
-    /// Bytes of the table that a frame reads for a handle, on average over the team at the start.
+    /// Returns the bytes of the table that a frame reads per handle, on average over the team at the start.
     pub fn bytes_per_handle(&self) -> f64 {
         match &self.packed {
             Some(packed) => packed.format.bytes_per_handle() as f64,
@@ -206,62 +206,62 @@ impl FollowerTable {
         }
     }
 
-    /// [`bytes_per_handle`](Self::bytes_per_handle) as a part of what the most exact table takes.
+    /// Returns [`bytes_per_handle`](Self::bytes_per_handle) as a part of that of the most exact table.
     pub fn relative_cost(&self) -> f64 {
         self.bytes_per_handle() / self.exact_bytes_per_handle
     }
 
-    /// The same solver without what its frames do not read: no clearance can be had from it.
+    /// Returns the same solver without the data that its frames do not read. No clearance can be computed from it.
     pub fn for_frames(&self) -> Self {
         let rows = if self.packed.is_some() { Arc::new(Rows::empty()) } else { self.rows.clone() };
         Self { rows, ..self.clone() }
     }
 
-    /// The same without any rows, for [`FollowerTable::second_handle`] alone.
+    /// Returns the same solver without any rows, for [`FollowerTable::second_handle`] alone.
     pub(crate) fn without_rows(&self) -> Self {
         Self { rows: Arc::new(Rows::empty()), packed: None, ..self.clone() }
     }
 
-    /// The instructions it uses.
+    /// Returns the instructions that it uses.
     pub fn instructions(&self) -> Instructions {
         self.instructions
     }
 
-    /// Bytes that its frames need.
+    /// Returns the bytes that its frames need.
     pub fn memory_bytes(&self) -> usize {
         let table = self.packed.as_ref().map_or_else(|| self.rows.memory_bytes(), |packed| packed.memory_bytes());
         size_of::<Self>() + table + self.head.memory_bytes()
     }
 
-    /// Simulated seconds up to which frames are interpolated in the table.
+    /// Returns the simulated seconds up to which frames are interpolated in the table.
     pub fn valid_until(&self) -> f64 {
         let time = self.head.valid_until() / self.head_speed;
         // The travel of that time may be rounded up past the table.
         if self.head_speed * time > self.head.valid_until() { time.next_down() } else { time }
     }
 
-    /// How many frames lay beyond the table.
+    /// Returns the number of frames beyond the table.
     pub fn fallbacks(&self) -> u64 {
         self.fallbacks
     }
 
-    /// Where the handles behind the head can stand: for the clearance.
+    /// Returns the places of the handles behind the head, for the clearance.
     pub(crate) fn rows(&self) -> &Rows {
         &self.rows
     }
 
-    /// Where the second handle stands when the head has travelled so many metres, and the derivative by these metres;
-    /// `None` beyond the table.
+    /// Returns the place of the second handle when the head has travelled `travelled` metres, and its derivative by
+    /// these metres; `None` beyond the table.
     pub(crate) fn second_handle(&self, travelled: f64) -> Option<(Alpha, f64)> {
         let sample = (0.0..=self.head.valid_until()).contains(&travelled).then(|| self.head.at(travelled))?;
         Some((sample.alpha, sample.alpha_per_metre))
     }
 
-    /// The chain when the head has travelled so many metres, within the table.
+    /// Fills the chain for `travelled` metres of the head, within the table.
     fn interpolate(&self, travelled: f64, chain: &mut Chain) {
         debug_assert!(self.instructions.is_available(), "{}", self.instructions.name());
         match self.instructions {
-            // SAFETY: a solver is only made with instructions that this processor was found to have.
+            // SAFETY: a solver is only made with instructions that this processor has.
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx512 => unsafe { self.interpolate_with_avx512(travelled, chain) },
             // SAFETY: as above.
@@ -294,10 +294,10 @@ impl FollowerTable {
     #[inline(always)]
     fn interpolate_wanted<const FUSED: bool, const VELOCITIES: bool>(&self, travelled: f64, chain: &mut Chain) {
         let sample = self.head.at(travelled);
-        let moment = Moment { alpha: sample.alpha, alpha_per_second: sample.alpha_per_metre * self.head_speed };
+        let input = FrameInput { alpha: sample.alpha, alpha_per_second: sample.alpha_per_metre * self.head_speed };
         match &self.packed {
-            Some(packed) => single_kernel::write::<FUSED, VELOCITIES>(packed, &moment, chain),
-            None => kernel::write::<FUSED, VELOCITIES>(&self.rows, &moment, chain),
+            Some(packed) => single_kernel::write::<FUSED, VELOCITIES>(packed, &input, chain),
+            None => kernel::write::<FUSED, VELOCITIES>(&self.rows, &input, chain),
         }
         let last = chain.handles() - 1;
         chain.heading[last] = chain.heading[last - 1];

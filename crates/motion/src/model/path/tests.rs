@@ -1,4 +1,4 @@
-//! Paths of every kind, and what holds of each: one suite for all.
+//! Paths of every kind and their common properties: one suite for all.
 
 use super::*;
 use crate::model::description::{PathDescription, RouteStep};
@@ -24,7 +24,7 @@ pub(crate) fn any_path() -> impl Strategy<Value = Path> {
     prop_oneof![spiral, turnaround, route].prop_map(|description| description.path().unwrap())
 }
 
-/// What a place may be off by, in metres: the promise for positions, of a path that is a few metres from its origin.
+/// Returns the error bound of a place, metres: the promise for positions of a path a few metres from its origin.
 fn rounding(travelled: f64) -> f64 {
     8.0 * f64::EPSILON * (100.0 + travelled.abs())
 }
@@ -32,7 +32,7 @@ fn rounding(travelled: f64) -> f64 {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(256))]
 
-    /// Place and travel are each other's inverse, and a path is travelled by its arc length.
+    /// Place and travel are inverse functions, and a path is travelled by its arc length.
     #[test]
     fn place_and_travel_are_inverse(path in any_path(), share in -0.5..0.99f64, step in 1e-6..1e-3f64) {
         let travelled = share * path.length();
@@ -67,7 +67,7 @@ proptest! {
     }
 }
 
-/// The same length whatever the ratio of its arcs, to the digits of the 50-digit figure.
+/// The length is the same for every ratio of the arcs, to the digits of the 50-digit figure.
 #[test]
 fn a_turn_is_as_long_whatever_its_ratio() {
     for arc_ratio in [1.0, 2.0, 3.0] {
@@ -78,7 +78,7 @@ fn a_turn_is_as_long_whatever_its_ratio() {
     }
 }
 
-/// A long way before a narrow bend costs the join no digits.
+/// A long approach to a narrow bend costs the join no digits.
 #[test]
 fn long_lines_join_narrow_arcs() {
     for (length, radius) in [(1000.0, 0.01), (9000.0, 0.5), (777.7, 0.05)] {

@@ -13,8 +13,8 @@ fn board(x: f64, y: f64, heading: f64, half_length: f64, half_width: f64) -> Boa
     Board { centre: Point::new(x, y), axis: Vector::new(heading.cos(), heading.sin()), half_length, half_width }
 }
 
-/// The distance by parry, 0 where the boards overlap. It is computed near the origin and in units of `size`: its
-/// thresholds are absolute.
+/// Returns the distance by parry, 0 if the boards overlap. It is computed near the origin and in units of `size`,
+/// because parry's thresholds are absolute.
 fn parry_distance(a: &Board, b: &Board, size: f64) -> f64 {
     let shape = |board: &Board| Cuboid::new([board.half_length / size, board.half_width / size].into());
     let pose = |board: &Board, at: Vector| Pose::new([at.x, at.y].into(), board.axis.y.atan2(board.axis.x));
@@ -22,8 +22,8 @@ fn parry_distance(a: &Board, b: &Board, size: f64) -> f64 {
     query::distance(&pose_a, &shape(a), &pose_b, &shape(b)).unwrap().distance * size
 }
 
-/// The translation along our deepest pair parts the boards, and in no direction tried does less (by parry, whose
-/// own depths are off where a corner is nearer to another edge than to the one it came through).
+/// The translation along our deepest pair separates the boards, and no tried direction needs less (by parry, whose own
+/// depths are wrong if a corner is nearer to another edge than to the one it crossed).
 fn check_depth(a: &Board, b: &Board, ours: f64, size: f64) {
     let (on_a, on_b) = closest_points_board_board(a, b);
     let out = (on_a - on_b).normalize();
@@ -38,10 +38,10 @@ fn check_depth(a: &Board, b: &Board, ours: f64, size: f64) {
     }
 }
 
-/// Computes one pair with both; `size` is the scale of everything in it. Returns whether the boards overlap.
+/// Computes one pair with both; `size` is the scale of all lengths. Returns true if the boards overlap.
 fn compare(a: &Board, b: &Board, size: f64) -> bool {
     let tolerance = 1e-12 * size;
-    // What the stage's own coordinates have lost, far from the origin.
+    // Rounding of the stage's coordinates, far from the origin.
     let lost = tolerance + 8.0 * f64::EPSILON * (a.centre.coords.norm() + b.centre.coords.norm());
     let ours = signed_distance_board_board(a, b);
     let separation = separation_board_board(a, b);

@@ -1,4 +1,4 @@
-//! Bounds of where boards on a spiral can be, and how far they can move relative to each other.
+//! Bounds of the places of boards on a spiral, and of their relative motion.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,7 @@ use crate::model::root::bisect_predicate;
 use crate::model::team::Team;
 
 impl Spiral {
-    /// Returns the first place from which a board can reach into the disc. Where an inward spiral ends outside the
+    /// Returns the first place from which a board can reach into the disc. If an inward spiral ends outside the
     /// circle about the origin, but not beyond the disc, a board may still lie across its end.
     pub(super) fn first_in_disc(
         &self,
@@ -50,8 +50,8 @@ impl Spiral {
         Some(Coordinate { high, low: 0.0 })
     }
 
-    /// Returns a lower bound of the clearance of two boards that share no handle, with all handles at least `r` from the
-    /// centre of an inward spiral, r >= 5 max(link + inset + width, pitch); it grows with r.
+    /// Returns a lower bound of the clearance of two boards that share no handle, with all handles at least `r` from
+    /// the centre of an inward spiral, r >= 5 max(link + inset + width, pitch); it grows with r.
     ///
     /// There theta > 31, so that the curvature is at most 1.002 / r, and chord and arc differ by less than 1 %: the
     /// tangent turns by at most tau = 1.03 link / r <= 0.21 along one link, and a chord leans by at most half of that
@@ -62,14 +62,14 @@ impl Spiral {
     ///   atan(width / 2 inset).
     /// - k > 2, phi <= 2 pi / 3: along the tangent half way, each link leans by at most phi / 2, so the gap is at least
     ///   (k - 1) body_link cos(phi / 2) - 2 inset - width sin(phi / 2). With width <= body_link and phi <= (k + 1) tau
-    ///   that is more than body_link - 2 inset at k = 3 and grows with k up to phi = 1.6. Where phi is more, k >= 7, and
-    ///   it is more than 2 body_link - 2 inset.
-    /// - phi more than that: every point of a board is within width / 2 + 1.05 max(link^2 / 8, inset (link + inset) / 2)
-    ///   / r of the path between or just beyond its handles. Two places of the path p apart in polar angle, less whole
-    ///   turns, are apart by more than 0.49 r where |p| > 1/2, and otherwise by pitch r / hypot(r, 1.02 a)
-    ///   >= 0.999 pitch. This case is impossible where the whole team turns by less.
+    ///   that is more than body_link - 2 inset at k = 3 and grows with k up to phi = 1.6. Where phi is more, k >= 7,
+    ///   and it is more than 2 body_link - 2 inset.
+    /// - phi more than that: every point of a board is within width / 2 + 1.05 max(link^2 / 8, inset (link + inset) /
+    ///   2) / r of the path between or just beyond its handles. Two places of the path p apart in polar angle, less
+    ///   whole turns, are apart by more than 0.49 r where |p| > 1/2, and otherwise by pitch r / hypot(r, 1.02 a) >=
+    ///   0.999 pitch. This case is impossible where the whole team turns by less.
     fn board_clearance_bound(&self, team: &Team, r: f64) -> f64 {
-        let Team { hole_inset, width, benches: _, head_length: _, body_length: _ } = *team;
+        let Team { hole_inset, width, .. } = *team;
         let (longest, body) = (team.longest_link(), team.link(1));
         if width > body {
             return f64::NEG_INFINITY;

@@ -15,7 +15,7 @@ pub(super) enum Curve {
         origin: RealVector,
         direction: RealVector,
     },
-    /// Its angle from x is `heading` where the coordinate is 0; `sense` is 1 where it turns left, -1 where right.
+    /// Its angle from x is `heading` at coordinate 0; `sense` is 1 if it turns left, -1 if right.
     Arc {
         centre: RealVector,
         radius: Real,
@@ -51,7 +51,7 @@ impl Curve {
         self.place_with(at, unit)
     }
 
-    /// The place `by` further along the coordinate. Where that is little, no sine and no cosine is computed.
+    /// Returns the place `by` further along the coordinate. For a small `by`, no sine and no cosine is computed.
     pub fn moved(&self, place: &RealParam, by: &Real, functions: &mut Functions) -> RealParam {
         let at = &place.at + by;
         if by.rounded().abs() >= 1e-8 {
@@ -85,12 +85,12 @@ impl Curve {
         RealParam { at, point, slope, unit }
     }
 
-    /// 1 where the coordinate grows in the direction of travel, -1 where it shrinks.
+    /// Returns 1 if the coordinate grows in the direction of travel, -1 if it falls.
     pub fn forward(&self) -> f64 {
         if matches!(self, Self::Spiral { direction: Direction::Inward, .. }) { -1.0 } else { 1.0 }
     }
 
-    /// Metres per unit of the coordinate.
+    /// Returns the metres per unit of the coordinate.
     pub fn rate(&self, at: &Real) -> Real {
         match self {
             Self::Line { .. } => Real::from(1.0),
@@ -99,7 +99,7 @@ impl Curve {
         }
     }
 
-    /// The coordinate `metres` of travel after another, before it where negative.
+    /// Returns the coordinate `metres` of travel after another, before it if negative.
     fn advanced(&self, from: &Real, metres: &Real, functions: &mut Functions) -> Real {
         match self {
             Self::Line { .. } => from + metres,
@@ -112,14 +112,14 @@ impl Curve {
     }
 }
 
-/// Metres of the spiral from its centre: s = a/2 (theta sqrt(1 + theta^2) + ln(theta + sqrt(1 + theta^2))).
+/// Returns the metres of the spiral from its centre: s = a/2 (theta sqrt(1 + theta^2) + ln(theta + sqrt(1 + theta^2))).
 fn spiral_length(radius_per_radian: &Real, theta: &Real, functions: &mut Functions) -> Real {
     let w = (Real::from(1.0) + theta.square()).sqrt();
     let logarithm = functions.ln(&(theta + &w));
     radius_per_radian / Real::from(2.0) * (theta * w + logarithm)
 }
 
-/// The polar angle so many metres of the spiral from its centre.
+/// Returns the polar angle at `metres` of the spiral from its centre.
 ///
 /// s is convex and neither below a theta nor below a theta^2 / 2: Newton's method begins outside and cannot overshoot.
 fn spiral_angle(radius_per_radian: &Real, length: &Real, functions: &mut Functions) -> Real {
@@ -134,7 +134,7 @@ fn spiral_angle(radius_per_radian: &Real, length: &Real, functions: &mut Functio
         let slope = radius_per_radian * (Real::from(1.0) + theta.square()).sqrt();
         let step = excess / slope;
         theta = theta - &step;
-        // The next step would be the square of this one.
+        // The next step is the square of this one.
         if step.rounded().abs() <= 1e-20 * theta.rounded() {
             break;
         }
@@ -142,17 +142,17 @@ fn spiral_angle(radius_per_radian: &Real, length: &Real, functions: &mut Functio
     theta
 }
 
-/// A curve in its place on the path.
+/// A curve on the path.
 #[derive(Debug, Clone)]
 pub(super) struct Segment {
     pub curve: Curve,
-    /// Where it begins; on the first segment, which has no beginning, the place from which it is measured.
+    /// Its first place; on the first segment, which has no beginning, the place from which it is measured.
     pub first: RealParam,
     /// Metres of travel at `first`.
     pub begin: Real,
-    /// Where it ends.
+    /// Its last place.
     pub last: RealParam,
-    /// Metres of travel there.
+    /// Metres of travel at `last`.
     pub end: Real,
 }
 
@@ -166,7 +166,7 @@ pub(super) struct RealPath {
 
 impl RealPath {
     /// # Errors
-    /// A sentence where there is no memory for the constants.
+    /// A sentence if there is no memory for the constants.
     pub fn new(description: &PathDescription) -> Result<Self, String> {
         let mut path = Self { segments: Vec::new(), heading: Real::from(0.0), functions: Functions::new()? };
         match *description {
@@ -197,7 +197,8 @@ impl RealPath {
         self.push(Curve::Spiral { radius_per_radian, direction: Direction::Inward }, start, &length);
     }
 
-    /// The inward spiral that ends at A, of no length, both arcs, and the outward one that begins at B, of no length.
+    /// Returns the inward spiral that ends at A, without length, both arcs, and the outward spiral that begins at B,
+    /// without length.
     fn turnaround(&mut self, pitch: f64, turn_radius: f64, arc_ratio: f64) {
         let turn = self.functions.turn();
         let (radius_per_radian, radius) = (Real::from(pitch) / &turn, Real::from(turn_radius));
@@ -219,8 +220,8 @@ impl RealPath {
         self.push(Curve::Spiral { radius_per_radian, direction: Direction::Outward }, theta, &zero);
     }
 
-    /// Lets travel begin `lead_in` metres before the end of the first segment and end `lead_out` metres after the
-    /// beginning of the last.
+    /// Sets the start of travel `lead_in` metres before the end of the first segment and its end `lead_out` metres
+    /// after the beginning of the last.
     fn between(&mut self, lead_in: f64, lead_out: f64) {
         let lead_in = Real::from(lead_in);
         for segment in &mut self.segments {
@@ -278,7 +279,7 @@ impl RealPath {
         self.segments.len()
     }
 
-    /// The segment and the place so many metres of travel past the start; clamped to the path's end.
+    /// Returns the segment and the place `travelled` metres past the start, at most the path's end.
     pub fn place_at(&mut self, travelled: &Real) -> (usize, RealParam) {
         let index = self.segments.partition_point(|segment| segment.begin <= *travelled).max(1) - 1;
         let Segment { curve, first, begin, end, .. } = &self.segments[index];
@@ -287,7 +288,7 @@ impl RealPath {
         (index, curve.place(at, &mut self.functions))
     }
 
-    /// The place `by` further along the coordinate of a segment.
+    /// Returns the place `by` further along the coordinate of a segment.
     pub fn moved(&mut self, segment: usize, place: &RealParam, by: &Real) -> RealParam {
         self.segments[segment].curve.moved(place, by, &mut self.functions)
     }

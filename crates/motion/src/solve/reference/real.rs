@@ -1,4 +1,4 @@
-//! Real numbers of 38 digits and vectors of two of them, on astro-float, with the signs of arithmetic that make the
+//! Real numbers of 38 digits and vectors of two of them, on astro-float, with arithmetic operators that make the
 //! reference's formulas readable. Only the reference calls it.
 
 use std::borrow::Borrow;
@@ -26,21 +26,21 @@ impl Real {
         self * self
     }
 
-    /// The double towards zero from the number.
+    /// Returns the number rounded towards zero to a double.
     pub fn rounded(&self) -> f64 {
         let Some((words, _, sign, exponent, _)) = self.0.as_raw_parts() else { return f64::NAN };
         let leading = words.last().copied().unwrap_or(0) >> 11;
-        // The number is 0.leading... times 2^exponent; two factors, since one alone may overflow.
+        // The number is 0.leading... times 2^exponent; two factors, because one alone may overflow.
         let exponent = exponent - 53;
         let half = exponent / 2;
         let size = leading as f64 * 2f64.powi(half) * 2f64.powi(exponent - half);
         if sign == Sign::Neg { -size } else { size }
     }
 
-    /// The number to 106 bits.
+    /// Returns the number to 106 bits.
     pub fn split(&self) -> DoubleDouble {
         let high = self.rounded();
-        // Rounded towards zero, the rest may be more than half a unit of the last place.
+        // After rounding towards zero, the rest may be more than half a unit of the last place.
         DoubleDouble::sum(high, (self - Self::from(high)).rounded())
     }
 }
@@ -98,12 +98,13 @@ impl RealVector {
         Self { x: &self.x * by, y: &self.y * by }
     }
 
-    /// Turned by a quarter, counter-clockwise.
+    /// Returns the vector turned by a quarter turn, counter-clockwise.
     pub fn left(&self) -> Self {
         Self { x: -self.y.clone(), y: self.x.clone() }
     }
 
-    /// Turned by an angle below 1e-8, from the Taylor series of sine and cosine: what they leave out is below 1e-42.
+    /// Returns the vector turned by an angle below 1e-8, from the Taylor series of sine and cosine: the omitted terms
+    /// are below 1e-42.
     pub fn turned_slightly(&self, angle: &Real) -> Self {
         let square = angle.square();
         let sine = angle * (Real::from(1.0) - &square / Real::from(6.0));
@@ -131,25 +132,25 @@ impl Sub for &RealVector {
     }
 }
 
-/// The functions that are not algebraic, and the digits of pi and ln 2 that they have found so far.
+/// The transcendental functions, and the digits of pi and ln 2 found so far.
 pub(super) struct Functions {
     constants: Consts,
 }
 
 impl Functions {
     /// # Errors
-    /// A sentence where there is no memory for the constants.
+    /// A sentence if there is no memory for the constants.
     pub fn new() -> Result<Self, String> {
         let constants = Consts::new().map_err(|error| format!("the high-precision reference: {error:?}"))?;
         Ok(Self { constants })
     }
 
-    /// 2 pi.
+    /// Returns 2 pi.
     pub fn turn(&mut self) -> Real {
         Real::from(2.0) * Real(self.constants.pi(BITS, ROUNDING))
     }
 
-    /// The unit vector at an angle from x: cosine and sine.
+    /// Returns the unit vector at an angle from x: cosine and sine.
     pub fn unit_vector(&mut self, angle: &Real) -> RealVector {
         let x = Real(angle.0.cos(BITS, ROUNDING, &mut self.constants));
         RealVector { x, y: Real(angle.0.sin(BITS, ROUNDING, &mut self.constants)) }

@@ -44,8 +44,8 @@ fn length(vector: &RealVector) -> Real {
     vector.dot(vector).sqrt()
 }
 
-/// The largest error of position over the handle's speed, where that is above 1, and of speed, relative, at each time
-/// of a table whose clock begins `before` seconds after the motion.
+/// Returns the largest error of position over the handle's speed, if that is above 1, and of speed, relative, at each
+/// time of a table whose clock begins `before` seconds after the motion.
 fn errors(reference: &mut Reference, rows: &[Row], before: f64) -> Vec<(f64, f64, f64)> {
     let frames = rows.chunk_by(|a, b| a.time == b.time);
     let errors = frames.map(|rows| {
@@ -67,8 +67,8 @@ fn it_agrees_with_50_digits_on_the_papers_scene() {
     assert_eq!(errors.len(), 11);
     for (time, position, speed) in errors {
         println!("t = {time} s: {position:e} m, {speed:e}");
-        // The table was made from decimal lengths and times; the doubles nearest to them move a handle so far, the
-        // faster it goes the further.
+        // The table was made from decimal lengths and times. The doubles nearest to them move a handle by this, in
+        // proportion to its speed.
         assert!(
             position < 6e-14 && speed < if time < 430.0 { 1e-14 } else { 1e-11 },
             "{time} s: {position:e} {speed:e}"
@@ -88,22 +88,22 @@ fn it_agrees_with_50_digits_on_the_turnaround() {
     }
 }
 
-/// A decimal without rounding to a double: at most 20 digits that mean something.
+/// Returns a decimal without rounding to a double: at most 20 significant digits.
 fn decimal(text: &str) -> Real {
     let (mantissa, exponent) = text.split_once('e').unwrap_or((text, "0"));
     let decimals = mantissa.split_once('.').map_or(0, |(_, decimals)| decimals.len() as i32);
     let digits: i128 = mantissa.replace('.', "").parse().unwrap();
     let half = |digits: i128| Real::from(digits as f64);
     let whole = half(digits / 10_000_000_000) * Real::from(1e10) + half(digits % 10_000_000_000);
-    // Powers up to 22 are doubles; smaller numbers are as good as zero here.
+    // Powers up to 22 are doubles; smaller numbers count as zero here.
     whole * Real::from(10f64.powi(exponent.parse().unwrap())) / Real::from(10f64.powi(decimals))
 }
 
-/// In centimetres, every number of both scenes is a double: nothing hides the digits that the tables print.
+/// In centimetres, every number of both scenes is a double: the digits of the tables can be compared.
 const CENTIMETRES: Team = Team { benches: 223, head_length: 341.0, body_length: 220.0, width: 30.0, hole_inset: 27.5 };
 
-/// The largest error in metres of a reference in centimetres at whole seconds of a table whose x is in a column and
-/// whose clock begins `before` seconds after the motion; and the number of rows.
+/// Returns the largest error in metres of a reference in centimetres at whole seconds of a table whose x is in a column
+/// and whose clock begins `before` seconds after the motion; and the number of rows.
 fn error_in_centimetres(description: &PathDescription, text: &str, column: usize, before: f64) -> (f64, usize) {
     let mut reference = Reference::new(CENTIMETRES, description, 100.0).unwrap();
     let (mut now, mut seats, mut worst, mut rows) = (f64::NAN, Vec::new(), 0f64, 0);
@@ -160,7 +160,7 @@ fn from_the_lock_on_there_is_no_follower() {
     for time in [432.917924228384, 432.917925, 432.92] {
         assert_eq!(reference.handles(time), Err(NoFollower), "{time} s");
     }
-    // Very near the centre there is one again.
+    // Very near the centre there is a follower again.
     for k in 0..=96 {
         assert_newton_agrees(team(1), &PAPER, 433.0 + 0.1 * f64::from(k));
     }
@@ -199,8 +199,8 @@ fn a_vector_turned_slightly_is_that_of_sine_and_cosine() {
     }
 }
 
-/// Checks what must hold of every chain, whatever the path: each handle is on its segment, each link has its length, no
-/// place between a handle and its follower is further away, speeds follow from small motions.
+/// Checks the properties of every chain on any path: each handle is on its segment, each link has its length, no place
+/// between a handle and its follower is further away, speeds agree with small motions.
 fn assert_sound(team: Team, description: &PathDescription, time: f64) -> Vec<Seat> {
     let mut reference = Reference::new(team, description, 1.0).unwrap();
     let path = description.path().unwrap();
@@ -249,7 +249,7 @@ fn chains_are_sound_and_the_head_has_travelled_its_way() {
     }
 }
 
-/// Metres of travel from the beginning of a spiral to a place on it, by Romberg's rule on ds / dtheta.
+/// Returns the metres of travel from the beginning of a spiral to a place on it, by Romberg's rule on ds / dtheta.
 fn integrated(path: &mut RealPath, segment: usize, to: &Real) -> Real {
     let on = path.segment(segment);
     let span = to - &on.first.at;
@@ -270,8 +270,8 @@ fn integrated(path: &mut RealPath, segment: usize, to: &Real) -> Real {
     rows[rows.len() - 1].clone() * span * Real::from(on.curve.forward())
 }
 
-/// The chain at `time` by the safe solver, and how far it is from the reference: each position within 1e-12 m, times so
-/// much as small errors grow along the chain.
+/// Returns the chain at `time` by the safe solver, and checks it against the reference: each position within 1e-12 m,
+/// times the growth of small errors along the chain.
 fn assert_newton_agrees(team: Team, description: &PathDescription, time: f64) {
     let path: Path = description.path().unwrap();
     let newton = Newton::new(path, team, 1.0, Velocities::Computed);
@@ -295,7 +295,7 @@ fn assert_newton_agrees(team: Team, description: &PathDescription, time: f64) {
 
 #[test]
 fn newton_agrees_on_the_procession_and_the_turnaround() {
-    // Here the distance from a handle on the S shrinks now and again along the spiral behind.
+    // Here the distance from a handle on the S shrinks several times along the spiral behind.
     let (pitch, turn_radius, lead_in) = (0.5, 0.1, 100.0);
     let tight = PathDescription::Turnaround { pitch, turn_radius, arc_ratio: 1.0, lead_in, lead_out: 100.0 };
     for (team, description) in [(team(60), procession()), (team(60), TURNAROUND), (team(1), tight)] {
@@ -337,7 +337,7 @@ fn followers_are_on_the_right_side_of_a_junction() {
         let steps = vec![RouteStep::Line { length: 1.0 }, RouteStep::Arc { side: Side::Left, radius, turns: 0.25 }];
         let description = PathDescription::Route { start: Point::origin(), heading_turns: 0.1, steps };
         let time = 1.0 + 2.0 * radius * (0.5 * team(1).link(0) / radius).asin();
-        // The root is at the junction for a time between two doubles: nearer to it than a guess in doubles is exact.
+        // The root is at the junction for a time between two doubles: nearer than the error of a guess in doubles.
         for bits in time.to_bits() - 3..=time.to_bits() + 3 {
             let seats = assert_sound(team(1), &description, f64::from_bits(bits));
             sides[seats[1].segment - 1] += 1;

@@ -1,22 +1,23 @@
-//! The first place behind a handle at the link's distance, in doubles: the guess from which the reference begins.
+//! The first place behind a handle at the link's distance, in doubles: the first guess of the reference.
 //!
-//! The straight-line distance from the handle grows by at most a metre per metre of path. So from a place that lacks so
-//! much of the link's length one may go back by as much and cannot pass the place sought (sphere tracing: Hart, The
-//! Visual Computer 12, 1996, for rays). The points are displacements from places that the reference knows exactly, so
-//! that they keep their digits far from the origin. Only the reference calls it.
+//! The straight-line distance from the handle grows by at most a metre per metre of path. So from a place whose
+//! distance is m metres short of the link, a step of m metres back cannot pass the place sought (sphere tracing: Hart,
+//! The Visual Computer 12, 1996, for rays). The points are displacements from places that the reference knows exactly,
+//! so that they keep their digits far from the origin. Only the reference calls it.
 
 use super::path::{Curve, RealParam, Segment};
 use crate::linkage::NoFollower;
 use crate::model::Vector;
 use crate::model::spiral::Direction;
 
-/// The finest step, in links: a way out of the link's reach and back in that is shorter than it may be overlooked.
+/// The finest step, in links: a shorter stretch outside the link's reach may be overlooked.
 const FINEST: f64 = 1e-9;
 
-/// The longest step on a spiral, radians: short against the half turns over which a chord's radius_per_radian changes its sign.
+/// The longest step on a spiral, radians: short against the half turns over which the growth of a chord changes its
+/// sign.
 const LONGEST: f64 = 0.05;
 
-/// By how much a distance must shrink, in links, to be taken for more than rounding.
+/// Least decrease of a distance, in links, that counts as more than rounding.
 const NOISE: f64 = 1e-14;
 
 /// Steps after which the search on one segment gives up.
@@ -25,7 +26,7 @@ const MOST_STEPS: usize = 10_000_000;
 /// The way back along a curve from one of its places, seen from the front handle of a link.
 pub(super) struct Walk<'a> {
     curve: &'a Curve,
-    /// The coordinate of the place, and how much of it is left behind.
+    /// The coordinate of the place, and the units of the curve behind it.
     at: f64,
     behind: f64,
     /// From the front handle to the place.
@@ -33,12 +34,12 @@ pub(super) struct Walk<'a> {
     slope: Vector,
     /// Of the arc, with the sign of its curvature; of the spiral, per radian.
     radius: f64,
-    /// Whether the handle is on this curve and the distance can shrink only after a fold.
+    /// True if the handle is on this curve and the distance can shrink only after a fold.
     folds: bool,
 }
 
 impl<'a> Walk<'a> {
-    /// Back from `place` on `segment`, which is the path's first or not, for the handle at `front`.
+    /// Starts from `place` on `segment`, for the handle at `front`. `is_first`: the segment is the path's first.
     pub fn new(segment: &'a Segment, is_first: bool, place: &RealParam, front: &RealParam) -> Self {
         let radius = match &segment.curve {
             Curve::Line { .. } => f64::INFINITY,
@@ -56,11 +57,11 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// How far back, in units of the coordinate, the first place is that is `link` metres from the front handle; `None`
-    /// where the segment has none.
+    /// Returns how far back, in units of the coordinate, the first place is that is `link` metres from the front
+    /// handle; `None` if the segment has none.
     ///
     /// # Errors
-    /// [`NoFollower`] where a handle on the inward spiral is found to come nearer again first.
+    /// [`NoFollower`] if a handle on the inward spiral comes nearer again first.
     pub fn first_at(&self, link: f64) -> Result<Option<f64>, NoFollower> {
         let (mut back, mut distance) = (0.0, self.offset.norm());
         let mut farthest = distance;
@@ -71,7 +72,7 @@ impl<'a> Walk<'a> {
             let next = self.behind.min(back + self.safe_step(back, (link - distance).max(FINEST * link)));
             let reached = self.position(next).norm();
             if reached >= link {
-                // The step was one of the finest: the path is as good as straight.
+                // The step was one of the finest: the path is straight to rounding.
                 return Ok(Some(back + (next - back) * (link - distance) / (reached - distance)));
             }
             if next == self.behind {
@@ -86,7 +87,7 @@ impl<'a> Walk<'a> {
         Err(NoFollower)
     }
 
-    /// How far back along the coordinate one may go from `back` with no more than `metres` of path.
+    /// Returns how far back along the coordinate from `back` at most `metres` of path lead.
     fn safe_step(&self, back: f64, metres: f64) -> f64 {
         match self.curve {
             Curve::Line { .. } => metres,
@@ -94,7 +95,7 @@ impl<'a> Walk<'a> {
             Curve::Spiral { direction, .. } => {
                 let step = |theta: f64| (metres / (self.radius * 1f64.hypot(theta))).min(LONGEST);
                 match direction {
-                    // Further out a radian is longer: first by the rate here, then by the rate at the end of that.
+                    // Further out a radian is longer: first by the rate here, then by the rate at the end of that step.
                     Direction::Inward => step(self.at + back + step(self.at + back)),
                     Direction::Outward => step(self.at - back),
                 }
@@ -102,7 +103,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// From the front handle to the point `back` behind the place.
+    /// Returns the vector from the front handle to the point `back` behind the place.
     fn position(&self, back: f64) -> Vector {
         let left = |vector: Vector| Vector::new(-vector.y, vector.x);
         let half_sine = (0.5 * back).sin();

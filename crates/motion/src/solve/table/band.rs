@@ -1,8 +1,8 @@
 //! How T is made: band after band from the team's rear to the front of the path.
 //!
-//! A [`NodeChain`] holds the places of one phase in all rows of a band, each found from the one behind it. Five of them
-//! make a piece: their slopes carry its polynomials, their places prove them; where they do not, the piece is cut in
-//! two. The next band starts from the frontmost row of this one. Called by [`super::FollowerTable::new`] only.
+//! A [`NodeChain`] holds the places of one phase in all rows of a band, each found from the place behind it. Five of
+//! them make a piece: their slopes give its polynomials, their places prove them; where the proof fails, the piece is
+//! halved. The next band starts from the frontmost row of this one. Only [`super::FollowerTable::new`] calls it.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
@@ -20,35 +20,35 @@ use crate::model::elementary::hypot;
 use crate::model::path::Param;
 use crate::model::team::Team;
 
-/// Halvings of what lies between two kinks, at most.
+/// Greatest number of halvings between two kinks.
 const MOST_HALVINGS: usize = 9;
 
-/// Bytes of a table, at most.
+/// Greatest size of a table, bytes.
 const MOST_BYTES: usize = 150 << 20;
 
-/// The part of these that any phases may take.
+/// The part of these bytes that any range of phases may take.
 const LEAST_SHARE: f64 = 0.125;
 
-/// Rows of a band from which on two threads make it.
+/// Number of rows from which two threads make a band.
 const PARALLEL_ROWS: usize = 128;
 
-/// What part of its allowance a halved piece may still use up if halving is to continue: a smaller gain is rounding,
+/// Halving continues if the halved piece uses less than this part of its parent's error: a smaller gain is rounding,
 /// not shape.
 const LEAST_GAIN: f64 = 0.75;
 
-/// A piece that uses up this many times its allowance is cut without looking at the rest of its rows.
+/// A piece with an error of this many times its allowance is cut before its other rows are tested.
 const HOPELESS: f64 = 100.0;
 
 /// Beta of the five node chains of a piece.
 const NODES: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 
-/// Max |e|, where the slope's error is e = b (b^2 - 1/4) (b^2 - 1) times its first neglected coefficient.
+/// Max |e|, if the slope's error is e = b (b^2 - 1/4) (b^2 - 1) times its first neglected coefficient.
 const LARGEST_NODAL: f64 = 0.12;
 
-/// The nodes of one phase through a band, from its last row forward, as far as the chain can stand there.
+/// The nodes of one phase through a band, from its last row forward, as far as the chain can stand.
 type NodeChain = Arc<Vec<Node>>;
 
-/// A band being made.
+/// A band during its making.
 struct BandBuilder<'a> {
     track: &'a Track<'a>,
     tolerance: Tolerance,
@@ -60,13 +60,13 @@ struct BandBuilder<'a> {
     /// The row behind the band; nothing ahead of `needed` has to be exact.
     end_row: usize,
     needed: usize,
-    /// Whether the second handle can come here.
+    /// True if the second handle can come here.
     with_centres: bool,
     /// Bytes that the band may take.
     budget: usize,
 }
 
-/// What has been made of a band.
+/// The finished part of a band.
 struct Made {
     band: Band,
     front_row: Vec<(Piece, [Node; 5])>,
@@ -74,7 +74,7 @@ struct Made {
 }
 
 impl Made {
-    /// Adds what was made of later phases.
+    /// Adds the part of later phases.
     fn append(&mut self, later: Self) {
         let Self { band, front_row, valid_from } = later;
         self.band.pieces.extend(band.pieces);
@@ -91,9 +91,9 @@ type Quintet = [NodeChain; 5];
 /// The largest errors of a piece over its rows, as parts of what is allowed.
 struct Errors {
     worst: f64,
-    /// Alpha behind which the piece is exact.
+    /// Alpha from which on the piece is exact.
     valid_from: f64,
-    /// Whether cutting the piece can help: some node chain reaches each row that is wrong.
+    /// True if cutting the piece can help: some node chain reaches each wrong row.
     curable: bool,
 }
 
@@ -115,7 +115,8 @@ impl BandBuilder<'_> {
         std::array::from_fn(|k| self.node_chain(piece.begin + 0.25 * k as f64 * (piece.end - piece.begin)))
     }
 
-    /// Cuts a piece until its parts are exact, and adds these to the band. `None` where the table grows too large.
+    /// Cuts a piece until its parts are exact, and adds these to the band. Returns `None` if the table becomes too
+    /// large.
     fn refine(&self, made: &mut Made, piece: Piece, chains: Quintet, halvings: usize, parent: f64) -> Option<()> {
         let errors = self.errors(piece, &chains, halvings);
         if errors.worst <= 1.0 || !errors.curable || halvings == 0 || errors.worst > LEAST_GAIN * parent {
@@ -137,7 +138,7 @@ impl BandBuilder<'_> {
             refine(made, first, first_chains)?;
             return refine(made, second, second_chains);
         }
-        // Two threads make the same as one.
+        // One and two threads give the same result.
         let mut later = self.nothing(0.0);
         let (first, second) = std::thread::scope(|scope| {
             let second = scope.spawn(|| refine(&mut later, second, second_chains));
@@ -149,13 +150,14 @@ impl BandBuilder<'_> {
         self.is_within_budget(made, piece.end)
     }
 
-    /// A band without pieces.
+    /// Creates a band without pieces.
     fn nothing(&self, valid_from: f64) -> Made {
         let band = Band::new(self.first_row, self.rows, self.lengths);
         Made { band, front_row: Vec::new(), valid_from }
     }
 
-    /// Where the first phases take too much, so will all of them; a part of them may take more than its share.
+    /// Returns `None` if the first phases take too many bytes: then all phases will. A part of the phases may take more
+    /// than its share.
     fn is_within_budget(&self, made: &Made, phases: f64) -> Option<()> {
         let bytes = size_of_val(made.band.coefficients.as_slice()) as f64;
         (bytes <= self.budget as f64 * phases.max(LEAST_SHARE)).then_some(())
@@ -199,7 +201,7 @@ impl BandBuilder<'_> {
         }
     }
 
-    /// How far the polynomials of a piece are off; infinitely where the piece is sure to be cut.
+    /// Returns the errors of the polynomials of a piece, infinite if the piece is certain to be cut.
     fn errors(&self, piece: Piece, chains: &Quintet, halvings: usize) -> Errors {
         let half = 0.5 * (piece.end - piece.begin);
         let mut errors = Errors { worst: 0.0, valid_from: 0.0, curable: false };
@@ -222,11 +224,11 @@ impl BandBuilder<'_> {
         errors
     }
 
-    /// The error of one row of a piece `2 half` long, as a part of what is allowed: the largest of those of place,
-    /// heading and speed.
+    /// Returns the error of one row of a piece `2 half` long, as a part of what is allowed: the largest of the errors
+    /// of place, heading and speed.
     fn error(&self, half: f64, nodes: [&Node; 5], index: usize, chain: &NodeChain) -> f64 {
         let mut polynomials = polynomials(half, nodes);
-        // The size of the slope's next power, had it fallen off as the last one did.
+        // The size of the slope's next power, if it falls as the last one did.
         let power = |power: usize| power as f64 * hypot(polynomials[0][power], polynomials[1][power]);
         let neglected = LARGEST_NODAL * power(5) * (power(5) / power(4)).min(1.0);
         let dropped: [f64; 3] = std::array::from_fn(|quantity| {
@@ -236,7 +238,7 @@ impl BandBuilder<'_> {
         });
         let [x, y, heading] = polynomials;
         let middle = nodes[2];
-        // Each step rounds; the node chains of a band differ by what adds up.
+        // Each step rounds; the node chains of a band differ by the sum.
         let walk = (index as f64 + 8.0).sqrt() * f64::EPSILON * self.link;
         let allowed = self.tolerance.metres(self.link) + 4.0 * walk;
         let allowed_heading = 10.0 * allowed / self.link + 2.0 * f64::EPSILON;
@@ -254,14 +256,14 @@ impl BandBuilder<'_> {
         if worst <= 1.0 && !self.is_first_follower(chain, index) { f64::INFINITY } else { worst }
     }
 
-    /// Whether the node before this one of a node chain is where the linkage has the follower.
+    /// Returns true if the previous node of a node chain is the follower that the linkage finds.
     fn is_first_follower(&self, chain: &NodeChain, index: usize) -> bool {
         let Some(before) = index.checked_sub(1) else { return true };
         is_follower(self.track, chain[before].at, chain[index].at, self.link)
     }
 }
 
-/// Whether a place at a link's distance is where the linkage has the follower of `front`.
+/// Returns true if a place at a link's distance is the follower of `front` that the linkage finds.
 fn is_follower(track: &Track, place: Param, front: Param, link: f64) -> bool {
     if place.segment == front.segment && track.path.segment(front).distance_grows(front.at, place.at) {
         return true;
@@ -271,13 +273,15 @@ fn is_follower(track: &Track, place: Param, front: Param, link: f64) -> bool {
     track.displacement(found, place).norm() <= 1e-6 * link + 1e-13 * size
 }
 
-/// One row's nodes in the five chains, the row counted forward from the band's last; `None` where a chain ends before.
+/// Returns one row's nodes in the five chains, the row counted forward from the band's last; `None` if a chain ends
+/// before.
 fn quintet_at(chains: &Quintet, index: usize) -> Option<[&Node; 5]> {
     let [a, b, c, d, e] = chains.each_ref().map(|chain| chain.get(index));
     Some([a?, b?, c?, d?, e?])
 }
 
-/// The polynomials in beta of x and y relative to the middle node, metres, and of the heading relative to its heading.
+/// Returns the polynomials in beta of x and y relative to the middle node, metres, and of the heading relative to its
+/// heading.
 fn polynomials(half: f64, nodes: [&Node; 5]) -> [[f64; 6]; 3] {
     [
         from_slopes(nodes.map(|node| -half * node.spacing * node.tangent.x)),
@@ -286,7 +290,7 @@ fn polynomials(half: f64, nodes: [&Node; 5]) -> [[f64; 6]; 3] {
     ]
 }
 
-/// A difference of two angles brought into half a turn.
+/// Returns a difference of two angles reduced to half a turn.
 pub(super) fn within_half_turn(angle: f64) -> f64 {
     if angle > PI {
         angle - TAU
@@ -297,17 +301,17 @@ pub(super) fn within_half_turn(angle: f64) -> f64 {
     }
 }
 
-/// The first row of bands so far behind that shorter polynomials and more pieces serve a frame better: it then waits
-/// for memory, of which each piece of a row takes less.
+/// The first row of bands so far behind that shorter polynomials and more pieces make a frame faster: it then waits for
+/// memory, and each piece of a row needs less.
 const FAR_ROW: usize = 512;
 
-/// The table for `team` on `path`; `None` where there is none, or a too large one.
+/// Makes the table for `team` on `path`; `None` if there is none, or it would be too large.
 pub(super) fn rows(track: &Track, team: &Team, tolerance: Tolerance) -> Option<Rows> {
     let beginning = Beginning::new(track, team)?;
     let link = team.link(1);
     let foremost = foremost(track, team)?;
     let second = track.follower(track.path.param_at(0.0), team.link(0))?;
-    // One chain of nodes determines the number of rows, with some to spare; it is least where each takes half a turn.
+    // One chain of nodes determines the number of rows, with a margin; it is least if each takes half a turn.
     let mut node = beginning.node(track, 0.0);
     let bytes_per_row = Lengths::NEAR.per_row() * size_of::<f64>();
     let fewest = (track.path.arc_length(node.at, foremost) / (FRAC_PI_2 * link)).max(0.0) as usize;
@@ -330,8 +334,7 @@ pub(super) fn rows(track: &Track, team: &Team, tolerance: Tolerance) -> Option<R
     let kinks = kinks(track, &beginning, link, end);
     let phases = kinks.iter().map(|kink| kink.fract()).collect();
     let mut table = Rows { tolerance, bands: Vec::new(), kinks: phases, valid_from: 0.0 };
-    // So far behind, one piece is enough, and smoother than the beginning could for each phase by
-    // itself.
+    // So far behind, one piece suffices. It is smoother than the beginning computed for each phase.
     let whole = Piece { begin: 0.0, end: 1.0 };
     let nodes = [0.0, 0.25, 0.5, 0.75, 1.0].map(|alpha| beginning.node(track, alpha));
     let mut behind = Row::new(track, &[(whole, nodes)]);

@@ -1,7 +1,7 @@
-//! Where the table begins: one link's length of path so far behind the team that it is nearly or wholly straight.
+//! The beginning of the table: one link's length of path so far behind the team that it is nearly or exactly straight.
 //!
-//! Called by the making of the table only. There alpha is known for every place: on a straight line T is linear; on a
-//! spiral a polynomial A with A(follower of p) = A(p) + 1 is fitted over a few links.
+//! Used only to make the table. Here alpha is known for every place: on a straight line T is linear; on a spiral a
+//! polynomial A with A(follower of p) = A(p) + 1 is fitted over a few links.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -12,10 +12,10 @@ use crate::model::path::Param;
 use crate::model::root::increasing_root;
 use crate::model::team::Team;
 
-/// Links beyond the tail at which a table on a spiral begins to be made: so far out that it is smooth.
+/// Links beyond the tail at which a table on a spiral begins, so far out that it is smooth.
 const LEAD: f64 = 64.0;
 
-/// Links over which the beginning is fitted on a spiral; the degree of the polynomial, and at how many places.
+/// Links over which the beginning is fitted on a spiral; the degree of the polynomial; the number of fitted places.
 const FITTED_LINKS: usize = 4;
 const FITTED_DEGREE: usize = 8;
 const FITTED_PLACES: usize = 32;
@@ -36,7 +36,7 @@ struct Fit {
 }
 
 impl Beginning {
-    /// The beginning for a team whose head starts at the path's start.
+    /// Makes the beginning for a team whose head starts at the path's start.
     pub(super) fn new(track: &Track, team: &Team) -> Option<Self> {
         let (start, link) = (track.path.param_at(0.0), team.link(1));
         let head = if start.segment == 0 { start } else { Param { segment: 0, at: track.path.last(0) } };
@@ -47,7 +47,7 @@ impl Beginning {
         if !curve.tightens() {
             return None;
         }
-        // The arc under a link is longest where the path bends most, which is under the first links.
+        // The arc over a link is longest where the path bends most, which is over the first links.
         let stretch = [team.link(0), link].into_iter().try_fold(1f64, |stretch, link| {
             let rear = linkage::follower(track.path, head, link).ok()?;
             Some(stretch.max(track.path.arc_length(rear, head) / link))
@@ -66,7 +66,7 @@ impl Beginning {
         Some(Self { base, link, fit: Some(fit) })
     }
 
-    /// The node `alpha` links behind the base, from 0 to 1.
+    /// Returns the node `alpha` links behind the base, from 0 to 1.
     pub(super) fn node(&self, track: &Track, alpha: f64) -> Node {
         let (at, spacing) = match &self.fit {
             None => (self.base.at.plus(-alpha * self.link), self.link),
@@ -87,7 +87,7 @@ impl Beginning {
         Node { at, tangent, spacing, heading: 0.0, heading_rate: 0.0 }
     }
 
-    /// Alpha of a place, where it is known here: anywhere on the line, or at and behind the base on a spiral.
+    /// Returns alpha of a place, if it is known here: anywhere on the line, or at and behind the base on a spiral.
     pub(super) fn alpha(&self, place: Param) -> Option<f64> {
         if place.segment != 0 {
             return None;
@@ -118,7 +118,7 @@ impl Fit {
     }
 }
 
-/// The coefficients with which A of a follower less A of its front is 1, in the sense of least squares.
+/// Returns the coefficients with which A of a follower less A of its front is 1, by least squares.
 fn fitted(span: f64, rear_of: impl Fn(f64) -> Option<f64>) -> Option<Vec<f64>> {
     let scaled = |ahead: f64| 2.0 * ahead / span - 1.0;
     let before_last = span * (1.0 - 1.0 / FITTED_LINKS as f64);
@@ -130,7 +130,7 @@ fn fitted(span: f64, rear_of: impl Fn(f64) -> Option<f64>) -> Option<Vec<f64>> {
             equations[(row, column)] = rear.powi(column as i32 + 1) - front.powi(column as i32 + 1);
         }
     }
-    // By QR, since the singular values of nalgebra take hypotenuses from the C library.
+    // By QR, because nalgebra's singular values use the C library's hypotenuse.
     let factors = equations.qr();
     let mut ones = DVector::from_element(FITTED_PLACES, 1.0);
     factors.q_tr_mul(&mut ones);

@@ -1,7 +1,7 @@
-//! Where the head and the handle behind it are, by the metres the head has travelled.
+//! Places of the head and the handle behind it, by the metres that the head has travelled.
 //!
-//! The head's link differs from the others, so its map is not the table's; both places are tabulated over the head's
-//! travel instead. Made and read by the follower table only.
+//! The head's link differs from the others, so its map is not the table's. Both places are tabulated over the head's
+//! travel instead. Only the follower table makes and reads it.
 
 use super::polynomial::SlopeFit;
 use super::rows::{Alpha, Rows};
@@ -12,7 +12,7 @@ use crate::model::path::Param;
 use crate::model::root::increasing_root;
 use crate::model::team::Team;
 
-/// The nodes whose slopes carry a polynomial and whose values prove it: those of Gauss-Lobatto's formula.
+/// Nodes of the Gauss-Lobatto formula: their slopes give a polynomial and their values prove it.
 const NODES: [f64; 7] =
     [-1.0, -0.830_223_896_278_567, -0.468_848_793_470_714_2, 0.0, 0.468_848_793_470_714_2, 0.830_223_896_278_567, 1.0];
 
@@ -25,26 +25,26 @@ const LARGEST_NODAL: f64 = 0.04;
 /// x, y, heading and alpha.
 const QUANTITIES: usize = 4;
 
-/// Pieces, at most: 20 MB. A longer way has a table of its beginning.
+/// Greatest number of pieces, 20 MB. For a longer path the table covers its beginning.
 const MOST_PIECES: usize = 1 << 16;
 
-/// Links of travel that a piece may be long.
+/// Greatest length of a piece, in links of travel.
 const LONGEST: f64 = 1.0;
 
-/// Metres of travel that a piece at the start may be long: places come out with the rounding of the piece's extent.
+/// Greatest length of a piece at the start, metres of travel: places have the rounding of the piece's extent.
 const LONGEST_METRES: f64 = 100.0;
 
-/// Links of travel below which pieces are not cut any further: the table ends.
+/// Least length of a piece, in links of travel: at shorter ones the table ends.
 const SHORTEST: f64 = 1e-7;
 
-/// Metres of error that are promised where the travel is short, and the relative error of speeds.
+/// Promised error in metres for a short travel, and promised relative error of speeds.
 const MOST_ERROR: f64 = 1e-13;
 const SPEED_ERROR: f64 = 1e-12;
 
-/// A kink this near the end of a piece, in links, does not cut it.
+/// A kink this near the end of a piece, in links, does not cut the piece.
 const AT_END: f64 = 1e-11;
 
-/// Metres of travel on which all is polynomial.
+/// A stretch of travel, metres, on which all quantities are polynomials.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
     /// Metres of travel where beta is 0, and beta per metre.
@@ -67,7 +67,7 @@ pub(super) struct HeadTable {
     shares_per_metre: f64,
 }
 
-/// What the table has for one moment.
+/// The table's values for one travel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct HeadSample {
     /// Metres, and radians, the heading not yet within half a turn.
@@ -76,12 +76,12 @@ pub(super) struct HeadSample {
     pub heading: f64,
     /// The head's unit tangent.
     pub tangent: [f64; 2],
-    /// Where the second handle stands, and how that changes by metre of travel; negative while it goes forward.
+    /// Place of the second handle, and its change per metre of travel; negative while it goes forward.
     pub alpha: Alpha,
     pub alpha_per_metre: f64,
 }
 
-/// The head and the second handle as the linkage has them.
+/// The head and the second handle from the linkage.
 #[derive(Debug, Clone, Copy)]
 struct Exact {
     head: Param,
@@ -93,7 +93,7 @@ struct Exact {
 }
 
 impl HeadTable {
-    /// The sample at so many metres of travel, from 0 to [`HeadTable::valid_until`].
+    /// Returns the sample at `travelled` metres, from 0 to [`HeadTable::valid_until`].
     #[inline(always)]
     pub(super) fn at(&self, travelled: f64) -> HeadSample {
         let share = ((travelled * self.shares_per_metre) as usize).min(self.piece_of_share.len() - 2);
@@ -102,12 +102,12 @@ impl HeadTable {
         self.pieces[index.min(self.pieces.len() - 1)].at(travelled)
     }
 
-    /// Metres of travel.
+    /// Returns the metres of travel at which the table ends.
     pub(super) fn valid_until(&self) -> f64 {
         self.begins.last().copied().unwrap_or(0.0)
     }
 
-    /// The foremost row in which the second handle comes to stand.
+    /// Returns the foremost row in which the second handle can stand.
     pub(super) fn foremost_row(&self) -> usize {
         // Alpha is within a link of the middle of its piece.
         self.pieces.iter().map(|piece| piece.row).min().map_or(0, |row| row.saturating_sub(1))
@@ -124,7 +124,7 @@ impl HeadTable {
         self.shares_per_metre = shares as f64 / self.valid_until();
         let piece_at = |travelled: f64| self.begins.partition_point(|begin| *begin <= travelled).max(1) - 1;
         let begin = |share: usize| share as f64 / self.shares_per_metre;
-        // A little around each share, so that rounding cannot lead to a wrong one.
+        // With a margin around each share, so that rounding cannot select a wrong piece.
         self.piece_of_share =
             (0..=shares).map(|share| piece_at(begin(share)).min(self.pieces.len() - 1) as u32).collect();
     }
@@ -157,7 +157,7 @@ impl Piece {
     }
 }
 
-/// What the making of a [`HeadTable`] needs to know.
+/// Input to make a [`HeadTable`].
 pub(super) struct HeadBuilder<'a> {
     pub track: &'a Track<'a>,
     pub team: &'a Team,
@@ -170,7 +170,7 @@ impl<'a> HeadBuilder<'a> {
         Self { track, team, rows, fit: SlopeFit::new(&NODES) }
     }
 
-    /// The table from the start on as far as it is exact; `None` where it is not at the start.
+    /// Makes the table from the start on as far as it is exact; `None` if it is not exact at the start.
     pub(super) fn build(&self) -> Option<HeadTable> {
         let link = self.team.link(1);
         let mut table = HeadTable { begins: vec![0.0], ..HeadTable::default() };
@@ -213,11 +213,11 @@ impl<'a> HeadBuilder<'a> {
         Some(table)
     }
 
-    /// The first two handles at the start.
+    /// Returns the first two handles at the start.
     fn start(&self) -> Option<Exact> {
         let head = self.track.path.param_at(0.0);
         let second = self.track.follower(head, self.team.link(0))?;
-        // The row by bisection: T is monotone.
+        // The row is found by bisection: T is monotone.
         let (mut ahead, mut behind) = (self.rows.valid_from.ceil() as usize, self.rows.rows());
         while behind - ahead > 1 {
             let row = ahead.midpoint(behind);
@@ -240,13 +240,13 @@ impl<'a> HeadBuilder<'a> {
         Some(Exact { head, tangent, heading: pose.heading, heading_rate: pose.heading_per_metre, alpha, alpha_rate })
     }
 
-    /// What is exact a short way after something that is; the head stays on its segment.
+    /// Returns the exact handles a short distance after exact ones; the head stays on its segment.
     fn exact_from(&self, from: Exact, metres: f64) -> Option<Exact> {
         let guess = from.alpha.plus((metres * from.alpha_rate).clamp(-1.0, 1.0));
         self.exact(self.track.advanced(from.head, metres), guess)
     }
 
-    /// The same with the head on the next segment, where it has come to the end of its own.
+    /// Does the same with the head moved to the next segment if it is at the end of its own.
     fn past_junction(&self, exact: Exact, travelled: f64) -> Exact {
         let (path, segment) = (self.track.path, exact.head.segment + 1);
         if segment == path.segments() || path.end_of(segment - 1) > travelled {
@@ -261,7 +261,7 @@ impl<'a> HeadBuilder<'a> {
         end.min(next.unwrap_or(f64::INFINITY)).min(path.length())
     }
 
-    /// The end of a piece, cut where the second handle first meets a kink of T; and what is exact there.
+    /// Returns the end of a piece, cut where the second handle first meets a kink of T, and the exact handles there.
     fn cut_at_kink(&self, from: Exact, travelled: f64, end: f64, to: Exact) -> (f64, Exact) {
         let moved = to.alpha.minus(from.alpha);
         let nearest = self.rows.kinks.iter().filter_map(|kink| {
@@ -288,7 +288,7 @@ impl<'a> HeadBuilder<'a> {
         }
     }
 
-    /// The polynomials from one distance of travel to another, and their error as a part of what is allowed.
+    /// Returns the polynomials from one travel to another, and their error as a part of what is allowed.
     fn piece(&self, from: Exact, travelled: f64, end: f64) -> Option<(Piece, f64)> {
         let half = 0.5 * (end - travelled);
         let middle = travelled + half;
@@ -322,7 +322,8 @@ impl<'a> HeadBuilder<'a> {
         Some((piece, error))
     }
 
-    /// Whether there are rows for the last handle all along a piece. A stall pushes the team back, past its first place too.
+    /// Returns true if there are rows for the last handle all along a piece. A stall pushes the team back, also past
+    /// its first place.
     fn has_rows(&self, exact: &[Exact; NODES.len()]) -> bool {
         let (first, last) = (exact[0], exact[NODES.len() - 1]);
         let moved = exact.map(|exact| exact.alpha.minus(first.alpha));
@@ -333,8 +334,8 @@ impl<'a> HeadBuilder<'a> {
         furthest.row + self.team.benches <= self.rows.rows()
     }
 
-    /// What the rounding of the travel alone does to places and speeds, as a part of what is promised: near a lock,
-    /// where the handles behind race away from the head, no table and no solver keeps the promise.
+    /// Returns the change of places and speeds by the rounding of the travel alone, as a part of what is promised: near
+    /// a lock, where the handles behind move much faster than the head, no table and no solver keeps the promise.
     fn harm_of_rounding(&self, piece: &Piece) -> f64 {
         let (link, travelled) = (self.team.link(1), piece.middle);
         let rounding = f64::EPSILON * travelled;
@@ -351,7 +352,7 @@ impl<'a> HeadBuilder<'a> {
         ends[0].max(ends[1])
     }
 
-    /// x, y, heading and alpha relative to the centre of a piece, and their derivatives by travel.
+    /// Returns x, y, heading and alpha relative to the centre of a piece, and their derivatives by travel.
     fn data(&self, exact: Exact, centre: Exact) -> ([f64; QUANTITIES], [f64; QUANTITIES]) {
         let offset = self.track.displacement(centre.head, exact.head);
         let turn = super::band::within_half_turn(exact.heading - centre.heading);
@@ -365,11 +366,11 @@ impl<'a> HeadBuilder<'a> {
         let (values, rates) = exact;
         let found = piece.at_beta(beta);
         let alpha = found.alpha.minus(Alpha { row: piece.row, phase: 0.0 });
-        // Where T goes from one piece to the next, alpha jumps by what rounding has added up to along the rows.
+        // From one piece of T to the next, alpha jumps by the rounding accumulated along the rows.
         let walk = 2.0 * (self.rows.rows() as f64).sqrt() * f64::EPSILON * link;
         let allowed = tolerance.metres(self.team.shortest_link()) + walk;
         let place = hypot(found.x - values[0], found.y - values[1]).max(link * (alpha - values[3]).abs());
-        // The size of a slope's next power, had it fallen off as the last one did.
+        // The size of a slope's next power, if it falls as the last one did.
         let neglected = |quantities: &[usize]| {
             let power = |power: usize| {
                 let sum: f64 = quantities.iter().map(|quantity| piece.coefficients[power][*quantity].powi(2)).sum();
@@ -378,7 +379,7 @@ impl<'a> HeadBuilder<'a> {
             let (last, before) = (power(COEFFICIENTS - 1), power(COEFFICIENTS - 2));
             LARGEST_NODAL * piece.scale * last * (last / before).min(1.0)
         };
-        // The second handle's speed may be off relative to the head's, too.
+        // The second handle's speed may also have an error relative to the head's.
         let speed = neglected(&[3]) / rates[3].abs().max(1.0 / link);
         (place / allowed)
             .max((found.heading - values[2]).abs() / (10.0 * allowed / link + 2.0 * f64::EPSILON))

@@ -1,17 +1,17 @@
-//! A frame from the table: every handle behind the head by itself, eight at a time.
+//! A frame from the table: every handle behind the head independently, eight at a time.
 //!
 //! Called by the follower table, and for other formats by [`super::single_kernel`]. The loops over [`LANES`] have a
-//! fixed length, so that the compiler turns them into vectors.
+//! fixed length, so that the compiler vectorises them.
 
 use std::f64::consts::{PI, TAU};
 
 use super::rows::{Alpha, Band, LANES, Lanes, Lengths, Piece, Rows};
 use crate::solve::Chain;
 
-/// What a frame needs to know besides the table.
+/// The input of a frame besides the table.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Moment {
-    /// Where the second handle stands.
+pub(super) struct FrameInput {
+    /// Place of the second handle in the table.
     pub alpha: Alpha,
     /// Its derivative by time, 1/s; negative while the handle goes forward.
     pub alpha_per_second: f64,
@@ -20,7 +20,7 @@ pub(super) struct Moment {
 /// x, y, heading, speed, vx and vy of neighbouring handles.
 pub(super) type Outputs = [[f64; LANES]; 6];
 
-/// One piece of a band at one moment.
+/// One piece of a band for one frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Local {
     pub beta: f64,
@@ -31,11 +31,11 @@ pub(super) struct Local {
 
 impl Local {
     #[inline(always)]
-    pub(super) fn new(piece: &Piece, moment: &Moment) -> Self {
+    pub(super) fn new(piece: &Piece, input: &FrameInput) -> Self {
         Self {
-            beta: piece.beta(moment.alpha.phase),
-            beta_per_second: piece.beta_per_alpha() * moment.alpha_per_second,
-            sign: -moment.alpha_per_second.signum(),
+            beta: piece.beta(input.alpha.phase),
+            beta_per_second: piece.beta_per_alpha() * input.alpha_per_second,
+            sign: -input.alpha_per_second.signum(),
         }
     }
 }
@@ -45,26 +45,26 @@ pub(super) trait Blocks: Copy {
     /// The coefficients of one block.
     type Block;
 
-    /// The blocks from one on.
+    /// Returns the blocks from block `first` on.
     fn blocks(self, first: usize) -> impl Iterator<Item = Self::Block>;
 
-    /// The polynomials of one block, Horner's scheme for values and slopes; without velocities the last three are
-    /// unspecified.
+    /// Returns the polynomials of one block, values and slopes by Horner's scheme. Without velocities the last three
+    /// are unspecified.
     fn outputs<const FUSED: bool, const VELOCITIES: bool>(block: Self::Block, local: &Local) -> Outputs;
 }
 
-/// Writes all handles but the head from a table in double precision. With `FUSED` the processor multiplies and
-/// adds in one instruction.
+/// Writes all handles but the head from a table in double precision. With `FUSED` the processor multiplies and adds in
+/// one instruction.
 ///
-/// The heading of the last handle is not its own.
+/// The heading of the last handle is invalid and written by the caller.
 #[inline(always)]
-pub(super) fn write<const FUSED: bool, const VELOCITIES: bool>(rows: &Rows, moment: &Moment, chain: &mut Chain) {
-    let Alpha { row, phase } = moment.alpha;
+pub(super) fn write<const FUSED: bool, const VELOCITIES: bool>(rows: &Rows, input: &FrameInput, chain: &mut Chain) {
+    let Alpha { row, phase } = input.alpha;
     let end = row + chain.handles() - 1;
     let mut next = row;
     for band in &rows.bands[rows.band_of(row)..] {
         let piece = band.piece_at(phase);
-        let local = Local::new(&band.pieces[piece], moment);
+        let local = Local::new(&band.pieces[piece], input);
         let handled = next..end.min(band.first_row + band.rows);
         next = handled.end;
         if band.lengths == Lengths::NEAR {
@@ -94,7 +94,7 @@ pub(super) fn write_band<B: Blocks, const FUSED: bool, const VELOCITIES: bool>(
     let blocks = (rows.end - band_row).div_ceil(LANES) - first_block;
     let first_row = band_row + first_block * LANES;
     let whole = usize::from(first_row < rows.start)..(rows.end - first_row) / LANES;
-    // No closure here: where one is not inlined, it knows nothing of the caller's instructions.
+    // No closure here: a closure that is not inlined lacks the caller's instruction set.
     let last = (whole.end < blocks && whole.end >= whole.start).then_some(whole.end);
     for partial in (whole.start > 0).then_some(0).into_iter().chain(last) {
         let row = first_row + partial * LANES;
@@ -103,7 +103,7 @@ pub(super) fn write_band<B: Blocks, const FUSED: bool, const VELOCITIES: bool>(
         let outputs = B::outputs::<FUSED, VELOCITIES>(block, local);
         store_some::<VELOCITIES>(&outputs, lanes, chain, row + 1, second);
     }
-    // Whole blocks are stored straight from registers.
+    // Whole blocks are stored directly from registers.
     if whole.start < whole.end {
         let handle = first_row + whole.start * LANES + 1 - second;
         let Chain { x, y, heading, speed, vx, vy } = &mut *chain;
@@ -111,8 +111,7 @@ pub(super) fn write_band<B: Blocks, const FUSED: bool, const VELOCITIES: bool>(
         let [x, y, heading, speed, vx, vy] =
             [x, y, heading, speed, vx, vy].map(|list| &mut list[handle..].as_chunks_mut::<LANES>().0[..number]);
         for (index, block) in source.blocks(first_block + whole.start).enumerate().take(number) {
-            // Where the polynomials are short, LLVM else takes the blocks for what is to be vectorised, with gathers
-            // and scatters: four times as slow.
+            // With short polynomials LLVM would vectorise over blocks, with gathers and scatters: four times as slow.
             std::hint::black_box(());
             let outputs = B::outputs::<FUSED, VELOCITIES>(block, local);
             x[index] = outputs[0];
@@ -127,7 +126,7 @@ pub(super) fn write_band<B: Blocks, const FUSED: bool, const VELOCITIES: bool>(
     }
 }
 
-/// Writes a part of the lanes.
+/// Writes some of the lanes.
 #[inline(always)]
 fn store_some<const VELOCITIES: bool>(
     outputs: &Outputs,
@@ -206,13 +205,13 @@ impl<'a, const K: usize, const H: usize> Blocks for Doubles<'a, K, H> {
     }
 }
 
-/// `x * y + z`: one rounding where the processor has the instruction, two where it would be a library call.
+/// Returns `x * y + z`: one rounding if the processor has the instruction, two if it would be a library call.
 #[inline(always)]
 fn multiply_add<const FUSED: bool>(x: f64, y: f64, z: f64) -> f64 {
     if FUSED { x.mul_add(y, z) } else { x * y + z }
 }
 
-/// An angle less than a turn outside of (-pi, pi], brought into it.
+/// Returns an angle less than a turn outside of (-pi, pi], reduced to that interval.
 #[inline(always)]
 pub(super) fn within_half_turn(angle: f64) -> f64 {
     let down = if angle > PI { TAU } else { 0.0 };

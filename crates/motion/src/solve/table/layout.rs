@@ -1,5 +1,5 @@
-//! How the table is laid out before it is made: how far forward it reaches, its bands of rows, and the phases at which
-//! the path's junctions cut it.
+//! Layout of the table before it is made: how far forward it reaches, its bands of rows, and the phases at which the
+//! path's junctions cut it.
 //!
 //! Called by [`super::band`] only.
 
@@ -11,20 +11,20 @@ use crate::model::curve::Curve;
 use crate::model::path::Param;
 use crate::model::team::Team;
 
-/// Kinks nearer together than this, in links, are taken for one.
+/// Kinks nearer together than this, in links, count as one.
 const SAME_KINK: f64 = 1e-11;
 
-/// Rows ahead of the team, at most: a longer way has a table of its beginning.
+/// Greatest number of rows ahead of the team: for a longer path the table covers its beginning.
 const MOST_ROWS_AHEAD: usize = 1 << 15;
 
-/// Rows of the frontmost band; each further one reaches twice as far back.
+/// Rows of the frontmost band; each further band reaches twice as far back.
 const FIRST_BAND: usize = 8;
 
-/// The first row of each band and the row behind it, from the rear forward.
+/// Returns the first row of each band and the row behind it, from the rear forward.
 pub(super) fn bands(end: usize) -> Vec<(usize, usize)> {
     let mut begins = vec![0];
     let mut next = FIRST_BAND;
-    // The last band is not to be a short one.
+    // A short last band is avoided.
     while next + next / 2 <= end {
         begins.push(next);
         next *= 2;
@@ -35,7 +35,7 @@ pub(super) fn bands(end: usize) -> Vec<(usize, usize)> {
     bands
 }
 
-/// The foremost place to which the second handle comes.
+/// Returns the foremost place of the second handle.
 pub(super) fn foremost(track: &Track, team: &Team) -> Option<Param> {
     let reach = track.path.length().min(MOST_ROWS_AHEAD as f64 * team.link(1));
     let second = |travelled: f64| linkage::follower(track.path, track.path.param_at(travelled), team.link(0)).ok();
@@ -70,7 +70,7 @@ pub(super) fn foremost(track: &Track, team: &Team) -> Option<Param> {
     Some(foremost)
 }
 
-/// Alpha of every junction at which the path's curvature changes, in order of phase.
+/// Returns alpha of every junction at which the path's curvature changes, in order of phase.
 pub(super) fn kinks(track: &Track, beginning: &Beginning, link: f64, end: usize) -> Vec<f64> {
     let path = track.path;
     let mut kinks: Vec<f64> = (1..path.segments())
@@ -95,7 +95,7 @@ pub(super) fn kinks(track: &Track, beginning: &Beginning, link: f64, end: usize)
     kinks
 }
 
-/// The pieces into which the kinks of a band cut the phases.
+/// Returns the pieces into which the kinks of a band cut the phases.
 pub(super) fn between_kinks(kinks: &[f64], first_row: usize) -> Vec<Piece> {
     let mut cuts = vec![0.0];
     for kink in kinks.iter().filter(|kink| **kink >= first_row as f64) {

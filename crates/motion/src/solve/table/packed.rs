@@ -1,12 +1,10 @@
-//! The table once more in fewer bytes: shorter polynomials over shorter pieces, in single precision where that is
-//! enough.
+//! The table in fewer bytes: shorter polynomials over shorter pieces, in single precision where that suffices.
 //!
-//! In: the rows of T, and what may be lost. Out: the same bands with pieces of their own, and a proven bound of what
-//! was lost, over all phases and all rows that a frame can read. Made for the frame alone; the clearance reads the
-//! rows.
+//! In: the rows of T and the allowed loss. Out: the same bands with other pieces, and a proven bound of the loss over
+//! all phases and all rows that a frame can read. Only frames read it; the clearance reads the rows.
 //!
-//! Every polynomial of a piece is written for a part of it, exactly, and shortened by Chebyshev polynomials, which
-//! bounds the change; to this comes the rounding of single precision. Where it is too much, the part is halved.
+//! Every polynomial of a piece is rewritten exactly for a part of it and shortened by Chebyshev polynomials, which
+//! bounds the change; the rounding of single precision is added. If the sum is too large, the part is halved.
 
 use super::polynomial::{economise, on_part};
 use super::rows::{Band, LANES, Lanes, Lengths, Piece, Rows, piece_at, piece_of_share};
@@ -17,16 +15,16 @@ use crate::model::elementary::hypot;
 #[repr(align(32))]
 pub(super) struct Singles(pub [f32; LANES]);
 
-/// How the coefficients of a frame are kept.
+/// Precision of the coefficients of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Precision {
-    /// Constants of coordinates in double precision, all else in single.
+    /// Constants of coordinates in double precision, the rest in single precision.
     Mixed,
     /// All in single precision.
     Single,
 }
 
-/// How a packed table is kept.
+/// Format of a packed table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Format {
     pub precision: Precision,
@@ -34,7 +32,7 @@ pub(crate) struct Format {
 }
 
 impl Format {
-    /// Bytes that a frame reads for a handle.
+    /// Returns the bytes that a frame reads per handle.
     pub(crate) fn bytes_per_handle(self) -> usize {
         let singles = self.lengths.per_row() * size_of::<f32>();
         match self.precision {
@@ -54,14 +52,14 @@ impl std::fmt::Display for Format {
     }
 }
 
-/// What the packing may change, besides what the rows themselves are off.
+/// Allowed changes by the packing, besides the errors of the rows.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Allowed {
     /// Metres.
     pub place: f64,
     /// Radians.
     pub heading: f64,
-    /// Relative to a handle's own speed; infinite where no velocities are wanted.
+    /// Relative to a handle's own speed; infinite if velocities are omitted.
     pub speed: f64,
 }
 
@@ -72,9 +70,9 @@ pub(super) struct PackedBand {
     pub rows: usize,
     /// In order of phase, from 0 to 1 without a gap.
     pub pieces: Vec<Piece>,
-    /// Constants of x and y where they are doubles, by piece, then by block.
+    /// Constants of x and y if they are doubles, by piece, then by block.
     pub constants: Vec<Lanes>,
-    /// By piece, then by block: x, y and heading by power, constants included where they are not doubles.
+    /// By piece, then by block: x, y and heading by power, with the constants that are not doubles.
     pub coefficients: Vec<Singles>,
     piece_of_share: Vec<u32>,
 }
@@ -86,10 +84,11 @@ pub(super) struct PackedRows {
     pub bands: Vec<PackedBand>,
 }
 
-/// Halvings of a piece of the rows, at most.
+/// Greatest number of halvings of a piece of the rows.
 const MOST_HALVINGS: usize = 7;
 
-/// Bytes of a packed table, at most: a multiple of what the rows take, and so many more, which stay near the processor.
+/// Greatest size of a packed table: a multiple of the rows' bytes, plus a number of bytes that stay in the processor's
+/// cache.
 const MOST_GROWTH: usize = 2;
 const SMALL: usize = 1 << 18;
 
@@ -97,7 +96,7 @@ const SMALL: usize = 1 << 18;
 const ROUNDING: f64 = 0.5 * f32::EPSILON as f64;
 
 impl PackedRows {
-    /// The formats worth having, the fewest bytes first.
+    /// All formats, the fewest bytes first.
     pub(super) const FORMATS: [Format; 3] = {
         let [three, four] = [(3, 2), (4, 3)];
         const fn format(precision: Precision, (coordinate, heading): (usize, usize)) -> Format {
@@ -106,8 +105,7 @@ impl PackedRows {
         [format(Precision::Single, three), format(Precision::Mixed, three), format(Precision::Mixed, four)]
     };
 
-    /// The rows from `foremost` on in another format; `None` where that would lose more than is allowed, or gain
-    /// nothing.
+    /// Packs the rows from `foremost` on. Returns `None` if that would lose more than is allowed, or save nothing.
     pub(super) fn new(rows: &Rows, foremost: usize, format: Format, allowed: Allowed) -> Option<Self> {
         let mut budget = MOST_GROWTH * rows.memory_bytes() + SMALL;
         let mut bands = Vec::with_capacity(rows.bands.len());
@@ -133,7 +131,7 @@ impl PackedRows {
         Some(Self { format, bands })
     }
 
-    /// The number of the band that holds a row.
+    /// Returns the number of the band that holds a row.
     #[inline(always)]
     pub(super) fn band_of(&self, row: usize) -> usize {
         self.bands.iter().position(|band| row < band.first_row + band.rows).unwrap_or(self.bands.len())
@@ -156,7 +154,7 @@ impl PackedBand {
         }
     }
 
-    /// The number of the piece that holds a phase from 0 to 1.
+    /// Returns the number of the piece that holds a phase from 0 to 1.
     #[inline(always)]
     pub(super) fn piece_at(&self, phase: f64) -> usize {
         piece_at(&self.pieces, &self.piece_of_share, phase)
@@ -170,12 +168,12 @@ impl PackedBand {
     }
 }
 
-/// A band being packed.
+/// A band during packing.
 struct Builder<'a> {
     band: &'a Band,
     /// The first row that a frame can read.
     first: usize,
-    /// Alpha from which on the rows are exact.
+    /// Alpha from which the rows are exact.
     valid_from: f64,
     format: Format,
     allowed: Allowed,
@@ -188,7 +186,7 @@ struct Builder<'a> {
 type Polynomials = [[f64; 6]; 3];
 
 impl Builder<'_> {
-    /// Adds `part` of a piece of the band, halved until nothing more is lost than is allowed.
+    /// Adds `part` of a piece of the band, halved until the loss is within what is allowed.
     fn refine(&mut self, index: usize, piece: Piece, part: Piece, halvings: usize) -> Option<()> {
         let first = self.first.max((self.valid_from - part.end).ceil().max(0.0) as usize);
         let end = self.band.first_row + self.band.rows;
@@ -201,7 +199,7 @@ impl Builder<'_> {
         self.refine(index, piece, Piece { begin: middle, ..part }, halvings)
     }
 
-    /// The band's own polynomials over a part of a piece.
+    /// Returns the band's polynomials over a part of a piece.
     fn polynomials(&self, index: usize, piece: Piece, part: Piece, row: usize) -> Polynomials {
         let (begin, end) = (piece.beta(part.begin), piece.beta(part.end));
         let [x, y] = self.band.coordinates(index, row);
@@ -209,15 +207,15 @@ impl Builder<'_> {
         [x, y, heading].map(|polynomial| on_part(&polynomial, 0.5 * (begin + end), 0.5 * (end - begin)))
     }
 
-    /// Shortens the polynomials of a row; returns what that and the rounding change at most, as a part of what is
-    /// allowed.
+    /// Shortens the polynomials of a row. Returns an upper bound of the change by this and by rounding, as a part of
+    /// what is allowed.
     fn loss(&self, polynomials: &mut Polynomials) -> f64 {
         let Lengths { coordinate, heading } = self.format.lengths;
         let [x, y, angle] = polynomials;
         let [dropped_x, dropped_y] = [&mut *x, &mut *y].map(|axis| economise(axis, coordinate));
         let dropped_heading = economise(angle, heading);
         let mixed = self.format.precision == Precision::Mixed;
-        // Twice for the coefficients and beta, and once for every step of Horner's scheme.
+        // Two roundings for the coefficients and beta, and one for every step of Horner's scheme.
         let rounding = |coefficients: &[f64; 6], constant: bool, length: usize| {
             let (constant_part, others) =
                 (coefficients[0].abs(), coefficients[1..].iter().map(|c| c.abs()).sum::<f64>());
@@ -234,7 +232,7 @@ impl Builder<'_> {
         (place / self.allowed.place).max(turn / self.allowed.heading).max(speed)
     }
 
-    /// Adds the polynomials of a part; `None` where the table grows too large.
+    /// Adds the polynomials of a part. Returns `None` if the table becomes too large.
     fn add(&mut self, index: usize, piece: Piece, part: Piece) -> Option<()> {
         let Lengths { coordinate, heading } = self.format.lengths;
         let mixed = self.format.precision == Precision::Mixed;

@@ -1,14 +1,12 @@
-//! Polynomials on -1..1 with given slopes, and how to shorten them.
-//!
-//! Called by the making of the table only.
+//! Polynomials on -1..1 with given slopes, and how to shorten them. Used only to make the table.
 
 use nalgebra::SMatrix;
 
-/// The polynomial of degree `N` with given slopes at `N` nodes; its constant is left at zero.
+/// Returns the polynomial of degree `N` with given slopes at `N` nodes; its constant is zero.
 ///
-/// Values are not used: half of their rounding would come back in the slopes between them, and the more the shorter the
-/// piece. They are left to the proof: where the slope's error is the first neglected power's, which is zero at the
-/// nodes, the value is farthest off at nodes.
+/// Values are not used: half of their rounding would return in the slopes between them, more in shorter pieces. The
+/// proof uses them: where the slope's error is that of the first neglected power, zero at the nodes, the value's error
+/// is greatest at nodes.
 #[derive(Debug, Clone)]
 pub(super) struct SlopeFit<const N: usize> {
     from_slopes: SMatrix<f64, N, N>,
@@ -21,14 +19,15 @@ impl<const N: usize> SlopeFit<N> {
         Self { from_slopes: slopes.try_inverse().expect("different nodes determine the polynomial") }
     }
 
-    /// The coefficients from the first power on.
+    /// Returns the coefficients from the first power on.
     pub(super) fn coefficients(&self, slopes: [f64; N]) -> [f64; N] {
         let slope: [f64; N] = (self.from_slopes * SMatrix::<f64, N, 1>::from(slopes)).into();
         std::array::from_fn(|power| slope[power] / (power + 1) as f64)
     }
 }
 
-/// A power, always with the same rounding: what `powi` gives depends on whether the compiler knows the number.
+/// Returns a power, always with the same rounding: the result of `powi` depends on whether the compiler knows the
+/// number.
 fn whole_power(number: f64, exponent: usize) -> f64 {
     let (mut power, mut square, mut left) = (1.0, number, exponent);
     loop {
@@ -43,8 +42,8 @@ fn whole_power(number: f64, exponent: usize) -> f64 {
     }
 }
 
-/// The polynomial of the fifth degree that is zero in the middle and has given slopes at -1, -1/2, 0, 1/2 and 1.
-/// See [`SlopeFit`].
+/// Returns the polynomial of the fifth degree that is zero in the middle and has given slopes at -1, -1/2, 0, 1/2 and
+/// 1. See [`SlopeFit`].
 pub(super) fn from_slopes([a, b, c, d, e]: [f64; 5]) -> [f64; 6] {
     // Newton's divided differences of five equidistant numbers, by power.
     let (near, far) = (0.5 * (d - b), 0.5 * (e - a));
@@ -56,22 +55,22 @@ pub(super) fn from_slopes([a, b, c, d, e]: [f64; 5]) -> [f64; 6] {
     [0.0, c, linear / 2.0, square / 3.0, cubic / 4.0, fourth / 5.0]
 }
 
-/// Value and slope at `beta`.
+/// Returns value and slope at `beta`.
 #[inline(always)]
 pub(super) fn horner<const N: usize>(coefficients: &[f64; N], beta: f64) -> (f64, f64) {
     coefficients.iter().rev().fold((0.0, 0.0), |(value, slope), c| (value * beta + c, slope * beta + value))
 }
 
-/// Bounds of what a change of a polynomial does to its value and to its slope in -1..1.
+/// Bounds of the change of a polynomial's value and slope in -1..1.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Change {
     pub value: f64,
     pub slope: f64,
 }
 
-/// Takes the powers from `keep` on out of a polynomial of at most the fifth degree, and bounds what that changes: each
-/// power is replaced by the polynomial next to it (Lanczos' economisation; Press et al., Numerical Recipes, 3rd ed.,
-/// section 5.11), so that what is dropped is a Chebyshev polynomial, whose slope is at most the square of its degree.
+/// Removes the powers from `keep` on from a polynomial of at most the fifth degree, and bounds the change. Each power
+/// is replaced by the polynomial next to it (Lanczos' economisation; Press et al., Numerical Recipes, 3rd ed., section
+/// 5.11). The difference is a Chebyshev polynomial, whose slope is at most the square of its degree.
 pub(super) fn economise(coefficients: &mut [f64; 6], keep: usize) -> Change {
     /// The power less the Chebyshev polynomial of its degree, scaled: coefficients of the lower powers.
     const REPLACEMENTS: [[f64; 5]; 6] = [
@@ -95,7 +94,7 @@ pub(super) fn economise(coefficients: &mut [f64; 6], keep: usize) -> Change {
     bound
 }
 
-/// The same polynomial on a part of -1..1, given by its middle and half its length, again over -1..1.
+/// Returns the same polynomial on a part of -1..1, given by its middle and half its length, again over -1..1.
 pub(super) fn on_part(coefficients: &[f64; 6], middle: f64, half: f64) -> [f64; 6] {
     let mut part = *coefficients;
     for low in 0..5 {

@@ -1,9 +1,9 @@
-//! T itself: where every handle of a chain of equal links stands, as polynomials.
+//! T: the places of all handles of a chain of equal links, as polynomials.
 //!
 //! All links but the head's are equal, so that one map F takes every handle's place to its follower's. T satisfies
-//! T(alpha + 1) = F(T(alpha)): where the second handle stands at T(alpha), the ones behind it stand at T(alpha + 1),
-//! T(alpha + 2) and so on, each found without the ones before. (T is the inverse of an Abel function of F; Kuczma,
-//! Choczewski and Ger, Iterative Functional Equations, 1990.)
+//! T(alpha + 1) = F(T(alpha)): if the second handle stands at T(alpha), the handles behind it stand at T(alpha + 1),
+//! T(alpha + 2) and so on, each found independently. (T is the inverse of an Abel function of F; Kuczma, Choczewski and
+//! Ger, Iterative Functional Equations, 1990.)
 //!
 //! The whole part of alpha is a *row*, counted from the front of the table backward; its fraction is a *phase*. The
 //! rows are grouped into bands, and the phases of each band are cut into pieces. Every piece holds, for every row of
@@ -11,29 +11,29 @@
 //! the piece. Where a handle or its follower crosses a junction of the path, T has a kink in its second derivative;
 //! since T takes whole links to followers, all kinks of one junction have one phase, and pieces end there.
 //!
-//! Made by [`super::band`]; read by the frame and by the clearance.
+//! Made by [`super::band`]. Read by the frame and by the clearance.
 
 use super::polynomial::horner;
 use super::track::Track;
 use crate::model::Vector;
 use crate::model::path::Param;
 
-/// Rows that are worked out together.
+/// Rows that are computed together.
 pub(crate) const LANES: usize = 8;
 
-/// One coefficient of as many neighbouring rows.
+/// One coefficient of [`LANES`] neighbouring rows.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
 pub(crate) struct Lanes(pub [f64; LANES]);
 
-/// How exact a table is.
+/// Tolerance of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
-    /// Metres that a polynomial may be off, besides rounding.
+    /// Greatest error of a polynomial, metres, besides rounding.
     pub place: f64,
-    /// The same as a part of a link.
+    /// The same error as a part of a link.
     pub relative: f64,
-    /// What a speed may be off, relative to itself.
+    /// Greatest relative error of a speed.
     pub speed: f64,
 }
 
@@ -41,13 +41,13 @@ impl Tolerance {
     /// As exact as doubles allow.
     pub const EXACT: Self = Self { place: 5e-15, relative: 1e-13, speed: 3e-13 };
 
-    /// Metres that a polynomial may be off where links are so long.
+    /// Returns the greatest error of a polynomial, metres, for links of `link` metres.
     pub(super) fn metres(&self, link: f64) -> f64 {
         self.place.min(self.relative * link)
     }
 }
 
-/// How long the polynomials of a band are.
+/// Numbers of coefficients of the polynomials of a band.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Lengths {
     /// Coefficients of each coordinate.
@@ -57,12 +57,12 @@ pub(crate) struct Lengths {
 }
 
 impl Lengths {
-    /// Those of rows at the front.
+    /// For rows at the front.
     pub(super) const NEAR: Self = Self { coordinate: 6, heading: 5 };
-    /// Those of rows so far behind that shorter polynomials and more pieces serve a frame better.
+    /// For rows so far behind that shorter polynomials and more pieces make a frame faster.
     pub(super) const FAR: Self = Self { coordinate: 5, heading: 4 };
 
-    /// Coefficients of a row in a piece.
+    /// Returns the number of coefficients of a row in a piece.
     pub(super) fn per_row(self) -> usize {
         2 * self.coordinate + self.heading
     }
@@ -78,13 +78,13 @@ pub(crate) struct Piece {
 }
 
 impl Piece {
-    /// Beta of a phase.
+    /// Returns beta of a phase.
     #[inline(always)]
     pub fn beta(&self, phase: f64) -> f64 {
         ((phase - self.begin) - (self.end - phase)) / (self.end - self.begin)
     }
 
-    /// Beta per unit of alpha.
+    /// Returns beta per unit of alpha.
     #[inline(always)]
     pub fn beta_per_alpha(&self) -> f64 {
         2.0 / (self.end - self.begin)
@@ -97,20 +97,20 @@ pub(crate) struct Band {
     /// The band's first row and how many it has: multiples of [`LANES`].
     pub first_row: usize,
     pub rows: usize,
-    /// How long its polynomials are.
+    /// Numbers of coefficients of its polynomials.
     pub(super) lengths: Lengths,
     /// In order of phase, from 0 to 1 without a gap.
     pub pieces: Vec<Piece>,
     /// By piece, then by block of [`LANES`] rows, then x, y and heading by power: see [`Band::block`].
     pub(super) coefficients: Vec<Lanes>,
-    /// The place with beta 0 by piece, then by row, where the second handle can come; made with the table, then
-    /// dropped.
+    /// The place with beta 0 by piece, then by row, where the second handle can be. Needed only while the table is
+    /// made.
     pub(super) centres: Vec<Option<Param>>,
     /// The piece in which each of equal shares of the phases begins.
     pub(super) piece_of_share: Vec<u32>,
 }
 
-/// What T has at one alpha, relative to the piece's centre.
+/// T at one alpha, relative to the piece's centre.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Local {
     pub offset: Vector,
@@ -119,32 +119,32 @@ pub(super) struct Local {
 }
 
 impl Band {
-    /// A band without pieces.
+    /// Creates a band without pieces.
     pub(super) fn new(first_row: usize, rows: usize, lengths: Lengths) -> Self {
         let (pieces, coefficients, centres, piece_of_share) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         Self { first_row, rows, lengths, pieces, coefficients, centres, piece_of_share }
     }
 
-    /// The number of the piece that holds a phase from 0 to 1.
+    /// Returns the number of the piece that holds a phase from 0 to 1.
     #[inline(always)]
     pub(crate) fn piece_at(&self, phase: f64) -> usize {
         piece_at(&self.pieces, &self.piece_of_share, phase)
     }
 
-    /// The coefficients of the `LANES` rows from `first_row + LANES * block` on: those of x by power, then of y, then
-    /// of the heading, metres and radians.
+    /// Returns the coefficients of the `LANES` rows from `first_row + LANES * block` on: those of x by power, then of
+    /// y, then of the heading, metres and radians.
     pub(crate) fn block(&self, piece: usize, block: usize) -> &[Lanes] {
         let (blocks, per_row) = (self.rows / LANES, self.lengths.per_row());
         &self.coefficients[(piece * blocks + block) * per_row..][..per_row]
     }
 
-    /// The coefficients of x and y of one row, by power, metres; those beyond the band's lengths are zero.
+    /// Returns the coefficients of x and y of one row, by power, metres; beyond the band's lengths they are zero.
     pub(crate) fn coordinates(&self, piece: usize, row: usize) -> [[f64; 6]; 2] {
         let length = self.lengths.coordinate;
         [0, length].map(|begin| self.polynomial(piece, row, begin, length))
     }
 
-    /// The coefficients of the heading of one row, by power, radians.
+    /// Returns the coefficients of the heading of one row, by power, radians.
     pub(super) fn heading(&self, piece: usize, row: usize) -> [f64; 6] {
         self.polynomial(piece, row, 2 * self.lengths.coordinate, self.lengths.heading)
     }
@@ -155,7 +155,7 @@ impl Band {
         std::array::from_fn(|power| block.get(power).map_or(0.0, |coefficient| coefficient.0[local % LANES]))
     }
 
-    /// Fills `piece_of_share`, when all pieces are there.
+    /// Fills `piece_of_share` after the last piece.
     pub(super) fn index(&mut self) {
         self.piece_of_share = piece_of_share(&self.pieces);
     }
@@ -167,7 +167,7 @@ impl Band {
     }
 }
 
-/// The piece in which each of equal shares of the phases begins.
+/// Returns the piece in which each of equal shares of the phases begins.
 pub(super) fn piece_of_share(pieces: &[Piece]) -> Vec<u32> {
     let shares = (4 * pieces.len()).next_power_of_two();
     let begin = |share: usize| share as f64 / shares as f64;
@@ -175,7 +175,7 @@ pub(super) fn piece_of_share(pieces: &[Piece]) -> Vec<u32> {
     (0..shares).map(|share| piece_at(begin(share)) as u32).collect()
 }
 
-/// The number of the piece that holds a phase from 0 to 1.
+/// Returns the number of the piece that holds a phase from 0 to 1.
 #[inline(always)]
 pub(super) fn piece_at(pieces: &[Piece], piece_of_share: &[u32], phase: f64) -> usize {
     let share = (phase * piece_of_share.len() as f64) as usize;
@@ -194,7 +194,7 @@ pub(crate) struct Rows {
     pub bands: Vec<Band>,
     /// The phases of the kinks, in order.
     pub(super) kinks: Vec<f64>,
-    /// The least alpha from which on every piece was found exact.
+    /// The least alpha from which every piece is exact.
     pub valid_from: f64,
 }
 
@@ -207,7 +207,7 @@ pub(crate) struct Alpha {
 }
 
 impl Alpha {
-    /// Alpha moved by less than its whole part.
+    /// Returns alpha moved by less than its whole part.
     #[inline(always)]
     pub(crate) fn plus(self, by: f64) -> Self {
         let phase = self.phase + by;
@@ -215,7 +215,7 @@ impl Alpha {
         Self { row: self.row.wrapping_add_signed(whole as isize), phase: phase - whole }
     }
 
-    /// How much further back this alpha is than another.
+    /// Returns how much further back this alpha is than another.
     pub(super) fn minus(self, other: Self) -> f64 {
         (self.row as f64 - other.row as f64) + (self.phase - other.phase)
     }
@@ -226,23 +226,23 @@ impl Alpha {
 }
 
 impl Rows {
-    /// A table without rows.
+    /// Creates a table without rows.
     pub(super) fn empty() -> Self {
         Self { tolerance: Tolerance::EXACT, bands: Vec::new(), kinks: Vec::new(), valid_from: 0.0 }
     }
 
-    /// The number of rows.
+    /// Returns the number of rows.
     pub(crate) fn rows(&self) -> usize {
         self.bands.last().map_or(0, |band| band.first_row + band.rows)
     }
 
-    /// The number of the band that holds a row.
+    /// Returns the number of the band that holds a row.
     #[inline(always)]
     pub(crate) fn band_of(&self, row: usize) -> usize {
         self.bands.iter().position(|band| row < band.first_row + band.rows).unwrap_or(self.bands.len())
     }
 
-    /// Bytes of one piece for a row, on average over so many rows from the rear on.
+    /// Returns the bytes of one piece for a row, on average over the last `rows` rows.
     pub(super) fn bytes_per_row(&self, rows: usize) -> f64 {
         let first = self.rows().saturating_sub(rows);
         let of_band = |band: &Band| {
@@ -256,7 +256,7 @@ impl Rows {
         self.bands.iter().map(Band::memory_bytes).sum()
     }
 
-    /// T relative to the centre of the piece at `alpha`, and that centre; while the table is made.
+    /// Returns T relative to the centre of the piece at `alpha`, and that centre. Used only while the table is made.
     pub(super) fn local(&self, alpha: Alpha) -> Option<(Param, Local)> {
         let band = self.bands.get(self.band_of(alpha.row))?;
         let piece = band.piece_at(alpha.phase);
@@ -269,14 +269,15 @@ impl Rows {
         Some((centre, Local { offset: Vector::new(x.0, y.0), rate: per_alpha * Vector::new(x.1, y.1) }))
     }
 
-    /// Alpha of a place near `guess` (Newton's method), and the derivative of T there; while the table is made.
+    /// Returns alpha of a place near `guess` (Newton's method), and the derivative of T there. Used only while the
+    /// table is made.
     pub(super) fn locate(&self, track: &Track, place: Param, guess: Alpha) -> Option<(Alpha, Vector)> {
         let mut alpha = guess;
         for _ in 0..30 {
             let (centre, local) = self.local(alpha)?;
             let miss = track.displacement(centre, place) - local.offset;
             let step = miss.dot(&local.rate) / local.rate.norm_squared();
-            // The rate is that before the step, which has to be so short that it does not matter.
+            // The rate is the one before the step; the step has to be short enough for that.
             let settled = step.abs() < 1e-13;
             alpha = alpha.plus(step.clamp(-0.5, 0.5));
             if settled {

@@ -4,34 +4,38 @@
 
 use std::f64::consts::TAU;
 
-use super::kernel::{Blocks, Local, Moment, Outputs, write_band};
+use super::kernel::{Blocks, FrameInput, Local, Outputs, write_band};
 use super::packed::{PackedBand, PackedRows, Precision, Singles};
 use super::rows::{Alpha, LANES, Lanes};
 use crate::solve::Chain;
 
-/// Writes all handles but the head from a packed table; as [`super::kernel::write`].
+/// Writes all handles but the head from a packed table, as [`super::kernel::write`].
 #[inline(always)]
-pub(super) fn write<const FUSED: bool, const VELOCITIES: bool>(rows: &PackedRows, moment: &Moment, chain: &mut Chain) {
+pub(super) fn write<const FUSED: bool, const VELOCITIES: bool>(
+    rows: &PackedRows,
+    input: &FrameInput,
+    chain: &mut Chain,
+) {
     // The formats of `PackedRows::FORMATS`.
     match (rows.format.precision, rows.format.lengths.coordinate) {
-        (Precision::Single, _) => write_bands::<Single<3, 2>, FUSED, VELOCITIES>(rows, moment, chain),
-        (Precision::Mixed, 3) => write_bands::<Mixed<3, 2>, FUSED, VELOCITIES>(rows, moment, chain),
-        (Precision::Mixed, _) => write_bands::<Mixed<4, 3>, FUSED, VELOCITIES>(rows, moment, chain),
+        (Precision::Single, _) => write_bands::<Single<3, 2>, FUSED, VELOCITIES>(rows, input, chain),
+        (Precision::Mixed, 3) => write_bands::<Mixed<3, 2>, FUSED, VELOCITIES>(rows, input, chain),
+        (Precision::Mixed, _) => write_bands::<Mixed<4, 3>, FUSED, VELOCITIES>(rows, input, chain),
     }
 }
 
 #[inline(always)]
 fn write_bands<'a, B: PackedBlocks<'a>, const FUSED: bool, const VELOCITIES: bool>(
     rows: &'a PackedRows,
-    moment: &Moment,
+    input: &FrameInput,
     chain: &mut Chain,
 ) {
-    let Alpha { row, phase } = moment.alpha;
+    let Alpha { row, phase } = input.alpha;
     let end = row + chain.handles() - 1;
     let mut next = row;
     for band in &rows.bands[rows.band_of(row)..] {
         let piece = band.piece_at(phase);
-        let local = Local::new(&band.pieces[piece], moment);
+        let local = Local::new(&band.pieces[piece], input);
         let handled = next..end.min(band.first_row + band.rows);
         next = handled.end;
         write_band::<_, FUSED, VELOCITIES>(B::new(band, piece), band.first_row, &local, handled, row, chain);
@@ -81,7 +85,7 @@ impl<'a, const K: usize, const H: usize> Blocks for Single<'a, K, H> {
     }
 }
 
-/// Constants of coordinates as doubles, all else in single precision.
+/// Constants of coordinates as doubles, the rest in single precision.
 #[derive(Clone, Copy)]
 struct Mixed<'a, const K: usize, const H: usize> {
     constants: &'a [Lanes],
@@ -133,7 +137,7 @@ impl<'a, const K: usize, const H: usize> Blocks for Mixed<'a, K, H> {
 
 type Lanes32 = [f32; LANES];
 
-/// A polynomial and its slope by beta, from its coefficients by power.
+/// Returns a polynomial and its slope by beta, from its coefficients by power.
 #[inline(always)]
 fn value_and_slope<const K: usize, const FUSED: bool>(coefficients: &[Singles], beta: f32) -> (Lanes32, Lanes32) {
     let mut value = coefficients[K - 1].0;
@@ -145,7 +149,7 @@ fn value_and_slope<const K: usize, const FUSED: bool>(coefficients: &[Singles], 
     (times_plus::<FUSED>(&value, beta, &coefficients[0].0), slope)
 }
 
-/// A polynomial without its constant, and its slope, from its coefficients by power from the first on.
+/// Returns a polynomial without its constant, and its slope, from its coefficients by power from the first on.
 #[inline(always)]
 fn offset_and_slope<const FUSED: bool>(coefficients: &[Singles], beta: f32) -> (Lanes32, Lanes32) {
     let mut value = coefficients[coefficients.len() - 1].0;
@@ -160,7 +164,7 @@ fn offset_and_slope<const FUSED: bool>(coefficients: &[Singles], beta: f32) -> (
     (value, slope)
 }
 
-/// A heading in (-pi, pi] from its coefficients by power.
+/// Returns a heading in (-pi, pi] from its coefficients by power.
 #[inline(always)]
 fn heading_of<const H: usize, const FUSED: bool>(coefficients: &[Singles], beta: f32) -> [f64; LANES] {
     let mut heading = coefficients[H - 1].0;
@@ -175,10 +179,10 @@ fn heading_of<const H: usize, const FUSED: bool>(coefficients: &[Singles], beta:
     widened(&heading)
 }
 
-/// The greatest number of single precision that is not above pi.
+/// The greatest number of single precision not above pi.
 const SINGLE_PI: f32 = std::f32::consts::PI.next_down();
 
-/// Speed, vx and vy from the slopes by beta.
+/// Returns speed, vx and vy from the slopes by beta.
 #[inline(always)]
 fn velocities<const FUSED: bool, const VELOCITIES: bool>(
     mut vx: Lanes32,

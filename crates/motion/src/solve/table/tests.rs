@@ -13,7 +13,8 @@ fn paths() -> [Path; 3] {
     [Path::spiral(0.55, 16.0), turnaround, route.build().unwrap()]
 }
 
-/// The largest differences of place, metres, of heading and of speed, relative to the head's or its own.
+/// Returns the largest differences of place, metres, of heading and of speed, relative to the head's or the handle's
+/// own.
 fn differences(one: &Chain, other: &Chain) -> [f64; 3] {
     let mut most = [0.0; 3];
     for i in 0..one.handles() {
@@ -45,7 +46,7 @@ fn the_table_agrees_with_the_safe_solver_on_every_code_path_and_across_junctions
                 table.solve(time, &mut found).unwrap();
                 newton.solve_at(time, &mut wanted).unwrap();
                 let [place, heading, speed] = differences(&found, &wanted);
-                // Both solvers may be off by what the travel's rounding does to the chain.
+                // Both solvers may have the error that the travel's rounding causes in the chain.
                 let allowed = 2.0 * 1e-13f64.max(8.0 * f64::EPSILON * time);
                 let name = instructions.name();
                 assert!(
@@ -111,8 +112,8 @@ fn what_cannot_be_packed_is_refused() {
     assert!(FollowerTable::formats().into_iter().all(|format| table.packed(format, allowed).is_none()));
 }
 
-/// So small that miri runs it too (`tests/run`), on each instruction set: the calls of code that needs one are the
-/// library's only unsafe code.
+/// A case so small that miri runs it too (`tests/run`), on each instruction set: the calls of code that needs one are
+/// the library's only unsafe code.
 #[test]
 fn a_small_table_is_read_as_exactly() {
     let path = Path::route(Point::new(0.0, 0.0), 0.0).line(2.0).arc(Side::Left, 3.0, 0.1).line(2.0).build().unwrap();

@@ -1,8 +1,8 @@
-//! Places along a path relative to each other, to the last digit however far from the origin, and the step from a
-//! handle to the one ahead of it.
+//! Places along a path relative to each other, to the last digit at any distance from the origin, and the step from a
+//! handle to the handle ahead.
 //!
-//! In: a path and places on it. Out: displacements, places at a link's distance, [`Node`]s. Called by the making of the
-//! table only; no frame comes here.
+//! In: a path and places on it. Out: displacements, places at a link's distance, [`Node`]s. Used only to make the
+//! table, not by frames.
 
 use crate::linkage;
 use crate::model::Vector;
@@ -18,8 +18,8 @@ pub(super) struct Track<'a> {
     last: Vec<Coordinate>,
 }
 
-/// Where one handle of a chain of equal links stands, and how that changes with alpha, the number of links (and
-/// fractions of one) behind a fixed place of the chain.
+/// Place of one handle of a chain of equal links, and its change with alpha, the number of links (and fractions of one)
+/// behind a fixed place of the chain.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Node {
     pub at: Param,
@@ -31,7 +31,7 @@ pub(super) struct Node {
     pub heading_rate: f64,
 }
 
-/// How a link lies: from the rear handle to the front one, and how it turns.
+/// How a link lies, from the rear handle to the front one, and how it turns.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pose {
     pub heading: f64,
@@ -51,7 +51,7 @@ impl<'a> Track<'a> {
         Self { path, first, last: segments.map(|segment| path.last(segment)).collect() }
     }
 
-    /// The vector from one place to another, relative to its own length as exact as a double.
+    /// Returns the vector from one place to another, with a relative error of a few units in the last place.
     pub(super) fn displacement(&self, from: Param, to: Param) -> Vector {
         if from.segment > to.segment {
             return -self.displacement(to, from);
@@ -64,9 +64,10 @@ impl<'a> Track<'a> {
         self.path.segment(from).displacement(from.at, to.at)
     }
 
-    /// The place about `metres` further along, exact to first order: for a guess, or the last step of an iteration.
+    /// Returns the place about `metres` further along, exact to first order: for a guess, or the last step of an
+    /// iteration.
     ///
-    /// The last segment is taken to continue beyond its end. `None` at the centre of a spiral.
+    /// The last segment continues beyond its end. `None` at the centre of a spiral.
     pub(super) fn moved(&self, from: Param, metres: f64) -> Option<Param> {
         let mut place = from;
         let mut left = metres;
@@ -89,7 +90,7 @@ impl<'a> Track<'a> {
         }
     }
 
-    /// The place near `moving` that is `link` metres from `fixed`.
+    /// Returns the place near `moving` that is `link` metres from `fixed`.
     fn settled(&self, mut moving: Param, fixed: Param, link: f64) -> Option<Param> {
         for _ in 0..20 {
             let offset = self.displacement(fixed, moving);
@@ -106,7 +107,8 @@ impl<'a> Track<'a> {
         None
     }
 
-    /// The place `link` metres ahead of another, about `gap` metres of travel ahead, where both are on one segment.
+    /// Returns the place `link` metres ahead of another, about `gap` metres of travel ahead, if both are on one
+    /// segment.
     fn ahead_on_segment(&self, rear: Param, gap: f64, link: f64) -> Option<Param> {
         let segment = self.path.segment(rear);
         let by = segment.ahead(rear.at, gap, link)?;
@@ -116,14 +118,15 @@ impl<'a> Track<'a> {
         (by.is_finite() && segment.contains(at.at) && is_on_segment).then_some(at)
     }
 
-    /// The first place behind `front` at a link's distance.
+    /// Returns the first place behind `front` at a link's distance.
     pub(super) fn follower(&self, front: Param, link: f64) -> Option<Param> {
         let rear = linkage::follower(self.path, front, link).ok()?;
-        // On one segment it was found in the segment's own coordinate, and has all its digits.
+        // On one segment it was found in the segment's own coordinate, with all its digits.
         if rear.segment == front.segment { Some(rear) } else { self.settled(rear, front, link) }
     }
 
-    /// The node one link ahead of `rear`, with `gap` metres as a guess of how far that is; the guess is improved.
+    /// Returns the node one link ahead of `rear`. `gap` is a guess of the travel between them in metres; the guess is
+    /// improved.
     pub(super) fn ahead(&self, rear: &Node, gap: &mut f64, link: f64) -> Option<Node> {
         let at = match self.ahead_on_segment(rear.at, *gap, link) {
             Some(at) => at,
@@ -141,7 +144,7 @@ impl<'a> Track<'a> {
         Some(Node { at, tangent, spacing, heading: pose.heading, heading_rate: -spacing * pose.heading_per_metre })
     }
 
-    /// How the link between two places lies, given with their tangents; `None` at a stall or a lock.
+    /// Returns the pose of the link between two places, given with their tangents; `None` at a stall or a lock.
     pub(super) fn pose(&self, front: (Param, Vector), rear: (Param, Vector), link: f64) -> Option<Pose> {
         let direction = self.displacement(rear.0, front.0) / link;
         let (front_cosine, rear_cosine) = (direction.dot(&front.1), direction.dot(&rear.1));
@@ -151,7 +154,7 @@ impl<'a> Track<'a> {
         (rear_cosine > 0.0).then_some(Pose { heading, speed_ratio, heading_per_metre: turning / link })
     }
 
-    /// The place exactly `metres` of arc length further along its own segment.
+    /// Returns the place exactly `metres` of arc length further along its own segment.
     pub(super) fn advanced(&self, from: Param, metres: f64) -> Param {
         Param { segment: from.segment, at: self.path.segment(from).advance(from.at, metres) }
     }
