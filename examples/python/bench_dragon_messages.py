@@ -1,5 +1,5 @@
-# Generated from src/wire/layouts.rs, src/show/state.rs and src/motion/event.rs, not written by hand:
-# BENCH_DRAGON_WRITE=1 cargo test --test msgs
+# Generated from crates/messages/src (layouts and state), not written by hand:
+# BENCH_DRAGON_WRITE=1 cargo test --test repository msgs::
 # What stands below MESSAGES is written by hand.
 """The memory layouts of bench-dragon's messages, once, for every Python subscriber.
 
@@ -15,7 +15,7 @@ import numpy as np
 # The bench number that means "no bench".
 NO_BENCH = 0xFFFFFFFF
 
-# What the dragon is doing: the latest event passed, which stays until the show ends or loops, or what is near.
+# The state of the dragon: the latest event passed, until the show ends or loops, or else an approaching event.
 STATES = (
     # Nothing has happened and nothing is near.
     "moving",
@@ -23,7 +23,7 @@ STATES = (
     "approaching",
     # Two boards that share no handle have touched.
     "contact",
-    # A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
+    # A link is at its dead point, square to the path at its front handle: the rest of the chain is pushed backwards.
     "stall",
     # A link is in a singular configuration: the motion cannot continue.
     "lock",
@@ -31,7 +31,7 @@ STATES = (
     "path_end",
 )
 
-# How serious an alert is.
+# The level of an alert.
 LEVELS = (
     # Nothing has happened and nothing is near.
     "clear",
@@ -39,7 +39,7 @@ LEVELS = (
     "approaching",
     # Two boards that share no handle have touched.
     "contact",
-    # A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
+    # A link is at its dead point, square to the path at its front handle: the rest of the chain is pushed backwards.
     "stall",
     # A link is in a singular configuration: the motion cannot continue.
     "lock",
@@ -51,7 +51,7 @@ EVENTS = {
     0: None,
     # Two boards that share no handle first touch.
     2: "contact",
-    # A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
+    # A link is at its dead point, square to the path at its front handle: the rest of the chain is pushed backwards.
     3: "stall",
     # A link is in a singular configuration: its rear handle would have to jump, and the motion cannot continue.
     4: "lock",
@@ -59,7 +59,7 @@ EVENTS = {
     5: "path_end",
 }
 
-# Whether simulated time advances.
+# The playback state: simulated time advances or stands still.
 PLAYBACK = (
     # Simulated time advances.
     "playing",
@@ -93,7 +93,7 @@ class _Message(ctypes.Structure):
 
 
 class HandlePose(_Message):
-    """Where one handle is and how it moves.
+    """The position and velocity of one handle.
 
     Over iceoryx2 the payload of `<name>/poses` is a slice of these, the head first.
     """
@@ -107,21 +107,21 @@ class HandlePose(_Message):
         # Radians in (-pi, pi]: the direction of the bench this handle leads (from handle i+1 to handle i); the last
         # handle takes the last bench's.
         ("heading", ctypes.c_double),
-        # Velocity along x in simulation, metres per simulated second; NaN where the scene requests no velocities.
+        # Velocity along x in simulation, metres per simulated second; NaN if the scene requests no velocities.
         ("vx", ctypes.c_double),
-        # Velocity along y in simulation, metres per simulated second; NaN where the scene requests no velocities.
+        # Velocity along y in simulation, metres per simulated second; NaN if the scene requests no velocities.
         ("vy", ctypes.c_double),
     ]
 
 
 class HandlePose32(_Message):
-    """Where one handle is and how it moves, in half the bytes: the numbers of `HandlePose`, each rounded to the nearest
-    single-precision float, so that a place is off by at most 6e-8 of its distance from the centre (0.5 um at 8 m, 0.06
-    mm at 1 km) along each axis.
+    """The position and velocity of one handle, in half the bytes: the numbers of `HandlePose`, each rounded to the nearest
+    single-precision float. The error along each axis is at most 6e-8 of the distance from the centre (0.5 um at 8 m,
+    0.06 mm at 1 km).
 
-    Over iceoryx2 the payload of `<name>/poses32`, which is there where a scene asks for it, is a slice of these, the
-    head first: one handle in `every`, and the tail. The service's attribute `every` holds that number, so that the pose
-    with the index `i` is of the handle `i * every`, the last pose of the last handle.
+    Over iceoryx2 the payload of `<name>/poses32`, a service that a scene can request, is a slice of these, the head
+    first: one handle in `every`, and the tail. The service's attribute `every` holds that number: the pose with the
+    index `i` is of the handle `i * every`, the last pose of the last handle.
     """
 
     LAYOUT = 1
@@ -132,15 +132,15 @@ class HandlePose32(_Message):
         ("y", ctypes.c_float),
         # Radians from -pi to pi, both rounded: the direction of the bench this handle leads, as `HandlePose.heading`.
         ("heading", ctypes.c_float),
-        # Velocity along x in simulation, metres per simulated second; NaN where the scene asks for no velocities.
+        # Velocity along x in simulation, metres per simulated second; NaN if the scene requests no velocities.
         ("vx", ctypes.c_float),
-        # Velocity along y in simulation, metres per simulated second; NaN where the scene asks for no velocities.
+        # Velocity along y in simulation, metres per simulated second; NaN if the scene requests no velocities.
         ("vy", ctypes.c_float),
     ]
 
 
 class FrameHeader(_Message):
-    """What is true of a whole frame.
+    """The facts of a whole frame.
 
     Over iceoryx2 the user header of `<name>/poses` and `<name>/poses32`.
     """
@@ -163,22 +163,22 @@ class FrameHeader(_Message):
         ("deadline_ns", ctypes.c_uint64),
         # Simulated seconds since the start of the scene.
         ("sim_time", ctypes.c_double),
-        # Simulated seconds per second of wall time, as in force; 0 while paused or held, unchanged once the show has
-        # ended.
+        # Simulated seconds per second of wall time, as in force; 0 while paused or held, unchanged after the end of the
+        # show.
         ("time_scale", ctypes.c_double),
-        # Metres between the nearest two boards that share no handle, negative when they overlap; NaN where the scene
-        # has no `[alerts]` or fewer than three benches.
+        # Metres between the nearest two boards that share no handle, negative when they overlap; NaN if the scene has
+        # no `[alerts]` or fewer than three benches.
         ("min_clearance", ctypes.c_double),
         # The number of handles in this message.
         ("handles", ctypes.c_uint32),
-        # What the dragon is doing: one of `STATES`.
+        # The state of the dragon: one of `STATES`.
         ("state", ctypes.c_uint32),
-        # Whether simulated time advances: one of `PLAYBACK`.
+        # The playback state: one of `PLAYBACK`.
         ("playback", ctypes.c_uint32),
-        # The latest cue passed, counted from 1; 0 where none has been.
+        # The latest cue passed, counted from 1; 0 before the first cue.
         ("cue", ctypes.c_uint32),
-        # Grows by one at every jump of simulated time, such as the beginning of the next loop: who interpolates starts
-        # anew.
+        # Grows by one at every jump of simulated time, such as the beginning of the next loop. No interpolation crosses
+        # a jump.
         ("epoch", ctypes.c_uint32),
         # Always 0.
         ("reserved", ctypes.c_uint32),
@@ -190,7 +190,7 @@ class CollisionAlert(_Message):
 
     `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, at every level. The fields
     that begin with `event` are the event the alert is about: the next contact, stall or lock while the level is clear
-    or approaching, the one that has happened otherwise.
+    or approaching, else the event that has happened.
 
     Over iceoryx2 the payload of `<name>/alerts`.
     """
@@ -205,32 +205,32 @@ class CollisionAlert(_Message):
         ("stamp_ns", ctypes.c_uint64),
         # Simulated seconds of that frame.
         ("sim_time", ctypes.c_double),
-        # Simulated seconds at which the event happens or happened; NaN where there is none.
+        # Simulated seconds at which the event happens or happened; NaN if there is no event.
         ("event_time", ctypes.c_double),
-        # `event_time - sim_time`, simulated seconds; negative once it has passed; NaN where there is no event.
+        # `event_time - sim_time`, simulated seconds; negative once it has passed; NaN if there is no event.
         ("time_to_event", ctypes.c_double),
-        # Metres between the nearest two boards in that frame, negative when they overlap; NaN where there are fewer
-        # than three benches.
+        # Metres between the nearest two boards in that frame, negative when they overlap; NaN if there are fewer than
+        # three benches.
         ("clearance", ctypes.c_double),
-        # The midpoint between the nearest two boards, metres right of the centre; NaN where there are fewer than three
+        # The midpoint between the nearest two boards, metres right of the centre; NaN if there are fewer than three
         # benches.
         ("x", ctypes.c_double),
-        # The midpoint between the nearest two boards, metres up from the centre; NaN where there are fewer than three
+        # The midpoint between the nearest two boards, metres up from the centre; NaN if there are fewer than three
         # benches.
         ("y", ctypes.c_double),
-        # Where the event happens, metres right of the centre: the touching point of a contact, the rear handle of the
-        # bench that stalls or locks; NaN where there is no event.
+        # The place of the event, metres right of the centre: the touching point of a contact, the rear handle of the
+        # bench that stalls or locks; NaN if there is no event.
         ("event_x", ctypes.c_double),
-        # Where the event happens, metres up from the centre; NaN where there is no event.
+        # The place of the event, metres up from the centre; NaN if there is no event.
         ("event_y", ctypes.c_double),
-        # How serious the alert is: one of `LEVELS`.
+        # The severity of the alert: one of `LEVELS`.
         ("level", ctypes.c_uint32),
         # The first of the nearest two benches, from 0, or `NO_BENCH`.
         ("bench_a", ctypes.c_uint32),
         # The second of the nearest two benches, or `NO_BENCH`.
         ("bench_b", ctypes.c_uint32),
-        # What kind of event: one of `EVENTS`, with the number of the frame's state that it leads to; 0 where there is
-        # none.
+        # The kind of the event: one of `EVENTS`, with the number of the frame's state that it leads to; 0 if there is
+        # no event.
         ("event", ctypes.c_uint32),
         # The bench that stalls or locks, or the first of two that touch, or `NO_BENCH`.
         ("event_bench_a", ctypes.c_uint32),
@@ -240,7 +240,7 @@ class CollisionAlert(_Message):
 
 
 class LoopStatus(_Message):
-    """How the loop is doing, once a second.
+    """The status of the loop, once a second.
 
     Figures that end in `_second` are of the last second alone, those that end in `_total` since the start of the run;
     all durations are in nanoseconds.
@@ -270,9 +270,10 @@ class LoopStatus(_Message):
         ("skipped", ctypes.c_uint64),
         # Times the show has been played to its end and begun again.
         ("shows_played", ctypes.c_uint64),
-        # Contacts that no search had found before the show, since the start: 0 unless a search is wrong or gave up.
+        # Contacts that no search had found before the show, since the start: 0 unless a search is wrong or stopped
+        # early.
         ("unforeseen_contacts", ctypes.c_uint64),
-        # Frames for whose time there was no solution, so that the one before was shown again, since the start.
+        # Frames without a solution at their time, which repeated the frame before, since the start.
         ("unsolved_frames", ctypes.c_uint64),
         # Wake-up lateness of the last second: median, ns.
         ("lateness_p50_second", ctypes.c_uint64),
@@ -329,11 +330,11 @@ class Cue(_Message):
         ("stamp_ns", ctypes.c_uint64),
         # Simulated seconds of that frame.
         ("sim_time", ctypes.c_double),
-        # Simulated seconds at which the cue is.
+        # Simulated seconds of the cue itself.
         ("cue_time", ctypes.c_double),
         # Its number, from 1 in the order of the cues' times.
         ("number", ctypes.c_uint32),
-        # 1 where the show waits there until the command `go`, else 0.
+        # 1 if the show waits there until the command `go`, else 0.
         ("pauses", ctypes.c_uint32),
         # Its name.
         ("name", ctypes.c_uint8 * 64),
@@ -345,7 +346,7 @@ class ControlRequest(_Message):
 
     LAYOUT = 1
     _fields_ = [
-        # Any number of the client's; the response repeats it.
+        # A number that the client chooses; the response repeats it.
         ("id", ctypes.c_uint64),
         # The value of a command that has one: simulated seconds per second, simulated seconds, or periods.
         ("value", ctypes.c_double),
@@ -357,13 +358,13 @@ class ControlRequest(_Message):
 
 
 class ControlResponse(_Message):
-    """What became of a command. Response of `<name>/control`."""
+    """The result of a command. Response of `<name>/control`."""
 
     LAYOUT = 1
     _fields_ = [
-        # That of the request.
+        # The id of the request.
         ("id", ctypes.c_uint64),
-        # The period at whose beginning the command was obeyed.
+        # The period at whose beginning the command was executed.
         ("tick", ctypes.c_uint64),
         # Simulated seconds of that period.
         ("sim_time", ctypes.c_double),
@@ -371,9 +372,9 @@ class ControlResponse(_Message):
         ("time_scale", ctypes.c_double),
         # 0 done, 1 already so, 2 refused in this state, 3 value out of range, 4 not understood, 5 too many waiting.
         ("code", ctypes.c_uint32),
-        # Whether simulated time advances, as in `FrameHeader.playback`.
+        # The playback state, as in `FrameHeader.playback`.
         ("playback", ctypes.c_uint32),
-        # The latest cue passed, from 1; 0 where none has been.
+        # The latest cue passed, from 1; 0 before the first cue.
         ("cue", ctypes.c_uint32),
         # Always 0.
         ("reserved", ctypes.c_uint32),
@@ -385,21 +386,21 @@ class StageSegment(_Message):
 
     LAYOUT = 3
     _fields_ = [
-        # Where it begins, metres right of the centre.
+        # Its beginning, metres right of the centre.
         ("x", ctypes.c_double),
-        # Where it begins, metres up from the centre.
+        # Its beginning, metres up from the centre.
         ("y", ctypes.c_double),
-        # Direction of travel there, radians counter-clockwise from x.
+        # Direction of travel at its beginning, radians counter-clockwise from x.
         ("heading", ctypes.c_double),
         # Metres along it.
         ("length", ctypes.c_double),
-        # Of an arc, 1/m, positive where it turns left; of a line 0; of a spiral NaN.
+        # Of an arc, 1/m, positive if it turns left; of a line 0; of a spiral NaN.
         ("curvature", ctypes.c_double),
         # Of a spiral, the polar angle at which it begins, radians (for an outward one: before it is turned); else NaN.
         ("theta_first", ctypes.c_double),
         # Of a spiral, the polar angle at which it ends, radians; else NaN.
         ("theta_last", ctypes.c_double),
-        # Which curve it is: one of `SEGMENTS`.
+        # The kind of curve: one of `SEGMENTS`.
         ("kind", ctypes.c_uint32),
         # Always 0.
         ("reserved", ctypes.c_uint32),
@@ -413,7 +414,7 @@ class StageEvent(_Message):
     _fields_ = [
         # Simulated seconds at which it happens.
         ("time", ctypes.c_double),
-        # What happens, as the state that it leads to: one of `STATES`.
+        # The event, as the state that it leads to: one of `STATES`.
         ("state", ctypes.c_uint32),
         # Always 0.
         ("reserved", ctypes.c_uint32),
@@ -425,11 +426,11 @@ class StageCue(_Message):
 
     LAYOUT = 4
     _fields_ = [
-        # Simulated seconds at which it is.
+        # Simulated seconds of the cue.
         ("time", ctypes.c_double),
         # Its number, from 1 in the order of the cues' times.
         ("number", ctypes.c_uint32),
-        # 1 where the show waits there until the command `go`, else 0.
+        # 1 if the show waits there until the command `go`, else 0.
         ("pauses", ctypes.c_uint32),
         # Its name.
         ("name", ctypes.c_uint8 * 64),
@@ -437,10 +438,10 @@ class StageCue(_Message):
 
 
 class Stage(_Message):
-    """What a subscriber needs to draw the stage and its time line. Sent at the start and kept for late joiners.
+    """The geometry and the time line of a show, for drawing them. Sent at the start and kept for late joiners.
 
-    The head's board has a length of its own; all that follow have one length. The team may stand further back than the
-    first segment begins, on the same spiral or line.
+    The head's board and the other boards can differ in length. The team may stand further back than the first segment
+    begins, on the same spiral or line.
 
     Over iceoryx2 the payload of `<name>/stage`. Layout 2 added the segments of the path, layout 3 gave them their name,
     layout 4 added the time line: the freeze time, the events and the cues, layout 5 the hash of the scene's text.
@@ -452,9 +453,9 @@ class Stage(_Message):
         ("run_id", ctypes.c_uint64),
         # CLOCK_REALTIME in nanoseconds when this was written.
         ("stamp_ns", ctypes.c_uint64),
-        # Metres per turn of the spiral or spirals; NaN where the path has none.
+        # Metres per turn of the spiral or spirals; NaN if the path has none.
         ("pitch", ctypes.c_double),
-        # The turn on which the head starts (theta = 2 pi start_turn); NaN where it does not start on a spiral.
+        # The turn on which the head starts (theta = 2 pi start_turn); NaN if it does not start on a spiral.
         ("start_turn", ctypes.c_double),
         # Metres from the centre of a handle's hole to the nearest end of the board.
         ("hole_inset", ctypes.c_double),
@@ -474,8 +475,8 @@ class Stage(_Message):
         ("events", ctypes.c_uint32),
         # The number of cues in the show; the first 32 of them are listed.
         ("cues", ctypes.c_uint32),
-        # BLAKE3 of the scene's text, as `verify` prints it of a certificate: what is proved of that text is true of
-        # this show. All zero where it is not known.
+        # BLAKE3 of the scene's text, as `verify` prints it of a certificate: the proofs of that text hold for this
+        # show. All zero if it is not known.
         ("scene_hash", ctypes.c_uint8 * 32),
         # The segments of the path in the order of travel; those not in use are zero.
         ("path", StageSegment * 32),

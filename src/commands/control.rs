@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use bench_dragon::client::control::conductor::Action as Conducting;
+use bench_dragon::client::control::command_client::Action as StateAction;
 use bench_dragon::client::control::{ControlError, Controller, refusal, standing};
 use bench_dragon::messages::ControlResponse;
 use bench_dragon::messages::control::{Code, Command};
@@ -94,7 +94,7 @@ pub fn control(common: &Common, arguments: &ControlArguments) -> Result<(), Comm
             if let Some(sentence) = refusal(&state, Command::State) {
                 return Err(CommandError::Failed(sentence));
             }
-            Conducting::Toggle.command(&state)
+            StateAction::Toggle.command(&state)
         }
         Action::Rate { rate } => Command::Rate(rate),
         Action::Seek { time } => Command::Seek(time),

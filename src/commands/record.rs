@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use bench_dragon::client::connection::Wake;
-use bench_dragon::client::feed::{Feed, FeedEvent, FeedOptions, Frames};
+use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use bench_dragon::client::polling::Obstacle;
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::recording::mcap::recorder::{
@@ -80,7 +80,7 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
     topics.sort_unstable();
     topics.dedup();
     let stop = stop_on_signals()?;
-    let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::Never, frames: Frames::All })?;
+    let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::Never, frames: Delivery::All })?;
     // A file that may not grow is then a failed write, and no signal that ends the process.
     signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
     let config = RecorderConfig {

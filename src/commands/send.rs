@@ -3,7 +3,7 @@
 use std::net::{Ipv4Addr, SocketAddrV4};
 use std::sync::atomic::Ordering;
 
-use bench_dragon::client::feed::Frames;
+use bench_dragon::client::feed::Delivery;
 use bench_dragon::client::polling::poll_until;
 use bench_dragon::outputs::send::axes::Axes;
 use bench_dragon::outputs::send::network::{NetworkError, Outlet, Route, destination};
@@ -137,7 +137,7 @@ fn psn(common: &Common, arguments: &PsnArguments) -> Result<(), CommandError> {
         }
     };
     let mut sender = PsnSender::new(options, outlet, &mut notify);
-    poll_until(&stop, names, Frames::Newest, &mut sender)?;
+    poll_until(&stop, names, Delivery::Newest, &mut sender)?;
     let summary = sender.finish();
     printed?;
     let mut output = Output::standard();
@@ -194,7 +194,7 @@ fn osc(common: &Common, arguments: &OscArguments) -> Result<(), CommandError> {
             number(*rate)
         )
     })?;
-    poll_until(&stop, &common.names, Frames::Newest, &mut senders)?;
+    poll_until(&stop, &common.names, Delivery::Newest, &mut senders)?;
     let summary = senders.finish();
     let mut output = Output::standard();
     if common.json {

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use bench_dragon::client::clock::{monotonic_ns, realtime_ns};
 use bench_dragon::client::connection::Wake;
-use bench_dragon::client::feed::{Feed, FeedOptions, Frames};
+use bench_dragon::client::feed::{Delivery, Feed, FeedOptions};
 use bench_dragon::client::shared_memory::service_name;
 use bench_dragon::show::scene::Accepted;
 use bench_dragon::soak::figures;
@@ -20,7 +20,7 @@ use bench_dragon::soak::member::Role;
 use bench_dragon::soak::observer::Observer;
 use bench_dragon::soak::processes::{ConductPlan, Plan};
 use bench_dragon::soak::report::{Machine, Report, SCHEMA, SubscriberReport};
-use bench_dragon::soak::verdict::Verdict;
+use bench_dragon::soak::verdict::SoakVerdict;
 use indicatif::ProgressBar;
 use nix::sys::signal::{SigSet, Signal};
 
@@ -122,7 +122,7 @@ pub fn soak(common: &Common, arguments: &SoakArguments) -> Result<(), CommandErr
     bar.finish_and_clear();
     fleet.take_stderr().iter().for_each(|line| eprintln!("publisher: {line}"));
     let limits = arguments.limits();
-    let verdict = Verdict::of(&fleet, &limits);
+    let verdict = SoakVerdict::of(&fleet, &limits);
     let report = Report {
         schema: SCHEMA,
         verdict: verdict.word(),
@@ -285,7 +285,7 @@ impl ReportFiles {
 pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result<(), CommandError> {
     arguments.parent.watch()?;
     let stop = stop_on_signals()?;
-    let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::OnFrame, frames: Frames::All })?;
+    let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::OnFrame, frames: Delivery::All })?;
     let mut observer = Observer::new(common.load_scene()?.motion.link_tolerance());
     let mut output = std::io::stdout().lock();
     let mut print = |observer: &mut Observer| -> Result<(), CommandError> {

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use anstyle::Style;
 use bench_dragon::client::clock::monotonic_ns;
 use bench_dragon::client::connection::Wake;
-use bench_dragon::client::feed::{Feed, FeedEvent, FeedOptions, Frames};
+use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use bench_dragon::client::polling::Obstacle;
 use bench_dragon::messages::json::{AlertObject, CueObject};
 use bench_dragon::messages::sentence::{Figures, alert_sentence, cue_sentence, time_until};
@@ -72,7 +72,7 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
         (false, false) => Display::Lines,
     };
     let stop = stop_on_signals()?;
-    let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::OnFrame, frames: Frames::All })?;
+    let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::OnFrame, frames: Delivery::All })?;
     let mut monitor = Monitor::default();
     let began = Instant::now();
     let over = |at: Instant| arguments.duration.is_some_and(|seconds| (at - began).as_secs_f64() >= seconds);

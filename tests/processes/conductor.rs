@@ -5,7 +5,7 @@ use crate::harness;
 
 use std::time::{Duration, Instant};
 
-use bench_dragon::client::control::conductor::{Action, Conductor};
+use bench_dragon::client::control::command_client::{Action, CommandClient};
 use bench_dragon::client::control::{ControlError, Controller, PendingCommand};
 use bench_dragon::messages::control::Command as Conduct;
 use harness::{Process, json_lines, long, program, scene_file, text, unique, wait};
@@ -43,7 +43,7 @@ fn done(name: &str, arguments: &[&str]) -> Value {
 /// Returns the numbers of actions in the order of their answers, each with its result in a word.
 fn answers(actions: &[Action], between: impl FnOnce(), name: &str) -> Vec<(usize, String)> {
     let (sender, receiver) = std::sync::mpsc::channel();
-    let conductor = Conductor::start(&unique(name), move |number: usize, conducted| {
+    let conductor = CommandClient::start(&unique(name), move |number: usize, conducted| {
         let word = match conducted {
             Ok((command, response)) => {
                 format!("{}: {}", command.name(), response.result().unwrap().name())

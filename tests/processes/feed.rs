@@ -7,7 +7,7 @@ use crate::harness;
 use std::time::{Duration, Instant};
 
 use bench_dragon::client::connection::Wake;
-use bench_dragon::client::feed::{Feed, FeedEvent, FeedOptions, Frames};
+use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use bench_dragon::messages::{FrameHeader, Stage};
 use bench_dragon::publisher::live::{Outgoing, Publisher};
 use bench_dragon::publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
@@ -73,7 +73,7 @@ fn span(seen: &[Seen], of: u64) -> (u64, u64, u64, u64) {
 
 #[test]
 fn a_publisher_restarted_between_two_polls_is_a_new_run() {
-    for frames in [Frames::All, Frames::Newest] {
+    for frames in [Delivery::All, Delivery::Newest] {
         let name = format!("restart_{frames:?}");
         let mut feed = Feed::new(&unique(&name), FeedOptions { wake: Wake::OnFrame, frames }).unwrap();
         let mut seen = Vec::new();
@@ -105,7 +105,7 @@ fn a_publisher_restarted_between_two_polls_is_a_new_run() {
 #[test]
 fn a_publisher_that_is_started_again_at_any_moment_is_followed_at_once() {
     const RATE: u64 = 100;
-    let mut feed = Feed::new(&unique("again"), FeedOptions { wake: Wake::OnFrame, frames: Frames::All }).unwrap();
+    let mut feed = Feed::new(&unique("again"), FeedOptions { wake: Wake::OnFrame, frames: Delivery::All }).unwrap();
     let mut seen = Vec::new();
     let delays = [0, 40, 80, 120, 160, 200, 250, 400].map(Duration::from_millis);
     for delay in delays {
@@ -138,7 +138,7 @@ fn a_publisher_that_is_started_again_at_any_moment_is_followed_at_once() {
 
 #[test]
 fn the_newest_frame_is_one_a_poll_and_the_rest_is_counted() {
-    let mut feed = Feed::new(&unique("newest"), FeedOptions { wake: Wake::Never, frames: Frames::Newest }).unwrap();
+    let mut feed = Feed::new(&unique("newest"), FeedOptions { wake: Wake::Never, frames: Delivery::Newest }).unwrap();
     let publisher = publisher("newest", &["--rate", "500"]);
     let mut seen = Vec::new();
     poll_until(&mut feed, &mut seen, |seen| !seen.is_empty());
@@ -189,7 +189,7 @@ fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {
     let name = unique("beside");
     let stages = [7, 8].map(|run_id| stage(run_id, 0, [0; 32], &scene.motion, &show));
     let [mut bystander, mut sender] = stages.map(|stage| opened(&name, &scene, 0, stage));
-    let mut feed = Feed::new(&name, FeedOptions { wake: Wake::Never, frames: Frames::All }).unwrap();
+    let mut feed = Feed::new(&name, FeedOptions { wake: Wake::Never, frames: Delivery::All }).unwrap();
     let mut runs = Vec::new();
     let mut poll = |runs: &mut Vec<(&'static str, u64)>| {
         let polled = feed.poll(Duration::from_millis(20), &mut |event| match event {

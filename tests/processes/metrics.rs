@@ -10,7 +10,7 @@ use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
 
 use bench_dragon::client::connection::Wake;
-use bench_dragon::client::feed::{Feed, FeedEvent, FeedOptions, Frames};
+use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use bench_dragon::messages::LoopStatus;
 use harness::{
     Process, can_run, http_get, http_get_as, program, python, python_modules, scene_file, summary, text, unique, wait,
@@ -65,7 +65,7 @@ fn statuses_of(name: &str) -> Receiver<LoopStatus> {
     let (sender, receiver) = mpsc::channel();
     let name = unique(name);
     std::thread::spawn(move || {
-        let mut feed = Feed::new(&name, FeedOptions { wake: Wake::Never, frames: Frames::Newest }).unwrap();
+        let mut feed = Feed::new(&name, FeedOptions { wake: Wake::Never, frames: Delivery::Newest }).unwrap();
         let mut received = true;
         while received {
             let mut take = |event: FeedEvent<'_>| {

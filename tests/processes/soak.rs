@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use bench_dragon::client::connection::Wake;
-use bench_dragon::client::feed::{Feed, FeedEvent, FeedOptions, Frames};
+use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use bench_dragon::messages::LoopStatus;
 use nix::sys::signal::Signal::{SIGINT, SIGKILL, SIGTERM};
 use nix::sys::signal::{Signal, kill};
@@ -361,7 +361,7 @@ fn what_cannot_be_is_refused_before_it_starts() {
 #[test]
 fn the_status_comes_once_a_second_and_adds_up() {
     let publisher = Process::start(program("status").args(["run", "--json", "--rate", "50", "--start", "300"]));
-    let mut feed = Feed::new(&unique("status"), FeedOptions { wake: Wake::OnFrame, frames: Frames::All }).unwrap();
+    let mut feed = Feed::new(&unique("status"), FeedOptions { wake: Wake::OnFrame, frames: Delivery::All }).unwrap();
     let mut statuses: Vec<LoopStatus> = Vec::new();
     let mut frames = Vec::new();
     let end = Instant::now() + Duration::from_secs(120);

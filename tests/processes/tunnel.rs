@@ -158,7 +158,7 @@ fn lives_and_deaths(machines: &Machines) {
     assert!(seconds.iter().all(|second| second["latency_ns"].is_null() && second["missed"] == 0), "{seconds:?}");
     let refused = machines.program("right", &["control", "pause"]).output_within(60);
     assert_eq!(refused.status.code(), Some(1));
-    assert!(text(&refused.stderr).contains("conduct it there"), "{}", text(&refused.stderr));
+    assert!(text(&refused.stderr).contains("send them there"), "{}", text(&refused.stderr));
     for (host, sentence) in
         [("left", "another publisher is running"), ("right", "a tunnel brings it from another machine")]
     {

@@ -5,12 +5,12 @@
 
 use nix::time::{ClockId, ClockNanosleepFlags, clock_gettime, clock_nanosleep};
 
-/// Time as the loop sees it: two clocks and a sleep.
+/// The time of the loop: two clocks and a sleep.
 pub trait Clock {
-    /// CLOCK_MONOTONIC in nanoseconds: all pacing and all latencies.
+    /// Returns CLOCK_MONOTONIC in nanoseconds: for all pacing and all latencies.
     fn monotonic_ns(&self) -> u64;
 
-    /// CLOCK_REALTIME in nanoseconds: for people and ROS only, since it can be stepped.
+    /// Returns CLOCK_REALTIME in nanoseconds: for people and ROS only, since it can be stepped.
     fn realtime_ns(&self) -> u64;
 
     /// Sleeps until a moment of CLOCK_MONOTONIC; may return early (a signal) or late.
@@ -38,28 +38,28 @@ impl Clock for SystemClock {
     }
 }
 
-/// CLOCK_MONOTONIC in nanoseconds: all pacing and all latencies.
+/// Returns CLOCK_MONOTONIC in nanoseconds: for all pacing and all latencies.
 pub fn monotonic_ns() -> u64 {
     now(ClockId::CLOCK_MONOTONIC)
 }
 
-/// CLOCK_REALTIME in nanoseconds: for people and ROS only, since it can be stepped.
+/// Returns CLOCK_REALTIME in nanoseconds: for people and ROS only, since it can be stepped.
 pub fn realtime_ns() -> u64 {
     now(ClockId::CLOCK_REALTIME)
 }
 
-/// Which CLOCK_MONOTONIC this process reads, as text: the start of the machine and the time namespace that it counts from.
-/// Moments of clocks with different names cannot be compared.
+/// Returns the name of this process's CLOCK_MONOTONIC: the start of the machine and the time namespace. Moments of
+/// clocks with different names cannot be compared.
 pub fn monotonic_clock_name() -> String {
-    // Both are the same in every container of a machine, but in one that has a time namespace of its own. Where a sandbox has
-    // neither file, nothing distinguishes its processes.
+    // Both are the same in every container of a machine, unless the container has its own time namespace. In a sandbox
+    // without either file, nothing distinguishes the processes.
     let boot = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").unwrap_or_default();
     let namespace = std::fs::read_link("/proc/self/ns/time").unwrap_or_default();
     format!("{} {}", boot.trim(), namespace.display())
 }
 
 fn now(clock: ClockId) -> u64 {
-    // Linux has both clocks, and neither call has another way to fail.
+    // Linux has both clocks, and the call cannot fail otherwise.
     clock_gettime(clock).map_or(0, |time| time.tv_sec() as u64 * 1_000_000_000 + time.tv_nsec() as u64)
 }
 
@@ -67,11 +67,11 @@ fn now(clock: ClockId) -> u64 {
 pub fn sleep_until(deadline_ns: u64) {
     let time =
         nix::sys::time::TimeSpec::new((deadline_ns / 1_000_000_000) as i64, (deadline_ns % 1_000_000_000) as i64);
-    // An interruption by a signal is no fault: the caller reads the clock and its stop flag again.
+    // An interruption by a signal is no error: the caller reads the clock and its stop flag again.
     let _ = clock_nanosleep(ClockId::CLOCK_MONOTONIC, ClockNanosleepFlags::TIMER_ABSTIME, &time);
 }
 
-/// The moments at which periods begin: start + tick / rate, each from the integer tick, so that nothing drifts.
+/// The deadlines of the periods: start + tick / rate, each from the integer tick, so that nothing drifts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deadlines {
     start_ns: u64,
@@ -79,17 +79,17 @@ pub struct Deadlines {
 }
 
 impl Deadlines {
-    /// Periods of 1 / `rate` seconds, the first of which begins at `start_ns`.
+    /// Creates periods of 1 / `rate` seconds, the first of which begins at `start_ns`.
     pub fn starting_at(start_ns: u64, rate: f64) -> Self {
         Self { start_ns, period_ns: 1e9 / rate }
     }
 
-    /// When a period begins, CLOCK_MONOTONIC in nanoseconds.
+    /// Returns the beginning of a period, CLOCK_MONOTONIC in nanoseconds.
     pub fn of(&self, tick: u64) -> u64 {
         self.start_ns + (tick as f64 * self.period_ns) as u64
     }
 
-    /// The period that a moment lies in.
+    /// Returns the period that contains a moment.
     pub fn latest_at(&self, now_ns: u64) -> u64 {
         let estimate = (now_ns.saturating_sub(self.start_ns) as f64 / self.period_ns) as u64;
         // The division rounds; the deadlines themselves decide.

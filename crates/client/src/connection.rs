@@ -28,7 +28,7 @@ use selected::{OfRun, Origin, Selected, publishers};
 type Receiver<Payload, Header> = Port<ipc::Service, Payload, Header>;
 type PoseSample = Sample<ipc::Service, [HandlePose], FrameHeader>;
 
-/// How long stale publishers are not connected to again.
+/// The time before another connection to stale publishers.
 const STALE_INTERVAL: Duration = Duration::from_secs(5);
 
 /// A publisher's services, as far as they exist.
@@ -118,8 +118,8 @@ impl Subscription {
                 return Err(OpenError::Failed { service: name.to_string(), reason: format!("{error:?}") });
             }
         };
-        // Other subscribers keep a service whose publisher has gone. One more would prevent the next publisher from creating
-        // it again.
+        // Other subscribers keep a service whose publisher has gone. One more would prevent the next publisher from
+        // creating it again.
         if self.only_stale_publishers(&publishers(&poses_service)) {
             self.service::<CollisionAlert>("alerts")?;
             self.service::<Cue>("cues")?;
@@ -187,8 +187,8 @@ impl Subscription {
         nodes
     }
 
-    /// Returns true if frames are passed over that a show of this machine may send, because another process is selected:
-    /// the end of a tunnel, selected while no show ran here.
+    /// Returns true if frames are passed over that a show of this machine may send, because another process is
+    /// selected: the end of a tunnel, selected while no show ran here.
     pub fn passes_over_the_show(&self, connection: &Connection) -> bool {
         let Selection::Following { selected, passes_over: true, .. } = &connection.selection else { return false };
         let process = |node: &UniqueNodeId| node.pid::<ipc::Service>().ok();
@@ -196,12 +196,12 @@ impl Subscription {
         !shows.is_empty() && shows.iter().all(|show| process(show) != process(&selected.origin.node))
     }
 
-    /// Opens services that did not exist when the connection was made: a publisher creates its services one after another,
-    /// and a publisher without alerts never creates that service.
+    /// Opens services that did not exist when the connection was made: a publisher creates its services one after
+    /// another, and a publisher without alerts never creates that service.
     ///
     /// # Errors
-    /// [`OpenError::Full`] if a new service has no memory left, [`OpenError::Incompatible`] if its messages have another
-    /// layout.
+    /// [`OpenError::Full`] if a new service has no memory left, [`OpenError::Incompatible`] if its messages have
+    /// another layout.
     pub fn open_missing_services(&self, connection: &mut Connection) -> Result<(), OpenError> {
         let missing = connection.missing();
         if connection.alerts.is_none() {
@@ -287,9 +287,9 @@ impl Connection {
         }
     }
 
-    /// Returns true if the service names the clock of this process, so that moments of CLOCK_MONOTONIC in its frames can be
-    /// compared with moments here. The name is that of the creator: a tunnel may use a service that a show of this machine
-    /// has left.
+    /// Returns true if the service names the clock of this process, so that moments of CLOCK_MONOTONIC in its frames
+    /// can be compared with moments here. The name is that of the creator: a tunnel may use a service that a show of
+    /// this machine has left.
     pub fn names_clock(&self) -> bool {
         let clock = monotonic_clock_name();
         self.poses_service.attributes().iter().any(|it| it.key() == CLOCK && it.value() == clock.as_str())
@@ -303,8 +303,8 @@ impl Connection {
         }
     }
 
-    /// Passes the frames that have come to `each`, oldest first, and returns their number. They are at most as many as the
-    /// queue holds: otherwise a publisher that is faster than `each` would keep the caller here.
+    /// Passes the frames that have come to `each`, oldest first, and returns their number. They are at most as many as
+    /// the queue holds: otherwise a publisher that is faster than `each` would keep the caller here.
     pub fn frames(&mut self, mut each: impl FnMut(&FrameHeader, &[HandlePose])) -> usize {
         let (mut count, mut received) = (0, 0);
         while received < self.poses.buffer_size()
@@ -355,8 +355,8 @@ impl Connection {
         held.map(|(_, status)| status).or_else(|| self.next(self.status.as_ref()))
     }
 
-    /// Buffers statuses received before a publisher is selected. Returns true if any arrived: a publisher of few frames is
-    /// known by its statuses to be alive.
+    /// Buffers statuses received before a publisher is selected. Returns true if any arrived: a publisher of few frames
+    /// is known by its statuses to be alive.
     pub fn hold_statuses(&mut self) -> bool {
         let Selection::Undecided { statuses } = &mut self.selection else { return false };
         let Some(port) = &self.status else { return false };
@@ -403,8 +403,8 @@ impl Connection {
         first.or_else(|| self.poses.receive().ok().flatten())
     }
 
-    /// Selects the publisher of the next frame, if none is selected and a frame has come. Every publisher sends frames all
-    /// the time, also while paused.
+    /// Selects the publisher of the next frame, if none is selected and a frame has come. Every publisher sends frames
+    /// all the time, also while paused.
     fn decide(&mut self) {
         if matches!(self.selection, Selection::Undecided { .. })
             && let Some(sample) = self.next_frame()
@@ -416,8 +416,8 @@ impl Connection {
         }
     }
 
-    /// Returns true if a frame is handed over. The first frame selects its publisher, until that publisher has gone or the
-    /// connection is left.
+    /// Returns true if a frame is handed over. The first frame selects its publisher, until that publisher has gone or
+    /// the connection is left.
     fn select(&mut self, origin: Origin, run_id: u64) -> bool {
         match &mut self.selection {
             Selection::Undecided { statuses } => {

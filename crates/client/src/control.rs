@@ -1,9 +1,9 @@
-//! Conducting a publisher from another process: requests over `<name>/control`, and their responses.
+//! Commands to a publisher from another process: requests over `<name>/control`, and their responses.
 //!
-//! [`Controller`] is for the thread that waits, as the `control` command does; a [`conductor`] has a thread of its own,
-//! for whoever has something else to do meanwhile, as `watch` and the stage picture's server have.
+//! A [`Controller`] waits for the response, as the command `control` does. A [`command_client`] has its own thread, for
+//! programs with other work meanwhile, such as `watch` and the stage picture's server.
 
-pub mod conductor;
+pub mod command_client;
 
 use std::time::{Duration, Instant};
 
@@ -18,35 +18,35 @@ use bench_dragon_messages::control::{Code, Command};
 use bench_dragon_messages::state::PlaybackState;
 use bench_dragon_messages::{ControlRequest, ControlResponse, FrameHeader, HandlePose};
 
-/// How often a response is looked for.
+/// The interval of polls for a response.
 const POLL_INTERVAL: Duration = Duration::from_micros(500);
-/// How long a publisher is given to answer, and a step to make progress.
+/// The time limit of an answer, and of a step without progress.
 pub const PATIENCE: Duration = Duration::from_secs(30);
-/// How often it is tested whether a publisher that has not answered lives, and whether a step makes progress.
+/// The interval of tests that a publisher which has not answered is alive, and of tests that a step makes progress.
 const LIVENESS_INTERVAL: Duration = Duration::from_millis(200);
 const PROGRESS_INTERVAL: Duration = Duration::from_secs(1);
 /// A century: an instant farther off cannot be represented everywhere.
 const LONGEST_TIMEOUT: Duration = Duration::from_secs(100 * 365 * 86_400);
 
-/// Why there is no response.
+/// The reason why there is no response.
 #[derive(Debug, thiserror::Error)]
 pub enum ControlError {
     /// The service cannot be used.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// There is no publisher to conduct.
+    /// There is no publisher.
     #[error("nobody publishes under the name \"{0}\"")]
     NoPublisher(String),
-    /// Frames come, and no show is here that would take commands.
+    /// Frames come, and no show on this machine takes commands.
     #[error(
-        "no show runs under the name \"{0}\" on this machine, and a tunnel that brings its frames from another carries no \
-         commands: conduct it there"
+        "no show runs under the name \"{0}\" on this machine, and a tunnel that brings its frames from another machine \
+         carries no commands: send them there"
     )]
     Elsewhere(String),
     /// The publisher has ended or was killed before it answered.
     #[error("the publisher of \"{0}\" has ended without an answer")]
     Ended(String),
-    /// A hold came while the command waited to be sent, and it was dropped.
+    /// The command was dropped, because a hold came before it was sent.
     #[error("a hold overtook this command, which was not sent")]
     Overtaken,
     /// The publisher did not answer.
@@ -54,7 +54,7 @@ pub enum ControlError {
     NoAnswer {
         /// Its name.
         name: String,
-        /// How long it was given.
+        /// The time limit.
         timeout: Duration,
     },
 }
@@ -70,10 +70,11 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// A controller of the publisher of `name`, which is there already.
+    /// Creates a controller of the publisher of `name`, which runs already.
     ///
     /// # Errors
-    /// [`ControlError::NoPublisher`] or [`ControlError::Elsewhere`], or [`ControlError::Open`] where the service cannot be used.
+    /// [`ControlError::NoPublisher`] or [`ControlError::Elsewhere`], or [`ControlError::Open`] if the service cannot be
+    /// used.
     pub fn new(name: &str) -> Result<Self, ControlError> {
         let service = service_name(name, "control")?;
         check_room_to_subscribe()?;
@@ -98,7 +99,7 @@ impl Controller {
         Ok(Self { name: name.to_owned(), client, sent: 0, service: opened, node })
     }
 
-    /// Sends a command and waits for what became of it, at most `timeout`.
+    /// Sends a command and waits for its response, at most `timeout`.
     ///
     /// # Errors
     /// [`ControlError::NoPublisher`], [`ControlError::Ended`] or [`ControlError::NoAnswer`].
@@ -107,7 +108,7 @@ impl Controller {
         self.await_response(command, timeout, |_| deadline)
     }
 
-    /// Sends a command and waits for what became of it: [`PATIENCE`], and for a step as long as it makes progress.
+    /// Sends a command and waits for its response: [`PATIENCE`], and for a step as long as it makes progress.
     ///
     /// # Errors
     /// As [`Self::send`].
@@ -139,16 +140,16 @@ impl Controller {
         }
     }
 
-    /// Whether a publisher is there and alive. Cleans up after one that was killed.
+    /// Returns true if a live publisher exists. Cleans up after a killed publisher.
     fn publisher_is_alive(&self) -> bool {
         let _ = self.node.try_cleanup_dead_nodes();
         self.service.dynamic_config().number_of_servers() > 0
     }
 
-    /// Sends a command. Dropping what is returned gives up the response, not the command.
+    /// Sends a command. Dropping the returned value abandons the response, not the command.
     ///
     /// # Errors
-    /// [`ControlError::Open`] where the service fails.
+    /// [`ControlError::Open`] if the service fails.
     pub fn request(&mut self, command: Command) -> Result<PendingCommand, ControlError> {
         self.sent += 1;
         let (number, value) = command.number_and_value();
@@ -166,13 +167,13 @@ pub struct PendingCommand {
 }
 
 impl PendingCommand {
-    /// The response, if it has come.
+    /// Returns the response, if it has come.
     ///
     /// # Errors
-    /// [`ControlError::NoPublisher`] where nobody was there who could answer, [`ControlError::Ended`] where nobody is any
-    /// more.
+    /// [`ControlError::NoPublisher`] if no publisher received the request, [`ControlError::Ended`] if the publisher has
+    /// ended.
     pub fn poll(&self) -> Result<Option<ControlResponse>, ControlError> {
-        // Looked at before the response, which may have been the last that the publisher did.
+        // Read before the response, which may have been the publisher's last action.
         let awaited = self.pending.is_connected();
         match self.pending.receive().map_err(|error| failed(&self.name, format!("{error:?}")))? {
             Some(response) => Ok(Some(*response)),
@@ -185,14 +186,14 @@ impl PendingCommand {
     }
 }
 
-/// Watches over a publisher whose answer is awaited.
+/// Tests a publisher whose answer is awaited.
 ///
-/// One that was killed leaves requests that seem to wait for ever. A step may last for hours: whether it makes progress is
-/// seen by asking how the show stands.
+/// Requests to a killed publisher stay pending without end. A step may last for hours: requests for the state show its
+/// progress.
 struct Vigil {
     tested: Instant,
     probed: Instant,
-    /// When the show was last seen to have played on, and the tick then.
+    /// The time of the last progress of the show, and its tick.
     progressed: Instant,
     tick: u64,
     probe: Option<PendingCommand>,
@@ -204,7 +205,7 @@ impl Vigil {
         Self { tested: now, probed: now, progressed: now, tick: 0, probe: None }
     }
 
-    /// Until when the answer to a command that was sent at `sent` is awaited.
+    /// Returns the deadline of the answer to a command that was sent at `sent`.
     fn deadline(&self, command: Command, sent: Instant) -> Instant {
         match command {
             Command::Step(_) => self.progressed.max(sent) + PATIENCE,
@@ -212,10 +213,10 @@ impl Vigil {
         }
     }
 
-    /// Tests what is due by now.
+    /// Makes the tests that are due.
     ///
     /// # Errors
-    /// [`ControlError::Ended`]
+    /// [`ControlError::Ended`] if the publisher has ended.
     fn check(&mut self, controller: &mut Controller) -> Result<(), ControlError> {
         let now = Instant::now();
         if now.duration_since(self.tested) >= LIVENESS_INTERVAL {
@@ -226,7 +227,7 @@ impl Vigil {
         }
         if now.duration_since(self.probed) >= PROGRESS_INTERVAL {
             self.probed = now;
-            // One question at a time: each takes a period of the loop, and others wait behind it.
+            // One request at a time: each takes a period of the loop, and others wait behind it.
             match self.probe.as_ref().map(PendingCommand::poll) {
                 Some(Ok(None)) => return Ok(()),
                 // A step that has come to the end of the show is over when its periods are.
@@ -244,7 +245,7 @@ impl Vigil {
     }
 }
 
-/// Whether somebody can send frames under a name.
+/// Returns true if a publisher of frames exists under a name.
 fn has_frames(node: &Node<ipc::Service>, name: &str) -> bool {
     let Ok(poses) = service_name(name, "poses") else { return false };
     let builder = node.service_builder(&poses).publish_subscribe::<[HandlePose]>().user_header::<FrameHeader>();
@@ -255,7 +256,7 @@ fn failed(name: &str, reason: String) -> OpenError {
     OpenError::Failed { service: format!("{name}/control"), reason }
 }
 
-/// How the show stands after a command, for people.
+/// Returns the state of the show after a command, as a sentence.
 pub fn standing(response: &ControlResponse) -> String {
     let playback = response.playback_state().map_or("unknown", PlaybackState::name);
     let ControlResponse { tick, sim_time, time_scale, .. } = *response;
@@ -263,7 +264,7 @@ pub fn standing(response: &ControlResponse) -> String {
     format!("{playback}{rate}, t = {sim_time:.3} s, tick {tick}")
 }
 
-/// Why a command was not obeyed, in a sentence; `None` where it was.
+/// Returns the reason why a command was refused, as a sentence; `None` if it was done.
 pub fn refusal(response: &ControlResponse, command: Command) -> Option<String> {
     let (name, value) = (command.name(), command.number_and_value().1);
     let playback = response.playback_state().map_or("in an unknown state", PlaybackState::name);

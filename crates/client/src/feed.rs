@@ -1,9 +1,9 @@
-//! The feed of a publisher's services, through any number of publishers: what every subscriber command stands on.
+//! The feed of a publisher's services, through any number of publishers: the base of every subscriber command.
 //!
-//! In: the services of a name, over [`connection`](super::connection). Out: a [`FeedEvent`] for all that comes and
-//! changes. Connecting, opening services that appear later, distinguishing a silent publisher from a dead one
-//! ([`liveness`]), gaps and new runs ([`sequence`]) are here and nowhere else; `watch`, the stage picture and the
-//! subscribers of the soak test call [`Feed::poll`] in a loop and handle the events.
+//! In: the services of a name, over [`connection`](super::connection). Out: a [`FeedEvent`] for each message and each
+//! change. Only this file connects, opens services that appear later, distinguishes a silent publisher from a dead one
+//! ([`liveness`]), and finds gaps and new runs ([`sequence`]). `watch`, the stage picture and the subscribers of the
+//! soak test call [`Feed::poll`] in a loop and handle the events.
 
 pub mod liveness;
 pub mod sequence;
@@ -16,35 +16,36 @@ use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopSt
 use liveness::{Change, Liveness};
 use sequence::SequenceTracker;
 
-/// How often it is tried to connect while there is no publisher.
+/// The interval of connection attempts while there is no publisher.
 const CONNECT_INTERVAL: Duration = Duration::from_millis(20);
-/// How often services are opened that were not there yet.
+/// The interval at which missing services are opened.
 const OPEN_INTERVAL: Duration = Duration::from_millis(100);
-/// How long a publisher may send nothing at all where no show is: statuses and, over a tunnel, stages come once a second.
+/// How long a publisher may send nothing while no show runs here: statuses and, over a tunnel, stages come once a
+/// second.
 const QUIET: Duration = Duration::from_millis(1500);
 
-/// Which of the frames that have come since the last poll are handed over.
+/// The frames since the last poll that are handed over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Frames {
+pub enum Delivery {
     /// Every one, oldest first.
     All,
-    /// The newest; the others cost no more than their receiving.
+    /// The newest; the others are only received.
     Newest,
 }
 
-/// How a feed reads.
+/// The options of a feed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FeedOptions {
-    /// Whether each frame wakes the reader.
+    /// The way in which the reader notices a frame.
     pub wake: Wake,
-    /// Which frames are handed over.
-    pub frames: Frames,
+    /// The frames that are handed over.
+    pub frames: Delivery,
 }
 
-/// What comes from a publisher, and what becomes of it.
+/// A message of a publisher, or a change of the publisher.
 #[derive(Debug, Clone, Copy)]
 pub enum FeedEvent<'a> {
-    /// Frames come from a run that the latest frame was not of. Its first frame follows.
+    /// Another run than that of the latest frame has begun. Its first frame follows.
     Started {
         /// The run.
         run_id: u64,
@@ -55,8 +56,8 @@ pub enum FeedEvent<'a> {
         header: &'a FrameHeader,
         /// Its handles, head first.
         handles: &'a [HandlePose],
-        /// Frames of the run between the one before and this that were not handed over: they were lost, or passed over
-        /// by [`Frames::Newest`].
+        /// Frames of the run between the previous frame and this one that were not handed over: lost, or skipped by
+        /// [`Delivery::Newest`].
         missed: u64,
     },
     /// The stage, at the start of each run.
@@ -69,8 +70,8 @@ pub enum FeedEvent<'a> {
     Status(&'a LoopStatus),
     /// The publisher is alive and has stopped sending. The next frame ends that.
     Silent,
-    /// The publisher has ended or died, and all that it sent has been handed over; or it is the silent end of a tunnel and
-    /// a show has begun on this machine.
+    /// The publisher has ended or died, and all its messages have been handed over. Or it is the silent end of a
+    /// tunnel, and a show has begun on this machine.
     Gone,
 }
 
@@ -87,7 +88,7 @@ pub enum FeedEvent<'a> {
 /// use bench_dragon_show::scene::Scene;
 /// use bench_dragon_show::{Playback, Show};
 /// use bench_dragon_client::connection::Wake;
-/// use bench_dragon_client::feed::{Feed, FeedEvent, FeedOptions, Frames};
+/// use bench_dragon_client::feed::{Feed, FeedEvent, FeedOptions, Delivery};
 /// use bench_dragon_publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
 /// use bench_dragon_messages::FrameHeader;
 /// use bench_dragon_show::convert::stage;
@@ -106,7 +107,7 @@ pub enum FeedEvent<'a> {
 /// };
 /// let mut publisher = SharedMemoryPublisher::open(&config)?;
 ///
-/// let mut feed = Feed::new(&config.name, FeedOptions { wake: Wake::Never, frames: Frames::All })?;
+/// let mut feed = Feed::new(&config.name, FeedOptions { wake: Wake::Never, frames: Delivery::All })?;
 /// let mut received = 0;
 /// while received < 10 {
 ///     let header = FrameHeader { run_id: 1, handles: 224, ..FrameHeader::default() };
@@ -123,33 +124,33 @@ pub enum FeedEvent<'a> {
 /// ```
 pub struct Feed {
     subscription: Subscription,
-    frames: Frames,
+    frames: Delivery,
     sequence: SequenceTracker,
     next_connect: Instant,
     connected: Option<Connected>,
 }
 
-/// A connection, and what is known of the publisher at its other end.
+/// A connection, and the state of the publisher at its other end.
 struct Connected {
     connection: Connection,
     shares_clock: bool,
     liveness: Liveness,
     last_open: Instant,
-    /// Whether anything has been handed over, which begins with a frame.
+    /// True if anything has been handed over, which begins with a frame.
     received: bool,
-    /// Since when there has been no sign that any publisher sends, as long as nothing has been handed over.
+    /// The moment since which no publisher has sent anything; used until something has been handed over.
     quiet_since: Instant,
-    /// What tells the latest stage, alert and cue from others: they come again where there is a tunnel to other machines.
+    /// The identity of the latest stage, alert and cue: a tunnel to other machines sends them again.
     stage: Option<(u64, u64)>,
     alert: Option<(u64, u64, u32)>,
     cue: Option<(u64, u64, u32)>,
 }
 
 impl Feed {
-    /// A feed of the services of `name`, none of which need exist yet.
+    /// Creates a feed of the services of `name`, which need not exist yet.
     ///
     /// # Errors
-    /// [`OpenError`] for a name that iceoryx2 cannot take, or where this process may not use the shared memory.
+    /// [`OpenError`] for a name that iceoryx2 refuses, or if this process may not use the shared memory.
     pub fn new(name: &str, options: FeedOptions) -> Result<Self, OpenError> {
         Ok(Self {
             subscription: Subscription::new(name, options.wake)?,
@@ -160,13 +161,13 @@ impl Feed {
         })
     }
 
-    /// Waits until something comes, at most `timeout`, and hands all that has come to `handle`, but of frames at most as
-    /// many as the queue holds. Does what is due besides, so it is to be called again and again, a few times a second
-    /// at least; it may return sooner and with nothing.
+    /// Waits for messages, at most `timeout`, and passes all of them to `handle`, but at most as many frames as the
+    /// queue holds. May return sooner and without messages. It also connects and tests the publisher, so call it in a
+    /// loop, at least a few times a second.
     ///
     /// # Errors
-    /// [`OpenError`] where the services exist and cannot be used. The feed has let go of them then, and the next call
-    /// connects anew: what is in the way may have gone.
+    /// [`OpenError`] if the services exist and cannot be used. The feed has closed them then, and the next call
+    /// connects again: the obstacle may have gone.
     pub fn poll(&mut self, timeout: Duration, handle: &mut dyn FnMut(FeedEvent<'_>)) -> Result<(), OpenError> {
         let Some(connected) = &mut self.connected else { return self.connect(timeout) };
         connected.connection.wait(timeout.min(OPEN_INTERVAL));
@@ -188,8 +189,8 @@ impl Feed {
             None => (),
             Some(Change::Silent) => handle(FeedEvent::Silent),
             Some(Change::Gone) => {
-                // What it sent between the reading above and its end is still in the queues, perhaps before what the next
-                // publisher sends.
+                // Messages sent between the reading above and its end are still in the queues, perhaps before messages
+                // of the next publisher.
                 connected.receive(self.frames, &mut self.sequence, handle);
                 if !is_alive(&connected.connection) {
                     if connected.received {
@@ -201,7 +202,7 @@ impl Feed {
         }
         let is_quiet = |connected: &&mut Connected| !connected.received && connected.quiet_since.elapsed() >= QUIET;
         if let Some(connected) = self.connected.as_mut().filter(is_quiet) {
-            // A show that is stopped may stay so: to ask costs more than all else that is done here.
+            // A stopped show may stay stopped: this test costs more than the rest of the poll.
             connected.quiet_since = Instant::now();
             if !self.subscription.show_is_here() {
                 self.leave();
@@ -210,14 +211,13 @@ impl Feed {
         Ok(())
     }
 
-    /// Whether the publisher's clock is that of this process, so that latencies can be computed; `None` while there is no
-    /// publisher. Where another publisher's frames come, it holds for them when the poll that brings the first has
-    /// returned.
+    /// Returns true if the publisher's clock is that of this process, so that latencies can be computed; `None` while
+    /// there is no publisher. For another publisher the value is right after the poll that brings its first frame.
     pub fn shares_clock(&self) -> Option<bool> {
         self.connected.as_ref().map(|connected| connected.shares_clock)
     }
 
-    /// Lets go of the services, so that the next publisher can make them anew.
+    /// Closes the services, so that the next publisher can create them again.
     fn leave(&mut self) {
         if let Some(connected) = self.connected.take() {
             self.subscription.leave(connected.connection);
@@ -248,16 +248,16 @@ impl Feed {
     }
 }
 
-/// Whether frames are of this machine's clock: the service names it, and a show is here. Services can outlive the show
-/// that made them, and a tunnel then sends another machine's frames through them.
+/// Returns true if the deadlines are of this machine's clock: the service names the clock, and a show runs here.
+/// Services can outlive the show that created them, and a tunnel then sends another machine's frames through them.
 fn shares_clock(subscription: &Subscription, connection: &Connection) -> bool {
     connection.names_clock() && subscription.show_is_here()
 }
 
 impl Connected {
-    /// Hands over what is in the queues: the stage first, since it explains the frames, and frames before the alerts
-    /// and cues that belong to them.
-    fn receive(&mut self, frames: Frames, sequence: &mut SequenceTracker, handle: &mut dyn FnMut(FeedEvent<'_>)) {
+    /// Hands over the messages in the queues: the stage first, since it describes the frames, and frames before their
+    /// alerts and cues.
+    fn receive(&mut self, frames: Delivery, sequence: &mut SequenceTracker, handle: &mut dyn FnMut(FeedEvent<'_>)) {
         let Self {
             connection,
             liveness,
@@ -290,8 +290,8 @@ impl Connected {
             handle(FeedEvent::Frame { header, handles, missed });
         };
         let any = match frames {
-            Frames::All => connection.frames(take_frame) > 0,
-            Frames::Newest => connection.newest_frame(take_frame).is_some(),
+            Delivery::All => connection.frames(take_frame) > 0,
+            Delivery::Newest => connection.newest_frame(take_frame).is_some(),
         };
         if any {
             liveness.frame_at(Instant::now());

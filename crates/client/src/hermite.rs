@@ -1,9 +1,9 @@
-//! Where every handle is at the moment of display: cubic Hermite interpolation between the frames of a stream.
+//! The handles at the moment of display: cubic Hermite interpolation between the frames of a stream.
 //!
-//! In: frames as they come, and a moment of CLOCK_MONOTONIC. Out: positions, headings, velocities at that moment, which
-//! no frame need have. A display that runs a period behind the stream, at any rate of its own, shows the dragon where it
-//! was: the error falls with the fourth power of the frames' distance (de Boor, A Practical Guide to Splines, IV.6:
-//! h^4 / 384 times the greatest fourth derivative). Needs no feature of this crate; for subscribers of any kind.
+//! In: frames as they come, and a moment of CLOCK_MONOTONIC. Out: positions, headings and velocities at that moment,
+//! also between frames. The display runs a period behind the stream, at any rate. The error falls with the fourth power
+//! of the frames' distance (de Boor, A Practical Guide to Splines, IV.6: h^4 / 384 times the greatest fourth
+//! derivative).
 
 use std::collections::VecDeque;
 
@@ -18,19 +18,19 @@ struct Snapshot {
 }
 
 impl Snapshot {
-    /// Whether velocities are zero because the show stands still, and not because the handles rest there.
+    /// Returns true if velocities are zero because the show stands still, and not because the handles rest there.
     fn stands_still(&self) -> bool {
         self.header.playback_state() != Some(PlaybackState::Playing)
     }
 
-    /// Whether simulated time runs without a jump from this frame to a later one.
+    /// Returns true if simulated time runs without a jump from this frame to a later one.
     fn continues_to(&self, later: &Self) -> bool {
         let (a, b) = (&self.header, &later.header);
         (a.run_id, a.epoch, self.handles.len()) == (b.run_id, b.epoch, later.handles.len()) && b.sim_time > a.sim_time
     }
 }
 
-/// The latest frames of a stream, and what lies between them.
+/// The latest frames of a stream, and the poses between them.
 ///
 /// # Examples
 ///
@@ -61,15 +61,15 @@ pub struct HermiteReader {
 }
 
 impl HermiteReader {
-    /// A reader that keeps the latest `keep` frames, at least two: a display that runs `d` seconds behind a stream of
-    /// `r` frames per second needs d r + 2.
+    /// Creates a reader that keeps the latest `keep` frames, at least two. A display that runs `d` seconds behind a
+    /// stream of `r` frames per second needs d r + 2.
     pub fn new(keep: usize) -> Self {
         Self { frames: VecDeque::with_capacity(keep.max(2)), keep: keep.max(2) }
     }
 
-    /// Takes in the next frame of a stream. Frames of another run are forgotten. A frame of another machine has a
-    /// `deadline_ns` of that machine's clock, which no moment here can be compared with: put the time of its arrival in
-    /// place of that.
+    /// Adds the next frame of a stream, and drops the frames of another run. A frame of another machine has a
+    /// `deadline_ns` of that machine's clock, which cannot be compared with moments here: replace it by the time of
+    /// arrival.
     pub fn push(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
         if self.frames.back().is_some_and(|last| last.header.run_id != header.run_id) {
             self.frames.clear();
@@ -83,17 +83,17 @@ impl HermiteReader {
         self.frames.push_back(snapshot);
     }
 
-    /// The header of the newest frame.
+    /// Returns the header of the newest frame.
     pub fn newest(&self) -> Option<&FrameHeader> {
         self.frames.back().map(|frame| &frame.header)
     }
 
-    /// Fills `handles` with what was true at a moment, CLOCK_MONOTONIC in nanoseconds, and returns its simulated time,
-    /// seconds. Before the oldest frame that is kept, after the newest, and where simulated time jumps, the frame before
-    /// is shown as it is. `None` where no frame has come.
+    /// Fills `handles` with the poses at a moment, CLOCK_MONOTONIC in nanoseconds, and returns its simulated time in
+    /// seconds. Returns `None` if no frame has come. There is no interpolation before the oldest kept frame, after the
+    /// newest, and at a jump of simulated time: there the nearest earlier frame, or the oldest, is returned.
     ///
-    /// Headings follow from the positions, as those of the frames do. Without velocities in the stream the path between
-    /// two frames is a straight line.
+    /// Headings follow from the positions, as in the frames. Without velocities in the stream the path between two
+    /// frames is a straight line.
     pub fn at(&self, monotonic_ns: u64, handles: &mut Vec<HandlePose>) -> Option<f64> {
         let after = self.frames.partition_point(|frame| frame.header.deadline_ns <= monotonic_ns);
         let before = self.frames.get(after.saturating_sub(1))?;
@@ -115,7 +115,7 @@ impl HermiteReader {
     }
 }
 
-/// The handles at the share `u` of the way, `length` simulated seconds, from one frame to the next.
+/// Appends the handles at the share `u` of the way, `length` simulated seconds, from one frame to the next.
 fn interpolate(from: &Snapshot, to: &Snapshot, length: f64, u: f64, handles: &mut Vec<HandlePose>) {
     let ends = (!from.stands_still(), !to.stands_still());
     for (a, b) in from.handles.iter().zip(&to.handles) {

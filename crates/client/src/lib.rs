@@ -1,7 +1,7 @@
-//! Programs in processes of their own that follow a running publisher: all that a subscriber in Rust compiles.
+//! Programs that follow a running publisher from another process: all that a subscriber in Rust compiles.
 //!
-//! [`feed`] is the one source of a publisher's messages; [`hermite`] interpolates between frames; [`control`] sends commands.
-//! This crate knows the messages and no solver.
+//! [`feed`] is the one source of a publisher's messages; [`hermite`] interpolates between frames; [`control`] sends
+//! commands. This crate knows the messages and no solver.
 
 pub mod clock;
 pub mod connection;

@@ -1,28 +1,28 @@
-//! The loop of a subscriber that is not woken by frames: what `send` and `metrics` stand on. In: the events of a
-//! [`Feed`] for each publisher. Out: calls of a [`Handler`].
+//! The loop of a subscriber that polls, for `send` and `metrics`. In: the events of a [`Feed`] of each publisher. Out:
+//! calls of a [`Handler`].
 //!
-//! To be woken by each frame would cost the publisher more than it saves here; polling costs it nothing.
+//! Waking this process at each frame would cost the publisher more than it saves here; polling costs the publisher
+//! nothing.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::connection::Wake;
-use super::feed::{Feed, FeedEvent, FeedOptions, Frames};
+use super::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use crate::shared_memory::OpenError;
 
-/// How often frames are polled, which is how much later than the publisher a handler can be.
+/// The interval of polls: the greatest delay of a handler after the publisher.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
-/// What is in the way of services that cannot be used at present. It may go: a program of another version ends, a subscriber
-/// leaves.
+/// The reason why services cannot be used at present. It may end: a program of another version or a subscriber ends.
 #[derive(Debug, Default)]
 pub struct Obstacle(Option<String>);
 
 impl Obstacle {
-    /// How long to wait before the next attempt.
+    /// The time before the next attempt.
     pub const RETRY_INTERVAL: Duration = Duration::from_millis(200);
 
-    /// Takes in how a poll ended: whether there is an obstacle now, of which the log has the sentence once.
+    /// Updates the obstacle by the result of a poll, and logs a new one once. Returns true if there is an obstacle.
     pub fn is_met(&mut self, polled: Result<(), OpenError>) -> bool {
         let now = polled.err().map(|error| error.to_string());
         now.iter().filter(|_| now != self.0).for_each(|sentence| log::warn!("{sentence}"));
@@ -30,35 +30,36 @@ impl Obstacle {
         self.0.is_some()
     }
 }
-/// What is called with all that comes.
+
+/// A receiver of all events.
 pub trait Handler {
-    /// Takes in what has come from a publisher, which is known by its place in the list of names, from 0.
+    /// Handles an event of a publisher, given by its place in the list of names, from 0.
     fn handle(&mut self, publisher: usize, event: FeedEvent<'_>);
-    /// Takes in whether the clock of a publisher that is there is that of this process, before its first frame comes
-    /// and again after each poll. Handlers that compare no moments need not know.
+    /// Handles the clock of a running publisher: `shares_clock` is true if it is that of this process. Called before
+    /// the first frame and after each poll. Handlers that compare no moments can ignore it.
     fn clock(&mut self, _publisher: usize, _shares_clock: bool) {}
-    /// Does what is due, whether anything has come or not.
+    /// Does periodic work, after every poll.
     fn polled(&mut self, now: Instant);
 }
 
-/// The feed of one publisher, and what is in its way.
+/// The feed of one publisher, and its obstacle.
 struct Source {
     feed: Feed,
     obstacle: Obstacle,
     next: Instant,
 }
 
-/// Feeds a handler from the services of each name, through any number of publishers, until `stop` is set.
+/// Calls a handler with the events of the services of each name, through any number of publishers, until `stop` is set.
 ///
 /// # Errors
-/// [`OpenError`] for a name that iceoryx2 cannot take, or where this process may not use the shared memory. Services that
-/// cannot be used later on are waited for while the others are polled; the log names the reason once. All are polled by
-/// one thread: a service that hangs in its creation, since its publisher was killed at that moment, keeps the others
-/// waiting for as long as iceoryx2 waits for it, at each attempt until its files have been removed.
+/// [`OpenError`] for a name that iceoryx2 refuses, or if this process may not use the shared memory. Services that
+/// become unusable later are tried again while the others are polled; the log names the reason once. One thread polls
+/// all: a service whose publisher was killed while creating it delays the others. The delay lasts as long as iceoryx2
+/// waits for the service, at each attempt until the service's files have been removed.
 pub fn poll_until(
     stop: &AtomicBool,
     names: &[String],
-    frames: Frames,
+    frames: Delivery,
     handler: &mut impl Handler,
 ) -> Result<(), OpenError> {
     let source = |name: &String| {

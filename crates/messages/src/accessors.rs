@@ -1,64 +1,63 @@
-//! From the numbers of a layout back to states, levels, codes and events. Called by every subscriber that wants more than a
-//! number.
+//! From the numbers of a layout to states, levels, codes and events. Called by subscribers.
 
 use crate::control::Code;
 use crate::layouts::{CollisionAlert, ControlResponse, FrameHeader, NO_BENCH, StageEvent};
 use crate::state::{EventKind, FrameState, Level, PlaybackState};
 
 impl FrameHeader {
-    /// The state, or `None` for a number that this layout does not know.
+    /// Returns the state, or `None` for a number that this layout does not know.
     pub fn frame_state(&self) -> Option<FrameState> {
         of_number(&FrameState::ALL, self.state)
     }
 
-    /// Whether the show plays, or `None` for a number that this layout does not know.
+    /// Returns the playback state, or `None` for a number that this layout does not know.
     pub fn playback_state(&self) -> Option<PlaybackState> {
         of_number(&PlaybackState::ALL, self.playback)
     }
 }
 
 impl ControlResponse {
-    /// What became of the command, or `None` for a number that this layout does not know.
+    /// Returns the result of the command, or `None` for a number that this layout does not know.
     pub fn result(&self) -> Option<Code> {
         Code::of_number(self.code)
     }
 
-    /// Whether the show plays, or `None` for a number that this layout does not know.
+    /// Returns the playback state, or `None` for a number that this layout does not know.
     pub fn playback_state(&self) -> Option<PlaybackState> {
         of_number(&PlaybackState::ALL, self.playback)
     }
 }
 
 impl StageEvent {
-    /// What happens, or `None` for a number that this layout does not know.
+    /// Returns the kind of the event, or `None` for a number that this layout does not know.
     pub fn kind(&self) -> Option<EventKind> {
         of_number(&FrameState::ALL, self.state)?.event()
     }
 }
 
 impl CollisionAlert {
-    /// The level, or `None` for a number that this layout does not know.
+    /// Returns the level, or `None` for a number that this layout does not know.
     pub fn alert_level(&self) -> Option<Level> {
         of_number(&Level::ALL, self.level)
     }
 
-    /// What the alert is about; `None` where it is about no event.
+    /// Returns the kind of the alert's event; `None` if the alert has no event.
     pub fn event_kind(&self) -> Option<EventKind> {
         of_number(&FrameState::ALL, self.event)?.event()
     }
 
-    /// The nearest benches in this frame, from 0.
+    /// Returns the nearest benches in this frame, from 0.
     pub fn nearest_benches(&self) -> impl Iterator<Item = u32> {
         benches(self.bench_a, self.bench_b)
     }
 
-    /// The benches of the event, from 0.
+    /// Returns the benches of the event, from 0.
     pub fn event_benches(&self) -> impl Iterator<Item = u32> {
         benches(self.event_bench_a, self.event_bench_b)
     }
 }
 
-/// The value with a number on the wire: values are numbered in order, from 0.
+/// Returns the value of a number on the wire: values are numbered in order, from 0.
 fn of_number<T: Copy>(all: &[T], number: u32) -> Option<T> {
     all.get(number as usize).copied()
 }

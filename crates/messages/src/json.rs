@@ -1,6 +1,6 @@
-//! Messages as JSON: the names of numbers, null where there is nothing, and text where a double is too small.
+//! Messages as JSON: names in place of numbers, null for no value, and text for integers that a double cannot hold.
 //!
-//! In: a layout. Out: what serde writes. Called by `watch --json`, the stage picture's server and the
+//! In: a layout. Out: a value that serde writes. Called by `watch --json`, the stage picture's server and the
 //! recorder.
 
 use serde::Serialize;
@@ -19,7 +19,7 @@ impl Serialize for Exact {
     }
 }
 
-/// A [`CollisionAlert`] with the fields of the layout in their order. Numbers that are not one become null.
+/// A [`CollisionAlert`] with the fields of the layout in their order. NaN becomes null.
 #[derive(Debug, Clone, Serialize)]
 #[serde(tag = "type", rename = "alert")]
 pub struct AlertObject {
@@ -89,7 +89,7 @@ impl From<&Cue> for CueObject {
     }
 }
 
-/// A [`Stage`] with what of it is in use.
+/// A [`Stage`] with the entries that are in use.
 #[derive(Debug, Clone, Serialize)]
 pub struct StageObject {
     run_id: Exact,

@@ -1,14 +1,14 @@
 //! The memory layouts that publishers write and subscribers in any language read.
 //!
 //! Depends on nothing but serde and iceoryx2's [`ZeroCopySend`]: states, levels and kinds are plain numbers here, and
-//! [`convert`](super::convert) is where they get their types. Everything is little-endian, `#[repr(C)]` and without
-//! implicit padding. A type's name ends in the version of its layout, so that a subscriber built for another layout is
-//! refused instead of reading nonsense.
+//! `convert` of the crate `show` fills them in, and the accessors of this crate give them their types. Everything is
+//! little-endian, `#[repr(C)]` and without implicit padding. A type's name ends in the version of its layout, so that a
+//! subscriber built for another layout is refused instead of reading nonsense.
 //!
 //! `msgs/msg` and `examples/python/bench_dragon_messages.py` are generated from this file, doc comments included, by
-//! `BENCH_DRAGON_WRITE=1 cargo test --test msgs`. The comments are therefore for readers of all three languages; what
-//! is true of iceoryx2 alone stands in a paragraph that begins with "Over iceoryx2" and is left out of `msgs/msg`. A
-//! link to a constant or to an enum of `show::state` gives the ROS 2 message those constants.
+//! `BENCH_DRAGON_WRITE=1 cargo test --test msgs`. The comments are therefore for readers of all three languages. Facts
+//! of iceoryx2 alone stand in a paragraph that begins with "Over iceoryx2", which `msgs/msg` leaves out. A link to a
+//! constant or to an enum of [`state`](crate::state) gives the ROS 2 message those constants.
 
 mod control;
 mod stage;
@@ -23,7 +23,7 @@ pub use stage::*;
 /// The bench number that means "no bench".
 pub const NO_BENCH: u32 = u32::MAX;
 
-/// Where one handle is and how it moves.
+/// The position and velocity of one handle.
 ///
 /// Over iceoryx2 the payload of `<name>/poses` is a slice of these, the head first.
 ///
@@ -48,19 +48,19 @@ pub struct HandlePose {
     /// Radians in (-pi, pi]: the direction of the bench this handle leads (from handle i+1 to handle i); the last
     /// handle takes the last bench's.
     pub heading: f64,
-    /// Velocity along x in simulation, metres per simulated second; NaN where the scene requests no velocities.
+    /// Velocity along x in simulation, metres per simulated second; NaN if the scene requests no velocities.
     pub vx: f64,
-    /// Velocity along y in simulation, metres per simulated second; NaN where the scene requests no velocities.
+    /// Velocity along y in simulation, metres per simulated second; NaN if the scene requests no velocities.
     pub vy: f64,
 }
 
-/// Where one handle is and how it moves, in half the bytes: the numbers of [`HandlePose`], each rounded to the nearest
-/// single-precision float, so that a place is off by at most 6e-8 of its distance from the centre (0.5 um at 8 m, 0.06
-/// mm at 1 km) along each axis.
+/// The position and velocity of one handle, in half the bytes: the numbers of [`HandlePose`], each rounded to the
+/// nearest single-precision float. The error along each axis is at most 6e-8 of the distance from the centre (0.5 um at
+/// 8 m, 0.06 mm at 1 km).
 ///
-/// Over iceoryx2 the payload of `<name>/poses32`, which is there where a scene asks for it, is a slice of these, the
-/// head first: one handle in `every`, and the tail. The service's attribute `every` holds that number, so that the
-/// pose with the index `i` is of the handle `i * every`, the last pose of the last handle.
+/// Over iceoryx2 the payload of `<name>/poses32`, a service that a scene can request, is a slice of these, the head
+/// first: one handle in `every`, and the tail. The service's attribute `every` holds that number: the pose with the
+/// index `i` is of the handle `i * every`, the last pose of the last handle.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/HandlePose32/1")]
 #[repr(C)]
@@ -71,13 +71,13 @@ pub struct HandlePose32 {
     pub y: f32,
     /// Radians from -pi to pi, both rounded: the direction of the bench this handle leads, as [`HandlePose::heading`].
     pub heading: f32,
-    /// Velocity along x in simulation, metres per simulated second; NaN where the scene asks for no velocities.
+    /// Velocity along x in simulation, metres per simulated second; NaN if the scene requests no velocities.
     pub vx: f32,
-    /// Velocity along y in simulation, metres per simulated second; NaN where the scene asks for no velocities.
+    /// Velocity along y in simulation, metres per simulated second; NaN if the scene requests no velocities.
     pub vy: f32,
 }
 
-/// What is true of a whole frame.
+/// The facts of a whole frame.
 ///
 /// Over iceoryx2 the user header of `<name>/poses` and `<name>/poses32`.
 ///
@@ -112,22 +112,22 @@ pub struct FrameHeader {
     pub deadline_ns: u64,
     /// Simulated seconds since the start of the scene.
     pub sim_time: f64,
-    /// Simulated seconds per second of wall time, as in force; 0 while paused or held, unchanged once the show has
-    /// ended.
+    /// Simulated seconds per second of wall time, as in force; 0 while paused or held, unchanged after the end of the
+    /// show.
     pub time_scale: f64,
-    /// Metres between the nearest two boards that share no handle, negative when they overlap; NaN where the scene
+    /// Metres between the nearest two boards that share no handle, negative when they overlap; NaN if the scene
     /// has no `[alerts]` or fewer than three benches.
     pub min_clearance: f64,
     /// The number of handles in this message.
     pub handles: u32,
-    /// What the dragon is doing: one of [`FrameState`](crate::state::FrameState).
+    /// The state of the dragon: one of [`FrameState`](crate::state::FrameState).
     pub state: u32,
-    /// Whether simulated time advances: one of [`PlaybackState`](crate::state::PlaybackState).
+    /// The playback state: one of [`PlaybackState`](crate::state::PlaybackState).
     pub playback: u32,
-    /// The latest cue passed, counted from 1; 0 where none has been.
+    /// The latest cue passed, counted from 1; 0 before the first cue.
     pub cue: u32,
-    /// Grows by one at every jump of simulated time, such as the beginning of the next loop: who interpolates starts
-    /// anew.
+    /// Grows by one at every jump of simulated time, such as the beginning of the next loop. No interpolation crosses a
+    /// jump.
     pub epoch: u32,
     /// Always 0.
     pub reserved: u32,
@@ -137,7 +137,7 @@ pub struct FrameHeader {
 ///
 /// `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, at every level. The fields
 /// that begin with `event` are the event the alert is about: the next contact, stall or lock while the level is clear
-/// or approaching, the one that has happened otherwise.
+/// or approaching, else the event that has happened.
 ///
 /// Over iceoryx2 the payload of `<name>/alerts`.
 ///
@@ -171,32 +171,32 @@ pub struct CollisionAlert {
     pub stamp_ns: u64,
     /// Simulated seconds of that frame.
     pub sim_time: f64,
-    /// Simulated seconds at which the event happens or happened; NaN where there is none.
+    /// Simulated seconds at which the event happens or happened; NaN if there is no event.
     pub event_time: f64,
-    /// `event_time - sim_time`, simulated seconds; negative once it has passed; NaN where there is no event.
+    /// `event_time - sim_time`, simulated seconds; negative once it has passed; NaN if there is no event.
     pub time_to_event: f64,
-    /// Metres between the nearest two boards in that frame, negative when they overlap; NaN where there are fewer than
+    /// Metres between the nearest two boards in that frame, negative when they overlap; NaN if there are fewer than
     /// three benches.
     pub clearance: f64,
-    /// The midpoint between the nearest two boards, metres right of the centre; NaN where there are fewer than three
+    /// The midpoint between the nearest two boards, metres right of the centre; NaN if there are fewer than three
     /// benches.
     pub x: f64,
-    /// The midpoint between the nearest two boards, metres up from the centre; NaN where there are fewer than three
+    /// The midpoint between the nearest two boards, metres up from the centre; NaN if there are fewer than three
     /// benches.
     pub y: f64,
-    /// Where the event happens, metres right of the centre: the touching point of a contact, the rear handle of the
-    /// bench that stalls or locks; NaN where there is no event.
+    /// The place of the event, metres right of the centre: the touching point of a contact, the rear handle of the
+    /// bench that stalls or locks; NaN if there is no event.
     pub event_x: f64,
-    /// Where the event happens, metres up from the centre; NaN where there is no event.
+    /// The place of the event, metres up from the centre; NaN if there is no event.
     pub event_y: f64,
-    /// How serious the alert is: one of [`Level`](crate::state::Level).
+    /// The severity of the alert: one of [`Level`](crate::state::Level).
     pub level: u32,
     /// The first of the nearest two benches, from 0, or [`NO_BENCH`].
     pub bench_a: u32,
     /// The second of the nearest two benches, or [`NO_BENCH`].
     pub bench_b: u32,
-    /// What kind of event: one of [`EventKind`](crate::state::EventKind), with the number of the frame's state
-    /// that it leads to; 0 where there is none.
+    /// The kind of the event: one of [`EventKind`](crate::state::EventKind), with the number of the frame's state that
+    /// it leads to; 0 if there is no event.
     pub event: u32,
     /// The bench that stalls or locks, or the first of two that touch, or [`NO_BENCH`].
     pub event_bench_a: u32,
@@ -249,7 +249,7 @@ const SCENE_NAME_BYTES: usize = 64;
 pub struct SceneName([u8; SCENE_NAME_BYTES]);
 
 impl SceneName {
-    /// As much of a name as there is room for.
+    /// Creates a name, cut to the bytes that there is room for.
     pub fn new(name: &str) -> Self {
         let mut bytes = [0; SCENE_NAME_BYTES];
         let end = (0..=name.len().min(SCENE_NAME_BYTES)).rev().find(|end| name.is_char_boundary(*end)).unwrap_or(0);
@@ -257,7 +257,7 @@ impl SceneName {
         Self(bytes)
     }
 
-    /// What stands before the zeros.
+    /// Returns the text before the zeros.
     pub fn as_str(&self) -> &str {
         let end = self.0.iter().position(|byte| *byte == 0).unwrap_or(SCENE_NAME_BYTES);
         std::str::from_utf8(&self.0[..end]).unwrap_or_default()
@@ -282,7 +282,7 @@ impl<'de> Deserialize<'de> for SceneName {
     }
 }
 
-/// How the loop is doing, once a second.
+/// The status of the loop, once a second.
 ///
 /// Figures that end in `_second` are of the last second alone, those that end in `_total` since the start of the run;
 /// all durations are in nanoseconds.
@@ -322,9 +322,9 @@ pub struct LoopStatus {
     pub skipped: u64,
     /// Times the show has been played to its end and begun again.
     pub shows_played: u64,
-    /// Contacts that no search had found before the show, since the start: 0 unless a search is wrong or gave up.
+    /// Contacts that no search had found before the show, since the start: 0 unless a search is wrong or stopped early.
     pub unforeseen_contacts: u64,
-    /// Frames for whose time there was no solution, so that the one before was shown again, since the start.
+    /// Frames without a solution at their time, which repeated the frame before, since the start.
     pub unsolved_frames: u64,
     /// Wake-up lateness of the last second: median, ns.
     pub lateness_p50_second: u64,

@@ -1,31 +1,31 @@
-//! Alerts in words, for people: benches are counted from 1, and the sentence states it.
+//! Alerts in words, for people. Benches are counted from 1, and the sentence states this.
 //!
-//! In: a [`CollisionAlert`] and the number of benches. Out: a sentence. Called by `run`, `watch` and the stage picture's
-//! server, so that all of them print the same.
+//! In: a [`CollisionAlert`] and the number of benches. Out: a sentence. Called by `run`, `watch` and the stage
+//! picture's server, so that all of them print the same.
 
 use super::layouts::{CollisionAlert, Cue};
 use crate::state::EventKind;
 use crate::state::{FrameState, Level};
 
-/// Whether a sentence holds what changes from frame to frame: the time until the event, and the clearance.
+/// The place of the values that change from frame to frame: the time until the event, and the clearance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Figures {
-    /// It does.
+    /// In the sentence.
     Shown {
         /// Simulated seconds per second of wall time, in which the time until the event is given; 0 while paused.
         time_scale: f64,
     },
-    /// It does not: they stand beside the sentence.
+    /// Beside the sentence.
     Omitted,
 }
 
-/// A cue that the show has reached, as a sentence.
+/// Returns a cue that the show has reached, as a sentence.
 pub fn cue_sentence(cue: &Cue) -> String {
     let waits = if cue.pauses == 1 { ": waiting for go" } else { "" };
     format!("cue {} \"{}\"{waits}", cue.number, cue.name.as_str())
 }
 
-/// A bench as people call it, counted from 1.
+/// Returns the name of a bench for people, counted from 1.
 pub fn bench_name(bench: u32, benches: u32) -> String {
     let number = u64::from(bench) + 1;
     match number {
@@ -35,8 +35,8 @@ pub fn bench_name(bench: u32, benches: u32) -> String {
     }
 }
 
-/// An alert as a sentence, in a team of so many benches: what happened, in the past tense, since the show may go on; or
-/// what is coming and where, and apart from it the two that are nearest now.
+/// Returns an alert of a team of `benches` benches as a sentence. A past event is in the past tense, since the show may
+/// continue. For a coming event, its place and the two benches that are nearest now are separate.
 pub fn alert_sentence(alert: &CollisionAlert, benches: u32, figures: Figures) -> String {
     let happened = alert.alert_level().is_some_and(Level::has_happened);
     let sentence = match (happened, alert.event_kind()) {
@@ -54,7 +54,7 @@ pub fn alert_sentence(alert: &CollisionAlert, benches: u32, figures: Figures) ->
     if sentence.contains("bench ") { format!("{sentence} (counting from 1)") } else { sentence }
 }
 
-/// A state that no alert reports, as a sentence; `None` where an alert does, or where there is nothing to report.
+/// Returns a state that no alert reports, as a sentence; `None` if an alert reports it or nothing has happened.
 pub fn state_sentence(state: FrameState) -> Option<&'static str> {
     match state {
         FrameState::PathEnd => Some("the head has reached the end of the path"),
@@ -90,19 +90,20 @@ fn coming(alert: &CollisionAlert, kind: EventKind, benches: u32, figures: Figure
     format!("{}: {who} at {}{when}", kind.name(), place(alert))
 }
 
-/// Wall time until so many simulated seconds have passed, at a rate in force; a show that stands still comes nowhere.
+/// Returns the wall time until `seconds` simulated seconds have passed, at the rate in force; none while the show
+/// stands still.
 pub fn time_until(simulated_seconds: f64, time_scale: f64) -> String {
     if time_scale > 0.0 { format!("in {:.1} s", simulated_seconds / time_scale) } else { "not while paused".to_owned() }
 }
 
-/// A number with so many decimals at most: no zeros at its end, and no minus before zero.
+/// Returns a number with at most `decimals` decimals: no zeros at its end, and no minus before zero.
 pub fn rounded(value: f64, decimals: usize) -> String {
     let fixed = format!("{value:.decimals$}");
     let short = if fixed.contains('.') { fixed.trim_end_matches('0').trim_end_matches('.') } else { &fixed };
     if short == "-0" { "0".to_owned() } else { short.to_owned() }
 }
 
-/// Zero has no sign for people: a touch is solved to the last bits, on either side.
+/// Removes the sign of zero: the clearance of a touch is solved to the last bits, on either side.
 fn nearest(alert: &CollisionAlert, benches: u32, figures: Figures) -> Option<String> {
     alert.nearest_benches().next()?;
     let nearest = format!("nearest now are {}", names(alert.nearest_benches(), benches));
@@ -195,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn an_alert_about_nothing_names_nobody() {
+    fn an_alert_about_nothing_names_no_bench() {
         let nothing = CollisionAlert::default();
         assert_eq!(alert_sentence(&nothing, 2, SHOWN), "no contact, stall or lock ahead");
     }

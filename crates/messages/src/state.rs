@@ -1,17 +1,17 @@
-//! The state of a frame, the level of an alert, and whether the show plays: each a type without impossible values.
+//! The state of a frame, the level of an alert and the playback state: each a type without impossible values.
 //!
-//! How serious each is stands here alone, as its [`Severity`]: colours, signs and diagnostics follow from that, so that
-//! nothing that shows a state need know which states there are.
+//! Only this file has the [`Severity`] of each: colours, signs and diagnostics follow from the severity, and not from
+//! the list of states.
 //!
-//! Called by the show; the wire numbers the values of each type in their order, from 0. The constants in `msgs/msg`
-//! and in the Python layouts are generated from here, doc comments included: see `wire::layouts`.
+//! On the wire the values of each type are numbered in their order, from 0. The constants in `msgs/msg` and in the
+//! Python layouts are generated from this file, doc comments included: see [`layouts`](crate::layouts).
 
 /// The kinds of events. Their order is that in which two events at one time are listed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum EventKind {
     /// Two boards that share no handle first touch.
     Contact,
-    /// A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
+    /// A link is at its dead point, square to the path at its front handle: the rest of the chain is pushed backwards.
     Stall,
     /// A link is in a singular configuration: its rear handle would have to jump, and the motion cannot continue.
     Lock,
@@ -20,7 +20,7 @@ pub enum EventKind {
 }
 
 impl EventKind {
-    /// The name in JSON and on the terminal.
+    /// Returns the name in JSON and on the terminal.
     pub fn name(self) -> &'static str {
         match self {
             Self::Contact => "contact",
@@ -31,7 +31,7 @@ impl EventKind {
     }
 }
 
-/// How serious a state or a level is, for whatever shows it.
+/// The severity of a state or a level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Severity {
     /// Nothing is wrong.
@@ -43,7 +43,7 @@ pub enum Severity {
 }
 
 impl Severity {
-    /// The name in JSON.
+    /// Returns the name in JSON.
     pub fn name(self) -> &'static str {
         match self {
             Self::Ok => "ok",
@@ -53,7 +53,7 @@ impl Severity {
     }
 }
 
-/// What the dragon is doing: the latest event passed, which stays until the show ends or loops, or what is near.
+/// The state of the dragon: the latest event passed, until the show ends or loops, or else an approaching event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FrameState {
     /// Nothing has happened and nothing is near.
@@ -62,7 +62,7 @@ pub enum FrameState {
     Approaching,
     /// Two boards that share no handle have touched.
     Contact,
-    /// A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
+    /// A link is at its dead point, square to the path at its front handle: the rest of the chain is pushed backwards.
     Stall,
     /// A link is in a singular configuration: the motion cannot continue.
     Lock,
@@ -74,7 +74,7 @@ impl FrameState {
     /// Every state, in the order of their numbers on the wire.
     pub const ALL: [Self; 6] = [Self::Moving, Self::Approaching, Self::Contact, Self::Stall, Self::Lock, Self::PathEnd];
 
-    /// The event that led to this state; `None` where none has happened.
+    /// Returns the event that led to this state; `None` if no event has happened.
     pub fn event(self) -> Option<EventKind> {
         match self {
             Self::Moving | Self::Approaching => None,
@@ -85,7 +85,7 @@ impl FrameState {
         }
     }
 
-    /// How serious it is. The end of the path is where a show is meant to end.
+    /// Returns the severity. The end of the path is the intended end of a show.
     pub fn severity(self) -> Severity {
         match self {
             Self::Moving | Self::PathEnd => Severity::Ok,
@@ -94,7 +94,7 @@ impl FrameState {
         }
     }
 
-    /// The name in JSON and on the terminal.
+    /// Returns the name in JSON and on the terminal.
     pub fn name(self) -> &'static str {
         match self {
             Self::Moving => "moving",
@@ -130,7 +130,7 @@ impl From<Level> for FrameState {
     }
 }
 
-/// How serious an alert is.
+/// The level of an alert.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Level {
     /// Nothing has happened and nothing is near.
@@ -139,7 +139,7 @@ pub enum Level {
     Approaching,
     /// Two boards that share no handle have touched.
     Contact,
-    /// A link is at its dead point, square to the path at its front handle: what follows is pushed backwards.
+    /// A link is at its dead point, square to the path at its front handle: the rest of the chain is pushed backwards.
     Stall,
     /// A link is in a singular configuration: the motion cannot continue.
     Lock,
@@ -149,7 +149,7 @@ impl Level {
     /// Every level, in the order of their numbers on the wire.
     pub const ALL: [Self; 5] = [Self::Clear, Self::Approaching, Self::Contact, Self::Stall, Self::Lock];
 
-    /// The level that an event raises; `None` for the end of the path, which raises none.
+    /// Returns the level that an event raises; `None` for the end of the path, which raises none.
     pub fn of(kind: EventKind) -> Option<Self> {
         match kind {
             EventKind::Contact => Some(Self::Contact),
@@ -159,17 +159,17 @@ impl Level {
         }
     }
 
-    /// Whether an event has happened, rather than none or one that is coming.
+    /// Returns true if an event has happened.
     pub fn has_happened(self) -> bool {
         FrameState::from(self).event().is_some()
     }
 
-    /// How serious it is: as the state.
+    /// Returns the severity of the state with the same name.
     pub fn severity(self) -> Severity {
         FrameState::from(self).severity()
     }
 
-    /// The name in JSON and on the terminal.
+    /// Returns the name in JSON and on the terminal.
     pub fn name(self) -> &'static str {
         match self {
             Self::Clear => "clear",
@@ -178,7 +178,7 @@ impl Level {
     }
 }
 
-/// Whether simulated time advances.
+/// The playback state: simulated time advances or stands still.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum PlaybackState {
     /// Simulated time advances.
@@ -195,7 +195,7 @@ impl PlaybackState {
     /// Every state, in the order of their numbers on the wire.
     pub const ALL: [Self; 4] = [Self::Playing, Self::Paused, Self::Held, Self::Ended];
 
-    /// The name in JSON and on the terminal.
+    /// Returns the name in JSON and on the terminal.
     pub fn name(self) -> &'static str {
         match self {
             Self::Playing => "playing",

@@ -1,5 +1,4 @@
-//! What the web servers of this room have in common: an address, one thread for all requests, an end. Called by `view` and
-//! `metrics`.
+//! The common part of the web servers of `view` and `metrics`: an address, one thread for all requests, an end.
 
 use std::io;
 use std::net::SocketAddr;
@@ -10,11 +9,11 @@ use axum::Router;
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 
-/// A server that listens and answers nothing yet.
+/// A server that listens and does not answer yet.
 pub(super) struct Listening {
     runtime: Runtime,
     listener: TcpListener,
-    /// Where it listens.
+    /// The address it listens at.
     pub(super) address: SocketAddr,
 }
 
@@ -22,19 +21,19 @@ impl Listening {
     /// Listens at an address; port 0 takes any free one.
     ///
     /// # Errors
-    /// The system's, where the address cannot be listened on.
+    /// The system's error, if the server cannot listen at the address.
     pub(super) fn at(address: SocketAddr) -> io::Result<Self> {
-        // One thread for all requests: they must not take the cores a publisher on this machine needs.
+        // One thread for all requests: they must leave the other cores to a publisher on this machine.
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         let listener = runtime.block_on(TcpListener::bind(address))?;
         let address = listener.local_addr()?;
         Ok(Self { runtime, listener, address })
     }
 
-    /// Answers until `stop` is set, which it is afterwards in any case.
+    /// Answers requests until `stop` is set. `stop` is set afterwards in any case.
     ///
     /// # Errors
-    /// The system's, where nothing can be answered any more.
+    /// The system's error, if no request can be answered any more.
     pub(super) fn serve(self, router: Router, stop: &AtomicBool) -> io::Result<()> {
         let Self { runtime, listener, .. } = self;
         let served = runtime.block_on(async {

@@ -1,26 +1,26 @@
-//! Keys in the bytes that a terminal sends. A sequence whose rest does not come is no sequence: somebody has pressed Escape.
+//! Keys in the bytes that a terminal sends. If the rest of a sequence does not come, its first byte was the key Escape.
 //! Called by `watch`.
 
-/// A key of those that `watch` knows.
+/// A key that `watch` knows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Key {
-    /// One that has a letter or a sign.
+    /// A letter or a sign.
     Char(char),
-    /// The arrow to the left.
+    /// The left arrow.
     Left,
-    /// The arrow to the right.
+    /// The right arrow.
     Right,
 }
 
-/// The keys that a terminal has sent these bytes for, and how many bytes they are; the rest is the beginning of another.
-/// Where nothing more belongs to them, no beginning is: then an Escape without a whole sequence behind it was a key.
+/// Returns the keys of these bytes, and the number of bytes they take; the rest is the beginning of another key. If no
+/// more bytes belong to them, an Escape without a whole sequence behind it is a key.
 pub fn keys_of(bytes: &[u8], is_over: bool) -> (Vec<Key>, usize) {
     const ESCAPE: u8 = 0x1b;
     let (mut keys, mut at) = (Vec::new(), 0);
     while at < bytes.len() {
         let sequence = match bytes[at..] {
             [ESCAPE] => None,
-            // Escape, [ or O, parameters, and a letter that tells which key it is.
+            // Escape, [ or O, parameters, and a letter that identifies the key.
             [ESCAPE, b'[' | b'O', ref rest @ ..] => rest.iter().position(|byte| (0x40..=0x7e).contains(byte)),
             [byte, ..] => {
                 keys.extend((b' '..=b'~').contains(&byte).then_some(Key::Char(byte.into())));

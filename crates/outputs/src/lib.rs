@@ -1,6 +1,6 @@
 //! Subscribers that pass a show on: the stage page, lighting desks, sound programs, metrics.
 //!
-//! Each is a process of its own that handles the events of one feed: none can hurt the loop.
+//! Each is a separate process that handles the events of feeds, so that none can delay the loop.
 
 mod http;
 pub mod keys;

@@ -1,10 +1,10 @@
-//! The figures of running publishers for Prometheus, over HTTP. In: the services of one name or several, one more
-//! subscriber of them. Out: text at `/metrics`, in which the label `name` tells them apart. Called by the command
+//! The figures of running publishers for Prometheus, over HTTP. In: the services of one name or several, as a
+//! subscriber. Out: text at `/metrics`, in which the label `name` distinguishes the publishers. Called by the command
 //! `metrics`.
 //!
-//! A [`Monitor`] for each publisher takes in all that comes, on one thread besides the server's, since ports cannot
-//! leave the thread that made them; each request gets what it knows at that moment. In `families`, which figures; in
-//! `exposition`, the text.
+//! A [`Monitor`] of each publisher handles all events, on one thread besides the server's, since ports cannot leave the
+//! thread that created them. Each request gets the figures of that moment: `families` has their list, `exposition` the
+//! text.
 
 pub mod exposition;
 pub mod families;
@@ -27,24 +27,24 @@ use super::http::Listening;
 use super::view::origin::Admission;
 use crate::monitor::Monitor;
 use bench_dragon_client::clock::monotonic_ns;
-use bench_dragon_client::feed::{FeedEvent, Frames};
+use bench_dragon_client::feed::{Delivery, FeedEvent};
 use bench_dragon_client::polling::{Handler, poll_until};
 use bench_dragon_client::shared_memory::{OpenError, service_name};
 
-/// Why the figures could not be served.
+/// The reason why the figures cannot be served.
 #[derive(Debug, thiserror::Error)]
 pub enum MetricsError {
     /// The publisher's services cannot be used.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// The address cannot be listened on.
+    /// The server cannot listen at the address.
     #[error(
         "cannot serve metrics at {address}: {source}; choose a free port and an address of this machine with --listen"
     )]
     Listen {
         /// The address given.
         address: SocketAddr,
-        /// What the system reported.
+        /// The system's error.
         source: std::io::Error,
     },
 }
@@ -61,9 +61,9 @@ impl Server {
         Self { names: names.into(), monitors: names.iter().map(|_| Mutex::default()).collect() }
     }
 
-    /// Every publisher's figures, each family once.
+    /// Returns every publisher's figures, each family once.
     fn families(&self) -> Vec<Family> {
-        // A monitor that a panic left behind is still the best there is.
+        // After a panic the monitor still has the latest figures.
         let report = |monitor: &Mutex<Monitor>| monitor.lock().unwrap_or_else(PoisonError::into_inner).report();
         joined(self.names.iter().zip(&*self.monitors).map(|(name, monitor)| families(name, &report(monitor))))
     }
@@ -100,8 +100,8 @@ pub fn serve<Refused: From<MetricsError>>(
     let reader = std::thread::spawn({
         let (names, mut handler, stop) = (Arc::clone(&server.names), server.clone(), Arc::clone(stop));
         move || {
-            // Every frame, so that one that is missing was lost.
-            let read = poll_until(&stop, &names, Frames::All, &mut handler);
+            // Every frame, so that a gap means a lost frame.
+            let read = poll_until(&stop, &names, Delivery::All, &mut handler);
             stop.store(true, Ordering::Relaxed);
             read
         }
@@ -118,7 +118,7 @@ pub fn serve<Refused: From<MetricsError>>(
     Ok(read.map_err(MetricsError::from)?)
 }
 
-/// A foreign name that resolves to this machine is answered nothing: a page of that name could read the figures.
+/// Refuses a foreign name that resolves to this machine: a page of that name could read the figures.
 async fn own_host(admission: Admission, request: Request, next: Next) -> Response {
     let host = request.headers().get(header::HOST).and_then(|host| host.to_str().ok());
     if !admission.allows_host(host) {

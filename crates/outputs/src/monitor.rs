@@ -1,5 +1,5 @@
-//! What a monitor knows of a publisher: rate, gaps, latency, state, alert. In: the events of a [`feed`](bench_dragon_client::feed).
-//! Out: an [`IntervalReport`] whenever one is wanted. Called by `watch`.
+//! The figures of a publisher: rate, gaps, latency, state, alert. In: the events of a
+//! [`feed`](bench_dragon_client::feed). Out: an [`IntervalReport`] on request. Called by `watch` and `metrics`.
 
 use std::time::Instant;
 
@@ -9,14 +9,14 @@ use bench_dragon_client::feed::FeedEvent;
 use bench_dragon_messages::state::FrameState;
 use bench_dragon_messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus};
 
-/// Whether there is a publisher.
+/// The presence of a publisher.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Presence {
-    /// None yet, or none any more.
+    /// There is no publisher.
     Waiting,
     /// Frames come.
     Publishing,
-    /// The publisher is there but sends nothing: it is stopped or hangs.
+    /// The publisher exists but sends nothing: it is stopped or hangs.
     Silent,
 }
 
@@ -31,12 +31,12 @@ pub struct Latency {
     pub max: u64,
 }
 
-/// What was received since the last report, and the latest of each kind.
+/// The messages received since the last report, and the latest of each kind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IntervalReport {
-    /// Whether there is a publisher.
+    /// The presence of the publisher.
     pub presence: Presence,
-    /// The latest frame's header, if there was ever one.
+    /// The latest frame's header, if any frame has come.
     pub header: Option<FrameHeader>,
     /// The latest frame's head.
     pub head: HandlePose,
@@ -46,9 +46,9 @@ pub struct IntervalReport {
     pub received: u64,
     /// Gaps in the sequence since the monitor started.
     pub missed: u64,
-    /// Latency in this interval; `None` if nothing came, or if it came from a machine with a clock of its own.
+    /// Latency in this interval; `None` if no frame came, or if the frames have another machine's clock.
     pub latency: Option<Latency>,
-    /// Whether the publisher's clock is that of this process.
+    /// True if the publisher's clock is that of this process.
     pub shares_clock: bool,
     /// The latest alert.
     pub alert: Option<CollisionAlert>,
@@ -57,18 +57,18 @@ pub struct IntervalReport {
 }
 
 impl IntervalReport {
-    /// The latest frame's header while there is a publisher.
+    /// Returns the latest frame's header while there is a publisher.
     pub fn present_header(&self) -> Option<FrameHeader> {
         self.header.filter(|_| self.presence != Presence::Waiting)
     }
 
-    /// The state of the latest frame, or `None` while waiting.
+    /// Returns the state of the latest frame, or `None` while waiting.
     pub fn state(&self) -> Option<FrameState> {
         self.present_header()?.frame_state()
     }
 }
 
-/// Counts and keeps what comes from one publisher's name.
+/// Collects the figures of one publisher's name.
 pub struct Monitor {
     presence: Presence,
     header: Option<FrameHeader>,
@@ -103,7 +103,7 @@ impl Default for Monitor {
 }
 
 impl Monitor {
-    /// Takes in an event that was received at `received_ns` of CLOCK_MONOTONIC.
+    /// Handles an event that was received at `received_ns` of CLOCK_MONOTONIC.
     pub fn handle(&mut self, event: &FeedEvent<'_>, received_ns: u64) {
         match *event {
             FeedEvent::Frame { header, handles, missed } => {
@@ -127,13 +127,13 @@ impl Monitor {
         }
     }
 
-    /// Takes in whether the publisher's clock is that of this process, as
-    /// [`Feed::shares_clock`](bench_dragon_client::feed::Feed::shares_clock) has it; nothing changes where there is no publisher.
+    /// Sets `shares_clock`, as [`Feed::shares_clock`](bench_dragon_client::feed::Feed::shares_clock) returns it; `None`
+    /// changes nothing.
     pub fn clock(&mut self, shares_clock: Option<bool>) {
         self.shares_clock = shares_clock.unwrap_or(self.shares_clock);
     }
 
-    /// What has come since the last report, which begins a new interval.
+    /// Returns the figures since the last report, and begins a new interval.
     pub fn report(&mut self) -> IntervalReport {
         let elapsed = self.interval_began.elapsed().as_secs_f64();
         let at = |quantile| self.latency.value_at_quantile(quantile);

@@ -1,8 +1,8 @@
-//! What takes the dragon out of the machine: trackers for lighting desks ([`psn_sender`]), OSC messages ([`osc_sender`]).
+//! Outputs to other machines: trackers for lighting desks ([`psn_sender`]) and OSC messages ([`osc_sender`]).
 //!
-//! Each is a handler of one more subscriber of each publisher, in a process of its own. Here is what they have in
-//! common: which frames are due, and when frames have stopped. In: the events of a feed. Out: UDP datagrams. Called by
-//! the command `send`.
+//! Each is a subscriber of each publisher, in a separate process. This file has their common part: it decides which
+//! frames are due, and when frames have stopped. In: the events of a feed. Out: UDP datagrams. Called by the command
+//! `send`.
 
 pub mod axes;
 pub mod network;
@@ -18,13 +18,13 @@ use std::time::{Duration, Instant};
 use bench_dragon_client::feed::FeedEvent;
 use bench_dragon_messages::FrameHeader;
 
-/// Time without frames after which a receiver is told that they have stopped. A publisher that is started again at once
-/// is back before that.
+/// Time without frames after which receivers get the message that frames have stopped. A publisher that is restarted at
+/// once sends again before that.
 pub const STOPPED_AFTER: Duration = Duration::from_secs(2);
 
-/// Which frames of a stream are due, at a rate of at most so many per second: the first one in each interval, by the times
-/// at which they should have been made. So a publisher of that rate or a lower one has every frame sent, however late some
-/// of them come, and one of a higher rate evenly spread ones.
+/// Selects the frames that are due, at a limited rate: the first frame of each interval, by the frames' deadlines. A
+/// publisher of at most that rate has every frame sent, even late ones. The frames of a faster publisher are evenly
+/// spread.
 #[derive(Debug, Clone, Copy)]
 pub struct Pace {
     rate: f64,
@@ -33,18 +33,18 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// At most `rate` frames per second.
+    /// Creates a selection of at most `rate` frames per second.
     pub fn new(rate: f64) -> Self {
         Self { rate, latest: None }
     }
 
-    /// Whether a frame is due; the frames of a run are to be asked about in their order.
+    /// Returns true if a frame is due. Call it with the frames of a run in their order.
     pub fn is_due(&mut self, header: &FrameHeader) -> bool {
         let Some((_, first_ns, latest)) = self.latest.as_mut().filter(|(run_id, ..)| *run_id == header.run_id) else {
             self.latest = Some((header.run_id, header.deadline_ns, 0));
             return true;
         };
-        // Deadlines are rounded to nanoseconds: one at the beginning of an interval must not fall before it.
+        // Deadlines are rounded to nanoseconds: a deadline at the beginning of an interval must not fall before it.
         let interval = (header.deadline_ns.saturating_sub(*first_ns) as f64 * 1e-9 * self.rate + 0.01) as u64;
         let due = interval > *latest;
         *latest = interval.max(*latest);
@@ -52,7 +52,7 @@ impl Pace {
     }
 }
 
-/// Whether frames come. One that has stopped is reported by the feed at once; a receiver is told after
+/// The arrivals of frames. The feed reports at once that they have stopped; receivers get that message after
 /// [`STOPPED_AFTER`].
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Arrivals {
@@ -61,7 +61,7 @@ pub struct Arrivals {
 }
 
 impl Arrivals {
-    /// Takes in an event.
+    /// Handles an event.
     pub fn handle(&mut self, event: &FeedEvent<'_>, now: Instant) {
         match event {
             FeedEvent::Frame { .. } => *self = Self { last_frame: Some(now), reported: false },
@@ -70,7 +70,7 @@ impl Arrivals {
         }
     }
 
-    /// Since when frames have been known to have stopped; `None` while they come, and before the first one.
+    /// Returns the moment at which frames stopped; `None` while they come, and before the first one.
     pub fn stopped_since(&self, now: Instant) -> Option<Instant> {
         let since = self.last_frame? + STOPPED_AFTER;
         (self.reported && now >= since).then_some(since)

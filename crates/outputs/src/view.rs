@@ -1,14 +1,14 @@
-//! The live stage picture: reads the frames of one publisher or several and serves them to browsers, with the page that draws
-//! them.
+//! The live stage picture: reads the frames of one publisher or several and serves them to browsers, with the page that
+//! draws them.
 //!
-//! Called by the `view` command. `reader` reads a publisher's shared memory on a thread of its own, since ports cannot leave
-//! the thread that made them, and hands the newest picture over; `browser` sends it to one browser at that one's pace, over
-//! one WebSocket for each publisher; `wire` is its layout on the way. `origin` is who may connect, `gate` who may command,
-//! and how; `certificates` is what is proved of which scene.
+//! Called by the `view` command. `reader` reads a publisher's shared memory on a separate thread, since ports cannot
+//! leave the thread that created them, and hands over the newest picture. `browser` sends the picture to one browser at
+//! its pace, over one WebSocket for each publisher; `wire` is its layout. `origin` decides which pages may connect,
+//! `authorization` which browsers may command; `certificates` has the proofs of scenes.
 
+mod authorization;
 mod browser;
 mod certificates;
-mod gate;
 pub(crate) mod origin;
 mod reader;
 mod wire;
@@ -24,7 +24,7 @@ use axum::Router;
 use axum::body::Bytes;
 use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::ws::{Utf8Bytes, WebSocketUpgrade};
-use axum::extract::{Query, Request, State as Shared};
+use axum::extract::{Query, Request, State as Served};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Redirect, Response};
@@ -33,36 +33,36 @@ use tokio::sync::watch;
 use tower_http::services::ServeDir;
 
 use super::http::Listening;
+use authorization::Authorization;
+pub use authorization::Token;
 use bench_dragon_client::connection::Wake;
-use bench_dragon_client::feed::{Feed, FeedOptions, Frames};
+use bench_dragon_client::feed::{Delivery, Feed, FeedOptions};
 use bench_dragon_client::shared_memory::{OpenError, service_name};
 pub use certificates::{Certificate, Proofs, SceneHash};
-use gate::Gate;
-pub use gate::Token;
 use origin::Admission;
 pub use origin::AllowedOrigin;
 
 /// Browsers send requests of a few letters.
 const MAX_REQUEST_BYTES: usize = 1024;
-/// Each frame that woke the server would cost the publisher more than the frame itself.
-const FEED: FeedOptions = FeedOptions { wake: Wake::Never, frames: Frames::Newest };
+/// Waking the server at each frame would cost the publisher more than the frame itself.
+const FEED: FeedOptions = FeedOptions { wake: Wake::Never, frames: Delivery::Newest };
 
-/// The newest of everything a browser needs, each as it goes over the wire; empty where there is none.
+/// The newest messages that a browser needs, each in its wire format; empty if there is none.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Picture {
     /// Set while there is no publisher.
     waiting: Utf8Bytes,
     stage: Utf8Bytes,
     alert: Utf8Bytes,
-    /// The latest cues, each with its number among all that have come to this server, so that none is left out.
+    /// The latest cues, each with its number among all cues of this server, so that none is left out.
     cues: Arc<[(u64, Utf8Bytes)]>,
     frame: Bytes,
-    /// Whether frames are stamped by the clock of this machine; `None` while there is no publisher.
+    /// True if frames are stamped by the clock of this machine; `None` while there is no publisher.
     shares_clock: Option<bool>,
 }
 
 impl Picture {
-    /// No publisher, and the reason where there is one that cannot be used.
+    /// Returns the picture without a publisher, with the reason if a publisher cannot be used.
     fn waiting(reason: Option<&str>) -> Self {
         Self { waiting: wire::waiting(reason).into(), ..Self::default() }
     }
@@ -74,46 +74,46 @@ struct Server {
     admission: Arc<Admission>,
 }
 
-/// What a browser is served of one publisher.
+/// The data of one publisher that browsers are served.
 #[derive(Clone)]
 struct Channel {
     name: String,
     pictures: watch::Receiver<Picture>,
-    /// `None` where nobody may command.
-    gate: Option<Arc<Gate>>,
+    /// `None` if no browser may command.
+    authorization: Option<Arc<Authorization>>,
 }
 
-/// How the stage picture is served.
+/// The options of the server.
 #[derive(Debug, Clone)]
 pub struct ViewOptions {
-    /// Where to listen; port 0 takes any free one.
+    /// The address to listen at; port 0 takes any free port.
     pub address: SocketAddr,
-    /// Whether browsers may conduct the show.
+    /// True if browsers may send commands.
     pub control: bool,
-    /// Pages of other places that are let in.
+    /// The admitted origins of other pages.
     pub origins: Vec<AllowedOrigin>,
     /// A folder that is served below `/pages/`.
     pub pages: Option<PathBuf>,
-    /// What is proved of which scenes; it may grow while pages are served.
+    /// The proofs of scenes; they may grow while pages are served.
     pub proofs: Arc<Proofs>,
 }
 
-/// What browsers need to connect.
+/// The data that browsers need to connect.
 #[derive(Debug, Clone)]
 pub struct Ready {
-    /// Where the server listens.
+    /// The address of the server.
     pub address: SocketAddr,
-    /// What whoever conducts has to give, where that is needed: as soon as more than this machine's own page is let in.
+    /// The token for commands. It is needed if more than this machine's own page is admitted.
     pub token: Option<Token>,
 }
 
-/// Why the stage picture could not be served.
+/// The reason why the stage picture cannot be served.
 #[derive(Debug, thiserror::Error)]
 pub enum ViewError {
     /// The publisher's services cannot be used.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// The address cannot be listened on.
+    /// The server cannot listen at the address.
     #[error(
         "cannot serve the stage picture at {address}: {source}; choose a free port with --port and an address of this \
          machine with --listen"
@@ -121,18 +121,18 @@ pub enum ViewError {
     Listen {
         /// The address given.
         address: SocketAddr,
-        /// What the system reported.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// The folder of pages is none.
+    /// The folder of pages cannot be read.
     #[error("--pages {}: {source}, expected a folder", folder.display())]
     Pages {
         /// The folder given.
         folder: PathBuf,
-        /// What the system reported.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// No token can be made.
+    /// No token can be created.
     #[error("the system has no random numbers for a token: {0}")]
     Token(#[from] getrandom::Error),
 }
@@ -158,13 +158,13 @@ pub fn serve<Refused: From<ViewError>>(
     let loopback = address.ip().is_loopback();
     let needs_token = control && (!loopback || !origins.is_empty());
     let token = if needs_token { Some(Token::random().map_err(ViewError::from)?) } else { None };
-    let gate = |name: &str| control.then(|| Gate::new(name, token.clone()).map(Arc::new)).transpose();
-    let gates = names.iter().map(|name| gate(name)).collect::<Result<Vec<_>, _>>().map_err(listen)?;
+    let authorization = |name: &str| control.then(|| Authorization::new(name, token.clone()).map(Arc::new)).transpose();
+    let authorizations = names.iter().map(|name| authorization(name)).collect::<Result<Vec<_>, _>>().map_err(listen)?;
     ready(&Ready { address, token: token.clone() })?;
     let (mut channels, mut readers) = (Vec::new(), Vec::new());
-    for (name, gate) in names.iter().zip(gates) {
+    for (name, authorization) in names.iter().zip(authorizations) {
         let (sender, pictures) = watch::channel(Picture::default());
-        channels.push(Channel { name: name.clone(), pictures, gate });
+        channels.push(Channel { name: name.clone(), pictures, authorization });
         let (name, proofs, stop) = (name.clone(), Arc::clone(&proofs), Arc::clone(stop));
         readers.push(std::thread::spawn(move || {
             let read = Feed::new(&name, FEED).map(|feed| reader::read(feed, &name, &proofs, &sender, &stop));
@@ -181,7 +181,7 @@ pub fn serve<Refused: From<ViewError>>(
     Ok(read.map_err(ViewError::from)?)
 }
 
-/// A file of the user's folder; a name that no file can have is that of none.
+/// Returns a file of the user's folder; not found for a name that no file can have.
 async fn own_file<B>(found: impl Future<Output = io::Result<Response<B>>>) -> Response
 where
     Response<B>: IntoResponse,
@@ -210,11 +210,11 @@ fn router(server: Server, pages: Option<&Path>) -> Router {
         .route("/camera.js", file("text/javascript; charset=utf-8", include_str!("view/camera.js")))
         .route("/dragon.js", file("text/javascript; charset=utf-8", include_str!("view/dragon.js")))
         .route("/drawing.js", file("text/javascript; charset=utf-8", include_str!("view/drawing.js")))
-        .route("/hands.js", file("text/javascript; charset=utf-8", include_str!("view/hands.js")))
         .route("/hermite.js", file("text/javascript; charset=utf-8", include_str!("view/hermite.js")))
         .route("/marks.js", file("text/javascript; charset=utf-8", include_str!("view/marks.js")))
         .route("/palette.js", file("text/javascript; charset=utf-8", include_str!("view/palette.js")))
         .route("/panel.js", file("text/javascript; charset=utf-8", include_str!("view/panel.js")))
+        .route("/pointer_input.js", file("text/javascript; charset=utf-8", include_str!("view/pointer_input.js")))
         .route("/publishers.js", get(move || async move { served("text/javascript; charset=utf-8", names) }))
         .route("/roster.js", file("text/javascript; charset=utf-8", include_str!("view/roster.js")))
         .route("/show.js", file("text/javascript; charset=utf-8", include_str!("view/show.js")))
@@ -230,14 +230,14 @@ fn router(server: Server, pages: Option<&Path>) -> Router {
         .with_state(server)
 }
 
-/// The module that tells the page whose dragons it draws.
+/// Returns the module with the names of the publishers that the page draws.
 fn publishers_module(channels: &[Channel]) -> String {
     let names: Vec<_> = channels.iter().map(|channel| &channel.name).collect();
     // JSON is JavaScript.
     format!("export const publishers = {};\n", serde_json::json!(names))
 }
 
-/// A file of the page, which fetches nothing from anywhere else.
+/// Returns a file of the page, which loads nothing from other servers.
 fn served(kind: &'static str, text: impl IntoResponse) -> Response {
     let headers = [
         (header::CONTENT_TYPE, kind),
@@ -248,8 +248,8 @@ fn served(kind: &'static str, text: impl IntoResponse) -> Response {
     (headers, text).into_response()
 }
 
-/// A file of the user's own. A foreign name that resolves to this machine gets none.
-async fn own_page(Shared(server): Shared<Server>, request: Request, next: Next) -> Response {
+/// Returns a file of the user. A foreign name that resolves to this machine is refused.
+async fn own_page(Served(server): Served<Server>, request: Request, next: Next) -> Response {
     if !server.admission.allows_host(text_of(request.headers(), header::HOST)) {
         return (StatusCode::FORBIDDEN, "this server has another name").into_response();
     }
@@ -265,7 +265,7 @@ fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
 }
 
 async fn frames(
-    Shared(server): Shared<Server>,
+    Served(server): Served<Server>,
     headers: HeaderMap,
     Query(query): Query<Vec<(String, String)>>,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
@@ -296,7 +296,7 @@ async fn frames(
     }
 }
 
-/// The least time between two frames at a `rate` that was asked for, none without one; `None` for a rate that cannot be.
+/// Returns the least time between two frames at a requested `rate`, zero without a rate; `None` for an invalid rate.
 fn gap(rate: Option<&str>) -> Option<Duration> {
     match rate.map(str::parse::<f64>) {
         None => Some(Duration::ZERO),

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use bench_dragon_publisher::live::statistics::Percentiles;
 
-/// What a conductor has sent and what came back.
+/// The counts of a load generator.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Conducted {
     /// The seed of its commands.
@@ -25,7 +25,7 @@ pub struct Conducted {
     pub sent: u64,
     /// Answers of each command, by the names of the command and of the code.
     pub answers: BTreeMap<String, BTreeMap<String, u64>>,
-    /// Answers that refused a command, or its value, where the command table does.
+    /// Answers that refused a command or its value, as the command table does.
     pub refused_as_expected: u64,
     /// Answers that the command table does not allow.
     pub wrong: u64,
@@ -39,14 +39,14 @@ pub struct Conducted {
     pub jumps: u64,
     /// The first faults, in words.
     pub faults: Vec<String>,
-    /// From sending a command to sending the frame of the period in which it was obeyed, ns. Steps that ran are left out.
+    /// From sending a command to sending the frame of the period that executed it, ns. Without steps that ran.
     pub applied_ns: Option<Percentiles>,
-    /// From sending a command to receiving its answer, ns. Steps that ran are left out.
+    /// From sending a command to receiving its answer, ns. Without steps that ran.
     pub answered_ns: Option<Percentiles>,
 }
 
 impl Conducted {
-    /// Sentences for people.
+    /// Returns the counts as sentences.
     pub fn lines(&self) -> Vec<String> {
         let kinds: Vec<_> =
             self.answers.iter().map(|(name, codes)| format!("{name} {}", codes.values().sum::<u64>())).collect();
@@ -58,7 +58,7 @@ impl Conducted {
                 self.refused_as_expected, self.wrong, self.lost, self.compared, self.contradicted
             ),
         ];
-        for (what, percentiles) in [("obeyed", self.applied_ns), ("answered", self.answered_ns)] {
+        for (what, percentiles) in [("executed", self.applied_ns), ("answered", self.answered_ns)] {
             let Some(Percentiles { p50, p99, max, .. }) = percentiles else { continue };
             let figures = [("p50", p50), ("p99", p99), ("max", max)].map(|(name, ns)| {
                 format!("{name} {:.2} ms ({:.1} periods)", ns as f64 / 1e6, ns as f64 / self.period_ns)

@@ -1,4 +1,4 @@
-//! The processes that conduct a soak test: the conductor, and clients that are killed. Kept by the
+//! The processes that send commands in a soak test: the load generator, and clients that are killed. Owned by the
 //! [`fleet`](super::fleet).
 
 use std::process::Child;
@@ -11,12 +11,12 @@ use super::conduct::Conducted;
 use super::member::ProcessState;
 use super::processes::{ConductPlan, Plan, ProcessEvent, signal};
 
-/// How long a client runs before it is killed.
+/// The time after which a client is killed.
 const CLIENT_LIFETIME: Duration = Duration::from_secs(5);
 
-/// Who conducts, and what came of it.
+/// The load generator and the clients, with their counts.
 pub struct Conducting {
-    conductor: Child,
+    load_generator: Child,
     state: ProcessState,
     conducted: Option<Conducted>,
     clients: Vec<(Child, Instant)>,
@@ -25,10 +25,10 @@ pub struct Conducting {
 }
 
 impl Conducting {
-    /// Starts the conductor, and the clients.
+    /// Starts the load generator and the clients.
     pub(super) fn start(plan: &Plan, conduct: &ConductPlan, sender: &Sender<ProcessEvent>) -> std::io::Result<Self> {
         let mut conducting = Self {
-            conductor: plan.spawn_conductor(conduct, sender)?,
+            load_generator: plan.spawn_load_generator(conduct, sender)?,
             state: ProcessState::Running,
             conducted: None,
             clients: Vec::new(),
@@ -56,12 +56,12 @@ impl Conducting {
         Ok(())
     }
 
-    /// Takes in what the conductor has counted.
+    /// Stores the counts of the load generator.
     pub(super) fn counted(&mut self, conducted: Conducted) {
         self.conducted = Some(conducted);
     }
 
-    /// Takes in that the conductor has ended.
+    /// Records the end of the load generator.
     pub(super) fn ended(&mut self) {
         self.state = match self.state {
             ProcessState::Ending => ProcessState::Ended,
@@ -69,11 +69,11 @@ impl Conducting {
         };
     }
 
-    /// Has all of them end.
+    /// Sends SIGTERM to all of them.
     pub(super) fn end(&mut self) {
         if self.state == ProcessState::Running {
             self.state = ProcessState::Ending;
-            signal(&self.conductor, Signal::SIGTERM);
+            signal(&self.load_generator, Signal::SIGTERM);
         }
         for (client, _) in &mut self.clients {
             self.clients_lost += u64::from(matches!(client.try_wait(), Ok(Some(_))));
@@ -81,28 +81,28 @@ impl Conducting {
         }
     }
 
-    /// Whether any of them has been told to end and has not ended.
+    /// Returns true if any of them has not ended after SIGTERM.
     pub(super) fn is_ending(&mut self) -> bool {
         self.clients.retain_mut(|(client, _)| matches!(client.try_wait(), Ok(None)));
         self.state == ProcessState::Ending || !self.clients.is_empty()
     }
 
-    /// All processes that may still run.
+    /// Returns all processes that may still run.
     pub(super) fn children(&mut self) -> impl Iterator<Item = &mut Child> {
-        self.clients.iter_mut().map(|(client, _)| client).chain([&mut self.conductor])
+        self.clients.iter_mut().map(|(client, _)| client).chain([&mut self.load_generator])
     }
 
-    /// What the conductor has counted; `None` if it never reported.
+    /// Returns the counts of the load generator; `None` if it never reported.
     pub fn conducted(&self) -> Option<&Conducted> {
         self.conducted.as_ref()
     }
 
-    /// Clients that were killed amid a request.
+    /// Returns the number of clients that were killed during a request.
     pub fn clients_killed(&self) -> u64 {
         self.clients_killed
     }
 
-    /// Processes that ended by themselves, or did not end. To be called once the fleet has finished.
+    /// Returns the number of processes that ended by themselves, or did not end. Call it after the fleet has finished.
     pub fn failed(&self) -> u64 {
         self.clients_lost + self.clients.len() as u64 + u64::from(self.state != ProcessState::Ended)
     }

@@ -1,5 +1,5 @@
-//! A row of figures a second of a soak test: of the publisher by its status and by /proc, of each subscriber by what
-//! it has seen. In: a [`Fleet`]. Out: a row for the [`history`](super::history), whose columns the report plots.
+//! A row of figures a second of a soak test: of the publisher from its status and from /proc, of each subscriber from
+//! its observation. In: a [`Fleet`]. Out: a row for the [`history`](super::history), whose columns the report plots.
 
 use super::fleet::Fleet;
 use super::observation::{Latencies, Status};
@@ -24,12 +24,12 @@ const PUBLISHER_COLUMNS: [&str; 12] = [
 const SUBSCRIBER_COLUMNS: [&str; 5] =
     ["latency_p50_ns", "latency_p99_ns", "latency_max_ns", "latency_since_deadline_p99_ns", "missed"];
 
-/// The name of a subscriber's column.
+/// Returns the name of a subscriber's column.
 pub fn column_of(label: &str, name: &str) -> String {
     format!("{label}: {name}")
 }
 
-/// The names of what [`row`] returns.
+/// Returns the names of the values of [`row`].
 pub fn columns(fleet: &Fleet) -> Vec<String> {
     let publisher = PUBLISHER_COLUMNS.iter().map(|name| (*name).to_owned());
     let subscribers = fleet
@@ -39,7 +39,7 @@ pub fn columns(fleet: &Fleet) -> Vec<String> {
     publisher.chain(subscribers).collect()
 }
 
-/// The figures since the last call, in the order of [`columns`]; NaN where nothing is known.
+/// Returns the figures since the last call, in the order of [`columns`]; NaN for an unknown figure.
 pub fn row(fleet: &mut Fleet) -> Vec<f64> {
     let status = fleet.status();
     let held = fleet.measure_publisher();

@@ -1,8 +1,8 @@
 //! The processes of a soak test: one publisher, and subscribers that keep up, are slow, or die and return.
 //!
-//! In: a [`Plan`], and what the processes print. Out: what the subscribers have seen and the publisher has counted.
-//! Used by the command `soak`, which calls [`Fleet::poll`] often and takes a row of [`figures`](super::figures) once a
-//! second.
+//! In: a [`Plan`], and the output of the processes. Out: the observations of the subscribers, the counts of the
+//! publisher. Used by the command `soak`, which calls [`Fleet::poll`] often and takes a row of
+//! [`figures`](super::figures) once a second.
 
 use std::process::{Child, ExitStatus};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -17,24 +17,24 @@ use super::processes::{Plan, ProcessEvent, signal};
 use super::resources::Resources;
 use bench_dragon_publisher::live::statistics::RunSummary;
 
-/// How long a flaky subscriber runs before it is killed.
+/// The time after which a flaky subscriber is killed.
 const FLAKY_LIFETIME: Duration = Duration::from_secs(5);
-/// How long subscribers may take to receive their first frame.
+/// The time limit of a subscriber's first frame.
 const START_TIMEOUT: Duration = Duration::from_secs(60);
-/// How long the publisher, and then the subscribers, may take to end after a signal.
+/// The time limit of the publisher's end after a signal, and then of the subscribers'.
 const END_TIMEOUT: Duration = Duration::from_secs(15);
-/// The exit code of a program that cannot do what it is asked for.
+/// The exit code of a program for an invalid request.
 const REFUSED: i32 = 2;
-/// From this long after the start the publisher's memory should no longer grow.
+/// The time after the start from which the publisher's memory should no longer grow.
 pub const SETTLING: Duration = Duration::from_secs(60);
 
-/// Why the soak test could not continue.
+/// The reason why the soak test cannot continue.
 #[derive(Debug, thiserror::Error)]
 pub enum FleetError {
     /// A process could not be started or signalled.
     #[error("a process of the soak test could not be started: {0}")]
     Start(#[from] std::io::Error),
-    /// The publisher cannot do what its options or its scene ask for: its own sentence.
+    /// The publisher refuses its options or its scene: its own sentence.
     #[error("{0}")]
     Refused(String),
     /// The publisher ended before all subscribers had received a frame.
@@ -43,9 +43,9 @@ pub enum FleetError {
     /// A subscriber ended before it received a frame.
     #[error("the subscriber {0} ended at once: its error stands above")]
     SubscriberEnded(String),
-    /// Whoever conducts did not begin.
-    #[error("the conductor did not begin within {} s", START_TIMEOUT.as_secs())]
-    NoConductor,
+    /// The load generator did not begin.
+    #[error("the load generator did not begin within {} s", START_TIMEOUT.as_secs())]
+    NoLoadGenerator,
     /// Frames did not come.
     #[error("not every subscriber received a frame within {} s", START_TIMEOUT.as_secs())]
     NoFrames,
@@ -55,16 +55,16 @@ pub enum FleetError {
 pub struct Fleet {
     plan: Plan,
     publisher: Child,
-    /// How the publisher ended, if it has.
+    /// The exit status of the publisher, if it has ended.
     publisher_ended: Option<ExitStatus>,
-    /// Whether it ended before it was told to.
+    /// True if it ended without a signal from the soak test.
     publisher_ended_early: bool,
     summary: Option<RunSummary>,
     members: Vec<Member>,
     conducting: Option<Conducting>,
     events: Receiver<ProcessEvent>,
     sender: Sender<ProcessEvent>,
-    /// Lines of the publisher's standard error that nobody has taken yet.
+    /// Lines of the publisher's standard error since [`Fleet::take_stderr`].
     stderr: Vec<String>,
     settled_bytes: Option<u64>,
     most_bytes_after: u64,
@@ -76,7 +76,7 @@ impl Fleet {
     /// `proceed` returns false.
     ///
     /// # Errors
-    /// [`FleetError`] where that does not come about.
+    /// [`FleetError`] if a process fails or no frame comes.
     pub fn start(plan: Plan, proceed: &dyn Fn() -> bool) -> Result<Self, FleetError> {
         let (sender, events) = channel();
         let mut fleet = Self {
@@ -101,7 +101,7 @@ impl Fleet {
         fleet.wait_for_frames(proceed)?;
         if let Some(conduct) = &fleet.plan.conduct {
             fleet.conducting = Some(Conducting::start(&fleet.plan, conduct, &fleet.sender)?);
-            fleet.wait_for_conductor(proceed)?;
+            fleet.wait_for_load_generator(proceed)?;
         }
         fleet.began = Instant::now();
         Ok(fleet)
@@ -130,13 +130,13 @@ impl Fleet {
         Ok(())
     }
 
-    /// It searches the scene for events before it reports for the first time.
-    fn wait_for_conductor(&mut self, proceed: &dyn Fn() -> bool) -> Result<(), FleetError> {
+    /// Waits for the first report of the load generator.
+    fn wait_for_load_generator(&mut self, proceed: &dyn Fn() -> bool) -> Result<(), FleetError> {
         let deadline = Instant::now() + START_TIMEOUT;
         while proceed() && self.conducting.as_ref().is_some_and(|conducting| conducting.conducted().is_none()) {
             self.poll(Duration::from_millis(50))?;
             if self.publisher_ended.is_some() || Instant::now() > deadline {
-                return Err(FleetError::NoConductor);
+                return Err(FleetError::NoLoadGenerator);
             }
         }
         Ok(())
@@ -148,10 +148,10 @@ impl Fleet {
         Ok(Member::new(format!("{} {number}", role.name()), role, child))
     }
 
-    /// Takes in what comes within `time`, notices deaths, and kills and replaces flaky subscribers.
+    /// Handles the output of the processes for `time`, detects deaths, and kills and replaces flaky subscribers.
     ///
     /// # Errors
-    /// [`FleetError::Start`] where a subscriber cannot be started again.
+    /// [`FleetError::Start`] if a subscriber cannot be started again.
     pub fn poll(&mut self, time: Duration) -> Result<(), FleetError> {
         self.receive(time);
         if self.publisher_ended.is_none() {
@@ -162,7 +162,7 @@ impl Fleet {
                 let had_ended = member.child.try_wait()?.is_some();
                 member.child.kill()?;
                 member.child.wait()?;
-                let next = member.incarnations + 1;
+                let next = member.starts + 1;
                 member.replace(self.plan.spawn_subscriber(index, member.role, next, &self.sender)?, had_ended);
             }
         }
@@ -184,30 +184,30 @@ impl Fleet {
 
     fn handle(&mut self, event: ProcessEvent) {
         match event {
-            ProcessEvent::Observed { member, incarnation, observation } => {
-                self.members[member].observed(incarnation, *observation);
+            ProcessEvent::Observed { member, start, observation } => {
+                self.members[member].observed(start, *observation);
             }
-            ProcessEvent::Ended { member, incarnation } => self.members[member].ended(incarnation),
+            ProcessEvent::Ended { member, start } => self.members[member].ended(start),
             ProcessEvent::Conducted(conducted) => {
                 self.conducting.iter_mut().for_each(|conducting| conducting.counted((*conducted).clone()));
             }
-            ProcessEvent::ConductorEnded => self.conducting.iter_mut().for_each(Conducting::ended),
+            ProcessEvent::LoadGeneratorEnded => self.conducting.iter_mut().for_each(Conducting::ended),
             ProcessEvent::Summary(summary) => self.summary = Some(*summary),
             ProcessEvent::Stderr(line) => self.stderr.push(line),
         }
     }
 
-    /// Whether the publisher has ended.
+    /// Returns true if the publisher has ended.
     pub fn publisher_has_ended(&self) -> bool {
         self.publisher_ended.is_some()
     }
 
-    /// Who conducts, if anybody does.
+    /// Returns the processes that send commands, if any.
     pub fn conducting(&self) -> Option<&Conducting> {
         self.conducting.as_ref()
     }
 
-    /// The subscribers.
+    /// Returns the subscribers.
     pub fn members(&self) -> &[Member] {
         &self.members
     }
@@ -220,22 +220,22 @@ impl Fleet {
         self.members.iter().filter(|member| member.role == Role::Steady)
     }
 
-    /// The latest status that a steady subscriber has received.
+    /// Returns the latest status that a steady subscriber has received.
     pub fn status(&self) -> Option<Status> {
         self.steady().find_map(|member| member.present().status)
     }
 
-    /// Frames that steady subscribers have missed so far.
+    /// Returns the number of frames that steady subscribers have missed so far.
     pub fn missed(&self) -> u64 {
         self.steady().map(|member| member.present().missed).sum()
     }
 
-    /// The lines that the publisher has printed on standard error since the last call.
+    /// Returns the lines that the publisher has printed on standard error since the last call.
     pub fn take_stderr(&mut self) -> Vec<String> {
         std::mem::take(&mut self.stderr)
     }
 
-    /// What the publisher's process holds now, from which the growth of its memory follows.
+    /// Returns the present resources of the publisher's process, from which the growth of its memory follows.
     pub(super) fn measure_publisher(&mut self) -> Option<Resources> {
         let held = Resources::of(self.publisher.id())?;
         if self.began.elapsed() >= SETTLING {
@@ -245,12 +245,13 @@ impl Fleet {
         Some(held)
     }
 
-    /// By how many bytes the publisher's resident memory grew after [`SETTLING`]; `None` if the test was shorter.
+    /// Returns the growth of the publisher's resident memory after [`SETTLING`], in bytes; `None` if the test was
+    /// shorter.
     pub fn resident_growth(&self) -> Option<u64> {
         self.settled_bytes.map(|settled| self.most_bytes_after - settled)
     }
 
-    /// Whether the publisher ended before it was told to, with an error, or not at all. To be called once the fleet has
+    /// Returns true if the publisher ended without a signal, with an error, or not at all. Call it after the fleet has
     /// finished.
     pub fn publisher_failed(&self) -> bool {
         self.publisher_ended_early
@@ -258,15 +259,15 @@ impl Fleet {
             || self.publisher_ended.is_none_or(|status| !status.success())
     }
 
-    /// The summary of the publisher, once it has ended in good order.
+    /// Returns the summary of the publisher, after it has ended without an error.
     pub fn summary(&self) -> Option<&RunSummary> {
         self.summary.as_ref()
     }
 
-    /// Ends whoever conducts, then the publisher, lets subscribers receive what is left, and ends them.
+    /// Ends the load generator, then the publisher, lets subscribers receive the remaining frames, and ends them.
     ///
     /// # Errors
-    /// [`FleetError::Start`] where the state of a process is not known.
+    /// [`FleetError::Start`] if the state of a process is not known.
     pub fn finish(&mut self) -> Result<(), FleetError> {
         self.conducting.iter_mut().for_each(Conducting::end);
         let deadline = Instant::now() + END_TIMEOUT;
@@ -300,7 +301,7 @@ impl Drop for Fleet {
         let conducting = self.conducting.iter_mut().flat_map(Conducting::children);
         let members = self.members.iter_mut().map(|member| &mut member.child);
         for child in members.chain(conducting).chain([&mut self.publisher]) {
-            // It may have ended already, which is what is wanted.
+            // It may have ended already.
             let _ = child.kill();
             let _ = child.wait();
         }

@@ -1,9 +1,10 @@
 //! `soak --report`: the distributions of wake-up lateness and step cost as an HdrHistogram interval log.
 //!
-//! In: the samples of the loop, on the statistics thread. Out: a text file of format version 1.3, two lines for each ten
-//! seconds, with the tags `lateness` and `step`, values in nanoseconds, each histogram encoded as V2 and compressed: what
-//! HistogramLogProcessor, HistogramLogAnalyzer and the readers of HdrHistogram's ports take. The sum over all lines of a
-//! tag is the distribution whose percentiles the summary of the run has. The command `run` calls it for `soak`.
+//! In: the samples of the loop, on the statistics thread. Out: a text file of format version 1.3, two lines for each
+//! ten seconds, with the tags `lateness` and `step`, values in nanoseconds, each histogram encoded as V2 and
+//! compressed. HistogramLogProcessor, HistogramLogAnalyzer and the readers of HdrHistogram's ports read it. The sum
+//! over all lines of a tag is the distribution of the percentiles in the run's summary. The command `run` calls it for
+//! `soak`.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -15,19 +16,19 @@ use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, Tag};
 
 use bench_dragon_publisher::live::statistics::{Durations, Sample};
 
-/// What stands above the lines in every interval log.
+/// The header of every interval log.
 const LEGEND: &str = "\"StartTimestamp\",\"Interval_Length\",\"Interval_Max\",\"Interval_Compressed_Histogram\"\n";
-/// Seconds of an interval: a night's log stays small, and a bad minute is found.
+/// Seconds of an interval: short enough to find a bad minute, long enough for a small log of a night.
 const INTERVAL_S: f64 = 10.0;
 
 /// The log of a run's distributions.
 pub struct HistogramLog<W = File> {
     file: W,
-    /// How errors call it.
+    /// Its name in errors.
     name: String,
     rate: f64,
     serializer: V2DeflateSerializer,
-    /// The interval that the latest sample lies in, and its distributions.
+    /// The interval of the latest sample, and its distributions.
     interval: u64,
     durations: Durations,
     text: Vec<u8>,
@@ -35,10 +36,10 @@ pub struct HistogramLog<W = File> {
 }
 
 impl HistogramLog {
-    /// Makes the file of a run of so many frames per second that begins at `began_ns` of CLOCK_REALTIME.
+    /// Creates the file of a run of `rate` frames per second that begins at `began_ns` of CLOCK_REALTIME.
     ///
     /// # Errors
-    /// A sentence, where the file cannot be made.
+    /// A sentence, if the file cannot be created.
     pub fn create(file: &Path, rate: f64, began_ns: u64) -> Result<Self, String> {
         let name = file.display().to_string();
         let failed = |error: io::Error| format!("{name}: {error}, expected a file to write");
@@ -73,7 +74,8 @@ impl<W: Write> HistogramLog<W> {
         self.durations.record(sample, (1e9 / self.rate) as u64);
     }
 
-    /// Writes the last interval; why the log is not whole, in a sentence, or `None` where it is.
+    /// Writes the last interval. Returns the reason why the log is incomplete, as a sentence, or `None` if it is
+    /// complete.
     pub fn finish(mut self) -> Option<String> {
         self.close_interval();
         self.failure
@@ -86,8 +88,8 @@ impl<W: Write> HistogramLog<W> {
         if lateness.is_empty() {
             return;
         }
-        // A builder without comments and times writes nothing of its own. Neither memory nor the serializer of a histogram
-        // that is within its bounds has a reason to fail.
+        // A builder without comments and times writes no header. Writing to memory, and serializing a histogram within
+        // its bounds, cannot fail.
         if let Ok(mut log) = IntervalLogWriterBuilder::new().begin_log_with(&mut self.text, &mut self.serializer) {
             for (tag, histogram) in [("lateness", lateness), ("step", step)] {
                 let written = log.write_histogram(histogram, begins, length, Tag::new(tag));
@@ -98,7 +100,7 @@ impl<W: Write> HistogramLog<W> {
         self.write();
     }
 
-    /// Writes what stands in memory; nothing any more after a failure.
+    /// Writes the lines in memory. After a failure it writes nothing.
     fn write(&mut self) {
         if self.failure.is_none()
             && let Err(error) = self.file.write_all(&self.text)

@@ -2,17 +2,17 @@
 
 use serde::Serialize;
 
-/// Stretches of time that are kept; when as many are full, neighbours are merged and each stretch is twice as long.
+/// The number of stretches of time. When all are full, neighbours are merged and each stretch is twice as long.
 const MOST_STRETCHES: usize = 1024;
 
-/// Columns of figures, each row a stretch of time. Of several seconds in a stretch each column keeps the greatest
-/// value: the worst for percentiles, the latest for counts that only grow.
+/// Columns of figures, each row a stretch of time. Each column keeps the greatest value of a stretch: the worst for
+/// percentiles, the latest for counts that only grow.
 #[derive(Debug, Clone, Serialize)]
 pub struct History {
-    /// Seconds that a row stands for.
+    /// Seconds of a row.
     seconds_per_row: u64,
     columns: Vec<String>,
-    /// Seconds since the start at the end of each row, and its figures; NaN (null in JSON) where nothing was known.
+    /// Seconds since the start at the end of each row, and its figures; NaN (null in JSON) for unknown figures.
     rows: Vec<Row>,
     #[serde(skip)]
     seconds_in_last: u64,
@@ -26,7 +26,7 @@ struct Row {
 }
 
 impl History {
-    /// An empty history with these columns.
+    /// Creates an empty history with these columns.
     pub fn new(columns: Vec<String>) -> Self {
         Self { seconds_per_row: 1, columns, rows: Vec::with_capacity(MOST_STRETCHES), seconds_in_last: 0 }
     }
@@ -62,12 +62,12 @@ impl History {
         self.seconds_per_row *= 2;
     }
 
-    /// Seconds that a row stands for.
+    /// Seconds of a row.
     pub fn seconds_per_row(&self) -> u64 {
         self.seconds_per_row
     }
 
-    /// The points of a column: seconds since the start, and what was known then. Empty for a column that is not there.
+    /// Returns the points of a column: seconds since the start, and the known value. Empty for an unknown column.
     pub fn column(&self, name: &str) -> Vec<(f64, f64)> {
         let Some(at) = self.columns.iter().position(|column| column == name) else { return Vec::new() };
         self.rows.iter().map(|row| (row.seconds, row.values[at])).filter(|point| !point.1.is_nan()).collect()
@@ -78,7 +78,7 @@ impl Row {
     fn merge(&mut self, later: &Row) {
         self.seconds = later.seconds;
         for (mine, other) in self.values.iter_mut().zip(&later.values) {
-            // The greater of a number and NaN is the number.
+            // The maximum of a number and NaN is the number.
             *mine = mine.max(*other);
         }
     }

@@ -1,6 +1,6 @@
-//! What a user requires of a soak test, and how the limits are written. Called by the command `soak`.
+//! The limits of a soak test, and their notation. Called by the command `soak`.
 
-/// What a user requires.
+/// The limits of a soak test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Frames that a steady subscriber may miss.
@@ -13,36 +13,36 @@ pub struct Limits {
     pub resident_growth_bytes: u64,
 }
 
-/// A share as a person writes it: `0.01%`, `0.0001`.
+/// Parses a share: `0.01%`, `0.0001`.
 ///
 /// # Errors
-/// What was expected, where it is no share from 0 to 1.
+/// The expected notation, if the text is no share from 0 to 1.
 pub fn share(text: &str) -> Result<f64, String> {
     let (digits, unit) = text.trim().strip_suffix('%').map_or((text.trim(), 1.0), |digits| (digits, 0.01));
     let share = digits.trim().parse::<f64>().map_or(f64::NAN, |number| number * unit);
     if (0.0..=1.0).contains(&share) { Ok(share) } else { Err("expected a share such as 0.01% or 0.0001".to_owned()) }
 }
 
-/// A short time as a person writes it: `500ns`, `200us`, `1.5ms`, `1s`. Nanoseconds.
+/// Parses a short time: `500ns`, `200us`, `1.5ms`, `1s`. Returns nanoseconds.
 ///
 /// # Errors
-/// What was expected, where it is no such time.
+/// The expected notation, if the text is no such time.
 pub fn nanoseconds(text: &str) -> Result<u64, String> {
-    // The seconds come last: every other unit ends with their letter.
+    // Seconds come last: every other unit ends with the same letter.
     let units = [("ns", 1.0), ("us", 1e3), ("ms", 1e6), ("s", 1e9)];
     quantity(text, &units).ok_or_else(|| "expected a time with its unit such as 200us or 1ms".to_owned())
 }
 
-/// A size as a person writes it: `800B`, `500kB`, `1MB`, `2GB`. Bytes.
+/// Parses a size: `800B`, `500kB`, `1MB`, `2GB`. Returns bytes.
 ///
 /// # Errors
-/// What was expected, where it is no such size.
+/// The expected notation, if the text is no such size.
 pub fn bytes(text: &str) -> Result<u64, String> {
     let units = [("kB", 1e3), ("MB", 1e6), ("GB", 1e9), ("B", 1.0)];
     quantity(text, &units).ok_or_else(|| "expected a size with its unit such as 500kB or 1MB".to_owned())
 }
 
-/// A number of at most 10^18 in a unit of these names.
+/// Parses a number of at most 10^18 in one of these units.
 fn quantity(text: &str, units: &[(&str, f64)]) -> Option<u64> {
     let (digits, unit) = units.iter().find_map(|(name, unit)| Some((text.trim().strip_suffix(name)?, unit)))?;
     let value = digits.trim().parse::<f64>().ok()? * unit;

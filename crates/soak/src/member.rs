@@ -1,4 +1,4 @@
-//! One subscriber of a soak test: its role, its present process, and what all its incarnations have seen. Kept by the
+//! One subscriber of a soak test: its role, its present process, and the observations of all its starts. Owned by the
 //! [`fleet`](super::fleet), which starts and signals the processes; read by the verdict and the report.
 
 use std::process::Child;
@@ -8,11 +8,11 @@ use serde::Serialize;
 
 use super::observation::{Latencies, Observation};
 
-/// What a subscriber is for.
+/// The role of a subscriber.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
-    /// Reads whenever a frame comes, and must miss none.
+    /// Reads every frame, and must miss none.
     Steady,
     /// Sleeps longer than its queue lasts.
     Slow,
@@ -21,7 +21,7 @@ pub enum Role {
 }
 
 impl Role {
-    /// Its name in labels.
+    /// Returns its name in labels.
     pub fn name(self) -> &'static str {
         match self {
             Self::Steady => "steady",
@@ -31,7 +31,7 @@ impl Role {
     }
 }
 
-/// Where the present process of a subscriber is in its life.
+/// The state of a subscriber's present process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ProcessState {
     /// It runs.
@@ -44,36 +44,36 @@ pub enum ProcessState {
     EndedByItself,
 }
 
-/// A subscriber and all its incarnations.
+/// A subscriber over all its starts.
 #[derive(Debug)]
 pub struct Member {
     /// Its name in the report.
     pub label: String,
-    /// What it is for.
+    /// Its role.
     pub role: Role,
-    /// Processes it has been so far.
-    pub incarnations: u64,
-    /// The present one's state.
+    /// The number of its processes so far, from 1.
+    pub starts: u64,
+    /// The state of the present process.
     pub state: ProcessState,
-    /// Former incarnations that had ended by themselves.
+    /// Former processes that had ended by themselves.
     lost: u64,
     pub(super) child: Child,
     pub(super) spawned: Instant,
-    /// What its former incarnations saw.
+    /// The observation of its former processes.
     past: Observation,
-    /// What the present one has seen.
+    /// The observation of the present process.
     present: Observation,
-    /// The latencies that came since the last row of figures.
+    /// The latencies since the last row of figures.
     fresh: Option<Latencies>,
 }
 
 impl Member {
-    /// A subscriber whose first process has just been started.
+    /// Creates a subscriber whose first process has just been started.
     pub fn new(label: String, role: Role, child: Child) -> Self {
         Self {
             label,
             role,
-            incarnations: 1,
+            starts: 1,
             state: ProcessState::Running,
             lost: 0,
             child,
@@ -84,28 +84,28 @@ impl Member {
         }
     }
 
-    /// Puts the process of the next incarnation in the place of one that was killed, or had ended before.
+    /// Replaces a process that was killed, or had ended before, by the next one.
     pub fn replace(&mut self, child: Child, had_ended: bool) {
         self.lost += u64::from(had_ended);
         self.past = self.seen();
         self.present = Observation::default();
-        self.incarnations += 1;
+        self.starts += 1;
         self.state = ProcessState::Running;
         self.spawned = Instant::now();
         self.child = child;
     }
 
-    /// Takes in what an incarnation has seen. What a former one still had in its pipe is left out.
-    pub fn observed(&mut self, incarnation: u64, observation: Observation) {
-        if incarnation == self.incarnations {
+    /// Stores the observation of a start. The rest in the pipe of a former process is ignored.
+    pub fn observed(&mut self, start: u64, observation: Observation) {
+        if start == self.starts {
             self.fresh = Latencies::worst(self.fresh, observation.second);
             self.present = observation;
         }
     }
 
-    /// Takes in that the process of an incarnation has ended.
-    pub fn ended(&mut self, incarnation: u64) {
-        if incarnation == self.incarnations {
+    /// Records the end of the process of a start.
+    pub fn ended(&mut self, start: u64) {
+        if start == self.starts {
             self.state = match self.state {
                 ProcessState::Ending => ProcessState::Ended,
                 _ => ProcessState::EndedByItself,
@@ -113,23 +113,23 @@ impl Member {
         }
     }
 
-    /// What all its incarnations have seen.
+    /// Returns the observation of all its processes.
     pub fn seen(&self) -> Observation {
         self.past.joined(&self.present)
     }
 
-    /// What its present incarnation has seen.
+    /// Returns the observation of its present process.
     pub fn present(&self) -> &Observation {
         &self.present
     }
 
-    /// The latencies that came since the last call.
+    /// Returns the latencies since the last call.
     pub fn take_fresh(&mut self) -> Option<Latencies> {
         self.fresh.take()
     }
 
-    /// How many of its processes ended without a signal from the soak test, or did not end after one. To be called once the
-    /// fleet has finished.
+    /// Returns the number of its processes that ended without a signal from the soak test, or did not end after one.
+    /// Call it after the fleet has finished.
     pub fn failed(&self) -> u64 {
         self.lost + u64::from(self.state != ProcessState::Ended)
     }
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn incarnations_add_up_and_a_former_one_is_not_heard_any_more() {
+    fn starts_add_up_and_a_former_one_is_not_heard_any_more() {
         let mut member = member();
         let seen = |received| Observation { received, ..Observation::default() };
         member.observed(1, seen(10));
@@ -172,7 +172,7 @@ mod tests {
         member.ended(1);
         member.observed(2, seen(7));
         assert_eq!((member.seen().received, member.present().received), (17, 7));
-        assert_eq!((member.state, member.incarnations), (ProcessState::Running, 2));
+        assert_eq!((member.state, member.starts), (ProcessState::Running, 2));
         member.replace(process(), true);
         member.state = ProcessState::Ended;
         assert_eq!(member.failed(), 1, "one ended by itself and was started again");

@@ -1,14 +1,14 @@
-//! What a subscriber process of a soak test has seen, as it prints it once a second and the soak test reads it.
+//! The observation of a subscriber process, which the process prints once a second and the soak test reads.
 //!
-//! In: counts and percentiles from the [`observer`](super::observer). Out: JSON through a pipe; sums over the
-//! incarnations of a subscriber. Used by the [`fleet`](super::fleet), the verdict and the report.
+//! In: counts and percentiles from the [`observer`](super::observer). Out: JSON through a pipe; sums over the processes
+//! of a subscriber. Used by the [`fleet`](super::fleet), the verdict and the report.
 
 use serde::{Deserialize, Serialize};
 
 use bench_dragon_messages::LoopStatus;
 use bench_dragon_publisher::live::statistics::Percentiles;
 
-/// What a subscriber has seen so far; counts are since its process started.
+/// The observation of a subscriber so far; counts are since its process started.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Observation {
     /// Frames received.
@@ -21,13 +21,13 @@ pub struct Observation {
     pub disordered: u64,
     /// Frames whose link lengths were compared with the stage's.
     pub links_checked: u64,
-    /// Frames with a link of another length than promised.
+    /// Frames with a link of another length than the stage's.
     pub wrong_links: u64,
     /// The largest difference of a link from its length, metres.
     pub worst_link_error: f64,
-    /// Frames that do not follow from the one before by the rules of playing, pausing and jumping.
+    /// Frames that do not follow from the frame before by the rules of playing, pausing and jumping.
     pub disobedient: u64,
-    /// What was wrong with the first of those.
+    /// The fault of the first of those.
     pub disobedience: Option<String>,
     /// Frames whose time was compared with that of the frames before.
     pub times_checked: u64,
@@ -35,7 +35,7 @@ pub struct Observation {
     pub epoch: u32,
     /// The largest distance of a deadline from first deadline + tick / rate, nanoseconds.
     pub phase_error_ns: f64,
-    /// Runs of a publisher that frames came from.
+    /// Runs of the publishers of the frames.
     pub runs: u64,
     /// Alerts received.
     pub alerts: u64,
@@ -52,8 +52,8 @@ pub struct Observation {
 }
 
 impl Observation {
-    /// What two incarnations of a subscriber saw together, `self` the former one. Latencies are those of the
-    /// incarnation in which they were worst.
+    /// Returns the observation of two processes of a subscriber together, `self` the former one. Latencies are the
+    /// worse of the two.
     pub fn joined(&self, later: &Self) -> Self {
         Self {
             received: self.received + later.received,
@@ -82,7 +82,7 @@ impl Observation {
 /// Latencies of frames, nanoseconds of CLOCK_MONOTONIC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Latencies {
-    /// From `sent_ns` to receiving: what the transport and this process's waking cost.
+    /// From `sent_ns` to receiving: the cost of the transport and of waking this process.
     pub since_sent: Percentiles,
     /// From `deadline_ns` to receiving, skipped periods included with the latency they would have had: the latency at
     /// the nominal rate, a late wake-up of the publisher included.
@@ -90,7 +90,7 @@ pub struct Latencies {
 }
 
 impl Latencies {
-    /// The worse of two, percentile by percentile.
+    /// Returns the worse of two, percentile by percentile.
     pub fn worst(a: Option<Self>, b: Option<Self>) -> Option<Self> {
         let (Some(a), Some(b)) = (a, b) else { return a.or(b) };
         let worse = |a: Percentiles, b: Percentiles| Percentiles {
@@ -106,7 +106,7 @@ impl Latencies {
     }
 }
 
-/// What a soak test records of a [`LoopStatus`].
+/// The fields of a [`LoopStatus`] that a soak test records.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Status {
     /// The nominal rate, frames per second.

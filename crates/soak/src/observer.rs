@@ -5,7 +5,7 @@
 
 use hdrhistogram::Histogram;
 
-use super::obedience::Obedience;
+use super::conformance::ConformanceCheck;
 use super::observation::{Latencies, Observation};
 use bench_dragon_client::feed::FeedEvent;
 use bench_dragon_messages::{FrameHeader, HandlePose, LoopStatus, Stage};
@@ -16,7 +16,7 @@ const LONGEST_NS: u64 = 3_600_000_000_000;
 /// Skipped periods of one gap that are counted as late frames; beyond it the gap itself is the finding.
 const MOST_LATE_PERIODS: u64 = 100_000;
 
-/// The distributions of both latencies over some time.
+/// The distributions of both latencies over a time.
 struct Histograms {
     since_sent: Histogram<u64>,
     since_deadline: Histogram<u64>,
@@ -40,30 +40,30 @@ impl Histograms {
     }
 }
 
-/// Checks what one subscriber receives.
+/// Checks the messages that one subscriber receives.
 pub struct Observer {
     seen: Observation,
-    /// Lengths of the head's link and of every other, metres.
+    /// Lengths of the head's link and of the other links, metres.
     links: Option<[f64; 2]>,
-    /// Metres by which links may be off besides rounding.
+    /// The tolerance of links besides rounding, metres.
     link_tolerance: f64,
     /// The first frame of the present run.
     first: FrameHeader,
     previous: Option<FrameHeader>,
-    obedience: Obedience,
+    conformance: ConformanceCheck,
     second: Histograms,
     total: Histograms,
 }
 
 impl Default for Observer {
-    /// An observer of a scene whose links are exact.
+    /// Creates an observer of a scene whose links are exact.
     fn default() -> Self {
         Self::new(0.0)
     }
 }
 
 impl Observer {
-    /// An observer of a scene whose links may be off by so many metres besides rounding.
+    /// Creates an observer of a scene whose links have a tolerance of `link_tolerance` metres besides rounding.
     pub fn new(link_tolerance: f64) -> Self {
         Self {
             seen: Observation::default(),
@@ -71,13 +71,13 @@ impl Observer {
             link_tolerance,
             first: FrameHeader::default(),
             previous: None,
-            obedience: Obedience::default(),
+            conformance: ConformanceCheck::default(),
             second: Histograms::new(),
             total: Histograms::new(),
         }
     }
 
-    /// Takes in an event that was received at `received_ns` of CLOCK_MONOTONIC.
+    /// Handles an event that was received at `received_ns` of CLOCK_MONOTONIC.
     pub fn handle(&mut self, event: &FeedEvent<'_>, received_ns: u64) {
         match *event {
             FeedEvent::Started { .. } => self.seen.runs += 1,
@@ -85,7 +85,7 @@ impl Observer {
             FeedEvent::Frame { header, handles, missed } => {
                 self.seen.missed += missed;
                 self.frame(header, handles, received_ns);
-                self.check_obedience(header, handles);
+                self.check_conformance(header, handles);
             }
             FeedEvent::Alert(_) => self.seen.alerts += 1,
             FeedEvent::Status(status) => self.status(status),
@@ -93,12 +93,12 @@ impl Observer {
         }
     }
 
-    /// Takes in the stage, which determines the length of the links.
+    /// Takes the length of the links from the stage.
     fn stage(&mut self, stage: &Stage) {
         self.links = Some([stage.head_length, stage.body_length].map(|length| length - 2.0 * stage.hole_inset));
     }
 
-    /// Takes in a status, whose rate determines the phase.
+    /// Stores a status, whose rate determines the phase.
     fn status(&mut self, status: &LoopStatus) {
         self.seen.status = Some(status.into());
     }
@@ -126,7 +126,7 @@ impl Observer {
         self.check_links(handles);
     }
 
-    /// Counts what lies between two frames of a run; false where the second cannot follow the first.
+    /// Counts the frames and periods between two frames of a run. Returns false if the second cannot follow the first.
     fn follow(&mut self, previous: &FrameHeader, header: &FrameHeader, received_ns: u64) -> bool {
         let advance = |of: fn(&FrameHeader) -> u64| of(header).checked_sub(of(previous)).filter(|step| *step > 0);
         let steps = (
@@ -139,7 +139,8 @@ impl Observer {
         let Some(skipped) = periods.checked_sub(frames) else { return false };
         self.seen.skipped += skipped;
         if frames == 1 {
-            // What was skipped would have come with this frame: without these the wait would count only once.
+            // The skipped periods count as late frames that came with this one: otherwise the wait would count only
+            // once.
             let period_ns = span_ns / periods;
             for period in 1..=skipped.min(MOST_LATE_PERIODS) {
                 let latency_ns = received_ns.saturating_sub(header.deadline_ns - period * period_ns);
@@ -158,12 +159,12 @@ impl Observer {
         self.seen.phase_error_ns = self.seen.phase_error_ns.max(error);
     }
 
-    fn check_obedience(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
+    fn check_conformance(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
         self.seen.epoch = header.epoch;
-        // Without the rate no time can be checked.
+        // Times cannot be checked without the rate.
         let Some(status) = self.seen.status else { return };
         self.seen.times_checked += 1;
-        if let Err(fault) = self.obedience.check(header, handles, status.rate) {
+        if let Err(fault) = self.conformance.check(header, handles, status.rate) {
             self.seen.disobedient += 1;
             self.seen.disobedience.get_or_insert(fault);
         }
@@ -178,7 +179,7 @@ impl Observer {
             let radius = pair[1].x.hypot(pair[1].y);
             let promised = self.link_tolerance + 1e-12 * expected + 4.0 * (radius.next_up() - radius);
             let error = (length - expected).abs();
-            // A length that is no number is wrong as well.
+            // NaN is a wrong length too.
             right &= error <= promised;
             self.seen.worst_link_error = self.seen.worst_link_error.max(error);
         }
@@ -186,7 +187,7 @@ impl Observer {
         self.seen.wrong_links += u64::from(!right);
     }
 
-    /// What was seen; begins a new second.
+    /// Returns the observation, and begins a new second.
     pub fn observation(&mut self) -> Observation {
         let observation =
             Observation { second: self.second.latencies(), total: self.total.latencies(), ..self.seen.clone() };
@@ -220,7 +221,7 @@ mod tests {
         [(10.0, 0.0), (13.0, 0.0), (13.0, 1.0)].map(|(x, y)| HandlePose { x, y, ..HandlePose::default() })
     }
 
-    /// An observer behind the feed's own tracker of the sequence.
+    /// An observer after the feed's tracker of the sequence.
     #[derive(Default)]
     struct Received {
         observer: Observer,

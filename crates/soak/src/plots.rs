@@ -4,10 +4,10 @@ use plotters::prelude::*;
 
 use bench_dragon_drawing::palette::{LIGHT, SERIES, channels};
 
-/// Pixels across and down: on a phone, half as large, words can still be read.
+/// Width and height in pixels: words are still readable at half the size, on a phone.
 const SIZE: (u32, u32) = (760, 300);
 
-/// Words in the face of the page.
+/// The font of the page.
 fn words(size: u32, colour: RGBColor) -> TextStyle<'static> {
     let style = TextStyle::from(("system-ui, sans-serif", size).into_font());
     TextStyle { color: colour.to_backend_color(), ..style }
@@ -18,25 +18,25 @@ fn colour(hex: &str) -> RGBColor {
 }
 
 /// A line of a plot.
-pub struct Line {
-    /// What it is.
+pub struct PlotLine {
+    /// Its name.
     pub label: String,
     /// Seconds since the start, and values.
     pub points: Vec<(f64, f64)>,
 }
 
-/// How values are spread over the height.
+/// The vertical scale.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scale {
-    /// Evenly, from 0.
+    /// Linear, from 0.
     Linear,
-    /// By powers of ten: for durations.
+    /// Logarithmic, for durations.
     Logarithmic,
 }
 
-/// A plot of some lines over time as HTML: what each colour means, and an `<svg>` element. `None` if there is nothing to
+/// Returns a plot of lines over time as HTML: a legend, and an `<svg>` element. Returns `None` if there is nothing to
 /// plot.
-pub fn plot(unit: &str, scale: Scale, lines: &[Line]) -> Option<String> {
+pub fn plot(unit: &str, scale: Scale, lines: &[PlotLine]) -> Option<String> {
     let points = || lines.iter().flat_map(|line| &line.points);
     let last = points().map(|point| point.0).fold(f64::NAN, f64::max);
     let most = points().map(|point| point.1).fold(f64::NAN, f64::max);
@@ -52,7 +52,7 @@ pub fn plot(unit: &str, scale: Scale, lines: &[Line]) -> Option<String> {
         let mut chart = ChartBuilder::on(&area);
         chart.margin(8).margin_right(28).x_label_area_size(46).y_label_area_size(84);
         match scale {
-            // Zeros have no logarithm: they lie on the lower edge.
+            // Zero has no logarithm: it lies on the lower edge.
             Scale::Logarithmic => {
                 let floor = if least.is_nan() { 0.1 } else { least * 0.7 };
                 let down = (floor..(most * 1.4).max(floor * 10.0)).log_scale();
@@ -68,10 +68,10 @@ pub fn plot(unit: &str, scale: Scale, lines: &[Line]) -> Option<String> {
     Some(legend(lines) + &svg)
 }
 
-/// What each colour means. Above the plot, where it hides no line.
-fn legend(lines: &[Line]) -> String {
-    // A picture of its own, so that the rules that make plots dark make it dark too.
-    let key = |(line, (colour, _)): (&Line, &(&str, &str))| {
+/// Returns the legend, which stands above the plot, where it hides no line.
+fn legend(lines: &[PlotLine]) -> String {
+    // An `<svg>` element too, so that the dark rules of the plots apply to it.
+    let key = |(line, (colour, _)): (&PlotLine, &(&str, &str))| {
         format!(
             "<span><svg width=\"18\" height=\"10\"><rect y=\"3\" width=\"18\" height=\"4\" fill=\"{colour}\"/></svg> {}</span>\n",
             escaped(&line.label)
@@ -80,12 +80,12 @@ fn legend(lines: &[Line]) -> String {
     format!("<p class=\"legend\">\n{}</p>\n", lines.iter().zip(SERIES.iter().cycle()).map(key).collect::<String>())
 }
 
-/// Text as HTML takes it.
+/// Returns text with the special characters of HTML escaped.
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// The unit in which a span of time reads well: its seconds and its name.
+/// Returns a suitable unit for a span of time: its seconds and its name.
 fn unit_of_time(span: f64) -> (f64, &'static str) {
     match span {
         _ if span > 3.0 * 3600.0 => (3600.0, "hours"),
@@ -98,7 +98,7 @@ fn draw<'a, Y>(
     chart: &mut ChartContext<'a, SVGBackend<'a>, Cartesian2d<plotters::coord::types::RangedCoordf64, Y>>,
     unit: &str,
     time: &str,
-    lines: &[Line],
+    lines: &[PlotLine],
     (seconds, floor): (f64, f64),
 ) -> Option<()>
 where
@@ -117,7 +117,7 @@ where
     Some(())
 }
 
-/// A label of the axis without needless digits.
+/// Returns a label of the axis without unnecessary digits.
 fn short(value: f64) -> String {
     if value >= 10.0 || value == 0.0 { format!("{value:.0}") } else { format!("{value:.2}") }
 }
@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn plots_are_svg_and_nothing_gives_none() {
-        let line = |points| Line { label: "a & b".to_owned(), points };
+        let line = |points| PlotLine { label: "a & b".to_owned(), points };
         for scale in [Scale::Linear, Scale::Logarithmic] {
             assert_eq!(plot("us", scale, &[line(Vec::new())]), None);
             let html = plot("us", scale, &[line(vec![(0.0, 0.0), (1.0, 0.0)])]).unwrap();

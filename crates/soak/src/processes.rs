@@ -1,5 +1,5 @@
-//! How the processes of a soak test are started, signalled and read: a thread for each pipe turns its lines into
-//! events. Called by the [`fleet`](super::fleet).
+//! Starts, signals and reads the processes of a soak test: a thread for each pipe turns its lines into events. Called
+//! by the [`fleet`](super::fleet).
 
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Read};
@@ -16,42 +16,42 @@ use super::member::Role;
 use super::observation::Observation;
 use bench_dragon_publisher::live::statistics::RunSummary;
 
-/// What to start.
+/// The processes to start.
 #[derive(Debug, Clone)]
 pub struct Plan {
     /// This program.
     pub program: PathBuf,
     /// Arguments of publisher and subscribers before their subcommand.
     pub common: Vec<OsString>,
-    /// What follows `run`.
+    /// Arguments of `run`.
     pub publisher: Vec<OsString>,
     /// The subscribers.
     pub roles: Vec<Role>,
-    /// Who conducts the show, if anybody does.
+    /// The load generator and its clients, if any.
     pub conduct: Option<ConductPlan>,
 }
 
-/// Who conducts the show.
+/// The plan of a load generator and its clients.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConductPlan {
     /// The seed of the commands.
     pub seed: u64,
-    /// Frames per second, where they are not the scene's.
+    /// Frames per second, if not the scene's.
     pub rate: Option<f64>,
-    /// Further clients of the control service, each killed amid a request and started again.
+    /// Further clients of the control service, each killed during a request and started again.
     pub flaky_clients: usize,
 }
 
-/// What a process has printed, or that it has ended.
+/// The output of a process, or its end.
 pub(super) enum ProcessEvent {
-    /// A subscriber has printed what it has seen.
-    Observed { member: usize, incarnation: u64, observation: Box<Observation> },
+    /// A subscriber has printed its observation.
+    Observed { member: usize, start: u64, observation: Box<Observation> },
     /// A subscriber has closed its standard output.
-    Ended { member: usize, incarnation: u64 },
-    /// The conductor has printed what it has counted.
+    Ended { member: usize, start: u64 },
+    /// The load generator has printed its counts.
     Conducted(Box<Conducted>),
-    /// The conductor has closed its standard output.
-    ConductorEnded,
+    /// The load generator has closed its standard output.
+    LoadGeneratorEnded,
     /// The publisher has printed its summary.
     Summary(Box<RunSummary>),
     /// The publisher has printed a line on standard error.
@@ -59,7 +59,8 @@ pub(super) enum ProcessEvent {
 }
 
 impl Plan {
-    /// This program in a process group of its own, so that Ctrl-C on the terminal reaches the soak test alone.
+    /// Returns a command for this program in another process group, so that Ctrl-C on the terminal reaches the soak
+    /// test only.
     fn command(&self, subcommand: &str) -> Command {
         let mut command = Command::new(&self.program);
         command.args(&self.common).arg(subcommand).args(["--end-with-parent", &std::process::id().to_string()]);
@@ -72,7 +73,7 @@ impl Plan {
         let mut command = self.command("run");
         command.args(&self.publisher).arg("--json").stderr(Stdio::piped());
         let mut child = command.spawn()?;
-        // Nobody receives any more where the test has ended.
+        // The receiver is gone if the test has ended.
         read_lines(child.stdout.take(), sender, |line, sender| {
             if let Ok(summary) = serde_json::from_str(&line) {
                 let _ = sender.send(ProcessEvent::Summary(Box::new(summary)));
@@ -84,12 +85,12 @@ impl Plan {
         Ok(child)
     }
 
-    /// Starts an incarnation of a member.
+    /// Starts the process of a member.
     pub(super) fn spawn_subscriber(
         &self,
         member: usize,
         role: Role,
-        incarnation: u64,
+        start: u64,
         sender: &Sender<ProcessEvent>,
     ) -> std::io::Result<Child> {
         let mut command = self.command("soak-subscriber");
@@ -100,13 +101,13 @@ impl Plan {
         let stdout = child.stdout.take();
         let sender = sender.clone();
         std::thread::spawn(move || {
-            // A process that is killed can leave half a line.
+            // A killed process can leave half a line.
             let observations = lines(stdout).filter_map(|line| serde_json::from_str(&line).ok());
             for observation in observations {
-                // Nobody receives any more where the test has ended.
-                let _ = sender.send(ProcessEvent::Observed { member, incarnation, observation: Box::new(observation) });
+                // The receiver is gone if the test has ended.
+                let _ = sender.send(ProcessEvent::Observed { member, start, observation: Box::new(observation) });
             }
-            let _ = sender.send(ProcessEvent::Ended { member, incarnation });
+            let _ = sender.send(ProcessEvent::Ended { member, start });
         });
         Ok(child)
     }
@@ -114,7 +115,7 @@ impl Plan {
 
 impl Plan {
     /// Starts the process that sends commands.
-    pub(super) fn spawn_conductor(
+    pub(super) fn spawn_load_generator(
         &self,
         conduct: &ConductPlan,
         sender: &Sender<ProcessEvent>,
@@ -128,11 +129,11 @@ impl Plan {
         let stdout = child.stdout.take();
         let sender = sender.clone();
         std::thread::spawn(move || {
-            // Nobody receives any more where the test has ended.
+            // The receiver is gone if the test has ended.
             for conducted in lines(stdout).filter_map(|line| serde_json::from_str(&line).ok()) {
                 let _ = sender.send(ProcessEvent::Conducted(Box::new(conducted)));
             }
-            let _ = sender.send(ProcessEvent::ConductorEnded);
+            let _ = sender.send(ProcessEvent::LoadGeneratorEnded);
         });
         Ok(child)
     }
@@ -147,7 +148,7 @@ fn lines(pipe: Option<impl Read>) -> impl Iterator<Item = String> {
     pipe.into_iter().flat_map(|pipe| BufReader::new(pipe).lines().map_while(Result::ok))
 }
 
-/// Hands each line of a pipe to `each`, on a thread of its own.
+/// Starts a thread that passes each line of a pipe to `each`.
 fn read_lines(
     pipe: Option<impl Read + Send + 'static>,
     sender: &Sender<ProcessEvent>,

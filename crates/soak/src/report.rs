@@ -11,17 +11,17 @@ use super::fleet::Fleet;
 use super::history::History;
 use super::member::{Member, Role};
 use super::observation::{Latencies, Observation};
-use super::plots::{Line, Scale, escaped, plot};
+use super::plots::{PlotLine, Scale, escaped, plot};
 use super::verdict::LimitCheck;
 use bench_dragon_drawing::palette::dark_rules;
 use bench_dragon_publisher::live::Deliveries;
 use bench_dragon_publisher::live::statistics::RunSummary;
 
-/// The name of the report's JSON, whose schema is docs/soak-report.schema.json. A change that a reader of the former one
-/// would not survive raises the number.
+/// The name of the report's JSON, whose schema is docs/soak-report.schema.json. An incompatible change raises the
+/// number.
 pub const SCHEMA: &str = "bench_dragon/soak/1";
 
-/// All that is known of a soak test.
+/// The results of a soak test.
 #[derive(Debug, Serialize)]
 pub struct Report {
     /// [`SCHEMA`].
@@ -34,34 +34,34 @@ pub struct Report {
     pub command: Vec<String>,
     /// The version of this program.
     pub version: &'static str,
-    /// Where it ran.
+    /// The machine of the test.
     pub machine: Machine,
     /// CLOCK_REALTIME in seconds when it began.
     pub began_at: u64,
-    /// Wall time from all subscribers' receiving to the end, seconds.
+    /// Wall time from the first frame of all subscribers to the end, seconds.
     pub seconds: f64,
-    /// The summary that the publisher printed at its end; null if it did not end in good order.
+    /// The summary that the publisher printed at its end; null if it did not end properly.
     pub publisher: Option<RunSummary>,
-    /// What each subscriber saw.
+    /// The observation of each subscriber.
     pub subscribers: Vec<SubscriberReport>,
-    /// What was commanded and answered; null where nobody conducted.
+    /// The counts of commands and answers; null without `--conduct`.
     pub conducted: Option<Conducted>,
-    /// Further clients of the control service that were killed amid a request.
+    /// Further clients of the control service that were killed during a request.
     pub clients_killed: u64,
     /// Figures over time; of several seconds in a row the greatest.
     pub history: History,
 }
 
-/// What a subscriber saw in all its incarnations.
+/// The observation of a subscriber, over all its starts.
 #[derive(Debug, Serialize)]
 pub struct SubscriberReport {
     /// Its name.
     pub label: String,
-    /// What it was for.
+    /// Its role.
     pub role: Role,
-    /// Processes it has been.
+    /// The number of its processes.
     pub incarnations: u64,
-    /// Counts and latencies; those of the last second are left out.
+    /// Counts and latencies, without those of the last second.
     pub seen: Observation,
 }
 
@@ -77,7 +77,7 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// This one.
+    /// Returns this machine.
     pub fn this() -> Self {
         let processors = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
         let name = processors.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
@@ -92,12 +92,12 @@ impl Machine {
 }
 
 impl SubscriberReport {
-    /// Those of a fleet.
+    /// Returns the reports of a fleet's subscribers.
     pub fn all(fleet: &Fleet) -> Vec<Self> {
         let report = |member: &Member| Self {
             label: member.label.clone(),
             role: member.role,
-            incarnations: member.incarnations,
+            incarnations: member.starts,
             seen: Observation { second: None, ..member.seen() },
         };
         fleet.members().iter().map(report).collect()
@@ -105,7 +105,7 @@ impl SubscriberReport {
 }
 
 impl Report {
-    /// Lines for people: the verdict, each limit, each subscriber.
+    /// Returns lines of text: the verdict, each limit, each subscriber.
     pub fn lines(&self) -> Vec<String> {
         let mut lines = vec![format!("{} after {:.1} s", self.verdict, self.seconds)];
         lines.extend(self.checks.iter().map(|check| format!("  {}", check.line())));
@@ -131,11 +131,11 @@ impl Report {
         lines
     }
 
-    /// Sentences about what was commanded, and the first disobedience of each subscriber.
+    /// Returns sentences about the commands, and the first fault that each subscriber found.
     fn conducting(&self) -> impl Iterator<Item = String> {
         let conducted = self.conducted.iter().flat_map(Conducted::lines);
         let killed = (self.clients_killed > 0)
-            .then(|| format!("{} clients of the control service were killed amid a request", self.clients_killed));
+            .then(|| format!("{} clients of the control service were killed during a request", self.clients_killed));
         let disobedience =
             self.subscribers.iter().filter(|_| self.conducted.is_some()).filter_map(|subscriber| {
                 Some(format!("{}: {}", subscriber.label, subscriber.seen.disobedience.as_ref()?))
@@ -143,7 +143,7 @@ impl Report {
         conducted.chain(killed).chain(disobedience)
     }
 
-    /// A sentence for each transport of the publisher that counts what it delivers.
+    /// Returns a sentence for each transport of the publisher with counters.
     fn deliveries(&self) -> impl Iterator<Item = String> {
         self.publisher.iter().flat_map(|summary| &summary.deliveries).map(
             |(name, Deliveries { frames, skipped, discarded })| {
@@ -152,7 +152,7 @@ impl Report {
         )
     }
 
-    /// One page that needs nothing else.
+    /// Returns the report as one page without other files.
     pub fn html(&self) -> String {
         let mut page = String::new();
         let plots = self.plots();
@@ -216,7 +216,7 @@ impl Report {
         )
     }
 
-    /// What was commanded, a row for each command; nothing where nobody conducted.
+    /// Returns a table of the commands, a row for each; empty without `--conduct`.
     fn section_on_conducting(&self) -> String {
         let Some(conducted) = &self.conducted else { return String::new() };
         let codes: BTreeSet<_> = conducted.answers.values().flat_map(|codes| codes.keys()).collect();
@@ -234,7 +234,7 @@ impl Report {
     }
 
     fn plots(&self) -> String {
-        let line = |label: &str, column: &str, scale: f64| Line {
+        let line = |label: &str, column: &str, scale: f64| PlotLine {
             label: label.to_owned(),
             points: self.history.column(column).into_iter().map(|(at, value)| (at, value / scale)).collect(),
         };
@@ -244,7 +244,7 @@ impl Report {
                 .into_iter()
                 .collect::<Vec<_>>()
         };
-        let of_each = |column: &str, scale: f64| -> Vec<Line> {
+        let of_each = |column: &str, scale: f64| -> Vec<PlotLine> {
             let labels = self.subscribers.iter().map(|subscriber| &subscriber.label);
             labels.map(|label| line(label, &column_of(label, column), scale)).collect()
         };
@@ -277,7 +277,7 @@ impl Report {
             ("Open file descriptors".to_owned(), "", Scale::Linear, vec![line("open", "file_descriptors", 1.0)]),
             ("Shows played".to_owned(), "", Scale::Linear, vec![line("shows", "shows_played", 1.0)]),
         ]);
-        let section = |(title, unit, scale, lines): (String, &str, Scale, Vec<Line>)| {
+        let section = |(title, unit, scale, lines): (String, &str, Scale, Vec<PlotLine>)| {
             let picture = plot(unit, scale, &lines).unwrap_or_else(|| "<p>Nothing was measured.</p>".to_owned());
             format!("<h2>{title}</h2>\n{picture}\n")
         };
@@ -285,7 +285,7 @@ impl Report {
     }
 }
 
-/// Light, and dark where the browser prefers that; what is wider than a phone scrolls by itself.
+/// Light, or dark if the browser prefers dark; elements wider than a phone scroll separately.
 const STYLE: &str = ":root{color-scheme:light dark;--ground:#fbfaf7;--ink:#16181d;--line:#d9d5cb;--good:#00734f;--bad:#c2001f}\
                      @media(prefers-color-scheme:dark){:root{--ground:#0b0d11;--ink:#f2f0ea;--line:#2a2f39;--good:#1fb8a6;--bad:#ff4a5f}}\
                      body{font:15px/1.45 system-ui,sans-serif;max-width:960px;margin:2em auto;padding:0 1em;background:var(--ground);color:var(--ink)}\

@@ -1,17 +1,17 @@
-//! What a process holds, read from /proc. Called by the soak test for its publisher.
+//! The resources of a process, read from /proc. Called by the soak test for its publisher.
 
 use std::collections::BTreeSet;
 use std::os::unix::fs::MetadataExt;
 
-/// Where Linux keeps shared memory.
+/// The folder of Linux for shared memory.
 const SHARED_MEMORY: &str = "/dev/shm/";
 /// The unit of a file's blocks, bytes.
 const BLOCK: u64 = 512;
 
-/// What a process holds.
+/// The resources of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Resources {
-    /// Resident memory, shared memory that was touched included, bytes.
+    /// Resident memory with used shared memory, bytes.
     pub resident_bytes: u64,
     /// Open file descriptors.
     pub file_descriptors: u64,
@@ -20,7 +20,7 @@ pub struct Resources {
 }
 
 impl Resources {
-    /// What the process `id` holds, or `None` if it is not there any more.
+    /// Returns the resources of the process `id`, or `None` if it has ended.
     pub fn of(id: u32) -> Option<Self> {
         let pages = std::fs::read_to_string(format!("/proc/{id}/statm")).ok()?;
         let pages: u64 = pages.split_whitespace().nth(1)?.parse().ok()?;

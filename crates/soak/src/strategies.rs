@@ -1,10 +1,10 @@
-//! Random commands for the tests of this folder: all of them, with values in range and out of it, for a show of 7 s.
+//! Random commands for the tests of this crate: every command, with values in and out of range, for a show of 7 s.
 
 use proptest::prelude::*;
 
 use bench_dragon_messages::control::Command;
 
-/// A command. Those without which nothing plays come more often.
+/// Returns a command. Resume, step and release come more often, since they let the show play.
 pub(super) fn commands() -> impl Strategy<Value = Command> {
     prop_oneof![
         Just(Command::State),

@@ -1,4 +1,4 @@
-//! The verdict of a soak test: each limit, the value found, and whether it was kept.
+//! The verdict of a soak test: each limit, the value found, and the result.
 
 use serde::Serialize;
 
@@ -13,7 +13,7 @@ use bench_dragon_publisher::live::statistics::RunSummary;
 /// A deadline may be this far from first deadline + tick / rate: both are rounded to whole nanoseconds.
 const ROUNDING_NS: f64 = 2.0;
 
-/// How a value is to be written for people.
+/// The unit of a value, for its notation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Unit {
@@ -28,7 +28,7 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// A value for people.
+    /// Returns a value as text.
     pub fn show(self, value: f64) -> String {
         match self {
             Self::Count => format!("{value}"),
@@ -39,28 +39,28 @@ impl Unit {
     }
 }
 
-/// One limit and what was found.
+/// One limit and the value found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LimitCheck {
-    /// What is limited.
+    /// The name of the limited value.
     pub name: &'static str,
-    /// The most that it may be.
+    /// The greatest allowed value.
     pub limit: f64,
-    /// What it was; NaN (null in JSON) where it is not known, because the publisher left no summary.
+    /// The value found; NaN (null in JSON) if it is not known, because the publisher left no summary.
     pub value: f64,
-    /// How both are to be read.
+    /// The unit of both.
     pub unit: Unit,
-    /// Whether the limit was kept.
+    /// True if the limit was kept.
     pub passed: bool,
 }
 
 impl LimitCheck {
     fn new(name: &'static str, unit: Unit, limit: f64, value: f64) -> Self {
-        // A value that is not known does not pass.
+        // An unknown value does not pass.
         Self { name, limit, value, unit, passed: value <= limit }
     }
 
-    /// A line for people.
+    /// Returns the check as a line of text.
     pub fn line(&self) -> String {
         let value = if self.value.is_nan() { "not known".to_owned() } else { self.unit.show(self.value) };
         let mark = if self.passed { "pass" } else { "FAIL" };
@@ -68,15 +68,15 @@ impl LimitCheck {
     }
 }
 
-/// All limits together.
+/// The checks of all limits.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Verdict {
-    /// Each of them.
+pub struct SoakVerdict {
+    /// The checks.
     pub checks: Vec<LimitCheck>,
 }
 
-impl Verdict {
-    /// The verdict on a fleet that has finished.
+impl SoakVerdict {
+    /// Returns the verdict on a fleet that has finished.
     pub fn of(fleet: &Fleet, limits: &Limits) -> Self {
         let steady: Vec<_> = fleet.members().iter().filter(|member| member.role == Role::Steady).collect();
         let of_all = |count: fn(&Observation) -> u64| {
@@ -101,7 +101,7 @@ impl Verdict {
                 of_summary(|summary| summary.wakeup_ns.p999 as f64),
             ),
         ];
-        // A test of less than a minute has not measured growth.
+        // A test of less than a minute does not measure growth.
         checks.extend(fleet.resident_growth().map(|growth| {
             let limit = limits.resident_growth_bytes as f64;
             LimitCheck::new("growth of resident memory after the first minute", Unit::Bytes, limit, growth as f64)
@@ -114,34 +114,34 @@ impl Verdict {
             count("processes that ended by themselves or hung", 0.0, lost(fleet)),
         ]);
         if let Some(conducting) = fleet.conducting() {
-            let of_conductor = |value: fn(&Conducted) -> u64| {
-                // Who sent nothing has tested nothing.
+            let of_load = |value: fn(&Conducted) -> u64| {
+                // Without commands nothing was tested.
                 let conducted = conducting.conducted().filter(|conducted| conducted.sent > 0);
                 conducted.map_or(f64::NAN, |conducted| value(conducted) as f64)
             };
             checks.extend([
                 count("frames that disobey the commands", 0.0, of_all(|seen| seen.disobedient)),
                 count("jumps of simulated time too many or too few", 0.0, wrong_jumps(&steady, conducting)),
-                count("answers that the command table does not allow", 0.0, of_conductor(|conducted| conducted.wrong)),
-                count("answers that their frames contradict", 0.0, of_conductor(|conducted| conducted.contradicted)),
-                count("commands that were not answered", 0.0, of_conductor(|conducted| conducted.lost)),
+                count("answers that the command table does not allow", 0.0, of_load(|conducted| conducted.wrong)),
+                count("answers that their frames contradict", 0.0, of_load(|conducted| conducted.contradicted)),
+                count("commands that were not answered", 0.0, of_load(|conducted| conducted.lost)),
             ]);
         }
         Self { checks }
     }
 
-    /// Whether every limit was kept.
+    /// Returns true if every limit was kept.
     pub fn passed(&self) -> bool {
         self.checks.iter().all(|check| check.passed)
     }
 
-    /// `PASS` or `FAIL`.
+    /// Returns `PASS` or `FAIL`.
     pub fn word(&self) -> &'static str {
         if self.passed() { "PASS" } else { "FAIL" }
     }
 }
 
-/// Frames that should have come and did not, those after the last one received included.
+/// Returns the number of frames that did not come, with those after the last received frame.
 fn missed(fleet: &Fleet, steady: &[&Member]) -> f64 {
     let Some(summary) = fleet.summary() else { return f64::NAN };
     let of = |member: &&Member| {
@@ -151,8 +151,9 @@ fn missed(fleet: &Fleet, steady: &[&Member]) -> f64 {
     steady.iter().map(of).sum::<u64>() as f64
 }
 
-/// Steady subscribers for whom the publisher's frames and skipped periods do not add up to the last tick they
-/// received, that saw more than one run, or that left more than a second's frames uncompared with the stage.
+/// Returns the number of steady subscribers that disagree with the publisher. Either frames and skipped periods do not
+/// add up to the last received tick, or there was more than one run, or more than a second's frames were not compared
+/// with the stage.
 fn disagreements(fleet: &Fleet, steady: &[&Member]) -> f64 {
     let Some(summary) = fleet.summary() else { return f64::NAN };
     let disagrees = |member: &&&Member| {
@@ -168,8 +169,8 @@ fn disagreements(fleet: &Fleet, steady: &[&Member]) -> f64 {
     steady.iter().filter(disagrees).count() as f64
 }
 
-/// By how many the jumps that steady subscribers counted differ from those that were commanded and those by which the
-/// show began again; not known where the last status did not come.
+/// Returns the difference between the jumps that steady subscribers counted and the expected jumps: those commanded and
+/// those by which the show began again. Unknown without the last status.
 fn wrong_jumps(steady: &[&Member], conducting: &Conducting) -> f64 {
     let Some(conducted) = conducting.conducted() else { return f64::NAN };
     let of = |member: &&Member| {

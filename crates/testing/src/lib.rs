@@ -1,4 +1,4 @@
-//! What tests of several crates share. The program contains none of it.
+//! Code that tests of several crates share. The program contains none of it.
 
 pub mod model;
 pub mod simulated;

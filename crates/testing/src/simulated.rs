@@ -1,4 +1,4 @@
-//! A clock for tests: sleeping advances it at once, and a script decides how late or how early each sleep ends.
+//! A clock for tests: a sleep advances it at once, and a script sets how late or how early each sleep ends.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -9,15 +9,15 @@ use bench_dragon_client::clock::Clock;
 /// CLOCK_REALTIME minus CLOCK_MONOTONIC of a simulated clock.
 pub const REALTIME_OFFSET_NS: u64 = 1_700_000_000_000_000_000;
 
-/// Sleeps after which a test has hung.
+/// The number of sleeps after which a test fails.
 const MOST_SLEEPS: u64 = 10_000_000;
 
-/// How a sleep ends.
+/// The end of a sleep.
 #[derive(Debug, Clone, Copy)]
 pub enum Wake {
-    /// So many nanoseconds after its deadline.
+    /// This number of nanoseconds after its deadline.
     Late(u64),
-    /// Before its deadline, as by a signal, after so many thousandths of the time until then.
+    /// Before its deadline, as by a signal, after this number of thousandths of the time until then.
     Early(u64),
 }
 
@@ -25,16 +25,16 @@ pub enum Wake {
 #[derive(Debug)]
 pub struct SimulatedClock {
     now_ns: Cell<u64>,
-    /// How the next sleeps end; once it is empty, all end on time.
+    /// The ends of the next sleeps; later sleeps end on time.
     wakes: RefCell<VecDeque<Wake>>,
     sleeps: Cell<u64>,
     stop_at_ns: u64,
-    /// Set once the clock has reached the moment given to [`SimulatedClock::stopping_at`].
+    /// Set when the clock reaches the moment given to [`SimulatedClock::stopping_at`].
     pub stop: AtomicBool,
 }
 
 impl SimulatedClock {
-    /// A clock at `now_ns`, whose sleeps end as `wakes` lists.
+    /// Creates a clock at `now_ns`, whose sleeps end as `wakes` lists.
     pub fn new(now_ns: u64, wakes: impl IntoIterator<Item = Wake>) -> Self {
         Self {
             now_ns: Cell::new(now_ns),
@@ -45,12 +45,12 @@ impl SimulatedClock {
         }
     }
 
-    /// The same clock, which sets its stop flag at a moment.
+    /// Returns the same clock, which sets its stop flag at a moment.
     pub fn stopping_at(self, stop_at_ns: u64) -> Self {
         Self { stop_at_ns, ..self }
     }
 
-    /// Lets time pass, as work does.
+    /// Advances the time, as work does.
     pub fn advance(&self, ns: u64) {
         self.now_ns.set(self.now_ns.get() + ns);
         if self.now_ns.get() >= self.stop_at_ns {

@@ -1,6 +1,6 @@
 //! The keys of `watch`: what a media player's keys do, done to the show.
 //!
-//! In: keys, and the answers of a [`Conductor`]. Out: lines for the screen. Nothing is sent without a key, and nothing
+//! In: keys, and the answers of a [`CommandClient`]. Out: lines for the screen. Nothing is sent without a key, and nothing
 //! here waits for an answer.
 
 use std::collections::VecDeque;
@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-use bench_dragon::client::control::conductor::{Action, Conducted, Conductor};
+use bench_dragon::client::control::command_client::{Action, ActionResult, CommandClient};
 use bench_dragon::client::control::{refusal, standing};
 use bench_dragon::client::feed::FeedEvent;
 use bench_dragon::messages::control::Command;
@@ -46,8 +46,8 @@ pub enum KeyOutcome {
 pub struct Keyboard {
     mode: Option<KeyMode>,
     terminal_is_gone: bool,
-    conductor: Conductor<()>,
-    answers: Receiver<Conducted>,
+    client: CommandClient<()>,
+    answers: Receiver<ActionResult>,
     waiting: VecDeque<Action>,
     /// Commands sent, holds aside, whose answer has not come: at most one, so that each key acts on what the one before
     /// it left.
@@ -76,13 +76,13 @@ impl Keyboard {
             .map_err(io::Error::from)?;
         let (sender, answers) = channel();
         // Nobody waits for an answer any more where the keyboard has gone.
-        let conductor = Conductor::start(name, move |(), conducted| drop(sender.send(conducted)))?;
+        let client = CommandClient::start(name, move |(), conducted| drop(sender.send(conducted)))?;
         let (waiting, unanswered, end) = (VecDeque::new(), 0, f64::INFINITY);
         let mode = KeyMode::enter();
         Ok(Self {
             mode,
             terminal_is_gone: false,
-            conductor,
+            client,
             answers,
             waiting,
             unanswered,
@@ -186,7 +186,7 @@ impl Keyboard {
     }
 
     fn send(&mut self, action: Action) -> Option<KeyOutcome> {
-        match self.conductor.request((), action) {
+        match self.client.request((), action) {
             Ok(()) => {
                 self.unanswered += 1;
                 None
@@ -195,7 +195,7 @@ impl Keyboard {
         }
     }
 
-    fn answered(&mut self, conducted: Conducted) -> KeyOutcome {
+    fn answered(&mut self, conducted: ActionResult) -> KeyOutcome {
         self.unanswered -= 1;
         let outcome = match conducted {
             Ok((command, response)) => match refusal(&response, command) {
@@ -213,7 +213,7 @@ impl Keyboard {
         if self.unanswered == 0
             && let Some(action) = self.waiting.pop_front()
         {
-            // A conductor with nothing to answer has room.
+            // A client that awaits no answer has room.
             let _ = self.send(action);
         }
         outcome

@@ -1,28 +1,28 @@
-//! Whether a publisher that sends no frames is silent or gone: when to test for it, and what follows. The caller brings
-//! the time and the test, so that nothing here waits. Called by the feed after every read.
+//! The liveness of a publisher that sends no frames: silent or gone. The caller passes the time and the test, so that
+//! nothing here waits. Called by the feed after every read.
 
 use std::time::{Duration, Instant};
 
-/// Without frames for this long, and this often from then on, it is tested whether the publisher is alive.
+/// The time without frames before the first test of the publisher, and the interval of the tests.
 const LIVENESS_INTERVAL: Duration = Duration::from_millis(200);
-/// The least time without frames after which a publisher that is alive is reported as silent.
+/// The least time without frames after which a live publisher is reported as silent.
 const SILENCE: Duration = Duration::from_millis(500);
-/// Periods without a frame after which it is, where they are longer than that.
+/// The same in periods of the publisher, if they are longer.
 const SILENT_PERIODS: f64 = 3.0;
 
 /// A connected publisher's liveness.
 #[derive(Debug, Clone, Copy)]
 pub struct Liveness {
-    /// When frames last came, or when the connection was made.
+    /// The time of the latest frames, or of the connection.
     last_frame: Instant,
     last_test: Instant,
     /// [`SILENCE`], or longer for a publisher of a low rate.
     silence: Duration,
-    /// Whether frames come, as far as has been reported.
+    /// True if frames come, as last reported.
     sending: bool,
 }
 
-/// What a test of the publisher has shown.
+/// The result of a test of the publisher.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
     /// It is alive and has stopped sending.
@@ -32,26 +32,26 @@ pub enum Change {
 }
 
 impl Liveness {
-    /// A publisher that was alive when the connection to it was made, at `now`.
+    /// Creates the liveness of a publisher that was connected to, alive, at `now`.
     pub fn connected_at(now: Instant) -> Self {
         Self { last_frame: now, last_test: now, silence: SILENCE, sending: false }
     }
 
-    /// Takes in that frames came.
+    /// Records that frames came.
     pub fn frame_at(&mut self, now: Instant) {
         self.last_frame = now;
         self.sending = true;
     }
 
-    /// Takes in the publisher's rate, in frames per second. One that is no rate changes nothing.
+    /// Sets the publisher's rate, in frames per second. An invalid rate changes nothing.
     pub fn rate(&mut self, rate: f64) {
         if let Ok(periods) = Duration::try_from_secs_f64(SILENT_PERIODS / rate) {
             self.silence = periods.max(SILENCE);
         }
     }
 
-    /// Tests the publisher with `is_alive` where that is due, and returns what has changed. A silence is reported once
-    /// after each time that frames came.
+    /// Tests the publisher with `is_alive` if a test is due, and returns the change. A silence is reported once, until
+    /// frames come again.
     pub fn test(&mut self, now: Instant, is_alive: impl FnOnce() -> bool) -> Option<Change> {
         let since = |then| now.saturating_duration_since(then);
         if since(self.last_frame) < LIVENESS_INTERVAL || since(self.last_test) < LIVENESS_INTERVAL {

@@ -1,4 +1,4 @@
-//! Gaps in the frames of a publisher, and where a new run begins. Pure; the feed calls it once for each frame.
+//! Gaps in the frames of a publisher, and the beginnings of runs. Pure; the feed calls it once for each frame.
 
 /// Follows the `sequence` of received frames, which counts a run's frames without gaps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -14,9 +14,9 @@ struct Latest {
 }
 
 impl SequenceTracker {
-    /// Takes in a frame. Returns the frames of its run that are missing between the latest one and this, or `None`
-    /// where it is the first received of a run. A frame that is not newer than the latest has no gap before it and
-    /// closes none.
+    /// Records a frame. Returns the number of frames missing between the latest frame of its run and this one, or
+    /// `None` for the first received frame of a run. A frame that is not newer than the latest has no gap before it and
+    /// closes no gap.
     pub fn advance(&mut self, run_id: u64, sequence: u64) -> Option<u64> {
         match &mut self.latest {
             Some(latest) if latest.run_id == run_id => {

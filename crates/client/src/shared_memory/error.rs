@@ -1,4 +1,4 @@
-//! What can go wrong with iceoryx2's services, each in one sentence that names a remedy.
+//! The errors of iceoryx2's services, each in one sentence that names a remedy.
 
 use ::iceoryx2::port::publisher::PublisherCreateError;
 use ::iceoryx2::prelude::ServiceName;
@@ -9,10 +9,10 @@ use ::iceoryx2::service::builder::publish_subscribe::{
 use super::MOST_PUBLISHERS;
 use super::memory::SHARED_MEMORY;
 
-/// Why the shared memory cannot be used.
+/// The reason why the shared memory cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// iceoryx2 has no services of such a name.
+    /// iceoryx2 refuses the name.
     #[error("the name is \"{name}\", expected a name for services of iceoryx2: not empty, at most {most} bytes")]
     Name {
         /// The name given.
@@ -20,7 +20,7 @@ pub enum OpenError {
         /// The most bytes a name may have.
         most: usize,
     },
-    /// Somebody publishes under this name already.
+    /// Another publisher runs under this name.
     #[error("another publisher is running under the name \"{0}\": stop it, or choose another name for this one")]
     AlreadyPublished(String),
     /// A service has as many publishers as it admits.
@@ -38,7 +38,7 @@ pub enum OpenError {
     NoRoom {
         /// Frames in a queue.
         queue: usize,
-        /// Subscribers that may come.
+        /// The most subscribers.
         subscribers: usize,
         /// Bytes needed.
         needed: u64,
@@ -47,20 +47,20 @@ pub enum OpenError {
     },
     /// A service stays incomplete.
     #[error(
-        "the service \"{0}\" is incomplete and nobody completes it: stop every program that uses it, or choose another \
+        "the service \"{0}\" is incomplete and no process completes it: stop every program that uses it, or choose another \
          name"
     )]
     Incomplete(String),
     /// There is no room even for bookkeeping.
-    #[error("{SHARED_MEMORY} has {free} bytes left, which is too little: remove what fills it, or make it larger")]
+    #[error("{SHARED_MEMORY} has {free} bytes left, which is too little: remove files from it, or make it larger")]
     Full {
         /// Bytes left.
         free: u64,
     },
     /// The services on this machine belong to another user.
     #[error(
-        "{folder} belongs to another user, who keeps all others out: run as that user, or build every program that is to \
-         take part with the feature any_user"
+        "{folder} belongs to another user and is closed to others: run as that user, or build all programs with the \
+         feature any_user"
     )]
     AnotherUsers {
         /// The folder that cannot be entered.
@@ -69,7 +69,7 @@ pub enum OpenError {
     /// A service of this name exists with other properties.
     #[error(
         "the service \"{0}\" exists with another layout of its messages, or with other limits: a program of another \
-         version of bench-dragon has it open; stop that or take the same version for both, or choose another \
+         version of bench-dragon has it open; stop that program, use the same version for both, or choose another \
          name"
     )]
     Incompatible(String),
@@ -80,16 +80,16 @@ pub enum OpenError {
          another name"
     )]
     OtherAttributes(String),
-    /// A program has opened a service before its publisher, with limits of its own.
+    /// A program has opened a service before its publisher, with other limits.
     #[error(
         "the service \"{0}\" exists with lower limits than this scene asks for: a program that was started before the show \
-         has made it, such as a tunnel that listens to it; start that after the show"
+         has created it, such as a tunnel; start that program after the show"
     )]
     OtherLimits(String),
     /// The service admits no more subscribers.
     #[error(
         "\"{service}\" has {most} subscribers, which is as many as its publisher admits (publish.subscribers in its \
-         scene): end one first, or raise that and start the publisher again"
+         scene): end one first, or raise the limit and restart the publisher"
     )]
     TooManySubscribers {
         /// The service.
@@ -102,12 +102,12 @@ pub enum OpenError {
     Failed {
         /// The service.
         service: String,
-        /// What iceoryx2 reports.
+        /// The error of iceoryx2.
         reason: String,
     },
 }
 
-/// Returns why a service of messages cannot be opened.
+/// Returns the error of a service that cannot be opened.
 pub fn service_error(service: &ServiceName, error: PublishSubscribeOpenOrCreateError) -> OpenError {
     use PublishSubscribeOpenError as Open;
     if matches!(error, PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(Open::HangsInCreation)) {
@@ -133,7 +133,7 @@ pub fn service_error(service: &ServiceName, error: PublishSubscribeOpenOrCreateE
     }
 }
 
-/// Returns why a publisher's port cannot be made.
+/// Returns the error of a publisher's port that cannot be created.
 pub fn port_error(name: &str, service: &str, error: PublisherCreateError) -> OpenError {
     match error {
         PublisherCreateError::ExceedsMaxSupportedPublishers => {
@@ -143,12 +143,12 @@ pub fn port_error(name: &str, service: &str, error: PublisherCreateError) -> Ope
     }
 }
 
-/// Returns the error of a service whose maker has not finished it.
+/// Returns the error of a service whose creator has not finished it.
 pub fn incomplete(name: &str, service: &str) -> OpenError {
     OpenError::Incomplete(format!("{name}/{service}"))
 }
 
-/// Returns the error that has no remedy of its own.
+/// Returns the error without a specific remedy.
 pub fn failed(name: &str, service: &str, error: impl std::fmt::Debug) -> OpenError {
     OpenError::Failed { service: format!("{name}/{service}"), reason: format!("{error:?}") }
 }

@@ -1,16 +1,16 @@
-//! The shared memory itself: what is left of it, and pages reserved before they are written.
+//! The shared memory itself: its free bytes, and pages reserved before they are written.
 
 use std::collections::BTreeSet;
 use std::fs::OpenOptions;
 
 use super::error::OpenError;
 
-/// Where Linux keeps shared memory.
+/// The folder of Linux for shared memory.
 pub const SHARED_MEMORY: &str = "/dev/shm";
-/// What a subscriber needs of it for its own bookkeeping, and more.
+/// Bytes that a subscriber needs for its bookkeeping, with a margin.
 const SUBSCRIBER_BYTES: u64 = 500_000;
 
-/// Refuses to subscribe where the shared memory is as good as full.
+/// Refuses to subscribe if the shared memory is almost full.
 ///
 /// # Errors
 /// [`OpenError::Full`].
@@ -21,17 +21,17 @@ pub fn check_room_to_subscribe() -> Result<(), OpenError> {
     }
 }
 
-/// What is left of the shared memory; `None` where there is no such folder: iceoryx2 itself will report what is wrong.
+/// Returns the free bytes of the shared memory; `None` if the folder does not exist: iceoryx2 will report this error.
 pub fn free_bytes() -> Option<u64> {
     let space = nix::sys::statvfs::statvfs(SHARED_MEMORY).ok()?;
     Some(space.blocks_available() * space.fragment_size())
 }
 
-/// Has the system set aside every page of the shared memory that this process has mapped. Without this a page is looked
-/// for when it is first written, and should others have filled the memory by then, the process is killed with SIGBUS.
+/// Reserves every page of the shared memory that this process has mapped. Otherwise the system allocates a page at its
+/// first write, and kills the process with SIGBUS if the memory is full by then.
 ///
 /// # Errors
-/// [`OpenError::Full`] where the pages are not there.
+/// [`OpenError::Full`] if there are not enough pages.
 pub fn reserve_pages() -> Result<(), OpenError> {
     let full = || OpenError::Full { free: free_bytes().unwrap_or(0) };
     // Linux has this file for every process.

@@ -1,13 +1,14 @@
-//! What processes leave that were killed while they were starting. iceoryx2 cleans up after killed processes whenever a
-//! node is made or dropped, but 0.10.0 stumbles over files that such a process had not finished:
+//! Stale files of processes that were killed during their start. iceoryx2 cleans up after killed processes whenever a
+//! node is created or dropped, but 0.10.0 fails at files that such a process had not finished:
 //!
-//! - in a node's folder: it cannot remove the folder, gives the whole dead node up, and tries again in vain each time;
-//! - in shared memory: it waits for ever for somebody to finish the file, and so does the program that made the node;
+//! - in a node's folder: it cannot remove the folder, leaves the whole dead node, and fails again each time;
+//! - in shared memory: it waits without end for the file to be finished, and so does the program that created the node;
 //! - among the services: every later attempt to open that service fails.
 //!
-//! Whoever makes a node calls [`remove_unfinished_files`] before, and [`spawn_reaper`] on a thread that is not real-time.
-//! Whether a file is unfinished shows in its mode, which its maker sets last. One that is still being made is left alone,
-//! however long that takes: on a busy disk it takes seconds, since iceoryx2 has files of nodes and services synced.
+//! A program that creates a node calls [`remove_unfinished_files`] before, and [`spawn_reaper`] on a thread that is not
+//! real-time. The mode of a file shows that it is unfinished: its creator sets the mode last. A file that is still
+//! being created is left alone. On a busy disk this takes seconds, since iceoryx2 syncs the files of nodes and
+//! services.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -25,20 +26,20 @@ use super::memory::SHARED_MEMORY;
 const UNFINISHED: u32 = 0o600;
 /// The mode of an unfinished file in shared memory.
 const UNFINISHED_MEMORY: u32 = 0o200;
-/// How long a file has to have been unfinished. Making one in memory takes less than a thousandth of this.
+/// The time after which an unfinished file is stale. Creating a file in memory takes less than a thousandth of this.
 const LONGEST_MAKING: Duration = Duration::from_secs(2);
-/// How often [`spawn_reaper`] looks.
+/// The interval of [`spawn_reaper`].
 const INTERVAL: Duration = Duration::from_millis(500);
 
-/// Whether a listed node's process is there.
+/// The state of a listed node's process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Life {
     Dead,
     NotKnownDead,
 }
 
-/// Removes unfinished files of dead nodes, so that iceoryx2 can remove the rest, and nodes that never came to be listed.
-/// What cannot be removed stays.
+/// Removes unfinished files of dead nodes, so that iceoryx2 can remove the rest, and nodes that were never listed.
+/// Files that cannot be removed stay.
 pub fn remove_unfinished_files() {
     let config = Config::global_config();
     let mut nodes = BTreeMap::new();
@@ -55,7 +56,7 @@ pub fn remove_unfinished_files() {
         let id = folder.file_name().unwrap_or_default().to_string_lossy();
         match nodes.get(id.as_ref()) {
             Some(Life::Dead) => remove_all(with_mode(folder, UNFINISHED)),
-            // Killed before it was listed: nobody else knows of it.
+            // Its process was killed before the node was listed: no other program removes it.
             None if is_old(folder) && !entries(folder).iter().any(|file| is_being_written(file)) => {
                 let monitor = format!("{}{id}.", config.global.prefix);
                 let its_own =
@@ -68,7 +69,7 @@ pub fn remove_unfinished_files() {
     }
 }
 
-/// Has a thread of this process remove unfinished shared memory and services of killed processes from now on.
+/// Starts a thread that removes unfinished shared memory and services of killed processes.
 pub fn spawn_reaper() {
     static STARTED: Once = Once::new();
     STARTED.call_once(|| {
@@ -82,8 +83,8 @@ pub fn spawn_reaper() {
     });
 }
 
-/// Removes files that have been unfinished for long; `seen` remembers since when, so that no clock of a file system
-/// matters.
+/// Removes files that have been unfinished for long; `seen` has the time since when, independent of the file system's
+/// clock.
 fn remove_what_stays_unfinished(seen: &mut BTreeMap<PathBuf, Instant>) {
     let config = Config::global_config();
     let prefix = config.global.prefix.to_string();
@@ -95,7 +96,7 @@ fn remove_what_stays_unfinished(seen: &mut BTreeMap<PathBuf, Instant>) {
     let (now, mut old) = (Instant::now(), Vec::new());
     for file in unfinished {
         let since = *seen.entry(file.clone()).or_insert(now);
-        // Memory is never synced, and who waits for it to be finished may have it open for writing too.
+        // Memory is never synced, and processes that wait for the file may have it open for writing too.
         if now - since >= LONGEST_MAKING && (file.starts_with(SHARED_MEMORY) || !is_being_written(&file)) {
             old.push(file);
         }
@@ -107,15 +108,15 @@ fn entries(folder: &Path) -> Vec<PathBuf> {
     fs::read_dir(folder).map_or_else(|_| Vec::new(), |entries| entries.flatten().map(|entry| entry.path()).collect())
 }
 
-/// The files in a folder that have this mode.
+/// Returns the files of this mode in a folder.
 fn with_mode(folder: &Path, mode: u32) -> Vec<PathBuf> {
     let has_mode =
         |file: &PathBuf| file.metadata().is_ok_and(|of| of.is_file() && of.permissions().mode() & 0o777 == mode);
     entries(folder).into_iter().filter(has_mode).collect()
 }
 
-/// Whether a process has a file open for writing, as its maker has until it is finished; others open it to read. Processes
-/// of other users are not seen, unless by root.
+/// Returns true if a process has a file open for writing, as its creator has until the file is finished; others open it
+/// to read. Only root sees the processes of other users.
 fn is_being_written(file: &Path) -> bool {
     let identity = |file: &Path| file.metadata().map(|of| (of.dev(), of.ino())).ok();
     let Some(file) = identity(file) else { return false };
@@ -126,11 +127,11 @@ fn is_being_written(file: &Path) -> bool {
 }
 
 fn remove_all(files: Vec<PathBuf>) {
-    // Somebody else may have been quicker.
+    // Another process may have removed it first.
     files.iter().for_each(|file| drop(fs::remove_file(file)));
 }
 
-/// Whether nothing has changed in a folder for long.
+/// Returns true if nothing has changed in a folder for long.
 fn is_old(folder: &Path) -> bool {
     let changed = folder.metadata().and_then(|of| of.modified());
     let is_old = |elapsed: Duration| elapsed > LONGEST_MAKING;
@@ -142,7 +143,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_node_that_is_not_listed_yet_stays_while_somebody_makes_it() {
+    fn a_node_that_is_not_listed_yet_stays_while_a_process_makes_it() {
         // This makes the folder of all nodes, as iceoryx2 has it.
         let _node = super::super::node().unwrap();
         let nodes = Config::global_config().global.node_dir().to_string();

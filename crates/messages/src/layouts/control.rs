@@ -30,11 +30,11 @@ pub struct Cue {
     pub stamp_ns: u64,
     /// Simulated seconds of that frame.
     pub sim_time: f64,
-    /// Simulated seconds at which the cue is.
+    /// Simulated seconds of the cue itself.
     pub cue_time: f64,
     /// Its number, from 1 in the order of the cues' times.
     pub number: u32,
-    /// 1 where the show waits there until the command `go`, else 0.
+    /// 1 if the show waits there until the command `go`, else 0.
     pub pauses: u32,
     /// Its name.
     pub name: SceneName,
@@ -57,7 +57,7 @@ pub struct Cue {
 #[type_name("bench_dragon/ControlRequest/1")]
 #[repr(C)]
 pub struct ControlRequest {
-    /// Any number of the client's; the response repeats it.
+    /// A number that the client chooses; the response repeats it.
     pub id: u64,
     /// The value of a command that has one: simulated seconds per second, simulated seconds, or periods.
     pub value: f64,
@@ -67,7 +67,7 @@ pub struct ControlRequest {
     pub reserved: u32,
 }
 
-/// What became of a command. Response of `<name>/control`.
+/// The result of a command. Response of `<name>/control`.
 ///
 /// # Examples
 ///
@@ -84,9 +84,9 @@ pub struct ControlRequest {
 #[type_name("bench_dragon/ControlResponse/1")]
 #[repr(C)]
 pub struct ControlResponse {
-    /// That of the request.
+    /// The id of the request.
     pub id: u64,
-    /// The period at whose beginning the command was obeyed.
+    /// The period at whose beginning the command was executed.
     pub tick: u64,
     /// Simulated seconds of that period.
     pub sim_time: f64,
@@ -94,9 +94,9 @@ pub struct ControlResponse {
     pub time_scale: f64,
     /// 0 done, 1 already so, 2 refused in this state, 3 value out of range, 4 not understood, 5 too many waiting.
     pub code: u32,
-    /// Whether simulated time advances, as in [`FrameHeader::playback`](super::FrameHeader::playback).
+    /// The playback state, as in [`FrameHeader::playback`](super::FrameHeader::playback).
     pub playback: u32,
-    /// The latest cue passed, from 1; 0 where none has been.
+    /// The latest cue passed, from 1; 0 before the first cue.
     pub cue: u32,
     /// Always 0.
     pub reserved: u32,

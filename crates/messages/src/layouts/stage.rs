@@ -23,28 +23,29 @@ pub const SEGMENT_OUTWARD_SPIRAL: u32 = 3;
 #[type_name("bench_dragon/StageSegment/3")]
 #[repr(C)]
 pub struct StageSegment {
-    /// Where it begins, metres right of the centre.
+    /// Its beginning, metres right of the centre.
     pub x: f64,
-    /// Where it begins, metres up from the centre.
+    /// Its beginning, metres up from the centre.
     pub y: f64,
-    /// Direction of travel there, radians counter-clockwise from x.
+    /// Direction of travel at its beginning, radians counter-clockwise from x.
     pub heading: f64,
     /// Metres along it.
     pub length: f64,
-    /// Of an arc, 1/m, positive where it turns left; of a line 0; of a spiral NaN.
+    /// Of an arc, 1/m, positive if it turns left; of a line 0; of a spiral NaN.
     pub curvature: f64,
     /// Of a spiral, the polar angle at which it begins, radians (for an outward one: before it is turned); else NaN.
     pub theta_first: f64,
     /// Of a spiral, the polar angle at which it ends, radians; else NaN.
     pub theta_last: f64,
-    /// Which curve it is: one of [`SEGMENT_*`](SEGMENT_LINE).
+    /// The kind of curve: one of [`SEGMENT_*`](SEGMENT_LINE).
     pub kind: u32,
     /// Always 0.
     pub reserved: u32,
 }
 
 impl StageSegment {
-    /// The name of its kind: `line`, `arc`, `inward_spiral`, `outward_spiral`, or `unknown` for a later layout's.
+    /// Returns the name of its kind: `line`, `arc`, `inward_spiral`, `outward_spiral`, or `unknown` for a later
+    /// layout's.
     pub fn kind_name(&self) -> &'static str {
         match self.kind {
             SEGMENT_LINE => "line",
@@ -76,7 +77,7 @@ pub fn hexadecimal(hash: &[u8]) -> String {
 pub struct StageEvent {
     /// Simulated seconds at which it happens.
     pub time: f64,
-    /// What happens, as the state that it leads to: one of [`FrameState`](crate::state::FrameState).
+    /// The event, as the state that it leads to: one of [`FrameState`](crate::state::FrameState).
     pub state: u32,
     /// Always 0.
     pub reserved: u32,
@@ -87,20 +88,20 @@ pub struct StageEvent {
 #[type_name("bench_dragon/StageCue/4")]
 #[repr(C)]
 pub struct StageCue {
-    /// Simulated seconds at which it is.
+    /// Simulated seconds of the cue.
     pub time: f64,
     /// Its number, from 1 in the order of the cues' times.
     pub number: u32,
-    /// 1 where the show waits there until the command `go`, else 0.
+    /// 1 if the show waits there until the command `go`, else 0.
     pub pauses: u32,
     /// Its name.
     pub name: SceneName,
 }
 
-/// What a subscriber needs to draw the stage and its time line. Sent at the start and kept for late joiners.
+/// The geometry and the time line of a show, for drawing them. Sent at the start and kept for late joiners.
 ///
-/// The head's board has a length of its own; all that follow have one length. The team may stand further back than the
-/// first segment begins, on the same spiral or line.
+/// The head's board and the other boards can differ in length. The team may stand further back than the first segment
+/// begins, on the same spiral or line.
 ///
 /// Over iceoryx2 the payload of `<name>/stage`. Layout 2 added the segments of the path, layout 3 gave them their name,
 /// layout 4 added the time line: the freeze time, the events and the cues, layout 5 the hash of the scene's text.
@@ -128,9 +129,9 @@ pub struct Stage {
     pub run_id: u64,
     /// CLOCK_REALTIME in nanoseconds when this was written.
     pub stamp_ns: u64,
-    /// Metres per turn of the spiral or spirals; NaN where the path has none.
+    /// Metres per turn of the spiral or spirals; NaN if the path has none.
     pub pitch: f64,
-    /// The turn on which the head starts (theta = 2 pi start_turn); NaN where it does not start on a spiral.
+    /// The turn on which the head starts (theta = 2 pi start_turn); NaN if it does not start on a spiral.
     pub start_turn: f64,
     /// Metres from the centre of a handle's hole to the nearest end of the board.
     pub hole_inset: f64,
@@ -150,8 +151,8 @@ pub struct Stage {
     pub events: u32,
     /// The number of cues in the show; the first [`MOST_CUES`] of them are listed.
     pub cues: u32,
-    /// BLAKE3 of the scene's text, as `verify` prints it of a certificate: what is proved of that text is true of this
-    /// show. All zero where it is not known.
+    /// BLAKE3 of the scene's text, as `verify` prints it of a certificate: the proofs of that text hold for this show.
+    /// All zero if it is not known.
     pub scene_hash: [u8; SCENE_HASH_BYTES],
     /// The segments of the path in the order of travel; those not in use are zero.
     pub path: [StageSegment; MOST_SEGMENTS],
@@ -162,23 +163,23 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// The segments of the path that are in use.
+    /// Returns the segments of the path that are in use.
     pub fn path_in_use(&self) -> &[StageSegment] {
         &self.path[..(self.segments as usize).min(MOST_SEGMENTS)]
     }
 
-    /// The hash of the scene's text in hexadecimal digits; `None` where it is not known.
+    /// Returns the hash of the scene's text in hexadecimal digits; `None` if it is not known.
     pub fn scene_hash_digits(&self) -> Option<String> {
         let is_known = self.scene_hash.iter().any(|byte| *byte != 0);
         is_known.then(|| hexadecimal(&self.scene_hash))
     }
 
-    /// The events that are in use.
+    /// Returns the events that are in use.
     pub fn events_in_use(&self) -> &[StageEvent] {
         &self.timeline[..(self.events as usize).min(MOST_EVENTS)]
     }
 
-    /// The cues that are listed.
+    /// Returns the cues that are listed.
     pub fn cues_in_use(&self) -> &[StageCue] {
         &self.cue_list[..(self.cues as usize).min(MOST_CUES)]
     }

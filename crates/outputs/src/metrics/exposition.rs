@@ -1,33 +1,33 @@
-//! Metrics as text, in the two formats that Prometheus reads: OpenMetrics 1.0 and its own, 0.0.4. In: families of samples.
-//! Out: text. Pure.
+//! Metrics as text, in the two formats that Prometheus reads: OpenMetrics 1.0 and Prometheus 0.0.4. In: families of
+//! samples. Out: text. Pure.
 
 use std::fmt::Write;
 
-/// What kind of figures a family holds.
+/// The kind of the figures in a family.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// One that goes up and down.
+    /// A value that rises and falls.
     Gauge,
-    /// One that only grows, or begins at 0 again. Its samples' name ends in `_total`.
+    /// A value that only grows, or restarts at 0. The name of its samples ends in `_total`.
     Counter,
     /// Quantiles, each with the label `quantile`.
     Summary,
-    /// Always 1; its labels are what matters. Its samples' name ends in `_info`.
+    /// Always 1; the labels hold the information. The name of its samples ends in `_info`.
     Info,
 }
 
 /// Samples of one name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Family {
-    /// The name without `_total` or `_info`; it ends in the unit where there is one.
+    /// The name without `_total` or `_info`; it ends in the unit, if there is one.
     pub name: &'static str,
-    /// What kind they are.
+    /// Their kind.
     pub kind: Kind,
     /// The unit, as Prometheus writes units.
     pub unit: Option<&'static str>,
-    /// What they are, in one sentence.
+    /// Their meaning, in one sentence.
     pub help: &'static str,
-    /// Each with its labels.
+    /// The samples, each with its labels.
     pub samples: Vec<(Vec<(&'static str, String)>, f64)>,
 }
 
@@ -41,12 +41,12 @@ pub enum Format {
 }
 
 impl Format {
-    /// The one that a request asks for by its header `Accept`.
+    /// Returns the format that a request prefers by its header `Accept`.
     pub fn accepted(accept: &str) -> Self {
         if accept.contains("application/openmetrics-text") { Self::OpenMetrics } else { Self::Prometheus }
     }
 
-    /// The type of the text, for the header `Content-Type`.
+    /// Returns the type of the text, for the header `Content-Type`.
     pub fn content_type(self) -> &'static str {
         match self {
             Self::OpenMetrics => "application/openmetrics-text; version=1.0.0; charset=utf-8",
@@ -55,7 +55,7 @@ impl Format {
     }
 }
 
-/// The families as text. Those without samples are left out.
+/// Returns the families as text, without those that have no samples.
 pub fn render(families: &[Family], format: Format) -> String {
     let mut text = String::new();
     for family in families.iter().filter(|family| !family.samples.is_empty()) {
@@ -82,7 +82,7 @@ fn write_family(text: &mut String, family: &Family, format: Format) {
     let sample_name = format!("{}{suffix}", family.name);
     // OpenMetrics describes the family, the other format its samples.
     let name = if format == Format::OpenMetrics { family.name } else { &sample_name };
-    // A String takes whatever is written to it.
+    // Writing to a String cannot fail.
     let mut line = |line: String| text.push_str(&line);
     line(format!("# TYPE {name} {kind}\n"));
     if let Some(unit) = family.unit.filter(|_| format == Format::OpenMetrics) {

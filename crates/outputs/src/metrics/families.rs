@@ -1,16 +1,16 @@
-//! Which figures are served, under which names. In: what a [`Monitor`](crate::monitor::Monitor) knows. Out:
-//! families of samples. Pure.
+//! The figures that are served, and their names. In: the report of a [`Monitor`](crate::monitor::Monitor).
+//! Out: families of samples. Pure.
 //!
-//! Names and units follow Prometheus ("Metric and label naming"): seconds, bytes, metres, `_total` for what is counted.
-//! Every sample has the publisher's name as its label `name`; the run is a label of one of them only, since each new value
-//! of a label makes a new series.
+//! Names and units follow Prometheus ("Metric and label naming"): seconds, bytes, metres, `_total` for counts. Every
+//! sample has the publisher's name as its label `name`. Only one sample has the run as a label, since each new value of
+//! a label makes a new series.
 
 use super::exposition::{Family, Kind};
 use crate::monitor::{IntervalReport, Presence};
 use bench_dragon_messages::state::{FrameState, PlaybackState};
 use bench_dragon_messages::{CollisionAlert, FrameHeader, LoopStatus};
 
-/// All families of the publisher `name`. Those of a publisher that is not there have no samples.
+/// Returns all families of the publisher `name`. Without a running publisher most of them have no samples.
 pub fn families(name: &str, report: &IntervalReport) -> Vec<Family> {
     let families = Families { name };
     let mut all = families.of_this_process(report);
@@ -26,7 +26,7 @@ pub fn families(name: &str, report: &IntervalReport) -> Vec<Family> {
     all
 }
 
-/// The families of several publishers as one list, in which each family stands once with the samples of all.
+/// Returns the families of several publishers as one list: each family once, with the samples of all publishers.
 pub fn joined(publishers: impl IntoIterator<Item = Vec<Family>>) -> Vec<Family> {
     let mut all: Vec<Family> = Vec::new();
     for family in publishers.into_iter().flatten() {
@@ -48,7 +48,7 @@ impl Families<'_> {
         [("name", self.name.to_owned())].into_iter().chain(further).collect()
     }
 
-    /// A family of one sample.
+    /// Returns a family of one sample.
     fn one(
         &self,
         name: &'static str,
@@ -68,7 +68,7 @@ impl Families<'_> {
         self.one(name, Kind::Gauge, None, help, value)
     }
 
-    /// One sample for each of several states, 1 for the one that holds.
+    /// Returns one sample for each of several states, 1 for the present state.
     fn states<'a>(
         &self,
         name: &'static str,
@@ -136,14 +136,14 @@ impl Families<'_> {
             ),
             self.count(
                 "bench_dragon_unsolved_frames",
-                "Frames without a solution, which repeated the one before.",
+                "Frames without a solution, which repeated the frame before.",
                 status.unsolved_frames,
             ),
             self.one(
                 "bench_dragon_requested_rate_hertz",
                 Kind::Gauge,
                 Some("hertz"),
-                "The rate that was asked for.",
+                "The requested rate.",
                 status.rate,
             ),
             self.one(
@@ -155,7 +155,7 @@ impl Families<'_> {
             ),
             self.summary(
                 "bench_dragon_wakeup_lateness_seconds",
-                "How late the loop woke, in the last second and in the whole run; quantile 1 is the maximum.",
+                "Wake-up lateness of the loop, in the last second and in the whole run; quantile 1 is the maximum.",
                 [status.lateness_p50_second, status.lateness_p99_second, status.lateness_max_second],
                 [
                     status.lateness_p50_total,
@@ -166,7 +166,7 @@ impl Families<'_> {
             ),
             self.summary(
                 "bench_dragon_step_seconds",
-                "What a step of the loop cost, in the last second and in the whole run; quantile 1 is the maximum.",
+                "Cost of a step of the loop, in the last second and in the whole run; quantile 1 is the maximum.",
                 [status.step_p50_second, status.step_p99_second, status.step_max_second],
                 [status.step_p50_total, status.step_p99_total, status.step_p999_total, status.step_max_total],
             ),
@@ -190,7 +190,7 @@ impl Families<'_> {
         ]
     }
 
-    /// Nanoseconds as quantiles: 0.5, 0.99, 1 of the last second; 0.5, 0.99, 0.999, 1 of the run.
+    /// Returns nanoseconds as quantiles: 0.5, 0.99, 1 of the last second; 0.5, 0.99, 0.999, 1 of the run.
     fn summary(&self, name: &'static str, help: &'static str, second: [u64; 3], run: [u64; 4]) -> Family {
         let sample =
             |window, quantile, ns: u64| (self.labels(&[("window", window), ("quantile", quantile)]), ns as f64 / 1e9);
@@ -217,13 +217,13 @@ impl Families<'_> {
             ),
             self.states(
                 "bench_dragon_state",
-                "What the dragon is doing: 1 for the present state.",
+                "State of the dragon: 1 for the present state.",
                 FrameState::ALL.into_iter().map(FrameState::name),
                 state,
             ),
             self.states(
                 "bench_dragon_playback",
-                "Whether simulated time advances: 1 for the present state.",
+                "Playback state: 1 for the present state.",
                 PlaybackState::ALL.into_iter().map(PlaybackState::name),
                 playback,
             ),
@@ -233,7 +233,7 @@ impl Families<'_> {
                 "bench_dragon_clearance_meters",
                 Kind::Gauge,
                 Some("meters"),
-                "Distance of the nearest two boards that share no handle, negative where they overlap.",
+                "Distance of the nearest two boards that share no handle, negative if they overlap.",
                 header.min_clearance,
             ));
         }

@@ -1,14 +1,15 @@
-//! From the stage's axes to a receiver's. In: what a person chose. Out: vectors and rotations in those axes. Pure.
+//! From the stage's axes to a receiver's. In: the axes that a user chose. Out: vectors and rotations in those axes.
+//! Pure.
 
 use std::str::FromStr;
 
-/// The stage's axes in the order in which a vector has them: x to the right, y into the depth, and up.
+/// The stage's axes in the order of a vector's components: x to the right, y into the depth, and up.
 const NAMES: [&str; 3] = ["x", "y", "up"];
 
-/// Which of the stage's axes is the receiver's first, second and third, each perhaps reversed.
+/// The stage's axes that are the receiver's first, second and third axis, each perhaps reversed.
 ///
-/// The stage's own are right-handed, seen from above as on paper: x to the right, y away from the audience, up towards the
-/// reader. Those that PosiStageNet states (x right, y up, z depth) are `x,up,y`, which is the default.
+/// The stage's own are right-handed, seen from above as on paper: x to the right, y away from the audience, up towards
+/// the reader. The axes of PosiStageNet (x right, y up, z depth) are `x,up,y`, the default.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axes([Axis; 3]);
 
@@ -26,24 +27,24 @@ impl Default for Axes {
 }
 
 impl Axes {
-    /// A vector of the stage (x, y, up) in the receiver's axes.
+    /// Returns a vector of the stage (x, y, up) in the receiver's axes.
     pub fn vector(&self, of_stage: [f64; 3]) -> [f64; 3] {
         self.0.map(|axis| match axis.sign * of_stage[axis.of_stage] {
-            // Zero has no sign, for people who read it on a desk.
+            // A desk would show the sign of a negative zero.
             0.0 => 0.0,
             value => value,
         })
     }
 
-    /// A turn by `heading` radians from x towards y as axis times angle, in the receiver's axes. There, as everywhere, a
-    /// positive turn about the first axis is from the second towards the third, so that axes of the other handedness
-    /// reverse it.
+    /// Returns a turn by `heading` radians from x towards y as axis times angle, in the receiver's axes. There, as
+    /// everywhere, a positive turn about the first axis is from the second towards the third, so that axes of the other
+    /// handedness reverse it.
     pub fn rotation(&self, heading: f64) -> [f64; 3] {
         let sign = self.handedness();
         self.vector([0.0, 0.0, sign * heading])
     }
 
-    /// 1 for axes that are right-handed, as the stage's are; -1 for left-handed ones.
+    /// Returns 1 for right-handed axes, as the stage's, and -1 for left-handed axes.
     fn handedness(&self) -> f64 {
         let [first, second, third] = self.0;
         let cyclic = (first.of_stage + 1) % 3 == second.of_stage;
@@ -51,7 +52,7 @@ impl Axes {
         if cyclic { signs } else { -signs }
     }
 
-    /// Whether they are right-handed.
+    /// Returns true if the axes are right-handed.
     pub fn are_right_handed(&self) -> bool {
         self.handedness() > 0.0
     }

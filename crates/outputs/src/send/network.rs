@@ -1,32 +1,34 @@
-//! Where datagrams go, over UDP and IPv4. In: bytes. Out: datagrams, and a line in the log when a network goes or comes.
+//! Datagrams over UDP and IPv4. In: bytes. Out: datagrams, and a line in the log when a destination fails or works
+//! again.
 //!
-//! A receiver that is gone costs nothing: the socket is not connected, so that no answer of its machine reaches it.
+//! A receiver that is gone costs nothing: the socket is not connected, so that no error of the receiver's machine
+//! reaches it.
 
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, ToSocketAddrs, UdpSocket};
 
 use socket2::{Domain, Protocol, Socket, Type};
 
-/// How datagrams leave this machine.
+/// The route of datagrams out of this machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Route {
     /// The address of the interface by which they leave; `None` leaves it to the machine's routes.
     pub interface: Option<Ipv4Addr>,
-    /// Over how many routers multicast datagrams may go, plus one.
+    /// The most routers on the way of a multicast datagram, plus one.
     pub multicast_ttl: u32,
 }
 
-/// Why datagrams cannot be sent at all.
+/// The reason why no datagram can be sent.
 #[derive(Debug, thiserror::Error)]
 pub enum NetworkError {
     /// The interface is not of this machine.
     #[error("no interface of this machine has the address {0}, expected one that `ip -4 address` lists")]
     Interface(Ipv4Addr),
-    /// There is no socket to be had.
+    /// No socket can be opened.
     #[error("no UDP socket can be opened: {0}")]
     Socket(#[from] std::io::Error),
 }
 
-/// A socket that datagrams leave by.
+/// A socket for datagrams.
 #[derive(Debug)]
 pub struct Outlet {
     socket: UdpSocket,
@@ -38,12 +40,12 @@ pub struct Outlet {
 #[derive(Debug)]
 struct Destination {
     address: SocketAddrV4,
-    /// Whether the latest datagram could not be sent.
+    /// True if the latest datagram was not sent.
     failing: bool,
 }
 
 impl Outlet {
-    /// A socket for all of these destinations.
+    /// Opens a socket for all of these destinations.
     ///
     /// # Errors
     /// [`NetworkError`] for an interface that is not of this machine.
@@ -60,7 +62,7 @@ impl Outlet {
             socket.set_multicast_if_v4(&interface)?;
         }
         socket.set_multicast_ttl_v4(route.multicast_ttl)?;
-        // A receiver on this very machine is one too.
+        // A receiver may run on this machine.
         socket.set_multicast_loop_v4(true)?;
         socket.set_broadcast(true)?;
         let destinations =
@@ -68,15 +70,14 @@ impl Outlet {
         Ok(Self { socket: socket.into(), destinations, sent: 0, unsent: 0 })
     }
 
-    /// Sends a datagram to every destination. One that cannot be sent is counted; the log says so when that begins and
-    /// when it ends.
+    /// Sends a datagram to every destination. Counts failures; the log has the first failure and its end.
     pub fn send(&mut self, datagram: &[u8]) {
         for destination in &mut self.destinations {
             let address = destination.address;
             let failure = self.socket.send_to(datagram, address).err();
             match (&failure, destination.failing) {
-                (Some(error), false) => log::warn!("nothing can be sent to {address} ({error}); it is tried on"),
-                (None, true) => log::warn!("{address} can be sent to again"),
+                (Some(error), false) => log::warn!("cannot send to {address} ({error}); sending is tried again"),
+                (None, true) => log::warn!("sending to {address} works again"),
                 _ => (),
             }
             destination.failing = failure.is_some();
@@ -84,21 +85,21 @@ impl Outlet {
         }
     }
 
-    /// Datagrams sent so far, to all destinations together.
+    /// Returns the number of datagrams sent so far, to all destinations together.
     pub fn sent(&self) -> u64 {
         self.sent
     }
 
-    /// Datagrams that could not be sent.
+    /// Returns the number of datagrams that could not be sent.
     pub fn unsent(&self) -> u64 {
         self.unsent
     }
 }
 
-/// The address that a person gives as `HOST:PORT`, or `HOST` where there is a usual port.
+/// Returns the address of `HOST:PORT`, or of `HOST` if there is a usual port.
 ///
 /// # Errors
-/// One sentence for what names no IPv4 address.
+/// A sentence, if the text names no IPv4 address.
 pub fn destination(text: &str, usual_port: Option<u16>) -> Result<SocketAddrV4, String> {
     let expected = if usual_port.is_some() { "an address such as 10.0.0.5 or desk.local:56565" } else { "HOST:PORT" };
     let (host, port) = match text.rsplit_once(':') {

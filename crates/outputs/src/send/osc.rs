@@ -1,9 +1,8 @@
-//! The OSC messages (Open Sound Control 1.0), one function for each address. In: what a publisher has sent. Out: messages
-//! whose arguments always have the same types. Pure; called by the [`sender`](super::osc_sender).
+//! The OSC messages (Open Sound Control 1.0), one function for each address. In: the messages of a publisher. Out: OSC
+//! messages whose arguments always have the same types. Pure; called by the [`sender`](super::osc_sender).
 //!
-//! `docs/sending.md` lists the addresses. They are for desks that people set up, so handles and benches count from 1. Where
-//! there is no bench the number is -1; where there is no time or no clearance the number is [`NEVER`], which no threshold
-//! that a desk waits for is above.
+//! `docs/sending.md` lists the addresses. Users set up desks by hand, so handles and benches count from 1. The number
+//! of no bench is -1. The number of no time or no clearance is [`NEVER`], which is above every threshold of a desk.
 
 use rosc::encoder::encode;
 use rosc::{OscBundle, OscMessage, OscPacket, OscTime, OscType};
@@ -12,27 +11,27 @@ use bench_dragon_messages::state::EventKind;
 use bench_dragon_messages::state::{FrameState, Level, PlaybackState};
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, NO_BENCH, Stage};
 
-/// A time or a distance that there is not.
+/// The number for no time or no distance.
 pub const NEVER: f32 = 1e6;
-/// Messages in a bundle at most: so many of the largest fit a datagram that the network does not cut.
+/// The most messages in a bundle: this number of the largest fits a datagram that the network does not fragment.
 const MOST_MESSAGES: usize = 8;
 
 /// The messages of one publisher.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Addresses {
-    /// What each address begins with: a slash and the publisher's name.
+    /// The beginning of each address: a slash and the publisher's name.
     prefix: String,
 }
 
 impl Addresses {
-    /// Addresses that begin with the publisher's name. What no address may hold becomes an underscore.
+    /// Creates addresses that begin with the publisher's name. Characters that no address may have become underscores.
     pub fn new(name: &str) -> Self {
         let allowed = |c: char| c.is_ascii_graphic() && !"#*,?[]{}".contains(c);
         let prefix = name.trim_matches('/').chars().map(|c| if allowed(c) { c } else { '_' }).collect::<String>();
         Self { prefix: format!("/{prefix}") }
     }
 
-    /// What each address begins with.
+    /// Returns the beginning of each address.
     pub fn prefix(&self) -> &str {
         &self.prefix
     }
@@ -41,8 +40,8 @@ impl Addresses {
         OscMessage { addr: format!("{}/{address}", self.prefix), args }
     }
 
-    /// `/alert ,sisffffiii`: level and its number, what it is about, simulated seconds until that, the clearance, where and
-    /// which benches that is about, the latest cue.
+    /// `/alert ,sisffffiii`: the level and its number, the event, simulated seconds until the event, the clearance, the
+    /// place and the benches of the event, the latest cue.
     pub fn alert(&self, alert: &CollisionAlert, cue: u32) -> OscMessage {
         let level = alert.alert_level().map_or("unknown", Level::name);
         let event = alert.event_kind().map_or("none", EventKind::name);
@@ -63,13 +62,13 @@ impl Addresses {
         )
     }
 
-    /// `/countdown ,fs`: seconds of wall time until the next event, and which one it is.
+    /// `/countdown ,fs`: seconds of wall time until the next event, and its name.
     pub fn countdown(&self, coming: Option<(f64, &'static str)>) -> OscMessage {
         let (seconds, event) = coming.unwrap_or((f64::NAN, "none"));
         self.message("countdown", vec![or_never(seconds), text(event)])
     }
 
-    /// `/state ,sisi`: what the dragon is doing and its number, whether time advances and its number.
+    /// `/state ,sisi`: the state and its number, the playback state and its number.
     pub fn state(&self, state: State) -> OscMessage {
         let (state, playback) = match state {
             State::Of { state, playback } => ((state.name(), state as i32), (playback.name(), playback as i32)),
@@ -97,14 +96,14 @@ impl Addresses {
     }
 }
 
-/// What `/state` tells.
+/// The content of `/state`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
     /// Frames come.
     Of {
-        /// What the dragon is doing.
+        /// The state of the dragon.
         state: FrameState,
-        /// Whether time advances.
+        /// The playback state.
         playback: PlaybackState,
     },
     /// Frames have stopped.
@@ -112,14 +111,14 @@ pub enum State {
 }
 
 impl State {
-    /// That of a frame; `None` for one of a later layout.
+    /// Returns the state of a frame; `None` for a frame of a later layout.
     pub fn of(header: &FrameHeader) -> Option<Self> {
         Some(Self::Of { state: header.frame_state()?, playback: header.playback_state()? })
     }
 }
 
-/// The next event that the show comes to, in seconds of wall time, with its name; `None` where there is none ahead, and
-/// while time stands still.
+/// Returns the wall time until the next event, in seconds, with its name; `None` if no event is ahead, and while time
+/// stands still.
 pub fn next_event(stage: &Stage, header: &FrameHeader) -> Option<(f64, &'static str)> {
     let plays = header.playback_state() == Some(PlaybackState::Playing) && header.time_scale > 0.0;
     let ahead = |time: f64| time > header.sim_time && time <= stage.freeze_time;
@@ -128,12 +127,12 @@ pub fn next_event(stage: &Stage, header: &FrameHeader) -> Option<(f64, &'static 
     Some(((next.time - header.sim_time) / header.time_scale, name))
 }
 
-/// Messages in their order as datagrams: bundles to be obeyed at once, since a desk's clock is another one.
+/// Returns messages in their order as datagrams: bundles to be executed at once, since a desk has another clock.
 pub fn datagrams(messages: Vec<OscMessage>) -> Vec<Vec<u8>> {
     let immediately = OscTime { seconds: 0, fractional: 1 };
     let bundle = |messages: &[OscMessage]| {
         let content = messages.iter().cloned().map(OscPacket::Message).collect();
-        // Only an address that is none could be refused, and `Addresses` makes none.
+        // Only an invalid address could be refused, and `Addresses` makes none.
         encode(&OscPacket::Bundle(OscBundle { timetag: immediately, content })).ok()
     };
     messages.chunks(MOST_MESSAGES).filter_map(bundle).collect()
@@ -155,7 +154,7 @@ fn or_zero(value: f64) -> OscType {
     if value.is_nan() { OscType::Float(0.0) } else { float(value) }
 }
 
-/// As people count.
+/// Returns the number counted from 1.
 fn bench(number: u32) -> OscType {
     OscType::Int(if number == NO_BENCH { -1 } else { number as i32 + 1 })
 }
@@ -166,7 +165,7 @@ mod tests {
     use bench_dragon_messages::{SceneName, StageEvent};
 
     #[test]
-    fn an_alert_about_nothing_fires_no_threshold_and_names_nobody() {
+    fn an_alert_about_nothing_fires_no_threshold_and_names_no_bench() {
         let message = Addresses::new("bench_dragon").alert(&CollisionAlert::default(), 0);
         assert_eq!(message.addr, "/bench_dragon/alert");
         let (never, none) = (OscType::Float(1e6), OscType::Int(-1));

@@ -1,5 +1,5 @@
-//! When OSC messages go out, and which once only. In: the events of a feed. Out: datagrams by [`osc`](super::osc). Called
-//! by `send osc`.
+//! The times at which OSC messages are sent. In: the events of a feed. Out: datagrams by [`osc`](super::osc). Called by
+//! `send osc`.
 
 use std::time::{Duration, Instant};
 
@@ -16,13 +16,13 @@ use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage}
 pub const MOST_RATE: u32 = 60;
 /// The least time between two countdowns.
 const COUNTDOWN_INTERVAL: Duration = Duration::from_millis(100);
-/// How often the state is told that has not changed, for who listens later.
+/// Resend interval of an unchanged state, for late receivers.
 const STATE_INTERVAL: Duration = Duration::from_secs(1);
-/// A cue is sent that was reached so much before the first frame that came: to be connected takes a moment, and a show can
-/// begin with a cue.
+/// Time before the first received frame within which a cue is sent: connecting takes a moment, and a show can begin
+/// with a cue.
 const CUE_GRACE_NS: u64 = 1_000_000_000;
 
-/// What has been sent.
+/// Counts of sent messages.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct OscSummary {
     /// Frames of the publisher that were sent.
@@ -38,7 +38,7 @@ pub struct OscSummary {
 }
 
 impl OscSummary {
-    /// What two senders have sent together.
+    /// Returns the sum of two counts.
     fn plus(self, other: Self) -> Self {
         Self {
             frames: self.frames + other.frames,
@@ -74,7 +74,7 @@ pub struct OscSender {
 }
 
 impl OscSender {
-    /// A sender of at most `rate` bundles of frames per second by `outlet`.
+    /// Creates a sender of at most `rate` bundles of frames per second by `outlet`.
     pub fn new(addresses: Addresses, rate: f64, outlet: Outlet) -> Self {
         Self {
             addresses,
@@ -97,7 +97,7 @@ impl OscSender {
         }
     }
 
-    /// Tells receivers that nothing holds any more, and returns what has been sent.
+    /// Sends receivers the state `stopped`, and returns the counts.
     pub fn finish(mut self) -> OscSummary {
         let mut messages = std::mem::take(&mut self.pending);
         if self.latest.is_some() {
@@ -111,7 +111,7 @@ impl OscSender {
         datagrams(messages).iter().for_each(|datagram| self.outlet.send(datagram));
     }
 
-    /// An alert is sent once, though a connection that is made anew begins with the current one again.
+    /// Sends an alert once: a new connection begins with the current alert again.
     fn take_alert(&mut self, alert: &CollisionAlert) {
         let of = |alert: &CollisionAlert| (alert.run_id, alert.tick, alert.level, alert.event);
         if self.last_alert.as_ref().is_some_and(|last| of(last) == of(alert)) {
@@ -123,12 +123,12 @@ impl OscSender {
         self.summary.alerts += 1;
     }
 
-    /// A cue is sent once, and never one that the show had passed long before this sender listened.
+    /// Sends a cue once, and no cue that the show passed long before this sender connected.
     fn take_cue(&mut self, cue: &Cue) {
         let of = |cue: &Cue| (cue.run_id, cue.tick, cue.number);
         let is_known = self.last_cue.as_ref().is_some_and(|last| of(last) == of(cue));
         let of_this_run = self.latest.is_some_and(|(header, _)| header.run_id == cue.run_id);
-        // Stamps alone do not tell: the clock may have been set back since the first frame.
+        // Stamps alone do not suffice: the clock may have been set back since the first frame.
         let is_old = cue.tick < self.first_tick && cue.stamp_ns.saturating_add(CUE_GRACE_NS) < self.first_stamp_ns;
         if is_known || !of_this_run || is_old {
             return;
@@ -140,7 +140,7 @@ impl OscSender {
 }
 
 impl OscSender {
-    /// Takes in what has come.
+    /// Handles an event.
     fn take(&mut self, event: FeedEvent<'_>) {
         self.arrivals.handle(&event, Instant::now());
         match event {
@@ -159,14 +159,14 @@ impl OscSender {
         }
     }
 
-    /// Sends what is due.
+    /// Sends the messages that are due.
     fn send_due(&mut self, now: Instant) {
         let mut messages = std::mem::take(&mut self.pending);
         let due = std::mem::take(&mut self.due);
         if let Some((header, head)) = &self.latest {
             let stopped = self.arrivals.stopped_since(now).is_some();
             let state = if stopped { Some(State::Stopped) } else { State::of(header) };
-            // A change waits for no interval; nor does a countdown that ends.
+            // A change is sent at once, and so is the end of a countdown.
             if let Some(state) = state.filter(|state| self.told_state != Some(*state) || now >= self.next_state) {
                 messages.push(self.addresses.state(state));
                 (self.told_state, self.next_state) = (Some(state), now + STATE_INTERVAL);
@@ -187,7 +187,7 @@ impl OscSender {
     }
 }
 
-/// The senders of several publishers, each with addresses of its own.
+/// The senders of several publishers, each with its own addresses.
 pub struct OscSenders(Vec<OscSender>);
 
 impl OscSenders {
@@ -196,7 +196,7 @@ impl OscSenders {
         Self(senders)
     }
 
-    /// Tells receivers that nothing holds any more, and returns what has been sent, of all together.
+    /// Sends receivers the state `stopped`, and returns the counts of all senders together.
     pub fn finish(self) -> OscSummary {
         self.0.into_iter().map(OscSender::finish).fold(OscSummary::default(), OscSummary::plus)
     }

@@ -1,12 +1,12 @@
-//! The packets of PosiStageNet 2.03 (VYV and MA Lighting, "PosiStageNet protocol description v2.03", 2019). In: trackers,
-//! names, timestamps. Out: the bytes of UDP packets. Pure; called by the [`sender`](super::psn_sender).
+//! The packets of PosiStageNet 2.03 (VYV and MA Lighting, "PosiStageNet protocol description v2.03", 2019). In:
+//! trackers, names, timestamps. Out: the bytes of UDP packets. Pure; called by the [`sender`](super::psn_sender).
 //!
-//! All is little-endian. A chunk is a header of 32 bits (bits 0 to 15 its id, 16 to 30 the length of what follows, 31
-//! whether that is chunks again) and its content. A frame is split into packets that all have its number and their count;
-//! a receiver puts them together, so they go out back to back.
+//! All is little-endian. A chunk is a header of 32 bits and its content. Bits 0 to 15 of the header are its id, 16 to
+//! 30 the length of the content, and 31 is set if the content is chunks. A frame is split into packets that all have
+//! its number and their count. A receiver puts them together, so they are sent back to back.
 
-/// The greatest size of a packet: what an Ethernet frame of 1,500 bytes holds besides the headers of IP and UDP. The
-/// protocol allows 1,500 and these would be fragmented.
+/// The greatest size of a packet: an Ethernet frame of 1,500 bytes without the headers of IP and UDP. The protocol
+/// allows 1,500 bytes, which would be fragmented.
 pub const MOST_BYTES: usize = 1472;
 /// The most packets of a frame: their count is a byte.
 pub const MOST_PACKETS: usize = 255;
@@ -27,27 +27,27 @@ const DATA_TRACKER_ORIENTATION: u16 = 0x0002;
 const DATA_TRACKER_STATUS: u16 = 0x0003;
 const DATA_TRACKER_TIMESTAMP: u16 = 0x0006;
 
-/// Where the count of packets stands in a packet: the last byte of its header.
+/// The place of the count of packets in a packet: the last byte of its header.
 const PACKET_COUNT_AT: usize = 4 + 4 + 11;
 
-/// What is sent of a tracker, in the receiver's axes.
+/// The data of a tracker, in the receiver's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tracker {
     /// Its number.
     pub id: u16,
     /// Metres.
     pub position: [f32; 3],
-    /// Metres per second; left out of the packet where it is not known.
+    /// Metres per second; left out of the packet if it is not known.
     pub speed: Option<[f32; 3]>,
-    /// The axis about which it is turned, as long as the angle in radians.
+    /// The axis of its rotation; the length of the vector is the angle in radians.
     pub orientation: [f32; 3],
-    /// 1 where the position holds, 0 where it is not known any more.
+    /// 1 if the position is valid, 0 if it is not known any more.
     pub status: f32,
-    /// Microseconds from the sender's start to the moment for which the position holds.
+    /// Microseconds from the sender's start to the moment of the position.
     pub timestamp_us: u64,
 }
 
-/// A tracker's number and name. The name is not empty: some receivers cannot read such a one.
+/// A tracker's number and name. The name is not empty: some receivers cannot read an empty one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TrackerName {
     /// Its number.
@@ -61,11 +61,11 @@ pub struct TrackerName {
 pub struct PacketFrame {
     /// The packets, at most [`MOST_PACKETS`] of at most [`MOST_BYTES`].
     pub packets: Vec<Vec<u8>>,
-    /// How many of the trackers are in them: all, unless they are too many for a frame.
+    /// The number of trackers in them: all, unless they are too many for a frame.
     pub trackers: usize,
 }
 
-/// Positions: a frame of DATA packets with the number `frame_id`, sent `timestamp_us` after the sender's start.
+/// Returns positions: a frame of DATA packets with the number `frame_id`, sent `timestamp_us` after the sender's start.
 pub fn data_frame(timestamp_us: u64, frame_id: u8, trackers: &[Tracker]) -> PacketFrame {
     let opening = [];
     split(
@@ -88,7 +88,7 @@ pub fn data_frame(timestamp_us: u64, frame_id: u8, trackers: &[Tracker]) -> Pack
     )
 }
 
-/// Names: a frame of INFO packets, each of which begins with the system's name.
+/// Returns names: a frame of INFO packets, each of which begins with the system's name.
 pub fn info_frame(timestamp_us: u64, frame_id: u8, system_name: &str, trackers: &[TrackerName]) -> PacketFrame {
     let mut opening = Vec::new();
     leaf(&mut opening, INFO_SYSTEM_NAME, system_name.as_bytes());
@@ -105,7 +105,7 @@ struct Kind {
     list: u16,
 }
 
-/// A frame in as few packets as hold it, its trackers in their order.
+/// Returns a frame in the fewest packets, its trackers in their order.
 fn split<Item>(
     kind: Kind,
     timestamp_us: u64,
@@ -155,7 +155,7 @@ fn chunk_header(out: &mut Vec<u8>, id: u16, length: usize, has_subchunks: bool) 
     out.extend(header.to_le_bytes());
 }
 
-/// States the length of the chunk of chunks that begins at `at` and reaches to the end.
+/// Writes the length of the chunk of chunks that begins at `at` and reaches to the end.
 fn set_length(packet: &mut [u8], at: usize) {
     let length = (packet.len() - at - 4) as u16 | 0x8000;
     packet[at + 2..at + 4].copy_from_slice(&length.to_le_bytes());

@@ -1,8 +1,8 @@
-//! Trackers for lighting desks: which, when, and what they say while no frames come. In: the events of the feeds of one
-//! publisher or several. Out: datagrams by [`psn`](super::psn). Called by `send psn`.
+//! Trackers for lighting desks: their choice, their times, and their state while no frames come. In: the events of the
+//! feeds of one publisher or several. Out: datagrams by [`psn`](super::psn). Called by `send psn`.
 //!
-//! A receiver holds for present what is in the latest frame. So each frame has the trackers of all publishers, each with the
-//! time for which its place holds, and there is one count of frames: two senders to one desk would mix theirs.
+//! A receiver takes the trackers of the latest frame as present. So each frame has the trackers of all publishers, each
+//! with the time of its position. There is one count of frames: a desk would mix the counts of two senders.
 
 use std::time::{Duration, Instant};
 
@@ -23,21 +23,21 @@ pub const USUAL_ADDRESS: &str = "236.10.10.10";
 pub const USUAL_PORT: u16 = 56565;
 /// The protocol's usual rate of positions, per second.
 pub const USUAL_RATE: f64 = 60.0;
-/// How often names are sent.
+/// The interval of names.
 const INFO_INTERVAL: Duration = Duration::from_secs(1);
-/// How long desks are told at the full rate that frames have stopped, and how often from then on.
+/// How long status 0 is sent at the full rate after frames have stopped, and its interval after that.
 const STOPPED_FULL_RATE: Duration = Duration::from_secs(10);
 /// See [`STOPPED_FULL_RATE`].
 const STOPPED_INTERVAL: Duration = Duration::from_secs(1);
 
-/// What is sent.
+/// The options of a sender.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PsnOptions {
-    /// Which handles of each publisher.
+    /// The handles of each publisher.
     pub trackers: Selection,
-    /// In which axes.
+    /// The axes.
     pub axes: Axes,
-    /// At most so many frames per second.
+    /// The most frames per second.
     pub rate: f64,
     /// The trackers' numbers, for each publisher in the order in which they are polled.
     pub numbers: Vec<Numbers>,
@@ -45,10 +45,10 @@ pub struct PsnOptions {
     pub system_name: String,
 }
 
-/// What a person who runs a sender wants to know at once.
+/// A notice for the user who runs a sender.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Notice {
-    /// Frames of a team come whose trackers were not known.
+    /// The first frames of a team.
     Team {
         /// The number of handles.
         handles: u32,
@@ -59,20 +59,21 @@ pub enum Notice {
         /// Packets of names a second.
         name_packets: usize,
     },
-    /// Some that were chosen cannot be sent; one sentence.
+    /// Some chosen handles cannot be sent; one sentence.
     LeftOut(String),
     /// Frames have stopped: the publisher's trackers have status 0.
     Stopped,
-    /// They come again.
+    /// Frames come again.
     Resumed,
 }
 
-/// What has been sent.
+/// Counts of sent messages.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct PsnSummary {
     /// Frames that were sent, each with the newest of every publisher.
     pub frames: u64,
-    /// Frames of publishers that came too soon after one that was sent, or were overtaken before they were read or sent.
+    /// Frames of publishers that came too soon after a sent frame, or were replaced by newer ones before they were
+    /// sent.
     pub passed_over: u64,
     /// Frames sent with status 0 while none came.
     pub stopped_frames: u64,
@@ -88,7 +89,7 @@ pub struct PsnSummary {
 pub struct PsnSender<'a> {
     options: PsnOptions,
     outlet: Outlet,
-    /// Called with the place of a publisher and what a person wants to know of it.
+    /// Called with the place of a publisher and a notice about it.
     notify: &'a mut dyn FnMut(usize, Notice),
     started_ns: u64,
     pace: Pace,
@@ -96,7 +97,7 @@ pub struct PsnSender<'a> {
     sources: Vec<Source>,
     due: bool,
     next_info: Instant,
-    /// When desks are told again that the frames of all have stopped.
+    /// The next moment at which status 0 is sent for all publishers.
     next_stopped: Option<Instant>,
     data_frame_id: u8,
     info_frame_id: u8,
@@ -104,7 +105,7 @@ pub struct PsnSender<'a> {
 }
 
 impl<'a> PsnSender<'a> {
-    /// A sender by `outlet`, which calls `notify` with the place of a publisher and what a person wants to know of it.
+    /// Creates a sender by `outlet`, which calls `notify` with the place of a publisher and a notice about it.
     pub fn new(options: PsnOptions, outlet: Outlet, notify: &'a mut dyn FnMut(usize, Notice)) -> Self {
         Self {
             pace: Pace::new(options.rate),
@@ -122,7 +123,7 @@ impl<'a> PsnSender<'a> {
         }
     }
 
-    /// Tells desks that nothing holds any more, and returns what has been sent.
+    /// Sends status 0 for all trackers, and returns the counts.
     pub fn finish(mut self) -> PsnSummary {
         if self.sources.iter().any(Source::is_known) {
             self.sources.iter_mut().for_each(Source::stop);
@@ -135,8 +136,8 @@ impl<'a> PsnSender<'a> {
         monotonic_ns().saturating_sub(self.started_ns) / 1000
     }
 
-    /// Whether a frame goes out for this one. Several publishers have one count of intervals, on the clock that their deadlines
-    /// have in common; that of one alone begins with its run.
+    /// Returns true if this frame is due. Several publishers share one count of intervals, on the common clock of their
+    /// deadlines; the count of a single publisher begins with its run.
     fn is_due(&mut self, header: &FrameHeader, made_ns: u64) -> bool {
         match &self.sources[..] {
             [_] => self.pace.is_due(header),
@@ -149,7 +150,7 @@ impl<'a> PsnSender<'a> {
         let is_due = self.is_due(header, made_ns);
         let alone = self.sources.len() == 1;
         let Some(source) = self.sources.get_mut(publisher) else { return };
-        // Of several, each frame goes out with the next that is due of any.
+        // The frames of several publishers are sent together, with the next due frame of any of them.
         if alone && !is_due {
             self.summary.passed_over += 1;
             return;
@@ -159,7 +160,7 @@ impl<'a> PsnSender<'a> {
         }
         self.next_stopped = None;
         if let Some(left_out) = source.meet(header.handles, &self.options.trackers) {
-            // At once, after the frame at hand.
+            // At once, after the present frame.
             self.next_info = Instant::now();
             left_out.into_iter().for_each(|sentence| (self.notify)(publisher, Notice::LeftOut(sentence)));
         }
@@ -169,8 +170,7 @@ impl<'a> PsnSender<'a> {
         self.due |= is_due;
     }
 
-    /// Sends all trackers as they are, all packets back to back; nothing where there are none. Returns the number of
-    /// packets.
+    /// Sends all trackers, all packets back to back, if there are any. Returns the number of packets.
     fn send_trackers(&mut self) -> usize {
         let mut trackers = Vec::with_capacity(self.sources.iter().map(|source| source.trackers.len()).sum());
         for source in &mut self.sources {
@@ -216,7 +216,7 @@ impl<'a> PsnSender<'a> {
         self.summary.stopped_frames += 1;
     }
 
-    /// Stops the trackers of those publishers from which no frames come any more. Since when none comes from any.
+    /// Stops the trackers of publishers whose frames have stopped. Returns the moment since when no publisher sends.
     fn stop_silent(&mut self, now: Instant) -> Option<Instant> {
         let mut since = None;
         let mut all = true;
@@ -233,7 +233,7 @@ impl<'a> PsnSender<'a> {
     }
 }
 
-/// The number of the next frame: 1 to 255, and again. A receiver exists that takes 0 for none.
+/// Returns the number of the next frame: 1 to 255, then 1 again. One known receiver takes 0 for no frame.
 fn next_frame_id(latest: u8) -> u8 {
     latest % u8::MAX + 1
 }

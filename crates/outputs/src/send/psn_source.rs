@@ -1,5 +1,5 @@
-//! The trackers of one publisher: which handles, their names, where they are, whether frames come. In: frames. Out: trackers,
-//! which the [`sender`](super::psn_sender) puts into packets. Called by it alone.
+//! The trackers of one publisher: their handles, names, positions and arrivals. In: frames. Out: trackers, which the
+//! [`sender`](super::psn_sender), its only caller, puts into packets.
 
 use std::time::Instant;
 
@@ -15,16 +15,16 @@ use bench_dragon_messages::{FrameHeader, HandlePose};
 pub(super) struct Source {
     numbers: Numbers,
     arrivals: Arrivals,
-    /// Whether frames are of this machine's clock.
+    /// True if the deadlines are of this machine's clock.
     pub(super) shares_clock: bool,
     team: Option<Team>,
-    /// Where they were in the latest frame that was taken.
+    /// The positions in the latest frame.
     pub(super) trackers: Vec<Tracker>,
-    /// Whether that frame has not been sent yet.
+    /// True if that frame has not been sent yet.
     pub(super) unsent: bool,
-    /// Whether desks have been told that frames have stopped.
+    /// True if status 0 has been sent since frames stopped.
     pub(super) stopped: bool,
-    /// How many of them the latest frame that was sent had room for.
+    /// The number of trackers in the latest sent frame.
     sent: Option<usize>,
 }
 
@@ -49,39 +49,39 @@ impl Source {
         }
     }
 
-    /// When a frame should have been made, CLOCK_MONOTONIC in ns of this machine; one of another machine counts as made
-    /// now.
+    /// Returns the deadline of a frame, CLOCK_MONOTONIC of this machine in ns; the present moment for a frame of
+    /// another machine.
     pub(super) fn made_ns(&self, header: &FrameHeader) -> u64 {
         if self.shares_clock { header.deadline_ns } else { monotonic_ns() }
     }
 
-    /// Whose trackers they are, for sentences, where several publishers send to one desk.
+    /// Returns the publisher's name for sentences, if several publishers send to one desk.
     pub(super) fn of(&self) -> String {
         self.numbers.of.as_ref().map_or(String::new(), |of| format!(" of \"{of}\""))
     }
 
-    /// Whether there are trackers: a frame has come at some time.
+    /// Returns true if there are trackers: a frame has come at some time.
     pub(super) fn is_known(&self) -> bool {
         self.team.is_some()
     }
 
-    /// Names of the trackers for which a frame has room; none before the first frame.
+    /// Returns the names of the trackers for which a frame has room; none before the first frame.
     pub(super) fn names(&self) -> &[TrackerName] {
         let names: &[TrackerName] = self.team.as_ref().map_or(&[], |team| &team.names);
         &names[..self.sent.unwrap_or(names.len()).min(names.len())]
     }
 
-    /// Takes in an event for what it tells of arrivals.
+    /// Updates the arrivals by an event.
     pub(super) fn arrived(&mut self, event: &FeedEvent<'_>, now: Instant) {
         self.arrivals.handle(event, now);
     }
 
-    /// See [`Arrivals::stopped_since`]; none where there are no trackers.
+    /// See [`Arrivals::stopped_since`]; `None` without trackers.
     pub(super) fn stopped_since(&self, now: Instant) -> Option<Instant> {
         self.arrivals.stopped_since(now).filter(|_| self.is_known())
     }
 
-    /// Chooses the trackers where the team is another one. A sentence for each kind of handles that is left out, or `None` where
+    /// Chooses the trackers of a new team. Returns a sentence for each kind of handles that is left out, or `None` if
     /// the team is known.
     pub(super) fn meet(&mut self, handles: u32, selection: &Selection) -> Option<Vec<String>> {
         if self.team.as_ref().is_some_and(|team| team.handles == handles) {
@@ -107,13 +107,13 @@ impl Source {
         Some(sentences)
     }
 
-    /// Takes over a frame's places, made at `timestamp_us`. Whether it replaces one that was not sent.
+    /// Takes the positions of a frame, made at `timestamp_us`. Returns true if it replaces a frame that was not sent.
     pub(super) fn take(&mut self, header: &FrameHeader, handles: &[HandlePose], axes: Axes, timestamp_us: u64) -> bool {
         let Some(team) = &self.team else { return false };
         let vector = |x, y| axes.vector([x, y, 0.0]).map(|part| part as f32);
         let tracker = |(handle, name): (&u32, &TrackerName)| {
             let pose = handles.get(*handle as usize)?;
-            // Desks count seconds of wall time.
+            // Velocities are per second of wall time.
             let (vx, vy) = (pose.vx * header.time_scale, pose.vy * header.time_scale);
             Some(Tracker {
                 id: name.id,
@@ -129,7 +129,7 @@ impl Source {
         std::mem::replace(&mut self.unsent, true)
     }
 
-    /// From here on the trackers are where they last were, standing still, with status 0.
+    /// Keeps the trackers at their last positions, standing still, with status 0.
     pub(super) fn stop(&mut self) {
         self.stopped = true;
         for tracker in &mut self.trackers {
@@ -138,15 +138,15 @@ impl Source {
         }
     }
 
-    /// Takes in that the frame which is sent has room for so many trackers, and returns for how many that leaves. How
-    /// many are left out, where that has changed and is not none.
+    /// Limits this frame to `room` trackers. Returns the rest of the room, and the number of trackers left out, if that
+    /// has changed and is not zero.
     pub(super) fn fit(&mut self, room: usize) -> (usize, Option<usize>) {
         let sent = self.trackers.len().min(room);
         let has_changed = self.sent.replace(sent) != Some(sent);
         (room - sent, Some(self.trackers.len() - sent).filter(|left_out| has_changed && *left_out > 0))
     }
 
-    /// The number of handles and the trackers, once for each team.
+    /// Returns the number of handles and the trackers, once for each team.
     pub(super) fn announce(&mut self) -> Option<(u32, Vec<TrackerName>)> {
         let team = self.team.as_mut().filter(|team| !team.announced)?;
         team.announced = true;

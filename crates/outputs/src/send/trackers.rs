@@ -1,4 +1,4 @@
-//! Which handles are sent, and as which trackers. In: what a person chose and the size of a team. Out: handles, numbers,
+//! The handles that are sent, and their trackers. In: the user's choice and the size of a team. Out: handles, numbers,
 //! names. Pure.
 
 use std::str::FromStr;
@@ -19,12 +19,12 @@ enum Part {
 }
 
 impl Selection {
-    /// Every handle.
+    /// Selects every handle.
     pub fn all() -> Self {
         Self(vec![Part::All])
     }
 
-    /// The handles of a team of so many that are chosen, from 0, in their order and each once.
+    /// Returns the chosen handles of a team of `handles`, from 0, in their order and each once.
     pub fn of(&self, handles: u32) -> Vec<u32> {
         let range = |part: &Part| match *part {
             Part::All => 0..handles,
@@ -38,7 +38,7 @@ impl Selection {
         chosen
     }
 
-    /// The greatest number that is chosen, from 1, and that a team of so many handles does not have.
+    /// Returns the greatest chosen number, from 1, that a team of `handles` does not have.
     pub fn beyond(&self, handles: u32) -> Option<u32> {
         let last = |part: &Part| if let Part::Range(_, last) = *part { last } else { 0 };
         self.0.iter().map(last).max().filter(|last| *last > handles)
@@ -66,7 +66,7 @@ impl FromStr for Selection {
     }
 }
 
-/// What a handle of a team of so many is called, counted from 1: `head`, `handle 12`, `tail`.
+/// Returns the name of a handle in a team of `handles`, counted from 1: `head`, `handle 12`, `tail`.
 pub fn handle_name(handle: u32, handles: u32) -> String {
     match handle {
         0 => "head".to_owned(),
@@ -75,25 +75,25 @@ pub fn handle_name(handle: u32, handles: u32) -> String {
     }
 }
 
-/// The numbers that the trackers of a team may have, and what their names begin with.
+/// The numbers that the trackers of a team may have, and the beginning of their names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Numbers {
     /// The number of the first handle's tracker.
     pub first: u16,
-    /// The last number that is left to this team.
+    /// The last number of this team.
     pub last: u16,
-    /// The publisher's name, where several send to one desk.
+    /// The publisher's name, if several publishers send to one desk.
     pub of: Option<String>,
 }
 
 impl Numbers {
-    /// Those of one publisher alone.
+    /// Returns the numbers of a single publisher.
     pub fn from(first: u16) -> Self {
         Self { first, last: u16::MAX, of: None }
     }
 
-    /// Those of several publishers, whose heads' numbers are `step` apart whether the others are there or not. `None` where
-    /// there are more publishers than numbers.
+    /// Returns the numbers of several publishers, whose heads' numbers are `step` apart even if some do not run.
+    /// Returns `None` for more publishers than numbers.
     pub fn of_several(names: &[String], first: u16, step: u16) -> Option<Vec<Self>> {
         let starts = (0..names.len()).map(|place| {
             let start = u64::from(first) + place as u64 * u64::from(step);
@@ -108,7 +108,7 @@ impl Numbers {
         Some(numbers.collect())
     }
 
-    /// The trackers of the chosen handles. Those that would have a number above the last are left out.
+    /// Returns the trackers of the chosen handles, without those that would have a number above the last.
     pub fn trackers(&self, chosen: &[u32], handles: u32) -> Vec<TrackerName> {
         let number = |handle: u32| u16::try_from(u64::from(handle) + u64::from(self.first)).ok();
         let named = |handle: &u32| {

@@ -1,10 +1,10 @@
 // The words after # in the page's address, for a screen without a keyboard: #show,transparent or #dark&follow=12.
 
-/** Words that stand alone, and words that take numbers (as many as named) or a word after `=`. */
+/** Words without a value, and words with numbers (as many as named) or a word after `=`. */
 const ALONE = ["show", "transparent", "nolabels", "dark", "light", "sound"];
 const WITH = { follow: /^[1-9]\d*$/, bench: /^[1-9]\d*$/, rotate: /^-?\d+(\.\d+)?$/, view: /^-?[\d.]+,-?[\d.]+,[\d.]+$/, lang: /^(en|zh)$/ };
 
-/** The text of an address; one that is no encoding of a text stands as it is. */
+/** The decoded text of an address; the text itself if it cannot be decoded. */
 function textOf(address) {
   try {
     return decodeURI(address);
@@ -14,8 +14,8 @@ function textOf(address) {
 }
 
 /**
- * What the address says: each word with its value, `true` where it has none, numbers as numbers, a place as three of
- * them; and `unknown`, all that is not understood. Commas or & part the words; numbers after a comma belong to the word before.
+ * Parses the address: each word with its value, `true` without a value, numbers as numbers, a place as three numbers;
+ * and `unknown`, all unknown words. Commas or & separate words; numbers after a comma belong to the word before.
  */
 export function wordsOf(hash) {
   const said = { unknown: [] };

@@ -1,4 +1,4 @@
-// The boards as rectangles: which is where, which two are nearest. Metres of the stage; knows no canvas and no page.
+// The boards as rectangles: their places, and the nearest two. Metres of the stage; knows no canvas and no page.
 
 import { STRIDE } from "./hermite.js";
 
@@ -16,7 +16,7 @@ export function rectangle(stage, places, bench) {
   };
 }
 
-/** The bench at a place of the stage, no further from it than `most` metres; -1 for none. */
+/** Returns the bench at a place of the stage, at most `most` metres away; -1 for none. */
 export function benchAt(stage, places, x, y, most) {
   let best = most, found = -1;
   for (let bench = 0; bench < places.length / STRIDE - 1; bench++) {
@@ -27,7 +27,7 @@ export function benchAt(stage, places, x, y, most) {
   return found;
 }
 
-/** The middle between the nearest points of two boards, one of which is always a corner; where they overlap, of that. */
+/** Returns the middle between the nearest points of two boards, one of which is a corner, or of their overlap. */
 export function nearest(stage, places, ...pair) {
   const [a, b] = pair.map((bench) => rectangle(stage, places, bench));
   let best = Infinity, place = null;
@@ -45,8 +45,8 @@ export function nearest(stage, places, ...pair) {
 }
 
 /**
- * The greatest gap between two rectangles along the normals of their sides (separating axis theorem): negative where they
- * overlap, and then the least way that parts them.
+ * Returns the greatest gap between two rectangles along the normals of their sides (separating axis theorem). It is
+ * negative if they overlap: then its size is the shortest way to separate them.
  */
 function gap(a, b) {
   const dx = b.x - a.x, dy = b.y - a.y, cos = Math.abs(a.c * b.c + a.s * b.s), sin = Math.abs(a.c * b.s - a.s * b.c);
@@ -59,9 +59,9 @@ function gap(a, b) {
 }
 
 /**
- * The two boards that share no handle and overlap most, and by how many metres; null where none come nearer to each
- * other than `tolerance` metres, the rounding of their places. Boards are compared with those of the same and the next
- * squares of a grid.
+ * Returns the two boards that share no handle and overlap most, and their overlap in metres; null if no two boards are
+ * nearer than `tolerance` metres, the rounding of their places. Boards are compared with those of the same and the
+ * adjacent squares of a grid.
  */
 export function overlapping(stage, places, tolerance) {
   const count = places.length / STRIDE - 1, side = Math.hypot(Math.max(stage.head_length, stage.body_length), stage.width) + tolerance;

@@ -1,8 +1,8 @@
-//! Sends the newest picture to one browser, at the pace at which it reads. Called by the server.
+//! Sends the newest picture to one browser, at the browser's pace. Called by the server.
 //!
-//! A socket's buffers hold seconds of frames, so a socket that can be written to is no sign that the other side has
-//! read. Each frame is therefore followed by a ping, which every WebSocket answers by itself once it has read that
-//! far, and no more than [`MAX_IN_FLIGHT`] frames stay unanswered: a slow browser gets fewer frames, not later ones.
+//! A socket's buffers hold seconds of frames, so a writable socket does not show that the browser has read. Each frame
+//! is therefore followed by a ping, which every WebSocket answers when it has read that far. At most [`MAX_IN_FLIGHT`]
+//! frames stay unanswered: a slow browser gets fewer frames, not later ones.
 
 use std::time::Duration;
 
@@ -11,23 +11,23 @@ use futures_util::{Sink, SinkExt, StreamExt};
 use tokio::sync::{mpsc, watch};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout};
 
-use super::gate::Visitor;
+use super::authorization::Visitor;
 use super::{Channel, Picture, wire};
 use bench_dragon_client::clock::monotonic_ns;
 
 /// Frames that may be in flight to a browser: enough for 60 a second over a network that takes 50 ms.
 const MAX_IN_FLIGHT: u64 = 3;
-/// How often a browser is sent a ping even where it gets no frames.
+/// The interval of pings without frames.
 const PING_INTERVAL: Duration = Duration::from_secs(10);
-/// A browser that sends nothing for so long, or takes so long to be written to, is gone.
+/// The time without messages, or of one write, after which a browser is gone.
 const TIMEOUT: Duration = Duration::from_secs(30);
 
-/// Serves a browser one publisher until it goes. `gap` is the least time between two frames.
+/// Serves one publisher to a browser until the browser goes. `gap` is the least time between two frames.
 pub(super) async fn serve(socket: WebSocket, channel: Channel, gap: Duration) {
-    let Channel { mut pictures, gate, .. } = channel;
+    let Channel { mut pictures, authorization, .. } = channel;
     let (mut sink, mut stream) = socket.split();
     let (sender, mut answers) = mpsc::unbounded_channel();
-    let mut visitor = Visitor::new(gate.as_deref(), sender);
+    let mut visitor = Visitor::new(authorization.as_deref(), sender);
     let permission = visitor.permission().map(text);
     if !matches!(timeout(TIMEOUT, send(&mut sink, permission.into_iter().collect())).await, Ok(Ok(()))) {
         return;
@@ -36,7 +36,7 @@ pub(super) async fn serve(socket: WebSocket, channel: Channel, gap: Duration) {
     pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let (mut sent, mut answered) = (0, 0);
     let (mut due, mut last_received) = (Instant::now(), Instant::now());
-    // One who comes later gets the latest cue, as over shared memory.
+    // A late browser gets the latest cue, as over shared memory.
     let past_cues = pictures.borrow().cues.iter().rev().skip(1).cloned().collect();
     let mut known = Picture { cues: past_cues, ..Picture::default() };
     pictures.mark_changed();
@@ -49,13 +49,13 @@ pub(super) async fn serve(socket: WebSocket, channel: Channel, gap: Duration) {
                 match message {
                     Message::Close(_) => return,
                     Message::Pong(count) => {
-                        // Only the last of several pings need be answered.
+                        // Only the last of several pings needs an answer.
                         let count = count.as_ref().try_into().map_or(0, u64::from_le_bytes);
                         answered = count.clamp(answered, sent);
                         continue;
                     }
                     Message::Text(request) if request == "clock" => {
-                        // Of frames that another machine's clock has stamped, this one tells nothing.
+                        // This clock does not apply to frames of another machine's clock.
                         let shares_clock = pictures.borrow().shares_clock == Some(true);
                         vec![text(wire::clock(shares_clock.then(monotonic_ns)))]
                     }
@@ -94,13 +94,13 @@ pub(super) async fn serve(socket: WebSocket, channel: Channel, gap: Duration) {
     }
 }
 
-/// Waits for a new picture that may be sent already. The sender has gone where this is an error.
+/// Waits until a new picture may be sent. An error means that the sender has gone.
 async fn wait_for(pictures: &mut watch::Receiver<Picture>, due: Instant) -> Result<(), watch::error::RecvError> {
     sleep_until(due).await;
     pictures.changed().await
 }
 
-/// The messages about what has changed besides the frame.
+/// Returns the messages about changes besides the frame.
 fn changed_messages(picture: &Picture, known: &Picture) -> Vec<Message> {
     let parts = |of: &Picture| [of.waiting.clone(), of.stage.clone(), of.alert.clone()];
     let changed = parts(picture).into_iter().zip(parts(known)).filter(|(new, old)| new != old && !new.is_empty());

@@ -1,22 +1,22 @@
-// The camera: from metres to pixels and back. Shows all that is there, one bench, or a fixed view; may be turned.
+// The camera: from metres to pixels and back. Shows everything, one bench, or a fixed view; may be turned.
 
 import { STRIDE } from "./hermite.js";
 
-/** What is left free on each side of all that is there, as a share of its size. */
+/** The margin on each side of everything shown, as a share of its size. */
 const MARGIN = 0.05;
 /** Boards of the longest kind that fit the shorter side of the picture while one bench is followed. */
 const BOARDS_FOLLOWED = 2.5;
-/** All that is there is framed anew where it fills less of the frame than this, or leaves it. */
+/** The share of the frame below which the frame is fitted again. It is also fitted when something leaves it. */
 const LEAST_FILLED = 0.75;
-/** How long the camera takes to move most of the way to a new frame, ms. */
+/** The time in which the camera moves most of the way to a new frame, ms. */
 const EASING = 700;
 
 export class Camera {
   constructor() {
     this.width = this.height = this.ratio = 1;
-    /** The middle of what is framed and its half sizes, along the screen's axes; and where that is to go. */
+    /** The middle of the frame and its half sizes, along the screen's axes; and their targets. */
     this.frame = this.goal = null;
-    /** How far from the centre the outermost bench has been, m. */
+    /** The greatest distance of a bench from the centre so far, m. */
     this.reach = 1;
     this.followed = 0;
     this.turn(0);
@@ -40,19 +40,19 @@ export class Camera {
     Object.assign(this, { mode: "bench", followed: bench, zoom: 1 });
   }
 
-  /** Shows a place and so many metres around it along the shorter side. */
+  /** Shows a place and its surroundings, in metres along the shorter side. */
   view(x, y, metres) {
     Object.assign(this, { mode: "free", x, y, zoom: 1, metres });
   }
 
-  /** Another team: what was chosen for the one before does not fit. */
+  /** Resets the choices that were made for another team. */
   forget() {
     this.frame = this.goal = null;
     if (this.mode === "free" && !this.metres) this.mode = "whole";
     this.zoom = 1;
   }
 
-  /** Looks at where everything is: all teams, each with `stage` and `places`, and the one whose bench is followed. */
+  /** Updates the frame: all teams, each with `stage` and `places`, and the team of the followed bench. */
   update(teams, passed, followed = teams[0]) {
     this.longest = Math.max(...teams.map(({ stage }) => Math.max(stage.head_length, stage.body_length)));
     const box = teams.map(({ stage, places }) => this.box(stage, places)).reduce(around), { places } = followed;
@@ -70,7 +70,7 @@ export class Camera {
     [this.x, this.y] = [right * this.c + up * this.s, up * this.c - right * this.s];
   }
 
-  /** What is there, along the screen's axes: the middle and half the sizes. */
+  /** Returns the box of everything, along the screen's axes: the middle and half the sizes. */
   box(stage, places) {
     let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
     for (let k = 0; k < places.length; k += STRIDE) {
@@ -92,7 +92,7 @@ export class Camera {
     return (this.zoom * shorter) / (this.metres || 10);
   }
 
-  /** Sizes of words and signs: they grow with the picture, so that they are read from as far away as it is. */
+  /** Sizes of words and signs: they grow with the picture, so that they are readable from the same distance. */
   get unit() {
     return Math.max(1, Math.min(this.width, this.height) / 800);
   }
@@ -107,7 +107,7 @@ export class Camera {
     return [this.x + right * this.c + up * this.s, this.y + up * this.c - right * this.s];
   }
 
-  /** From here on only hands move it. */
+  /** From now on only the user moves it. */
   release() {
     if (this.mode === "free") return;
     const { scale } = this;
@@ -124,11 +124,11 @@ export class Camera {
     this.y += up * this.c - right * this.s;
   }
 
-  /** Makes the picture `by` times as large and leaves in place what is at a pixel. */
+  /** Makes the picture `by` times as large around a pixel. */
   zoomAt(by, x = this.width / 2, y = this.height / 2) {
     if (this.mode === "whole") this.release();
     const [before, above] = this.toStage(x, y), { scale } = this;
-    // From a millimetre across the screen to fifty times all that is there.
+    // From a millimetre across the screen to fifty times everything.
     const most = Math.min(this.width, this.height) / 1e-3, least = Math.min(this.width, this.height) / (50 * this.reach);
     this.zoom *= Math.min(most, Math.max(least, by * scale)) / scale;
     if (this.mode === "bench") return;
@@ -138,7 +138,7 @@ export class Camera {
   }
 }
 
-/** The box around two boxes. */
+/** Returns the box around two boxes. */
 function around([x, y, wide, high], [bx, by, bw, bh]) {
   const [left, right, low, top] = [Math.min(x - wide, bx - bw), Math.max(x + wide, bx + bw), Math.min(y - high, by - bh), Math.max(y + high, by + bh)];
   return [(left + right) / 2, (low + top) / 2, (right - left) / 2, (top - low) / 2];
@@ -146,7 +146,7 @@ function around([x, y, wide, high], [bx, by, bw, bh]) {
 
 const grown = ([x, y, wide, high]) => [x, y, wide * (1 + MARGIN), high * (1 + MARGIN)];
 
-/** Whether a box has left a frame, or become small in it. */
+/** Returns true if a box has left a frame, or become small in it. */
 function outgrown([x, y, wide, high], [bx, by, bw, bh]) {
   const outside = Math.abs(bx - x) + bw > wide || Math.abs(by - y) + bh > high;
   return outside || (bw < LEAST_FILLED * wide && bh < LEAST_FILLED * high);

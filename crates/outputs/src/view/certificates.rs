@@ -1,8 +1,8 @@
-//! Certificates of events, checked while pages are served, and what they prove.
+//! Certificates of events, checked while pages are served, and their proofs.
 //!
-//! In: files of `events --certify`. Out: what is proved of a scene, by the hash of its text, as soon as its certificate has been
-//! checked by [`proof`]. The command opens the files and has them checked; the reader of each publisher asks whether its stage
-//! is of one of them.
+//! In: files of `events --certify`. Out: the proofs of a scene, by the hash of its text, after [`proof`] has checked
+//! its certificate. The command opens and checks the files; the reader of each publisher looks up the proofs of its
+//! stage.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -13,13 +13,13 @@ use std::sync::{Arc, PoisonError, RwLock};
 use bench_dragon_messages::SCENE_HASH_BYTES;
 use bench_dragon_proof::{Proved, ProvedEvent, Refused, scene_hash};
 
-/// Bytes of the longest first line, which holds the scene's text.
+/// The most bytes of the first line, which holds the scene's text.
 const LONGEST_FIRST_LINE: u64 = 1 << 26;
 
 /// BLAKE3 of a scene's text.
 pub type SceneHash = [u8; SCENE_HASH_BYTES];
 
-/// A certificate of which the first line alone has been read.
+/// A certificate whose first line has been read.
 #[derive(Debug)]
 pub struct Certificate {
     file: PathBuf,
@@ -28,7 +28,7 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    /// Opens a file and reads of which scene it is.
+    /// Opens a file and reads its scene.
     ///
     /// # Errors
     /// [`Refused`] for a file that cannot be read, or does not begin as a certificate.
@@ -40,12 +40,12 @@ impl Certificate {
         Ok(Self { file: file.to_owned(), scene_hash, lines: Cursor::new(first).chain(lines) })
     }
 
-    /// The file.
+    /// Returns the file.
     pub fn file(&self) -> &Path {
         &self.file
     }
 
-    /// Checks all of it, which takes seconds to minutes.
+    /// Checks the whole file, which takes seconds to minutes.
     ///
     /// # Errors
     /// [`Refused`]: the first line that is wrong.
@@ -54,33 +54,33 @@ impl Certificate {
     }
 }
 
-/// What is proved of which scenes.
+/// The proofs of scenes.
 #[derive(Debug, Default)]
 pub struct Proofs {
-    /// Of the scenes that there is a certificate of, what it proves; `None` until it has been checked.
+    /// The proofs of each scene with a certificate; `None` until the certificate has been checked.
     of: RwLock<HashMap<SceneHash, Option<Arc<[ProvedEvent]>>>>,
 }
 
 impl Proofs {
-    /// Nothing is proved yet; of the scenes of these certificates something may be.
+    /// Creates the proofs of these certificates' scenes, none of which is checked yet.
     pub fn expected<'a>(certificates: impl IntoIterator<Item = &'a Certificate>) -> Self {
         let of = certificates.into_iter().map(|certificate| (certificate.scene_hash, None)).collect();
         Self { of: RwLock::new(of) }
     }
 
-    /// Adds what a certificate has proved.
+    /// Adds the proofs of a certificate.
     pub fn add(&self, proved: &Proved) {
         let mut of = self.of.write().unwrap_or_else(PoisonError::into_inner);
         of.insert(scene_hash(&proved.scene), Some(proved.results.clone().into()));
     }
 
-    /// What is proved of the scene with this hash; `None` where nothing is, or not yet.
+    /// Returns the proofs of the scene with this hash; `None` if there are none, or none yet.
     pub(super) fn of(&self, scene: &SceneHash) -> Option<Arc<[ProvedEvent]>> {
         let of = self.of.read().unwrap_or_else(PoisonError::into_inner);
         of.get(scene).cloned().flatten()
     }
 
-    /// Whether there are certificates, and none of them is of the scene with this hash.
+    /// Returns true if there are certificates, and none for the scene with this hash.
     pub(super) fn are_of_others(&self, scene: &SceneHash) -> bool {
         let of = self.of.read().unwrap_or_else(PoisonError::into_inner);
         !of.is_empty() && !of.contains_key(scene)

@@ -1,6 +1,6 @@
-// The transport bar: conducts the show where the server says that this page may, and shows the cues everywhere. In: the
-// streams' messages and frames. Out: commands over the same WebSockets. Of several dragons one may be chosen; a hold and its
-// release are for all of them always.
+// The transport bar: sends commands if the server allows this page to, and always shows the cues. In: the streams'
+// messages and frames. Out: commands over the same WebSockets. One of several dragons may be selected; a hold and its
+// release always go to all of them.
 
 import { answerTo, say, translate } from "./words.js";
 
@@ -8,13 +8,13 @@ import { answerTo, say, translate } from "./words.js";
 const PLAYING = 0, HELD = 2, ENDED = 3;
 /** Simulated seconds of one seek by a key. */
 const SEEK = 5;
-/** While the time line is dragged, a seek is sent no more often than this (ms). */
+/** The least time between two seeks while the time line is dragged (ms). */
 const SEEK_INTERVAL = 100;
-/** An answer that has not come by then (ms) is not waited for. */
+/** The time limit of an answer (ms). */
 const PATIENCE = 2000;
-/** How long a sentence and a cue's name stay (ms). */
+/** The time for which a sentence and a cue's name are shown (ms). */
 const SENTENCE_TIME = 8000, CUE_TIME = 6000;
-/** Commands whose refusals are kept: more than a server leaves without an answer. */
+/** Commands whose refusals are kept: more than a server leaves unanswered. */
 const KEPT_REFUSALS = 16;
 const RATES = [0.1, 0.25, 0.5, 1, 2, 4, 10];
 
@@ -35,7 +35,9 @@ const BAR = `
 
 const TOKEN = "bench-dragon token";
 
-/** The token, out of the address at once: a screen that others see shows the address. A reload finds it again. */
+/**
+ * Takes the token out of the address at once: others may see the address on the screen. A reload finds the token again.
+ */
 function takeToken() {
   const given = /(?:^#|[,&])token=([^,&]*)/.exec(location.hash)?.[1];
   if (given !== undefined) {
@@ -46,22 +48,22 @@ function takeToken() {
     if (given !== undefined) sessionStorage.setItem(TOKEN, given);
     return sessionStorage.getItem(TOKEN);
   } catch {
-    // A browser that keeps nothing.
+    // A browser without storage.
     return given ?? null;
   }
 }
 const token = takeToken();
 
-/** Whether a certificate of this very scene proves that an event happens when it is announced. */
+/** Returns true if a certificate of exactly this scene proves the announced time of an event. */
 const isProved = (stage, { event, time }) => Boolean(stage.proved?.some((outcome) => outcome.event === event && outcome.status === "proved" && outcome.time_lo <= time && time <= outcome.time_hi));
 
-/** Whether a pause is what they need: any plays, or all stand at their end, where loops wait to begin again. */
+/** Returns true if the button pauses: any show plays, or all are at their end, where loops wait to begin again. */
 function canPause(streams) {
   const all = streams.map(({ playback }) => playback.newest.playback);
   return all.includes(PLAYING) || all.every((one) => one === ENDED);
 }
 
-/** Whether commands have somebody to obey them. */
+/** Returns true if a publisher can execute commands. */
 const isThere = ({ playback, stage, trouble }) => Boolean(playback.newest && stage && trouble === null);
 
 export function conduct(dragons) {
@@ -74,20 +76,23 @@ export function conduct(dragons) {
   cue.setAttribute("role", "status");
   const streams = dragons.map(({ stream }) => stream), several = dragons.length > 1, nameOf = (stream) => dragons[streams.indexOf(stream)].name;
   const greeted = new Map(), allowed = new Map();
-  /** What was not sent or was refused, and why: of each of the last commands by its number a sentence for each stream. */
+  /** The refusals of the last commands, by the command's number: a sentence for each stream. */
   const refusals = new Map();
-  /** The stream that is conducted, null for all; the commands so far, and the one whose refusal is shown. */
+  /** The selected stream, null for all; the number of commands so far, and the command whose refusal is shown. */
   let chosen = null, numbered = 0, refused = 0;
   let shownStages = [], shownRate, dragged = false, sentenceAt = 0, cueAt = 0;
-  /** Where a seek that has not been answered goes, and one that waits for that answer; the time of the last one sent. */
+  /** The target of an unanswered seek, and of a seek that waits for that answer; the time of the last seek sent. */
   let sought = null, wanted = null, soughtAt = -Infinity;
   /** The last answer to a seek: frames from before it are still on their way. */
   let landed = null;
-  /** Of each stream the run whose rate is known, and that rate: of its frames, or as it was commanded while the show stands still. */
+  /**
+   * The run of each stream whose rate is known, and that rate: from its frames, or as commanded while the show stands
+   * still.
+   */
   const known = new Map();
 
   const targets = () => (chosen ? [chosen] : streams), there = () => targets().filter(isThere);
-  /** The one whose time and speed are shown. */
+  /** Returns the stream whose time and speed are shown. */
   const lead = () => chosen ?? streams.find(isThere) ?? streams[0];
   const own = (stream, sentence) => (several ? say("refusedBy", { name: nameOf(stream), sentence }) : sentence);
   const put = (element, text) => element.textContent !== text && (element.textContent = text);
@@ -96,7 +101,7 @@ export function conduct(dragons) {
     put(part("answer"), sentence);
     sentenceAt = performance.now();
   }
-  /** Adds what became of a command at one stream to what is known of the others: none hides another's. */
+  /** Adds the result of a command at one stream to the results of the others. */
   function refuse(id, stream, sentence) {
     const sentences = refusals.get(id) ?? new Map();
     refusals.set(id, sentences.set(stream, own(stream, sentence)));
@@ -104,14 +109,15 @@ export function conduct(dragons) {
     refused = id;
   }
   function command(name, value) {
-    // A seek that waits goes before what was commanded after it; a hold does without.
+    // A waiting seek is sent before later commands, but not before a hold.
     if (name === "hold") wanted = null;
     if (name !== "seek" && wanted !== null) sendWanted();
-    // What is for all goes to those that are there; a hold, and its end, to every one: a refusal says where it did not arrive.
+    // Commands for all go to the connected streams; a hold and its release go to every stream: a refusal says where it
+    // did not arrive.
     const id = ++numbered, to = name === "hold" || name === "release" ? streams : there().length ? there() : targets();
     refusals.delete(id - KEPT_REFUSALS);
     const unsent = to.filter((stream) => {
-      // A show that is shorter than another one stands at its end.
+      // A show that is shorter than another one stays at its end.
       const within = name === "seek" && stream.stage ? Math.min(value, stream.stage.freeze_time) : value;
       return !stream.send({ command: name, value: within, id });
     });
@@ -122,7 +128,7 @@ export function conduct(dragons) {
     command(targets().length === 1 ? "toggle" : canPause(there()) ? "pause" : "resume");
   }
 
-  // The time line. One seek is on its way at a time, so that a hand that moves fast leaves no queue behind.
+  // The time line. One seek is pending at a time, so that a fast drag leaves no queue.
   function seek(time) {
     wanted = Math.min(Math.max(0, time), Number(line.max));
     sendSeek();
@@ -141,7 +147,7 @@ export function conduct(dragons) {
     return wanted ?? sought?.time ?? (isBefore ? landed.time : newest?.time) ?? 0;
   }
 
-  /** The events and cues of those that are conducted, on a line as long as the longest show. */
+  /** The events and cues of the selected shows, on a line as long as the longest show. */
   function showStages(all) {
     const stages = all.map(({ stage }) => stage);
     if (stages.length === shownStages.length && stages.every((stage, k) => stage === shownStages[k])) return;
@@ -182,7 +188,7 @@ export function conduct(dragons) {
     rates.replaceChildren(...all.map((one) => new Option(`${+one.toPrecision(3)} ×`, one, false, one === rate)));
     if (rate === null) rates.selectedIndex = -1;
   }
-  /** Whether all that are there are held. */
+  /** Returns true if all connected shows are held. */
   function allHeld() {
     const all = streams.filter(isThere);
     return all.length > 0 && all.every(({ playback }) => playback.newest.playback === HELD);
@@ -201,7 +207,7 @@ export function conduct(dragons) {
     if (bar.hidden) return;
     main.style.setProperty("--conduct-height", `${bar.offsetHeight}px`);
     for (const control of bar.querySelectorAll("button, input, select:not(#conduct-whom)")) control.disabled = !all.length;
-    // All can be held while the one that is chosen is gone.
+    // All shows can be held while the selected one is gone.
     part("hold").disabled = !streams.some(isThere);
     showHold();
     if (!all.length) return;
@@ -235,7 +241,7 @@ export function conduct(dragons) {
       }
       if (message.sentence) {
         refuse(message.id, stream, answerTo(message));
-        // Of several, one may obey an earlier command after another was not reached by a later one.
+        // One of several shows may execute an earlier command after a later command did not reach another one.
       } else if (message.code && (several ? message.id > refused : message.id !== refused)) put(part("answer"), "");
       sendSeek();
     }
@@ -267,7 +273,7 @@ export function conduct(dragons) {
   part("restart").onclick = () => command("restart");
   part("hold").onclick = hold;
   rates.onchange = () => {
-    // What is shown is what is in force, which a frame says.
+    // The shown value is the value in force, from a frame.
     commandRate(Number(rates.value));
     shownRate = undefined;
   };
@@ -287,7 +293,10 @@ export function conduct(dragons) {
     "[": () => changeRate(1 / 2), "]": () => changeRate(2),
     ArrowLeft: () => seek(now() - SEEK), ArrowRight: () => seek(now() + SEEK),
   };
-  /** Keys that what has the focus uses itself: the picture moves by arrows, buttons are pressed by space, lists have theirs. */
+  /**
+   * Keys that the focused element uses itself: the picture moves by arrows, buttons are pressed by space, lists have
+   * theirs.
+   */
   const usedBy = (target, key) =>
     target.closest("select, input:not([type=range]), dialog") || (key === " " && target.closest("button")) || (key.startsWith("Arrow") && target.closest("canvas"));
   addEventListener("keydown", (event) => {

@@ -1,5 +1,5 @@
-// One publisher's dragon: its stream, where it is now, its path and colours, what is so and what is marked. Knows the words for
-// its marks, and no canvas.
+// One publisher's dragon: its stream, its present pose, its path and colours, its state and its marks. Knows the words
+// for its marks, and no canvas.
 
 import { pathOf } from "./drawing.js";
 import { STRIDE } from "./hermite.js";
@@ -9,23 +9,26 @@ import { Show } from "./show.js";
 import { Stream } from "./stream.js";
 import { benchesOf, nameOf, remaining, say } from "./words.js";
 
-/** While there is nothing to show. */
+/** The situation without anything to show. */
 const WAITING = { name: "waiting", severity: "ok", happened: false, sentence: null };
 /** A state that the server does not list is shown as one without danger. */
 const UNKNOWN = { ...WAITING, name: "unknown" };
-/** Frames that do not come for so long (ms) are missed. */
+/** The time without frames after which the page reports silence (ms). */
 const SILENCE = 2000;
 /** Milliseconds between the frames of the slowest publisher. */
 const LONGEST_PERIOD = 10_000;
 
-/** How far from the centre the outermost bench is. */
+/** Returns the distance of the outermost bench from the centre. */
 function reachOf(stage, handles) {
   let most = 0;
   for (let k = 0; k < handles.length; k += STRIDE) most = Math.max(most, Math.hypot(handles[k], handles[k + 1]));
   return most + stage.width + stage.hole_inset || 1;
 }
 
-/** When the head reaches the end of the path, where the show comes so far and nothing that is counted down is before. */
+/**
+ * Returns the time at which the head reaches the end of the path, if the show gets there and no counted event is
+ * before.
+ */
 function pathEnd(stage, alert) {
   const end = stage.events.find(({ event, time }) => event === "path_end" && time <= stage.freeze_time);
   return end && alert?.event == null ? end.time : NaN;
@@ -36,7 +39,10 @@ function overlapWords({ pair, depth }) {
 }
 
 export class Dragon {
-  /** `name` is the publisher's, which stands before its words where there are `several`; `show` asks for the show look, `still` for no motion in it. */
+  /**
+   * `name` is the publisher's, written before its words if there are `several`; `show` selects the show look, `still`
+   * stops its motion.
+   */
   constructor(name, { several, show, still }) {
     this.name = name;
     this.several = several;
@@ -44,10 +50,10 @@ export class Dragon {
     this.colours = new SpeedScale();
     this.show = show ? new Show(still) : null;
     this.overlap = new Overlap();
-    /** The handles at the moment of the picture, and between which two frames they lie. */
+    /** The handles at the moment of the picture, and the two frames around it. */
     this.places = this.shown = null;
     this.path = this.run = this.team = this.epoch = null;
-    /** How long before the last pictures what they show was sent, ms; the frames a second, NaN until they have been counted. */
+    /** The age of the frames in the last pictures, ms; the frames a second, NaN until they have been counted. */
     this.latency = [];
     this.rate = NaN;
     this.counted = 0;
@@ -65,17 +71,17 @@ export class Dragon {
     return this.stream.playback.newest;
   }
 
-  /** Whether there is something to draw. */
+  /** Returns true if there is something to draw. */
   get isThere() {
     return Boolean(this.newest && this.stage);
   }
 
-  /** A word or a sentence of the picture, with the publisher's name before it where there are several. */
+  /** Returns a word or a sentence of the picture, after the publisher's name if there are several. */
   own(words) {
     return this.several ? `${this.name}: ${words}` : words;
   }
 
-  /** What is so now: the state, what is ahead and in how many seconds of wall time. */
+  /** Returns the situation: the state, the next event and the seconds of wall time until then. */
   situation(now) {
     const { playback, stage, alert, trouble } = this.stream, { newest } = playback;
     const silence = newest ? now - newest.at : 0;
@@ -91,8 +97,8 @@ export class Dragon {
   }
 
   /**
-   * Looks at what is so now, and where everything is. Whether its team is another one than before: what was chosen for the
-   * last one does not fit. `struck` then tells whether something has just happened.
+   * Updates the situation and the places. Returns true for a new team, for which earlier choices do not fit. `struck`
+   * is then true if something has just happened.
    */
   look(now) {
     const before = this.state, { playback } = this.stream, { newest, stage } = this;
@@ -108,7 +114,7 @@ export class Dragon {
     const { alert } = this.stream, known = stage.states[newest.state] ?? UNKNOWN;
     const deepest = known.happened && known.severity !== "ok" ? this.overlap.look(stage, this.places, newest, this.reach, now) : null;
     const all = marksOf({ state: known, alert, stage, places: this.places, overlap: deepest });
-    // An audience is shown where it will happen, not what the crew watches.
+    // An audience sees the place of the next event, not the marks for the crew.
     this.marks = this.named(this.show ? all.filter(({ kind }) => kind !== "now") : all, deepest);
     this.sight.now = deepest && !this.sight.trouble ? overlapWords(deepest) : "";
     const happened = this.state.happened && this.state.severity === "error";
@@ -119,7 +125,7 @@ export class Dragon {
     return isOther;
   }
 
-  /** A picture of it has just been drawn: measures how long before that what it shows was sent, where that is known. */
+  /** Measures the age of the frame in the picture that has just been drawn, if the clock is known. */
   drawn() {
     const { clock } = this.stream, { from, to, time } = this.shown;
     if (clock === null) this.latency.length = 0;
@@ -129,7 +135,7 @@ export class Dragon {
     if (this.latency.length > 600) this.latency.shift();
   }
 
-  /** Counts the frames that have come since the last time, so many ms ago. */
+  /** Counts the frames since the last call, `ms` ago. */
   count(passed) {
     const { received } = this.stream;
     this.rate = ((received - this.counted) * 1000) / passed;
@@ -144,12 +150,12 @@ export class Dragon {
     return isOther;
   }
 
-  /** How far the team reaches, and the path so far out. */
+  /** Sets the extent of the team, and draws the path as far out. */
   measure(stage, newest) {
     const reach = (this.reach = reachOf(stage, newest.handles));
-    // Positions are rounded to 32 bits, which alone moves the outermost bench a little.
+    // The rounding of positions to 32 bits moves the outermost bench a little.
     if (this.path && this.path.run === this.run && reach <= 1.001 * this.path.reach) return;
-    // A team that moves outward is given room ahead.
+    // A team that moves outward gets room ahead.
     const far = this.path?.run === this.run ? 1.1 * reach : reach;
     this.path = { run: this.run, reach: far, lines: pathOf(stage, far) };
   }
@@ -166,20 +172,22 @@ export class Dragon {
     return marks;
   }
 
-  /** What stands at its ends: head and tail, with its name where there are several; in the show look the name alone. */
+  /**
+   * Returns the words at its ends: head and tail, with its name if there are several; in the show look only the name.
+   */
   endNames() {
     const gone = this.several && this.sight.stale ? ` (${say(this.sight.trouble ?? "noFramesNow")})` : "";
     if (this.show) return this.several ? [this.name + gone, null] : [null, null];
     return [this.own(say("head")) + gone, this.own(say("tail"))];
   }
 
-  /** Changes where the picture of it does. */
+  /** Returns a value that changes with its picture. */
   lookKey() {
     const { newest, colours, shown, stream, marks, stage } = this, texts = marks.map(({ kind, pair, text }) => [kind, pair, text]);
     return [newest.run, newest.state, colours.resting, shown.time, shown.from.epoch, this.path.reach, colours.step, colours.head, stream.alert?.level, texts, stage.scene, this.show?.phase, this.sight.stale].join();
   }
 
-  /** The last words on why nothing comes, once it has been seen; empty where frames come. */
+  /** Returns the reason why no frames come, after the first frame; empty while they come. */
   notice() {
     const { newest, sight } = this, stopped = sight.trouble ?? (sight.silent === null ? null : "silent");
     if (!stopped || !this.isThere) return "";
@@ -187,7 +195,7 @@ export class Dragon {
     return this.own(say(words, { seconds: sight.silent, time: newest.time.toFixed(1) }));
   }
 
-  /** For tests and measurements; nothing of a publisher that is gone. */
+  /** For tests and measurements; empty for a publisher that is gone. */
   report(camera) {
     const { newest } = this, there = this.isThere && !this.sight.trouble;
     if (!there) return { name: this.name, state: null, run: null, sequence: null, head: null, shown: null, time: newest?.time ?? null };

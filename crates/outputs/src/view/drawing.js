@@ -5,13 +5,13 @@ import { STRIDE } from "./hermite.js";
 import { SHADES } from "./palette.js";
 import { Labels, doubled, scaleBar, target } from "./signs.js";
 
-/** Edges drawn at once: with thousands in one path, it takes several times as long. */
+/** Edges drawn at once: a path with thousands takes several times as long. */
 const BATCH = 100;
-/** Where the line around a dragon begins and ends, pixels beyond its boards. */
+/** The inner and outer edge of the line around a dragon, pixels beyond its boards. */
 const CASING_FROM = 1, CASING_TO = 4;
-/** How much is left of a dragon that is no longer true beside others that are. */
+/** The opacity of a stale dragon beside live ones. */
 const DIMMED = 0.4;
-/** Beyond so many turns the lines of the path lie closer together than pixels. */
+/** The number of turns beyond which the lines of the path are closer than pixels. */
 const MOST_TURNS = 1500;
 
 /** Adds a rectangle to the context's path. */
@@ -25,8 +25,8 @@ export function outline(context, { x, y, c, s, l, w }) {
 }
 
 /**
- * The path of a stage, in metres. A spiral on which the team comes in is drawn as far out as `reach`: the team stands
- * there.
+ * The path of a stage, in metres. A spiral on which the team comes in is drawn as far out as `reach`, where the team
+ * stands.
  */
 export function pathOf({ pitch, path: segments }, reach) {
   const path = new Path2D();
@@ -48,7 +48,7 @@ export function pathOf({ pitch, path: segments }, reach) {
   return path;
 }
 
-/** The spiral r = pitch * turn from one polar angle to another, as cubic curves that take its tangents over. */
+/** The spiral r = pitch * turn from one polar angle to another, as cubic curves with its tangents. */
 function addSpiral(path, pitch, from, to) {
   const turns = (to - from) / (2 * Math.PI);
   if (turns > MOST_TURNS) return;
@@ -66,7 +66,7 @@ function addSpiral(path, pitch, from, to) {
   }
 }
 
-/** Lets a context draw in metres, moved by some of its pixels. */
+/** Sets a context to draw in metres, with an offset in pixels. */
 function inMetres(context, camera, right = 0, down = 0) {
   const [left, top] = camera.toPixel(0, 0), { ratio, scale, c, s } = camera, pixels = ratio * scale;
   context.setTransform(pixels * c, -pixels * s, -pixels * s, -pixels * c, ratio * left + right, ratio * top + down);
@@ -74,10 +74,10 @@ function inMetres(context, camera, right = 0, down = 0) {
 
 /**
  * The ground with the path on it. A long path takes longer to draw than all its benches, so it is kept with a margin
- * until the camera has moved further than that, or it looks different.
+ * until the camera moves beyond the margin, or the path changes.
  */
 export class Ground {
-  /** A transparent ground is the path alone. */
+  /** A transparent ground is only the path. */
   constructor(transparent) {
     this.transparent = transparent;
     this.canvas = document.createElement("canvas");
@@ -108,7 +108,7 @@ export class Ground {
     other.drawImage(this.canvas, ...this.at);
   }
 
-  /** Dims what has been drawn since, to the share `left`. */
+  /** Dims the drawing since then, to the share `left`. */
   dim(other, left) {
     const { width, height } = other.canvas;
     other.setTransform(1, 0, 0, 1, 0, 0);
@@ -145,9 +145,9 @@ export class Ground {
 
 /**
  * Draws everything. `scene` has: ground, words (false: none are written), and dragons, each with stage, places (STRIDE
- * numbers a handle, as all handles here), colours (a SpeedScale), path, marks (see marks.js), chosen (a bench, or -1), its
- * chosenName, its endNames, show (a Show, or null), stale (whether it is no longer true and others are), and identity (what
- * tells it from others, see palette.js; null for one alone). Returns the words written, as boxes in pixels.
+ * numbers a handle, as all handles here), colours (a SpeedScale), path, marks (see marks.js), chosen (a bench, or -1),
+ * its chosenName, its endNames, show (a Show, or null), stale (true if it is stale beside live ones), and identity (see
+ * palette.js; null for a single dragon). Returns the words written, as boxes in pixels.
  */
 export function draw(context, camera, palette, { ground, dragons, words }) {
   ground.cover(context, camera, palette, dragons.map(({ path, identity }) => ({ lines: path, dashes: identity?.dashes ?? [] })));
@@ -186,7 +186,7 @@ function drawDragon(context, camera, palette, transparent, dragon) {
     mark(0, palette.ink, 2);
     if (count > 1) mark(count - 1, palette.ink, 1);
   }
-  // What comes first in the list lies on top.
+  // The first in the list lies on top.
   for (const { pair, ink, dashes } of marks.toReversed()) pair.filter((bench) => bench < count).forEach((bench) => mark(bench, palette[ink], 3.5, dashes));
   if (chosen >= 0 && chosen < count) mark(chosen, palette.ink, 3, [7, 4]);
   for (const { place, ink, ghost } of marks.toReversed()) if (place) target(context, place, palette, pixel, palette[ink], ghost);
@@ -194,8 +194,8 @@ function drawDragon(context, camera, palette, transparent, dragon) {
 }
 
 /**
- * A line around all boards together, below them, in the colour and the dashes that tell a dragon from others. Between two turns of
- * a coil that leave no room for it there is none.
+ * A line around all boards together, below them, in the colour and the dashes of a dragon. It is left out between two
+ * turns of a coil without room for it.
  */
 function casing(context, camera, palette, transparent, { stage, places, identity }) {
   const pixel = camera.unit / camera.scale;
@@ -215,7 +215,7 @@ function casing(context, camera, palette, transparent, { stage, places, identity
   context.lineJoin = "miter";
 }
 
-/** Words for all dragons; the most important ones take their places first. */
+/** Words for all dragons; the most important ones are placed first. */
 function label(labels, palette, dragons) {
   const each = (write) => dragons.forEach((dragon) => write(dragon, dragon.places.length / STRIDE - 1, (bench) => rectangle(dragon.stage, dragon.places, bench)));
   each(({ marks }) => {
@@ -238,7 +238,7 @@ function label(labels, palette, dragons) {
       named.add(chosen);
     }
     const [head, tail] = [board(0), board(count - 1)];
-    // In the show look the benches of marks have no names, and a dragon's own is not theirs.
+    // In the show look marked benches have no names; the dragon's name is not theirs.
     if (front && (show || !named.has(0))) labels.add(front, head.x + head.l * head.c, head.y + head.l * head.s, palette.ink);
     if (rear && count > 1 && !named.has(count - 1)) labels.add(rear, tail.x - tail.l * tail.c, tail.y - tail.l * tail.s, palette.ink);
   });
@@ -257,8 +257,8 @@ function inSight(camera, stage, places) {
 }
 
 /**
- * Boards in a colour; with an edge where one is given as a colour and a width. Each board is a line as wide as it, in a
- * path of its own: browsers draw a single line as a rectangle, which takes less time than a path of several corners.
+ * Boards in a colour, with an edge if a colour and a width are given. Each board is one line of the board's width in a
+ * separate path: browsers draw a single line as a rectangle, which is faster than a path of several corners.
  */
 export function fillBoards(context, stage, places, benches, colour, edge) {
   context.strokeStyle = colour;
@@ -286,7 +286,7 @@ function benches(context, camera, palette, { stage, places, colours }) {
   const edge = wide > 5 ? [palette.ground, 1 / camera.scale] : null;
   shown.forEach((all, shade) => fillBoards(context, stage, places, all, shades[shade] ?? palette.still, edge));
   if (wide < 14) return;
-  // Close by, the handles show.
+  // Large boards show their handles.
   context.fillStyle = palette.ground;
   context.beginPath();
   for (const bench of shown.flat()) {
@@ -298,7 +298,7 @@ function benches(context, camera, palette, { stage, places, colours }) {
   context.fill();
 }
 
-/** A sign on a board: light on dark, so that one of the two stands out whatever the board's colour. */
+/** A sign on a board: light on dark, so that one of the two is visible on every colour. */
 function onBoard(context, palette, width, pixel) {
   context.strokeStyle = palette.near;
   context.lineWidth = width + 3 * pixel;

@@ -1,7 +1,7 @@
-// Where every handle is at the moment of display: cubic Hermite interpolation between the frames of a stream.
+// The handles at the moment of display: cubic Hermite interpolation between the frames of a stream.
 //
-// The rules are those of the Rust `HermiteReader` (src/subscribers/hermite.rs) and of examples/python/hermite.py. The
-// module imports nothing and knows no page: any page may take it over as it is.
+// The rules are those of the Rust `HermiteReader` (crates/client/src/hermite.rs) and of examples/python/hermite.py. The
+// module imports nothing and knows no page: any page may use it unchanged.
 
 /** Numbers of a handle: x, y (m), heading (rad), vx, vy (m per simulated second). */
 export const STRIDE = 5;
@@ -10,22 +10,22 @@ export const STRIDE = 5;
  * A frame that is pushed.
  *
  * @typedef {object} Frame
- * @property {number} due - when the frame was true, ms of wall time on any clock that runs evenly
+ * @property {number} due - the moment of the frame, ms of wall time on any clock that runs evenly
  * @property {number} time - its simulated time, s
  * @property {number} scale - simulated seconds per second of wall time, from this frame on
- * @property {boolean} playing - false where the show stands still, whose velocities are zero for that reason alone
- * @property {string|number} run - which run of a publisher it belongs to
+ * @property {boolean} playing - false while the show stands still: only for that reason its velocities are zero
+ * @property {string|number} run - the run of the publisher
  * @property {number} epoch - grows by one at every jump of simulated time
  * @property {Float32Array|Float64Array} handles - STRIDE numbers a handle, head first
  */
 
-/** The speed of a handle without its sign, m per simulated second; NaN where it is not sent. */
+/** The speed of a handle without its sign, m per simulated second; NaN if it is not sent. */
 export function speedOf(handles, handle) {
   const vx = handles[STRIDE * handle + 3], vy = handles[STRIDE * handle + 4];
   return Math.sqrt(vx * vx + vy * vy);
 }
 
-/** The latest frames of a stream, and what lies between them. */
+/** The latest frames of a stream, and the poses between them. */
 export class HermiteReader {
   /** Keeps the latest `keep` frames: a display that runs d seconds behind r frames a second needs d r + 2. */
   constructor(keep = 64) {
@@ -34,7 +34,7 @@ export class HermiteReader {
     this.frames = [];
   }
 
-  /** Takes in the next frame of a stream. Frames of another run are forgotten. */
+  /** Adds the next frame of a stream, and drops the frames of another run. */
   push(frame) {
     if (this.newest && this.newest.run !== frame.run) this.clear();
     this.frames.push(frame);
@@ -45,21 +45,21 @@ export class HermiteReader {
     this.frames = [];
   }
 
-  /** The newest frame; null where none has come. */
+  /** The newest frame; null if none has come. */
   get newest() {
     return this.frames.at(-1) ?? null;
   }
 
   /**
-   * What was true at a moment on the clock of `due`: the simulated time, the handles, and the two frames they lie
-   * between, the same one twice where they are exactly a frame's. Before the oldest frame that is kept, after the
-   * newest, and where simulated time jumps, the frame before is shown as it is. Null where no frame has come.
+   * Returns the state at a moment on the clock of `due`: the simulated time, the handles, and the two frames around
+   * them, the same frame twice if the handles are exactly a frame's. There is no interpolation before the oldest kept
+   * frame, after the newest, and at a jump of simulated time. Null if no frame has come.
    *
-   * Headings follow from the positions, as those of the frames do. Without velocities in the stream the path between
+   * Headings follow from the positions, as in the frames. Without velocities in the stream the path between
    * two frames is a straight line.
    *
    * @param {number} moment - ms
-   * @param {Float64Array} [into] - is filled and used again where it has the right length
+   * @param {Float64Array} [into] - is filled and used again if it has the right length
    */
   at(moment, into) {
     const { frames } = this;
@@ -78,7 +78,7 @@ export class HermiteReader {
   }
 }
 
-/** Whether simulated time runs without a jump from a frame to a later one. */
+/** Returns true if simulated time runs without a jump from a frame to a later one. */
 function continues(from, to) {
   return from.run === to.run && from.epoch === to.epoch && from.handles.length === to.handles.length && to.time > from.time;
 }
@@ -101,7 +101,7 @@ function interpolate(from, to, length, u, handles) {
   for (let k = STRIDE; k < count; k += STRIDE) {
     handles[k - STRIDE + 2] = Math.atan2(handles[k - STRIDE + 1] - handles[k + 1], handles[k - STRIDE] - handles[k]);
   }
-  // The last handle heads where the last bench does.
+  // The last handle has the heading of the last bench.
   handles[count - STRIDE + 2] = handles[count - 2 * STRIDE + 2];
 }
 

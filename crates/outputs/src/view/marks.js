@@ -1,17 +1,17 @@
-// What is marked on the picture: what is coming and where, what is nearest now, and what overlaps once it has happened.
+// The marks on the picture: the next event and its place, the nearest boards now, and the overlap after a contact.
 
 import { nearest, overlapping } from "./boards.js";
 import { STRIDE } from "./hermite.js";
 
-/** Boards whose places are rounded to 32 bits overlap or part by up to so many metres for each metre from the centre. */
+/** The greatest error of a gap by the rounding of places to 32 bits, metres for each metre from the centre. */
 const ROUNDING = 1e-6;
-/** How often overlapping boards are looked for in a team of more benches than `SMALL`, ms. */
+/** The interval of searches for overlapping boards in a team of more benches than `SMALL`, ms. */
 const SEARCH_INTERVAL = 200;
 const SMALL = 500;
 
 const benchesOf = (...benches) => benches.filter((bench) => bench !== null && bench !== undefined);
 
-/** The deepest overlap of a stream of pictures, looked for only where the publisher reports one. */
+/** The deepest overlap of a stream of pictures, searched only if the publisher reports one. */
 export class Overlap {
   constructor() {
     this.found = null;
@@ -29,7 +29,8 @@ export class Overlap {
 
 /**
  * The marks of a state: each with the benches it concerns (`pair`), a place, a colour of the palette, whether the place
- * is a ghost (it will be there), whether the outlines are dashed. `text` and `names` are left to who knows the language.
+ * is a ghost (in the future), whether the outlines are dashed. The caller, which knows the language, sets `text` and
+ * `names`.
  */
 export function marksOf({ state, alert, stage, places, overlap }) {
   if (state.severity === "ok" || !alert) return [];
@@ -43,7 +44,7 @@ export function marksOf({ state, alert, stage, places, overlap }) {
   const marks = [];
   if (overlap) marks.push({ kind: "overlap", pair: overlap.pair, place: overlap.place, ink: "danger" });
   if (state.name !== "contact" && alert.event_bench_a !== null) {
-    // A link that stalls or locks is marked at its rear handle, wherever that is by now.
+    // A link that stalls or locks is marked at the present place of its rear handle.
     const rear = STRIDE * (alert.event_bench_a + 1);
     if (rear < places.length) marks.push({ kind: "link", pair: [alert.event_bench_a], place: { x: places[rear], y: places[rear + 1] }, ink: "danger" });
   }

@@ -1,17 +1,17 @@
-//! Who may open the WebSocket: this server's own page, programs, and the pages that the user lets in. Called by the
-//! server, and by that of `metrics` for the host.
+//! The admission to the WebSocket: this server's page, programs, and the pages that the user admits. Called by the
+//! server, and by the server of `metrics` for the host.
 
 use std::net::IpAddr;
 use std::str::FromStr;
 
-/// A page of another place that is let in: what browsers send as `Origin`.
+/// The origin of an admitted page, as browsers send it in `Origin`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AllowedOrigin(String);
 
 impl FromStr for AllowedOrigin {
     type Err = String;
 
-    /// An origin as a person writes it: with a slash at the end or without, with the scheme's usual port or without.
+    /// Parses an origin, with or without a slash at the end, with or without the scheme's usual port.
     fn from_str(text: &str) -> Result<Self, String> {
         let refused = || "expected an origin such as https://show.example or http://localhost:5173, or null".to_owned();
         let plain = text.trim().to_ascii_lowercase();
@@ -34,22 +34,22 @@ impl FromStr for AllowedOrigin {
     }
 }
 
-/// Which pages are let in.
+/// The admitted pages.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Admission {
-    /// Whether the server listens on a loopback address.
+    /// True if the server listens on a loopback address.
     pub(crate) loopback: bool,
-    /// Pages of other places that are let in.
+    /// The admitted origins of other pages.
     pub(crate) origins: Vec<AllowedOrigin>,
 }
 
 impl Admission {
-    /// Whether a WebSocket may be opened: by a page that is let in, by this server's own page, or by a program, which
+    /// Returns true if a WebSocket may be opened: by an admitted page, by this server's page, or by a program, which
     /// sends no origin.
     ///
-    /// Own is a page over http whose origin is the host it asks for. Behind a proxy that speaks TLS the page's origin
-    /// begins with https, and nothing that the proxy says of itself is believed, since anyone can say it: such an origin
-    /// has to be let in by name.
+    /// This server's page is a page over http whose origin is the requested host. Behind a proxy with TLS the page's
+    /// origin begins with https. The proxy's headers are not trusted, since any client can send them: such an origin
+    /// must be admitted by name.
     pub(crate) fn allows(&self, origin: Option<&str>, host: Option<&str>) -> bool {
         if origin.is_some_and(|origin| self.origins.iter().any(|allowed| allowed.0.eq_ignore_ascii_case(origin))) {
             return true;
@@ -60,8 +60,8 @@ impl Admission {
         origin.is_none_or(own) && self.allows_host(host)
     }
 
-    /// Whether a request for this host is meant for this server. On loopback the host must be a loopback name, or a
-    /// foreign name that resolves to this machine would pass as our own.
+    /// Returns true if a request for this host is meant for this server. On loopback the host must be a loopback name:
+    /// otherwise a foreign name that resolves to this machine would be accepted.
     pub(crate) fn allows_host(&self, host: Option<&str>) -> bool {
         host.is_some_and(|host| !self.loopback || is_loopback_name(host))
     }

@@ -1,19 +1,22 @@
-// The colours of the picture: those of the style sheet, the scale of speeds, and what the show look wears.
+// The colours of the picture: those of the style sheet, the scale of speeds, and those of the show look.
 
 import { STRIDE, speedOf } from "./hermite.js";
 
 /** Steps of the colour scale. */
 export const SHADES = 32;
-/** How far the scale reaches to either side of the head's speed, as shares of it: the first that holds every speed. */
+/**
+ * The widths of the scale on either side of the head's speed, as shares of it: the first that holds every speed is
+ * used.
+ */
 const WIDTHS = [1, 10, 100, 1000];
-/** Differences from the head's speed that are far smaller than this share of it have no colour of their own. */
+/** Differences from the head's speed that are far smaller than this share of it have no separate colour. */
 const FINEST = 0.001;
-/** How much of a colour is left while the dragon rests. */
+/** The opacity of colours while the dragon rests. */
 const AT_REST = 0.5;
 
 /**
- * What tells several dragons apart, besides their names: dashes (pixels of ink and of gap in turn), and a colour that stands
- * out from a light ground as from a dark one. Two of them differ in their dashes to an eye that sees no colour.
+ * The identities of several dragons, besides their names: dashes (pixels of ink and of gap in turn), and a colour that
+ * is visible on a light and on a dark ground. Without colour vision two dragons differ in their dashes.
  */
 const IDENTITIES = [
   { colour: "#1f6fb5", dashes: [] },
@@ -48,8 +51,8 @@ export function paletteOf(element) {
 
 /**
  * The scale of the colours for a run: from rest to twice the head's speed, logarithmic in the difference from it, since
- * most shows have differences of a thousandth for minutes and of a half for seconds; and only ever widened, so that a
- * colour means the same from the first picture of a run to the last. It keeps the speeds of the last moving frame.
+ * most shows have differences of a thousandth for minutes and of a half for seconds. It is only widened, so that a
+ * colour keeps its meaning within a run. It keeps the speeds of the last moving frame.
  */
 export class SpeedScale {
   constructor() {
@@ -66,7 +69,7 @@ export class SpeedScale {
     this.frame = null;
   }
 
-  /** Takes in the newest frame's speeds. */
+  /** Adds the newest frame's speeds. */
   take(frame) {
     if (this.frame === frame) return;
     this.frame = frame;
@@ -75,7 +78,7 @@ export class SpeedScale {
     this.resting = !(head > 0);
     if (this.resting) return;
     this.handles = handles;
-    // It is rounded anew in each frame.
+    // Each frame rounds it again.
     if (!(Math.abs(this.head - head) < 1e-4 * head)) this.head = head;
     let most = 0;
     for (let handle = 1; handle < handles.length / STRIDE; handle++) most = Math.max(most, Math.abs(speedOf(handles, handle) / head - 1));
@@ -87,18 +90,20 @@ export class SpeedScale {
     return WIDTHS[this.step];
   }
 
-  /** Where on the scale, from 0 to 1, a difference from the head's speed stands, as a share of it. */
+  /** Returns the place on the scale, from 0 to 1, of a difference from the head's speed, as a share of it. */
   place(difference) {
     const part = Math.log1p(Math.abs(difference) / FINEST) / Math.log1p(this.width / FINEST);
     return 0.5 + 0.5 * Math.sign(difference) * Math.min(1, part);
   }
 
-  /** Whether the show was at rest before a moving frame was seen: then colours tell head, body and tail apart. */
+  /**
+   * Returns true if the show was at rest before the first moving frame: then colours distinguish head, body and tail.
+   */
   get unseen() {
     return this.resting && !this.unsent && !this.handles;
   }
 
-  /** Which of the shades a bench has; SHADES where its speed is not sent. */
+  /** Returns the shade of a bench; SHADES if its speed is not sent. */
   shade(bench) {
     if (this.unseen) return bench === 0 ? SHADES - 1 : bench === this.frame.handles.length / STRIDE - 2 ? 0 : SHADES >> 1;
     const speed = this.handles ? speedOf(this.handles, bench) : NaN;
@@ -106,7 +111,7 @@ export class SpeedScale {
     return Math.min(SHADES - 1, Math.floor(this.place(speed / this.head - 1) * SHADES));
   }
 
-  /** Some speeds and where they stand on the scale. */
+  /** Returns some speeds and their places on the scale. */
   get ticks() {
     if (Number.isNaN(this.head)) return [];
     const shares = [-this.width, -0.1 * this.width, 0, 0.1 * this.width, this.width].filter((share) => share >= -1);

@@ -1,4 +1,4 @@
-// The panel beside the picture: the state, the countdown, the sentence, the figures. Reads what it is given; draws nothing.
+// The panel beside the picture: the state, the countdown, the sentence, the figures. Draws nothing.
 
 import { STRIDE, speedOf } from "./hermite.js";
 import { capital, proofOf, remaining, say, sentenceOf } from "./words.js";
@@ -14,14 +14,14 @@ export function put(id, text) {
   if (element(id).textContent !== text) element(id).textContent = text;
 }
 
-/** Of each dragon that the header has been about: its state, and the mark of its countdown, which were spoken last. */
+/** The last spoken state and countdown mark of each dragon that the header has shown. */
 const spokenOf = new Map();
 
 /**
- * The state, the sentence and the countdown of a situation: `state`, `alert`, `trouble` (why nothing comes, or null),
- * `silent` (seconds without a frame, or null), `stale` (whether the whole picture is no longer true), `of` (whose situation it
- * is, or null where there is one dragon), `seconds` until what is `ahead` (NaN where nothing is counted down),
- * `benches`, and `now` (what is so at this moment, in words).
+ * The state, the sentence and the countdown of a situation: `state`, `alert`, `trouble` (the reason why nothing comes,
+ * or null), `silent` (seconds without a frame, or null), `stale` (true if the whole picture is stale), `of` (the dragon
+ * of the situation, or null for a single dragon), `seconds` until the event `ahead` (NaN without a countdown),
+ * `benches`, and `now` (the present state in words).
  */
 export function showSituation({ state, alert, trouble, silent, stale, of, seconds, ahead, benches, now }) {
   const { dataset } = document.body, calm = state.severity === "ok" && !state.happened;
@@ -43,7 +43,10 @@ export function showSituation({ state, alert, trouble, silent, stale, of, second
   last.state = trouble ? null : state.name;
 }
 
-/** Shows the countdown, and speaks it at its marks. `last` is what was spoken last of this dragon, `own` says whose words are. */
+/**
+ * Shows the countdown, and speaks it at its marks. `last` has this dragon's last spoken words, `own` adds its name to
+ * words.
+ */
 function countdown(state, seconds, ahead, last, own) {
   const counting = seconds > -1, near = counting && (state.severity !== "ok" || seconds < 10);
   const [number, unit] = counting ? remaining(Math.max(0, seconds)) : ["", ""];
@@ -62,7 +65,7 @@ function countdown(state, seconds, ahead, last, own) {
   last.mark = mark;
 }
 
-/** Clearance, speeds and time; empty where nothing comes. */
+/** Clearance, speeds and time; empty without frames. */
 export function showFigures({ clearance, colours, time, scale }) {
   const known = Number.isFinite(clearance), metres = Math.max(0, clearance);
   put("metres", !known ? say("notComputed") : clearance < -0.0005 ? say("overlap", { metres: (-clearance).toFixed(3) }) : `${metres.toFixed(3)} m`);
@@ -79,7 +82,10 @@ export function showFigures({ clearance, colours, time, scale }) {
 }
 
 let provedStage = null;
-/** What is proved of the events of a stage, a line for each, those that the show cannot come to by themselves; nothing where there is no stage, or no certificate of its scene. */
+/**
+ * The proofs of the events of a stage, a line for each; events that the show cannot reach are separate. Empty without a
+ * certificate.
+ */
 export function showProofs(stage) {
   if (provedStage === stage) return;
   provedStage = stage;
@@ -92,7 +98,7 @@ export function showProofs(stage) {
 }
 
 let scaleShown = "";
-/** Speeds under the colours, where they stand; of a show that was at rest all the while, what has which colour. */
+/** The speeds under the colours; for a show at rest so far, the meaning of each colour. */
 function showScale({ ticks, width, unseen }) {
   const digits = Math.max(2, Math.ceil(-Math.log10(width / 10)));
   const parts = ["tail", "body", "head"].map((part, k) => ({ at: (50 * k).toFixed(1), text: say(part).toLowerCase() }));
@@ -127,7 +133,7 @@ export function showBench(chosen, handles) {
   put("bench", say("detail", values));
 }
 
-/** Which show this is, on the page and in the title; with `several`, the names of all publishers, the title is theirs. */
+/** The show's name, on the page and in the title; with `several`, the title has the names of all publishers. */
 export function showNames({ scene, publisher }, several) {
   const title = several ? say("titleSeveral", { publishers: several.join(", ") }) : scene ? say("title", { scene, publisher }) : say("stage");
   if (document.title !== title) document.title = title;

@@ -1,5 +1,5 @@
 //! Reads the shared memory and keeps the newest picture. In: the events of a [`feed`](bench_dragon_client::feed). Out:
-//! a [`Picture`] in a channel. Called by the server, on a thread of its own.
+//! a [`Picture`] in a channel. Called by the server, on a separate thread.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,12 +12,12 @@ use bench_dragon_client::feed::{Feed, FeedEvent};
 use bench_dragon_messages::{LoopStatus, Stage};
 use bench_dragon_proof::ProvedEvent;
 
-/// How often frames are polled: some browsers draw 240 times a second, none needs more. To be woken by each frame
-/// instead would cost the publisher more than the frame itself.
+/// The interval of polls: some browsers draw 240 times a second, none needs more. Waking this thread at each frame
+/// would cost the publisher more than the frame itself.
 const POLL_INTERVAL: Duration = Duration::from_millis(4);
-/// How long to wait where the services cannot be used, before the next attempt.
+/// The time before the next attempt if the services cannot be used.
 const RETRY_INTERVAL: Duration = Duration::from_millis(200);
-/// Cues that a browser which takes long to be written to may fall behind; of a show that has more, as many as it has.
+/// The cues kept for a slow browser; a show with more cues keeps all of them.
 const KEPT_CUES: usize = 16;
 
 /// Keeps the picture up to date until `stop` is set, through any number of publishers of a name.
@@ -40,7 +40,7 @@ pub(super) fn read(mut feed: Feed, name: &str, proofs: &Proofs, sender: &watch::
             }
             changed = true;
         }
-        // Known as soon as the publisher is found, and thus no later than its stage.
+        // Known when the publisher is found, thus no later than its stage.
         let shares_clock = feed.shares_clock();
         changed |= shares_clock != reader.picture.shares_clock;
         reader.picture.shares_clock = shares_clock;
@@ -54,25 +54,25 @@ pub(super) fn read(mut feed: Feed, name: &str, proofs: &Proofs, sender: &watch::
     }
 }
 
-/// The newest of everything, as far as it has come.
+/// The newest messages, as far as they have come.
 struct Reader<'a> {
     picture: Picture,
     /// The publisher's name.
     publisher: String,
     proofs: &'a Proofs,
     stage: Option<Stage>,
-    /// What is proved of the scene of that stage.
+    /// The proofs of the scene of that stage.
     proved: Option<Arc<[ProvedEvent]>>,
-    /// The scene of which it has been said that no certificate is its own.
+    /// The scene for which the log has the warning that no certificate is for it.
     unproved: Option<SceneHash>,
-    /// Of the run whose status came last: it alone holds the scene's name.
+    /// The latest status: only a status has the scene's name.
     status: Option<LoopStatus>,
     /// Cues that have come so far.
     cues: u64,
 }
 
 impl Reader<'_> {
-    /// Takes in an event; whether the picture has changed.
+    /// Applies an event. Returns true if the picture changed.
     fn handle(&mut self, event: FeedEvent<'_>) -> bool {
         match event {
             FeedEvent::Stage(stage) => {
@@ -97,7 +97,7 @@ impl Reader<'_> {
                 (self.stage, self.proved, self.status) = (None, None, None);
                 return true;
             }
-            // The page counts the time since the latest frame by itself.
+            // The page itself counts the time since the latest frame.
             FeedEvent::Status(status) => {
                 if self.status.replace(*status).is_some_and(|known| known.run_id == status.run_id) {
                     return false;
@@ -111,7 +111,7 @@ impl Reader<'_> {
         true
     }
 
-    /// Takes up what has been proved of the scene since its stage came; whether that changes the picture.
+    /// Looks for proofs of the scene that came after its stage. Returns true if they change the picture.
     fn look_for_proof(&mut self) -> bool {
         let Some(stage) = self.stage.as_ref().filter(|_| self.proved.is_none()) else { return false };
         self.proved = self.proofs.of(&stage.scene_hash);
@@ -121,22 +121,21 @@ impl Reader<'_> {
         self.proved.is_some()
     }
 
-    /// Says once of a scene that the certificates are of others.
+    /// Warns once for each scene that all certificates are for other scenes.
     fn warn_of_another_scene(&mut self) {
         let Some(stage) = self.stage.as_ref().filter(|stage| self.proofs.are_of_others(&stage.scene_hash)) else {
             return;
         };
         if self.unproved.replace(stage.scene_hash) != Some(stage.scene_hash) {
             log::warn!(
-                "\"{}\" shows a scene with another text than that of any certificate (BLAKE3 {}): its page says nothing \
-                 of proofs",
+                "\"{}\" shows a scene whose text no certificate has (BLAKE3 {}): its page shows no proofs",
                 self.publisher,
                 stage.scene_hash_digits().as_deref().unwrap_or("not known")
             );
         }
     }
 
-    /// Says what the stage is, with the scene's name once it is known.
+    /// Updates the message about the stage, with the scene's name when it is known.
     fn describe(&mut self) {
         let Some(stage) = &self.stage else { return };
         let status = self.status.as_ref().filter(|status| status.run_id == stage.run_id);

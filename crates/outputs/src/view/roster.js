@@ -1,5 +1,5 @@
-// The list of several dragons beside the picture: of each its sign, its name, its state, its countdown and its sentence. Where
-// there is one dragon, there is no list.
+// The list of several dragons beside the picture: the sign, name, state, countdown and sentence of each. A single
+// dragon has no list.
 
 import { identityOf } from "./palette.js";
 import { SIGNS, element } from "./panel.js";
@@ -7,7 +7,7 @@ import { capital, remaining, say, sentenceOf } from "./words.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** A stretch of the line that a dragon has on the picture. */
+/** A piece of the line around a dragon on the picture. */
 function swatch({ colour, dashes }) {
   const svg = document.createElementNS(SVG, "svg"), line = document.createElementNS(SVG, "line");
   for (const [name, value] of Object.entries({ viewBox: "0 0 60 8", "aria-hidden": "true" })) svg.setAttribute(name, value);
@@ -21,7 +21,7 @@ function swatch({ colour, dashes }) {
 const made = (tag, name) => Object.assign(document.createElement(tag), { className: name });
 
 export class Roster {
-  /** `select` is called with the dragon whose row is pressed, or with null where it was selected already. */
+  /** `select` is called with the dragon of the pressed row, or with null if it was selected already. */
   constructor(dragons, select) {
     this.selected = null;
     this.rows = dragons.map((dragon, place) => {
@@ -36,7 +36,10 @@ export class Roster {
     element("dragons").hidden = false;
   }
 
-  /** Shows how each is; `first` is the dragon of the header, which has its sentence there, `selected` that of the figures. */
+  /**
+   * Shows the situation of each; `first` is the dragon of the header, which has its sentence there, `selected` that of
+   * the figures.
+   */
   show(first, selected) {
     this.selected = selected;
     for (const { dragon, item, button, state, sentence } of this.rows) {
@@ -50,7 +53,7 @@ export class Roster {
     }
   }
 
-  /** Why nothing comes. */
+  /** The reason why nothing comes. */
   lost({ trouble, silent }) {
     return trouble ? `○ ${capital(say(trouble))}` : `… ${capital(say("noFrames", { seconds: silent }))}`;
   }

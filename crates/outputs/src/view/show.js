@@ -1,16 +1,17 @@
-// The show look: lacquered boards, a lantern at every handle, a dragon's head after its pearl, embers behind its tail, a
-// flash at the contact. The boards stay the true rectangles; all else is ornament. Keeps still where motion is unwanted.
+// The show look: lacquered boards, a lantern at every handle, a dragon's head after its pearl, embers behind its tail,
+// a flash at the contact. The boards stay the true rectangles; the rest is ornament. Stands still for users who prefer
+// no motion.
 
 import { rectangle } from "./boards.js";
 import { fillBoards } from "./drawing.js";
 import { STRIDE } from "./hermite.js";
 
-/** How long what glows behind head and tail lasts, ms, and the flash. */
+/** The lifetime of the glow behind head and tail, and of the flash, ms. */
 const TRAIL = 3500;
 const FLASH = 1600;
-/** Pixels of a glow's own picture. */
+/** Pixels of the picture of a glow. */
 const GLOW = 128;
-/** Lanterns that glow one by one: of more, every other one does, or every third, and so on. */
+/** The most lanterns that glow: of more, every second one glows, or every third, and so on. */
 const MOST_GLOWS = 1200;
 
 /** A spot of light, made once for each colour. */
@@ -24,7 +25,7 @@ function glowOf(colour) {
 }
 
 export class Show {
-  /** `still`: nothing moves but the dragon. */
+  /** `still`: only the dragon moves. */
   constructor(still) {
     this.still = still;
     this.glows = new Map();
@@ -33,12 +34,12 @@ export class Show {
     this.now = 0;
   }
 
-  /** Changes as often as what glows by itself is to be drawn anew. */
+  /** Returns a value that changes whenever the glow must be drawn again. */
   get phase() {
     return this.still ? 0 : Math.floor(this.now / 33);
   }
 
-  /** The next picture: where head and tail are, and whether something has just happened, at a place. */
+  /** Begins the next picture: the places of head and tail, and the place of an event that has just happened. */
   update(now, places, jumped, happened) {
     this.now = now;
     if (jumped) this.trail = [];
@@ -55,7 +56,7 @@ export class Show {
     context.drawImage(this.glows.get(colour), x - radius, y - radius, 2 * radius, 2 * radius);
   }
 
-  /** All but the crown. In metres; leaves the context as it was. */
+  /** Draws all but the crown, in metres; restores the context. */
   draw(context, camera, palette, { stage, places }, benches) {
     const pixel = camera.unit / camera.scale, count = places.length / STRIDE - 1, wide = stage.width * camera.scale;
     const light = (draw) => this.light(context, palette, draw);
@@ -70,7 +71,7 @@ export class Show {
     if (count > 1) this.tail(context, palette, pixel, rectangle(stage, places, count - 1));
   }
 
-  /** What lies over all marks: the head, and the flash. */
+  /** Draws the layer above all marks: the head, and the flash. */
   crown(context, camera, palette, { stage, places }) {
     const light = (draw) => this.light(context, palette, draw);
     this.head(context, palette, camera.unit / camera.scale, rectangle(stage, places, 0), this.flicker(0), light);
@@ -89,7 +90,7 @@ export class Show {
     return this.still ? 1 : 1 + 0.18 * Math.sin(this.now / 230 + 2.4 * k) * Math.sin(this.now / 570 + k);
   }
 
-  /** What head and tail leave behind, fading. */
+  /** Draws the fading trail of head and tail. */
   embers(context, palette, pixel, stage) {
     for (const { at, head, tail } of this.trail) {
       const left = 1 - (this.now - at) / TRAIL;
@@ -104,7 +105,7 @@ export class Show {
       context.fillStyle = colour;
       for (const k of benches) {
         const x = places[STRIDE * k], y = places[STRIDE * k + 1], r = radius * part;
-        // Of a dot nobody sees the corners.
+        // The corners of a dot are invisible.
         if (wide < 5) context.fillRect(x - r, y - r, 2 * r, 2 * r);
         else {
           context.beginPath();
@@ -189,7 +190,7 @@ export class Show {
     };
     dots("#ffffff", [0.3, 0.26, 0.13]);
     dots("#100608", [0.34, 0.25, 0.07], [0.9, 0.12, 0.045]);
-    // The pearl it runs after.
+    // The pearl in front of it.
     dots(palette.lantern, [1.75, 0, 0.17]);
     dots("#fffdf4", [1.79, 0, 0.09]);
     context.lineCap = "butt";
@@ -217,7 +218,7 @@ export class Show {
     context.restore();
   }
 
-  /** Once, and then a calm glow: nothing here flashes again and again. */
+  /** One flash, then a calm glow, without repetition. */
   burst(context, palette, camera) {
     const { at, place } = this.flash, part = this.still ? 1 : Math.min(1, (this.now - at) / FLASH);
     const size = Math.min(camera.width, camera.height) / camera.scale;

@@ -1,8 +1,8 @@
-// Signs and words on the picture: outlines that hold on any colour, rings, labels that keep apart, the scale bar.
+// Signs and words on the picture: outlines visible on any colour, rings, labels that do not overlap, the scale bar.
 
 /**
- * Strokes a line in a colour with a light and a dark edge, of which one stands out from whatever lies below, for eyes
- * of any kind. `trace` makes the path and strokes it; all widths in pixels.
+ * Strokes a line in a colour with a light and a dark edge, one of which is visible on every ground, with any colour
+ * vision. `trace` makes the path and strokes it; all widths in pixels.
  */
 export function doubled(context, palette, pixel, ink, width, trace, dashes = []) {
   for (const [colour, wide, dashed] of [[palette.far, width + 4.5, []], [palette.near, width + 3, []], [ink, width, dashes]]) {
@@ -14,7 +14,7 @@ export function doubled(context, palette, pixel, ink, width, trace, dashes = [])
   context.setLineDash([]);
 }
 
-/** A ring and a cross at a place: where something is now, or dashed and wider (a ghost) where it will be. */
+/** A ring and a cross at the present place of something, or dashed and wider (a ghost) at its future place. */
 export function target(context, { x, y }, palette, pixel, ink, ghost) {
   const around = ghost ? 19 : 13;
   const ring = () => {
@@ -46,7 +46,7 @@ export class Labels {
     this.signs = [];
   }
 
-  /** Words at a place of the stage, so many pixels away from it, `large` times the usual size. */
+  /** Words at a distance in pixels from a place of the stage, `large` times the usual size. */
   add(text, x, y, ink, away = 22, large = 1) {
     const [px, py] = this.camera.toPixel(x, y);
     if (px < 0 || py < 0 || px > this.camera.width || py > this.camera.height) return;
@@ -58,7 +58,7 @@ export class Labels {
     this.boxes.push(box);
   }
 
-  /** A ring around a place of the stage, which words leave free where they can. */
+  /** A ring around a place of the stage, which words leave free if they can. */
   ring(x, y) {
     const [px, py] = this.camera.toPixel(x, y), reach = 29 * this.camera.unit;
     this.signs.push({ x: px, y: py, half: reach, tall: reach });
@@ -81,7 +81,7 @@ export class Labels {
       const outward = Math.atan2(py - height / 2, px - width / 2);
       const boxes = TURNS.flatMap((turn) => [1, 2, 3.5].map((far) => {
         const angle = outward + 2 * Math.PI * turn, dx = Math.cos(angle), dy = Math.sin(angle);
-        // A wide label stands further off to the side than above.
+        // A wide label is further away at the side than above.
         const x = within(px + dx * (away * unit * far + half * Math.abs(dx)), half, width - half);
         return { x, y: within(py + dy * away * unit * far, tall, height - tall), half, tall, text };
       }));
@@ -101,7 +101,7 @@ export class Labels {
   }
 }
 
-/** How long some round number of metres is, in the lower right corner; the box it takes. */
+/** Draws the length of a round number of metres in the lower right corner; returns its box. */
 export function scaleBar(context, camera, palette) {
   const { ratio, unit, width, height } = camera;
   const most = Math.min(160 * unit, width / 4) / camera.scale, power = 10 ** Math.floor(Math.log10(most));

@@ -1,4 +1,4 @@
-// Sound: a tick at three, two and one second, a gong when something happens. Made here, from sines; off until asked for.
+// Sound: a tick at three, two and one second, a gong at an event. Made from sines; off by default.
 
 /** Overtones of a gong, over its lowest; they beat against each other. */
 const GONG = [1, 1.48, 1.52, 2.31, 2.74, 3.87, 5.12];
@@ -8,11 +8,11 @@ export class Sound {
     this.context = null;
     this.on = false;
     this.second = Infinity;
-    /** For tests: what has been played. */
+    /** For tests: the played sounds. */
     this.played = [];
   }
 
-  /** Browsers let a page sound only after a key or a click, unless they were started otherwise. */
+  /** Browsers allow sound only after a key or a click, unless they were started with another setting. */
   turn(on) {
     this.on = on;
     if (!on) return;
@@ -20,7 +20,7 @@ export class Sound {
     this.context.resume();
   }
 
-  /** `seconds` of wall time until something happens; what is not finite counts nothing down. */
+  /** `seconds` of wall time until the event; no countdown if not finite. */
   count(seconds) {
     const second = seconds > 0 && seconds <= 3 ? Math.ceil(seconds) : Infinity;
     if (this.on && second < this.second) this.tick(second);

@@ -1,4 +1,4 @@
-// The page: puts the dragons into the drawing and into words, and takes the user's hand.
+// The page: passes the dragons to the drawing and to the words, and handles the user's input.
 
 // First, since it takes the token out of the address.
 import { conduct } from "./conduct.js";
@@ -7,7 +7,7 @@ import { benchAt } from "./boards.js";
 import { Camera } from "./camera.js";
 import { Dragon } from "./dragon.js";
 import { Ground, draw } from "./drawing.js";
-import { attach } from "./hands.js";
+import { attach } from "./pointer_input.js";
 import { identityOf, paletteOf } from "./palette.js";
 import { element, put, showBench, showFigures, showNames, showProofs, showSituation } from "./panel.js";
 import { publishers } from "./publishers.js";
@@ -15,9 +15,9 @@ import { Roster } from "./roster.js";
 import { Sound } from "./sound.js";
 import { capital, nameOf, say, setLanguage, translate } from "./words.js";
 
-/** How often figures are shown, ms: oftener they could not be read. */
+/** The interval at which figures are updated, ms: short enough, and readable. */
 const FIGURES_INTERVAL = 100;
-/** How much earlier, in seconds, the countdown of another dragon has to end for the header to change to that one. */
+/** The seconds by which the countdown of another dragon must end earlier for the header to change to that dragon. */
 const HEADER_LEAD = 1;
 
 const words = wordsOf(location.hash), root = document.documentElement, stillness = matchMedia("(prefers-reduced-motion: reduce)");
@@ -31,13 +31,16 @@ const camera = new Camera(), ground = new Ground("transparent" in words), sound 
 const several = publishers.length > 1, dragons = publishers.map((name) => new Dragon(name, { several, show: words.show, still: stillness.matches }));
 root.toggleAttribute("data-several", several);
 const roster = several ? new Roster(dragons, select) : null;
-/** `chosen` is a bench (from 0, or -1) of the dragon `whose`; `selected` is the dragon whose figures are shown, null for the one that the header is about. */
+/**
+ * `chosen` is a bench (from 0, or -1) of the dragon `whose`; `selected` is the dragon of the figures, null for that of
+ * the header.
+ */
 let palette = paletteOf(canvas), chosen = -1, whose = dragons[0], selected = null, last = null, passedAt = 0;
 
 /**
- * For tests and measurements: what the page has received and drawn. `shown` is the simulated time and the handles of the
- * latest picture, `range` speeds on the colour scale, `marks` and `labels` what is marked and written on
- * it; `latency` and `ways` in ms since the frame was sent. Where there are several dragons it is of the first, and `dragons`
+ * For tests and measurements: the received and drawn data. `shown` is the simulated time and the handles of the
+ * latest picture, `range` speeds on the colour scale, `marks` and `labels` the marks and words on
+ * it; `latency` and `ways` in ms since the frame was sent. With several dragons it is of the first, and `dragons`
  * has the same of each.
  */
 const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, shown: null, range: null, marks: [], labels: [], latency: dragons[0].latency, ways: dragons[0].stream.ways, played: sound.played, toPixel: (x, y) => camera.toPixel(x, y), dragons: [] };
@@ -52,11 +55,11 @@ function fitCanvas() {
   last = null;
 }
 
-/** The dragon that the header is about. */
+/** The dragon of the header. */
 let header = dragons[0];
 /**
- * The dragon that needs to be looked at first: by what has happened, then by what is coming soonest; one that is there. Of
- * two whose countdowns are nearly equal, the one that is in the header already stays there: it is read aloud.
+ * The most urgent dragon that is present: by the gravest past event, then by the soonest coming event. Of two nearly
+ * equal countdowns the dragon of the header stays there, since the header is read aloud.
  */
 function foremost() {
   const rank = ({ sight, isThere }) => (sight.stale ? (isThere ? -1 : -2) : { ok: 0, warning: 1, error: 2 }[sight.state.severity] ?? 0);
@@ -89,7 +92,7 @@ function pass() {
   report();
 }
 
-/** Draws what is there. Nothing is drawn twice: a show that stands still costs nothing. */
+/** Draws the picture, only if it has changed: a show that stands still costs nothing. */
 function paint(there) {
   const look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y, camera.scale, camera.c, camera.s, chosen, whose.name, palette.ground].join();
   if (look === last) return;
@@ -102,11 +105,11 @@ function paint(there) {
   const labels = draw(context, camera, palette, { ground, dragons: scene, words: !words.nolabels });
   picture.drawn++;
   Object.assign(picture, { marks: there.flatMap(({ marks }) => marks), labels });
-  // One that has stopped is drawn again where another one moves, which says nothing about its frames.
+  // A dragon that has stopped is drawn again while another one moves: this is no latency of its frames.
   for (const dragon of there) if (!several || !dragon.sight.stale) dragon.drawn();
 }
 
-/** The picture stays; what tests read of a publisher that is gone does not. */
+/** The picture stays; the data for tests of a publisher that is gone does not. */
 function report() {
   picture.dragons = dragons.map((dragon) => dragon.report(camera));
   const { name: _, time, ...rest } = picture.dragons[0];
@@ -114,7 +117,7 @@ function report() {
   if (picture.shown) picture.range = dragons[0].colours.ticks.map(({ speed }) => speed);
 }
 
-/** What has been drawn stays until there is something else to draw. */
+/** The drawing stays until there is another one. */
 function drawNothing() {
   report();
   const blank = [palette.ground, canvas.width, canvas.height].join();
@@ -132,14 +135,14 @@ function showText(now) {
   showSituation({ ...sight, stale: dragons.every((one) => one.sight.stale), of: several ? first.name : null });
   roster?.show(first, selected);
   const notices = dragons.map((one) => one.notice()).filter(Boolean);
-  // The picture alone has no panel that says why it is empty.
+  // A page without the panel shows here why the picture is empty.
   const empty = words.show && !notices.length && sight.trouble;
   element("notice").hidden = !(notices.length || empty) || "nolabels" in words;
   put("notice", notices.length ? notices.join("\n") : empty ? capital(say(sight.trouble)) : "");
   const shown = selected ?? first, { newest, stage, colours, stream } = shown;
-  // A picture that stays is no longer of a scene that is known to be played.
+  // The scene of a picture that stays may no longer be played.
   showProofs(shown.isThere && !shown.sight.trouble ? stage : null);
-  // The rest changes too often to be read at every pass.
+  // The rest changes too often to be readable at every pass.
   if (!shown.isThere || now - figuresAt < FIGURES_INTERVAL) return;
   figuresAt = now;
   showNames(stage, several ? publishers : null);
@@ -148,13 +151,13 @@ function showText(now) {
   if (now - countedAt < 1000) return;
   for (const dragon of dragons) dragon.count(now - countedAt);
   countedAt = now;
-  // Of another machine's frames nobody knows when they were sent.
+  // The send time of another machine's frames is unknown.
   const { rate, latency } = shown, late = stream.clock === null ? [] : latency.slice(-60).sort((a, b) => a - b);
   const behind = late.length ? say("behind", { ms: late[late.length >> 1].toFixed(0) }) : "";
   put("rate", shown.sight.stale ? "" : say("frames", { rate: rate.toFixed(rate < 10 ? 1 : 0), behind }));
 }
 
-// The user's hand.
+// The user's input.
 
 function showFollow() {
   element("follow").setAttribute("aria-pressed", camera.mode === "bench");
@@ -178,7 +181,7 @@ function choose(bench, dragon = whose) {
   element("pick").value = bench >= 0 ? bench + 1 : "";
   showFollow();
 }
-/** Shows the figures of a dragon, or again of the one that the header is about. */
+/** Shows the figures of a dragon, or again of the dragon of the header. */
 function select(dragon) {
   choose(-1, dragon ?? whose);
   selected = dragon;
@@ -195,7 +198,7 @@ function toggleTheme() {
 async function fill() {
   if (document.fullscreenElement) return document.exitFullscreen();
   await root.requestFullscreen();
-  // A projector must not go to sleep; a browser that cannot promise that still shows the picture.
+  // A projector must not go to sleep; a browser without this function still shows the picture.
   await navigator.wakeLock?.request("screen").catch(() => null);
 }
 function toggleSound() {
@@ -213,7 +216,7 @@ const keys = {
 function tap(x, y) {
   const there = dragons.filter(({ isThere, places }) => isThere && places), place = camera.toStage(x, y), reach = 16 / camera.scale;
   if (!there.length) return;
-  // A board that is hit counts before one that is near.
+  // A hit board has priority over a near one.
   for (const most of [0, reach]) {
     for (const dragon of there) {
       const bench = benchAt(dragon.stage, dragon.places, ...place, most);
@@ -231,12 +234,12 @@ element("pick").oninput = ({ target }) => {
 Object.entries({ follow, whole, theme: toggleTheme, full: fill, sound: toggleSound, help, nearer: keys["+"], farther: keys["-"] }).forEach(([id, act]) => (element(id).onclick = act));
 matchMedia("(prefers-color-scheme: dark)").onchange = dressed;
 stillness.onchange = () => dragons.forEach(({ show }) => show && (show.still = stillness.matches));
-// Sound that the address asks for begins with the first key or click, where the browser wants one.
+// Sound set in the address begins with the first key or click, if the browser requires one.
 if (words.sound) toggleSound();
 addEventListener("pointerdown", () => sound.on && sound.turn(true));
 addEventListener("hashchange", () => location.reload());
 
-// The address may set how the picture begins, for a screen without a keyboard.
+// The address may set the initial picture, for a screen without a keyboard.
 if (words.rotate) camera.turn(words.rotate[0]);
 if (words.view) camera.view(...words.view);
 if (words.bench) choose(words.bench[0] - 1);

@@ -1,5 +1,5 @@
-// The stream: receives frames, stage and alerts, reconnects by itself, and interpolates where everything is
-// between two frames. Knows nothing of the page.
+// The stream: receives frames, stage and alerts, reconnects, and interpolates between two frames.
+// Knows nothing of the page.
 
 import { HermiteReader } from "./hermite.js";
 
@@ -7,18 +7,18 @@ const VERSION = 3;
 const HEADER_BYTES = 72;
 /** The number of `playing` among the states of playback. */
 const PLAYING = 0;
-/** Frames that are kept: half a second of the most that come, and more than the longest gap of the slowest. */
+/** Frames that are kept: half a second at the highest rate, and more than the longest gap at the lowest. */
 const KEPT_FRAMES = 64;
-/** More frames a second than this make no motion smoother once it is interpolated. */
+/** The rate above which more frames make the interpolated motion no smoother. */
 const MOST_FRAMES = 125;
-/** Frames further apart than this (ms) are shown one after another: the motion between them is not known. */
+/** The gap above which frames (ms) are shown without interpolation: the motion between them is not known. */
 const LONGEST_GAP = 1000;
-/** The clock is requested this often (ms); a server that has not answered by the next time is gone. */
+/** The interval of requests for the clock (ms); a server that has not answered by the next request is gone. */
 const CLOCK_INTERVAL = 5000;
 /** The window of the past (ms) from which the jitter of the frames is estimated. */
 const JITTER_WINDOW = 2000;
 
-/** A frame, as the server's layout has it. Null for a layout of another version. */
+/** Parses a frame of the server's layout. Null for a layout of another version. */
 function frameOf(data, at) {
   const bytes = new DataView(data);
   if (data.byteLength < HEADER_BYTES || bytes.getUint8(0) !== VERSION) return null;
@@ -40,15 +40,15 @@ function frameOf(data, at) {
 }
 
 /**
- * Milliseconds of wall time from one frame to the next. Simulated time has no jitter; where it stands still, jumps or
- * changes its rate, the moments at which the two were sent have to do.
+ * Returns the milliseconds of wall time from one frame to the next. Simulated time has no jitter. If it stands still,
+ * jumps or changes its rate, the moments of sending are used.
  */
 function elapsed(from, to) {
   const even = from.playing && to.playing && from.epoch === to.epoch && from.scale === to.scale && to.time > from.time;
   return even ? (1000 * (to.time - from.time)) / to.scale : Math.max(0, to.sent - from.sent);
 }
 
-/** The last frames, and a clock that runs evenly a little behind them however unevenly they come. */
+/** The last frames, and a clock that runs evenly a little behind them, even if they come unevenly. */
 class Playback {
   constructor() {
     this.reader = new HermiteReader(KEPT_FRAMES);
@@ -92,13 +92,13 @@ class Playback {
     return newest.time + (Math.min(now - this.earliest - newest.due, this.interval) * newest.scale) / 1000;
   }
 
-  /** What to draw now: see `HermiteReader.at`. `into` is used again. */
+  /** Returns the state to draw now: see `HermiteReader.at`. `into` is used again. */
   at(now, into) {
     const { frames } = this.reader;
     const passed = Math.min(now - this.drawnAt, 1000), target = now - this.earliest - this.lag;
     this.drawnAt = now;
     const error = target - this.shown - passed;
-    // A small error is worked off unseen.
+    // A small error is corrected slowly, invisibly.
     this.shown = Math.abs(error) < 300 ? this.shown + passed + error * Math.min(1, passed / 300) : target;
     const after = frames.findIndex((frame) => frame.due > this.shown);
     const tooFar = after > 0 && frames[after].due - frames[after - 1].due > LONGEST_GAP;
@@ -106,19 +106,21 @@ class Playback {
   }
 }
 
-/** The server's stream, opened again whenever it breaks. */
+/** The server's stream, reopened whenever it breaks. */
 export class Stream {
-  /** The stream of a publisher; of the server's only one where `name` is null. */
+  /** The stream of a publisher; of the server's only publisher if `name` is null. */
   constructor(name = null) {
     this.name = name;
     this.playback = new Playback();
     this.messages = { stage: {}, alert: {} };
-    /** Why no frames come: a key of the page's words, or the server's own reason; null while they come. */
+    /** The reason why no frames come: a key of the page's words, or the server's reason; null while they come. */
     this.trouble = "server";
     this.received = 0;
-    /** How long the last frames were on their way, ms. */
+    /** The transport times of the last frames, ms. */
     this.ways = [];
-    /** What the clock of the frames is ahead of this page's, ms; null while unknown, and always of another machine's frames. */
+    /**
+     * The offset of the frames' clock to this page's, ms; null while unknown, and always for another machine's frames.
+     */
     this.clock = null;
     /** Called with each message that is no frame and no clock. */
     this.onmessage = null;
@@ -142,7 +144,7 @@ export class Stream {
       this.retry = Math.min(4000, 2 * this.retry);
     };
     const requestClock = () => {
-      // Without waiting for the socket to close: a machine that was switched off never closes it.
+      // Do not wait for the socket to close: a machine that was switched off never closes it.
       if (requested !== null || socket.readyState !== WebSocket.OPEN) return again();
       requested = performance.now();
       socket.send("clock");
@@ -162,7 +164,7 @@ export class Stream {
         const now = performance.now(), way = now - requested;
         requested = null;
         if (message.monotonic_ns === null) {
-          // No publisher, or one on another machine: what may have been measured of its frames so far was wrong.
+          // No publisher, or one on another machine: earlier measurements of its frames were wrong.
           [nearest, this.clock] = [Infinity, null];
           this.ways.length = 0;
         } else if (this.clock === null || way <= nearest) {
@@ -171,7 +173,7 @@ export class Stream {
         }
       } else this.handle(message);
       if (message.type === "stage" && requested === null) {
-        // Another publisher may have another clock. The answer has as long as any other.
+        // Another publisher may have another clock. The time limit of the answer is the same.
         clearInterval(requests);
         requests = setInterval(requestClock, CLOCK_INTERVAL);
         requestClock();
@@ -179,13 +181,13 @@ export class Stream {
     };
   }
 
-  /** What was shown last is kept until there is something newer to show. The next frames may be of another clock. */
+  /** The last picture is kept until there is a newer one. The next frames may be of another clock. */
   lose(trouble) {
     this.trouble = trouble;
     this.clock = null;
   }
 
-  /** Sends a message; whether there is a server to send it to. */
+  /** Sends a message. Returns false if there is no server. */
   send(message) {
     if (this.socket.readyState !== WebSocket.OPEN) return false;
     this.socket.send(JSON.stringify(message));
@@ -208,7 +210,7 @@ export class Stream {
     this.playback.push(frame);
   }
 
-  /** The stage of the run whose frames came last, if it is known. */
+  /** The stage of the run of the latest frames, if it is known. */
   get stage() {
     return this.ofRun("stage");
   }
@@ -218,7 +220,7 @@ export class Stream {
     return this.ofRun("alert");
   }
 
-  /** Messages of the next run may come before its first frame: until then those of the last one are kept. */
+  /** Messages of the next run may come before its first frame: until then those of the last run are kept. */
   ofRun(type) {
     const run = this.playback.newest?.run, { newest, kept } = this.messages[type];
     if (newest && newest.run_id === run) return (this.messages[type].kept = newest);

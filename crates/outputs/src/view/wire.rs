@@ -1,4 +1,4 @@
-//! What a browser receives: frames as bytes, and JSON for what changes seldom. Called by the server only.
+//! The messages to a browser: frames as bytes, and JSON for rare changes. Called by the server only.
 //!
 //! Everything is little-endian. A frame is a header of 72 bytes and 20 bytes for each handle, head first:
 //!
@@ -15,11 +15,11 @@
 //! | 32 | u64 | run: new for every start of a publisher |
 //! | 40 | u64 | CLOCK_MONOTONIC in ns when the publisher sent the frame |
 //! | 48 | u64 | tick |
-//! | 56 | f32 | least clearance, m; NaN where not computed |
+//! | 56 | f32 | least clearance, m; NaN if not computed |
 //! | 60 | u32 | epoch: grows by one at every jump of simulated time |
-//! | 64 | u32 | the latest cue passed, from 1; 0 where none has been |
+//! | 64 | u32 | the latest cue passed, from 1; 0 before the first cue |
 //! | 68 | u32 | 0 |
-//! | 72 + 20 k | 5 x f32 | handle k: x, y (m), heading (rad), vx, vy (m per simulated second; NaN where not computed, 0 where the show stands still) |
+//! | 72 + 20 k | 5 x f32 | handle k: x, y (m), heading (rad), vx, vy (m per simulated second; NaN if not computed, 0 while the show stands still) |
 
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -55,7 +55,8 @@ pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
     bytes
 }
 
-/// The stage, the name of its publisher and, once they are known, that of its scene and what is proved of its events.
+/// Returns the stage, the name of its publisher and, when they are known, the scene's name and the proofs of its
+/// events.
 pub(super) fn stage(stage: &Stage, publisher: &str, scene: Option<&str>, proved: Option<&[ProvedEvent]>) -> String {
     #[derive(Serialize)]
     struct StageMessage<'a> {
@@ -71,18 +72,19 @@ pub(super) fn stage(stage: &Stage, publisher: &str, scene: Option<&str>, proved:
     json!(StageMessage { r#type: "stage", publisher, scene, stage, proved, states }).to_string()
 }
 
-/// A cue that the show has reached.
+/// Returns the message about a cue that the show has reached.
 pub(super) fn cue(cue: &Cue) -> String {
     json!(CueObject::from(cue)).to_string()
 }
 
-/// All that a page need know of a state, so that it can show one that it has never heard of.
+/// The facts about a state, so that a page can show states that it does not know.
 fn state(state: FrameState) -> Value {
     json!({"name": state.name(), "severity": state.severity().name(), "happened": state.event().is_some(),
         "sentence": state_sentence(state)})
 }
 
-/// An alert, its severity and its sentence, in a team of so many benches; the page shows its figures beside it.
+/// Returns an alert with its severity and its sentence, in a team of `benches` benches; the page shows the figures
+/// beside it.
 pub(super) fn alert(alert: &CollisionAlert, benches: u32) -> String {
     #[derive(Serialize)]
     struct AlertMessage {
@@ -102,13 +104,13 @@ pub(super) fn alert(alert: &CollisionAlert, benches: u32) -> String {
     json!(message).to_string()
 }
 
-/// No publisher is there, or one that cannot be used for this `reason`.
+/// Returns the message that there is no publisher, or a publisher that cannot be used for this `reason`.
 pub(super) fn waiting(reason: Option<&str>) -> String {
     json!({"type": "waiting", "reason": reason}).to_string()
 }
 
-/// The response to `clock`: CLOCK_MONOTONIC, which frames are stamped with; `None` where they are stamped with another
-/// machine's, or none come.
+/// Returns the response to `clock`: CLOCK_MONOTONIC, the clock of the frames' stamps; `None` if they have another
+/// machine's clock, or if no frames come.
 pub(super) fn clock(monotonic_ns: Option<u64>) -> String {
     json!({"type": "clock", "monotonic_ns": monotonic_ns.map(Exact)}).to_string()
 }

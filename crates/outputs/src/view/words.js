@@ -1,7 +1,7 @@
 // Every word of the page, in English and in Chinese, and the sentences about alerts.
 //
-// English sentences about alerts and refused commands come from the server, which has them from the same source as `run`,
-// `watch` and `control`; the Chinese ones are made here from the same numbers and names.
+// English sentences about alerts and refused commands come from the server, as those of `run`, `watch` and `control`.
+// The Chinese sentences are made here from the same numbers and names.
 
 const WORDS = {
   title: ["{scene} ({publisher}): stage picture", "{scene}（{publisher}）：舞台画面"],
@@ -42,7 +42,7 @@ const WORDS = {
   path_end: ["path end", "路径终点"],
   unknown: ["unknown", "未知"],
 
-  // What a certificate proves.
+  // Proofs of certificates.
   proofs: ["Proved by a certificate", "由证书证明"],
   provedBetween: ["{kind}: proved, first at {lo} to {hi} s{beyond}", "{kind}：已证明，首次在 {lo} 至 {hi} 秒{beyond}"],
   provedNone: ["{kind}: proved, none", "{kind}：已证明，不会发生"],
@@ -89,7 +89,7 @@ const WORDS = {
   lostServer: ["No server. The picture is from t = {time} s.", "没有服务器。画面停在 t = {time} s。"],
   silent: ["No frames for {seconds} s. The picture is from t = {time} s.", "已有 {seconds} 秒没有新帧。画面停在 t = {time} s。"],
 
-  // The transport bar, and the commands and states of playback that an answer names.
+  // The transport bar, and the commands and playback states in answers.
   conduct: ["Conduct the show", "操控演出"],
   toggleKey: ["Space", "空格键"],
   stepKey: [". (while paused)", ".（暂停时）"],
@@ -128,7 +128,7 @@ const WORDS = {
   all: ["All", "全部"],
   refusedBy: ["{name}: {sentence}", "{name}：{sentence}"],
 
-  // What the page is doing, and says once.
+  // The state of the page, spoken once.
   server: ["waiting for the server", "等待服务器"],
   publisher: ["waiting for a publisher", "等待发布端"],
   noStage: ["waiting for the stage", "等待舞台数据"],
@@ -147,20 +147,22 @@ export function setLanguage(name) {
   document.documentElement.lang = name === "zh" ? "zh-Hans" : "en";
 }
 
-/** The words of a key in the page's language, with what stands in braces filled in. A key that is not known is its own words. */
+/**
+ * Returns the words of a key in the page's language, with the values in braces filled in. An unknown key is returned.
+ */
 export function say(key, values = {}) {
   const words = WORDS[key]?.[language] ?? key;
   return words.replace(/\{(\w+)\}/g, (_, name) => values[name] ?? "");
 }
 
-/** Puts the words of the page's language where an element has `data-word`, `data-label` or `data-title`. */
+/** Sets the words of elements with `data-word`, `data-label` or `data-title` in the page's language. */
 export function translate(root) {
   for (const one of root.querySelectorAll("[data-word]")) one.textContent = say(one.dataset.word);
   for (const one of root.querySelectorAll("[data-title]")) one.title = say(one.dataset.title);
   for (const one of root.querySelectorAll("[data-label]")) one.setAttribute("aria-label", say(one.dataset.label));
 }
 
-/** Why a command was not obeyed. English sentences are the server's; one about a command that went nowhere stays so. */
+/** Returns the reason of a refusal. English sentences are the server's, also for a command that was not sent. */
 export function answerTo({ code, command, playback, sentence }) {
   if (language === 0) return `${capital(sentence)}.`;
   if (!WORDS[code]) return say("notDelivered", { reason: sentence });
@@ -169,7 +171,7 @@ export function answerTo({ code, command, playback, sentence }) {
 
 export const capital = (words) => words && words[0].toUpperCase() + words.slice(1);
 
-/** Seconds as a person reads them off from afar: a number and its unit. */
+/** Returns seconds in a form readable from afar: a number and its unit. */
 export function remaining(seconds) {
   if (seconds < 100) return [seconds.toFixed(1), say("s")];
   const whole = Math.floor(seconds), pad = (number) => String(number).padStart(2, "0");
@@ -183,13 +185,16 @@ export function benchesOf(pair) {
   return b === undefined ? say("number", { a }) : say("numbers", { a, b });
 }
 
-/** Seconds to the nanosecond, rounded up or down by `step`: what is between two times is between those that are shown. */
+/** Returns seconds to the nanosecond, rounded up or down by `step`: shown bounds enclose the exact ones. */
 function outward(seconds, step) {
   const near = Number(seconds.toFixed(9)), isInside = step > 0 ? near < seconds : near > seconds;
   return (isInside ? near + step : near).toFixed(9);
 }
 
-/** What is proved of an event, in a show that ends at `freeze`: `text`, empty for what this page does not know, and whether the show `canCome` to it, or could have. */
+/**
+ * Returns the proof of an event, in a show that ends at `freeze`: `text`, empty for an unknown event, and `canCome`,
+ * true if the show reaches it.
+ */
 export function proofOf({ event, status, time_lo, time_hi }, freeze) {
   const kind = capital(say(event)), lo = time_lo === null ? null : outward(time_lo, -1e-9);
   const isBeyond = lo !== null && time_lo > freeze;
@@ -198,7 +203,7 @@ export function proofOf({ event, status, time_lo, time_hi }, freeze) {
     return { text: say("provedBetween", { kind, lo, hi: outward(time_hi, 1e-9), beyond }), canCome: !isBeyond };
   }
   if (status === "undecided") return { text: say("provedUpTo", { kind, lo }), canCome: true };
-  // That a path does not end says no more than that its lock comes first.
+  // Without an end of the path the proof only says that the lock comes first.
   if (status === "none") return { text: lo === null ? say("provedNone", { kind }) : say("provedNoneBefore", { kind, lo }), canCome: event !== "path_end" };
   return { text: "", canCome: false };
 }
@@ -206,7 +211,7 @@ export function proofOf({ event, status, time_lo, time_hi }, freeze) {
 /** A bench's name on the picture. */
 export const nameOf = (bench) => (bench === 0 ? say("headBench") : say("one", { number: bench + 1 }));
 
-/** What an alert or a state says; nothing of an alert that the frames have not reached, or have left. */
+/** Returns the sentence of an alert or a state; empty for an alert that the frames have not reached, or have left. */
 export function sentenceOf(state, alert, count) {
   if (language === 0 || !alert && !state.sentence) {
     if (state.sentence) return `${capital(state.sentence)}.`;

@@ -1,8 +1,8 @@
-//! The check of a response against the table of commands: which codes and states the responses so far allow.
+//! The check of responses against the table of commands: the codes and states that the responses so far allow.
 //!
-//! It knows no times, except those that the stage lists: the [`record`](super::record) compares times with frames. Where
-//! a step or a cue may have changed the state since the last response, every possible state is kept, and each response
-//! removes those that would have answered otherwise.
+//! It knows no times, except those that the stage lists: the [`record`](super::record) compares times with frames. A
+//! step or a cue may change the state between two responses. Every possible state is kept, and each response removes
+//! the states that would have answered otherwise.
 
 use bench_dragon_messages::control::{Code, Command, RATES, Refusal};
 use bench_dragon_messages::state::PlaybackState;
@@ -13,7 +13,7 @@ use bench_dragon_messages::{ControlResponse, Stage};
 pub(super) struct ShowFacts {
     /// Simulated seconds at which it ends.
     pub end: f64,
-    /// The times of its cues in their order, and whether the show waits there.
+    /// The times of its cues in their order, each with true if the show waits there.
     pub cues: Vec<(f64, bool)>,
     /// Cues that the stage has no room for.
     pub cues_not_listed: usize,
@@ -34,7 +34,7 @@ impl ShowFacts {
         self.cues_not_listed > 0 || self.cues.iter().any(|cue| cue.1)
     }
 
-    /// Returns true if this number of cues can be passed at this time: a cue at the time itself may be or not.
+    /// Returns true if this number of cues can be passed at this time. A cue at the time itself may be passed or not.
     fn can_have_passed(&self, cue: u32, time: f64) -> bool {
         let before = self.cues.iter().filter(|cue| cue.0 < time).count();
         let until = self.cues.iter().filter(|cue| cue.0 <= time).count();
@@ -130,7 +130,7 @@ impl AnswerCheck {
         Self { facts, possible: vec![waiting], rate: 1.0, tick: 0 }
     }
 
-    /// Notes that a step was sent, whose response comes later: [`step_answered`](Self::step_answered).
+    /// Records that a step was sent, whose response comes later: [`step_answered`](Self::step_answered).
     pub fn step_sent(&mut self) {
         self.possible.iter_mut().for_each(|state| state.step = Step::Sent);
     }

@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use bench_dragon_messages::control::Command;
 
-/// The greatest time between two commands; half of it on average.
+/// The greatest time between two commands; the average is half of it.
 const LONGEST_GAP: Duration = Duration::from_millis(200);
 /// The longest step, as a share of a second.
 const LONGEST_STEP: f64 = 0.3;
 
-/// An endless list of commands, each with the time to wait before it.
+/// An endless list of commands, each with the wait before it.
 #[derive(Debug, Clone)]
 pub struct RandomCommands {
     chance: fastrand::Rng,
@@ -18,12 +18,12 @@ pub struct RandomCommands {
 }
 
 impl RandomCommands {
-    /// Those of a seed, for a show of so many frames per second that ends at `end` simulated seconds.
+    /// Creates the list of a seed, for a show of `rate` frames per second that ends at `end` simulated seconds.
     pub fn new(seed: u64, rate: f64, end: f64) -> Self {
         Self { chance: fastrand::Rng::with_seed(seed), rate, end }
     }
 
-    /// A time of the show, one in six just before its end, and one in six of no show.
+    /// Returns a time of the show: one in six just before its end, one in six out of range.
     fn time(&mut self) -> f64 {
         match self.chance.u32(0..12) {
             0 => -1.0,
@@ -34,7 +34,7 @@ impl RandomCommands {
         }
     }
 
-    /// Mostly about real time, sometimes the least or the greatest rate, one in six out of range.
+    /// Returns a rate: mostly near 1, sometimes the least or the greatest rate, one in six out of range.
     fn play_rate(&mut self) -> f64 {
         match self.chance.u32(0..24) {
             0..4 => [0.0, -1.0, 1e-7, 1.1e6, f64::NAN, f64::INFINITY][self.chance.usize(0..6)],
@@ -77,7 +77,7 @@ mod tests {
 
     #[test]
     fn a_seed_gives_the_same_list_again_and_another_seed_another() {
-        // As text: some values are no numbers.
+        // As text: some values are NaN.
         let list = |seed| format!("{:?}", RandomCommands::new(seed, 1000.0, 400.0).take(1000).collect::<Vec<_>>());
         assert_eq!(list(7), list(7));
         assert_ne!(list(7), list(8));

@@ -13,24 +13,24 @@ use super::record::{Answered, Record};
 use bench_dragon_client::clock::monotonic_ns;
 use bench_dragon_client::connection::Wake;
 use bench_dragon_client::control::{ControlError, Controller};
-use bench_dragon_client::feed::{Feed, FeedEvent, FeedOptions, Frames};
+use bench_dragon_client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use bench_dragon_client::shared_memory::OpenError;
 use bench_dragon_messages::ControlResponse;
 use bench_dragon_messages::control::{Code, Command};
 
-/// How long the publisher may take to answer.
+/// The time limit of an answer.
 const TIMEOUT: Duration = Duration::from_secs(10);
-/// How long the control service may take to appear.
+/// The time limit of the publisher's start.
 const START_TIMEOUT: Duration = Duration::from_secs(30);
 /// The interval at which frames are read.
 const READ_INTERVAL: Duration = Duration::from_millis(1);
 /// The interval at which the state is requested until a step has begun.
 const STEP_INTERVAL: Duration = Duration::from_millis(1);
-/// How long to wait for the last frames.
+/// The time limit of the last frames.
 const END_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Conducts the publisher of `name`, of `rate` frames per second, until `stop` is set. Reports its counts at the
-/// beginning, once a second, and at the end.
+/// Sends commands to the publisher of `name`, of `rate` frames per second, until `stop` is set. Reports its counts at
+/// the beginning, once a second, and at the end.
 ///
 /// # Errors
 /// [`OpenError`] if its frames cannot be read, and the errors of `report`.
@@ -41,7 +41,7 @@ pub fn conduct<Failed: From<OpenError>>(
     stop: &AtomicBool,
     report: &mut dyn FnMut(Conducted) -> Result<(), Failed>,
 ) -> Result<(), Failed> {
-    let mut feed = Feed::new(name, FeedOptions { wake: Wake::Never, frames: Frames::All })?;
+    let mut feed = Feed::new(name, FeedOptions { wake: Wake::Never, frames: Delivery::All })?;
     let mut record = Record::new(seed, rate);
     report(record.conducted())?;
     let Some(facts) = wait_for_stage(&mut feed, &mut record, stop)? else { return report(record.conducted()) };
@@ -123,7 +123,7 @@ struct LoadGenerator<'a> {
     lost: bool,
     steps: Sender<u64>,
     step_replies: Receiver<Reply>,
-    /// Whether a step has no answer yet.
+    /// True if a step has no answer yet.
     stepping: bool,
     events: &'a Sender<Answered>,
 }

@@ -1,4 +1,5 @@
-//! What a conductor counts: answers by kind, faults, latencies, and whether the frame of an answer's tick agrees with it.
+//! The counts of a load generator: answers by kind, faults, latencies, and the comparison of each answer with the frame
+//! of its tick.
 
 use std::collections::VecDeque;
 
@@ -24,11 +25,11 @@ pub(super) struct Answered {
     pub command: Command,
     /// CLOCK_MONOTONIC at which it was sent, ns.
     pub sent_ns: u64,
-    /// CLOCK_MONOTONIC at which the answer had come, ns.
+    /// CLOCK_MONOTONIC at which the answer was received, ns.
     pub answered_ns: u64,
-    /// The answer, and whether the command table allows it. `Err` where none came.
+    /// The answer, and the result of its check by the command table. `Err` if no answer came.
     pub answer: Result<(ControlResponse, Result<(), String>), String>,
-    /// Whether it is a step that ran, whose answer comes when it is over.
+    /// True for a step that ran, whose answer comes when it is over.
     pub is_step_that_ran: bool,
 }
 
@@ -93,8 +94,8 @@ impl Record {
         }
     }
 
-    /// Returns the periods of the step that ended with the frame at `place`. Returns `None` if a frame of
-    /// the step is missing, or if it may have begun in the period of a cue that pauses, without a frame that stands still.
+    /// Returns the periods of the step that ended with the frame at `place`. Returns `None` if a frame of the step is
+    /// missing, or if it may have begun in the period of a cue that pauses, without a frame that stands still.
     fn length_of_step(&self, place: usize) -> Option<u64> {
         let mut place = place;
         let mut periods = 0;
@@ -155,7 +156,7 @@ impl Record {
         self.waiting.push(answered);
     }
 
-    /// Compares the answers whose frames have come by now.
+    /// Compares the answers whose frames have come.
     pub fn compare(&mut self) {
         let Some(newest) = self.frames.back().map(|frame| frame.tick) else { return };
         for answered in std::mem::take(&mut self.waiting) {
@@ -164,7 +165,7 @@ impl Record {
                 self.waiting.push(answered);
                 continue;
             }
-            // This subscriber may have missed it; those that must miss none are others.
+            // This subscriber may miss frames; the steady subscribers must not.
             let Ok(place) = self.frames.binary_search_by_key(&answer.tick, |frame| frame.tick) else { continue };
             let frame = self.frames[place];
             self.conducted.compared += 1;
@@ -172,7 +173,7 @@ impl Record {
                 self.applied.saturating_record(frame.sent_ns.saturating_sub(answered.sent_ns));
             }
             let before = place.checked_sub(1).map(|before| self.frames[before]);
-            // At the tick of a step's answer another command may have been obeyed.
+            // At the tick of a step's answer another command may have been executed.
             let before = before.filter(|before| before.tick + 1 == frame.tick && !answered.is_step_that_ran);
             let jumps = before.map(|before| (frame.epoch.wrapping_sub(before.epoch), jumps_due(&answered, &before)));
             let agrees = frame.sim_time.to_bits() == answer.sim_time.to_bits()
@@ -194,12 +195,12 @@ impl Record {
         }
     }
 
-    /// Whether answers wait for their frames.
+    /// Returns true if answers wait for their frames.
     pub fn is_waiting(&self) -> bool {
         !self.waiting.is_empty()
     }
 
-    /// What has been counted.
+    /// Returns the counts.
     pub fn conducted(&self) -> Conducted {
         let of = |histogram: &Histogram<u64>| (!histogram.is_empty()).then(|| Percentiles::of(histogram));
         Conducted { applied_ns: of(&self.applied), answered_ns: of(&self.answered), ..self.conducted.clone() }
@@ -210,7 +211,8 @@ fn is_jump(answered: &Answered, answer: &ControlResponse) -> bool {
     matches!(answered.command, Command::Seek(_) | Command::Restart) && answer.result() == Some(Code::Done)
 }
 
-/// By how much `epoch` has to grow after the frame before: at a seek, at a restart, and where the show had ended.
+/// Returns the expected growth of `epoch` after the frame before: by a seek, by a restart, and after the end of the
+/// show.
 fn jumps_due(answered: &Answered, before: &FrameHeader) -> u32 {
     let commanded = answered.answer.as_ref().is_ok_and(|(answer, _)| is_jump(answered, answer));
     let begins_again = before.playback_state() == Some(PlaybackState::Ended);

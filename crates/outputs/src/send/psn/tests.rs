@@ -76,7 +76,7 @@ fn chunks(mut bytes: &[u8]) -> Vec<(u16, bool, &[u8])> {
 /// The fields of each tracker by their ids, in the order in which the trackers come.
 type Decoded = Vec<(u16, BTreeMap<u16, Vec<u8>>)>;
 
-/// What a frame's packets hold; fails where they are not of one frame of the given kind.
+/// Returns the content of a frame's packets; fails if they are not of one frame of the given kind.
 fn decode(frame: &PacketFrame, root: u16, list: u16, timestamp_us: u64, frame_id: u8) -> (Option<Vec<u8>>, Decoded) {
     assert!(frame.packets.len() <= 255);
     let (mut system, mut trackers) = (None, Vec::new());
@@ -181,7 +181,7 @@ fn thousands_of_trackers_are_one_frame_of_packets_that_fit_the_network() {
         assert!(decoded.iter().map(|(id, _)| usize::from(*id)).eq(1..=count));
     }
     let (_, decoded) = decode(&frame(60_000, known), 0x6755, 1, 0, 0);
-    assert_eq!((decoded.len(), frame(60_000, known).trackers), (5100, 5100), "what is left out is told");
+    assert_eq!((decoded.len(), frame(60_000, known).trackers), (5100, 5100), "the number of trackers left out");
     let names = (1..=5001).map(|id| TrackerName { id, name: format!("handle {id}") }).collect::<Vec<_>>();
     let (_, decoded) = decode(&info_frame(0, 0, "dragon", &names), 0x6756, 2, 0, 0);
     assert_eq!(decoded.len(), 5001);

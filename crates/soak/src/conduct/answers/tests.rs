@@ -69,7 +69,7 @@ impl Checked {
         control_response(1, &outcome)
     }
 
-    /// The answer to a command that is obeyed so many ticks later.
+    /// Returns the answer to a command that is executed `gap` ticks later.
     fn command(&mut self, gap: u64, command: Command) -> ControlResponse {
         let mut answer = ControlResponse::default();
         let last = self.tick + gap;

@@ -1,39 +1,39 @@
-//! Whether each frame follows from the one before: still while paused or held, at the rate in force while playing, a new
-//! epoch where simulated time jumps and nowhere else.
+//! The check that each frame follows from the frame before. Time stands still while paused or held, and advances at the
+//! rate in force while playing. The epoch changes exactly at jumps of simulated time.
 //!
-//! In: the frames of a publisher that loops without standing at its end, as the soak test starts it. What a frame is
-//! checked against are frames before it, never the commands. Called by the [`observer`](super::observer).
+//! In: the frames of a publisher that loops without a hold at its end, as the soak test starts it. A frame is checked
+//! against earlier frames, never against the commands. Called by the [`observer`](super::observer).
 
 use bench_dragon_messages::state::PlaybackState;
 use bench_dragon_messages::{FrameHeader, HandlePose};
 
-/// How far a number of periods may be from a whole one.
+/// The tolerance of a whole number of periods.
 const PERIODS_TOLERANCE: f64 = 0.01;
 
-/// What is known of the frames so far.
+/// The facts from the frames so far.
 #[derive(Debug, Default)]
-pub(super) struct Obedience {
-    /// The frame at which the present stretch began: one of the same epoch, playback and time scale.
+pub(super) struct ConformanceCheck {
+    /// The first frame of the present stretch, which has one epoch, playback state and time scale.
     anchor: FrameHeader,
     previous: Option<FrameHeader>,
-    /// The handles of the previous frame, if it stood still.
+    /// The handles of the previous frame, if the show stood still.
     still: Vec<HandlePose>,
-    /// Simulated seconds at which the show ends, once that was seen.
+    /// Simulated seconds at the end of the show, after the first end.
     end: Option<f64>,
 }
 
-impl Obedience {
-    /// Checks a frame of a publisher at so many frames per second.
+impl ConformanceCheck {
+    /// Checks a frame of a publisher of `rate` frames per second.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// The fault of the frame.
     pub fn check(&mut self, header: &FrameHeader, handles: &[HandlePose], rate: f64) -> Result<(), String> {
         let previous = self.previous.replace(*header);
         let result = self.stands_as_it_says(header, handles).and_then(|()| match &previous {
             Some(before) if before.run_id == header.run_id && before.sequence + 1 == header.sequence => {
                 self.follows(before, header, handles, rate)
             }
-            // What lies between was not received.
+            // The frames between were not received.
             _ => {
                 self.anchor = *header;
                 Ok(())
@@ -50,14 +50,14 @@ impl Obedience {
         result.map_err(with_frame)
     }
 
-    /// Whether playback, time scale and velocities fit each other.
+    /// Checks that playback state, time scale and velocities are consistent.
     fn stands_as_it_says(&mut self, header: &FrameHeader, handles: &[HandlePose]) -> Result<(), &'static str> {
         let Some(playback) = header.playback_state() else { return Err("no such playback") };
         let stands = matches!(playback, PlaybackState::Paused | PlaybackState::Held);
         if stands != (header.time_scale == 0.0) || header.time_scale < 0.0 || !header.time_scale.is_finite() {
             return Err("the time scale is not that of its playback");
         }
-        // Where a scene asks for no velocities they are no numbers.
+        // Without requested velocities they are NaN.
         let moves = |handle: &HandlePose| handle.vx.abs() > 0.0 || handle.vy.abs() > 0.0;
         if playback != PlaybackState::Playing && handles.iter().any(moves) {
             return Err("a frame that stands still has velocities");
@@ -91,14 +91,14 @@ impl Obedience {
             return self.goes_on(before, header, rate, periods);
         }
         self.anchor = *header;
-        // A period takes one command, so that it has one jump, and one more where the show begins again.
+        // A period executes one command, so it has at most one jump, and one more if the show begins again.
         if periods == 1 && jumps > 1 + u32::from(begins_again) {
             return Err("more jumps than a period can have");
         }
         Ok(())
     }
 
-    /// Whether the time is that of the present stretch; begins another where something changes.
+    /// Checks the time against the present stretch. Begins another stretch at a change.
     fn goes_on(
         &mut self,
         before: &FrameHeader,
@@ -122,8 +122,8 @@ impl Obedience {
         }
     }
 
-    /// Whether a time before the expected one has a reason: the end, a cue that pauses, or a step that was over within
-    /// periods that were skipped.
+    /// Returns true if a time before the expected one has a reason: the end, a cue that pauses, or a step that ended
+    /// within skipped periods.
     fn stops_early(
         &mut self,
         before: &FrameHeader,
@@ -143,7 +143,7 @@ impl Obedience {
         if periods > 1 && played < periods as f64 && (played - played.round()).abs() <= PERIODS_TOLERANCE {
             return true;
         }
-        // A show that is paused in the very period in which it ends has not been seen to end.
+        // A show that is paused in the period of its end has no frame with the state `ended`.
         let ends = stands || header.playback_state() == Some(PlaybackState::Ended);
         ends && *self.end.get_or_insert(header.sim_time) == header.sim_time
     }

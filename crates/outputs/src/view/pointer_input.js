@@ -1,8 +1,8 @@
-// The user's hand: mouse, fingers and keys on the picture. Knows which gesture means what, not what it does.
+// Pointer input: mouse, fingers and keys on the picture. Maps gestures to actions, and does not know the actions.
 
 /**
- * `acts` has: pan(x, y) and zoomAt(by, x, y) in pixels, isFree() (whether two fingers may move the picture), tap(x, y),
- * and `keys`, an act for each key.
+ * `acts` has: pan(x, y) and zoomAt(by, x, y) in pixels, isFree() (true if two fingers may move the picture), tap(x, y),
+ * and `keys`, an action for each key.
  */
 export function attach(canvas, acts) {
   const fingers = new Map();

@@ -1,14 +1,14 @@
-//! The way from browsers to `<name>/control`: who may command, what a message commands, and the answer to it.
+//! The commands of browsers to `<name>/control`: their authorization, their parsing, and their answers.
 //!
-//! In: the text of a message. Out: JSON. A [`Gate`] is there only where the user asked for control; its conductor has a
-//! thread of its own, so that no command keeps a picture waiting. Called by the server and by `browser`.
+//! In: the text of a message. Out: JSON. An [`Authorization`] exists only with `--control`. Its command client has a
+//! separate thread, so that no command delays a picture. Called by the server and by `browser`.
 
 use serde::Deserialize;
 use serde_json::{Value, json};
 use subtle::ConstantTimeEq;
 use tokio::sync::mpsc::UnboundedSender;
 
-use bench_dragon_client::control::conductor::{Action, Conducted, Conductor};
+use bench_dragon_client::control::command_client::{Action, ActionResult, CommandClient};
 use bench_dragon_client::control::refusal;
 use bench_dragon_messages::control::{Code, Command};
 use bench_dragon_messages::state::PlaybackState;
@@ -22,18 +22,18 @@ const OFF: &str = "this server was started without --control: it takes no comman
 const EXPECTED: &str = "expected JSON such as {\"command\":\"seek\",\"value\":400}; the commands are toggle, state, pause, \
                         resume, rate, seek, step, restart, hold, release and go, of which rate and seek have a value";
 
-/// Where an answer goes, and the sender's own number for the command.
+/// The channel of an answer, and the browser's number of the command.
 pub(super) struct Tag {
     id: Value,
     answers: UnboundedSender<String>,
 }
 
-/// What whoever commands has to give.
+/// The token that authorizes commands.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Token(String);
 
 impl Token {
-    /// A new one.
+    /// Creates a random token.
     ///
     /// # Errors
     /// The system has no random numbers.
@@ -43,52 +43,53 @@ impl Token {
         Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
     }
 
-    /// Its letters.
+    /// Returns its letters.
     pub fn as_str(&self) -> &str {
         &self.0
     }
 
-    /// Whether a text is this token, in a time that does not depend on how much of it is right.
+    /// Returns true if a text is this token, in a time that does not depend on the matching letters.
     fn is(&self, text: &str) -> bool {
         self.0.as_bytes().ct_eq(text.as_bytes()).into()
     }
 }
 
-/// A server's way to `<name>/control`.
-pub(super) struct Gate {
-    conductor: Conductor<Tag>,
+/// The authorization for `<name>/control`, and the client that sends the commands.
+pub(super) struct Authorization {
+    client: CommandClient<Tag>,
     token: Option<Token>,
 }
 
-impl Gate {
-    /// A gate to the publisher of `name`, for whoever has the token, or for everybody where there is none.
+impl Authorization {
+    /// Creates the authorization for the publisher of `name`: for browsers with the token, or for all browsers without
+    /// a token.
     ///
     /// # Errors
     /// The system has no thread left.
     pub(super) fn new(name: &str, token: Option<Token>) -> std::io::Result<Self> {
-        let conductor = Conductor::start(name, |Tag { id, answers }, conducted| {
+        let client = CommandClient::start(name, |Tag { id, answers }, result| {
             // A browser that has gone needs no answer.
-            let _ = answers.send(answer(&id, conducted));
+            let _ = answers.send(answer(&id, result));
         })?;
-        Ok(Self { conductor, token })
+        Ok(Self { client, token })
     }
 
-    /// Whether those who have given no token may command.
+    /// Returns true if browsers may command without a token.
     pub(super) fn is_open(&self) -> bool {
         self.token.is_none()
     }
 }
 
-/// One browser at the gate.
+/// One browser.
 pub(super) struct Visitor<'a> {
-    gate: Option<&'a Gate>,
+    authorization: Option<&'a Authorization>,
     allowed: bool,
     answers: UnboundedSender<String>,
     /// Commands whose answers have not come.
     pub(super) unanswered: usize,
 }
 
-/// What a browser may send.
+/// A message of a browser.
 #[derive(Deserialize)]
 #[serde(untagged, deny_unknown_fields)]
 enum Request {
@@ -104,50 +105,50 @@ enum Request {
 }
 
 impl<'a> Visitor<'a> {
-    /// A browser that has given nothing yet; what becomes of its commands goes to `answers`.
-    pub(super) fn new(gate: Option<&'a Gate>, answers: UnboundedSender<String>) -> Self {
-        Self { gate, allowed: gate.is_some_and(Gate::is_open), answers, unanswered: 0 }
+    /// Creates a browser that has sent no token yet; the results of its commands go to `answers`.
+    pub(super) fn new(authorization: Option<&'a Authorization>, answers: UnboundedSender<String>) -> Self {
+        Self { authorization, allowed: authorization.is_some_and(Authorization::is_open), answers, unanswered: 0 }
     }
 
-    /// The message about whether this browser may command; none where nobody may.
+    /// Returns the message that this browser may command or not; `None` if no browser may.
     pub(super) fn permission(&self) -> Option<String> {
-        self.gate?;
+        self.authorization?;
         let reason = (!self.allowed).then_some("commands need the token of the address that view printed");
         Some(json!({"type": "control", "allowed": self.allowed, "reason": reason}).to_string())
     }
 
-    /// Takes in a message; the response that can be given at once. The other is on its way to `answers`.
+    /// Handles a message. Returns a response if one is ready; other responses go to `answers`.
     pub(super) fn receive(&mut self, text: &str) -> Option<String> {
         let request = match serde_json::from_str(text) {
             Ok(request) => request,
             Err(_) => return Some(refused(&Value::Null, EXPECTED)),
         };
-        match (request, self.gate) {
+        match (request, self.authorization) {
             (Request::Command { id, .. }, None) => Some(refused(&id, OFF)),
             (Request::Token { .. }, None) => Some(refused(&Value::Null, OFF)),
-            (Request::Token { token }, Some(gate)) => {
-                self.allowed = gate.token.as_ref().is_none_or(|right| right.is(&token));
+            (Request::Token { token }, Some(authorization)) => {
+                self.allowed = authorization.token.as_ref().is_none_or(|right| right.is(&token));
                 self.permission()
             }
             (Request::Command { id, .. }, Some(_)) if !self.allowed => {
                 Some(refused(&id, "commands need the token of the address that view printed"))
             }
-            (Request::Command { command, value, id }, Some(gate)) => match action(&command, value) {
+            (Request::Command { command, value, id }, Some(authorization)) => match action(&command, value) {
                 Err(sentence) => Some(refused(&id, sentence)),
-                Ok(action) => self.pass_on(gate, id, action),
+                Ok(action) => self.pass_on(authorization, id, action),
             },
         }
     }
 
-    fn pass_on(&mut self, gate: &Gate, id: Value, action: Action) -> Option<String> {
+    fn pass_on(&mut self, authorization: &Authorization, id: Value, action: Action) -> Option<String> {
         let too_many = "too many commands are waiting";
-        // A hold is accepted always: one more than all others.
+        // A hold is always accepted: one more than all others.
         let most = if action == Action::Send(Command::Hold) { MOST_UNANSWERED + 1 } else { MOST_UNANSWERED };
         if self.unanswered >= most {
             return Some(refused(&id, too_many));
         }
         let tag = Tag { id: id.clone(), answers: self.answers.clone() };
-        match gate.conductor.request(tag, action) {
+        match authorization.client.request(tag, action) {
             Ok(()) => {
                 self.unanswered += 1;
                 None
@@ -157,7 +158,7 @@ impl<'a> Visitor<'a> {
     }
 }
 
-/// What a command's name and value ask for.
+/// Returns the action of a command's name and value.
 fn action(name: &str, value: Option<f64>) -> Result<Action, &'static str> {
     if name == "toggle" {
         return Ok(Action::Toggle);
@@ -174,15 +175,15 @@ fn action(name: &str, value: Option<f64>) -> Result<Action, &'static str> {
     }
 }
 
-/// The response to what never reaches the publisher.
+/// Returns the response to a command that never reaches the publisher.
 fn refused(id: &Value, sentence: &str) -> String {
     json!({"type": "answer", "id": id, "code": null, "sentence": sentence}).to_string()
 }
 
-/// What became of a command.
-fn answer(id: &Value, conducted: Conducted) -> String {
-    let (command, response) = match conducted {
-        Ok(conducted) => conducted,
+/// Returns the answer to a command.
+fn answer(id: &Value, result: ActionResult) -> String {
+    let (command, response) = match result {
+        Ok(done) => done,
         Err(error) => return refused(id, &error.to_string()),
     };
     json!({"type": "answer", "id": id, "command": command.name(),

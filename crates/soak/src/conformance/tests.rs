@@ -1,4 +1,4 @@
-//! Frames of the show's own clock under random commands, with skipped periods, and what is wrong with changed ones.
+//! Frames of the show clock under random commands, with skipped periods, and frames with a fault.
 
 use proptest::prelude::*;
 
@@ -11,7 +11,7 @@ use bench_dragon_show::scene::{AtEnd, OnContact};
 
 const RATE: f64 = 50.0;
 
-/// The frames of a show that these commands conduct, each after so many frames, each frame after so many periods.
+/// Returns the frames of a show under these commands: (frames after the command, periods after each frame, command).
 fn frames(list: &[(u64, u64, Command)]) -> Vec<(FrameHeader, Vec<HandlePose>)> {
     let playback = Playback {
         start: 0.0,
@@ -49,22 +49,22 @@ fn frames(list: &[(u64, u64, Command)]) -> Vec<(FrameHeader, Vec<HandlePose>)> {
 }
 
 fn faults(frames: &[(FrameHeader, Vec<HandlePose>)]) -> Vec<String> {
-    let mut obedience = Obedience::default();
-    frames.iter().filter_map(|(header, handles)| obedience.check(header, handles, RATE).err()).collect()
+    let mut conformance = ConformanceCheck::default();
+    frames.iter().filter_map(|(header, handles)| conformance.check(header, handles, RATE).err()).collect()
 }
 
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(500) })]
 
     #[test]
-    fn whatever_is_commanded_the_show_obeys(
+    fn frames_of_the_show_clock_conform_under_any_commands(
         list in prop::collection::vec((1u64..60, prop_oneof![8 => Just(1u64), 1 => 2u64..20], commands()), 1..40),
     ) {
         prop_assert_eq!(faults(&frames(&list)), Vec::<String>::new());
     }
 
     #[test]
-    fn frames_that_were_not_received_accuse_nobody(
+    fn frames_that_were_not_received_are_no_fault(
         list in prop::collection::vec((1u64..60, Just(1u64), commands()), 1..40),
         kept in prop::collection::vec(any::<bool>(), 3000),
     ) {
@@ -75,7 +75,7 @@ proptest! {
 }
 
 #[test]
-fn each_disobedience_is_noticed() {
+fn each_fault_is_noticed() {
     // Plays for 30 frames, is paused for 30, plays at double rate for 30, is held for 30.
     let list = [
         (30, 1, Command::State),

@@ -1,7 +1,6 @@
-//! Conducting from a thread of its own, so that whoever commands never waits: neither for the answer nor for a
-//! publisher that hangs.
+//! Commands sent by a separate thread, so that the caller never waits for an answer or for a publisher that hangs.
 //!
-//! In: an [`Action`] with a tag. Out: the tag and what became of it, handed to a function on that thread. Called by
+//! In: an [`Action`] with a tag. Out: the tag and the result, passed to a function on that thread. Called by
 //! `watch` for its keys and by the stage picture's server for its browsers.
 
 use std::collections::VecDeque;
@@ -16,41 +15,41 @@ use bench_dragon_messages::ControlResponse;
 use bench_dragon_messages::control::{Code, Command};
 use bench_dragon_messages::state::PlaybackState;
 
-/// How often responses are looked for while some are awaited.
+/// The interval of polls for pending responses.
 const POLL_INTERVAL: Duration = Duration::from_micros(500);
-/// After so long without a command the service is let go of, so that it can be made anew by another publisher.
+/// Time without a command after which the service is closed, so that another publisher can create it again.
 const IDLE: Duration = Duration::from_secs(1);
-/// Commands that may be sent and unanswered at once, and holds besides: the service admits 8 of a client, and one asks
-/// whether a step makes progress.
+/// Commands that may be pending at once, and holds besides: the service admits 8 of a client, and one requests the
+/// state during a step.
 const MOST_PENDING: usize = 4;
 const MOST_HOLDS: usize = 3;
 /// Commands that may be unanswered, sent or not.
 const MOST_WAITING: usize = 64;
-/// What overtakes all that waits, which is then dropped: nothing that was asked before a hold is done after it.
+/// The action that drops all waiting actions: no action requested before a hold is done after it.
 const HOLD: Action = Action::Send(Command::Hold);
 
-/// What a person asks of a show: a command, or one that depends on how the show stands.
+/// An action that a user requests: a command, or a command that depends on the state of the show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Action {
     /// This command.
     Send(Command),
     /// Pause a show that plays, resume one that is paused or waits.
     Toggle,
-    /// So many simulated seconds forward or back, within 0 and the end.
+    /// Seek forward or back, within 0 and the end.
     SeekBy {
         /// Simulated seconds, negative for back.
         seconds: f64,
-        /// Simulated seconds at which the show freezes; infinite where that is not known.
+        /// Simulated seconds at the end of the show; infinite if unknown.
         end: f64,
     },
 }
 
 impl Action {
-    /// The command, where the show stands as a response reports.
+    /// Returns the command in the state that a response reports.
     pub fn command(self, state: &ControlResponse) -> Command {
         match self {
             Self::Send(command) => command,
-            // A resume also ends the waiting at a cue or at the start. While held it is refused, which says why.
+            // A resume also ends the waiting at a cue or at the start. While held it is refused, with a sentence.
             Self::Toggle => match state.playback_state() {
                 Some(PlaybackState::Paused | PlaybackState::Held) => Command::Resume,
                 _ => Command::Pause,
@@ -60,44 +59,44 @@ impl Action {
     }
 }
 
-/// What became of an action: the command it came to and the response to it.
-pub type Conducted = Result<(Command, ControlResponse), ControlError>;
+/// The result of an action: its command and the response.
+pub type ActionResult = Result<(Command, ControlResponse), ControlError>;
 
 /// Too many commands wait already: the publisher does not keep up, or does not answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("too many commands are waiting")]
 pub struct TooMany;
 
-/// A thread that conducts the publisher of one name, through any number of publishers. Dropping it ends the thread;
-/// what has no answer by then gets none.
-pub struct Conductor<Tag> {
+/// A thread that sends commands to the publisher of one name, through any number of publishers. Dropping it ends the
+/// thread; pending actions get no result.
+pub struct CommandClient<Tag> {
     requests: Option<Sender<(Tag, Action)>>,
     unanswered: Arc<AtomicUsize>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl<Tag: Send + 'static> Conductor<Tag> {
-    /// Starts the thread. `handle` is called on it with the tag of each action and what became of it.
+impl<Tag: Send + 'static> CommandClient<Tag> {
+    /// Starts the thread, which calls `handle` with the tag and the result of each action.
     ///
     /// # Errors
-    /// The system's, where it has no thread left.
-    pub fn start(name: &str, handle: impl FnMut(Tag, Conducted) + Send + 'static) -> std::io::Result<Self> {
+    /// The system's error, if it has no thread left.
+    pub fn start(name: &str, handle: impl FnMut(Tag, ActionResult) + Send + 'static) -> std::io::Result<Self> {
         let (sender, receiver) = channel();
         let unanswered = Arc::new(AtomicUsize::new(0));
         let (name, counter) = (name.to_owned(), Arc::clone(&unanswered));
-        let thread = std::thread::Builder::new().name("conductor".to_owned()).spawn(move || {
+        let thread = std::thread::Builder::new().name("commands".to_owned()).spawn(move || {
             let (waiting, pending) = (VecDeque::new(), Vec::new());
             let (controller, vigil) = (None, Vigil::new());
-            Conducting { name, controller, unanswered: counter, waiting, pending, vigil, handle }.run(&receiver);
+            CommandThread { name, controller, unanswered: counter, waiting, pending, vigil, handle }.run(&receiver);
         });
         let thread = Some(thread?);
         Ok(Self { requests: Some(sender), unanswered, thread })
     }
 
-    /// Asks for an action. A hold overtakes all that waits; that gets [`ControlError::Overtaken`].
+    /// Requests an action. A hold drops all waiting actions, which get [`ControlError::Overtaken`].
     ///
     /// # Errors
-    /// [`TooMany`]: nothing will become of it.
+    /// [`TooMany`]: the action is not sent and gets no result.
     pub fn request(&self, tag: Tag, action: Action) -> Result<(), TooMany> {
         let most = if action == HOLD { MOST_WAITING + MOST_HOLDS } else { MOST_WAITING };
         if self.unanswered.fetch_add(1, Ordering::Relaxed) < most
@@ -111,7 +110,7 @@ impl<Tag: Send + 'static> Conductor<Tag> {
     }
 }
 
-impl<Tag> Drop for Conductor<Tag> {
+impl<Tag> Drop for CommandClient<Tag> {
     fn drop(&mut self) {
         self.requests = None;
         if let Some(thread) = self.thread.take() {
@@ -125,18 +124,18 @@ impl<Tag> Drop for Conductor<Tag> {
 struct Pending<Tag> {
     tag: Tag,
     action: Action,
-    /// The action's command, or, where that depends on how the show stands, the question how it does.
+    /// The action's command, or the request for the state on which the command depends.
     command: Command,
-    /// Whether it has been sent before, to a publisher that was gone.
+    /// True if it was sent before, to a publisher that had gone.
     repeated: bool,
-    /// Whether a hold has come since: nothing more is sent for it.
+    /// True if a hold has come since: nothing more is sent for this action.
     overtaken: bool,
     sent: Instant,
     response: PendingCommand,
 }
 
-/// What the thread owns; made there, since ports stay on the thread that made them.
-struct Conducting<Tag, Handle> {
+/// The data of the thread, created there, since ports stay on the thread that created them.
+struct CommandThread<Tag, Handle> {
     name: String,
     controller: Option<Controller>,
     unanswered: Arc<AtomicUsize>,
@@ -146,7 +145,7 @@ struct Conducting<Tag, Handle> {
     handle: Handle,
 }
 
-impl<Tag, Handle: FnMut(Tag, Conducted)> Conducting<Tag, Handle> {
+impl<Tag, Handle: FnMut(Tag, ActionResult)> CommandThread<Tag, Handle> {
     fn run(&mut self, requests: &Receiver<(Tag, Action)>) {
         loop {
             let patience = if self.pending.is_empty() { IDLE } else { POLL_INTERVAL };
@@ -164,7 +163,7 @@ impl<Tag, Handle: FnMut(Tag, Conducted)> Conducting<Tag, Handle> {
         }
     }
 
-    /// Drops what waits, but for holds, and has the hold sent next.
+    /// Drops all waiting actions except holds, and queues the hold.
     fn hold(&mut self, tag: Tag) {
         let (holds, overtaken) = self.waiting.drain(..).partition(|(_, action)| *action == HOLD);
         self.waiting = holds;
@@ -174,8 +173,8 @@ impl<Tag, Handle: FnMut(Tag, Conducted)> Conducting<Tag, Handle> {
         self.pending.iter_mut().for_each(|pending| pending.overtaken = pending.action != HOLD);
     }
 
-    /// The next action that may be sent by now: what depends on how the show stands goes before all that came after it,
-    /// but a hold.
+    /// Returns the next action that may be sent now. An action that depends on the state delays all later actions
+    /// except a hold.
     fn next_waiting(&mut self) -> Option<(Tag, Action)> {
         let is_hold = self.waiting.front()?.1 == HOLD;
         if !is_hold && self.pending.iter().any(|pending| !matches!(pending.action, Action::Send(_))) {
@@ -211,7 +210,7 @@ impl<Tag, Handle: FnMut(Tag, Conducted)> Conducting<Tag, Handle> {
         controller.request(command)
     }
 
-    /// Looks for the responses to all that are pending, in the order in which they were sent.
+    /// Polls the pending responses, in the order in which the requests were sent.
     fn poll(&mut self) {
         let alive = match &mut self.controller {
             _ if self.pending.is_empty() => return,
@@ -235,7 +234,7 @@ impl<Tag, Handle: FnMut(Tag, Conducted)> Conducting<Tag, Handle> {
             let tag = pending.tag;
             let is_question = command == Command::State && action != Action::Send(Command::State);
             match polled {
-                // A question that was refused has told nothing.
+                // A refused request for the state has no information.
                 Ok(state) if is_question && matches!(state.result(), Some(Code::Done | Code::Already)) => {
                     if overtaken {
                         self.answer(tag, Err(ControlError::Overtaken));
@@ -256,8 +255,8 @@ impl<Tag, Handle: FnMut(Tag, Conducted)> Conducting<Tag, Handle> {
         repeats.into_iter().for_each(|(tag, action)| self.begin(tag, action, true));
     }
 
-    fn answer(&mut self, tag: Tag, conducted: Conducted) {
+    fn answer(&mut self, tag: Tag, result: ActionResult) {
         self.unanswered.fetch_sub(1, Ordering::Relaxed);
-        (self.handle)(tag, conducted);
+        (self.handle)(tag, result);
     }
 }
