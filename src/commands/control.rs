@@ -16,46 +16,46 @@ use super::{CommandError, Common, Output};
 pub struct ControlArguments {
     #[command(subcommand)]
     action: Action,
-    /// Wait at most so long for the answer, seconds; by default 30, and for a step as long as it makes progress
+    /// Longest wait for the answer, seconds; by default 30, and for a step as long as it makes progress
     #[arg(long, value_name = "SECONDS", global = true, allow_negative_numbers = true)]
     timeout: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, clap::Subcommand)]
 enum Action {
-    /// Print how the show stands
+    /// Print the playback state
     State,
-    /// Simulated time stands still; frames go out at full rate
+    /// Stop simulated time; frames are sent at full rate
     Pause,
-    /// Simulated time advances again
+    /// Let simulated time advance again
     Resume,
-    /// Pause a show that plays, resume one that is paused
+    /// Pause a playing show, resume a paused one
     Toggle,
-    /// Simulated seconds per second of wall time from now on
+    /// Set the simulated seconds per second of wall time
     #[command(allow_negative_numbers = true)]
     Rate {
         /// 1e-6 to 1e6
         rate: f64,
     },
-    /// To a simulated time
+    /// Go to a simulated time
     #[command(allow_negative_numbers = true)]
     Seek {
         /// Seconds since the start of the scene
         time: f64,
     },
-    /// So many periods, then paused again
+    /// Play PERIODS periods, then pause again
     Step {
         /// Periods of the loop
         #[arg(default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1 << 53))]
         periods: u64,
     },
-    /// To the start of the show
+    /// Go to the start of the show
     Restart,
-    /// Stand still until released, whatever else is commanded
+    /// Stop until released, whatever else is commanded
     Hold,
-    /// From hold to paused
+    /// Go from hold to paused
     Release,
-    /// On from a cue that pauses, or from --paused
+    /// Continue from a cue that pauses, or from --paused
     Go,
 }
 
@@ -70,7 +70,7 @@ struct ResponseLine {
     cue: u32,
 }
 
-/// Sends one command and prints what became of it.
+/// Sends one command and prints its result.
 pub fn control(common: &Common, arguments: &ControlArguments) -> Result<(), CommandError> {
     let timeout = arguments.timeout.map(|seconds| {
         let sentence = || CommandError::BadInput(format!("--timeout is {seconds}, expected a number of seconds"));
