@@ -1,4 +1,4 @@
-//! What the least clearance of a frame costs: all pairs against the live way, and one pair.
+//! The cost of a frame's least clearance: all pairs against the live method, and one pair.
 //!
 //! Every case averages over a run of consecutive frames at one place of the show. On the paper's spiral it is given in
 //! hundredths of the head's way to the contact (of the way that leaves it 4 m from the centre, for longer teams).
@@ -109,14 +109,14 @@ fn live_without_table(bencher: Bencher, (benches, percent): (usize, usize)) {
     run(bencher, ClearanceMonitor::without_table(team(benches), 0.0), &chains);
 }
 
-/// The same with 223 benches, by frames a second: what a frame has to find out anew goes with the way between two.
+/// The same with 223 benches, by frames a second: the work of a frame grows with the distance between two.
 #[divan::bench(args = [60.0, 1_000.0, 20_000.0])]
 fn live_without_table_by_rate(bencher: Bencher, rate: f64) {
     let chains = chains(&spiral(), team(223), at(50), rate);
     run(bencher, ClearanceMonitor::without_table(team(223), 0.0), &chains);
 }
 
-/// A team too short to meet itself on the next turn: every bench is as near as any to the next but one.
+/// A team too short to meet itself on the next turn: all next-but-one benches are equally near.
 #[divan::bench]
 fn live_on_less_than_a_turn(bencher: Bencher) {
     let spiral = Path::spiral(PITCH, 60.0);
@@ -124,7 +124,7 @@ fn live_on_less_than_a_turn(bencher: Bencher) {
     run(bencher, monitor(&spiral, team(100)), &chains);
 }
 
-/// What the table of bounds costs once, before the show, with the follower table from which it is made.
+/// The cost of the table of bounds, once before the show, with the follower table from which it is made.
 #[divan::bench(args = [223, 1_000, 5_000, 10_000, 100_000], sample_count = 5, sample_size = 1)]
 fn make_monitor(benches: usize) -> ClearanceMonitor {
     monitor(&spiral(), team(benches))

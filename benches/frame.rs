@@ -1,6 +1,6 @@
-//! What a frame costs: each solver at 60 Hz and 1 kHz, with and without velocities, for teams of 10 to 100,000; the
+//! The cost of a frame: each solver at 60 Hz and 1 kHz, with and without velocities, for teams of 10 to 100,000; the
 //! floor below which no solver can go; the safe solver beside it in the same run; whole shows with and without alerts;
-//! the events; and a frame's way into shared memory.
+//! the events; and copying a frame into shared memory.
 //!
 //! `cargo bench --bench frame`
 
@@ -35,7 +35,7 @@ fn spiral() -> Path {
     Path::spiral(0.55, 16.0)
 }
 
-/// Plays the paper scene from 200 s on, over and over, a frame per call.
+/// Plays the paper scene from 200 s on, in a loop, a frame per call.
 fn play(bencher: Bencher, solver: &mut dyn Solver, handles: usize, rate: f64) {
     let mut chain = Chain::new(handles);
     let mut tick = 0.0;
@@ -52,7 +52,7 @@ fn newton_cold(bencher: Bencher, rate: f64) {
     play(bencher, &mut Newton::new(spiral(), team(223), 1.0, Velocities::Computed), 224, rate);
 }
 
-/// A spiral scene as the show plays it, including what it costs to distinguish the path's kind.
+/// A spiral scene as the show plays it, with the cost of distinguishing the path's kind.
 #[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
 fn scene_on_a_spiral(bencher: Bencher, rate: f64) {
     let scene = bench_dragon::show::scene::Scene::paper();
@@ -67,7 +67,7 @@ fn newton_on_a_turnaround(bencher: Bencher, rate: f64) {
 }
 
 /// Newton's method from no guess but the link's length over the radius, on theta in one double, with the system's sine
-/// and cosine: what a careful person writes first.
+/// and cosine: a careful first version.
 #[divan::bench(sample_count = 500, sample_size = 20)]
 fn newton_cold_without_care(bencher: Bencher) {
     let (radius_per_radian, team) = (0.55 / TAU, team(223));
@@ -182,7 +182,7 @@ fn newton_by_benches(bencher: Bencher, benches: usize) {
     play(bencher, &mut Newton::new(spiral(), team(benches), 1.0, Velocities::Computed), benches + 1, 60.0);
 }
 
-/// Whole frames of the paper scene's show as the live loop makes them, with and without what a scene can leave out.
+/// Whole frames of the paper scene's show as the live loop makes them, with and without the optional parts of a scene.
 #[divan::bench(args = ["bare", "velocities", "alerts", "alerts and velocities"], sample_count = 500, sample_size = 20)]
 fn show(bencher: Bencher, with: &str) {
     let mut scene = Scene::paper();
@@ -200,8 +200,8 @@ fn show(bencher: Bencher, with: &str) {
     });
 }
 
-/// The same where the clearance costs most: the nearest boards are about as near as every pair on two turns, so that no
-/// bench can be left out.
+/// The same at the greatest cost of the clearance: nearly all pairs on two turns are equally near, so no bench is
+/// excluded.
 #[divan::bench(sample_count = 500, sample_size = 4)]
 fn show_where_every_turn_is_as_near(bencher: Bencher) {
     let scene = Scene::paper();

@@ -20,7 +20,7 @@ import subprocess
 
 TARGET = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "target", "release")
 NAME = f"lateness_{os.getpid()}"
-# Microseconds that a CPU may take to wake up: one that any sleep meets, and one that no sleep meets.
+# Longest wake-up time of a CPU, microseconds: one that every sleep state meets, and one that none meets.
 CPU_LATENCIES = (("may sleep", 1_000_000), ("awake", 0))
 PERCENTILES = (("p50", 0.5), ("p99", 0.99), ("p999", 0.999))
 # Lateness beyond this many microseconds is only counted by cyclictest.

@@ -1,4 +1,4 @@
-"""What ROS 2 costs the loop: runs the publisher at 1 kHz with and without `--ros2`, in turn, and prints the ratios.
+"""The cost of ROS 2 to the loop: runs the publisher at 1 kHz with and without `--ros2`, in turn, and prints the ratios.
 
     cargo build --release && python3 benches/ros2_cost.py [--rounds 5] [--seconds 10]
 """

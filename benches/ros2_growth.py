@@ -1,4 +1,4 @@
-"""Whether the publisher grows: resident memory, threads and file descriptors while ROS 2 subscribers come and go.
+"""Growth of the publisher: resident memory, threads and file descriptors while ROS 2 subscribers come and go.
 
     cargo build --release && .venv/bin/python benches/ros2_growth.py [--minutes 10]
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What a second and a tenth dragon cost: publishers under different names on one machine, all read by one `metrics`.
+"""The cost of a second and a tenth dragon: publishers under different names on one machine, all read by one `metrics`.
 
 For each rate, one, two and ten publishers of the same scene in turn, for some rounds, so that the machine's moods fall on all.
 Of each publisher: its CPU time and resident memory, how late its loop woke, the periods it skipped; and the frames that the

@@ -1,8 +1,8 @@
-"""What the stage picture costs the publisher, how far it is behind, and how many pictures a second it reaches.
+"""The stage picture's cost to the publisher, its latency, and its pictures a second.
 
     cargo build --release
     .venv/bin/python benches/stage_picture.py cost      # lateness and step of a 1 kHz publisher: five browsers against none;
-                                                        # what follows is handed to `run`: cost --realtime 80
+                                                        # further options go to `run`: cost --realtime 80
     .venv/bin/python benches/stage_picture.py latency   # from sent_ns to received and to drawn, at 20 Hz, 60 Hz and 1 kHz
     .venv/bin/python benches/stage_picture.py long      # pictures a second of a scene of 5,000 benches, and of it as a show
     .venv/bin/python benches/stage_picture.py renderers # the same boards by canvas and by WebGL, in stage_picture_renderers.html
@@ -80,7 +80,7 @@ def summary_of_a_run():
 
 
 def cost():
-    """In turn, so that what else the machine does falls on all alike."""
+    """In turn, so that other load affects all alike."""
     rounds = {"nobody": [], "server, no browser": [], "five browsers": []}
     for turn in range(3):
         rounds["nobody"].append(summary_of_a_run())
@@ -130,7 +130,7 @@ def chromium_cpu():
 
 
 def renderers():
-    """In turn, so that what else the machine does falls on all alike."""
+    """In turn, so that other load affects all alike."""
     found = {"paths": [], "lines": [], "webgl": []}
     for _ in range(5):
         for renderer, turns in found.items():

@@ -1,11 +1,11 @@
-//! What a step of the loop costs, by the size of the team: the solver, the clearance, the way into shared memory, and all
-//! of it, beside copying as many bytes into the same memory. The parts are measured in turn, frame by frame, in one run,
-//! with one subscriber that takes every frame; the figures are medians.
+//! The cost of a step of the loop, by the size of the team: the solver, the clearance, publishing into shared memory,
+//! and the whole, beside copying as many bytes into the same memory. The parts are measured in turn, frame by frame, in
+//! one run, with one subscriber that takes every frame; the figures are medians.
 //!
-//! Then the step of the paper's team once more, beside the same with one and with two doors at which no command waits.
+//! Then the step of the paper's team once more, beside the same with one and with two empty command queues.
 //!
-//! And the step of the paper's team at 10 kHz, beside the same with a log of the run (`run --log`), and what the log does
-//! when the step is over.
+//! And the step of the paper's team at 10 kHz, beside the same with a log of the run (`run --log`), and the log's work
+//! after the step.
 //!
 //! `cargo bench --bench step`, or with some numbers of benches: `cargo bench --bench step -- 223 100000`, or the doors
 //! alone: `cargo bench --bench step -- doors`, or the log: `cargo bench --bench step -- log`
@@ -27,10 +27,10 @@ use bench_dragon::show::scene::{Scene, SceneText};
 use bench_dragon::show::{Playback, Show};
 
 const SIZES: [usize; 4] = [223, 5_000, 100_000, 1_000_000];
-/// Where the show begins, simulated seconds; it plays at 60 Hz from there.
+/// Start of the show, simulated seconds; it plays at 60 Hz from there.
 const START: f64 = 200.0;
-/// Frames of a part before the next part has its turn: so few that all parts see the same machine, so many that a part
-/// finds its own memory in the caches as the loop would.
+/// Frames of a part before the next part has its turn: few, so that all parts see the same load; enough for a part to
+/// find its memory in the caches as the loop would.
 const BATCH: usize = 4;
 /// Rounds before the first that counts: every page has been written by then.
 const WARM_UP: usize = 1;
@@ -40,9 +40,9 @@ const MOST_ROUNDS: usize = 3_000;
 const TIME: Duration = Duration::from_secs(5);
 /// Frames in the queue of the subscriber.
 const QUEUE: usize = 2;
-/// Times that doors are looked at for one figure: once takes less than a clock resolves.
+/// Polls of the command queues for one figure: a single one is below the clock's resolution.
 const POLLS: usize = 1_000;
-/// Copies that are held at once, so that copying meets memory as little used as publishing does.
+/// Copies held at once, so that copying uses memory as cold as publishing does.
 const COPIES: usize = QUEUE + 2;
 
 fn main() {
@@ -170,7 +170,7 @@ fn publisher_and_subscriber(name: &str, scene: &Scene, show: &Show) -> (SharedMe
     (publisher, connection)
 }
 
-/// Steps with no door, one and two, in turn: the same show, so that what it computes costs all of them the same.
+/// Steps with no command queue, one and two, in turn, of the same show, so that its computation costs all the same.
 fn measure_doors() {
     let scene = scene(223);
     let playback = Playback { start: START, ..Playback::of(&scene) };
@@ -178,7 +178,7 @@ fn measure_doors() {
     let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
     let (mut publisher, connection) =
         publisher_and_subscriber(&format!("bench_{}_doors", std::process::id()), &scene, &show);
-    // The outer ends stay: a queue that nobody can fill any more is another one.
+    // The outer ends stay: a queue without a producer behaves differently.
     let (mut doors, outer): (Vec<Doors>, Vec<Vec<Door>>) = (0..3)
         .map(|count| {
             let (ports, outer): (Vec<_>, Vec<_>) = (0..count).map(|_| door()).unzip();
@@ -191,7 +191,7 @@ fn measure_doors() {
     let mut tick = 0;
     for round in 0..MOST_ROUNDS / doors.len() {
         for place in 0..doors.len() {
-            // Who comes first and who last changes.
+            // The order alternates.
             let count = (place + round) % doors.len();
             let doors = &mut doors[count];
             for _ in 0..BATCH {
@@ -226,8 +226,8 @@ fn measure_doors() {
     }
 }
 
-/// Steps at 10 kHz without a log and with one, in turn. The log's thread reads what the step has written, so the next step
-/// must come as late as it does in a run.
+/// Steps at 10 kHz without a log and with one, in turn. The log's thread reads what the step has written, so the next
+/// step must come as late as it does in a run.
 fn measure_log() {
     let scene = scene(223);
     let playback = Playback { start: START, rate: 10_000.0, ..Playback::of(&scene) };
@@ -265,7 +265,7 @@ fn measure_log() {
     }
     log.finish();
     let whole = outcome.failure().is_none();
-    // It has no further use.
+    // No longer needed.
     let _ = std::fs::remove_file(&file);
     let ([without, with], after) = (times.map(median), median(after));
     println!("\n| step at 10 kHz | with a log | difference | after the step | log whole |\n|---|---|---|---|---|");
@@ -276,14 +276,14 @@ fn stamps(sequence: u64) -> Stamps {
     Stamps { run_id: 1, sequence, stamp_ns: 0, deadline_ns: 0 }
 }
 
-/// Takes what has come, as a subscriber does that is in time.
+/// Receives all frames, as a subscriber that keeps up does.
 fn drain(connection: &Connection) {
     connection.frames(|header, handles| {
         black_box((header.sequence, handles[0].x));
     });
 }
 
-/// Runs something and notes how long it takes.
+/// Runs a function and records its duration.
 fn timed<T>(times: &mut Vec<f64>, run: impl FnOnce() -> T) -> T {
     let began = Instant::now();
     let result = black_box(run());

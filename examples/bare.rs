@@ -1,8 +1,8 @@
-//! A bare iceoryx2 publisher and subscriber of a payload as large as the paper's frames, with none of this project's
-//! code: what the transport itself costs. `python3 benches/latency.py` sets the live publisher beside it.
+//! A bare iceoryx2 publisher and subscriber of a payload as large as the paper's frames, without this project's
+//! code: the cost of the transport. `python3 benches/latency.py` sets the live publisher beside it.
 //!
-//! `bare publish NAME SECONDS` sends 1,000 samples a second; `bare subscribe NAME SECONDS` receives them for so long and
-//! prints the latency from sending to receiving as a line of JSON.
+//! `bare publish NAME SECONDS` sends 1,000 samples a second; `bare subscribe NAME SECONDS` receives them for SECONDS
+//! and prints the latency from sending to receiving as a line of JSON.
 
 use std::time::{Duration, Instant};
 
@@ -18,7 +18,7 @@ type Header = [u64; 10];
 /// Handles in a sample, as in the paper's frames.
 const HANDLES: usize = 224;
 const PERIOD_NS: u64 = 1_000_000;
-/// The longest latency that is distinguished: an hour.
+/// The greatest latency distinguished: an hour.
 const LONGEST_NS: u64 = 3_600_000_000_000;
 /// Samples that the subscriber may fall behind, as in the live publisher.
 const QUEUE: usize = 64;

@@ -43,7 +43,7 @@ def excess(rear, front, link):
 
 
 def by_brentq(front, link):
-    # Half a turn on, the distance is more than the link wherever the motion can go on.
+    # Half a turn on, the distance is more than the link as long as the motion can continue.
     return brentq(excess, front, front + np.pi, args=(front, link), xtol=1e-14, rtol=1e-15)
 
 
@@ -104,7 +104,7 @@ def main():
     with open(TRUTH) as file:
         rows = list(csv.DictReader(file))
     exact = np.array([[float(row["x_m"]), float(row["y_m"])] for row in rows if row["t_s"] == "300.0"])
-    # The one time in the table that is no round number.
+    # The only time in the table that is no round number.
     touch = next(float(row["t_s"]) for row in rows if row["t_s"].startswith("412."))
     points = handles(300, follower)
     error = np.max(np.hypot(*(points - exact).T))

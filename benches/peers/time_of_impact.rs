@@ -1,5 +1,5 @@
 //! parry2d's times of impact beside the exact search: the contact of the paper's scene, by steps within which every
-//! board keeps its velocity and its angular velocity, as parry's casts have it, between two poses of the live solver.
+//! board keeps its velocity and its angular velocity, as parry's casts assume, between two poses of the live solver.
 //!
 //! `cargo bench --bench time_of_impact`
 
@@ -14,11 +14,11 @@ use parry2d_f64::math::Pose;
 use parry2d_f64::query::{NonlinearRigidMotion, ShapeCastOptions, cast_shapes, cast_shapes_nonlinear};
 use parry2d_f64::shape::{Cuboid, Shape};
 
-/// Length of a step, and where the search begins, both in simulated seconds: the shortest steps begin late.
+/// Length of a step, and start of the search, both in simulated seconds: the shortest steps begin late.
 const STEPS: [(f64, f64); 4] = [(1.0, 0.0), (0.1, 0.0), (0.01, 400.0), (0.001, 412.0)];
-/// Metres that the box about a board at both ends of a step is widened by, for what a turn sweeps in between.
+/// Metres that the box about a board at both ends of a step is widened by, for the area that a turn sweeps in between.
 const SWEEP: f64 = 0.1;
-/// How often the exact search is made: the fastest counts.
+/// Repetitions of the exact search: the fastest counts.
 const SEARCHES: usize = 20;
 
 #[derive(Clone, Copy)]
@@ -29,7 +29,7 @@ enum Cast {
     Nonlinear,
 }
 
-/// What a search found, and what it took.
+/// The result of a search, and its cost.
 struct Found {
     time: f64,
     pair: (usize, usize),
@@ -68,7 +68,7 @@ fn moving(from: &[(Pose, Cuboid)], to: &[(Pose, Cuboid)], step: f64) -> Vec<Movi
     from.iter().zip(to).map(one).collect()
 }
 
-/// When two boards first touch within a step, seconds after its beginning.
+/// Returns the time at which two boards first touch within a step, seconds after its beginning.
 fn impact(one: &Moving, other: &Moving, step: f64, cast: Cast) -> Option<f64> {
     let hit = match cast {
         Cast::Linear => {

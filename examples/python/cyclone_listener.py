@@ -79,7 +79,7 @@ def main():
     frames, newest = 0, None
     while time.monotonic() < end:
         for message in reader.take(N=10):
-            # The notice that a publisher has gone comes as a sample that holds nothing.
+            # The notice that a publisher has ended is a sample without content.
             if isinstance(message, PoseArray):
                 frames, newest = frames + 1, message
         if time.monotonic() >= report:

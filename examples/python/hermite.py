@@ -1,4 +1,4 @@
-"""Where every handle is at the moment of display: cubic Hermite interpolation between frames, with numpy alone.
+"""The place of every handle at the moment of display: cubic Hermite interpolation between frames, with numpy alone.
 
     reader = HermiteReader()
     reader.push(header, handles)                 # for every frame, as it comes
@@ -26,14 +26,14 @@ Frame = collections.namedtuple("Frame", "run_id epoch playback deadline_ns sim_t
 
 
 class HermiteReader:
-    """The latest frames of a stream, and what lies between them."""
+    """The latest frames of a stream, and interpolation between them."""
 
     def __init__(self, keep=64):
         """Keeps the latest `keep` frames: a display that runs d seconds behind r frames a second needs d r + 2."""
         self._frames = collections.deque(maxlen=max(keep, 2))
 
     def push(self, header, handles, arrival_ns=None):
-        """Takes in the next frame, which is copied. Frames of another run are forgotten.
+        """Copies the next frame. Frames of another run are forgotten.
 
         `arrival_ns` of time.monotonic_ns() takes the place of the frame's own moment, for frames of another machine.
         """
@@ -44,7 +44,7 @@ class HermiteReader:
         self._frames.append(frame if arrival_ns is None else frame._replace(deadline_ns=arrival_ns))
 
     def at(self, monotonic_ns):
-        """Simulated seconds and the handles at a moment of CLOCK_MONOTONIC; None where no frame has come.
+        """Simulated seconds and the handles at a moment of CLOCK_MONOTONIC; None before the first frame.
 
         Before the oldest frame that is kept, after the newest, and where simulated time jumps (another epoch), the
         frame before is shown as it is.
@@ -62,7 +62,7 @@ class HermiteReader:
         length = b.sim_time - a.sim_time
         u = (moment - a.sim_time) / length
         handles = a.handles.copy()
-        # Velocities are zero where the show stands still, not because the handles rest there: those are not used.
+        # Velocities are zero while the show stands still, not because the handles rest: they are not used.
         moving = (a.playback == PLAYING, b.playback == PLAYING)
         for position, rate in (("x", "vx"), ("y", "vy")):
             ends = (a.handles[position], b.handles[position], a.handles[rate] * length, b.handles[rate] * length)
@@ -75,7 +75,7 @@ class HermiteReader:
 
 
 def _coordinate(first, last, first_rate, last_rate, moving, u):
-    """The polynomial of least degree through both places and those rates that can be trusted; its value and slope."""
+    """Value and slope of the polynomial of least degree through both places and the valid rates."""
     step, w = last - first, 1.0 - u
     if np.isnan(first_rate).any() or np.isnan(last_rate).any() or moving == (False, False):
         return first + step * u, step
@@ -91,7 +91,7 @@ def _coordinate(first, last, first_rate, last_rate, moving, u):
 
 
 def frames(name, seconds):
-    """Yields (header, handles) of a publisher's frames, and None whenever none has come."""
+    """Yields (header, handles) of a publisher's frames, and None while there is none."""
     import iceoryx2 as iox2
     from bench_dragon_messages import FrameHeader, HandlePose, handles_of
 

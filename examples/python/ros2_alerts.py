@@ -33,12 +33,12 @@ EVENTS = {
 
 
 def benches(*numbers):
-    """Benches as people call them, counted from 1."""
+    """Names of benches for people, counted from 1."""
     return " and ".join(f"bench {number + 1}" for number in numbers if number != CollisionAlert.NO_BENCH)
 
 
 class Alerts(Node):
-    """Prints what comes. Who joins late gets the alert that holds: the publisher keeps it."""
+    """Prints each alert. A late subscriber gets the alert that holds: the publisher keeps it."""
 
     def __init__(self, name):
         super().__init__("bench_dragon_alerts")

@@ -1,4 +1,4 @@
-"""Shows where the head is at the moment of display, 20 times a second, whatever the rate of the topic.
+"""Prints the head's place at the moment of display, 20 times a second, at any rate of the topic.
 
     source /opt/ros/jazzy/setup.bash && source install/setup.bash        # with bench_dragon_msgs built, see docs/ros2.md
     python3 examples/python/ros2_display.py [--name bench_dragon] [--delay 0.1]
@@ -39,7 +39,7 @@ def main():
     )
 
     def show():
-        # CLOCK_MONOTONIC of the publisher's machine, on which this is meant to run too.
+        # CLOCK_MONOTONIC of the publisher's machine: run this there.
         shown = reader.at(time.monotonic_ns() - int(1e9 * arguments.delay))
         if shown is not None:
             moment, handles = shown

@@ -63,7 +63,7 @@ def follow(socket, deadline):
         if isinstance(message, str):
             message = json.loads(message)
             print(message, flush=True)
-            # Which states there are, and how serious each is. The first frames may come before it.
+            # All states and their severity. The first frames may come before it.
             states = message["states"] if message["type"] == "stage" else states
         else:
             header, handles = frame(message)

@@ -28,7 +28,7 @@ iox2.set_log_level(iox2.LogLevel.Fatal)
 
 
 def wait_for(opening):
-    """Opens a service as soon as its publisher has made it; ends where its messages have another layout."""
+    """Opens a service as soon as its publisher has created it; exits if its messages have another layout."""
     while True:
         try:
             return opening()
@@ -75,7 +75,7 @@ def main():
         while (sample := subscriber.receive()) is not None:
             header = sample.user_header().contents
             handles = handles_of(sample)
-            # Another run is a publisher that was started again, whose frames are counted from the beginning.
+            # Another run is a restarted publisher, whose frames count from the beginning.
             if header.run_id == run_id:
                 missed += header.sequence - sequence - 1
             run_id, sequence = header.run_id, header.sequence
@@ -93,7 +93,7 @@ def main():
                     "head": [float(handles["x"][0]), float(handles["y"][0])],
                 }
                 if not arguments.light:
-                    # How far the second link is from 1.65 m tells whether the content is whole.
+                    # A second link of another length than 1.65 m would mean damaged content.
                     line["link"] = float(np.hypot(handles["x"][2] - handles["x"][1], handles["y"][2] - handles["y"][1]))
                 print(json.dumps(line), flush=False)
             elif time.monotonic() >= printed + 1.0:
@@ -117,7 +117,7 @@ def main():
                         bench for bench in (message.event_bench_a, message.event_bench_b) if bench != NO_BENCH
                     ],
                 }
-                # NaN is no JSON.
+                # JSON has no NaN.
                 print(json.dumps({key: None if value != value else value for key, value in line.items()}))
             alert.delete()
     if arguments.json:

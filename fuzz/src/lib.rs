@@ -23,7 +23,7 @@ macro_rules! fuzz {
     };
 }
 
-/// Changes the first `size` bytes of `data`, which has room for `most`: three times in four as the target knows to.
+/// Changes the first `size` bytes of `data`, which has room for `most`: three times in four by the target's own changes.
 pub fn mutated(target: &Target, data: &mut [u8], size: usize, most: usize, seed: u32) -> usize {
     let mut random = Rng::with_seed(u64::from(seed));
     if random.u8(..4) == 0 {

@@ -24,8 +24,8 @@ pub struct CheckArguments {
     /// A certificate of `events --certify` for this scene: check it and print what it proves
     #[arg(long, value_name = "FILE")]
     certificate: Option<PathBuf>,
-    /// Prove the least clearance of the show: enclose it within a nanometre, rounding included. Seconds to minutes; with
-    /// --json, print that alone
+    /// Prove the least clearance of the show: enclose it within a nanometre, rounding included. Seconds to minutes;
+    /// with --json, print that alone
     #[arg(long)]
     prove: bool,
 }
