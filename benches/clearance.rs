@@ -1,7 +1,8 @@
-//! The cost of a frame's least clearance: all pairs against the live method, and one pair.
+//! Cost of the least clearance of a frame: all pairs against the live algorithm, and one pair.
 //!
-//! Every case averages over a run of consecutive frames at one place of the show. On the paper's spiral it is given in
-//! hundredths of the head's way to the contact (of the way that leaves it 4 m from the centre, for longer teams).
+//! Every case averages over a run of consecutive frames at one place of the show. On the paper's spiral, the place is
+//! given in hundredths of the head's way to the contact; for longer teams, of the way that leaves the head 4 m from the
+//! centre.
 
 use bench_dragon::motion::clearance::{ClearanceMonitor, board, least_clearance_all_pairs};
 use bench_dragon::motion::model::Point;
@@ -25,7 +26,7 @@ fn team(benches: usize) -> Team {
     Team { benches, head_length: 3.41, body_length: 2.2, width: 0.3, hole_inset: 0.275 }
 }
 
-/// The chains of consecutive frames, with the metres the head has travelled.
+/// Returns the chains of consecutive frames, with the metres the head has travelled.
 fn chains(path: &Path, team: Team, start: f64, rate: f64) -> Vec<(Chain, f64)> {
     let solver = Newton::new(path.clone(), team, 1.0, Velocities::Omitted);
     let frame = |k: usize| {
@@ -37,7 +38,7 @@ fn chains(path: &Path, team: Team, start: f64, rate: f64) -> Vec<(Chain, f64)> {
     (0..FRAMES).map(frame).collect()
 }
 
-/// The paper's spiral.
+/// Returns the paper's spiral.
 fn spiral() -> Path {
     Path::spiral(PITCH, 16.0)
 }
@@ -46,19 +47,19 @@ fn at(percent: usize) -> f64 {
     4.12 * percent as f64
 }
 
-/// The path of `config/turnaround.toml`.
+/// Returns the path of `config/turnaround.toml`.
 fn turnaround() -> Path {
     Path::turnaround(1.7, 4.5, 2.0, 100.0, 369.16).expect("its segments join")
 }
 
-/// The path of `config/procession.toml`.
+/// Returns the path of `config/procession.toml`.
 fn procession() -> Path {
     let corner = Path::route(Point::new(-30.0, -10.0), 0.0).line(40.0).arc(Side::Left, 6.0, 0.25).line(12.0);
     let bends = corner.arc(Side::Right, 5.0, 0.5).line(10.0).arc(Side::Left, 5.0, 0.5).line(120.0);
     bends.build().expect("its segments join")
 }
 
-/// A monitor with the table of the motion.
+/// Returns a monitor with the table of the motion.
 fn monitor(path: &Path, team: Team) -> ClearanceMonitor {
     let table = FollowerTable::new(path, team, 1.0, Velocities::Omitted).expect("these paths have a table");
     ClearanceMonitor::new(path, team, &table)
@@ -82,21 +83,21 @@ fn live(bencher: Bencher, (benches, percent): (usize, usize)) {
     run(bencher, monitor(&spiral(), team(benches)), &chains);
 }
 
-/// Large teams, half way to the contact.
+/// Large teams, halfway to the contact.
 #[divan::bench(args = [20_000, 100_000])]
 fn live_large_team(bencher: Bencher, benches: usize) {
     let chains = chains(&spiral(), team(benches), at(50), 60.0);
     run(bencher, monitor(&spiral(), team(benches)), &chains);
 }
 
-/// Metres of travel: in along the spiral, in the turn, and between the lanes that still come in.
+/// Metres of travel: inward along the spiral, in the turn, and between the lanes that still come in.
 #[divan::bench(args = [50.0, 110.0, 200.0, 300.0, 400.0])]
 fn live_on_the_turnaround(bencher: Bencher, travelled: f64) {
     let chains = chains(&turnaround(), team(223), travelled, 60.0);
     run(bencher, monitor(&turnaround(), team(223)), &chains);
 }
 
-/// Metres of travel. On the straight lines at the beginning all neighbours are equally near, so that all are tested.
+/// Metres of travel. On the straight lines at the beginning all neighbours are equally near, so all are tested.
 #[divan::bench(args = [10.0, 60.0, 90.0, 120.0, 200.0])]
 fn live_on_the_procession(bencher: Bencher, travelled: f64) {
     let chains = chains(&procession(), team(60), travelled, 60.0);
@@ -109,14 +110,14 @@ fn live_without_table(bencher: Bencher, (benches, percent): (usize, usize)) {
     run(bencher, ClearanceMonitor::without_table(team(benches), 0.0), &chains);
 }
 
-/// The same with 223 benches, by frames a second: the work of a frame grows with the distance between two.
+/// The same with 223 benches, by frames a second: the work of a frame depends on the distance between two frames.
 #[divan::bench(args = [60.0, 1_000.0, 20_000.0])]
 fn live_without_table_by_rate(bencher: Bencher, rate: f64) {
     let chains = chains(&spiral(), team(223), at(50), rate);
     run(bencher, ClearanceMonitor::without_table(team(223), 0.0), &chains);
 }
 
-/// A team too short to meet itself on the next turn: all next-but-one benches are equally near.
+/// A team too short to meet itself on the next turn: every bench is equally near to the next but one.
 #[divan::bench]
 fn live_on_less_than_a_turn(bencher: Bencher) {
     let spiral = Path::spiral(PITCH, 60.0);
@@ -124,7 +125,7 @@ fn live_on_less_than_a_turn(bencher: Bencher) {
     run(bencher, monitor(&spiral, team(100)), &chains);
 }
 
-/// The cost of the table of bounds, once before the show, with the follower table from which it is made.
+/// Cost of the table of bounds, made once before the show, with the follower table from which it is made.
 #[divan::bench(args = [223, 1_000, 5_000, 10_000, 100_000], sample_count = 5, sample_size = 1)]
 fn make_monitor(benches: usize) -> ClearanceMonitor {
     monitor(&spiral(), team(benches))

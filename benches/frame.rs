@@ -1,6 +1,6 @@
-//! The cost of a frame: each solver at 60 Hz and 1 kHz, with and without velocities, for teams of 10 to 100,000; the
-//! floor below which no solver can go; the safe solver beside it in the same run; whole shows with and without alerts;
-//! the events; and copying a frame into shared memory.
+//! Cost of a frame: each solver at 60 Hz and 1 kHz, with and without velocities, for teams of 10 to 100,000; the floor
+//! below which no solver can go; the safe solver beside it in the same run; whole shows with and without alerts; the
+//! events; and a frame's way into shared memory.
 //!
 //! `cargo bench --bench frame`
 
@@ -35,7 +35,7 @@ fn spiral() -> Path {
     Path::spiral(0.55, 16.0)
 }
 
-/// Plays the paper scene from 200 s on, in a loop, a frame per call.
+/// Plays the paper scene from 200 s on repeatedly, a frame per call.
 fn play(bencher: Bencher, solver: &mut dyn Solver, handles: usize, rate: f64) {
     let mut chain = Chain::new(handles);
     let mut tick = 0.0;
@@ -52,22 +52,22 @@ fn newton_cold(bencher: Bencher, rate: f64) {
     play(bencher, &mut Newton::new(spiral(), team(223), 1.0, Velocities::Computed), 224, rate);
 }
 
-/// A spiral scene as the show plays it, with the cost of distinguishing the path's kind.
+/// A spiral scene as the show plays it, including the cost of distinguishing the path's kind.
 #[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
 fn scene_on_a_spiral(bencher: Bencher, rate: f64) {
     let scene = bench_dragon::show::scene::Scene::paper();
     play(bencher, scene.motion.solver(scene.velocities).solver.as_mut(), 224, rate);
 }
 
-/// The turnaround, the head 20 m before its turn and on: the team on spiral, arcs and spiral.
+/// The turnaround, with the head from 20 m before its turn on: the team is on spiral, arcs and spiral.
 #[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
 fn newton_on_a_turnaround(bencher: Bencher, rate: f64) {
     let path = Path::turnaround(1.7, 4.5, 2.0, 220.0, 369.16).unwrap();
     play(bencher, &mut Newton::new(path, team(223), 1.0, Velocities::Computed), 224, rate);
 }
 
-/// Newton's method from no guess but the link's length over the radius, on theta in one double, with the system's sine
-/// and cosine: a careful first version.
+/// Newton's method with no guess except the link's length over the radius, on theta in one double, with the system's
+/// sine and cosine: a careful first implementation.
 #[divan::bench(sample_count = 500, sample_size = 20)]
 fn newton_cold_without_care(bencher: Bencher) {
     let (radius_per_radian, team) = (0.55 / TAU, team(223));
@@ -131,7 +131,7 @@ fn table_portable(bencher: Bencher) {
     play(bencher, &mut solver.expect("every processor has it"), 224, 60.0);
 }
 
-/// Making the table, once before the show.
+/// Makes the table, once before the show.
 #[divan::bench(args = [223, 5_000, 100_000], sample_count = 5, sample_size = 1)]
 fn make_table(benches: usize) -> FollowerTable {
     follower_table(benches, Velocities::Computed)
@@ -161,8 +161,8 @@ const SIZES: [(usize, f64); 15] = [
     (1_000_000, 1e-4),
 ];
 
-/// Frames of the table selected for an accuracy; prints the bytes a frame reads for a handle, and how long the table
-/// took to make.
+/// Frames of the table selected for an accuracy; prints the bytes that a frame reads for a handle, and the time for
+/// making the table.
 #[divan::bench(args = SIZES, sample_count = 100, sample_size = 4)]
 fn accuracy_by_benches(bencher: Bencher, (benches, accuracy): (usize, f64)) {
     let selected = selection::cheapest(&spiral(), team(benches), 1.0, Velocities::Computed, accuracy);
@@ -200,8 +200,8 @@ fn show(bencher: Bencher, with: &str) {
     });
 }
 
-/// The same at the greatest cost of the clearance: nearly all pairs on two turns are equally near, so no bench is
-/// excluded.
+/// The same at the greatest cost of the clearance: the nearest boards are about as near as every pair on two turns, so
+/// no bench can be left out.
 #[divan::bench(sample_count = 500, sample_size = 4)]
 fn show_where_every_turn_is_as_near(bencher: Bencher) {
     let scene = Scene::paper();
@@ -221,7 +221,7 @@ fn events() -> Timeline {
     Scene::paper().motion.timeline(&mut |_| ())
 }
 
-/// A frame into iceoryx2's shared memory, solving left out.
+/// A frame into iceoryx2's shared memory, without solving.
 #[divan::bench(sample_count = 500, sample_size = 20)]
 fn publish_over_iceoryx2(bencher: Bencher) {
     let scene = Scene::paper();
@@ -241,7 +241,8 @@ fn publish_over_iceoryx2(bencher: Bencher) {
     let mut publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");
     let frame = show.frame(0);
     let header = FrameHeader { handles: 224, ..FrameHeader::default() };
-    bencher.bench_local(|| publisher.publish(Outgoing::new(&header, frame)).expect("nobody else uses this service"));
+    bencher
+        .bench_local(|| publisher.publish(Outgoing::new(&header, frame)).expect("no other process uses this service"));
 }
 
 #[divan::bench(sample_count = 20, sample_size = 1)]
@@ -252,7 +253,7 @@ fn paper(bencher: Bencher) {
     play(bencher, &mut solver, 224, 60.0);
 }
 
-/// The floor: the sine and cosine of 224 angles, vectorised, and writing as many bytes as a frame has.
+/// The floor: the sine and cosine of 224 angles, vectorised, and writing the bytes of a frame.
 #[divan::bench(sample_count = 500, sample_size = 20)]
 fn floor(bencher: Bencher) {
     let angles: Vec<f64> = (0..224).map(|k| f64::from(k) * 0.19).collect();
@@ -264,7 +265,7 @@ fn floor(bencher: Bencher) {
 }
 
 mod floor {
-    //! The least that any frame does, with the same instructions as the solver under measurement.
+    //! The least work of any frame, with the same instructions as the measured solver.
 
     use super::Chain;
 
@@ -299,7 +300,7 @@ mod floor {
         }
     }
 
-    /// Cody and Waite's reduction and the polynomials of fdlibm.
+    /// Returns sine and cosine by Cody and Waite's reduction and the polynomials of fdlibm.
     #[inline(always)]
     #[allow(clippy::excessive_precision, reason = "the digits as published")]
     fn sine_cosine(angle: f64) -> (f64, f64) {

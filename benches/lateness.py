@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Wake-up lateness: the live loop beside cyclictest, on the same core, at the same interval and priority.
 
-In turn, for some rounds, so that the machine's moods fall on both; and either once with CPUs that may sleep and once with
-CPUs that are kept awake (cyclictest --latency, bench-dragon run --cpu-latency: cyclictest keeps them awake unless set
-not to). cyclictest is Debian's package rt-tests; real-time priority and waking CPUs need root. --priority 0 compares
-without a priority. The live loop counts the periods that a late wake-up delayed as well (coordinated omission);
-cyclictest counts the wake-up only, which is to its advantage. Needs:
+In turn, for some rounds, so that changes of the machine's load affect both; and either once with CPUs that may sleep
+and once with CPUs that are kept awake (cyclictest --latency, bench-dragon run --cpu-latency: cyclictest keeps them
+awake by default). cyclictest is Debian's package rt-tests; real-time priority and waking CPUs need root. --priority 0
+compares without a priority. The live loop also counts the periods that a late wake-up delayed (coordinated omission);
+cyclictest counts only the wake-up, which is to its advantage. Needs:
 
     apt-get install rt-tests && cargo build --release
     python3 benches/lateness.py [--seconds 20] [--rounds 3] [--cpu 1] [--priority 80] [--interval-us 1000]
@@ -20,7 +20,7 @@ import subprocess
 
 TARGET = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "target", "release")
 NAME = f"lateness_{os.getpid()}"
-# Longest wake-up time of a CPU, microseconds: one that every sleep state meets, and one that none meets.
+# Microseconds that a CPU may take to wake up: a limit that every sleep state meets, and one that none meets.
 CPU_LATENCIES = (("may sleep", 1_000_000), ("awake", 0))
 PERCENTILES = (("p50", 0.5), ("p99", 0.99), ("p999", 0.999))
 # Lateness beyond this many microseconds is only counted by cyclictest.

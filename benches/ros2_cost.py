@@ -1,4 +1,4 @@
-"""The cost of ROS 2 to the loop: runs the publisher at 1 kHz with and without `--ros2`, in turn, and prints the ratios.
+"""Cost of ROS 2 for the loop: runs the publisher at 1 kHz with and without `--ros2`, in turn, and prints the ratios.
 
     cargo build --release && python3 benches/ros2_cost.py [--rounds 5] [--seconds 10]
 """
@@ -16,7 +16,7 @@ FIGURES = [("wake-up lateness", "wakeup_ns", "p50"), ("wake-up lateness", "wakeu
 
 
 def play(options, seconds):
-    """The summary of one run."""
+    """Returns the summary of one run."""
     command = [ROOT / "target/release/bench-dragon", "run", "--json", "--quiet", "--rate", "1000", "--start", "300",
                "--duration", str(seconds), "--name", f"cost_{os.getpid()}", *options]
     lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()

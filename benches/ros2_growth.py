@@ -2,7 +2,7 @@
 
     cargo build --release && .venv/bin/python benches/ros2_growth.py [--minutes 10]
 
-At 60 Hz; a Cyclone DDS subscriber (`pip install cyclonedds==11.0.1`) runs for five seconds, every other one is killed.
+At 60 Hz; a Cyclone DDS subscriber (`pip install cyclonedds==11.0.1`) runs for five seconds; every second one is killed.
 """
 
 import argparse
@@ -17,7 +17,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 
 
 def look(process):
-    """Resident memory in MB, threads and file descriptors of a process."""
+    """Returns resident memory in MB, threads and file descriptors of a process."""
     status = dict(line.split(":", 1) for line in pathlib.Path(f"/proc/{process}/status").read_text().splitlines())
     return int(status["VmRSS"].split()[0]) / 1024, int(status["Threads"]), len(os.listdir(f"/proc/{process}/fd"))
 

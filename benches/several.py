@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""The cost of a second and a tenth dragon: publishers under different names on one machine, all read by one `metrics`.
+"""Cost of a second and a tenth dragon: publishers under different names on one machine, all read by one `metrics`.
 
-For each rate, one, two and ten publishers of the same scene in turn, for some rounds, so that the machine's moods fall on all.
-Of each publisher: its CPU time and resident memory, how late its loop woke, the periods it skipped; and the frames that the
-reader missed. Printed are medians over publishers and rounds, but of skipped and missed the sums, and beside each the ratio to
-one publisher alone. The load of the machine stands above: other programs are in all of this. Needs:
+For each rate, one, two and ten publishers of the same scene in turn, for some rounds, so that changes of the machine's
+load affect all. Of each publisher: its CPU time and resident memory, the lateness of its loop, the periods it skipped;
+and the frames that the reader missed. Prints medians over publishers and rounds, sums for skipped and missed, and
+beside each the ratio to one publisher alone. The load of the machine is printed above: other programs affect all
+figures. Needs:
 
     cargo build --release
     python3 benches/several.py [--seconds 15] [--rounds 3] [--counts 1,2,10] [--rates 60,1000] [--scene FILE]
@@ -21,13 +22,13 @@ import time
 import urllib.request
 
 PROGRAM = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "target", "release", "bench-dragon")
-# Until tables are made and every service is connected.
+# Time until tables are made and every service is connected.
 WARM_UP = 4
 COLUMNS = ("cpu", "memory", "p50", "p99", "max")
 
 
 def cpu_seconds(process):
-    """User and system time of a process so far: proc(5), fields 14 and 15."""
+    """Returns user and system time of a process so far: proc(5), fields 14 and 15."""
     with open(f"/proc/{process.pid}/stat", encoding="ascii") as file:
         fields = file.read().rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
@@ -39,7 +40,7 @@ def resident_mb(process):
 
 
 def missed(url):
-    """Frames that the reader has received and missed, over all names."""
+    """Returns the frames that the reader has received and missed, over all names."""
     with urllib.request.urlopen(url) as answer:
         text = answer.read().decode()
     count = lambda what: sum(float(value) for value in re.findall(rf"^bench_dragon_metrics_frames_{what}_total\{{.*\}} (\S+)$", text, re.M))

@@ -1,16 +1,15 @@
-"""The stage picture's cost to the publisher, its latency, and its pictures a second.
+"""Cost of the stage picture for the publisher, its delay, and the number of pictures a second.
 
     cargo build --release
     .venv/bin/python benches/stage_picture.py cost      # lateness and step of a 1 kHz publisher: five browsers against none;
-                                                        # further options go to `run`: cost --realtime 80
+                                                        # further arguments go to `run`: cost --realtime 80
     .venv/bin/python benches/stage_picture.py latency   # from sent_ns to received and to drawn, at 20 Hz, 60 Hz and 1 kHz
     .venv/bin/python benches/stage_picture.py long      # pictures a second of a scene of 5,000 benches, and of it as a show
     .venv/bin/python benches/stage_picture.py renderers # the same boards by canvas and by WebGL, in stage_picture_renderers.html
     .venv/bin/python benches/stage_picture.py pictures  # makes the pictures of docs/driving-a-stage-picture.md
 
-Takes the release build, or the debug build where there is no other. Needs Debian's Chromium and Playwright, which
-tests/run installs. Everything runs on this machine, in turn in one run:
-the ratios are more telling than the times.
+Uses the release build, or the debug build if there is no other. Needs Debian's Chromium and Playwright, which tests/run
+installs. Everything runs on this machine, in turn in one run: the ratios are more reliable than the times.
 """
 
 import contextlib
@@ -48,7 +47,7 @@ def server():
 
 @contextlib.contextmanager
 def pages(url, count, address="", **viewport):
-    """Pages, each in a Chromium of its own."""
+    """Pages, each in a separate Chromium."""
     with contextlib.ExitStack() as stack:
         playwright = stack.enter_context(sync_playwright())
         opened = []
@@ -64,7 +63,7 @@ def picture(page):
 
 
 def rates(page, seconds):
-    """Frames received and pictures drawn, a second; and the latencies of those, in ms."""
+    """Returns the frames received and pictures drawn per second, and their latencies in ms."""
     first = picture(page)
     page.wait_for_timeout(1000 * seconds)
     last = picture(page)
@@ -74,16 +73,16 @@ def rates(page, seconds):
 
 
 def summary_of_a_run():
-    """The summary of a 20 s run at 1 kHz."""
+    """Returns the summary of a 20 s run at 1 kHz."""
     with started("run", "--quiet", "--json", "--rate", "1000", "--start", "100", "--duration", "20", *sys.argv[2:]) as child:
         return json.loads(child.communicate()[0].splitlines()[-1])
 
 
 def cost():
-    """In turn, so that other load affects all alike."""
-    rounds = {"nobody": [], "server, no browser": [], "five browsers": []}
+    """In turn, so that other work of the machine affects all alike."""
+    rounds = {"no viewer": [], "server, no browser": [], "five browsers": []}
     for turn in range(3):
-        rounds["nobody"].append(summary_of_a_run())
+        rounds["no viewer"].append(summary_of_a_run())
         with server() as (url, _):
             rounds["server, no browser"].append(summary_of_a_run())
             with pages(url, 5, width=640, height=480):
@@ -96,7 +95,7 @@ def cost():
         skipped = statistics.median(run["skipped"] for run in runs)
         print(f"{who:32}" + "".join(f"{figure:14.1f}" for figure in figures[who]) + f"{skipped:14.0f}")
     for who in ("server, no browser", "five browsers"):
-        print(f"{who + ' : nobody':32}" + "".join(f"{with_ / without:14.2f}" for with_, without in zip(figures[who], figures["nobody"])))
+        print(f"{who + ' : no viewer':32}" + "".join(f"{with_ / without:14.2f}" for with_, without in zip(figures[who], figures["no viewer"])))
 
 
 def spread(figures):
@@ -115,7 +114,7 @@ def latency():
 
 
 def chromium_cpu():
-    """Milliseconds of processor that every Chromium started here has used so far."""
+    """Returns the milliseconds of processor time that every Chromium started here has used so far."""
     parents, used = {}, {}
     for folder in pathlib.Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
@@ -130,7 +129,7 @@ def chromium_cpu():
 
 
 def renderers():
-    """In turn, so that other load affects all alike."""
+    """In turn, so that other work of the machine affects all alike."""
     found = {"paths": [], "lines": [], "webgl": []}
     for _ in range(5):
         for renderer, turns in found.items():

@@ -1,14 +1,14 @@
-//! The cost of a step of the loop, by the size of the team: the solver, the clearance, publishing into shared memory,
-//! and the whole, beside copying as many bytes into the same memory. The parts are measured in turn, frame by frame, in
+//! Cost of a step of the loop, by the size of the team: the solver, the clearance, the way into shared memory, and the
+//! whole step, beside copying as many bytes into the same memory. The parts are measured in turn, frame by frame, in
 //! one run, with one subscriber that takes every frame; the figures are medians.
 //!
-//! Then the step of the paper's team once more, beside the same with one and with two empty command queues.
+//! Then the step of the paper's team again, beside the same step with one and with two empty command queues.
 //!
-//! And the step of the paper's team at 10 kHz, beside the same with a log of the run (`run --log`), and the log's work
+//! And the step of the paper's team at 10 kHz, without and with a log of the run (`run --log`), and the log's work
 //! after the step.
 //!
-//! `cargo bench --bench step`, or with some numbers of benches: `cargo bench --bench step -- 223 100000`, or the doors
-//! alone: `cargo bench --bench step -- doors`, or the log: `cargo bench --bench step -- log`
+//! `cargo bench --bench step`, or with some numbers of benches: `cargo bench --bench step -- 223 100000`, or the
+//! command queues alone: `cargo bench --bench step -- doors`, or the log: `cargo bench --bench step -- log`
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -17,6 +17,7 @@ use bench_dragon::client::connection::{Connection, Subscription, Wake};
 use bench_dragon::client::shared_memory::{node, service_name};
 use bench_dragon::messages::{FrameHeader, HandlePose};
 use bench_dragon::publisher::live::control::{Door, Doors, door};
+use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::publisher::live::{Outgoing, Publisher};
 use bench_dragon::publisher::log;
 use bench_dragon::publisher::log::arithmetic::Arithmetic;
@@ -29,10 +30,10 @@ use bench_dragon::show::{Playback, Show};
 const SIZES: [usize; 4] = [223, 5_000, 100_000, 1_000_000];
 /// Start of the show, simulated seconds; it plays at 60 Hz from there.
 const START: f64 = 200.0;
-/// Frames of a part before the next part has its turn: few, so that all parts see the same load; enough for a part to
-/// find its memory in the caches as the loop would.
+/// Frames of a part before the turn of the next part: few enough that all parts see the same machine, and enough that a
+/// part finds its own memory in the caches as the loop would.
 const BATCH: usize = 4;
-/// Rounds before the first that counts: every page has been written by then.
+/// Rounds before the first counted round: every page has been written by then.
 const WARM_UP: usize = 1;
 /// Rounds that end before the scene's contact.
 const MOST_ROUNDS: usize = 3_000;
@@ -40,9 +41,9 @@ const MOST_ROUNDS: usize = 3_000;
 const TIME: Duration = Duration::from_secs(5);
 /// Frames in the queue of the subscriber.
 const QUEUE: usize = 2;
-/// Polls of the command queues for one figure: a single one is below the clock's resolution.
+/// Polls of the command queues for one figure: one poll takes less than a clock resolves.
 const POLLS: usize = 1_000;
-/// Copies held at once, so that copying uses memory as cold as publishing does.
+/// Copies that are held at once, so that copying uses memory as little cached as publishing does.
 const COPIES: usize = QUEUE + 2;
 
 fn main() {
@@ -64,7 +65,7 @@ fn main() {
     measure_log();
 }
 
-/// The paper's scene with another number of benches.
+/// Returns the paper's scene with another number of benches.
 fn scene(benches: usize) -> Scene {
     let text = include_str!("../config/paper.toml").replace("benches = 223 ", &format!("benches = {benches} "));
     Scene::parse(&text, "paper.toml", "paper").expect("the paper's scene, with more benches")
@@ -92,17 +93,17 @@ fn measure(benches: usize) {
     let mut choice = scene.motion.solver(scene.velocities);
     let mut monitor = scene.motion.clearance_monitor(&choice);
     let name = format!("bench_{}_{benches}", std::process::id());
-    let (mut publisher, connection) = publisher_and_subscriber(&name, &scene, &show);
+    let (mut publisher, mut connection) = publisher_and_subscriber(&name, &scene, &show);
     let mut frame = show.frame(0).clone();
 
-    // As many bytes, into samples of a service of the same kind.
+    // Copies as many bytes into samples of a service of the same kind.
     let node = node().expect("the publisher has made one too");
     let service = node
         .service_builder(&service_name(&name, "copies").expect("the publisher's name, almost"))
         .publish_subscribe::<[HandlePose]>()
         .user_header::<FrameHeader>()
         .create()
-        .expect("nobody else uses this name");
+        .expect("no other process uses this name");
     let port = service.publisher_builder().initial_max_slice_len(handles).max_loaned_samples(COPIES);
     let port = port.create().expect("the memory for it is there");
     let poses: Vec<HandlePose> = (0..handles).map(|handle| handle_pose(&frame.chain, handle)).collect();
@@ -125,9 +126,9 @@ fn measure(benches: usize) {
                 timed(times, || {
                     let frame = show.frame(tick);
                     let header = frame_header(frame, stamps(tick));
-                    publisher.publish(Outgoing::new(&header, frame)).expect("nobody else uses this service");
+                    publisher.publish(Outgoing::new(&header, frame)).expect("no other process uses this service");
                 });
-                drain(&connection);
+                drain(&mut connection);
             }
         }
         for tick in ticks.clone() {
@@ -136,9 +137,9 @@ fn measure(benches: usize) {
             timed(&mut times.solver, || choice.solver.solve(time, chain).expect("200 s is before the lock"));
             let header = frame_header(&frame, stamps(tick));
             timed(&mut times.publish, || {
-                publisher.publish(Outgoing::new(&header, &frame)).expect("nobody else uses this service")
+                publisher.publish(Outgoing::new(&header, &frame)).expect("no other process uses this service")
             });
-            drain(&connection);
+            drain(&mut connection);
         }
         for tick in ticks.clone() {
             let time = START + tick as f64 / 60.0;
@@ -170,15 +171,17 @@ fn publisher_and_subscriber(name: &str, scene: &Scene, show: &Show) -> (SharedMe
     (publisher, connection)
 }
 
-/// Steps with no command queue, one and two, in turn, of the same show, so that its computation costs all the same.
+/// Measures steps with no command queue, one and two, in turn: the same show, so that its work costs all of them the
+/// same.
 fn measure_doors() {
     let scene = scene(223);
     let playback = Playback { start: START, ..Playback::of(&scene) };
     let timeline = scene.motion.timeline(&mut |_| ());
-    let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
-    let (mut publisher, connection) =
+    let show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
+    let (mut publisher, mut connection) =
         publisher_and_subscriber(&format!("bench_{}_doors", std::process::id()), &scene, &show);
-    // The outer ends stay: a queue without a producer behaves differently.
+    let mut show = ShowSource::new(show);
+    // The outer ends stay: a queue without a sender behaves differently.
     let (mut doors, outer): (Vec<Doors>, Vec<Vec<Door>>) = (0..3)
         .map(|count| {
             let (ports, outer): (Vec<_>, Vec<_>) = (0..count).map(|_| door()).unzip();
@@ -191,19 +194,17 @@ fn measure_doors() {
     let mut tick = 0;
     for round in 0..MOST_ROUNDS / doors.len() {
         for place in 0..doors.len() {
-            // The order alternates.
+            // The order of the three changes.
             let count = (place + round) % doors.len();
             let doors = &mut doors[count];
             for _ in 0..BATCH {
                 tick += 1;
                 timed(&mut times[count], || {
                     doors.take_one(&mut show, tick);
-                    let frame = show.frame(tick);
-                    let header = frame_header(frame, stamps(tick));
-                    publisher.publish(Outgoing::new(&header, frame)).expect("nobody else uses this service");
+                    publisher.publish(show.outgoing(tick, stamps(tick))).expect("no other process uses this service");
                     doors.finish_step(&mut show, tick);
                 });
-                drain(&connection);
+                drain(&mut connection);
             }
             timed(&mut takes[count], || {
                 for _ in 0..POLLS {
@@ -226,19 +227,19 @@ fn measure_doors() {
     }
 }
 
-/// Steps at 10 kHz without a log and with one, in turn. The log's thread reads what the step has written, so the next
-/// step must come as late as it does in a run.
+/// Measures steps at 10 kHz without a log and with one, in turn. The log's thread reads what the step has written, so
+/// the next step must come as late as it does in a run.
 fn measure_log() {
     let scene = scene(223);
     let playback = Playback { start: START, rate: 10_000.0, ..Playback::of(&scene) };
     let timeline = scene.motion.timeline(&mut |_| ());
     let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
-    let (mut publisher, connection) =
+    let (mut publisher, mut connection) =
         publisher_and_subscriber(&format!("bench_{}_log", std::process::id()), &scene, &show);
     let file = std::env::temp_dir().join(format!("bench_dragon_step_{}.jsonl", std::process::id()));
     let line = ShowLine::new(&SceneText::paper(), &playback, Arithmetic::of(&scene), show.solver_reason(), (1, 0));
     let (mut log, outcome) = log::open(&file, line, scene.team().handles()).expect("a file in the temporary folder");
-    let mut logging = log.publisher().expect("nobody has taken it");
+    let mut logging = log.publisher().expect("no other caller has taken it");
     let (mut times, mut after): ([Vec<f64>; 2], Vec<f64>) = Default::default();
     let began = Instant::now();
     for tick in 1.. {
@@ -248,12 +249,12 @@ fn measure_log() {
         if began.elapsed() > 2 * TIME {
             break;
         }
-        // The same number of frames each, in blocks that are longer than the log's thread sleeps.
+        // The same number of frames each, in blocks that are longer than the sleep of the log's thread.
         let logged = tick / 100 % 2 == 1;
         timed(&mut times[usize::from(logged)], || {
             let frame = show.frame(tick);
             let header = frame_header(frame, stamps(tick));
-            publisher.publish(Outgoing::new(&header, frame)).expect("nobody else uses this service");
+            publisher.publish(Outgoing::new(&header, frame)).expect("no other process uses this service");
             if logged {
                 logging.publish(Outgoing::new(&header, frame)).expect("a log ends no run");
             }
@@ -261,11 +262,11 @@ fn measure_log() {
         if logged {
             timed(&mut after, || logging.prepare());
         }
-        drain(&connection);
+        drain(&mut connection);
     }
     log.finish();
     let whole = outcome.failure().is_none();
-    // No longer needed.
+    // The file has no further use.
     let _ = std::fs::remove_file(&file);
     let ([without, with], after) = (times.map(median), median(after));
     println!("\n| step at 10 kHz | with a log | difference | after the step | log whole |\n|---|---|---|---|---|");
@@ -276,14 +277,14 @@ fn stamps(sequence: u64) -> Stamps {
     Stamps { run_id: 1, sequence, stamp_ns: 0, deadline_ns: 0 }
 }
 
-/// Receives all frames, as a subscriber that keeps up does.
-fn drain(connection: &Connection) {
+/// Receives all waiting messages, as a subscriber that keeps up does.
+fn drain(connection: &mut Connection) {
     connection.frames(|header, handles| {
         black_box((header.sequence, handles[0].x));
     });
 }
 
-/// Runs a function and records its duration.
+/// Runs a function and notes its duration.
 fn timed<T>(times: &mut Vec<f64>, run: impl FnOnce() -> T) -> T {
     let began = Instant::now();
     let result = black_box(run());

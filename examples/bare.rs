@@ -1,5 +1,5 @@
-//! A bare iceoryx2 publisher and subscriber of a payload as large as the paper's frames, without this project's
-//! code: the cost of the transport. `python3 benches/latency.py` sets the live publisher beside it.
+//! A bare iceoryx2 publisher and subscriber of a payload as large as the paper's frames, with none of this project's
+//! code: the cost of the transport itself. `python3 benches/latency.py` compares the live publisher with it.
 //!
 //! `bare publish NAME SECONDS` sends 1,000 samples a second; `bare subscribe NAME SECONDS` receives them for SECONDS
 //! and prints the latency from sending to receiving as a line of JSON.
@@ -13,14 +13,14 @@ use nix::time::{ClockId, ClockNanosleepFlags, clock_gettime, clock_nanosleep};
 
 /// A handle: 40 bytes.
 type Handle = [f64; 5];
-/// A header of 80 bytes; the first number is the time of sending.
+/// A header of 80 bytes; the first number is the sending time.
 type Header = [u64; 10];
 /// Handles in a sample, as in the paper's frames.
 const HANDLES: usize = 224;
 const PERIOD_NS: u64 = 1_000_000;
 /// The greatest latency distinguished: an hour.
 const LONGEST_NS: u64 = 3_600_000_000_000;
-/// Samples that the subscriber may fall behind, as in the live publisher.
+/// Samples by which the subscriber may fall behind, as in the live publisher.
 const QUEUE: usize = 64;
 
 type Failure = Box<dyn std::error::Error>;

@@ -1,4 +1,4 @@
-//! Conducts a running publisher: pauses the show, moves it to another time, resumes it.
+//! Controls a running publisher: pauses the show, moves it to another time, and resumes it.
 //!
 //! `cargo run --release -- run` in one terminal, `cargo run --release --example conduct [NAME]` in another.
 

@@ -1,4 +1,4 @@
-//! The cost and error of sampling: the paper's search for the contact, every pair at every hundredth of a second,
+//! Cost and error of sampling: the paper's way of finding the contact, every pair at every hundredth of a second,
 //! beside the exact search, in one run.
 //!
 //! `cargo run --release --example sampling`
@@ -29,7 +29,7 @@ fn main() {
     });
     let a_sample = began.elapsed() / samples;
     let overlap = overlap.unwrap_or(f64::NAN);
-    // From the start of the scene on; samples before 410 s cost as much as those after it.
+    // From the start of the scene on: the samples before 410 s cost as much as those after it.
     let whole = a_sample * (overlap * 100.0) as u32;
     println!("exact: contact at {contact:.12} s, with stall and lock, in {exact:.1?}");
     println!("sampled: first overlap seen at {overlap} s, {:.1} ms late", 1000.0 * (overlap - contact));

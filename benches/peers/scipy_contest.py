@@ -2,11 +2,11 @@
 """The contest problem behind the paper's scene, as it is usually solved: SciPy, handle by handle, step by step.
 
 Problem A of the 2024 China Undergraduate Mathematical Contest in Modeling. The head's polar angle by brentq from the
-arc length; each follower by brentq (--method fsolve: by fsolve) as the next place outward at the distance of its link;
-the contact at the first of the times looked at where the rectangles of two benches overlap by the separating axis
-theorem (all pairs near enough at once, in NumPy); with --refine, the root of the least gap between it and the time
-before. Speeds are left out. Prints the largest error of the positions at 300 s against the figures of 50 digits in
-tests/truth, the contact's error, and the time that took. Needs: pip install numpy scipy
+arc length; each follower by brentq (--method fsolve: by fsolve) as the next place outward at the distance of its link.
+The contact is the first tested time at which the rectangles of two benches overlap by the separating axis theorem (all
+pairs near enough at once, in NumPy); with --refine, the root of the least gap between it and the time before. Speeds
+are left out. Prints the largest error of the positions at 300 s against the figures of 50 digits in tests/truth, the
+contact's error, and the time needed. Needs: pip install numpy scipy
 
     python3 benches/peers/scipy_contest.py [--method brentq|fsolve] [--step 1] [--start 0] [--refine]
 """
@@ -38,12 +38,12 @@ def head(seconds):
 
 
 def excess(rear, front, link):
-    """How far the square of the distance of two places on the spiral is above that of the link."""
+    """Returns the square of the distance of two places on the spiral, less the square of the link."""
     return GROWTH**2 * (front * front + rear * rear - 2 * front * rear * np.cos(rear - front)) - link * link
 
 
 def by_brentq(front, link):
-    # Half a turn on, the distance is more than the link as long as the motion can continue.
+    # Half a turn on, the distance is more than the link wherever the motion can continue.
     return brentq(excess, front, front + np.pi, args=(front, link), xtol=1e-14, rtol=1e-15)
 
 
@@ -60,7 +60,7 @@ def handles(seconds, follower):
 
 
 def gaps(points):
-    """The gap of every pair of benches that share no handle and are near enough: negative where they overlap."""
+    """Returns the gap of every pair of benches that share no handle and are near enough: negative if they overlap."""
     front, rear = points[:-1], points[1:]
     centre, along = (front + rear) / 2, (front - rear) / LINKS[:, None]
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
@@ -104,7 +104,7 @@ def main():
     with open(TRUTH) as file:
         rows = list(csv.DictReader(file))
     exact = np.array([[float(row["x_m"]), float(row["y_m"])] for row in rows if row["t_s"] == "300.0"])
-    # The only time in the table that is no round number.
+    # The only time in the table that is not a round number.
     touch = next(float(row["t_s"]) for row in rows if row["t_s"].startswith("412."))
     points = handles(300, follower)
     error = np.max(np.hypot(*(points - exact).T))

@@ -1,5 +1,5 @@
-//! parry2d's times of impact beside the exact search: the contact of the paper's scene, by steps within which every
-//! board keeps its velocity and its angular velocity, as parry's casts assume, between two poses of the live solver.
+//! parry2d's times of impact beside the exact search: the contact of the paper's scene, by steps between two poses of
+//! the live solver. As parry's casts require, every board keeps its velocity and its angular velocity within a step.
 //!
 //! `cargo bench --bench time_of_impact`
 
@@ -14,11 +14,12 @@ use parry2d_f64::math::Pose;
 use parry2d_f64::query::{NonlinearRigidMotion, ShapeCastOptions, cast_shapes, cast_shapes_nonlinear};
 use parry2d_f64::shape::{Cuboid, Shape};
 
-/// Length of a step, and start of the search, both in simulated seconds: the shortest steps begin late.
+/// Length of a step, and the start of the search, both in simulated seconds: the shortest steps begin late.
 const STEPS: [(f64, f64); 4] = [(1.0, 0.0), (0.1, 0.0), (0.01, 400.0), (0.001, 412.0)];
-/// Metres that the box about a board at both ends of a step is widened by, for the area that a turn sweeps in between.
+/// Metres by which the box around a board at both ends of a step is widened, for the area that a turn sweeps in
+/// between.
 const SWEEP: f64 = 0.1;
-/// Repetitions of the exact search: the fastest counts.
+/// Number of exact searches: the fastest counts.
 const SEARCHES: usize = 20;
 
 #[derive(Clone, Copy)]
@@ -45,7 +46,7 @@ struct Moving {
     swept: Aabb,
 }
 
-/// Every board's pose in a chain.
+/// Returns every board's pose in a chain.
 fn poses(chain: &Chain, scene: &Scene) -> Vec<(Pose, Cuboid)> {
     let pose = |bench| {
         let board = board(chain, scene.team(), bench);
@@ -56,7 +57,7 @@ fn poses(chain: &Chain, scene: &Scene) -> Vec<(Pose, Cuboid)> {
     (0..scene.team().benches).map(pose).collect()
 }
 
-/// The boards between two lists of poses.
+/// Returns the boards between two lists of poses.
 fn moving(from: &[(Pose, Cuboid)], to: &[(Pose, Cuboid)], step: f64) -> Vec<Moving> {
     let one = |(&(start, shape), (end, _)): (&(Pose, Cuboid), &(Pose, Cuboid))| {
         let velocity = (end.translation - start.translation) / step;
@@ -81,7 +82,7 @@ fn impact(one: &Moving, other: &Moving, step: f64, cast: Cast) -> Option<f64> {
     hit.expect("parry knows two cuboids").map(|hit| hit.time_of_impact)
 }
 
-/// The first contact by steps.
+/// Finds the first contact by steps.
 fn search(scene: &Scene, (step, from): (f64, f64), cast: Cast) -> Found {
     let mut solver: Box<dyn Solver> = scene.motion.solver(scene.velocities).solver;
     let mut chain = Chain::new(scene.team().handles());

@@ -495,9 +495,9 @@ HANDLE_POSE_32 = np.dtype([(name, "<f4") for name, _ in HandlePose32._fields_])
 
 
 def handles_of(sample) -> np.ndarray:
-    """The handles of a frame as a numpy structured array, without copying, in the precision of its service.
+    """Returns the handles of a frame as a numpy structured array, without copying, in the precision of its service.
 
-    The array is read-only and lives only until `sample.delete()`: copy what is to be kept.
+    The array is read-only and valid only until `sample.delete()`: copy data for later use.
     """
     count = sample.header.number_of_elements
     kind = HANDLE_POSE_32 if sample.payload().contained_type is HandlePose32 else HANDLE_POSE
@@ -508,6 +508,6 @@ def handles_of(sample) -> np.ndarray:
 
 
 def indices_of(poses32, handles: int) -> np.ndarray:
-    """Which handle each pose of the service `<name>/poses32` is of, in a team of so many handles."""
+    """Returns the index of the handle of each pose of the service `<name>/poses32`, in a team of `handles` handles."""
     attributes = {attribute.key.to_string(): attribute.value.to_string() for attribute in poses32.attributes.values}
     return np.append(np.arange(0, handles - 1, int(attributes["every"])), handles - 1)

@@ -1,8 +1,8 @@
-"""Conducts a running publisher from Python: `pip install iceoryx2==0.10.0 numpy`, start a publisher, run this.
+"""Controls a running publisher from Python: `pip install iceoryx2==0.10.0 numpy`, start a publisher, run this.
 
     python3 examples/python/conduct.py [--name bench_dragon] pause | resume | rate 2 | seek 400 | step 10 | hold | ...
 
-Without a command it plays a short scene: half speed, a pause of a second, and on.
+Without a command it plays a short scene: half speed, a pause of a second, and resume.
 """
 
 import argparse
@@ -29,7 +29,7 @@ class Conductor:
         self._sent = 0
 
     def send(self, command, value=0.0, timeout=5.0):
-        """Sends a command by name or number and returns the response as a ControlResponse of its own memory."""
+        """Sends a command by name or number and returns the response as a ControlResponse in its own memory."""
         self._sent += 1
         number = COMMANDS.index(command) if isinstance(command, str) else command
         request = ControlRequest(id=self._sent, value=value, command=number, reserved=0)

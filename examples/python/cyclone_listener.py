@@ -1,4 +1,4 @@
-"""Prints the head's place once a second from the ROS 2 topic, with no ROS at all: `pip install cyclonedds==11.0.1`.
+"""Prints the head's place once a second from the ROS 2 topic, without ROS: `pip install cyclonedds==11.0.1`.
 
     python3 examples/python/cyclone_listener.py [--name bench_dragon] [--seconds 10]
 
@@ -79,7 +79,7 @@ def main():
     frames, newest = 0, None
     while time.monotonic() < end:
         for message in reader.take(N=10):
-            # The notice that a publisher has ended is a sample without content.
+            # The notice that a publisher has gone comes as an empty sample.
             if isinstance(message, PoseArray):
                 frames, newest = frames + 1, message
         if time.monotonic() >= report:

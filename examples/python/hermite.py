@@ -1,14 +1,14 @@
-"""The place of every handle at the moment of display: cubic Hermite interpolation between frames, with numpy alone.
+"""The place of every handle at the time of display: cubic Hermite interpolation between frames, with numpy alone.
 
     reader = HermiteReader()
     reader.push(header, handles)                 # for every frame, as it comes
-    time, handles = reader.at(monotonic_ns)      # at any moment: simulated seconds and a structured array
+    time, handles = reader.at(monotonic_ns)      # at any time: simulated seconds and a structured array
 
 `header` has the fields of FrameHeader, `handles` is a structured array with x, y, heading, vx, vy (as `handles_of` in
-bench_dragon_messages.py gives it). Display a period of the stream behind the present, such as
-`time.monotonic_ns() - 1e9 / rate`, and the error falls with the fourth power of the frames' distance. Frames that a
-tunnel brings from another machine have moments of that machine's clock: push these with the time of their arrival. Run
-as a program it subscribes and prints the head's place 20 times a second:
+bench_dragon_messages.py returns it). Display the stream a period behind the present, such as `time.monotonic_ns() - 1e9
+/ rate`: the error is then proportional to the fourth power of the interval of two frames. Frames that a tunnel brings
+from another machine have times of that machine's clock: push these with their arrival time. Run as a program it
+subscribes and prints the head's place 20 times a second:
 
     python3 examples/python/hermite.py [--name bench_dragon] [--seconds 10] [--delay 0.1] [--other-machine]
 """
@@ -26,16 +26,16 @@ Frame = collections.namedtuple("Frame", "run_id epoch playback deadline_ns sim_t
 
 
 class HermiteReader:
-    """The latest frames of a stream, and interpolation between them."""
+    """The latest frames of a stream, and the interpolation between them."""
 
     def __init__(self, keep=64):
         """Keeps the latest `keep` frames: a display that runs d seconds behind r frames a second needs d r + 2."""
         self._frames = collections.deque(maxlen=max(keep, 2))
 
     def push(self, header, handles, arrival_ns=None):
-        """Copies the next frame. Frames of another run are forgotten.
+        """Adds a copy of the next frame. Frames of another run are dropped.
 
-        `arrival_ns` of time.monotonic_ns() takes the place of the frame's own moment, for frames of another machine.
+        `arrival_ns` of time.monotonic_ns() replaces the frame's own time, for frames of another machine.
         """
         if self._frames and self._frames[-1].run_id != header.run_id:
             self._frames.clear()
@@ -44,10 +44,10 @@ class HermiteReader:
         self._frames.append(frame if arrival_ns is None else frame._replace(deadline_ns=arrival_ns))
 
     def at(self, monotonic_ns):
-        """Simulated seconds and the handles at a moment of CLOCK_MONOTONIC; None before the first frame.
+        """Returns simulated seconds and the handles at a time of CLOCK_MONOTONIC; None if no frame has come.
 
-        Before the oldest frame that is kept, after the newest, and where simulated time jumps (another epoch), the
-        frame before is shown as it is.
+        Before the oldest kept frame, after the newest, and if simulated time jumps (another epoch), the frame before is
+        shown unchanged.
         """
         if not self._frames:
             return None
@@ -57,12 +57,12 @@ class HermiteReader:
         elapsed = monotonic_ns - a.deadline_ns
         if elapsed <= 0 or a.epoch != b.epoch or len(a.handles) != len(b.handles) or b.sim_time <= a.sim_time:
             return a.sim_time, a.handles
-        # The rate in force holds until the next frame; the end of the show may come earlier.
+        # The present rate holds until the next frame; the end of the show may come earlier.
         moment = min(a.sim_time + a.time_scale * elapsed * 1e-9, b.sim_time)
         length = b.sim_time - a.sim_time
         u = (moment - a.sim_time) / length
         handles = a.handles.copy()
-        # Velocities are zero while the show stands still, not because the handles rest: they are not used.
+        # Velocities are zero while the show is paused, not because the handles rest: those are not used.
         moving = (a.playback == PLAYING, b.playback == PLAYING)
         for position, rate in (("x", "vx"), ("y", "vy")):
             ends = (a.handles[position], b.handles[position], a.handles[rate] * length, b.handles[rate] * length)
@@ -75,7 +75,7 @@ class HermiteReader:
 
 
 def _coordinate(first, last, first_rate, last_rate, moving, u):
-    """Value and slope of the polynomial of least degree through both places and the valid rates."""
+    """Returns value and slope of the polynomial of least degree through both places and the usable rates."""
     step, w = last - first, 1.0 - u
     if np.isnan(first_rate).any() or np.isnan(last_rate).any() or moving == (False, False):
         return first + step * u, step
@@ -91,7 +91,7 @@ def _coordinate(first, last, first_rate, last_rate, moving, u):
 
 
 def frames(name, seconds):
-    """Yields (header, handles) of a publisher's frames, and None while there is none."""
+    """Yields (header, handles) of a publisher's frames, and None whenever no frame has come."""
     import iceoryx2 as iox2
     from bench_dragon_messages import FrameHeader, HandlePose, handles_of
 
@@ -117,7 +117,7 @@ def main():
     parser.add_argument("--name", default="bench_dragon")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--delay", type=float, default=0.1, help="seconds behind the present: a period and a little")
-    parser.add_argument("--other-machine", action="store_true", help="frames come by a tunnel: go by their arrival")
+    parser.add_argument("--other-machine", action="store_true", help="frames come by a tunnel: use their arrival time")
     arguments = parser.parse_args()
     reader = HermiteReader()
     for frame in frames(arguments.name, arguments.seconds):

@@ -33,12 +33,12 @@ EVENTS = {
 
 
 def benches(*numbers):
-    """Names of benches for people, counted from 1."""
+    """Returns benches as people name them, counted from 1."""
     return " and ".join(f"bench {number + 1}" for number in numbers if number != CollisionAlert.NO_BENCH)
 
 
 class Alerts(Node):
-    """Prints each alert. A late subscriber gets the alert that holds: the publisher keeps it."""
+    """Prints the alerts. A late subscriber gets the alert in effect: the publisher keeps it."""
 
     def __init__(self, name):
         super().__init__("bench_dragon_alerts")

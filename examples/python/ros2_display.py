@@ -1,10 +1,10 @@
-"""Prints the head's place at the moment of display, 20 times a second, at any rate of the topic.
+"""Shows the place of the head at the time of display, 20 times a second, whatever the rate of the topic.
 
     source /opt/ros/jazzy/setup.bash && source install/setup.bash        # with bench_dragon_msgs built, see docs/ros2.md
     python3 examples/python/ros2_display.py [--name bench_dragon] [--delay 0.1]
 
-Between two messages the handles are interpolated by their velocities (hermite.py): ten messages a second are exact to
-some 20 nanometres, where the newest message alone is a tenth of a second old.
+Between two messages the handles are interpolated by their velocities (hermite.py): ten messages a second give an
+accuracy of about 20 nanometres. The newest message alone is up to a tenth of a second old.
 """
 
 import argparse
@@ -17,7 +17,7 @@ HANDLE_POSE = np.dtype([(field, "<f8") for field in ("x", "y", "heading", "vx", 
 
 
 def handles_of(message):
-    """The poses of a bench_dragon_msgs/HandlePoses as a structured array."""
+    """Returns the poses of a bench_dragon_msgs/HandlePoses as a structured array."""
     return np.array([tuple(getattr(pose, field) for field in HANDLE_POSE.names) for pose in message.poses], HANDLE_POSE)
 
 
@@ -39,7 +39,7 @@ def main():
     )
 
     def show():
-        # CLOCK_MONOTONIC of the publisher's machine: run this there.
+        # CLOCK_MONOTONIC of the publisher's machine, on which this program must run too.
         shown = reader.at(time.monotonic_ns() - int(1e9 * arguments.delay))
         if shown is not None:
             moment, handles = shown

@@ -15,7 +15,7 @@ from rclpy.node import Node
 
 
 class Listener(Node):
-    """Counts the frames and remembers the newest."""
+    """Counts the frames and keeps the newest."""
 
     def __init__(self, name):
         super().__init__("bench_dragon_listener")

@@ -1,4 +1,4 @@
-"""Reads the stage picture's WebSocket, as a visualiser on any machine could: `pip install websockets==17.4`.
+"""Reads the stage picture's WebSocket, as a visualiser on any machine can: `pip install websockets==17.4`.
 
     stage_socket.py [--url ws://127.0.0.1:8080/frames] [--rate HZ] [--seconds S]
 
@@ -22,7 +22,7 @@ PLAYBACK = ["playing", "paused", "held", "ended"]
 
 
 def frame(message):
-    """The header as a dictionary and one (x, y, heading, vx, vy) for each handle."""
+    """Returns the header as a dictionary and one (x, y, heading, vx, vy) for each handle."""
     if message[0] != VERSION:
         raise SystemExit(f"the server speaks version {message[0]} of the layout, this program version {VERSION}")
     (
@@ -63,7 +63,7 @@ def follow(socket, deadline):
         if isinstance(message, str):
             message = json.loads(message)
             print(message, flush=True)
-            # All states and their severity. The first frames may come before it.
+            # The states, and the severity of each. The first frames may come before the stage.
             states = message["states"] if message["type"] == "stage" else states
         else:
             header, handles = frame(message)
@@ -79,7 +79,7 @@ def follow(socket, deadline):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--url", default="ws://127.0.0.1:8080/frames")
-    parser.add_argument("--rate", type=float, default=60, help="at most so many frames a second")
+    parser.add_argument("--rate", type=float, default=60, help="greatest number of frames a second")
     parser.add_argument("--seconds", type=float, default=float("inf"))
     options = parser.parse_args()
     deadline = time.monotonic() + options.seconds

@@ -2,8 +2,8 @@
 
     python3 examples/python/subscribe.py [--name bench_dragon] [--seconds 10] [--json] [--light]
 
-The frames are read where the publisher wrote them: nothing is copied. With --json every frame is a line. With --light
-they are those in single precision, which a scene offers with `precision = "f32"` in `[publish]`.
+The frames are read in the memory that the publisher wrote: no data is copied. With --json every frame is a line. With
+--light the frames are in single precision, which a scene offers with `precision = "f32"` in `[publish]`.
 """
 
 import argparse
@@ -51,7 +51,7 @@ def main():
     parser.add_argument("--light", action="store_true", help="the frames in single precision")
     arguments = parser.parse_args()
 
-    # The node and its ports stay inside this function: as globals they would leave files behind.
+    # The node and its ports stay inside this function: as globals they would leave stale files.
     node = iox2.NodeBuilder.new().signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
 
     def service(suffix):
@@ -75,7 +75,7 @@ def main():
         while (sample := subscriber.receive()) is not None:
             header = sample.user_header().contents
             handles = handles_of(sample)
-            # Another run is a restarted publisher, whose frames count from the beginning.
+            # Another run is a publisher that was started again and counts its frames from the beginning.
             if header.run_id == run_id:
                 missed += header.sequence - sequence - 1
             run_id, sequence = header.run_id, header.sequence
@@ -93,7 +93,7 @@ def main():
                     "head": [float(handles["x"][0]), float(handles["y"][0])],
                 }
                 if not arguments.light:
-                    # A second link of another length than 1.65 m would mean damaged content.
+                    # The difference of the second link from 1.65 m shows if the content is complete.
                     line["link"] = float(np.hypot(handles["x"][2] - handles["x"][1], handles["y"][2] - handles["y"][1]))
                 print(json.dumps(line), flush=False)
             elif time.monotonic() >= printed + 1.0:

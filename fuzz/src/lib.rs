@@ -8,7 +8,7 @@ pub use libfuzzer_sys;
 use fastrand::Rng;
 use targets::Target;
 
-/// Makes a program of a target: its function, and its own changes besides those of libFuzzer.
+/// Makes a program from a target: its function, and its own changes besides those of libFuzzer.
 #[macro_export]
 macro_rules! fuzz {
     ($target:ident) => {
@@ -23,7 +23,8 @@ macro_rules! fuzz {
     };
 }
 
-/// Changes the first `size` bytes of `data`, which has room for `most`: three times in four by the target's own changes.
+/// Changes the first `size` bytes of `data`, which has room for `most` bytes: by the target's own changes in three of
+/// four cases.
 pub fn mutated(target: &Target, data: &mut [u8], size: usize, most: usize, seed: u32) -> usize {
     let mut random = Rng::with_seed(u64::from(seed));
     if random.u8(..4) == 0 {

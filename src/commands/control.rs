@@ -23,40 +23,43 @@ pub struct ControlArguments {
 
 #[derive(Debug, Clone, Copy, PartialEq, clap::Subcommand)]
 enum Action {
-    /// Print the playback state
+    #[command(about = help(0))]
     State,
-    /// Stop simulated time; frames are sent at full rate
+    #[command(about = help(1))]
     Pause,
-    /// Let simulated time advance again
+    #[command(about = help(2))]
     Resume,
     /// Pause a playing show, resume a paused one
     Toggle,
-    /// Set the simulated seconds per second of wall time
-    #[command(allow_negative_numbers = true)]
+    #[command(about = help(3), allow_negative_numbers = true)]
     Rate {
         /// 1e-6 to 1e6
         rate: f64,
     },
-    /// Go to a simulated time
-    #[command(allow_negative_numbers = true)]
+    #[command(about = help(4), allow_negative_numbers = true)]
     Seek {
         /// Seconds since the start of the scene
         time: f64,
     },
-    /// Play PERIODS periods, then pause again
+    #[command(about = help(5))]
     Step {
         /// Periods of the loop
         #[arg(default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1 << 53))]
         periods: u64,
     },
-    /// Go to the start of the show
+    #[command(about = help(6))]
     Restart,
-    /// Stop until released, whatever else is commanded
+    #[command(about = help(7))]
     Hold,
-    /// Go from hold to paused
+    #[command(about = help(8))]
     Release,
-    /// Continue from a cue that pauses, or from --paused
+    #[command(about = help(9))]
     Go,
+}
+
+/// Returns the help of the command of a number.
+fn help(number: usize) -> &'static str {
+    Command::TABLE[number].help
 }
 
 /// The line of `control --json`.

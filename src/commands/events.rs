@@ -3,7 +3,7 @@
 use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
-use bench_dragon::certify::{self, CertifyError, MOST_STEPS, Outcome, Status};
+use bench_dragon::certify::{self, CertifiedEvent, CertifyError, MOST_STEPS, Status};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
 use bench_dragon::show::scene::Scene;
@@ -97,13 +97,13 @@ fn certified(
     text: &str,
     file: &Path,
     common: &Common,
-) -> Result<Vec<Outcome>, CommandError> {
+) -> Result<Vec<CertifiedEvent>, CommandError> {
     expect_exact_motion(scene)?;
     let shown = file.display();
     let created = std::fs::File::create(file).map_err(|error| not_writable(&shown, &error))?;
     let mut writer = BufWriter::new(created);
     let bar = progress_bar(1000, common).with_message("proving");
-    let mut write = |line: &certify::Line| {
+    let mut write = |line: &certify::CertificateLine| {
         serde_json::to_writer(&mut writer, line).map_err(io::Error::from)?;
         writer.write_all(b"\n")
     };

@@ -16,7 +16,7 @@ use bench_dragon::messages::sentence::{Figures, alert_sentence, cue_sentence};
 use bench_dragon::publisher::live::control::{Doors, door};
 use bench_dragon::publisher::live::statistics::{self, Inbox, Run, RunSummary, Sample, Summary};
 use bench_dragon::publisher::live::{
-    Announcement, Counts, Deliveries, End, Frames, LoopOptions, PublishError, Publisher, run_loop,
+    Announcement, Counts, Deliveries, End, FrameSource, LoopOptions, PublishError, Publisher, run_loop,
 };
 use bench_dragon::publisher::transports::{self, Transport, TransportConfig, TransportError};
 
@@ -118,7 +118,7 @@ impl Publishing<'_> {
     /// What cannot be opened, or a thread that panicked.
     pub fn run(
         &self,
-        frames: &mut (dyn Frames + Send),
+        frames: &mut (dyn FrameSource + Send),
         transports: Vec<Box<dyn Transport>>,
         mut doors: Doors,
         stop: &AtomicBool,

@@ -8,6 +8,7 @@ use bench_dragon::client::clock::realtime_ns;
 use bench_dragon::client::shared_memory::service_name;
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::timeline::Timeline;
+use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::publisher::log::arithmetic::Arithmetic;
 use bench_dragon::publisher::log::lines::ShowLine;
 use bench_dragon::publisher::log::{self as recording_log, LogOutcome};
@@ -129,7 +130,7 @@ struct RunSession<'a> {
 
 impl RunSession<'_> {
     /// Opens what is published to, publishes, and prints the summary.
-    fn run(&self, mut show: Show, stop: &AtomicBool) -> Result<(), CommandError> {
+    fn run(&self, show: Show, stop: &AtomicBool) -> Result<(), CommandError> {
         let scene_hash = bench_dragon::proof::scene_hash(&self.text.text);
         let stage = convert::stage(self.run_id, realtime_ns(), scene_hash, &self.scene.motion, &show);
         let config = TransportConfig::of(self.common.name(), self.scene, self.playback.rate, stage);
@@ -150,12 +151,13 @@ impl RunSession<'_> {
             benches: self.scene.team().benches as u32,
             lead: Duration::ZERO,
         };
+        let mut source = ShowSource::new(show);
         let hooks = Hooks {
             opened: Box::new(|transports| self.print_start(transports)),
             sample: Box::new(|sample| histograms.iter_mut().for_each(|log| log.record(sample))),
             ended: Box::new(|counts| log.iter().for_each(|log| log.ended(counts))),
         };
-        let published = publishing.run(&mut show, transports, doors, stop, hooks)?;
+        let published = publishing.run(&mut source, transports, doors, stop, hooks)?;
         published.print(self.common)?;
         let log_failure = log.and_then(|outcome| outcome.failure());
         let failure = published.error.map(|error| error.to_string()).or(log_failure);

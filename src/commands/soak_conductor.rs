@@ -5,8 +5,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use bench_dragon::messages::control::Command;
-use bench_dragon::soak::conduct::conductor;
-use bench_dragon::soak::conduct::model::ShowFacts;
+use bench_dragon::soak::conduct::load_generator;
 
 use super::soak::Parent;
 use super::{CommandError, Common, stop_on_signals};
@@ -39,9 +38,9 @@ pub fn conduct(common: &Common, arguments: &SoakConductorArguments) -> Result<()
     arguments.parent.watch()?;
     let stop = stop_on_signals()?;
     let scene = common.load_scene()?;
-    let facts = ShowFacts::of(&scene, arguments.rate.unwrap_or(scene.rate));
+    let rate = arguments.rate.unwrap_or(scene.rate);
     let mut output = std::io::stdout().lock();
-    conductor::conduct(common.name(), &facts, arguments.seed, &stop, &mut |conducted| -> Result<(), CommandError> {
+    load_generator::conduct(common.name(), rate, arguments.seed, &stop, &mut |conducted| -> Result<(), CommandError> {
         serde_json::to_writer(&mut output, &conducted).map_err(std::io::Error::from)?;
         writeln!(output)?;
         Ok(output.flush()?)
@@ -52,7 +51,7 @@ pub fn conduct(common: &Common, arguments: &SoakConductorArguments) -> Result<()
 pub fn client(common: &Common, arguments: &SoakClientArguments) -> Result<(), CommandError> {
     arguments.parent.watch()?;
     let stop = stop_on_signals()?;
-    let Some(mut controller) = conductor::connect(common.name(), &stop) else { return Ok(()) };
+    let Some(mut controller) = load_generator::connect(common.name(), &stop) else { return Ok(()) };
     while !stop.load(Ordering::Relaxed) {
         controller.send(Command::State, TIMEOUT)?;
     }

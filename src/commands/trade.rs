@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use bench_dragon::drawing::palette::{LIGHT, SERIES, channels, with_dark_rules};
 use bench_dragon::show::scene::Scene;
 use bench_dragon::trade::display::{self, Display, DisplayMeasurement, Precision, Reader};
-use bench_dragon::trade::{LAST_SECOND_MOMENTS, Measurement, SPREAD_MOMENTS, measure, publisher_frame_ns};
+use bench_dragon::trade::{LAST_SECOND_SAMPLES, Measurement, SPREAD_SAMPLES, measure, publisher_frame_ns};
 use plotters::coord::combinators::LogCoord;
 use plotters::prelude::*;
 
@@ -148,7 +148,7 @@ fn print(output: &mut Output, measurements: &[Measurement]) -> Result<(), Comman
     let noise = measurements.first().map_or(f64::NAN, |first| first.noise);
     output.line(&format!(
         "* no other is both faster and more exact, where errors below {noise:.1e} m are rounding and count as equal. \
-         Errors: the largest over all handles at {SPREAD_MOMENTS} moments of the show and {LAST_SECOND_MOMENTS} of its \
+         Errors: the largest over all handles at {SPREAD_SAMPLES} moments of the show and {LAST_SECOND_SAMPLES} of its \
          last second, against a reference of more than 30 digits."
     ))
 }
@@ -186,7 +186,7 @@ fn print_display(output: &mut Output, scene: &Scene, displayed: &[DisplayMeasure
          without transport.",
         scene.team().handles(),
         display::WINDOW,
-        display::SPREAD_MOMENTS
+        display::SPREAD_SAMPLES
     ))
 }
 

@@ -1,8 +1,8 @@
-//! Conducting over the stage picture's WebSocket: who may, what is answered, and that nothing which is sent there stops
-//! the picture. Pages of one's own are let in where the user says so.
+//! Control over the stage picture's WebSocket: authorization, answers, and that no message sent there stops the
+//! picture. The user can admit pages of other origins.
 //!
-//! The publisher and the server are processes of their own; what the publisher does is asked of it by `control`. The
-//! page's transport bar is tried in Debian's Chromium by `tests/python/conduct_page.py`. Nothing asserts a speed.
+//! The publisher and the server are separate processes; `control` reads the state of the publisher.
+//! `tests/python/conduct_page.py` tests the page's transport bar in Debian's Chromium. No test asserts a speed.
 
 use crate::harness;
 
@@ -22,7 +22,7 @@ use tungstenite::{ClientRequestBuilder, Message, WebSocket};
 
 type Socket = WebSocket<MaybeTlsStream<TcpStream>>;
 
-/// A scene whose publisher is there at once, also where the program is not optimised, with two cues.
+/// Returns a scene with two cues whose publisher starts at once, even if the program is not optimised.
 fn cued_scene(name: &str) -> PathBuf {
     let scene = scene_file(name, &[("accuracy = 1e-9", "solver = \"newton\"")]);
     let cues = "[[cues]]\nname = \"lamps\"\nat = 150.0\n[[cues]]\nname = \"coil\"\nat = 300.0\nthen = \"pause\"\n";
@@ -44,19 +44,19 @@ fn publisher(name: &str, arguments: &[&str]) -> Process {
     panic!("no publisher");
 }
 
-/// How the show stands; `None` while nobody publishes.
+/// Returns the state of the show; `None` if no publisher runs.
 fn state(name: &str) -> Option<Value> {
     json_lines(&program(name).args(["--json", "control", "state"]).output().unwrap()).pop()
 }
 
-/// A server on a free port, and the line that it printed.
+/// Returns a server on a free port, and the line that it printed.
 fn server(name: &str, arguments: &[&str]) -> (Process, Value) {
     let mut server = Process::start(program(name).args(["view", "--json", "--port", "0"]).args(arguments));
     let ready = serde_json::from_str(&server.first_line_within(20)).unwrap();
     (server, ready)
 }
 
-/// Where a program of this machine connects.
+/// Returns the address to which a program of this machine connects.
 fn address(ready: &Value) -> String {
     let url = ready["url"].as_str().unwrap();
     format!("127.0.0.1:{}", url.trim_end_matches('/').rsplit(':').next().unwrap())
@@ -76,9 +76,9 @@ fn connect(address: &str, origin: Option<&str>) -> Result<Socket, u16> {
     }
 }
 
-/// The next message of a type.
+/// Returns the next message of a type.
 fn message(socket: &mut Socket, of: &str) -> Value {
-    // Frames keep coming where the message does not.
+    // Frames keep coming even if the message does not.
     let deadline = Instant::now() + Duration::from_secs(60);
     loop {
         assert!(Instant::now() < deadline, "no message {of} within 60 s");
@@ -124,12 +124,12 @@ fn a_program_conducts_over_the_socket_and_sees_the_time_line() {
         (&refused["code"], refused["sentence"].as_str().unwrap()),
         (&"out_of_range".into(), "seek is refused: 1000000000.0 is out of range")
     );
-    // A cue on the way is sent, with its name.
+    // A cue that is passed is sent with its name.
     ask(&mut socket, r#"{"command":"resume"}"#);
     let cue = message(&mut socket, "cue");
     assert_eq!((&cue["number"], &cue["name"], &cue["pauses"]), (&1.into(), &"lamps".into(), &false.into()));
     assert!((150.0..151.0).contains(&cue["sim_time"].as_f64().unwrap()), "{cue}");
-    // Held, all else is refused with a sentence.
+    // While the show is held, all other commands are refused with a sentence.
     assert_eq!(ask(&mut socket, r#"{"command":"hold"}"#)["playback"], "held");
     assert_eq!(ask(&mut socket, r#"{"command":"toggle"}"#)["sentence"], "resume is refused: the show is held");
     assert_eq!(ask(&mut socket, r#"{"command":"release"}"#)["playback"], "paused");
@@ -163,7 +163,7 @@ fn nothing_that_is_sent_stops_the_picture() {
         assert!(answer["code"].is_null() && answer["sentence"].is_string(), "{text}: {answer}");
     }
     assert_eq!(state(name).unwrap()["playback"], "playing");
-    // A flood of commands, by one that reads no answer and is killed in the middle: a socket that is dropped.
+    // A flood of commands from a client that reads no answer and is killed in the middle: its socket is dropped.
     let mut flood = connect(&address, None).unwrap();
     for number in 0..2000 {
         let sent = flood.send(Message::text(format!(r#"{{"command":"rate","value":{}}}"#, 1 + number % 2)));
@@ -172,16 +172,16 @@ fn nothing_that_is_sent_stops_the_picture() {
         }
     }
     drop(flood);
-    // Too long a message ends its own connection only.
+    // A message that is too long ends only its own connection.
     let mut long = connect(&address, None).unwrap();
     let _ = long.send(Message::text("x".repeat(100_000)));
-    // Another is answered, a hold at once, and frames still come.
+    // Another client gets an answer to a hold at once, and frames still come.
     let held = ask(&mut socket, r#"{"command":"hold","id":1}"#);
     assert_eq!((&held["id"], &held["playback"]), (&1.into(), &"held".into()));
     for _ in 0..5 {
         while !matches!(watching.read().unwrap(), Message::Binary(_)) {}
     }
-    // A publisher that has gone, and one that comes after it.
+    // A publisher that has gone, and the next publisher.
     publisher.signal(Signal::SIGKILL);
     drop(publisher);
     message(&mut watching, "waiting");
@@ -225,7 +225,7 @@ fn commands_need_control_and_beyond_this_machine_a_token() {
     let first = lines.until("localhost", 20);
     let token = first.split("#token=").nth(1).unwrap().split('.').next().unwrap();
     assert_eq!(token.len(), 32, "{first}");
-    // The addresses that others type, as the system lists them.
+    // The addresses that users of other machines type, as the system lists them.
     let addresses = std::process::Command::new("hostname").arg("-I").output().unwrap();
     let addresses = text(&addresses.stdout);
     for address in addresses.split_whitespace().filter(|address| address.contains('.')) {
@@ -256,7 +256,7 @@ fn a_page_from_elsewhere_is_let_in_by_its_name_only() {
     }
 }
 
-/// Status line, headers and body of a request whose path goes out as it is written.
+/// Returns status line, headers and body of the answer to a request whose path is sent unchanged.
 fn get(address: &str, path: &str, host: &str) -> String {
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
@@ -311,7 +311,7 @@ fn pages_of_ones_own_are_served_and_nothing_beside_them() {
     assert!(text(&refused.stderr).contains("--pages /nowhere"), "{}", text(&refused.stderr));
 }
 
-/// Chromium takes a core by itself.
+/// Chromium uses a whole core.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 fn in_a_browser(scenario: &str) {

@@ -1,5 +1,5 @@
-//! What is said to be proved of a show: by the hash of its scene's text, which the stage carries, and a certificate of that
-//! very text. What a browser shows is in `tests/python/stage_proofs.py`. Nothing asserts a speed.
+//! The proved results of a show: found by the hash of its scene's text, which the stage carries, and a certificate of
+//! the same text. `tests/python/stage_proofs.py` tests the browser. No test asserts a speed.
 
 use crate::harness;
 
@@ -14,10 +14,10 @@ use serde_json::{Value, json};
 use tungstenite::Message;
 use tungstenite::stream::MaybeTlsStream;
 
-/// How long anything may take, seconds.
+/// Deadline of every wait, seconds.
 const DEADLINE: u64 = 120;
 
-/// The school's scene in a folder, with another first line.
+/// Returns the school's scene in a folder, with another first line.
 fn scene(folder: &Path, first_line: &str) -> PathBuf {
     let file = folder.join("scene.toml");
     std::fs::write(&file, format!("# {first_line}\n{}", include_str!("../../config/school.toml"))).unwrap();
@@ -35,7 +35,7 @@ fn publisher(name: &str, scene: &Path) -> Process {
     Process::start(program(name).arg("--scene").arg(scene).args(arguments))
 }
 
-/// What a Python program reads of a publisher's stage, and computes of the file.
+/// Returns the data that a Python program reads from a publisher's stage, and its hash of the file.
 fn hashes(name: &str, scene: &Path) -> Value {
     let mut peer = python();
     peer.args(["tests/python/scene_hash.py", "--name", &unique(name), "--scene"]).arg(scene);
@@ -104,7 +104,7 @@ fn what_is_no_certificate_is_refused_with_a_sentence() {
         assert!(sentence.contains(expected) && sentence.contains(file.to_str().unwrap()), "{sentence}");
         assert!(sentence.lines().count() == 1 && output.stdout.is_empty(), "{sentence}");
     }
-    // One that goes wrong further on is found while pages are served, which goes on.
+    // A certificate with a later error: the error is found while pages are served, and the server continues.
     let cut = written("cut", &first(1, text_of_scene));
     let arguments = ["view", "--port", "0", "--json", "--certificate", cut.to_str().unwrap()];
     let mut view = Process::start(program("cut").args(arguments));
@@ -150,7 +150,7 @@ fn a_program_is_told_what_is_proved() {
     }
 }
 
-/// Chromium takes a core by itself.
+/// Chromium uses a whole core.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 fn in_a_browser(scenario: &str) {

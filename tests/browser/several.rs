@@ -1,5 +1,6 @@
-//! Several dragons at once: two publishers under names of their own, one page, one desk, one page of metrics. What a browser
-//! shows is in `tests/python/several_page.py`; what a desk hears, in `tests/python/psn_peer.py`. Nothing asserts a speed.
+//! Several dragons at once: two publishers under different names, one page, one lighting desk, one page of metrics.
+//! `tests/python/several_page.py` tests the browser; `tests/python/psn_peer.py` tests the desk. No test asserts a
+//! speed.
 
 use crate::harness;
 
@@ -14,9 +15,9 @@ use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 use tungstenite::Message;
 
-/// A scene whose publisher is there at once, also where the program is not optimised.
+/// A solver with which the publisher starts at once, even if the program is not optimised.
 const NEWTON: (&str, &str) = ("accuracy = 1e-9", "solver = \"newton\"");
-/// How long anything may take, seconds.
+/// Deadline of every wait, seconds.
 const DEADLINE: u64 = 120;
 
 fn publisher(name: &str, arguments: &[&str]) -> Process {
@@ -25,7 +26,7 @@ fn publisher(name: &str, arguments: &[&str]) -> Process {
     Process::start(run.arg("--scene").arg(scene).args(["run", "--json", "--duration", "600"]).args(arguments))
 }
 
-/// The program with several names.
+/// Returns the program with several names.
 fn of_several(names: &[&str]) -> std::process::Command {
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
     command.args(names.iter().flat_map(|name| ["--name".to_owned(), unique(name)]));
@@ -48,7 +49,7 @@ fn a_command_of_one_publisher_refuses_a_second_name() {
         };
         let printed = refused(&[&["--name", "two", command], further].concat());
         assert!(printed.contains("--name is given 2 times") && printed.contains("view, send and metrics"), "{printed}");
-        // One before the command and one after it are two as well.
+        // A name before the command and a name after it are also two names.
         let printed = refused(&[&[command], further, &["--name", "two"]].concat());
         assert!(printed.contains("--name is given 2 times"), "{printed}");
     }
@@ -65,7 +66,7 @@ fn a_command_of_one_publisher_refuses_a_second_name() {
     );
 }
 
-/// Frames and messages of a publisher over a server's WebSocket: its stage, then a frame's run.
+/// Returns the stage of a publisher over a server's WebSocket, and the run of its next frame.
 fn stage_and_run(address: &str, query: &str) -> (Value, String) {
     let (mut socket, _) = tungstenite::connect(format!("ws://{address}/frames{query}")).unwrap();
     let mut stage = Value::Null;
@@ -110,8 +111,9 @@ fn free_port() -> u16 {
     UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
-/// The second dragon comes late, ends and comes again; the first ends before the sender does. Every tracker of every frame of
-/// both is heard, under numbers that never change. Each step waits for what the desk has heard, however long that takes.
+/// The second dragon starts late, ends and starts again; the first ends before the sender does. The desk receives every
+/// tracker of every frame of both, under numbers that never change. Each step waits for messages at the desk, however
+/// long that takes.
 #[test]
 fn one_desk_hears_two_dragons_under_numbers_that_stay() {
     if !can_run(python_modules(&["iceoryx2", "numpy", "pypsn"])) {
@@ -138,7 +140,7 @@ fn one_desk_hears_two_dragons_under_numbers_that_stay() {
         process.signal(Signal::SIGTERM);
         summary(&process.output_within(DEADLINE));
     };
-    // Waits until the dragon at this place has stopped so often, and then been heard in so many frames.
+    // Waits until the dragon at this place has stopped `stopped` times, and has then been received in `equal` frames.
     let hears = |place: usize, stopped: u64, equal: u64| {
         let deadline = Instant::now() + Duration::from_secs(DEADLINE);
         loop {
@@ -178,7 +180,7 @@ fn one_desk_hears_two_dragons_under_numbers_that_stay() {
     assert_eq!(b["changes"], json!(["absent", "moving", "stopped", "moving", "stopped"]), "{b}");
     for (dragon, least) in [(a, 100), (b, 50)] {
         assert!(dragon["equal"].as_u64().unwrap() > least, "{dragon}");
-        // Sent before the peer had opened the publisher's memory, if any.
+        // Frames sent before the peer had opened the publisher's memory.
         assert!(dragon["unknown"].as_u64().unwrap() * 4 < dragon["equal"].as_u64().unwrap(), "{dragon}");
     }
     assert_eq!(heard["names"].as_object().unwrap().len(), 448);
@@ -224,7 +226,7 @@ fn metrics_and_osc_tell_two_dragons_apart() {
     until([1, 0]);
 }
 
-/// Chromium takes a core by itself.
+/// Chromium uses a whole core.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 fn in_a_browser(scenario: &str) {

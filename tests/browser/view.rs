@@ -1,8 +1,7 @@
-//! The stage picture as its users meet it: browsers, programs that read its WebSocket, and strangers.
+//! The stage picture as its users meet it: browsers, programs that read its WebSocket, and clients without rights.
 //!
-//! The browser is Debian's Chromium; what is done in it stands in `tests/python/stage_picture.py`, `stage_motion.py`,
-//! `stage_show.py` and `stage_places.py`.
-//! Nothing asserts a speed.
+//! The browser is Debian's Chromium; its tests are in `tests/python/stage_picture.py`, `stage_motion.py`,
+//! `stage_show.py` and `stage_places.py`. No test asserts a speed.
 
 use crate::harness;
 
@@ -19,7 +18,7 @@ use tungstenite::{ClientRequestBuilder, Message, WebSocket};
 
 type Socket = WebSocket<MaybeTlsStream<TcpStream>>;
 
-/// A server on a free port; its address without the scheme and the last slash.
+/// Returns a server on a free port, and its address without the scheme and the last slash.
 fn server(name: &str) -> (Process, String) {
     let mut server = Process::start(program(name).args(["view", "--json", "--port", "0"]));
     let ready: Value = serde_json::from_str(&server.first_line_within(20)).unwrap();
@@ -47,7 +46,7 @@ fn connect(address: &str) -> Socket {
     request(address, &[]).unwrap()
 }
 
-/// The next frame.
+/// Returns the next frame.
 fn frame(socket: &mut Socket) -> Vec<u8> {
     loop {
         if let Message::Binary(bytes) = socket.read().unwrap() {
@@ -68,7 +67,7 @@ fn f32_at(bytes: &[u8], at: usize) -> f64 {
     f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()).into()
 }
 
-/// `[x, y, speed]` of every handle of the paper's scene after 300 s, computed elsewhere with 50 digits.
+/// Returns `[x, y, speed]` of every handle of the paper's scene after 300 s, computed elsewhere with 50 digits.
 fn truth_at_300() -> Vec<[f64; 3]> {
     let rows = include_str!("../truth/paper_scene_exact.csv").lines().filter(|line| line.starts_with("300.0,"));
     let numbers = |line: &str| line.split(',').map(|cell| cell.parse().unwrap()).collect::<Vec<f64>>();
@@ -163,7 +162,7 @@ fn a_slow_reader_gets_the_newest_frame_and_no_backlog() {
     }
     wait(3.0);
     let woken = monotonic_ns();
-    // A client takes the frames and answers the pings that follow them, as every WebSocket does.
+    // A client reads the frames and answers the pings that follow them, as every WebSocket does.
     let late = (0..50).take_while(|_| u64_at(&frame(&mut socket), 40) < woken).count();
     assert!(late <= 4, "{late} old frames were kept for a reader that slept");
 }
@@ -176,7 +175,7 @@ fn another_browser_is_not_held_up_by_a_slow_one() {
     frame(&mut slow);
     let mut quick = connect(&address);
     let first = u64_at(&frame(&mut quick), 24);
-    // The slow one is open and reads nothing all the while.
+    // The slow client is open and reads nothing all the time.
     let last = (0..100).map(|_| u64_at(&frame(&mut quick), 24)).last().unwrap();
     assert!(last >= first + 100, "frame {last} after 100 frames from {first}");
 }
@@ -188,7 +187,7 @@ fn a_program_may_ask_for_fewer_frames() {
     let (mut socket, _) = tungstenite::connect(format!("ws://{address}/frames?rate=10")).unwrap();
     let first = u64_at(&frame(&mut socket), 48);
     let last = (0..10).map(|_| u64_at(&frame(&mut socket), 48)).last().unwrap();
-    // Ten frames at ten a second are 200 periods of the publisher, less when a late frame is made up for.
+    // Ten frames at ten a second are 200 periods of the publisher, and fewer after a late frame.
     assert!(last - first >= 150, "{} periods passed", last - first);
     for rate in ["0", "-1", "nan", "fast"] {
         let refused = tungstenite::connect(format!("ws://{address}/frames?rate={rate}"));
@@ -196,7 +195,7 @@ fn a_program_may_ask_for_fewer_frames() {
     }
 }
 
-/// The status with which a WebSocket was refused.
+/// Returns the status with which a WebSocket was refused.
 fn status(refused: Result<Socket, tungstenite::Error>) -> Option<u16> {
     match refused {
         Err(tungstenite::Error::Http(response)) => Some(response.status().as_u16()),
@@ -243,7 +242,7 @@ fn an_address_that_cannot_be_used_is_one_sentence() {
     assert!(printed.contains("--listen") && printed.lines().count() == 1, "{printed}");
 }
 
-/// Chromium takes a core by itself.
+/// Chromium uses a whole core.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 fn in_a_browser(scenario: &str) {
@@ -268,7 +267,7 @@ fn run_scenario(script: &str, scenario: &str) {
     }
     let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let arguments = [script, scenario, env!("CARGO_BIN_EXE_bench-dragon"), &unique(&scenario[..6])];
-    // The scenario that is ten minutes long where long tests are requested ends itself.
+    // If long tests are requested, the scenario of ten minutes ends itself.
     let limit = if long() { 900 } else { 180 };
     let output = Process::start(python().args(arguments)).output_within(limit);
     println!("{}", text(&output.stdout));

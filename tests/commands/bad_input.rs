@@ -1,5 +1,5 @@
-//! What a user can get wrong: each case ends with exit code 2 and one clear sentence on standard error, nothing on
-//! standard output, and no panic.
+//! Inputs that a user can get wrong: each case ends with exit code 2 and one clear sentence on standard error, nothing
+//! on standard output, and no panic.
 
 use std::io::Write;
 use std::process::{Command, Output};
@@ -8,7 +8,7 @@ fn run(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(arguments).output().unwrap()
 }
 
-/// The sentence that an input is refused with.
+/// Returns the sentence that refuses an input.
 fn refusal(arguments: &[&str]) -> String {
     let output = run(arguments);
     let printed = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -18,7 +18,7 @@ fn refusal(arguments: &[&str]) -> String {
     printed
 }
 
-/// The sentence that a scene is refused with: the paper's with one text replaced.
+/// Returns the sentence that refuses the paper's scene with one text replaced.
 fn scene_refusal(from: &str, to: &str) -> String {
     let scene = include_str!("../../config/paper.toml");
     assert!(scene.contains(from), "no {from} in the scene");

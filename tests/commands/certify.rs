@@ -1,5 +1,5 @@
-//! Certificates of events, made by the search and checked by `proof`: those of scenes with every kind of event are
-//! accepted and agree with the ordinary search, and what is changed in one is refused, or still true.
+//! Certificates of events, made by the search and checked by `proof`: certificates of scenes with every kind of event
+//! are accepted and agree with the ordinary search. A changed certificate is refused, or is still true.
 //!
 //! `BENCH_DRAGON_LONG=1` makes a thousand changes in place of some dozens, and adds larger scenes.
 
@@ -41,15 +41,14 @@ fn certificates_are_proofs() {
     }
 }
 
-/// What the program prints and its exit code.
+/// Returns the output, the error output and the exit code of the program.
 fn program(arguments: &[&str]) -> (String, String, Option<i32>) {
     let output = std::process::Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(arguments).output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     (text(output.stdout), text(output.stderr), output.status.code())
 }
 
-/// The way of a certificate through the program: made, checked, refused where a digit was changed, printed for its own
-/// scene and for no other.
+/// A certificate is made, checked, refused after a change of one digit, and printed for its own scene only.
 #[test]
 fn the_program_makes_and_checks_certificates() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! `draw`, by another program's reading of its SVG: where boards stand against the handles that `solve` prints, what is
-//! clipped, what the words and marks say at a time, sequences, and the colours against the page's style sheet.
+//! `draw`, as another program reads its SVG: the places of boards against the handles that `solve` prints, clipping,
+//! words and marks at a time, sequences, and the colours against the page's style sheet.
 
 mod colours;
 mod moving;
@@ -38,8 +38,8 @@ fn scene_file(name: &str) -> String {
     format!("{}/config/{name}.toml", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The corners of every board by the two handles that `solve` prints and the lengths that the scene's file states: front
-/// left, rear left, rear right, front right.
+/// Returns the corners of every board: front left, rear left, rear right, front right. They follow from the two handles
+/// that `solve` prints and the lengths in the scene's file.
 fn boards(scene: &str, time: &str) -> Vec<[[f64; 2]; 4]> {
     let file: toml::Table = std::fs::read_to_string(scene).unwrap().parse().unwrap();
     let length = |key: &str| file["team"][key].as_float().unwrap();
@@ -74,21 +74,21 @@ fn number(node: &Node, attribute: &str) -> f64 {
     node.attribute(attribute).unwrap().parse().unwrap()
 }
 
-/// The points of a polygon as they are written.
+/// Returns the points of a polygon as they are written.
 fn points(node: &Node) -> Vec<[f64; 2]> {
     let pairs = node.attribute("points").unwrap().split(' ');
     let pair = |pair: &str| pair.split_once(',').map(|(x, y)| [x.parse().unwrap(), y.parse().unwrap()]).unwrap();
     pairs.map(pair).collect()
 }
 
-/// The boards of a picture by the number of the bench.
+/// Returns the boards of a picture by the number of the bench.
 fn drawn(svg: &Document) -> BTreeMap<usize, Vec<[f64; 2]>> {
     let benches = with_id(svg, "benches").unwrap();
     let bench = |node: Node| Some((node.attribute("id")?.strip_prefix("bench-")?.parse().unwrap(), points(&node)));
     benches.children().filter_map(bench).collect()
 }
 
-/// Metres of the stage at the frame's edges (left, bottom, right, top), by the transform and the clip path.
+/// Returns the frame's edges on the stage (left, bottom, right, top) in metres, from the transform and the clip path.
 fn view(svg: &Document) -> [f64; 4] {
     let transform = with_id(svg, "stage").unwrap().attribute("transform").unwrap();
     let inner = transform.strip_prefix("matrix(").unwrap().trim_end_matches(')');
@@ -106,7 +106,7 @@ fn texts(svg: &Document) -> Vec<String> {
     words.map(|node| node.text().unwrap_or_default().trim().to_owned()).collect()
 }
 
-/// Whether any part of a convex board is in a rectangle, by Sutherland and Hodgman's clipping.
+/// Returns true if any part of a convex board is in a rectangle, by Sutherland and Hodgman's clipping.
 fn is_seen(board: &[[f64; 2]; 4], [left, bottom, right, top]: [f64; 4]) -> bool {
     let mut polygon: Vec<[f64; 2]> = board.to_vec();
     for (axis, sign, limit) in [(0, -1.0, -left), (0, 1.0, right), (1, -1.0, -bottom), (1, 1.0, top)] {
@@ -186,7 +186,7 @@ fn the_view_is_what_was_asked_for() {
         of(&["draw", "--view", "1,-2,8", "--no-axes", "--width", "1600", "--height", "900"]),
         [-3.0, -4.25, 5.0, 0.25],
     );
-    // Around a team on a straight line, and not around the origin, which is 150 m away.
+    // The frame surrounds a team on a straight line, and not the origin, which is 150 m away.
     let [left, bottom, right, top] = of(&["--scene", &scene_file("procession"), "draw", "--at", "path_end"]);
     assert!(left > -20.0 && right < 80.0 && bottom > -10.0 && top > 115.0, "{left} {bottom} {right} {top}");
     for (width, height, expected) in [
@@ -202,7 +202,7 @@ fn the_view_is_what_was_asked_for() {
         if let Some(height) = expected.1 {
             assert_eq!(root.attribute("height"), Some(height));
         }
-        // What the sizes are in is the same shape as what is drawn.
+        // The size of the picture has the shape of the drawn rectangle.
         let size = ["width", "height"]
             .map(|name| root.attribute(name).unwrap().trim_end_matches("mm").parse::<f64>().unwrap());
         let sheet: Vec<f64> = root.attribute("viewBox").unwrap().split(' ').map(|part| part.parse().unwrap()).collect();
@@ -210,7 +210,7 @@ fn the_view_is_what_was_asked_for() {
     }
 }
 
-/// The pairs of boards that overlap, by parry2d.
+/// Returns the benches whose boards overlap, by parry2d.
 fn overlapping(boards: &[[[f64; 2]; 4]]) -> BTreeSet<usize> {
     let polygon =
         |board: &[[f64; 2]; 4]| ConvexPolygon::from_convex_hull(&board.map(|[x, y]| Vector::new(x, y))).unwrap();
@@ -228,7 +228,7 @@ fn overlapping(boards: &[[[f64; 2]; 4]]) -> BTreeSet<usize> {
     found
 }
 
-/// The benches whose boards are outlined in the colour of danger.
+/// Returns the benches whose boards are outlined in the colour of danger.
 fn outlined(svg: &Document) -> BTreeSet<usize> {
     let red = svg.descendants().filter(|node| node.attribute("stroke") == Some(LIGHT.danger));
     let rims = red.filter(|node| node.attribute("points").is_some()).map(|node| points(&node));
@@ -242,7 +242,7 @@ fn what_touches_or_overlaps_now_is_marked_and_what_has_happened_is_told_in_the_p
     for (time, marked, present, past) in [
         ("412", BTreeSet::new(), vec![], vec![]),
         ("contact", BTreeSet::from([0, 8]), vec!["touch here"], vec![]),
-        // As people type it.
+        // A time as people type it.
         ("412.473838", BTreeSet::from([0, 8]), vec!["touch here"], vec![]),
         ("425", overlapping(&boards(&paper, "425")), vec![], vec!["touched here"]),
         ("lock", overlapping(&boards(&paper, "lock")), vec!["locks"], vec!["touched here", "stalled"]),
@@ -317,7 +317,7 @@ fn the_legend_lists_what_is_in_the_picture_and_stands_below_the_frame() {
 #[test]
 fn people_read_what_it_is_and_no_number_of_sixteen_digits() {
     let folder = tempfile::tempdir().unwrap();
-    // What XML would take for markup, or not at all.
+    // Characters that XML takes for markup or does not allow.
     let odd = std::fs::read_to_string(scene_file("school")).unwrap();
     let odd = odd.replacen("name = \"school\"", "name = 'a < b & \"c\" > d'", 1);
     let file = folder.path().join("odd.toml");

@@ -1,5 +1,5 @@
 //! Scenes that an earlier program answered wrongly, late or not at all. Each was found by a brute force that shares no
-//! code with the program; the figures are its own, or follow from the scene.
+//! code with the program; the figures are those of the brute force, or follow from the scene.
 
 use crate::harness;
 
@@ -28,7 +28,7 @@ fn timeline(scene: &Scene) -> Timeline {
     scene.motion.timeline(&mut |_| ())
 }
 
-/// The time of an event and its benches.
+/// Returns the time of an event and its benches.
 fn event(timeline: &Timeline, kind: EventKind) -> Option<(f64, Option<u32>, Option<u32>)> {
     timeline.find(kind).map(|timed| (timed.time, timed.event.bench_a, timed.event.bench_b))
 }
@@ -37,14 +37,14 @@ fn newton(scene: &Scene) -> Newton {
     Newton::new(scene.motion.path().clone(), *scene.team(), 1.0, Velocities::Computed)
 }
 
-/// What the program prints within ten minutes, which is a deadline for hanging and no measure of speed.
+/// Returns the program's output within ten minutes, a deadline for hanging and no measure of speed.
 fn answer(arguments: &[&str]) -> (i32, String, String) {
     let output = Process::start(Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(arguments)).output_within(600);
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
 }
 
-/// N1: nobody is pushed off a route, since a straight line without end lies behind its start.
+/// N1: no bench is pushed off a route, since an endless straight line lies behind its start.
 #[test]
 fn a_team_that_is_pushed_back_stays_on_its_route() {
     for name in ["tailoff", "pieces_46", "pieces_59"] {
@@ -70,7 +70,7 @@ fn a_team_that_is_pushed_back_stays_on_its_route() {
     }
 }
 
-/// N2: a stall just past a tight bend, and one whose end was reported in its place.
+/// N2: a stall just past a tight bend, and a stall whose end was reported in its place.
 #[test]
 fn stalls_in_tight_bends_are_found() {
     for (name, time, accuracy) in
@@ -81,7 +81,7 @@ fn stalls_in_tight_bends_are_found() {
     }
 }
 
-/// N3: past a stall a handle goes out and comes back within one step of the search, and a contact 8 mm deep lies between.
+/// N3: past a stall a handle moves out and back within one step of the search; a contact 8 mm deep lies between.
 #[test]
 fn a_contact_past_a_stall_is_found() {
     let scene = scene("missed_contact");
@@ -89,15 +89,16 @@ fn a_contact_past_a_stall_is_found() {
     let (time, a, b) = event(&timeline, Contact).expect("benches 1 and 8 touch");
     assert!((time - 37.145313188924).abs() < 1e-9, "{time}");
     assert_eq!((a, b), (Some(1), Some(8)));
-    // What the live guard looks for: no frame before the contact shows an overlap.
+    // The live guard: no frame before the contact shows an overlap.
     let mut show = Show::new(&scene, timeline, Playback { start: 37.0, rate: 1000.0, ..Playback::of(&scene) }).unwrap();
     for tick in 0..200 {
         assert_eq!(show.frame(tick).unforeseen_contacts, 0);
     }
 }
 
-/// A nearer place of the path comes within a link's reach, and its rear handle would jump by metres: the motion ends before it
-/// does. The last digits of the place decided otherwise for frames than for the lock, and boards touched where nothing was.
+/// A nearer place of the path comes within a link's reach, and its rear handle would jump by metres: the motion ends
+/// before that. The last digits of the place gave frames and the lock different answers, and boards touched where there
+/// was no contact.
 #[test]
 fn no_handle_jumps_before_the_motion_ends() {
     for (name, time) in [("jump_route", 22.83133633290738), ("jump_uturn", 31.446068153243733)] {
@@ -110,7 +111,7 @@ fn no_handle_jumps_before_the_motion_ends() {
         let (mut before, mut last) = (Chain::new(handles), Chain::new(handles));
         let to = timeline.end().event.travelled;
         newton.solve_at(to - 1e-6, &mut before).unwrap();
-        // And at the last digits before.
+        // The same at the last digits before the lock.
         for digits in 0..200 {
             newton.solve_at(to - f64::from(digits) * (to.next_up() - to), &mut last).unwrap();
             for handle in 0..handles {
@@ -121,7 +122,7 @@ fn no_handle_jumps_before_the_motion_ends() {
     }
 }
 
-/// N4: a lock is a lock however small the jump.
+/// N4: a lock is reported however small the jump.
 #[test]
 fn a_lock_with_a_jump_of_millimetres_is_a_lock() {
     let (time, bench, _) = event(&timeline(&scene("lock_skipped")), Lock).expect("handle 1 jumps by 2.58 mm");
@@ -129,7 +130,7 @@ fn a_lock_with_a_jump_of_millimetres_is_a_lock() {
     assert_eq!(bench, Some(0));
 }
 
-/// N5: bends whose diameter is the link, and a little more or less, cost no more than others.
+/// N5: bends whose diameter equals the link, or a little more or less, cost no more than others.
 #[test]
 fn bends_as_wide_as_a_link_are_searched() {
     for name in ["hang_uturn", "ut2", "ut3"] {
@@ -154,7 +155,8 @@ fn bends_as_wide_as_a_link_are_searched() {
         let motion = Motion::new(description, team, 1.0, Method::Newton).unwrap();
         let timeline = motion.timeline(&mut |_| ());
         assert_eq!(timeline.searched_until(), None, "link {link}, offset {offset}");
-        // Wider than the link, the link always has a next place for its rear handle; narrower, it stalls and locks.
+        // In a bend wider than the link, the rear handle always has a next place; in a narrower bend the link stalls
+        // and locks.
         let kind = timeline.end().event.kind;
         if offset >= 1e-9 {
             assert_eq!(kind, PathEnd, "link {link}, offset {offset}");
@@ -177,17 +179,17 @@ fn a_plan_knows_that_a_scene_without_alerts_runs_into_its_lock() {
     assert!(least.contains("is -0.") || least.contains("is -1"), "the overlap by the lock: {least}");
 }
 
-/// N7: the highest of two peaks lies half way between two samples.
+/// N7: the highest of two peaks lies halfway between two samples.
 #[test]
 fn the_fastest_handle_is_the_highest_peak() {
     let scene = scene("plan_speed_wrong");
     let plan = greatest_speed(&scene, &timeline(&scene), 1.0, &mut |_| ()).unwrap();
     assert!((plan.ratio - 3828.99).abs() < 0.1 && (plan.time - 8.325).abs() < 1e-3, "{plan:?}");
-    // So near a lock doubles enclose no step that holds the peak: there is no bound, and nothing is said to be proved.
+    // This near a lock, doubles enclose no step that holds the peak: there is no bound, and no proof is claimed.
     assert!(!plan.proved && plan.value_lo == 0.0 && plan.value_hi < 1.0 / 3828.0, "{plan:?}");
 }
 
-/// N8: boards that touch in a bend that lies far outside with small pitches, and boards that overlap on a straight line.
+/// N8: boards that touch in a bend far outside with small pitches, and boards that overlap on a straight line.
 #[test]
 fn a_pitch_that_does_not_exist_is_refused_and_one_that_cannot_be_decided_is_not_stated() {
     let error = least_pitch(scene("pp_16").team(), 4.5, &mut |_| ()).unwrap_err().to_string();
@@ -205,7 +207,7 @@ fn a_pitch_that_does_not_exist_is_refused_and_one_that_cannot_be_decided_is_not_
     assert_eq!((overlap.bench_a, overlap.bench_b), (0, 2));
 }
 
-/// N5, N7, N9, N10: what took minutes, or never ended, ends, or reports how far it came.
+/// N5, N7, N9, N10: scenes that took minutes, or never ended, end, or report how far the search came.
 #[test]
 fn long_scenes_end_or_say_how_far_they_came() {
     let cases: [(&str, &[&str]); 8] = [
@@ -229,7 +231,7 @@ fn long_scenes_end_or_say_how_far_they_came() {
     }
 }
 
-/// N11: links of a millimetre on a spiral of ten kilometres hold to their promise.
+/// N11: links of a millimetre on a spiral of ten kilometres keep the promised accuracy.
 #[test]
 fn short_links_near_the_centre_of_a_wide_spiral_hold() {
     for name in ["tiny_1", "tiny_2"] {
@@ -249,7 +251,7 @@ fn short_links_near_the_centre_of_a_wide_spiral_hold() {
     }
 }
 
-/// N11: a lock at the very end of what doubles resolve still has a place, and an event's printed time can be solved.
+/// N11: a lock at the limit of what doubles resolve still has a place, and `solve` accepts an event's printed time.
 #[test]
 fn a_lock_has_a_place_and_a_time_that_can_be_asked_for() {
     let scene = scene("x2");
@@ -269,7 +271,7 @@ fn a_lock_has_a_place_and_a_time_that_can_be_asked_for() {
     }
 }
 
-/// A show that ends approaching and begins approaching counts down in every round.
+/// A show that ends and begins in the state approaching counts down in every round.
 #[test]
 fn a_loop_that_ends_approaching_counts_down_again() {
     let scene = scene("alertloop");
@@ -282,6 +284,6 @@ fn a_loop_that_ends_approaching_counts_down_again() {
         *count += frame.alerts.len();
     }
     println!("{countdowns:?} alerts a round");
-    // The first round also announces the level it begins with; the later ones begin with the level of the end.
+    // The first round also announces its first level; later rounds begin with the level at the end.
     assert!(countdowns[1] >= countdowns[0] - 1 && countdowns[2] == countdowns[1], "{countdowns:?}");
 }

@@ -1,6 +1,7 @@
-//! A wish for accuracy decides: on every scene of `config/` and on random paths each wish gets a solver that keeps it,
-//! at moments that were not used for choosing it, against the safe solver and the reference of 38 digits; the weaker
-//! the wish, the fewer bytes a frame reads; events do not depend on it; the live clearance stays that of all pairs.
+//! The requested accuracy selects the solver. On every scene of `config/` and on random paths, each requested accuracy
+//! gets a solver that keeps it. It is tested at times that the selection did not use, against the safe solver and the
+//! reference of 38 digits. A coarser accuracy reads fewer bytes per frame; events do not depend on the accuracy; the
+//! live clearance remains that of all pairs.
 
 use crate::harness;
 
@@ -23,7 +24,7 @@ use harness::aloud;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
-/// From the strongest to the weakest, metres.
+/// Requested accuracies from the finest to the coarsest, metres.
 const WISHES: [f64; 7] = [1e-18, 1e-12, 1e-9, 1e-7, 1e-6, 1e-4, 1e-2];
 
 const VELOCITIES: [Velocities; 2] = [Velocities::Computed, Velocities::Omitted];
@@ -38,8 +39,8 @@ fn select(motion: &Motion, wish: f64, velocities: Velocities) -> Option<Selectio
     selection::cheapest(motion.path(), *motion.team(), motion.head_speed(), velocities, wish)
 }
 
-/// So many times up to `end`, of which the choice knows none: multiples of the golden ratio, every third of them in the
-/// last fiftieth; and some about the junctions.
+/// Returns `count` times up to `end` that the selection has not used: multiples of the golden ratio, every third in the
+/// last fiftieth, and some near the junctions.
 fn other_times(motion: &Motion, end: f64, count: usize) -> Vec<f64> {
     let share = |k: usize| (k as f64 * 0.618_033_988_749_895 + 0.137).fract();
     let mut times: Vec<f64> =
@@ -50,14 +51,14 @@ fn other_times(motion: &Motion, end: f64, count: usize) -> Vec<f64> {
     times
 }
 
-/// How far a frame may be off, handle by handle. Near a lock, where conditioning multiplies roundings, so much is
-/// allowed of these as the handle is faster than the head.
+/// Returns the allowed error of one handle in a frame. Near a lock, where conditioning multiplies roundings, the
+/// allowance grows with the handle's speed over the head's.
 fn floor(motion: &Motion, time: f64, (x, y): (f64, f64), speed: f64) -> f64 {
     let haste = (speed / motion.head_speed()).abs().max(1.0);
     8.0 * f64::EPSILON * (x.hypot(y) + motion.head_speed() * time) * haste
 }
 
-/// The solver of a wish against the safe one: places, links, headings, velocities.
+/// Compares the solver for a requested accuracy with the safe one: places, links, headings, velocities.
 fn assert_kept(motion: &Motion, wish: f64, solver: &mut dyn Solver, times: &[f64]) {
     let team = motion.team();
     let newton = Newton::new(motion.path().clone(), *team, motion.head_speed(), Velocities::Computed);
@@ -107,7 +108,7 @@ fn every_wish_is_kept_on_every_scene_and_a_weaker_one_costs_no_more() {
             println!("{name}: {}", choice.reason);
             assert_kept(&motion, wish, choice.solver.as_mut(), &times);
             let selection = select(&motion, wish, Velocities::Computed).unwrap();
-            // Along thousands of links roundings add up, beyond 8 eps (r + distance travelled).
+            // Along thousands of links roundings add up to more than 8 eps (r + distance travelled).
             let met = selection.meets() || wish < 1e-12;
             assert!(met, "{name} {wish:e}: {:e} of {:e}", selection.error, selection.allowed);
             let bytes = (selection.table.bytes_per_handle(), selection.table.memory_bytes());
@@ -117,8 +118,8 @@ fn every_wish_is_kept_on_every_scene_and_a_weaker_one_costs_no_more() {
     }
 }
 
-/// Both instruction sets and the portable path, with and without velocities, from every format of a table: each is
-/// machine code of its own, and none stands in for another.
+/// Both instruction sets and the portable path, with and without velocities, from every format of a table: each has its
+/// own machine code, so each is tested.
 #[test]
 fn every_instruction_set_keeps_every_wish_against_the_reference() {
     let mut run = BTreeSet::new();
@@ -127,7 +128,7 @@ fn every_instruction_set_keeps_every_wish_against_the_reference() {
         let mut reference = Reference::new(*motion.team(), motion.description(), motion.head_speed()).unwrap();
         let end = motion.timeline_without_contact().end().time;
         let moments = [0.0, 0.291, 0.613, 0.987].map(|share| (share * end, reference.handles(share * end).unwrap()));
-        // The wishes besides this one select no table in mixed precision of order 3.
+        // The other accuracies select no table in mixed precision of order 3.
         let wishes = WISHES.into_iter().chain([1e-5]);
         for (wish, velocities) in wishes.flat_map(|wish| VELOCITIES.map(|velocities| (wish, velocities))) {
             let table = select(&motion, wish, velocities).unwrap().table;
@@ -139,7 +140,7 @@ fn every_instruction_set_keeps_every_wish_against_the_reference() {
                     solver.solve(*time, &mut chain).unwrap();
                     for (k, truth) in truth.iter().enumerate() {
                         let error = truth.x.error_of(chain.x[k]).hypot(truth.y.error_of(chain.y[k]));
-                        // On a turnaround the start's own place is rounded several times.
+                        // On a turnaround the place of the start is itself rounded several times.
                         let floor = floor(&motion, *time, (chain.x[k], chain.y[k]), truth.speed).max(1e-13);
                         let at =
                             || format!("{name} {} {wish:e} {velocities:?} at {time}, handle {k}", instructions.name());
@@ -159,8 +160,8 @@ fn every_instruction_set_keeps_every_wish_against_the_reference() {
     assert_eq!((formats, run.len()), (4, formats * VELOCITIES.len() * Instructions::available().len()), "{run:?}");
 }
 
-/// Reports which instruction sets the tests of the solvers run on, by what the kernel has of this processor: one that
-/// is there is not left out.
+/// Reports the instruction sets on which the tests of the solvers run, from the kernel's list of this processor: no
+/// available set is left out.
 #[test]
 fn every_instruction_set_of_this_processor_is_tested() {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap();
@@ -180,7 +181,7 @@ fn every_instruction_set_of_this_processor_is_tested() {
     }
 }
 
-/// The same wish gives the same format and the same bits; the frames do not depend on the ones before.
+/// The same accuracy gives the same format and the same bits; frames do not depend on earlier frames.
 #[test]
 fn the_choice_is_the_same_every_time() {
     for name in ["paper", "procession"] {
@@ -234,12 +235,12 @@ fn the_live_clearance_is_that_of_the_frame() {
     }
 }
 
-/// Numbers between two others, evenly by magnitude.
+/// Returns numbers between two others, evenly by magnitude.
 fn magnitude(least: f64, most: f64) -> impl Strategy<Value = f64> {
     (least.log10()..most.log10()).prop_map(|exponent| 10f64.powf(exponent))
 }
 
-/// Spirals, turnarounds and routes with teams of any size of link.
+/// Returns spirals, turnarounds and routes with teams of any size of link.
 fn motions() -> impl Strategy<Value = Motion> {
     let spiral = (0.2..3.0f64, 1.0..60.0f64).prop_map(|(ratio, turns)| {
         let (pitch, start_turn) = (1.0 / ratio, 1.0 + turns + ratio);

@@ -1,11 +1,11 @@
-//! What `certify` proves, held against figures of 15 digits that were computed with 50, against the ordinary search on
-//! every scene at hand and on random ones, and with the processor's other rounding modes. `verify` checks the same
-//! certificates with code of its own: tests/certify.
+//! The proofs of `certify`, compared with figures of 15 digits that were computed with 50, and with the ordinary search
+//! on given and random scenes. They also hold in the processor's other rounding modes. `verify` checks the same
+//! certificates with separate code: tests/commands/certify.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use bench_dragon::certify::{MOST_STEPS, Outcome, Status, certify};
+use bench_dragon::certify::{CertifiedEvent, MOST_STEPS, Status, certify};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::show::scene::Scene;
@@ -14,28 +14,28 @@ use crate::oracle::scenes;
 
 const KINDS: [EventKind; 4] = [EventKind::Contact, EventKind::Stall, EventKind::Lock, EventKind::PathEnd];
 
-/// Steps for scenes of which some are given up: of those that are decided none takes as many.
+/// Most steps for a scene. A scene that is decided takes fewer; some scenes are given up.
 const STEPS: u64 = 30_000;
-/// Steps for scenes that are given up after hours as well: what is said until then is to be true.
+/// Most steps for scenes that are given up even after hours: the results up to then must be true.
 const STEPS_IN_VAIN: u64 = 1000;
 
-/// The outcomes of a scene, contact first, and the ordinary events.
-fn outcomes(scene: &Scene, most_steps: u64) -> (Vec<Outcome>, Timeline) {
+/// Returns the outcomes of a scene, contact first, and the ordinary events.
+fn outcomes(scene: &Scene, most_steps: u64) -> (Vec<CertifiedEvent>, Timeline) {
     let timeline = scene.motion.timeline(&mut |_| ());
     let outcomes = certify(&scene.motion, &timeline, "", most_steps, &mut |_| Ok(()), &mut |_| ()).unwrap();
     assert_eq!(outcomes.iter().map(|outcome| outcome.event).collect::<Vec<_>>(), KINDS);
     (outcomes, timeline)
 }
 
-fn proved(outcome: &Outcome) -> (f64, f64) {
+fn proved(outcome: &CertifiedEvent) -> (f64, f64) {
     match outcome.status {
         Status::Proved { time_lo, time_hi, .. } => (time_lo, time_hi),
         ref other => panic!("{:?}: {other:?}", outcome.event),
     }
 }
 
-/// What contradicts the ordinary search, and how many kinds of events were not decided.
-fn compared(outcomes: &[Outcome], timeline: &Timeline) -> (Vec<String>, usize) {
+/// Returns the contradictions to the ordinary search, and the number of kinds of events that were not decided.
+fn compared(outcomes: &[CertifiedEvent], timeline: &Timeline) -> (Vec<String>, usize) {
     let (mut wrong, mut undecided) = (Vec::new(), 0);
     for outcome in outcomes {
         let ordinary = timeline.find(outcome.event).map(|timed| timed.time);
@@ -62,7 +62,7 @@ fn load(file: &str) -> Scene {
 #[test]
 fn the_paper_scene_is_enclosed_to_a_nanosecond() {
     let (outcomes, _) = outcomes(&Scene::paper(), STEPS);
-    // Of the design, from computations with 50 digits.
+    // Figures of the design, from computations with 50 digits.
     let known = [
         (412.473837682115, Some((0, Some(8)))),
         (432.758134083656, Some((0, None))),
@@ -80,9 +80,9 @@ fn the_paper_scene_is_enclosed_to_a_nanosecond() {
 #[test]
 fn every_scene_of_the_repository_agrees() {
     let long = std::env::var_os("BENCH_DRAGON_LONG").is_some();
-    // Handles at distances that no double can tell from the link's, paths of 1e10 metres, boards that stay a fraction of a
-    // millimetre apart for a kilometre: these the search gives up, and says so. A U-turn hardly narrower than a link takes it
-    // 150,000 steps.
+    // The search gives up, and reports that: handles at distances that no double can tell from the link's, paths of
+    // 1e10 metres, boards that stay a fraction of a millimetre apart for a kilometre. A U-turn hardly narrower than a
+    // link takes 150,000 steps.
     let given_up = [
         "bigspeed",
         "hang_uturn",
@@ -150,11 +150,11 @@ fn random_scenes_agree() {
     });
     let (decided, compared_events) = (decided.into_inner(), compared_events.into_inner());
     println!("{decided} of {count} scenes decided, {compared_events} kinds of events compared");
-    // A share a little below that seen; about two in a hundred scenes are refused by their own text.
+    // The limit is a little below the observed share; about two in a hundred scenes are refused by their own text.
     assert!(decided * 100 >= 92 * count, "{decided} of {count}");
 }
 
-/// The scene of the paper with another pitch.
+/// Returns the paper's scene with another pitch.
 fn pitched(pitch: f64) -> Scene {
     let text = std::fs::read_to_string("config/paper.toml").unwrap();
     let line = text.lines().find(|line| line.starts_with("pitch")).unwrap().to_owned();
@@ -163,8 +163,8 @@ fn pitched(pitch: f64) -> Scene {
 
 #[test]
 fn boards_that_pass_within_micrometres_are_told_from_boards_that_touch() {
-    // The least pitch with which the head comes to a radius: a little below, two boards touch outside, a little above they
-    // pass, and touch further in.
+    // The least pitch with which the head reaches a radius: a little below, two boards touch outside; a little above,
+    // they pass, and touch further in.
     const REACH: f64 = 2.0;
     let team = *Scene::paper().team();
     let least = bench_dragon::certify::plan::least_pitch(&team, REACH, &mut |_| ()).unwrap().value_lo;
@@ -188,7 +188,7 @@ fn boards_that_pass_within_micrometres_are_told_from_boards_that_touch() {
 
 #[test]
 fn a_scene_that_doubles_cannot_decide_is_reported_so() {
-    // A U-turn whose diameter is the link to the last digits.
+    // A U-turn whose diameter equals the link up to the last digits.
     let (outcomes, _) = outcomes(&load("tests/scenes/hang_uturn.toml"), STEPS);
     for outcome in &outcomes {
         let Status::Undecided { time_lo, because } = &outcome.status else { panic!("{outcome:?}") };
@@ -196,7 +196,7 @@ fn a_scene_that_doubles_cannot_decide_is_reported_so() {
     }
 }
 
-/// The rounding modes of the control register of x86: down, up, towards zero.
+/// Rounding modes of the control register of x86: down, up, towards zero.
 #[cfg(target_arch = "x86_64")]
 #[test]
 fn the_rounding_mode_of_the_processor_changes_nothing() {
@@ -206,8 +206,8 @@ fn the_rounding_mode_of_the_processor_changes_nothing() {
     for mode in [1u32, 2, 3] {
         // 0x1f80 is the register's state at the start of a thread; its rounding mode is in bits 13 and 14.
         let (changed, usual) = (0x1f80 | mode << 13, 0x1f80u32);
-        // SAFETY: the register is set back before anything else runs, and only code that is meant to hold in any mode runs
-        // between.
+        // SAFETY: the register is set back before anything else runs, and the code in between is meant to hold in any
+        // mode.
         unsafe { asm!("ldmxcsr [{}]", in(reg) &changed) };
         let outcomes = certify(&scene.motion, &timeline, "", STEPS, &mut |_| Ok(()), &mut |_| ());
         // SAFETY: as above.

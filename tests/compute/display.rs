@@ -1,17 +1,17 @@
-//! The error at the moment of display against figures that an independent program measured.
+//! The error at the time of display, compared with figures that an independent program measured.
 
 use bench_dragon::motion::Method;
 use bench_dragon::motion::solve::Velocities;
 use bench_dragon::show::scene::Scene;
 use bench_dragon::trade::display::{Display, DisplayMeasurement, Precision, RATES, Reader, measure};
 
-/// The paper's scene by the safe solver, which needs no table.
+/// Returns the paper's scene with the safe solver, which needs no table.
 fn paper(velocities: Velocities) -> Scene {
     let scene = Scene::paper();
     Scene { motion: scene.motion.with_method(Method::Newton).unwrap(), velocities, ..scene }
 }
 
-/// All measurements; computing a frame takes a microsecond.
+/// Returns all measurements; computing a frame takes a microsecond.
 fn measured(scene: &Scene, delay: Option<f64>) -> Vec<DisplayMeasurement> {
     let display = Display { rate: 60.0, delay, frame_ns: 1000.0 };
     let mut shares = vec![0.0];
@@ -34,12 +34,13 @@ fn the_errors_are_what_an_independent_program_measured() {
         let single = find(&all, Reader::Hermite, rate, Precision::Single).max_position_error;
         println!("{rate} Hz: hold {hold:.1e}, linear {linear:.1e}, hermite {hermite:.1e}, single {single:.1e} m");
         assert!(hermite < linear && linear < hold, "{rate} Hz: {hermite:e} {linear:e} {hold:e}");
-        // The head's own age; no handle is much faster there.
+        // The error of hold is the head's way in a period; no handle is much faster there.
         assert!(hold > 0.9 / rate && hold < 1.1 / rate, "{rate} Hz: {hold:e}");
-        // Half a unit in the last place of 32 bits beyond 8 m, in both coordinates, from both ends.
+        // Single precision adds half a unit in the last place of 32 bits beyond 8 m, in both coordinates, from both
+        // ends.
         assert!(single > 1e-7 && single < hermite + 1.5e-6, "{rate} Hz: {single:e}");
     }
-    // numpy, every handle around 411 s.
+    // Figures from numpy, every handle around 411 s.
     let independent = [(60.0, 1.6e-11), (10.0, 2e-8), (2.0, 1.3e-5), (1.0, 2e-4)];
     let hermite = independent.map(|(rate, figure)| (Reader::Hermite, rate, figure));
     for (reader, rate, figure) in [(Reader::Hold, 60.0, 17e-3)].into_iter().chain(hermite) {
@@ -49,7 +50,7 @@ fn the_errors_are_what_an_independent_program_measured() {
     for reader in Reader::ALL {
         for pair in RATES.windows(2) {
             let [slow, fast] = [pair[0], pair[1]].map(|rate| error(reader, rate));
-            // Below 1e-12 m, at 412 m travelled, is rounding.
+            // Below 1e-12 m, at 412 m travelled, rounding dominates.
             assert!(fast < slow.max(1e-12), "{} at {pair:?} Hz: {slow:e}, {fast:e}", reader.name());
         }
     }

@@ -1,4 +1,5 @@
-//! Events against figures computed with 50 digits. `tests/oracle` compares them with brute force on random scenes.
+//! Events, compared with figures computed with 50 digits. `tests/compute/oracle` compares them with brute force on
+//! random scenes.
 
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
@@ -32,11 +33,11 @@ fn the_papers_own_motion_touches_earlier() {
     let text = include_str!("../../config/paper.toml").replace("accuracy = 1e-9", "solver = \"paper\"");
     let timeline = scene(&text).motion.timeline(&mut |_| ());
     let contact = timeline.find(EventKind::Contact).unwrap();
-    // Where the paper prints 412.5 s: the exact contact of its own model.
+    // The paper prints 412.5 s; this is the exact contact of its own model.
     assert!((contact.time - 412.414901).abs() < 1e-6, "{}", contact.time);
 }
 
-/// The boards meet in the last quarter of a second before the lock, whose own last digits no team can stand on.
+/// The boards meet in the last quarter of a second before the lock. No team can stand at the last digits of the lock.
 #[test]
 fn a_contact_just_before_the_lock_is_found() {
     let text = "[team]\nbenches = 3\nhead_length = 2.1117711923317812\nbody_length = 3.555706400138558\nwidth = 0.02\n\

@@ -1,5 +1,5 @@
-//! The greatest speed of a handle as `plan speed` encloses it, against the safe solver at thousands of places, the
-//! reference of 38 digits and a table of 50 digits: none of them knows of intervals, lemmas or the search.
+//! The greatest speed of a handle as `plan speed` encloses it. It is compared with the safe solver at thousands of
+//! places, the reference of 38 digits and a table of 50 digits. None of these uses intervals, lemmas or the search.
 
 use crate::tables;
 
@@ -24,15 +24,15 @@ fn plan(scene: &Scene, timeline: &Timeline) -> GreatestSpeed {
     greatest_speed(scene, timeline, LIMIT, &mut |_| ()).unwrap()
 }
 
-/// The greatest speed of any handle over the head's with the head so far along, and the handle's own.
+/// Returns the greatest speed of any handle over the head's at `travelled` metres, and the speed of `handle`.
 fn speeds(newton: &Newton, travelled: f64, handle: u32, chain: &mut Chain) -> (f64, f64) {
     newton.solve_at(travelled, chain).unwrap();
     let greatest = chain.speed.iter().fold(0f64, |greatest, speed| greatest.max(speed.abs()));
     (greatest, chain.speed[handle as usize].abs())
 }
 
-/// What is proved holds every speed that the safe solver finds, and the handle that is named is as fast as it should
-/// be.
+/// Asserts that the proved enclosure holds every speed that the safe solver finds, and that the named handle is as fast
+/// as stated.
 fn assert_holds(scene: &Scene, plan: &GreatestSpeed, freeze: f64, every: f64, who: &str) {
     let newton = Newton::new(scene.motion.path().clone(), *scene.team(), 1.0, Velocities::Computed);
     let mut chain = Chain::new(scene.team().handles());
@@ -96,14 +96,14 @@ fn tables_of_50_digits_and_the_reference_agree_with_the_turnaround() {
     let speed = handles[plan.handle as usize].speed;
     println!("{speed:.17} in [{least:.17}, {most:.17}]");
     assert!(least <= speed && speed <= most, "{speed} {plan:?}");
-    // Next to the peak it is slower: by far more than the enclosure is wide.
+    // Beside the peak the handle is slower by far more than the width of the enclosure.
     for beside in [-0.01, 0.01] {
         let handles = reference.handles(plan.time + beside).unwrap();
         assert!(handles[plan.handle as usize].speed < least, "{beside}");
     }
 }
 
-/// Turnarounds and routes whose radii are some links long.
+/// Returns turnarounds and routes whose radii are some links long.
 fn paths() -> impl Strategy<Value = String> {
     let turnaround = (1.0..2.5f64, 2.0..4.0f64, 0.5..2.0f64).prop_map(|(pitch, radius, ratio)| {
         format!(
@@ -144,7 +144,7 @@ fn random_paths_hold_what_dense_sampling_finds() {
             proved += 1;
             assert!(plan.value_hi - plan.value_lo <= 1e-9, "{text}: {plan:?}");
         } else {
-            // Where the peak is a corner at a junction the last digits may be missing; the enclosure stays one.
+            // If the peak is a corner at a junction, its last digits may be missing; the enclosure remains valid.
             given_up += 1;
             println!("given up: {plan:?}\n{text}");
             assert!(plan.value_hi - plan.value_lo <= 1e-7, "{text}: {plan:?}");

@@ -1,5 +1,5 @@
-//! The proved enclosures of a show's least clearance and of the least pitch against poses of the brute force that `tests/oracle` has, with distances
-//! by parry2d.
+//! The proved enclosures of a show's least clearance and of the least pitch, compared with poses of the brute force in
+//! `tests/compute/oracle`, with distances by parry2d.
 
 use bench_dragon::certify::plan::{LeastPitch, Overlap, least_pitch};
 use bench_dragon::certify::{ClearanceEnclosure, enclose_least_clearance};
@@ -13,10 +13,10 @@ use parry2d_f64::shape::Cuboid;
 /// The least pitch of the paper's team to 4.5 m, from computations with 50 digits.
 const LEAST_PITCH: f64 = 0.450_337_393_027_195_5;
 
-/// Metres by which the brute force may be off.
+/// Greatest error of the brute force, metres.
 const ROUNDING: f64 = 1e-10;
 
-/// The distance of two boards by parry, 0 where they overlap.
+/// Returns the distance of two boards by parry, 0 if they overlap.
 fn distance(team: &chain::Team, pose: &chain::Pose, [a, b]: [usize; 2]) -> f64 {
     let placed = |bench: usize| {
         let [front, rear] = [bench, bench + 1].map(|handle| pose.handles[handle].point);
@@ -28,8 +28,8 @@ fn distance(team: &chain::Team, pose: &chain::Pose, [a, b]: [usize; 2]) -> f64 {
     query::distance(&at_a, &shape_a, &at_b, &shape_b).unwrap().distance
 }
 
-/// The least distance of any two boards that share no handle; those further apart than `limit` by their middles are not
-/// looked at.
+/// Returns the least distance of any two boards that share no handle. Boards whose middles are further apart than
+/// `limit` are not tested.
 fn least_distance(team: &chain::Team, pose: &chain::Pose, limit: f64) -> f64 {
     let middle = |bench: usize| 0.5 * (pose.handles[bench].point + pose.handles[bench + 1].point);
     let reach = |bench: usize| (0.5 * team.link(bench) + team.hole_inset).hypot(0.5 * team.width);
@@ -38,7 +38,7 @@ fn least_distance(team: &chain::Team, pose: &chain::Pose, limit: f64) -> f64 {
     near.map(|pair| distance(team, pose, pair)).fold(f64::INFINITY, f64::min)
 }
 
-/// The enclosure of a scene's show, held against `samples` moments of it. `None` where there is none to be had.
+/// Compares the enclosure of a scene's show with `samples` times of the show. Returns `None` if there is no enclosure.
 fn compared(text: &str, samples: u32, most_steps: u64) -> Option<ClearanceEnclosure> {
     let scene = Scene::parse(text, "test", "test").ok()?;
     let timeline = scene.motion.timeline(&mut |_| ());
@@ -50,14 +50,14 @@ fn compared(text: &str, samples: u32, most_steps: u64) -> Option<ClearanceEnclos
     assert!(lo <= hi && hi - lo <= 1e-9, "{enclosure:?}");
     let (team, path) = scenes::read(text);
     let chain = chain::Chain::new(&path, &team);
-    // Parry has no depths: of boards that overlap it is only certain that they do.
+    // Parry computes no depths: it only tells that boards overlap.
     let there = distance(&team, &chain.pose(travelled), [bench_a, bench_b]);
     assert!(there <= hi.max(0.0) + ROUNDING, "{there} {enclosure:?}");
     if until.is_none_or(|until| travelled <= until) {
         assert!(lo <= there + ROUNDING, "{there} {enclosure:?}");
     }
     let end = until.unwrap_or(freeze.event.travelled);
-    // Near the end too, where a lock comes suddenly.
+    // Samples lie near the end too, since a lock comes suddenly.
     let moments = (0..samples).map(|k| end * f64::from(k) / f64::from(samples));
     let last = (4..12).map(|power| (end - 10f64.powi(-power)).max(0.0));
     for at in moments.chain(last) {
@@ -87,7 +87,7 @@ fn the_least_clearance_of_the_procession_is_enclosed_to_a_nanometre() {
 
 #[test]
 fn shows_that_end_with_a_lock_are_enclosed_up_to_it() {
-    // Boards that overlap and do not freeze the show; a lock in a spiral; locks where a nearer place takes the handle.
+    // Boards that overlap without ending the show; a lock in a spiral; locks at which a nearer place takes the handle.
     for file in ["scenes/noalerts", "../config/wide", "scenes/tailoff", "scenes/stall_missed", "scenes/pieces_59"] {
         let text = std::fs::read_to_string(format!("tests/{file}.toml")).unwrap();
         let enclosure = compared(&text, 40, 20_000).unwrap();
@@ -108,8 +108,8 @@ fn random_shows_are_no_nearer_than_is_proved() {
     assert!(tried >= 20 && proved >= 14, "{proved} of {tried}");
 }
 
-/// The least pitch of the team of a scene, held against the brute force: where the two boards overlap with `value_lo`, and
-/// all boards near the head, densely on the last turns, with `value_hi`.
+/// Compares the least pitch of a scene's team with the brute force: the two boards overlap with `value_lo`, and all
+/// boards near the head are apart, sampled densely on the last turns, with `value_hi`.
 fn least_pitch_compared(text: &str, radius: f64) -> LeastPitch {
     let scene = Scene::parse(text, "test", "test").unwrap();
     let plan = least_pitch(scene.team(), radius, &mut |_| ()).unwrap();
@@ -158,8 +158,8 @@ fn the_least_pitch_to_4_5_m_is_enclosed_to_a_nanometre() {
 
 #[test]
 fn least_pitches_of_other_teams_and_radii_are_those_of_the_brute_force() {
-    // Benches, lengths of the boards, width, inset, radius. Boards that touch a turn apart, at the radius and outside, pairs
-    // (0, k) and (1, k); wide boards that touch the next but one; a radius below half a link.
+    // Benches, lengths of the boards, width, inset, radius. Boards that touch a turn apart, at the radius and outside,
+    // pairs (0, k) and (1, k); wide boards that touch the next but one; a radius below half a link.
     let teams = [
         (20, 0.52, 0.57, 0.054, 0.135, 0.18),
         (20, 0.67, 0.4, 0.15, 0.05, 0.9),
@@ -179,7 +179,7 @@ fn least_pitches_of_other_teams_and_radii_are_those_of_the_brute_force() {
 
 #[test]
 fn a_link_that_locks_with_any_less_is_proved_too() {
-    // The head's link is more than twice the radius.
+    // The head's link is longer than twice the radius.
     let team = bench_dragon::motion::model::team::Team {
         benches: 8,
         head_length: 0.542,
@@ -191,7 +191,7 @@ fn a_link_that_locks_with_any_less_is_proved_too() {
     println!("{plan:?}");
     let (lo, hi) = (plan.value_lo, plan.value_hi.unwrap());
     assert!(plan.proved && plan.overlap.is_none() && hi - lo <= 1e-9, "{plan:?}");
-    // Points of the spiral at which the head's rear handle may be: the first peak of the distance from the radius.
+    // Possible places of the head's rear handle on the spiral: the first peak of the distance from the radius.
     let peak = |pitch: f64| {
         let (a, link) = (pitch / std::f64::consts::TAU, 0.512);
         let theta = 0.18 / a;

@@ -1,8 +1,8 @@
 //! An independent check of a scene's events: its own paths, followers, boards and searches, and random scenes on which
-//! the program has to agree with it. It shares no code with the library; only [`program_events`] calls that.
+//! the program must agree with it. It shares no code with the library; only [`program_events`] calls the library.
 //!
-//! `BENCH_DRAGON_ORACLE_SEED` and `BENCH_DRAGON_ORACLE_SCENES` choose other scenes and how many, `BENCH_DRAGON_LONG` runs
-//! 10,000, `BENCH_DRAGON_ORACLE_FILE` checks the scene in a file.
+//! `BENCH_DRAGON_ORACLE_SEED` and `BENCH_DRAGON_ORACLE_SCENES` select other scenes and their number.
+//! `BENCH_DRAGON_LONG` runs 10,000 scenes; `BENCH_DRAGON_ORACLE_FILE` checks the scene in a file.
 
 pub mod chain;
 mod comparison;
@@ -20,7 +20,7 @@ use chain::Chain;
 use comparison::{Comparison, Verdict, verdict};
 use scenes::{FAMILIES, Random, random_scene, read};
 
-/// What the program reports of one event.
+/// One event as the program reports it.
 #[derive(Clone, Debug)]
 struct Event {
     kind: &'static str,
@@ -31,7 +31,7 @@ struct Event {
     y: Option<f64>,
 }
 
-/// The events of a scene by the program, or the sentence with which it refuses the scene.
+/// Returns the events of a scene by the program, or the sentence that refuses the scene.
 fn program_events(scene_toml: &str) -> Result<Vec<Event>, String> {
     use bench_dragon::motion::timeline::TimedEvent;
     use bench_dragon::show::scene::Scene;
@@ -49,10 +49,10 @@ fn program_events(scene_toml: &str) -> Result<Vec<Event>, String> {
     Ok(timeline.events().iter().map(event).collect())
 }
 
-/// Seconds after which a scene is given up. The program's searches take a few at most.
+/// Time after which a scene is given up. The program's searches take a few seconds at most.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// [`program_events`] with a watchdog: a search that hangs or panics is an answer, too.
+/// Runs [`program_events`] with a watchdog; returns `None` if the search hangs or panics.
 fn program_answers(scene_toml: &str) -> Option<Result<Vec<Event>, String>> {
     let (sender, receiver) = mpsc::channel();
     let text = scene_toml.to_owned();
@@ -87,7 +87,7 @@ impl Tally {
             self.count(family, "ambiguous");
             self.ambiguous.push(format!("{name}: {:?}", found.ambiguous));
         }
-        // Who is in doubt accuses nobody.
+        // A scene in doubt is not counted as a failure.
         if !found.failures.is_empty() && found.ambiguous.is_empty() {
             self.count(family, "failed");
             self.failures.push(format!("==== {name}\n{}\n{text}", found.failures.join("\n")));
@@ -104,7 +104,7 @@ impl Tally {
     }
 }
 
-/// The comparison of one scene; `None` where the program refuses it.
+/// Compares one scene; returns `None` if the program refuses it.
 fn compare(text: &str) -> Option<Comparison> {
     let events = match program_answers(text) {
         Some(Err(_)) => return None,
@@ -128,8 +128,13 @@ fn the_program_agrees_with_brute_force() {
         return;
     }
     let seed = number_from("BENCH_DRAGON_ORACLE_SEED").unwrap_or(1);
-    let long = std::env::var_os("BENCH_DRAGON_LONG").is_some();
-    let scenes = number_from("BENCH_DRAGON_ORACLE_SCENES").unwrap_or(if long { 10_000 } else { 200 }) as usize;
+    let is = |name: &str, value: &str| std::env::var(name).is_ok_and(|given| given == value);
+    let scenes = match number_from("BENCH_DRAGON_ORACLE_SCENES") {
+        Some(scenes) => scenes as usize,
+        None if is("BENCH_DRAGON_LONG", "1") => 10_000,
+        None if is("BENCH_DRAGON_CASES", "few") => 50,
+        None => 200,
+    };
     let (next, tally) = (AtomicUsize::new(0), Mutex::new(Tally::default()));
     std::thread::scope(|scope| {
         for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
@@ -140,7 +145,7 @@ fn the_program_agrees_with_brute_force() {
                         return;
                     }
                     let family = index % FAMILIES.len();
-                    // Each scene has a seed of its own, so that one can be made again without the others.
+                    // Each scene has its own seed, so that it can be reproduced without the others.
                     let text = random_scene(family, &mut Random(seed << 32 | index as u64));
                     let started = Instant::now();
                     let found = compare(&text);
@@ -156,7 +161,7 @@ fn the_program_agrees_with_brute_force() {
     let tally = tally.into_inner().unwrap();
     tally.print();
     assert!(tally.failures.is_empty(), "{} scenes\n{}", tally.failures.len(), tally.failures.join("\n"));
-    // Shares a little below those seen: without events there is nothing to agree about.
+    // Shares a little below those observed: a comparison without events proves nothing.
     for (kind, share) in
         [("contact", 0.12), ("no contact", 0.3), ("stall", 0.4), ("no stall", 0.1), ("lock", 0.4), ("path_end", 0.2)]
     {
@@ -178,7 +183,7 @@ fn team(benches: usize, head: f64, body: f64, width: f64, inset: f64) -> String 
     )
 }
 
-/// Legs written as `line(metres)` and `arc(radius, turns)`, negative turns to the right.
+/// Returns segments as TOML: `line(metres)` and `arc(radius, turns)`, negative turns to the right.
 fn route(segments: &[[f64; 2]]) -> String {
     segments
         .iter()
@@ -208,7 +213,7 @@ fn the_oracle_knows_the_paper_scene() {
     assert_eq!((contact.benches, stalled, locked), ((0, 8), 0, 0));
 }
 
-/// Figures that another brute force found, with 113 bits.
+/// Figures that another brute force found with 113 bits.
 #[test]
 fn the_oracle_finds_what_another_oracle_found() {
     let stall_of = |scene: String| verdict_of(&scene).stall.unwrap().0;

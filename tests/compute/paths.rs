@@ -1,5 +1,5 @@
-//! Turnarounds and routes: events, least clearance and plans against dense sampling of all pairs, and what a live
-//! subscriber relies on at the junctions.
+//! Turnarounds and routes: events, least clearance and plans against dense sampling of all pairs, and the properties at
+//! junctions on which a live subscriber relies.
 
 use bench_dragon::certify::plan::{greatest_speed, least_pitch};
 use bench_dragon::messages::state::EventKind;
@@ -31,7 +31,7 @@ fn timeline(scene: &Scene) -> Timeline {
     scene.motion.timeline(&mut |_| ())
 }
 
-/// The chain with the head so far along, as the safe solver has it.
+/// Computes the chain at `travelled` metres with the safe solver.
 fn chain_at(scene: &Scene, travelled: f64, chain: &mut Chain) -> bool {
     let newton = Newton::new(scene.motion.path().clone(), *scene.team(), 1.0, Velocities::Computed);
     newton.solve_at(travelled, chain).is_ok()
@@ -61,8 +61,8 @@ fn the_turnaround_is_free_and_its_least_clearance_is_that_of_dense_sampling() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// Time reversal: with equal links, a chain in the turn, run backwards and turned by half a turn, is the chain in the
-    /// turn whose arcs are exchanged.
+    /// Time reversal: with equal links, a chain in the turn, run backwards and turned by half a turn, is the chain in
+    /// the turn whose arcs are exchanged.
     #[test]
     fn the_way_out_is_the_way_in_backwards(ratio in 0.5..2.0f64, head in 40.0..110.0f64) {
         let team = Team { benches: 20, head_length: 2.2, body_length: 2.2, width: 0.3, hole_inset: 0.275 };
@@ -84,7 +84,7 @@ proptest! {
 }
 
 /// Through the whole turn at 1 kHz: no handle goes further from frame to frame than its speed allows, velocities are
-/// the motion's, and the alert level does not flicker.
+/// those of the motion, and the alert level does not flicker.
 #[test]
 fn nothing_jumps_at_the_junctions_and_no_alert_flickers() {
     let scene = turnaround();
@@ -100,7 +100,7 @@ fn nothing_jumps_at_the_junctions_and_no_alert_flickers() {
         if let Some(before) = &before {
             for i in 0..frame.chain.handles() {
                 let moved = (frame.chain.x[i] - before.x[i], frame.chain.y[i] - before.y[i]);
-                // Half a frame at either velocity; what a slope that jumps in between can add is second order.
+                // Half a frame at either velocity; a slope that jumps in between adds a second-order term.
                 let expected =
                     (0.5 * (frame.chain.vx[i] + before.vx[i]) / rate, 0.5 * (frame.chain.vy[i] + before.vy[i]) / rate);
                 worst = worst.max((moved.0 - expected.0).hypot(moved.1 - expected.1));
@@ -139,7 +139,7 @@ fn a_hairpin_that_is_too_tight_stalls_and_locks() {
     let kinds: Vec<_> = timeline.events().iter().map(|timed| timed.event.kind).collect();
     println!("{:?}", timeline.events());
     assert!(kinds.contains(&EventKind::Stall) && timeline.end().event.kind == EventKind::Lock);
-    // The head is then still on the arc, the rear handle on the line before it: t . b = 0 in closed form.
+    // The head is then still on the arc, and the rear handle on the line before it: t . b = 0 in closed form.
     let (radius, link) = (0.5, 2.86);
     let angle = (stall.time - 10.0) / radius;
     let head = (10.0 + radius * angle.sin(), radius * (1.0 - angle.cos()));

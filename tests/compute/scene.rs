@@ -1,4 +1,4 @@
-//! What a scene file means: every default as documented, and the same thing stated in two ways.
+//! The meaning of a scene file: every default as documented, and the same scene stated in two ways.
 
 use std::f64::consts::{PI, TAU};
 
@@ -13,7 +13,7 @@ use bench_dragon::show::{Playback, Show};
 const TEAM: &str =
     "[team]\nbenches = 20\nhead_length = 3.41\nbody_length = 2.2\nwidth = 0.3\nhole_inset = 0.275\n[path]\n";
 
-/// A scene of this path, with these further tables.
+/// Returns a scene of this path with further tables.
 fn scene(path: &str, speed: f64, further: &str) -> Scene {
     let text = format!("{TEAM}{path}\n[motion]\nhead_speed = {speed:?}\n{further}");
     Scene::parse(&text, "a/folder/dragons.toml", "dragons").unwrap()
@@ -69,7 +69,7 @@ fn a_turnaround_leads_out_by_the_length_of_its_team() {
     assert!((lead_out - (2.86 + 19.0 * 1.65)).abs() < 1e-12, "{lead_out} m");
 }
 
-/// Metres are metres and seconds are seconds, however fast the head goes.
+/// Metres are metres and seconds are seconds at any speed of the head.
 #[test]
 fn cues_are_at_the_times_that_the_scene_states() {
     let cues = "[alerts]\n[[cues]]\nname = \"way\"\ntravelled = 3.0\n[[cues]]\nname = \"time\"\nat = 4.0\n\
@@ -91,12 +91,12 @@ fn stage_of(path: &str) -> Stage {
     stage(1, 2, [0; 32], &scene.motion, &show)
 }
 
-/// Metres from the centre at which a spiral ends, by the numbers of its message alone.
+/// Returns the radius at which a spiral ends, from the numbers of its message alone, metres.
 fn end_radius(stage: &Stage, segment: usize) -> f64 {
     stage.pitch / TAU * stage.path[segment].theta_last
 }
 
-/// What a display draws: each segment of the message begins where the numbers of the one before end.
+/// Each segment of the message, as a display draws it, begins where the segment before ends.
 #[test]
 fn the_segments_of_a_stage_join() {
     let turn = "kind = \"turnaround\"\npitch = 1.7\nturn_radius = 4.5\narc_ratio = 2\nlead_in = 9";
@@ -104,7 +104,7 @@ fn the_segments_of_a_stage_join() {
     let kinds: Vec<u32> = stage.path[..stage.segments as usize].iter().map(|segment| segment.kind).collect();
     assert_eq!(kinds, [SEGMENT_INWARD_SPIRAL, SEGMENT_ARC, SEGMENT_ARC, SEGMENT_OUTWARD_SPIRAL]);
     let radius = |segment: usize| stage.path[segment].x.hypot(stage.path[segment].y);
-    // Inward to the turn's radius, and outward from it.
+    // The first spiral ends at the turn's radius, and the second begins there.
     assert!((end_radius(&stage, 0) - 4.5).abs() < 1e-9 && (radius(1) - 4.5).abs() < 1e-9);
     assert!((radius(3) - 4.5).abs() < 1e-9 && (stage.pitch / TAU * stage.path[3].theta_first - 4.5).abs() < 1e-9);
     assert!(end_radius(&stage, 3) > 5.0);

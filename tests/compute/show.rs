@@ -1,5 +1,5 @@
-//! The show: deterministic, without drift, frozen and looped as the scene states, and with levels that do not depend on
-//! how often it is looked at.
+//! The show: deterministic, without drift, ended and looped as the scene states, and with levels that do not depend on
+//! the number of frames.
 
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::messages::state::{FrameState, Level, PlaybackState};
@@ -24,7 +24,7 @@ fn playback() -> Playback {
     Playback { end_hold: 0.0, ..Playback::of(&Scene::paper()) }
 }
 
-/// The frames of a loop are those of a solver of their own at times counted in whole ticks, whichever frames were
+/// The frames of a loop equal those of a separate solver at times counted in whole ticks, whichever frames were
 /// computed before: a skipped period or another run changes no bit.
 #[test]
 fn a_frame_is_that_of_its_tick_whatever_came_before() {
@@ -93,11 +93,11 @@ fn a_loop_begins_again_where_it_began() {
     assert_eq!((again.state, again.playback), (FrameState::Approaching, PlaybackState::Playing));
     let stamps = Stamps { run_id: 1, sequence: 30, stamp_ns: 2, deadline_ns: 3 };
     let [before, after] = [&first, again].map(|frame| frame_header(frame, stamps));
-    assert_eq!((before.epoch, after.epoch), (0, 1), "who interpolates starts anew");
+    assert_eq!((before.epoch, after.epoch), (0, 1), "the epoch tells readers to restart their interpolation");
     assert_eq!((after.tick, after.sequence, after.handles, after.time_scale), (30, 30, 224, 1.0));
 }
 
-/// The nearest two boards are those of the frame at every level; the event is the one ahead, then the one that happened.
+/// The nearest two boards are those of the frame at every level; the event is the next one, then the one that happened.
 #[test]
 fn an_alert_knows_what_it_is_about_and_who_is_nearest_now() {
     let mut show = show(Playback { start: 380.0, rate: 10.0, ..playback() });
@@ -161,7 +161,7 @@ fn a_tick_past_the_lock_freezes_the_show_at_it() {
     }
 }
 
-/// A show whose events no search has found, as when one gave up: the frames themselves show the contact.
+/// A show whose events were not found, as after a search that gave up: the frames themselves show the contact.
 #[test]
 fn boards_that_overlap_unforeseen_are_a_contact_at_once() {
     let scene = Scene::paper();
@@ -184,7 +184,7 @@ fn boards_that_overlap_unforeseen_are_a_contact_at_once() {
     assert!((contact.time - 412.474).abs() < 1e-9, "{contact:?}");
 }
 
-/// The levels announced over a whole show, repeats left out, and the times of the events as announced.
+/// Returns the levels announced over a whole show, without repeats, and the times of the events as announced.
 fn levels(rate: f64, time_scale: f64, start: f64, on_contact: OnContact) -> (Vec<Level>, Vec<(Level, f64)>) {
     let mut show = show(Playback { rate, time_scale, start, on_contact, ..playback() });
     let ticks = ((show.freeze_time() - start) * rate / time_scale).ceil() as u64 + 2;
@@ -212,7 +212,7 @@ fn the_paper_scene_never_flickers() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(12) })]
 
-    /// What is announced depends neither on the rate nor on the time scale.
+    /// The announcements depend neither on the rate nor on the time scale.
     #[test]
     fn events_do_not_depend_on_the_rate(exponent in -0.3f64..3.7, time_scale in 0.5f64..2.0) {
         use Level::{Approaching, Clear, Contact, Lock, Stall};

@@ -1,5 +1,5 @@
 //! One suite that every solver runs, on every kind of path: the figures of 50 digits and the README's table of them,
-//! the promise against the reference of 38 digits, what follows from rigidity, and the same bits every time.
+//! the promise against the reference of 38 digits, the consequences of rigidity, and the same bits every time.
 //!
 //! The promise: for the pose at the given double `time`, the error is at most max(accuracy, 8 eps (r + distance
 //! travelled)), and links hold to 1e-12 link + 4 ulp(r) and the rounding of the numbers that a segment is made of.
@@ -30,10 +30,10 @@ use tables::{Row, table};
 
 const ACCURACY: f64 = 1e-9;
 
-/// A motion to be solved, and until when.
+/// A motion and the time up to which it is solved.
 struct Subject {
     motion: Motion,
-    /// Seconds up to which it is tested: the lock or path end, or an event that is named.
+    /// Seconds up to which the motion is tested: the lock or path end, or a named event.
     end: f64,
 }
 
@@ -51,7 +51,7 @@ impl Subject {
         Self { motion, end }
     }
 
-    /// A scene of `config/`, up to its contact where it has one.
+    /// Returns a scene of `config/`, up to its contact if it has one.
     fn scene(name: &str) -> Self {
         let scene = Scene::load(&std::path::Path::new("config").join(format!("{name}.toml"))).unwrap();
         let timeline = scene.motion.timeline(&mut |_| ());
@@ -67,7 +67,7 @@ impl Subject {
         Newton::new(self.motion.path().clone(), *self.motion.team(), self.motion.head_speed(), Velocities::Computed)
     }
 
-    /// What an accuracy of 1e-9 m selects, on every code path, by name.
+    /// Returns the solvers that an accuracy of 1e-9 m selects, on every code path, by name.
     fn selected(&self) -> Vec<(String, Box<dyn Solver>)> {
         let (motion, velocities) = (&self.motion, Velocities::Computed);
         let selection = selection::cheapest(motion.path(), *motion.team(), motion.head_speed(), velocities, ACCURACY);
@@ -79,7 +79,7 @@ impl Subject {
         selected.collect()
     }
 
-    /// Every solver that follows exact motion, on every code path, by name.
+    /// Returns every solver that follows exact motion, on every code path, by name.
     fn solvers(&self) -> Vec<(String, Box<dyn Solver>)> {
         let newton: (String, Box<dyn Solver>) = ("newton".to_owned(), Box::new(self.newton()));
         let tables = Instructions::available().into_iter().filter_map(|instructions| {
@@ -89,8 +89,8 @@ impl Subject {
         std::iter::once(newton).chain(tables).collect()
     }
 
-    /// What holds of a chain by itself: finite, links as long as promised, headings those of the positions, velocities
-    /// along the path and equal at both ends of a link along it.
+    /// Asserts the properties of a chain alone: finite, links as long as promised, headings that fit the positions,
+    /// velocities along the path and equal at both ends of a link along the link.
     fn assert_sound(&self, chain: &Chain, time: f64, who: &str) {
         let team = self.motion.team();
         let at = || format!("{who} at {time} s: {:?} {team:?}", self.motion.description());
@@ -115,15 +115,15 @@ impl Subject {
         }
         for handle in 0..chain.handles() {
             let size = chain.vx[handle].hypot(chain.vy[handle]);
-            // What a wish selects is as smooth as links of 1e-12 need it.
+            // The selected solver is as smooth as links of 1e-12 require.
             let apart = if who.starts_with("1e-9 m") { 2e-11 } else { 1e-12 };
             assert!((size - chain.speed[handle].abs()).abs() <= apart * size.max(1e-300), "speed {handle}: {}", at());
         }
         assert_eq!(chain.heading[team.benches], chain.heading[team.benches - 1], "{}", at());
     }
 
-    /// A chain against the reference. Near a lock, where conditioning multiplies errors, so much is allowed as a handle
-    /// moves in the rounding of the time: its speed over the head's times more.
+    /// Compares a chain with the reference. Near a lock, where conditioning multiplies errors, the allowance grows by
+    /// the handle's movement within the rounding of the time: its speed over the head's.
     fn assert_true(&self, reference: &mut Reference, chain: &Chain, time: f64, who: &str) {
         let truth = reference.handles(time).unwrap_or_else(|_| panic!("no truth at {time} s"));
         let speed = self.motion.head_speed();
@@ -142,7 +142,7 @@ impl Subject {
         Reference::new(*self.motion.team(), self.motion.description(), self.motion.head_speed()).unwrap()
     }
 
-    /// Every solver at each of `times`.
+    /// Tests every solver at each of `times`.
     fn assert_promise(&self, times: &[f64]) {
         let mut chain = Chain::new(self.motion.team().handles());
         let mut reference = self.reference();
@@ -171,10 +171,10 @@ fn paper_team() -> Team {
     Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 }
 }
 
-/// The paper's scene and the turnaround with their tables of 50 digits.
+/// Returns the paper's scene and the turnaround with their tables of 50 digits.
 fn tables() -> [(&'static str, Subject, Vec<Row>); 2] {
     let paper = PathDescription::Spiral { pitch: 0.55, start_turn: 16.0 };
-    // The table's clock stands at 0 with the head at the start of the turn, 100 s into the scene.
+    // The table's clock is 0 with the head at the start of the turn, 100 s into the scene.
     let turnaround =
         PathDescription::Turnaround { pitch: 1.7, turn_radius: 4.5, arc_ratio: 2.0, lead_in: 100.0, lead_out: 369.16 };
     let since_start = |row: Row| Row { time: row.time + 100.0, ..row };
@@ -185,7 +185,7 @@ fn tables() -> [(&'static str, Subject, Vec<Row>); 2] {
     ]
 }
 
-/// The largest position error, metres, and relative speed error of a solver over rows.
+/// Returns the largest position error in metres and the largest relative speed error of a solver over rows.
 fn errors<'a>(solver: &mut dyn Solver, rows: impl Iterator<Item = &'a Row>) -> (f64, f64) {
     let mut chain = Chain::new(224);
     let (mut solved, mut position, mut speed) = (f64::NAN, 0f64, 0f64);
@@ -201,8 +201,8 @@ fn errors<'a>(solver: &mut dyn Solver, rows: impl Iterator<Item = &'a Row>) -> (
     (position, speed)
 }
 
-/// The README's table of errors against 50 digits, as this test measures it: nothing may be more than twice as far off
-/// as is printed there.
+/// The README's table of errors against 50 digits, as this test measures it: no error may be more than twice the
+/// printed one.
 #[test]
 fn the_readme_says_how_exact_every_solver_is() {
     let readme = include_str!("../../README.md");
@@ -257,11 +257,11 @@ fn every_scene_of_the_configuration_keeps_the_promise() {
 
 #[test]
 fn corners_of_the_ranges() {
-    // Benches, links of head and body, pitch, start turn, speed. Each line states what it is there for.
+    // Benches, links of head and body, pitch, start turn, speed. Each comment states the reason for its line.
     let corners = [
-        // The closest start there is for a team that fits: all of it within two turns.
+        // The closest start for a team that fits: all of it within two turns.
         spiral(1, 0.3, 0.3, 0.55, 1.0, 1.0),
-        // So far out that a double has no digits left for a bench.
+        // So far out that the digits of a double do not resolve a bench.
         spiral(3, 2.86, 1.65, 0.55, 1e7, 1.0),
         spiral(3, 1e3, 1e3, 1e4, 1e7, 1e6),
         // A fine spiral under long boards, and a coarse one under short boards.
@@ -281,21 +281,21 @@ fn corners_of_the_ranges() {
         spiral(6, 0.055, 0.055, 0.55, 3.0, 1.0),
         // Past the stall of a long head's link the short team behind it is pushed far out again.
         spiral(9, 1.0, 0.007, 1.7, 0.12, 1.0),
-        // The head's link is promised to its own length, which is a two hundredth of the others'.
+        // The head's link is promised relative to its own length, which is a two hundredth of the others'.
         spiral(8, 0.01, 2.0, 0.55, 8.0, 1.0),
     ];
     for subject in corners {
         println!("{subject:?}");
         subject.assert_promise(&[0.0, 0.3, 0.7, 0.99, 1.0 - 1e-6].map(|share| share * subject.end));
     }
-    // Ten years into a show: nothing may have added up on the way.
+    // Ten years into a show: no error may have accumulated.
     let subject = spiral(12, 2.86, 1.65, 0.55, 2e4, 1.0);
     let times = [10_000_000_000u64 - 2, 10_000_000_000].map(|tick| tick as f64 / 30.0);
     assert!(subject.end > times[1]);
     subject.assert_promise(&times);
 }
 
-/// Where a link is to hold to the last digits of x and y themselves, the angle's own digits must not cost any.
+/// Links hold to the last digits of x and y themselves; the digits of the angle must not cost any.
 #[test]
 fn short_links_far_from_the_centre() {
     let subject = spiral(20, 0.0156, 0.006126810246871752, 0.08501015264165514, 1627.284520913776, 1.0);
@@ -311,7 +311,7 @@ fn short_links_far_from_the_centre() {
 
 #[test]
 fn a_hundred_thousand_benches_hold_their_links() {
-    // The reference would take minutes; the safe solver stands in for it, itself tested above.
+    // The reference would take minutes; the safe solver, which is tested above, replaces it.
     let team = Team { benches: 100_000, ..paper_team() };
     let subject = Subject::new(PathDescription::Spiral { pitch: 0.55, start_turn: 16.0 }, team, 1.0);
     let (mut chain, mut safe) = (Chain::new(100_001), Chain::new(100_001));
@@ -322,7 +322,7 @@ fn a_hundred_thousand_benches_hold_their_links() {
         subject.assert_sound(&chain, time, "follower_table");
         for i in 0..chain.handles() {
             let error = (chain.x[i] - safe.x[i]).hypot(chain.y[i] - safe.y[i]);
-            // The last digit of a link, a hundred thousand times in one direction.
+            // The last digit of a link adds up, a hundred thousand times in one direction.
             assert!(error <= 1e5 * f64::EPSILON * 1.65, "handle {i}: {error:e} m");
         }
     }
@@ -342,7 +342,7 @@ fn a_time_past_the_lock_is_an_error_and_no_jump() {
     }
 }
 
-/// Frames do not depend on the ones before, past the table's end and back in it included.
+/// Frames do not depend on earlier frames, even past the table's end and back in it.
 #[test]
 fn a_frame_of_the_table_does_not_depend_on_the_ones_before() {
     for name in ["paper", "turnaround", "procession"] {
@@ -360,7 +360,7 @@ fn a_frame_of_the_table_does_not_depend_on_the_ones_before() {
     }
 }
 
-/// The table reaches its own end without a jump, and hands over without one.
+/// The table reaches its own end without a jump, and hands over without a jump.
 #[test]
 fn no_handle_jumps_from_piece_to_piece() {
     for name in ["paper", "turnaround", "procession"] {

@@ -1,4 +1,4 @@
-//! The paper's solver against its printed tables, and against its own model's limit computed with 50 digits.
+//! The paper's solver, compared with its printed tables and with its own model's limit computed with 50 digits.
 
 use crate::tables;
 
@@ -12,7 +12,7 @@ fn paper_team() -> Team {
     Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 }
 }
 
-/// The largest position error in metres and relative speed error of a solver at each time of a table.
+/// Returns the largest position error in metres and relative speed error of a solver at each time of a table.
 fn errors(solver: &mut dyn Solver, rows: &[Row]) -> Vec<(f64, f64, f64)> {
     let mut chain = Chain::new(224);
     rows.chunk_by(|a, b| a.time == b.time)
@@ -102,13 +102,13 @@ fn paper_reproduces_the_printed_collision_but_for_two_misprints() {
         let misprinted = handle == 51 || handle == 223;
         assert_eq!((chain.y[handle] - y).abs() > 1e-5, misprinted, "y of handle {handle}");
         if misprinted {
-            // With the printed y the point would lie off the spiral: nowhere near r = a theta for its own theta.
+            // With the printed y the point would lie off the spiral: far from r = a theta for its own theta.
             let theta = y.atan2(x).rem_euclid(std::f64::consts::TAU);
             let turns = (x.hypot(y) / 0.55 - theta / std::f64::consts::TAU).rem_euclid(1.0);
             assert!(turns.min(1.0 - turns) > 0.1, "handle {handle} as printed would lie on the spiral");
         }
     }
-    // What the paper's own model gives in their place.
+    // The values of the paper's own model for the same points.
     assert!((chain.y[51] - 4.300697).abs() < 1e-5 && (chain.y[223] - 8.312013).abs() < 1e-5);
 }
 

@@ -1,9 +1,9 @@
-//! The fuzz targets as tests that run everywhere: the corpus, the inputs to begin with, and a fixed number of seeded changes
-//! of them.
+//! The fuzz targets as tests that run everywhere: the corpus, the initial inputs, and a fixed number of seeded changes
+//! of both.
 //!
-//! Each target has a share of seconds; `BENCH_DRAGON_LONG=1` runs a hundred times as many cases, and `BENCH_DRAGON_FUZZ_CASES`
-//! and `BENCH_DRAGON_FUZZ_SEED` choose how many, and others. An input that fails is written to the folder for temporary
-//! files, and belongs into `tests/fuzz/corpus` once what it found is mended.
+//! Each target takes some seconds. `BENCH_DRAGON_LONG=1` runs a hundred times as many cases; `BENCH_DRAGON_FUZZ_CASES`
+//! and `BENCH_DRAGON_FUZZ_SEED` set their number and select other cases. An input that fails is written to the folder
+//! for temporary files. It belongs in `tests/fuzz/corpus` once the fault is fixed.
 
 #[path = "../harness/mod.rs"]
 mod harness;
@@ -18,15 +18,15 @@ use std::sync::{Once, mpsc};
 use fastrand::Rng;
 use targets::{TARGETS, Target};
 
-/// One case in so many begins with an input that was kept: those are larger, and slow.
+/// One case in this many begins with a kept input: those are larger, and slow.
 const KEPT: u32 = 64;
-/// Inputs of the cases that are changed further, for each to begin with.
+/// Changed inputs per initial input that are kept as starts of later cases.
 const CHANGES_KEPT: usize = 3;
 
 /// The name of the threads that run cases.
 const CASES: &str = "cases";
 
-/// Panics so far of threads that a target has started, such as a server's.
+/// Panics so far in threads that a target has started, such as a server's.
 static PANICS: AtomicU64 = AtomicU64::new(0);
 
 fn count_panics() {
@@ -43,7 +43,7 @@ fn count_panics() {
     });
 }
 
-/// The inputs that are kept for a target: scenes that were once answered wrongly are, too.
+/// Returns the kept inputs of a target, including scenes that were once answered wrongly.
 fn kept(name: &str) -> Vec<(PathBuf, Vec<u8>)> {
     let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
     let folders = [tests.join("fuzz/corpus").join(name), tests.join(format!("{name}s"))];
@@ -58,7 +58,7 @@ fn setting(name: &str) -> Option<u64> {
     std::env::var(name).ok().map(|value| value.parse().unwrap_or_else(|_| panic!("{name} is {value}")))
 }
 
-/// Runs an input: whether it got in, or what went wrong.
+/// Runs an input: returns true if it was accepted, or the error.
 fn outcome(target: &Target, input: &[u8]) -> Result<bool, String> {
     let before = PANICS.load(Ordering::SeqCst);
     let said = |panic: Box<dyn Any + Send>| match panic.downcast::<String>() {
@@ -72,7 +72,7 @@ fn outcome(target: &Target, input: &[u8]) -> Result<bool, String> {
     }
 }
 
-/// Where an input that fails is left.
+/// Writes an input that fails to a file and returns its path.
 fn written(target: &Target, input: &[u8]) -> PathBuf {
     let hash = blake3::hash(input).to_hex();
     let file = std::env::temp_dir().join(format!("fuzz-{}-{}", target.name, &hash[..12]));
@@ -116,7 +116,7 @@ fn fuzz(name: &str) {
         let input = (target.mutate)(from, &mut random);
         let is_in = run(&input);
         got_in += u64::from(is_in);
-        // Changes of changes, too, of those that get in: what is refused at once leads nowhere.
+        // Accepted inputs are changed again; changes of refused inputs reach no further code.
         if is_in && !from_kept && random.u8(..10) == 0 {
             if inputs.len() < CHANGES_KEPT * seeds.len() {
                 inputs.push(input);
@@ -179,7 +179,7 @@ fn command_line() {
 fn every_target_is_built_for_libfuzzer_and_every_kept_input_belongs_to_one() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     for Target { name, .. } in &TARGETS {
-        // The package does not hold them.
+        // The package does not contain this folder.
         if root.join("fuzz").exists() {
             assert!(root.join(format!("fuzz/fuzz_targets/{name}.rs")).exists(), "{name}");
         }

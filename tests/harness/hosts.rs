@@ -30,14 +30,14 @@ impl Hosts {
         Ok(hosts)
     }
 
-    /// Whether the cable carries multicast: "on" or "off".
+    /// Sets whether the cable carries multicast: "on" or "off".
     pub fn set_multicast(&self, multicast: &str) {
         for (host, end) in ["left", "right"].map(unique).iter().zip(&self.ends) {
             ip(&format!("-n {host} link set {end} multicast {multicast}")).unwrap();
         }
     }
 
-    /// A command on a host, "left" or "right", in a folder.
+    /// Returns a command on a host, "left" or "right", in a folder.
     pub fn on(&self, host: &str, folder: &Path, command: &Command) -> Command {
         let mut inside = Command::new("ip");
         inside.args(["netns", "exec", &unique(host)]).arg(command.get_program()).args(command.get_args());
@@ -45,7 +45,7 @@ impl Hosts {
         inside
     }
 
-    /// Bytes that the left host has sent so far.
+    /// Returns the number of bytes that the left host has sent so far.
     pub fn sent_bytes(&self) -> u64 {
         let mut command = Command::new("cat");
         command.arg(format!("/sys/class/net/{}/statistics/tx_bytes", self.ends[0]));

@@ -1,4 +1,4 @@
-//! Real processes for tests: each is ended by a deadline or with its test. Shared by the tests that start some.
+//! Real processes for tests: each ends by a deadline or with its test. Shared by the tests that start processes.
 
 #![allow(dead_code, reason = "not every test file uses all of it")]
 
@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-/// The user who has nothing.
+/// The user id of a user without rights.
 const NOBODY: u32 = 65534;
 
 /// A process that does not outlive its test.
@@ -39,11 +39,11 @@ impl Process {
         nix::sys::signal::kill(nix::unistd::Pid::from_raw(self.0.id() as i32), signal).unwrap();
     }
 
-    /// Stops the process: `kill` returns before the signal takes hold, this once every thread stands still.
+    /// Stops the process. `kill` returns before the signal takes effect; this returns once every thread is stopped.
     pub fn stop(&self) {
         self.signal(nix::sys::signal::Signal::SIGSTOP);
         let tasks = format!("/proc/{}/task", self.id());
-        wait_until("every thread stands still", || {
+        wait_until("every thread is stopped", || {
             std::fs::read_dir(&tasks).unwrap().flatten().all(|task| {
                 let stat = std::fs::read_to_string(task.path().join("stat")).unwrap_or_default();
                 // The state follows the name, which is in parentheses.
@@ -52,7 +52,7 @@ impl Process {
         });
     }
 
-    /// Closes the reading end of standard output, as `| head` does once it has enough.
+    /// Closes the reading end of standard output, as `| head` does after its last line.
     pub fn close_stdout(&mut self) {
         drop(self.0.stdout.take());
     }
@@ -62,7 +62,7 @@ impl Process {
         drop(self.0.stderr.take());
     }
 
-    /// Lines of standard output as they come; `output_within` is then not to be called.
+    /// Returns the lines of standard output as they come; `output_within` must not be called afterwards.
     pub fn lines(&mut self) -> Lines {
         let (sender, lines) = channel();
         let stdout = self.0.stdout.take().unwrap();
@@ -73,7 +73,7 @@ impl Process {
         Lines(lines)
     }
 
-    /// The first line that the process prints within `seconds`.
+    /// Returns the first line that the process prints within `seconds`.
     pub fn first_line_within(&mut self, seconds: u64) -> String {
         let mut output = BufReader::new(self.0.stdout.take().unwrap());
         let (sender, receiver) = channel();
@@ -87,11 +87,11 @@ impl Process {
         receiver.recv_timeout(Duration::from_secs(seconds)).unwrap()
     }
 
-    /// What the process printed, once it has ended by itself within `seconds`; nothing on standard output after
+    /// Returns the output of the process, which must end by itself within `seconds`; without standard output after
     /// [`first_line_within`](Self::first_line_within).
     pub fn output_within(mut self, seconds: u64) -> Output {
         let deadline = Instant::now() + Duration::from_secs(seconds);
-        // Read beside waiting: a full pipe would stop the process.
+        // Read while waiting: a full pipe would stop the process.
         let [stdout, stderr] =
             [std::thread::spawn(reading(self.0.stdout.take())), std::thread::spawn(reading(self.0.stderr.take()))];
         let status = loop {
@@ -105,22 +105,22 @@ impl Process {
     }
 }
 
-/// What a process prints while it runs.
+/// Lines that a process prints while it runs.
 pub struct Lines(Receiver<String>);
 
 impl Lines {
-    /// The next line that contains `what`, which has to come within `seconds`; the lines before it are gone.
+    /// Returns the next line that contains `what`, which must come within `seconds`; earlier lines are dropped.
     pub fn until(&self, what: &str, seconds: u64) -> String {
-        // The last line of those is the one.
+        // The last of these lines is the requested one.
         self.all_until(what, seconds).pop().unwrap()
     }
 
-    /// The lines up to the next one that contains `what`, which has to come within `seconds`, and that one.
+    /// Returns the lines up to and including the next one that contains `what`, which must come within `seconds`.
     pub fn all_until(&self, what: &str, seconds: u64) -> Vec<String> {
         self.all_until_one(|line| line.contains(what), what, seconds)
     }
 
-    /// The lines up to the next one that `is_it` accepts, which has to come within `seconds`, and that one.
+    /// Returns the lines up to and including the next one that `is_it` accepts, which must come within `seconds`.
     pub fn all_until_one(&self, is_it: impl Fn(&str) -> bool, what: &str, seconds: u64) -> Vec<String> {
         let deadline = Instant::now() + Duration::from_secs(seconds);
         let mut lines = Vec::new();
@@ -133,7 +133,7 @@ impl Lines {
         }
     }
 
-    /// All lines until the process ends, which has to be within `seconds`.
+    /// Returns all lines until the process ends, which must happen within `seconds`.
     pub fn rest(&self, seconds: u64) -> Vec<String> {
         let deadline = Instant::now() + Duration::from_secs(seconds);
         let mut lines = Vec::new();
@@ -148,11 +148,11 @@ impl Lines {
     }
 }
 
-/// A setting of a scene by which a subscriber loses nothing while a busy machine does not run it: the default queue lasts a
-/// third of a second at 200 Hz, this one two and a half.
+/// A setting of a scene with which a subscriber loses nothing while a busy machine does not run it. The default queue
+/// lasts a third of a second at 200 Hz, this queue two and a half seconds.
 pub const LONG_QUEUE: &str = "queue = 500";
 
-/// An iceoryx2 of its own: processes of another place are not seen, and what is left behind can be counted.
+/// A separate iceoryx2: processes of other places are not visible, and stale files can be counted.
 pub struct Place {
     folder: tempfile::TempDir,
     prefix: String,
@@ -171,14 +171,14 @@ impl Place {
         self.folder.path()
     }
 
-    /// The program here, under its usual name.
+    /// Returns the program in this place, under its usual name.
     pub fn program(&self) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
         command.current_dir(self.folder());
         command
     }
 
-    /// The paper's scene, published with these settings too.
+    /// Returns the paper's scene with these further publish settings.
     pub fn scene_publishing(&self, settings: &str) -> PathBuf {
         let scene = include_str!("../../config/paper.toml").replace("[publish]", &format!("[publish]\n{settings}"));
         let file = self.folder().join("scene.toml");
@@ -186,7 +186,7 @@ impl Place {
         file
     }
 
-    /// What the program prints here as the user who has nothing, from a copy that this user may read.
+    /// Runs the program in this place as the user without rights, from a copy that this user may read.
     pub fn as_nobody(&self, arguments: &[&str]) -> Output {
         let copy = self.folder().join("bench-dragon");
         if !copy.exists() {
@@ -199,7 +199,7 @@ impl Place {
         Process::start(&mut command).output_within(300)
     }
 
-    /// Files that exist here.
+    /// Returns the files that exist in this place.
     pub fn left_behind(&self) -> Vec<PathBuf> {
         let mut files = self.shared_memory();
         files.extend(files_below(&self.folder().join("root")));
@@ -212,12 +212,12 @@ impl Place {
         ours.map(|file| file.path()).collect()
     }
 
-    /// Fails if processes that have ended left more than the one small file that iceoryx2 always leaves.
+    /// Fails if ended processes have left more than the one small file that iceoryx2 always leaves.
     pub fn assert_clean(&self) {
         self.assert_clean_but_for(0);
     }
 
-    /// Fails if they left more than that file and so many others.
+    /// Fails if ended processes have left more than that file and `others` further files.
     pub fn assert_clean_but_for(&self, others: usize) {
         let files = self.left_behind();
         assert!(files.len() <= 1 + others, "{} files are left behind: {files:#?}", files.len());
@@ -246,14 +246,14 @@ fn reading(pipe: Option<impl Read>) -> impl FnOnce() -> Vec<u8> {
     }
 }
 
-/// Copies the program. Another process does: what other threads start meanwhile would hold a file that is open here for
-/// writing, and then it could not be started.
+/// Copies the program in another process. In this process, children of other threads would inherit the file open for
+/// writing, and the copy could not be started.
 pub fn copy_program(to: &Path) {
     let copied = Command::new("cp").arg(env!("CARGO_BIN_EXE_bench-dragon")).arg(to).status().unwrap();
     assert!(copied.success());
 }
 
-/// The program with a service name that no other test has.
+/// Returns the program with a service name that no other test has.
 pub fn program(name: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
     command.args(["--name", &unique(name)]);
@@ -271,11 +271,11 @@ pub fn python() -> Command {
     command
 }
 
-/// An example, which cargo builds with all tests and not with one file of them.
+/// Returns an example; cargo builds the examples with all tests, and not with one test file.
 pub fn example(name: &str) -> Command {
     let target = std::env::current_exe().unwrap();
     let file = target.ancestors().nth(2).unwrap().join("examples").join(name);
-    assert!(file.exists(), "{} is not there: `cargo build --release --examples` builds it", file.display());
+    assert!(file.exists(), "{} does not exist: `cargo build --release --examples` builds it", file.display());
     Command::new(file)
 }
 
@@ -292,13 +292,13 @@ pub fn summary(output: &Output) -> Value {
     json_lines(output).pop().unwrap()
 }
 
-/// What a server of this machine answers, header and body, or nothing where it does not.
+/// Returns the answer of a server of this machine, header and body, or nothing if it does not answer.
 pub fn http_get(url: &str, accept: &str) -> String {
     let (address, _) = url.strip_prefix("http://").unwrap().split_once('/').unwrap();
     http_get_as(url, address, accept)
 }
 
-/// The same, asked as one who takes the server for another host.
+/// Returns the same, with a request for another host name.
 pub fn http_get_as(url: &str, host: &str, accept: &str) -> String {
     let (address, path) = url.strip_prefix("http://").unwrap().split_once('/').unwrap();
     let answer = || -> std::io::Result<String> {
@@ -316,18 +316,18 @@ fn is_set(variable: &str) -> bool {
     std::env::var_os(variable).is_some_and(|value| value == "1")
 }
 
-/// Whether tests that take minutes are requested.
+/// Returns true if tests that take minutes are requested.
 pub fn long() -> bool {
     is_set("BENCH_DRAGON_LONG")
 }
 
-/// Prints a line that is seen even where the test passes: libtest captures `println!` and `eprintln!` only.
+/// Prints a line that is visible even if the test passes: libtest captures `println!` and `eprintln!` only.
 pub fn aloud(line: &str) {
     let _ = std::io::stderr().write_all(format!("{line}\n").as_bytes());
 }
 
-/// Reports that the test at hand, or a part of it, does not run. Where every test has to run
-/// (`BENCH_DRAGON_REQUIRE_ALL=1`, which `tests/run` sets), that is a failure.
+/// Reports that the current test, or a part of it, does not run. If every test must run (`BENCH_DRAGON_REQUIRE_ALL=1`,
+/// which `tests/run` sets), that is a failure.
 pub fn not_run(why: &str) {
     let thread = std::thread::current();
     let test = thread.name().unwrap_or("a test");
@@ -335,7 +335,7 @@ pub fn not_run(why: &str) {
     assert!(!is_set("BENCH_DRAGON_REQUIRE_ALL"), "{test} did not run: {why}");
 }
 
-/// Whether a test's requirement is met; reports where it is not.
+/// Returns true if a test's requirement is met; otherwise reports the reason.
 #[must_use]
 pub fn can_run(requirement: Result<(), String>) -> bool {
     requirement.inspect_err(|why| not_run(why)).is_ok()

@@ -1,6 +1,6 @@
-//! A disk that is slow, for one process: preloaded into it (`LD_PRELOAD`), this library answers `fsync` in the C library's
-//! place. The first file of a node and the first of a service take three seconds each, as they can where much else is
-//! being written; every other file takes as long as it takes.
+//! A slow disk for one process: preloaded into the process (`LD_PRELOAD`), this library replaces the C library's
+//! `fsync`. The first file of a node and the first file of a service take three seconds each, as on a disk under load;
+//! every other file takes its usual time.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,7 +9,7 @@ use std::time::Duration;
 use nix::libc::{SYS_fsync, c_int, syscall};
 
 const SLOW: Duration = Duration::from_secs(3);
-/// How the names of slow files end, and whether there has been one.
+/// The endings of the names of slow files, and true once there has been one.
 static KINDS: [(&str, AtomicBool); 2] = [(".details", AtomicBool::new(false)), (".service", AtomicBool::new(false))];
 
 /// The C library's `fsync`.

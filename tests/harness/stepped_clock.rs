@@ -1,6 +1,6 @@
-//! A wall clock that is stepped, for one process: preloaded into it (`LD_PRELOAD`), this library answers
-//! `clock_gettime` in the C library's place. CLOCK_REALTIME is right for two seconds, then an hour ahead for two
-//! seconds, then an hour behind; every other clock is the true one. The machine's own clock stays untouched.
+//! A stepped wall clock for one process: preloaded into the process (`LD_PRELOAD`), this library replaces the C
+//! library's `clock_gettime`. CLOCK_REALTIME is right for two seconds, then an hour ahead for two seconds, then an hour
+//! behind; every other clock is the true one. The machine's own clock stays untouched.
 
 use std::sync::OnceLock;
 
@@ -14,7 +14,7 @@ fn true_time(clock: clockid_t, time: *mut timespec) -> c_int {
     unsafe { syscall(SYS_clock_gettime, clock, time) as c_int }
 }
 
-/// The C library's `clock_gettime`, but for CLOCK_REALTIME.
+/// The C library's `clock_gettime`, except for CLOCK_REALTIME.
 ///
 /// # Safety
 /// `time` is writable, as for the C library's.

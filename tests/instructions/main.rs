@@ -1,14 +1,14 @@
-//! What the parts of a step cost, counted in instructions: none more than its line in `baseline.toml` and 5 %.
+//! Cost of the parts of a step, counted in instructions: none may cost 5 % more than its line in `baseline.toml`.
 //!
-//! Callgrind counts. It offers a program a processor with AVX2 and without AVX-512, and no load changes its counts: two
-//! runs differ in nothing but the proofs, and there by less than 0.1 %. A change that is to cost more runs
+//! Callgrind counts. It offers a program a processor with AVX2 and without AVX-512, and no load changes its counts. Two
+//! runs differ only in the proofs, by less than 0.1 %. A change with an intended higher cost runs
 //!
 //! ```text
 //! BENCH_DRAGON_WRITE=1 cargo test --release --test instructions
 //! ```
 //!
-//! and commits the baseline. Another compiler or C library moves counts by some percent with nobody to blame: beside a
-//! baseline of other tools a part fails only at 25 %.
+//! and commits the baseline. Another compiler or C library changes counts by some percent without a change of the code:
+//! with a baseline of other tools a part fails only at 25 %.
 
 #[path = "../harness/mod.rs"]
 mod harness;
@@ -22,28 +22,28 @@ use harness::{Process, aloud, not_run, text};
 use serde::{Deserialize, Serialize};
 
 const BASELINE: &str = "tests/instructions/baseline.toml";
-/// By how much a part may cost more than its baseline: of the same tools, and of others.
+/// Greatest increase of a part over its baseline: with the same tools, and with other tools.
 const MOST: f64 = 0.05;
 const MOST_OF_OTHER_TOOLS: f64 = 0.25;
 
-/// What has been counted.
+/// Counted instructions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Counts {
     /// The compiler, the C library with its elementary functions, and valgrind.
     tools: [String; 3],
-    /// What tables are read with.
+    /// The instruction set that reads tables.
     instructions: String,
-    /// Instructions of a call, by part.
+    /// Instructions per call, by part.
     parts: BTreeMap<String, u64>,
 }
 
-/// The first line that a program prints.
+/// Returns the first line that a program prints.
 fn first_line(program: &str, argument: &str) -> Result<String, String> {
     let output = Command::new(program).arg(argument).output().map_err(|error| format!("no {program} ({error})"))?;
     Ok(text(&output.stdout).lines().next().unwrap_or_default().to_owned())
 }
 
-/// Counts under callgrind; a sentence where there is no valgrind.
+/// Counts under callgrind; returns a sentence if there is no valgrind.
 fn count() -> Result<Counts, String> {
     let tools = [
         first_line("rustc", "--version")?,
@@ -72,14 +72,14 @@ fn count() -> Result<Counts, String> {
     Ok(Counts { tools, instructions, parts })
 }
 
-/// The instructions of one of callgrind's files.
+/// Returns the instructions of one of callgrind's files.
 fn total(file: &Path) -> u64 {
     let text = std::fs::read_to_string(file).unwrap();
     let total = text.lines().find_map(|line| line.strip_prefix("totals: ")).unwrap();
     total.parse().unwrap()
 }
 
-/// A line for each part, and those that fail.
+/// Returns a line for each part, and the lines that fail.
 fn compare(was: &Counts, is: &Counts) -> (Vec<String>, Vec<String>) {
     let most = if was.tools == is.tools { MOST } else { MOST_OF_OTHER_TOOLS };
     let (mut lines, mut failed) = (Vec::new(), Vec::new());
@@ -122,7 +122,7 @@ fn no_part_costs_5_percent_more_instructions_than_its_baseline() {
     }
     assert!(
         failed.is_empty(),
-        "{}\nWhere it is meant: BENCH_DRAGON_WRITE=1 cargo test --release --test instructions",
+        "{}\nIf it is intended: BENCH_DRAGON_WRITE=1 cargo test --release --test instructions",
         failed.join("\n")
     );
 }

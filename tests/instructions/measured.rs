@@ -1,9 +1,9 @@
-//! What is counted: the parts of a step of the loop, and steps of a certificate. [`run`] is called under callgrind;
-//! the test in `main.rs`, which starts it there, reads what it prints.
+//! The counted code: the parts of a step of the loop, and steps of a certificate. The test in `main.rs` starts [`run`]
+//! under callgrind and reads its output.
 
 use std::hint::black_box;
 
-use bench_dragon::certify::{Line, certify};
+use bench_dragon::certify::{CertificateLine, certify};
 use bench_dragon::client::connection::{Connection, Subscription, Wake};
 use bench_dragon::messages::control::Command;
 use bench_dragon::motion::Method;
@@ -13,43 +13,45 @@ use bench_dragon::motion::solve::table::{FollowerTable, Instructions};
 use bench_dragon::motion::solve::{Chain, Solver, Velocities};
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::proof;
+use bench_dragon::publisher::live::Publisher;
 use bench_dragon::publisher::live::control::{Door, Doors, door};
-use bench_dragon::publisher::live::{Outgoing, Publisher};
+use bench_dragon::publisher::live::show_source::{FrameMessages, ShowSource};
 use bench_dragon::publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
 use bench_dragon::show::alerts::LevelTracker;
-use bench_dragon::show::convert::{Stamps, frame_header, stage};
+use bench_dragon::show::convert::{Stamps, stage};
 use bench_dragon::show::scene::{Scene, SceneText};
 use bench_dragon::show::{Frame, Playback, Show};
 
-/// What stands before the name of the instructions that tables are read with.
+/// Text before the name of the instruction set that reads tables.
 pub const WITH: &str = "instructions: ";
-/// What stands before the name of a part and the number of its calls.
+/// Text before the name of a part and the number of its calls.
 pub const PART: &str = "counted: ";
 /// Calls of a part of a step.
 const CALLS: u64 = 60;
-/// When the first call is, simulated seconds; they go on at 60 Hz.
+/// Time of the first call, simulated seconds; the calls continue at 60 Hz.
 const START: f64 = 200.0;
-/// The same on the route, which is shorter.
+/// The same time on the route, which is shorter.
 const ON_ROUTE: f64 = 100.0;
 /// Steps of the certificate.
 const STEPS: u64 = 20;
 const STAMPS: Stamps = Stamps { run_id: 1, sequence: 1, stamp_ns: 0, deadline_ns: 0 };
 
-/// Callgrind counts what this calls, and nothing else: its name is given to it.
+/// Callgrind counts only this function and its callees: it gets the name of this function.
 #[inline(never)]
 fn counted(call: &mut dyn FnMut(u64), number: u64) {
     call(number);
-    // Makes this more than a jump to what it calls.
+    // Prevents the compiler from making this a jump to `call`.
     black_box(number);
 }
 
-/// At its end callgrind writes what it has counted, and begins anew.
+/// When this function ends, callgrind writes its counts and starts again from zero.
 #[inline(never)]
 fn part_is_over(name: &str, calls: u64) {
     println!("{PART}{calls} {name}");
 }
 
-/// Counts `call`, with `prepare` before each, which is not counted, and without the first, which may have more to do.
+/// Counts `call`, with `prepare` before each call, which is not counted. The first call is not counted either, since it
+/// may do more.
 fn part<T>(name: &str, on: &mut T, mut prepare: impl FnMut(&mut T, u64), mut call: impl FnMut(&mut T, u64)) {
     for number in 0..=CALLS {
         prepare(on, number);
@@ -61,7 +63,7 @@ fn part<T>(name: &str, on: &mut T, mut prepare: impl FnMut(&mut T, u64), mut cal
     part_is_over(name, CALLS);
 }
 
-/// Counts all parts. To make tables takes longest under callgrind: they are as few as can be.
+/// Counts all parts. Making tables takes longest under callgrind, so there are as few tables as possible.
 pub fn run() {
     let paper = Scene::paper();
     println!("{WITH}{}", paper.motion.instructions().name());
@@ -75,7 +77,7 @@ pub fn run() {
     let mut solver = route.motion.solver(Velocities::Computed).solver;
     frame("frame on a route, 60 benches", solver.as_mut(), ON_ROUTE, route.team().handles());
     clearance(ClearanceMonitor::new(path, team, &table), table, team.handles());
-    // The contact would cost a search.
+    // A search for the contact would take long.
     let timeline = paper.motion.timeline_without_contact();
     step(&paper, &timeline);
     certificate();
@@ -91,7 +93,7 @@ fn frame(name: &str, solver: &mut dyn Solver, start: f64, handles: usize) {
     );
 }
 
-/// Of a head that has gone as many metres as there are seconds.
+/// Counts for a head that has travelled as many metres as there are seconds.
 fn clearance(monitor: ClearanceMonitor, table: FollowerTable, handles: usize) {
     let mut on = (table, Chain::new(handles), monitor);
     let time = |number: u64| START + number as f64 / 60.0;
@@ -105,9 +107,10 @@ fn clearance(monitor: ClearanceMonitor, table: FollowerTable, handles: usize) {
     );
 }
 
-/// What the loop works with, and a subscriber that takes what comes.
+/// State of the loop, and a subscriber that receives its messages.
 struct Step {
-    show: Show,
+    show: ShowSource,
+    messages: FrameMessages,
     timeline: Timeline,
     rules: LevelTracker,
     frame: Frame,
@@ -138,7 +141,8 @@ impl Step {
         let frame = show.frame(0).clone();
         let (port, door) = door();
         Self {
-            show,
+            show: ShowSource::new(show),
+            messages: FrameMessages::new(0),
             timeline: timeline.clone(),
             rules,
             frame,
@@ -150,11 +154,10 @@ impl Step {
     }
 
     fn publish(&mut self) {
-        let header = frame_header(&self.frame, STAMPS);
-        self.publisher.publish(Outgoing::new(&header, &self.frame)).unwrap();
+        self.publisher.publish(self.messages.of(&self.frame, STAMPS)).unwrap();
     }
 
-    /// What has come since the last time, as a subscriber takes it that is in time.
+    /// Receives the messages since the last call, as a subscriber that keeps up does.
     fn receive(&mut self, _: u64) {
         self.frame.alerts.clear();
         let frames = self.connection.frames(|header, handles| assert_eq!(header.handles as usize, handles.len()));
@@ -172,7 +175,7 @@ fn step(scene: &Scene, timeline: &Timeline) {
     let on = &mut Step::new(scene, timeline);
     on.frame.alerts.clear();
     part("publish to one subscriber", on, Step::receive, |on, _| on.publish());
-    // Forgotten, a level is announced again.
+    // A level that is forgotten is announced again.
     part("alert: rules, and publish with it", on, Step::receive, |on, number| {
         let Step { rules, timeline, frame, .. } = on;
         rules.forget();
@@ -185,7 +188,7 @@ fn step(scene: &Scene, timeline: &Timeline) {
         on,
         |on, number| {
             on.door.answer();
-            on.show.frame(number);
+            on.show.show.frame(number);
             on.door.send(Command::Rate(1.0)).unwrap();
         },
         Step::poll,
@@ -193,14 +196,13 @@ fn step(scene: &Scene, timeline: &Timeline) {
     part("whole step", on, Step::receive, |on, number| {
         let tick = CALLS + number;
         on.doors.take_one(&mut on.show, tick);
-        let frame = on.show.frame(tick);
-        let header = frame_header(frame, STAMPS);
-        on.publisher.publish(Outgoing::new(&header, frame)).unwrap();
+        on.publisher.publish(on.show.outgoing(tick, STAMPS)).unwrap();
         on.doors.finish_step(&mut on.show, tick);
     });
 }
 
-/// The first steps of a proof, and their check. A longer team's first step is the most of both: it compares all pairs.
+/// Counts the first steps of a proof, and their check. The first step of a longer team is most of both: it compares all
+/// pairs.
 fn certificate() {
     let text = SceneText::paper().text.replace("benches = 223 ", "benches = 20 ");
     let motion = Scene::parse(&text, "paper.toml", "paper").unwrap().motion;
@@ -208,7 +210,8 @@ fn certificate() {
     let timeline = motion.timeline_without_contact();
     let mut lines = Vec::new();
     let mut search = |steps: u64| {
-        let mut write = |line: &Line| Ok(serde_json::to_writer(&mut lines, line).map(|()| lines.push(b'\n'))?);
+        let mut write =
+            |line: &CertificateLine| Ok(serde_json::to_writer(&mut lines, line).map(|()| lines.push(b'\n'))?);
         certify(&motion, &timeline, &text, steps, &mut write, &mut |_| ()).unwrap();
     };
     counted(&mut search, STEPS);

@@ -1,5 +1,5 @@
-//! Who lives beside the loop: the statistics thread, the thread of a transport, those who command, those who subscribe,
-//! and what sets the wall clock or stops the show.
+//! The actors beside the loop: the statistics thread, the thread of a transport, control clients, subscribers, and the
+//! actors that set the wall clock or stop the show.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -20,7 +20,7 @@ use crate::oracle::Oracle;
 use crate::port::{Receiver, Receivers};
 use crate::world::{Actor, SECOND_NS, World, same};
 
-/// When an actor is due that never acts again.
+/// The due time of an actor that never acts again.
 const NEVER: u64 = u64::MAX;
 
 /// The statistics thread.
@@ -38,14 +38,14 @@ impl Actor for Statistics {
         collector.report(world.now_ns(), false, |status| LoopStatus { stamp_ns: world.now_ns(), ..status });
         self.collected.borrow().reported(world.now_ns());
         let mut random = world.random.borrow_mut();
-        // Now and then it does not run for long: then samples are lost.
+        // Sometimes the thread does not run for long: then samples are lost.
         let late_ns =
             if random.once_in(50) { random.below(200 * self.every_ns) } else { random.below(self.every_ns / 4) };
         world.now_ns() + self.every_ns + late_ns
     }
 }
 
-/// Where its status goes; the stamp is the moment at which it was made.
+/// Receiver of the thread's statuses; the stamp is the time at which a status was made.
 pub struct Statuses(pub Rc<RefCell<Collected>>);
 
 impl StatusPublisher for Statuses {
@@ -67,7 +67,7 @@ impl Actor for Background {
         let poll_at = worker.send(&Frozen(world));
         self.behind.borrow_mut().emptied(worker.deliveries());
         let mut random = world.random.borrow_mut();
-        // Its network blocks; at a low rate it looks less often than every 50 ms, so that a night costs less.
+        // The network blocks. At a low rate the thread polls less often than every 50 ms, so that a night costs less.
         let blocked_ns = match random.below(40) {
             0 => random.below(40 * self.period_ns),
             1 => random.below(2 * SECOND_NS),
@@ -77,7 +77,7 @@ impl Actor for Background {
     }
 }
 
-/// The clock as a step sees it that takes no time.
+/// A clock without progress, for a step that takes no time.
 pub struct Frozen<'a>(pub &'a World);
 
 impl bench_dragon::client::clock::Clock for Frozen<'_> {
@@ -94,16 +94,16 @@ impl bench_dragon::client::clock::Clock for Frozen<'_> {
     }
 }
 
-/// Who sends commands through one door: one now and then, several in one period, a flood.
+/// A client that sends commands through one queue: one at a time, several in one period, or a flood.
 pub struct Controller {
     pub number: usize,
     pub door: Rc<RefCell<Door>>,
     pub oracle: Rc<RefCell<Oracle>>,
-    /// Between two commands, on average.
+    /// Mean time between two commands.
     pub pause_ns: f64,
     /// The end of the show, simulated seconds.
     pub end: f64,
-    /// Never takes an answer again.
+    /// True if the client never takes an answer again.
     pub is_dead: bool,
 }
 
@@ -164,13 +164,13 @@ impl Actor for Controller {
     }
 }
 
-/// A process that subscribes: at its own pace, with stalls, until it dies; then another comes.
+/// A process that subscribes: at its own pace, with stalls, until it dies; then another process starts.
 pub struct Subscriber {
     pub receivers: Rc<Receivers>,
     pub receiver: Rc<RefCell<Receiver>>,
     pub tracker: SequenceTracker,
     pub liveness: Liveness,
-    /// The beginning of simulated time.
+    /// The start of simulated time.
     pub origin: Instant,
     pub depth: usize,
     pub rate: f64,
@@ -179,7 +179,7 @@ pub struct Subscriber {
     pub received: u64,
     pub missed: u64,
     pub latest_ns: u64,
-    /// Once in so many steps it dies.
+    /// The subscriber dies once in this many steps, on average.
     pub lives: u64,
 }
 
@@ -209,7 +209,7 @@ impl Subscriber {
         self.origin + Duration::from_nanos(world.now_ns())
     }
 
-    /// Reads all that has come, and knows exactly what it has missed.
+    /// Reads all waiting frames, and counts the missed frames exactly.
     pub fn read(&mut self, world: &World) {
         let now = self.instant(world);
         let mut receiver = self.receiver.borrow_mut();
@@ -224,16 +224,16 @@ impl Subscriber {
             self.latest_ns = world.now_ns();
         }
         same("frames received and lost", self.received + receiver.lost, receiver.offered);
-        // What was lost before the first that it received is no gap.
+        // Frames lost before the first received one are no gap.
         let not_seen = self.first.zip(receiver.first).map_or(0, |(seen, put)| seen - put);
         same("frames missed", self.missed, receiver.lost - not_seen);
     }
 
-    /// Whether the publisher is there; it is.
+    /// Asserts that the liveness test finds the publisher.
     fn test(&mut self, world: &World) {
         let now = self.instant(world);
         match self.liveness.test(now, || true) {
-            Some(Change::Gone) => panic!("a publisher that lives is taken for dead"),
+            Some(Change::Gone) => panic!("a live publisher is reported dead"),
             Some(Change::Silent) => {
                 let quiet_s = (world.now_ns() - self.latest_ns) as f64 / 1e9;
                 assert!(quiet_s >= f64::max(0.5, 3.0 / self.rate) - 1e-6, "silent after {quiet_s} s");
@@ -242,7 +242,7 @@ impl Subscriber {
         }
     }
 
-    /// The publisher has ended: this is noticed.
+    /// Asserts that the end of the publisher is noticed.
     pub fn outlive(&mut self, world: &World) {
         self.read(world);
         let later = self.instant(world) + Duration::from_secs(1);
@@ -273,7 +273,7 @@ impl Actor for Rc<RefCell<Subscriber>> {
     }
 }
 
-/// What sets the wall clock: a leap of a second, or by days.
+/// An actor that sets the wall clock: by a leap second, or by days.
 pub struct WallClock {
     pub every_ns: f64,
 }

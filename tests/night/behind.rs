@@ -1,4 +1,4 @@
-//! The queue of a transport with a thread of its own, and the fake of that transport.
+//! The queue of a transport with a separate thread, and a fake of that transport.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -11,11 +11,11 @@ use bench_dragon::publisher::transports::background::Sink;
 
 use crate::world::same;
 
-/// What the queue promises: a quarter of a second of frames, at least 4, at most 256; 256 alerts; all cues 8 times.
+/// The promises of the queue: a quarter of a second of frames, at least 4, at most 256; 256 alerts; all cues 8 times.
 const MOST_ALERTS: usize = 256;
 const SHOWS: usize = 8;
 
-/// What the transport has to be given.
+/// The messages that the transport must receive.
 pub struct Behind {
     share: f64,
     slot: Option<u64>,
@@ -24,7 +24,7 @@ pub struct Behind {
     frames: VecDeque<(FrameHeader, f64)>,
     alerts: VecDeque<(u64, u32)>,
     cues: VecDeque<(u64, u32)>,
-    /// Whether a frame has found the queue full since it was emptied.
+    /// True if a frame has found the queue full since it was emptied.
     was_full: bool,
     delivered: Deliveries,
 }
@@ -44,7 +44,7 @@ impl Behind {
         }
     }
 
-    /// A frame is out, whose head is at `x`.
+    /// Records a sent frame with its head at `x`, and its alerts and cues.
     pub fn published(&mut self, header: &FrameHeader, x: f64, alerts: &[(u64, u32)], cues: &[(u64, u32)]) {
         self.alerts.extend(alerts.iter().take(MOST_ALERTS - self.alerts.len()));
         self.cues.extend(cues.iter().take(self.most_cues - self.cues.len()));
@@ -60,21 +60,21 @@ impl Behind {
         }
     }
 
-    /// The thread has looked into the queues.
+    /// Checks that the thread has emptied the queues.
     pub fn emptied(&mut self, deliveries: Deliveries) {
-        same("what is left in the queues", (self.frames.len(), self.alerts.len(), self.cues.len()), (0, 0, 0));
+        same("messages left in the queues", (self.frames.len(), self.alerts.len(), self.cues.len()), (0, 0, 0));
         self.was_full = false;
-        same("what was delivered", deliveries, self.delivered);
+        same("the delivered messages", deliveries, self.delivered);
     }
 
     fn frame(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
         if self.was_full {
-            // It continues with the newest.
+            // The thread continues with the newest frame.
             self.delivered.skipped += self.frames.len().saturating_sub(1) as u64;
             self.frames.drain(..self.frames.len().saturating_sub(1));
         }
         let Some((expected, x)) = self.frames.pop_front() else { panic!("{header:?} was not queued") };
-        // Where nothing is near there is no number, which is not equal to itself.
+        // If no boards are near, the clearance is NaN, which does not equal itself.
         let without = |of: &FrameHeader| FrameHeader { sent_ns: 0, min_clearance: 0.0, ..*of };
         same("the frame that is sent", without(header), without(&expected));
         same("its clearance", header.min_clearance.to_bits(), expected.min_clearance.to_bits());
@@ -83,7 +83,7 @@ impl Behind {
     }
 }
 
-/// In place of a network: takes all that comes, and compares.
+/// A replacement for the network: receives all messages, and compares them.
 pub struct Network(pub Rc<RefCell<Behind>>);
 
 impl Sink for Network {

@@ -1,4 +1,4 @@
-//! What the statistics have to come to: every sample once and in order, but those for which the queue had no room.
+//! The expected statistics: every sample once and in order, except those for which the queue had no room.
 
 use std::collections::VecDeque;
 
@@ -8,10 +8,10 @@ use bench_dragon::publisher::live::statistics::{Sample, Summary};
 
 use crate::world::{SECOND_NS, same};
 
-/// The longest duration that the statistics distinguish: a longer one counts as that, or as what it is.
+/// The longest duration that the statistics distinguish: a longer one counts as this one, or as itself.
 const LONGEST_NS: u64 = 3_600_000_000_000;
 
-/// A frame, as its sample has to show it. Durations lie between two bounds.
+/// A frame, as its sample must show it. Durations lie between two bounds.
 #[derive(Clone, Copy)]
 pub struct Expected {
     pub tick: u64,
@@ -25,10 +25,10 @@ pub struct Expected {
     pub step_ns: (u64, u64),
 }
 
-/// An alert or a cue on its way to the terminal: its period, and its level or number.
+/// An alert or a cue in flight to the terminal: its period, and its level or number.
 pub type Announced = (u64, &'static str, u32);
 
-/// The queues to the statistics, as they have to be, and what was taken from them.
+/// The expected content of the queues to the statistics, and the samples that were taken from them.
 pub struct Collected {
     samples: VecDeque<Expected>,
     announcements: VecDeque<Announced>,
@@ -39,7 +39,7 @@ pub struct Collected {
     /// The bounds of the longest durations taken so far.
     worst_lateness_ns: (u64, u64),
     worst_step_ns: (u64, u64),
-    /// Of the latest status: the frames until then, and when it was made.
+    /// Of the latest status: the frames until then, and the time at which it was made.
     status: (u64, u64),
     began_ns: u64,
 }
@@ -48,7 +48,7 @@ fn later(a: (u64, u64), b: (u64, u64)) -> (u64, u64) {
     (a.0.max(b.0), a.1.max(b.1))
 }
 
-/// Whether a duration, to three digits, lies between the bounds.
+/// Asserts that a duration, to three digits, lies between the bounds.
 fn assert_between(what: &str, value: u64, (least, most): (u64, u64)) {
     let least = least.min(LONGEST_NS);
     let holds = value as f64 >= 0.998 * least as f64 - 3.0 && value as f64 <= 1.002 * most as f64 + 3.0;
@@ -56,7 +56,7 @@ fn assert_between(what: &str, value: u64, (least, most): (u64, u64)) {
 }
 
 impl Collected {
-    /// Queues of so many samples, and so many alerts and cues, of a run that begins now.
+    /// Creates queues of `samples` samples, and `announcements` alerts and cues, of a run that begins now.
     pub fn new(samples: usize, announcements: usize, now_ns: u64) -> Self {
         Self {
             samples: VecDeque::new(),
@@ -72,7 +72,7 @@ impl Collected {
         }
     }
 
-    /// A frame is out.
+    /// Records a sent frame.
     pub fn frame(&mut self, sample: Expected, announcements: impl IntoIterator<Item = Announced>) {
         if self.samples.len() < self.most.0 {
             self.samples.push_back(sample);
@@ -107,15 +107,15 @@ impl Collected {
             Announcement::Alert { alert, .. } => (alert.tick, "alert", alert.level),
             Announcement::Cue(cue) => (cue.tick, "cue", cue.number),
         };
-        same("what is printed", Some(seen), self.announcements.pop_front());
+        same("the printed announcement", Some(seen), self.announcements.pop_front());
     }
 
-    /// The queues have been emptied.
+    /// Asserts that the queues are empty.
     pub fn emptied(&self) {
-        same("what is left in the queues", (self.samples.len(), self.announcements.len()), (0, 0));
+        same("messages left in the queues", (self.samples.len(), self.announcements.len()), (0, 0));
     }
 
-    /// The thread has done a step: whenever a second is over, a status has been sent.
+    /// Checks after a step of the thread that a status has been sent for every full second.
     pub fn reported(&self, now_ns: u64) {
         let second = |at_ns: u64| (at_ns - self.began_ns) / SECOND_NS;
         if self.latest.is_some() {
@@ -123,7 +123,7 @@ impl Collected {
         }
     }
 
-    /// A status was made at `now_ns`.
+    /// Checks a status that was made at `now_ns`.
     pub fn status(&mut self, status: &LoopStatus, now_ns: u64) {
         let Some(of) = self.latest else { panic!("{status:?} of no frame") };
         let seen = (status.tick, status.sequence, status.skipped, status.overruns, status.shows_played);

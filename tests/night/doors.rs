@@ -1,5 +1,5 @@
-//! Commands: one a period, in turn of the doors and in order at each; every one answered once; what is too much
-//! refused.
+//! Commands: one a period, in turn of the queues and in order within each; every command answered once; commands beyond
+//! the limit refused.
 
 use std::collections::VecDeque;
 
@@ -9,36 +9,36 @@ use bench_dragon::show::Outcome;
 
 use crate::world::same;
 
-/// Commands of one door that may have no answer yet: the promise of the queue.
+/// Most commands of one queue without an answer: the promise of the queue.
 const MOST_WAITING: usize = 64;
 
-/// What is known of one door.
+/// State of one command queue.
 #[derive(Default)]
 struct AtDoor {
     sent: u64,
     waiting: VecDeque<(u64, Command)>,
-    /// Answers that the loop has given, in order, and that were not taken yet.
+    /// Answers that the loop has given, in order, and that no client has taken yet.
     given: VecDeque<(u64, Outcome)>,
     taken: u64,
     refused: u64,
 }
 
 impl AtDoor {
-    /// Commands that were let in and whose answer was not taken.
+    /// Returns the number of accepted commands whose answer was not taken.
     fn open(&self) -> usize {
         (self.sent - self.taken) as usize
     }
 }
 
-/// All doors, as the loop has to see them.
+/// All command queues, as the loop must see them.
 pub struct Entrance {
     doors: Vec<AtDoor>,
     next: usize,
-    /// The period in which a command was executed last.
+    /// The period in which the last command was executed.
     executed: Option<u64>,
-    /// The command that is executed now, with its door.
+    /// The command that is executed now, with its queue.
     present: Option<(usize, u64)>,
-    /// The step that is not over, with its door.
+    /// The step in progress, with its queue.
     step: Option<(usize, u64)>,
     answer: Option<(usize, u64, Outcome)>,
 }
@@ -49,7 +49,7 @@ impl Entrance {
         Self { doors, next: 0, executed: None, present: None, step: None, answer: None }
     }
 
-    /// A command was sent at a door.
+    /// Records a command that was sent to a queue.
     pub fn sent(&mut self, door: usize, command: Command, result: Result<u64, Code>) {
         let at = &mut self.doors[door];
         if at.open() >= MOST_WAITING {
@@ -62,21 +62,21 @@ impl Entrance {
         }
     }
 
-    /// A command is executed at the beginning of the period `tick`.
+    /// Checks a command that is executed at the beginning of the period `tick`.
     pub fn executed(&mut self, tick: u64, command: Command) {
         assert!(self.executed < Some(tick), "a second command in the period {tick}");
         self.executed = Some(tick);
         let doors = self.doors.len();
         let turn = (0..doors).map(|turn| (self.next + turn) % doors).find(|door| !self.doors[*door].waiting.is_empty());
-        let door = turn.expect("a command that nobody has sent");
+        let door = turn.expect("a command that no client has sent");
         let (ticket, expected) = self.doors[door].waiting.pop_front().expect("one waits");
-        // A value that is no number is not equal to itself.
+        // A value of NaN does not equal itself.
         same("the command", format!("{command:?}"), format!("{expected:?}"));
         self.next = (door + 1) % doors;
         self.present = Some((door, ticket));
     }
 
-    /// What the show said of it; `None` for a step that has begun.
+    /// Records the show's answer to the command; `None` for a step that has begun.
     pub fn answered(&mut self, outcome: Option<Outcome>) {
         let (door, ticket) = self.present.take().expect("a command");
         match outcome {
@@ -88,34 +88,34 @@ impl Entrance {
         }
     }
 
-    /// A step is over, or was broken off.
+    /// Records the answer to a step that is complete, or was cancelled.
     pub fn step_is_over(&mut self, outcome: Outcome) {
         let (door, ticket) = self.step.take().expect("a step");
         self.doors[door].given.push_back((ticket, outcome));
     }
 
-    /// The command of this period has been dealt with, and what it broke off.
+    /// Records the answer of the executed command, after the answer to the step that it cancelled.
     pub fn settle(&mut self) {
         if let Some((door, ticket, outcome)) = self.answer.take() {
             self.doors[door].given.push_back((ticket, outcome));
         }
     }
 
-    /// The frame of the period `tick` is about to be computed: nobody may be waiting in vain.
+    /// Checks before the frame of the period `tick` that no command waits without reason.
     pub fn frame_begins(&mut self, tick: u64) {
         self.settle();
         let in_vain = self.executed != Some(tick) && self.doors.iter().any(|door| !door.waiting.is_empty());
         assert!(!in_vain, "a command waits and none is executed in the period {tick}");
     }
 
-    /// An answer was taken at a door.
+    /// Checks an answer that a client has taken from a queue.
     pub fn taken(&mut self, door: usize, answer: &Answer) {
         let at = &mut self.doors[door];
         at.taken += 1;
         same("the answer", Some((answer.ticket, answer.outcome)), at.given.pop_front());
     }
 
-    /// All answers that there are have been taken, and the loop has ended.
+    /// Checks the number of unanswered commands, after the end of the loop and the last answer.
     pub fn ended(&self) {
         let open: usize = self.doors.iter().map(AtDoor::open).sum();
         let waiting: usize = self.doors.iter().map(|door| door.waiting.len()).sum();
@@ -123,7 +123,7 @@ impl Entrance {
         same("commands without an answer", open, waiting + step);
     }
 
-    /// Commands that were let in, and those for which there was no room.
+    /// Returns the number of accepted commands, and of those for which there was no room.
     pub fn totals(&self) -> (u64, u64) {
         (self.doors.iter().map(|door| door.sent).sum(), self.doors.iter().map(|door| door.refused).sum())
     }

@@ -1,9 +1,9 @@
-//! The alerts as the design promises them, from what a subscriber sees of each frame and the list of events.
+//! A model of the promised alerts, from a subscriber's view of each frame and the list of events.
 
 use bench_dragon::messages::FrameHeader;
 use bench_dragon::messages::state::{Level, PlaybackState};
 
-/// What is said of a scene's alerts.
+/// The settings of a scene's alerts.
 #[derive(Clone)]
 pub struct Rules {
     pub approach_time: f64,
@@ -21,7 +21,7 @@ pub struct Levels {
     counted: u64,
     /// The time of the last frame of this epoch.
     before: Option<f64>,
-    /// Since when boards have been far apart.
+    /// Time since which boards have been far apart.
     apart_since: Option<f64>,
 }
 
@@ -30,17 +30,18 @@ impl Levels {
         Self { rules, rate, announced: None, counted: 0, before: None, apart_since: None }
     }
 
-    /// The level that a late subscriber is to get.
+    /// Returns the level that a late subscriber must get.
     pub fn current(&self) -> Option<Level> {
         self.announced.map(|(level, _)| level)
     }
 
-    /// The levels of the alerts that are to go with a frame. `new_epoch`: time has jumped; `anew`: a command did that.
-    pub fn expected(&mut self, header: &FrameHeader, new_epoch: bool, anew: bool) -> Vec<Level> {
-        if anew {
+    /// Returns the levels of the alerts that must go with a frame. `new_epoch`: time has jumped; `by_command`: a
+    /// command caused the jump.
+    pub fn expected(&mut self, header: &FrameHeader, new_epoch: bool, by_command: bool) -> Vec<Level> {
+        if by_command {
             self.announced = None;
         }
-        if new_epoch || anew {
+        if new_epoch || by_command {
             (self.before, self.apart_since) = (None, None);
         }
         let now = header.sim_time;
@@ -48,7 +49,7 @@ impl Levels {
             self.rules.events.iter().filter(|(time, _)| *time <= now).map(|(_, level)| *level).collect();
         let known = match self.before {
             Some(before) => self.rules.events.iter().filter(|(time, _)| *time <= before).count(),
-            // The first frame of an epoch announces where it stands, not how it came there.
+            // The first frame of an epoch announces its level, not earlier events.
             None => happened.len().saturating_sub(1),
         };
         let mut alerts = Vec::new();
@@ -80,7 +81,7 @@ impl Levels {
         let Rules { approach_time, approach_clearance, events } = &self.rules;
         let now = header.sim_time;
         let coming = events.first().is_some_and(|(time, _)| time - now <= *approach_time);
-        // No number: there is no pair.
+        // NaN means that there is no pair.
         let apart = header.min_clearance.is_nan() || header.min_clearance > 1.5 * approach_clearance;
         self.apart_since = if apart { self.apart_since.or(Some(now)) } else { None };
         let was_near = self.before.is_some() && self.current() == Some(Level::Approaching);
@@ -92,7 +93,7 @@ impl Levels {
         if coming || near { Level::Approaching } else { Level::Clear }
     }
 
-    /// Whether a second of wall time more has passed since the level changed.
+    /// Returns true if another second of wall time has passed since the level changed.
     fn counts_down(&mut self, header: &FrameHeader) -> bool {
         let since = self.announced.map_or(0, |(_, tick)| header.tick - tick);
         let seconds = (since as f64 / self.rate).floor() as u64;

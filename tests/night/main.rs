@@ -1,14 +1,13 @@
-//! Bad nights: the loop, the show, the doors for commands, the statistics and a transport's queue, on simulated time
-//! and under a simulated scheduler, from one seed. Late wake-ups, stalls, a wall clock that is set, slow and dying
-//! subscribers, floods of commands, a shared memory that is full; and the promises of the design, which hold all the
-//! same.
+//! Bad nights: the loop, the show, the command queues, the statistics and a transport's queue, on simulated time and
+//! under a simulated scheduler, from one seed. Late wake-ups, stalls, a wall clock that is set, slow and dying
+//! subscribers, floods of commands, a full shared memory; the promises of the design must hold nevertheless.
 //!
-//! `BENCH_DRAGON_NIGHT_HOURS=hours` simulates so many, `BENCH_DRAGON_NIGHT=seed` one night, with its last events.
+//! `BENCH_DRAGON_NIGHT_HOURS=hours` simulates that number of hours, `BENCH_DRAGON_NIGHT=seed` one night, with its last
+//! events.
 
 mod actors;
 mod behind;
 mod collected;
-mod conducted;
 mod doors;
 mod levels;
 mod night;
@@ -35,14 +34,15 @@ use world::Trace;
 /// Seeds of nights that once failed.
 const KEPT: &str = include_str!("seeds.txt");
 const HOURS: f64 = 10_000.0;
+const FEW_HOURS: f64 = 1_000.0;
 const LONG_HOURS: f64 = 1_000_000.0;
-/// Where the seeds of the long run begin, so that it repeats none of the short one.
+/// First seed of the long run, so that it repeats no night of the short run.
 const LONG_SEEDS: u64 = 1 << 32;
 
-/// One night has failed: nobody begins another.
+/// True once a night has failed: no thread begins another.
 static HAS_FAILED: AtomicBool = AtomicBool::new(false);
 
-/// Plays the night of a seed; where it fails, how to play it again.
+/// Plays the night of a seed; if it fails, prints the command that plays it again.
 fn play(seed: u64, stages: &[Stage]) -> Tally {
     let trace = Rc::new(Trace::default());
     let played = catch_unwind(AssertUnwindSafe(|| night::play(seed, stages, &trace)));
@@ -74,8 +74,13 @@ fn the_promises_hold_in_every_night() {
         let seed = seed.split_whitespace().next().and_then(|seed| seed.parse().ok()).expect("a seed a line");
         play(seed, &stages);
     }
-    let long = std::env::var("BENCH_DRAGON_LONG").is_ok_and(|value| value == "1");
-    let hours = number("BENCH_DRAGON_NIGHT_HOURS").unwrap_or(if long { LONG_HOURS } else { HOURS });
+    let is = |name: &str, value: &str| std::env::var(name).is_ok_and(|given| given == value);
+    let hours = match number("BENCH_DRAGON_NIGHT_HOURS") {
+        Some(hours) => hours,
+        None if is("BENCH_DRAGON_LONG", "1") => LONG_HOURS,
+        None if is("BENCH_DRAGON_CASES", "few") => FEW_HOURS,
+        None => HOURS,
+    };
     let first = if hours > HOURS { LONG_SEEDS } else { 0 };
     let total = play_for(hours, first);
     println!("{total}");
@@ -84,18 +89,18 @@ fn the_promises_hold_in_every_night() {
     }
 }
 
-/// Nights that are over, counted in the order of their seeds, so that the sum is the same on every machine.
+/// Completed nights, counted in the order of their seeds, so that the sum is the same on every machine.
 struct Played {
     /// The sum of all nights before `counted`.
     total: Tally,
     counted: u64,
-    /// Those behind it that were over sooner.
+    /// Later nights that were completed sooner.
     waiting: BTreeMap<u64, Tally>,
     printed: Instant,
 }
 
 impl Played {
-    /// Counts a night, and those that waited for it, until there are `hours`.
+    /// Counts a night, and the nights that waited for it, until there are `hours`.
     fn count(&mut self, seed: u64, night: Tally, hours: f64) {
         self.waiting.insert(seed, night);
         while self.total.hours() < hours
@@ -107,7 +112,7 @@ impl Played {
     }
 }
 
-/// Plays nights on every core until so many hours are simulated.
+/// Plays nights on every core until `hours` hours are simulated.
 fn play_for(hours: f64, first: u64) -> Tally {
     let (next, began) = (AtomicU64::new(first), Instant::now());
     let played =
@@ -137,7 +142,7 @@ fn play_for(hours: f64, first: u64) -> Tally {
     played.into_inner().expect("no night failed").total
 }
 
-/// What a night does depends on its seed alone.
+/// A night depends on its seed alone.
 #[test]
 fn a_seed_is_a_night() {
     let stages = Stage::all();

@@ -1,20 +1,21 @@
-//! One night: everybody is put in place, the real loop runs, and the accounts are settled.
+//! One night: the actors start, the real loop runs, and the final counts are checked.
 
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Instant;
 
 use bench_dragon::publisher::live::control::{Door, Doors, door};
+use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::publisher::live::statistics::{Collector, Run, queues_of};
 use bench_dragon::publisher::live::{Counts, End, LoopOptions, Publisher, StatusPublisher, run_loop};
 use bench_dragon::publisher::transports::background::{self, BackgroundConfig, Worker};
 use bench_dragon::show::scene::AtEnd;
 use bench_dragon::show::{Playback, Show};
+use bench_dragon_testing::model::{Formula, Model, ModelCue, ModelShow};
 
 use crate::actors::{Background, Controller, Frozen, Statistics, Statuses, Stopper, Subscriber, WallClock};
 use crate::behind::{Behind, Network};
 use crate::collected::Collected;
-use crate::conducted::{Conducted, CueAt};
 use crate::levels::Levels;
 use crate::oracle::{Checked, Oracle};
 use crate::plan::{Plan, Stage};
@@ -26,7 +27,7 @@ use crate::world::{Trace, World, same};
 /// A queue's oracle, and the thread at its other end.
 type Thread = (Rc<RefCell<Behind>>, Rc<RefCell<Worker<Network>>>);
 
-/// Everybody but the loop.
+/// All actors and models, without the loop.
 struct Cast {
     world: Rc<World>,
     oracle: Rc<RefCell<Oracle>>,
@@ -82,12 +83,13 @@ pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
         quiet_maintenance: 1000,
         maintained: None,
     };
-    // First, so that a full memory is seen before the others have the frame.
+    // First, so that a full memory is noticed before other transports have the frame.
     publishers.insert(0, Box::new(shared_memory));
     let cast = Cast { world, oracle, collected, collector, thread, doors, subscribers };
     cast.enter(&plan, stage);
 
-    let mut frames = Checked { show, world: Rc::clone(&cast.world), oracle: Rc::clone(&cast.oracle) };
+    let mut frames =
+        Checked { show: ShowSource::new(show), world: Rc::clone(&cast.world), oracle: Rc::clone(&cast.oracle) };
     let options = LoopOptions { run_id, rate: plan.rate, periods: plan.periods };
     let mut doors = Doors::new(ports);
     let World { stop, .. } = &*cast.world;
@@ -102,7 +104,7 @@ pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
     cast.settle(&plan, &counts)
 }
 
-/// A transport with a thread of its own: its ends go to the loop and to the statistics.
+/// Adds a transport with a separate thread: its ends go to the loop and to the statistics.
 fn thread(
     plan: &Plan,
     stage: &Stage,
@@ -130,17 +132,17 @@ fn oracle(
     thread: Option<&Thread>,
 ) -> Oracle {
     let Playback { rate, start, at_end, end_hold, paused, time_scale, .. } = plan.playback;
-    let cues = show.cues().iter().map(|cue| CueAt { time: cue.time, pauses: cue.pauses }).collect();
+    let cues = show.cues().iter().map(|cue| ModelCue { time: cue.time, pauses: cue.pauses }).collect();
     let end_hold = (at_end == AtEnd::Loop).then(|| (end_hold * rate).round() as u64);
-    let conducted =
-        Conducted::new(rate, start, stage.freeze(&plan.playback), end_hold, cues, paused).at_rate(time_scale);
+    let model = ModelShow { start, end: stage.freeze(&plan.playback), end_hold, cues };
+    let model = Model::new(model, Formula::new(rate), time_scale, paused);
     let levels = stage.rules().map(|rules| Levels::new(rules, rate));
     let behind = thread.map(|(behind, _)| Rc::clone(behind));
-    Oracle::new(run_id, conducted, levels, stage.events(), plan.doors.len(), Rc::clone(collected), behind)
+    Oracle::new(run_id, (rate, model), levels, stage.events(), plan.doors.len(), Rc::clone(collected), behind)
 }
 
 impl Cast {
-    /// Everybody takes their place.
+    /// Adds all actors to the world.
     fn enter(&self, plan: &Plan, stage: &Stage) {
         let Self { world, .. } = self;
         let soon = |ns: u64| plan.begin_ns + 1 + world.random.borrow_mut().below(ns);
@@ -177,7 +179,7 @@ impl Cast {
         }
     }
 
-    /// The loop has ended: what is on its way arrives, and everything adds up.
+    /// Delivers the messages in flight after the end of the loop, and compares all counts.
     fn settle(self, plan: &Plan, counts: &Counts) -> Tally {
         let Self { world, oracle, collected, collector, thread, doors, subscribers } = self;
         oracle.borrow_mut().pace.ended(&world, counts, plan.periods);
@@ -187,7 +189,7 @@ impl Cast {
         last.report(now_ns, true, |status| bench_dragon::messages::LoopStatus { stamp_ns: now_ns, ..status });
         collected.borrow().ended(&last.summary(), counts.frames);
         if let Some((behind, worker)) = thread {
-            // Nobody else runs now.
+            // No other actor runs now.
             worker.borrow_mut().send(&Frozen(&world));
             behind.borrow_mut().emptied(worker.borrow().deliveries());
         }

@@ -1,7 +1,8 @@
-//! The oracle of a night: what the loop does against models of the design's promises. The first that is broken ends the test.
+//! The oracle of a night compares the loop with models of the design's promises. The first broken promise ends the
+//! test.
 //!
-//! In: what passes the edges, which are the frames' source, the fake shared memory, the doors and the statistics. None
-//! of the models calls what it checks.
+//! Its input comes from the boundaries: the frames' source, the fake shared memory, the command queues and the
+//! statistics. No model calls the code that it checks.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -9,12 +10,14 @@ use std::rc::Rc;
 use bench_dragon::messages::FrameHeader;
 use bench_dragon::messages::control::Command;
 use bench_dragon::messages::state::{FrameState, Level};
-use bench_dragon::publisher::live::{Frames, Outgoing, Period};
-use bench_dragon::show::{Outcome, Show};
+use bench_dragon::publisher::live::show_source::ShowSource;
+use bench_dragon::publisher::live::{FrameSource, Outgoing, Period};
+use bench_dragon::show::Outcome;
+use bench_dragon::show::convert::Stamps;
+use bench_dragon_testing::model::{Formula, Model};
 
 use crate::behind::Behind;
 use crate::collected::{Announced, Collected, Expected};
-use crate::conducted::Conducted;
 use crate::doors::Entrance;
 use crate::levels::Levels;
 use crate::pace::Pace;
@@ -26,28 +29,28 @@ type Numbered = Vec<(u64, u32)>;
 pub struct Oracle {
     pub run_id: u64,
     pub pace: Pace,
-    pub show: Conducted,
+    pub show: Model<Formula>,
     pub levels: Option<Levels>,
-    /// Every event, in order: the state follows from it.
+    /// Every event, in order: the state depends on it.
     pub events: Vec<(f64, FrameState)>,
     pub entrance: Entrance,
     pub collected: Rc<RefCell<Collected>>,
     pub behind: Option<Rc<RefCell<Behind>>>,
-    /// Of the frame before.
+    /// Epoch of the frame before.
     epoch: u32,
     shows_played: u64,
-    /// Of the present frame: when it began, at the latest and at the earliest, and when it was sent.
+    /// Of the present frame: its latest and earliest start, and the time at which it was sent.
     began_ns: (u64, u64),
     sent_ns: u64,
     sample: Option<(FrameHeader, Vec<Announced>)>,
-    /// Where its head is, its alerts and its cues, on their way to a transport's queue.
+    /// The place of its head, its alerts and its cues, in flight to a transport's queue.
     queued: Option<(f64, Numbered, Numbered)>,
 }
 
 impl Oracle {
     pub fn new(
         run_id: u64,
-        show: Conducted,
+        (rate, show): (f64, Model<Formula>),
         levels: Option<Levels>,
         events: Vec<(f64, FrameState)>,
         doors: usize,
@@ -56,7 +59,7 @@ impl Oracle {
     ) -> Self {
         Self {
             run_id,
-            pace: Pace::new(show.rate),
+            pace: Pace::new(rate),
             show,
             levels,
             events,
@@ -75,44 +78,44 @@ impl Oracle {
     fn frame_begins(&mut self, world: &World, tick: u64) {
         self.began_ns = (world.awake_ns.get(), world.now_ns());
         self.pace.frame_begins(world, tick);
-        // What a command breaks off is answered before the command is.
-        same("a step that a command broke off", self.show.step_outcome, None);
+        // A step that a command cancels is answered before the command.
+        same("a step that a command cancelled", self.show.step_outcome, None);
         self.entrance.frame_begins(tick);
         self.show.count_to(tick);
     }
 
-    /// A frame goes out, complete but for the moment of sending.
+    /// Checks a frame before it is sent, complete except for the time of sending.
     pub fn frame_goes_out(&mut self, world: &World, outgoing: Outgoing<'_>) {
         let header = outgoing.header;
         world.note("frame", [header.tick as f64, header.sim_time]);
         self.pace.frame_goes_out(world, header, self.run_id);
-        let Self { show, .. } = self;
+        let show = &self.show;
         same("the time", header.sim_time.to_bits(), show.sim_time().to_bits());
         same("the time scale", header.time_scale, show.time_scale());
         same("playback", header.playback_state(), Some(show.playback()));
         same("the epoch and the cue", (header.epoch, header.cue), (show.epoch, show.passed as u32));
-        let cues: Numbered = outgoing.cues().map(|cue| (cue.tick, cue.number)).collect();
-        let reached = show.take_reached(self.shows_played);
+        let cues: Numbered = outgoing.cues.iter().map(|cue| (cue.tick, cue.number)).collect();
+        let reached = announced(&mut self.show, self.shows_played);
         same("cues", &cues, &reached.iter().map(|cue| (header.tick, *cue as u32 + 1)).collect());
-        let alerts: Numbered = outgoing.alerts().map(|alert| (alert.tick, alert.level)).collect();
+        let alerts: Numbered = outgoing.alerts.iter().map(|alert| (alert.tick, alert.level)).collect();
         same("alerts", &alerts, &self.expected_alerts(header));
         self.check_state(header);
         (self.epoch, self.shows_played) = (self.show.epoch, self.show.shows_played);
         let mut tally = world.tally.borrow_mut();
         (tally.alerts, tally.cues) = (tally.alerts + alerts.len() as u64, tally.cues + cues.len() as u64);
-        self.queued = Some((outgoing.frame.chain.x[0], alerts.clone(), cues.clone()));
+        self.queued = Some((outgoing.chain.x[0], alerts.clone(), cues.clone()));
         let of = |what, list: Numbered| list.into_iter().map(move |(tick, number)| (tick, what, number));
         self.sample = Some((*header, of("alert", alerts).chain(of("cue", cues)).collect()));
     }
 
     fn expected_alerts(&mut self, header: &FrameHeader) -> Numbered {
-        let anew = std::mem::take(&mut self.show.jumped_by_command);
+        let by_command = std::mem::take(&mut self.show.jumped_by_command);
         let Some(levels) = &mut self.levels else { return Vec::new() };
-        let expected = levels.expected(header, header.epoch != self.epoch, anew);
+        let expected = levels.expected(header, header.epoch != self.epoch, by_command);
         expected.into_iter().map(|level| (header.tick, level as u32)).collect()
     }
 
-    /// The latest event passed, or else the level.
+    /// Checks the state: the latest event passed, or else the level.
     fn check_state(&self, header: &FrameHeader) {
         let passed = self.events.iter().rfind(|(time, _)| *time <= header.sim_time);
         let near = self.levels.as_ref().is_some_and(|levels| levels.current() == Some(Level::Approaching));
@@ -124,7 +127,7 @@ impl Oracle {
         same("the state", header.frame_state(), Some(expected));
     }
 
-    /// The shared memory has the frame, and the next transport gets it.
+    /// Records that the shared memory has the frame; the next transport gets it.
     pub fn frame_was_sent(&mut self, world: &World, header: &FrameHeader) {
         self.sent_ns = world.now_ns();
         let (x, alerts, cues) = self.queued.take().expect("a frame");
@@ -133,13 +136,13 @@ impl Oracle {
         }
     }
 
-    /// A new subscriber gets the alert that is kept.
+    /// Checks the kept alert that a new subscriber gets.
     pub fn late_subscriber(&self, level: Option<u32>) {
         let now = self.levels.as_ref().and_then(Levels::current).map(|level| level as u32);
         same("the level that a late subscriber gets", level, now);
     }
 
-    /// Every transport has taken the frame, and the loop makes its sample.
+    /// Records that every transport has taken the frame; the loop makes its sample.
     pub fn frame_is_out(&mut self, world: &World, subscribers: u32) {
         self.pace.frame_is_out();
         let (header, announcements) = self.sample.take().expect("a frame");
@@ -173,18 +176,25 @@ impl Oracle {
     }
 }
 
+/// Returns the cues reached since the last frame; cues of shows passed entirely in between are not announced.
+fn announced(show: &mut Model<Formula>, first_show: u64) -> Vec<usize> {
+    let last_show = show.shows_played;
+    let shown = show.reached.drain(..).filter(|(number, _)| *number == first_show || *number == last_show);
+    shown.map(|(_, cue)| cue).collect()
+}
+
 /// The real show, between the loop and the oracle.
 pub struct Checked {
-    pub show: Show,
+    pub show: ShowSource,
     pub world: Rc<World>,
     pub oracle: Rc<RefCell<Oracle>>,
 }
 
-impl Frames for Checked {
-    fn frame(&mut self, tick: u64) -> Period<'_> {
+impl FrameSource for Checked {
+    fn frame(&mut self, tick: u64, stamps: Stamps) -> Period<'_> {
         self.oracle.borrow_mut().frame_begins(&self.world, tick);
         self.world.spend(self.world.cost_ns());
-        self.show.frame(tick).into()
+        self.show.frame(tick, stamps)
     }
 
     fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {

@@ -5,22 +5,22 @@ use bench_dragon::publisher::live::{Counts, End};
 
 use crate::world::{SECOND_NS, World, same};
 
-/// A deadline is rounded to a nanosecond, here and there.
+/// Rounding of a deadline to a nanosecond, on both sides.
 const ROUNDING_NS: f64 = 2.0;
-/// The loop heeds its stop flag ten times a second.
+/// The loop checks its stop flag ten times a second.
 const HEEDED_NS: u64 = SECOND_NS / 10;
 
-/// What has become of the periods so far.
+/// The count of periods so far.
 pub struct Pace {
     rate: f64,
-    /// When the first period began.
+    /// The start of the first period.
     begin_ns: u64,
-    /// The period that is to come if nothing is late.
+    /// The next period, if nothing is late.
     next_tick: u64,
     pub frames: u64,
     pub skipped: u64,
     pub overruns: u64,
-    /// The least and the most by which the present frame can be late.
+    /// The least and the greatest possible lateness of the present frame.
     pub lateness_ns: (u64, u64),
     frames_at_stop: Option<u64>,
 }
@@ -39,17 +39,17 @@ impl Pace {
         }
     }
 
-    /// The loop's first look at its clock is where its periods begin.
+    /// Sets the beginning of the periods: the loop's first read of its clock.
     fn begin(&mut self, world: &World) {
         self.begin_ns = world.first_read_ns.get().expect("the loop has read its clock");
     }
 
-    /// start + tick / rate.
+    /// Returns start + tick / rate.
     fn deadline(&self, tick: u64) -> f64 {
         self.begin_ns as f64 + tick as f64 / self.rate * 1e9
     }
 
-    /// Doubles of that size are so far apart.
+    /// Returns the distance of some doubles of that size, with the rounding to a nanosecond.
     fn tolerance(&self, tick: u64) -> f64 {
         ROUNDING_NS + 4.0 * f64::EPSILON * self.deadline(tick)
     }
@@ -60,7 +60,7 @@ impl Pace {
         self.next_tick = tick;
     }
 
-    /// A frame of the period `tick` is about to be computed.
+    /// Checks the time of a frame of the period `tick` before its computation.
     pub fn frame_begins(&mut self, world: &World, tick: u64) {
         self.begin(world);
         assert!(tick >= self.next_tick, "period {tick}, where {} or a later one is due", self.next_tick);
@@ -76,7 +76,7 @@ impl Pace {
         self.frames_at_stop = self.frames_at_stop.or(stopped);
     }
 
-    /// The header of the frame that goes out.
+    /// Checks the header of a frame that is sent.
     pub fn frame_goes_out(&mut self, world: &World, header: &FrameHeader, run_id: u64) {
         same("the run and the sequence", (header.run_id, header.sequence), (run_id, self.frames));
         same("the period", header.tick, self.next_tick);
@@ -90,9 +90,9 @@ impl Pace {
         self.next_tick += 1;
     }
 
-    /// The loop has ended.
+    /// Checks the counts after the end of the loop.
     pub fn ended(&mut self, world: &World, counts: &Counts, periods: Option<u64>) {
-        // A loop that is stopped at once has had no frame.
+        // A loop that is stopped at once has sent no frame.
         self.begin(world);
         let elapsed = counts.frames + counts.skipped;
         same("the frames", counts.frames, self.frames);

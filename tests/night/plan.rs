@@ -1,4 +1,4 @@
-//! What a night is: drawn from its seed before it begins.
+//! The parameters of a night, drawn from its seed before it begins.
 
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::messages::state::{FrameState, Level};
@@ -22,7 +22,7 @@ const CONTACT_CUES: &str = "[[cues]]\nname = \"one\"\nat = 2.0\n[[cues]]\nname =
                             [[cues]]\nname = \"closing\"\nbefore = \"contact\"\nseconds = 5.0\n";
 const PIECES: &str = include_str!("../scenes/alertloop.toml");
 
-/// A scene, and what its models need of it.
+/// A scene, and the data that its models need.
 pub struct Stage {
     pub scene: Scene,
     pub timeline: Timeline,
@@ -54,13 +54,13 @@ impl Stage {
             EventKind::PathEnd => FrameState::PathEnd,
         };
         let end = timeline.end().time;
-        // Without alerts nothing is known but the end.
+        // Without alerts only the end is known.
         let known = |time: f64| scene.alerts.is_some() || time == end;
         let events = events.iter().filter(|(time, _)| known(*time)).map(|(time, kind)| (*time, state(kind))).collect();
         Self { scene, timeline, rules, events }
     }
 
-    /// Every scene that nights are played of.
+    /// Returns every scene of the nights.
     pub fn all() -> Vec<Self> {
         [
             format!("{TEAM}{SPIRAL}{ALERTS}{CONTACT_CUES}"),
@@ -74,7 +74,7 @@ impl Stage {
         .collect()
     }
 
-    /// When a show of it freezes, simulated seconds.
+    /// Returns the simulated time at which a show of it ends, seconds.
     pub fn freeze(&self, playback: &Playback) -> f64 {
         let contact = self.events.iter().find(|(_, state)| *state == FrameState::Contact);
         let stops = self.scene.alerts.is_some() && playback.on_contact == OnContact::Stop;
@@ -90,7 +90,7 @@ impl Stage {
     }
 }
 
-/// A subscriber's queue, how often it reads, and once in how many reads it dies.
+/// A subscriber's queue, its reading interval, and the mean number of reads until it dies.
 #[derive(Debug, Clone, Copy)]
 pub struct Reader {
     pub depth: usize,
@@ -104,20 +104,20 @@ pub struct Plan {
     pub begin_ns: u64,
     pub rate: f64,
     pub periods: Option<u64>,
-    /// When a signal comes.
+    /// Time of a signal.
     pub stop_ns: Option<u64>,
     /// Frames until the shared memory is full.
     pub room: u64,
     pub playback: Playback,
-    /// Sleeps, or frames, between two that go wrong.
+    /// Mean number of sleeps, or frames, between two faults.
     pub faults_every: f64,
-    /// Between two commands at each door, on average.
+    /// Mean time between two commands at each queue.
     pub doors: Vec<f64>,
     pub readers: Vec<Reader>,
-    /// Samples, and alerts and cues, for which the statistics have room.
+    /// Room of the statistics: samples, and alerts and cues.
     pub queues: (usize, usize),
     pub statistics_every_ns: u64,
-    /// The rate of a transport with a thread of its own.
+    /// The rate of a transport with a separate thread.
     pub background_rate: Option<f64>,
     pub wall_clock_every_ns: f64,
 }
@@ -125,7 +125,7 @@ pub struct Plan {
 impl Plan {
     pub fn draw(random: &mut Random, stages: &[Stage]) -> Self {
         let stage = random.below(stages.len() as u64) as usize;
-        // Hours are cheap at a low rate; threads meet at a high one.
+        // Hours are cheap at a low rate; threads interfere at a high one.
         let fast = random.once_in(3);
         let rate = if fast {
             random.pick(&[10.0, 24.0, 25.0, 29.97, 50.0, 59.94, 60.0, 100.0, 144.0, 240.0, 1000.0, 20_000.0])

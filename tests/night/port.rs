@@ -1,5 +1,6 @@
-//! In place of the shared memory: queues that drop the oldest frame for a subscriber that is behind, as iceoryx2's do
-//! with safe overflow, history of one alert, new subscribers let in by maintenance, and a memory that can be full.
+//! A replacement for the shared memory: queues that drop the oldest frame for a slow subscriber, as iceoryx2's do with
+//! safe overflow. It has a history of one alert, maintenance that connects new subscribers, and a memory that can be
+//! full.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -15,12 +16,12 @@ use crate::world::{SECOND_NS, World};
 pub struct Receiver {
     pub frames: VecDeque<FrameHeader>,
     depth: usize,
-    /// The sequence of the first frame that was put here, and how many were put here, and dropped.
+    /// The sequence of the first frame that was put here, and the numbers of frames put here and dropped.
     pub first: Option<u64>,
     pub offered: u64,
     pub lost: u64,
     pub is_connected: bool,
-    /// Its process has died: the queue stands until maintenance removes it.
+    /// True if its process has died: the queue exists until maintenance removes it.
     pub is_dead: bool,
 }
 
@@ -41,11 +42,11 @@ impl Receiver {
     }
 }
 
-/// Who subscribes.
+/// The subscribers.
 #[derive(Default)]
 pub struct Receivers {
     list: RefCell<Vec<Rc<RefCell<Receiver>>>>,
-    /// Whether maintenance has something to do.
+    /// True if maintenance has work to do.
     has_changed: Cell<bool>,
 }
 
@@ -67,17 +68,17 @@ pub struct SharedMemory {
     /// The level of the latest alert, which the service keeps.
     pub level: Option<u32>,
     pub quiet_maintenance: u64,
-    /// When maintenance was done last, and how long the loop had been held up by then.
+    /// The time of the last maintenance, and the delay of the loop up to then.
     pub maintained: Option<(u64, u64)>,
 }
 
-/// Late subscribers are let in about ten times a second.
+/// Late subscribers are connected about ten times a second.
 const LEAST_OFTEN_NS: u64 = SECOND_NS / 5;
 
 pub const FULL: &str = "the shared memory is full";
 
 impl SharedMemory {
-    /// New subscribers get the alert that is kept; the queues of dead ones are removed.
+    /// Connects new subscribers, which get the kept alert, and removes the queues of dead ones.
     fn let_in(&mut self) {
         self.receivers.list.borrow_mut().retain(|receiver| {
             let mut receiver = receiver.borrow_mut();
@@ -100,7 +101,7 @@ impl Publisher for SharedMemory {
         }
         *room -= 1;
         oracle.borrow_mut().frame_goes_out(world, outgoing);
-        self.level = outgoing.alerts().last().map(|alert| alert.level).or(self.level);
+        self.level = outgoing.alerts.last().map(|alert| alert.level).or(self.level);
         world.spend(world.cost_ns());
         let header = FrameHeader { sent_ns: world.now_ns(), ..*outgoing.header };
         for receiver in self.receivers.list.borrow().iter() {

@@ -1,7 +1,7 @@
-//! The seed of a night: every number that is drawn comes from here.
+//! The seed of a night: every random number comes from here.
 
-/// SplitMix64 (Steele, Lea, Flood 2014). Written out, so that a seed that is kept means the same night for ever: the
-/// libraries reserve the right to change their generators.
+/// SplitMix64 (Steele, Lea, Flood 2014). Written out, so that a kept seed always means the same night: libraries
+/// reserve the right to change their generators.
 pub struct Random(u64);
 
 impl Random {
@@ -16,27 +16,27 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Less than `limit`, 0 where that is 0.
+    /// Returns a number less than `limit`, 0 if `limit` is 0.
     pub fn below(&mut self, limit: u64) -> u64 {
         ((u128::from(self.draw()) * u128::from(limit)) >> 64) as u64
     }
 
-    /// From 0 to 1.
+    /// Returns a number from 0 to 1.
     pub fn share(&mut self) -> f64 {
         (self.draw() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// True once in so many.
+    /// Returns true once in `times` calls, on average.
     pub fn once_in(&mut self, times: u64) -> bool {
         self.below(times) == 0
     }
 
-    /// Every magnitude between the two alike.
+    /// Returns a number between the two, with every magnitude equally likely.
     pub fn magnitude(&mut self, least: f64, most: f64) -> f64 {
         least * (most / least).powf(self.share())
     }
 
-    /// How many go well before one does not, `mean` on average.
+    /// Returns the number of successes before a fault, `mean` on average.
     pub fn gap(&mut self, mean: f64) -> u64 {
         (-(1.0 - self.share()).ln() * mean) as u64
     }

@@ -1,4 +1,4 @@
-//! What was simulated, counted.
+//! Counts of the simulated events.
 
 use crate::world::SECOND_NS;
 
@@ -6,12 +6,12 @@ use crate::world::SECOND_NS;
 pub struct Tally {
     pub nights: u64,
     pub simulated_ns: u128,
-    /// The part of that in which the loop was held up for a second or more.
+    /// The part of this time in which the loop was delayed for a second or more.
     pub stalled_ns: u128,
     pub frames: u64,
     pub skipped: u64,
     pub delays: u64,
-    /// Of those, the ones of a second or more.
+    /// The delays of a second or more.
     pub stalls: u64,
     pub commands: u64,
     /// Commands for which there was no room.
@@ -50,7 +50,7 @@ impl Tally {
         self.stops += other.stops;
     }
 
-    /// Whether all that can happen has happened.
+    /// Returns true if every possible event has happened.
     pub fn has_everything(&self) -> bool {
         let Self { nights, simulated_ns, stalled_ns, frames, skipped, delays, stalls, commands, too_many, .. } = *self;
         let Self { alerts, cues, clock_steps, samples_lost, frames_lost, .. } = *self;

@@ -1,7 +1,7 @@
-//! Simulated time and the scheduler: the loop runs until it sleeps or spends time; then all that is due runs, in order
-//! of time, each as late as the seed has it.
+//! Simulated time and the scheduler. The loop runs until it sleeps or spends time; then all due actors run, in order of
+//! time, each with the delay that the seed gives.
 //!
-//! [`World`] is the loop's [`Clock`]. Whatever runs beside the loop is an [`Actor`]: one step of a thread or of a
+//! [`World`] is the loop's [`Clock`]. Each program beside the loop is an [`Actor`]: one step of a thread or of a
 //! process.
 
 use std::cell::{Cell, RefCell};
@@ -18,16 +18,16 @@ use crate::tally::Tally;
 
 pub const SECOND_NS: u64 = 1_000_000_000;
 const MILLISECOND_NS: u64 = 1_000_000;
-/// Events that are shown where a night fails.
+/// Events that are shown if a night fails.
 const TRACED: usize = 60;
-/// Reads of a clock between two at which the loop's thread is preempted, on average.
+/// Mean number of clock reads between two preemptions of the loop's thread.
 const READS_PER_PREEMPTION: f64 = 300.0;
-/// The longest that the loop is held up, in periods: the model of the show counts them one by one.
+/// The longest delay of the loop, in periods: the model of the show counts them one by one.
 const LONGEST_STALL_PERIODS: u64 = 1_000_000;
 
-/// What runs beside the loop.
+/// A thread or process beside the loop.
 pub trait Actor {
-    /// Does one step at the present time; when it is due again.
+    /// Does one step at the present time and returns the time of the next.
     fn step(&mut self, world: &World) -> u64;
 }
 
@@ -62,17 +62,17 @@ pub struct World {
     next_due_ns: Cell<u64>,
     period_ns: u64,
     faults_every: f64,
-    /// What goes well before the next fault: reads of the clocks, sleeps.
+    /// Operations without a fault before the next fault: reads of the clocks, sleeps.
     reads_left: Cell<u64>,
     sleeps_left: Cell<u64>,
-    /// Nanoseconds by which the loop has been held up.
+    /// Total delay of the loop, nanoseconds.
     pub delayed_ns: Cell<u64>,
-    /// Since when the loop was last seen to be awake: no later than what it does now.
+    /// The time at which the loop was last known to be awake: no later than its present work.
     pub awake_ns: Cell<u64>,
     pub stop: AtomicBool,
-    /// When that was set, and how long the loop had been held up until then.
+    /// The time at which the stop flag was set, and the delay of the loop up to then.
     pub stopped: Cell<Option<(u64, u64)>>,
-    /// What CLOCK_MONOTONIC said first, and CLOCK_REALTIME last.
+    /// The first value of CLOCK_MONOTONIC, and the last of CLOCK_REALTIME.
     pub first_read_ns: Cell<Option<u64>>,
     pub stamp_ns: Cell<u64>,
     pub trace: Rc<Trace>,
@@ -110,7 +110,7 @@ impl World {
         self.now_ns().wrapping_add(self.offset_ns.get())
     }
 
-    /// CLOCK_REALTIME is set to another time.
+    /// Sets CLOCK_REALTIME to another time.
     pub fn step_realtime(&self, by_ns: i64) {
         self.offset_ns.set(self.offset_ns.get().wrapping_add_signed(by_ns));
         self.note("the wall clock is set by, s", [by_ns as f64 / 1e9, 0.0]);
@@ -121,21 +121,21 @@ impl World {
         self.trace.note(self.now_ns(), what, of);
     }
 
-    /// The stop flag is set, as by a signal.
+    /// Sets the stop flag, as by a signal.
     pub fn set_stop(&self) {
         self.note("stop", [0.0; 2]);
         self.stop.store(true, Ordering::Release);
         self.stopped.set(Some((self.now_ns(), self.delayed_ns.get())));
     }
 
-    /// Adds what runs beside the loop, due first at `due_ns`.
+    /// Adds an actor, due first at `due_ns`.
     pub fn add(&self, actor: Box<dyn Actor>, due_ns: u64) {
         self.actors.borrow_mut().push(actor);
         self.due_ns.borrow_mut().push(due_ns);
         self.next_due_ns.set(self.next_due_ns.get().min(due_ns));
     }
 
-    /// Time passes for the loop; the others run meanwhile.
+    /// Advances the loop's time; the actors run meanwhile.
     fn advance_to(&self, until_ns: u64) {
         while self.next_due_ns.get() <= until_ns {
             let (index, due_ns) = {
@@ -153,21 +153,21 @@ impl World {
         self.now_ns.set(self.now_ns().max(until_ns));
     }
 
-    /// The loop's thread is held up.
+    /// Delays the loop's thread.
     pub fn spend(&self, ns: u64) {
         if ns > 0 {
             self.advance_to(self.now_ns() + ns);
-            // Counted at its end: what a stop falls into is after it.
+            // Counted at its end: a stop within the delay comes before the count.
             self.delayed_ns.set(self.delayed_ns.get() + ns);
         }
     }
 
-    /// The loop is seen to be awake.
+    /// Records that the loop is awake.
     pub fn is_awake(&self) {
         self.awake_ns.set(self.now_ns());
     }
 
-    /// How long something takes: mostly a small part of a period, now and then periods, whole ones among them, seconds.
+    /// Returns a random duration: mostly a small part of a period, sometimes whole periods or seconds.
     pub fn delay_ns(&self) -> u64 {
         let mut random = self.random.borrow_mut();
         let ns = match random.below(16) {
@@ -182,7 +182,7 @@ impl World {
         ns.min(self.period_ns.saturating_mul(LONGEST_STALL_PERIODS))
     }
 
-    /// As [`delay_ns`](Self::delay_ns), but rarely more than a part of a period. For each frame.
+    /// As [`delay_ns`](Self::delay_ns), but rarely more than a part of a period. Used for each frame.
     pub fn cost_ns(&self) -> u64 {
         let usual = {
             let mut random = self.random.borrow_mut();
@@ -194,7 +194,7 @@ impl World {
         };
         usual.unwrap_or_else(|| {
             let ns = self.delay_ns();
-            self.fault("the loop is held up, s", ns);
+            self.fault("the loop is delayed, s", ns);
             ns
         })
     }
@@ -208,7 +208,7 @@ impl World {
         self.note(what, [ns as f64 / 1e9, 0.0]);
     }
 
-    /// Once in a while the thread is preempted just before a clock is read, or just after.
+    /// Sometimes preempts the thread just before a clock is read, or just after.
     fn preempted(&self) -> bool {
         let left = self.reads_left.get();
         self.reads_left.set(left.wrapping_sub(1));
@@ -275,7 +275,7 @@ impl Clock for World {
     }
 }
 
-/// As an assertion of two values that are to be the same, with a sentence for the trace.
+/// Asserts that two values are equal, with a sentence for the trace.
 pub fn same<T: PartialEq + Debug>(what: &str, seen: T, expected: T) {
     assert!(seen == expected, "{what}: {seen:?}, expected {expected:?}");
 }

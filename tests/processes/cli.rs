@@ -1,8 +1,8 @@
-//! The command line's contract, held with the real binary over every scene in `config/`: what is printed, where, in
-//! which order, with which bits, and the exit code.
+//! The command line's contract, tested with the real binary over every scene in `config/`: the output, its streams,
+//! order and bits, and the exit code.
 //!
-//! A scene that is added to the folder is tested with the others. `BENCH_DRAGON_LONG=1` adds what takes minutes,
-//! `trade` on long teams.
+//! A scene that is added to the folder is tested with the others. `BENCH_DRAGON_LONG=1` adds tests of minutes: `trade`
+//! on long teams.
 
 mod answers;
 mod conventions;

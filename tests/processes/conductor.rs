@@ -1,5 +1,5 @@
-//! Those who conduct a publisher that is stopped, dies, or has long to do: what they are told, and what is not done any more.
-//! The publisher is a process of its own. Nothing asserts a speed.
+//! Control clients of a publisher that is stopped, dies, or executes a long command: their answers, and the commands
+//! that are not executed any more. The publisher is a separate process. No test asserts a speed.
 
 use crate::harness;
 
@@ -27,7 +27,7 @@ fn publisher(name: &str, arguments: &[&str]) -> Process {
     panic!("no publisher");
 }
 
-/// Exit code, the response as printed, and the sentence on standard error.
+/// Returns the exit code, the response as printed, and the sentence on standard error.
 fn control(name: &str, arguments: &[&str]) -> (i32, Value, String) {
     let output = program(name).args(["--json", "control"]).args(arguments).output().unwrap();
     let line = json_lines(&output).pop().unwrap_or(Value::Null);
@@ -40,14 +40,13 @@ fn done(name: &str, arguments: &[&str]) -> Value {
     line
 }
 
-/// Numbers of actions in the order in which they were answered, and in a word what became of each.
+/// Returns the numbers of actions in the order of their answers, each with its result in a word.
 fn answers(actions: &[Action], between: impl FnOnce(), name: &str) -> Vec<(usize, String)> {
     let (sender, receiver) = std::sync::mpsc::channel();
     let conductor = Conductor::start(&unique(name), move |number: usize, conducted| {
         let word = match conducted {
             Ok((command, response)) => {
-                let name = Conduct::NAMES[command.number_and_value().0 as usize];
-                format!("{name}: {}", response.result().unwrap().name())
+                format!("{}: {}", command.name(), response.result().unwrap().name())
             }
             Err(ControlError::Overtaken) => "overtaken".to_owned(),
             Err(error) => error.to_string(),
@@ -57,7 +56,7 @@ fn answers(actions: &[Action], between: impl FnOnce(), name: &str) -> Vec<(usize
     let conductor = conductor.unwrap();
     for (number, action) in actions.iter().enumerate() {
         conductor.request(number, *action).unwrap();
-        // Each has been sent, or waits, before the next comes.
+        // Each command has been sent, or waits, before the next one starts.
         wait(0.02);
     }
     between();
@@ -70,7 +69,7 @@ fn nothing_that_was_asked_before_a_hold_is_done_after_it() {
     let publisher = publisher(name, &[]);
     publisher.stop();
     let send = |command| Action::Send(command);
-    // Three are sent, the last of them a question; four wait for its answer, and two of them would end the hold.
+    // Three are sent, the last of them a query; four wait for its answer, and two of them would end the hold.
     let actions = [
         send(Conduct::Pause),
         send(Conduct::Rate(2.0)),
@@ -134,7 +133,7 @@ fn commands_to_a_publisher_that_dies_are_given_up_in_their_order() {
     }
 }
 
-/// The loop takes a command every five seconds, and as many wait as the door admits.
+/// The loop takes a command every five seconds, and the command queue is full.
 #[test]
 fn a_question_that_is_refused_answers_nothing() {
     let name = "full_door";
@@ -142,7 +141,7 @@ fn a_question_that_is_refused_answers_nothing() {
     let mut floods: Vec<_> = (0..9).map(|_| Controller::new(&unique(name)).unwrap()).collect();
     let mut waiting = Vec::new();
     for _ in 0..10 {
-        // Those that have been refused are sent again; a client may have so many waiting.
+        // Refused commands are sent again; a client may have a limited number of commands waiting.
         waiting.retain(|pending: &PendingCommand| matches!(pending.poll(), Ok(None)));
         waiting.extend(floods.iter_mut().flat_map(|controller| {
             let requests = [(); 8].map(|()| controller.request(Conduct::State).ok());
@@ -151,7 +150,7 @@ fn a_question_that_is_refused_answers_nothing() {
         wait(0.2);
         let (code, line, sentence) = control(name, &["--timeout", "1", "toggle"]);
         if sentence.contains("has not answered") {
-            // It has found a place that had just become free.
+            // The command has found a place that had just become free.
             continue;
         }
         assert!(code == 1 && line.is_null(), "{code} {line}");
@@ -159,10 +158,10 @@ fn a_question_that_is_refused_answers_nothing() {
         assert_eq!(answers(&[Action::Toggle], || (), name), [(0, "state: too_many".to_owned())]);
         return;
     }
-    panic!("the door is never full");
+    panic!("the command queue is never full");
 }
 
-/// A step that lasts longer than the publisher is given for any other answer.
+/// A step that lasts longer than the client waits for any other answer.
 #[test]
 fn a_long_step_is_awaited() {
     if !long() {

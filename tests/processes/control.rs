@@ -1,5 +1,5 @@
-//! Conducting a running publisher over shared memory: from the command line and from Python, in every state, at an exact
-//! tick, and at no cost to the stream.
+//! Control of a running publisher over shared memory: from the command line and from Python, in every state, at an
+//! exact tick, and at no cost to the stream.
 
 use crate::harness;
 
@@ -28,12 +28,12 @@ fn publisher(name: &str, arguments: &[&str]) -> Process {
         refusal = sentence;
         wait(0.1);
     }
-    // One that runs has to be ended before it can be asked what it printed.
+    // A running process must end before the test can read its output.
     process.signal(nix::sys::signal::Signal::SIGINT);
     panic!("{refusal}; the publisher: {}", text(&process.output_within(20).stderr));
 }
 
-/// Exit code, the response as printed, and the sentence on standard error.
+/// Returns the exit code, the response as printed, and the sentence on standard error.
 fn control(name: &str, arguments: &[&str]) -> (i32, Value, String) {
     let output = program(name).args(["--json", "control"]).args(arguments).output().unwrap();
     let line = json_lines(&output).pop().unwrap_or(Value::Null);
@@ -109,7 +109,7 @@ fn every_command_in_every_state_from_python() {
     assert_eq!(codes("playing"), [0, 0, 1, 0, 0, 2, 0, 0, 2, 2]);
     assert_eq!(codes("paused"), [0, 1, 0, 0, 0, 0, 0, 0, 2, 2]);
     assert_eq!(codes("held"), [0, 2, 2, 2, 2, 2, 2, 1, 0, 2]);
-    // Two commands that do not exist, and six values that no show can take.
+    // Two commands that do not exist, and six values that no show accepts.
     assert_eq!(codes("any"), [4, 4, 3, 3, 3, 3, 3, 3]);
 }
 
@@ -127,7 +127,7 @@ fn a_flood_and_killed_clients_cost_the_stream_nothing() {
         let mut flood = Process::start(&mut peer(name, "flood"));
         flood.lines().until("flooding", 20);
         wait(1.0);
-        // Another is answered meanwhile.
+        // Another command is answered meanwhile.
         done(name, &["pause"]);
         done(name, &["resume"]);
         flood.signal(nix::sys::signal::Signal::SIGKILL);
@@ -164,7 +164,7 @@ fn a_show_waits_for_go_at_its_start_and_at_its_cues() {
     assert!(code == 1 && line["code"] == "refused" && sentence.contains("waits for nothing"), "{line} {sentence}");
 }
 
-/// A frame that is further than all cues announces every one of them, however many there are.
+/// A frame that passes all cues announces every one of them, however many there are.
 #[test]
 fn all_cues_of_one_step_are_announced() {
     let name = "many_cues";
@@ -180,7 +180,7 @@ fn all_cues_of_one_step_are_announced() {
     let mut watch = Process::start(program(name).args(["watch", "--json", "--duration", "6"]));
     let printed = watch.lines();
     let of = |line: &str| serde_json::from_str::<Value>(line).unwrap();
-    // It has seen frames before, or would be sent the last cue alone.
+    // The subscriber has received frames before; otherwise it would be sent the last cue alone.
     printed.all_until_one(|line| of(line)["received"].as_u64().is_some_and(|frames| frames > 0), "a frame", 60);
     done(name, &["go"]);
     let lines = Vec::from_iter(printed.rest(60).iter().map(|line| of(line)));
@@ -188,7 +188,7 @@ fn all_cues_of_one_step_are_announced() {
     assert_eq!(Vec::from_iter(names), Vec::from_iter(numbers.map(|cue| format!("cue {cue}"))));
 }
 
-/// A show as it stands when a command comes.
+/// The state of a show when a command arrives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stand {
     Playing,
@@ -227,11 +227,11 @@ impl Conductor {
         }
     }
 
-    /// Brings the show to a stand; the scene's cue at 0.2 s pauses, and it ends after 412.4 s.
+    /// Brings the show to a state; the scene's cue at 0.2 s pauses, and the show ends after 412.4 s.
     fn bring_to(&mut self, stand: Stand) {
         self.send(Conduct::Release);
         self.send(Conduct::Rate(1.0));
-        // A resume ends waiting, too.
+        // A resume also ends a wait at a cue.
         self.send(Conduct::Resume);
         self.send(Conduct::Pause);
         assert_eq!(self.send(Conduct::Seek(1.0)), (Code::Done, PlaybackState::Paused));
@@ -259,7 +259,7 @@ impl Conductor {
         }
     }
 
-    /// The answer to the step, if one was under way; it is broken off.
+    /// Returns the answer to the step, if one was in progress; the step is cancelled.
     fn end_step(&mut self) -> Option<Code> {
         let step = self.step.take()?;
         if !step.is_finished() {
@@ -269,7 +269,7 @@ impl Conductor {
     }
 }
 
-/// A publisher whose show waits at a cue, and ends at its contact.
+/// Returns a publisher whose show waits at a cue, and ends at its contact.
 fn publisher_with_a_cue(name: &str) -> Process {
     let scene = scene_file(name, &[("accuracy = 1e-9", "solver = \"newton\"")]);
     let cue = "[[cues]]\nname = \"wait\"\nat = 0.2\nthen = \"pause\"\n";
@@ -285,8 +285,8 @@ fn every_command_in_every_state() {
     let _publisher = publisher_with_a_cue(name);
     let mut conductor = Conductor::new(name);
     let held = (Refused, Held);
-    // Playing, paused, stepping, waiting, held, ended: the code, and whether the show plays then. A step has no answer
-    // before it is over.
+    // Playing, paused, stepping, waiting, held, ended: the code, and the state after the command. A step has no answer
+    // before it is complete.
     let table: [(Conduct, [(Code, PlaybackState); 6]); 10] = [
         (
             Conduct::State,
@@ -325,7 +325,7 @@ fn every_command_in_every_state() {
         for (stand, expected) in STANDS.into_iter().zip(expected) {
             conductor.bring_to(stand);
             assert_eq!(conductor.send(command), expected, "{command:?} while {stand:?}");
-            // What breaks a step off has it refused.
+            // A command that cancels a step causes its refusal.
             assert_eq!(conductor.end_step(), (stand == Stand::Stepping).then_some(Refused), "{command:?}");
         }
     }
@@ -345,7 +345,7 @@ fn every_command_in_every_state() {
     }
 }
 
-/// The service's files are their owner's alone, unless the program was built to let everybody in.
+/// The service's files belong to their owner alone, unless the program was built to admit all users.
 #[test]
 fn another_user_cannot_conduct() {
     if !can_run(root("become another user")) {

@@ -1,7 +1,7 @@
-//! What goes wrong on a real machine, done to real processes: kills, stops, clocks, full memory, races, other users.
+//! Faults of a real machine, caused to real processes: kills, stops, clocks, full memory, races, other users.
 //!
-//! Each test ends with nothing lost that was promised and nothing left behind. `BENCH_DRAGON_LONG=1` repeats the kills
-//! a thousand and a hundred times. Every wait has a deadline, and nothing asserts a speed.
+//! Each test ends with no loss that was excluded and no stale file. `BENCH_DRAGON_LONG=1` repeats the kills a thousand
+//! and a hundred times. Every wait has a deadline, and no test asserts a speed.
 
 use crate::harness;
 
@@ -17,20 +17,20 @@ use serde_json::Value;
 
 use harness::{LONG_QUEUE, Lines, Place, Process, can_run, is_root, json_lines, long, root, summary, text, wait};
 
-/// A publisher whose subscribers lose nothing while the machine is too busy to run them.
+/// Returns a publisher whose subscribers lose nothing while the machine is too busy to run them.
 fn publisher(place: &Place, arguments: &[&str]) -> Process {
     let scene = place.scene_publishing(LONG_QUEUE);
     Process::start(place.program().args(["run", "--json", "--scene"]).arg(scene).args(arguments))
 }
 
-/// A subscriber that checks every frame: its process, and an observation a second.
+/// Returns a subscriber that checks every frame: its process, and an observation per second.
 fn observer(place: &Place) -> (Process, Lines) {
     let mut process = Process::start(place.program().arg("soak-subscriber"));
     let lines = process.lines();
     (process, lines)
 }
 
-/// What an observer has seen when it is stopped, which must end it without an error.
+/// Stops an observer, which must end without an error, and returns its observation.
 fn observed((process, lines): (Process, Lines)) -> Value {
     process.signal(SIGTERM);
     let last = lines.rest(300).pop().unwrap();
@@ -43,13 +43,13 @@ fn number(value: &Value, key: &str) -> u64 {
     value[key].as_u64().unwrap_or_else(|| panic!("no {key} in {value}"))
 }
 
-/// Fails unless a run's frames reached an observer up to the last one, in order and right.
+/// Fails unless a run's frames reached an observer up to the last one, in order and correct.
 fn assert_nothing_lost(seen: &Value, summary: &Value) {
     assert_nothing_wrong(seen);
     assert_eq!(number(seen, "runs"), 1, "{seen}");
     assert_eq!(number(seen, "last_sequence") + 1, number(summary, "frames"), "{seen} {summary}");
-    // Periods that passed between the last frame and the stop are in the summary, and in no frame: where the last status came
-    // it has those before the last frame.
+    // Periods that passed between the last frame and the stop are in the summary, and in no frame. If the last status
+    // has arrived, it has the skipped periods before the last frame.
     let (frames, in_all) = (number(summary, "frames"), number(summary, "skipped"));
     let status = &seen["status"];
     let skipped = if status["frames"] == frames { number(status, "skipped") } else { in_all };
@@ -57,7 +57,7 @@ fn assert_nothing_lost(seen: &Value, summary: &Value) {
     assert_eq!(number(seen, "last_tick") + 1, frames + skipped, "{seen} {summary}");
 }
 
-/// Fails unless an observer missed nothing between the frames it received, and found nothing wrong with them.
+/// Fails unless an observer missed nothing between the frames it received, and found no error in them.
 fn assert_nothing_wrong(seen: &Value) {
     assert!(number(seen, "received") > 0, "{seen}");
     for fault in ["missed", "disordered", "wrong_links"] {
@@ -66,7 +66,7 @@ fn assert_nothing_wrong(seen: &Value) {
     assert!(seen["phase_error_ns"].as_f64().unwrap() <= 2.0, "{seen}");
 }
 
-/// One clear sentence and exit code 1.
+/// Returns one clear sentence; the exit code must be 1.
 fn refusal(output: &Output) -> String {
     let printed = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{:?} {printed}", output.status.signal());
@@ -83,7 +83,7 @@ fn killed_subscribers_take_nothing_with_them() {
     let kills = if long() { 1000 } else { 20 };
     for kill in 0..kills {
         let victim = Process::start(place.program().args(["watch", "--json"]));
-        // From a moment before it has opened anything to one in full swing.
+        // From a time before the process has opened anything to a time in full operation.
         wait(0.015 * f64::from(kill % 20));
         victim.signal(SIGKILL);
     }
@@ -92,10 +92,10 @@ fn killed_subscribers_take_nothing_with_them() {
     publisher.signal(SIGINT);
     let summary = summary(&publisher.output_within(300));
     assert_nothing_lost(&observed(steady), &summary);
-    // What was killed half way stays untouched for two seconds: it could be alive and slow.
+    // Files of a process killed halfway stay untouched for two seconds: the process could be alive and slow.
     wait(2.5);
     Process::start(place.program().args(["watch", "--duration", "3"])).output_within(300);
-    // Nobody knows of a file whose maker was killed before it had listed it.
+    // A file whose maker was killed before listing it remains unknown to every process.
     place.assert_clean_but_for(kills as usize / 100);
 }
 
@@ -145,17 +145,17 @@ fn files_of_dead_runs_are_gone_after_the_next() {
     assert!(place.left_behind().len() > 5, "a killed publisher leaves files");
     for start in 0..20 {
         let killed = Process::start(place.program().args(["run", "--rate", "100"]));
-        // From before it has opened anything to the first frames.
+        // From a time before the process has opened anything to the first frames.
         wait(0.01 * f64::from(start));
         killed.signal(SIGKILL);
     }
-    // What was killed half way stays untouched for two seconds: it could be alive and slow.
+    // Files of a process killed halfway stay untouched for two seconds: the process could be alive and slow.
     wait(2.5);
     summary(&Process::start(place.program().args(["run", "--json", "--duration", "3"])).output_within(300));
     place.assert_clean();
 }
 
-/// The library of this name, which changes what a process sees of the machine.
+/// Returns the library of this name, which changes a process's view of the machine.
 fn preloaded(name: &str) -> PathBuf {
     let library = std::env::current_exe().unwrap().ancestors().nth(2).unwrap().join(format!("examples/lib{name}.so"));
     assert!(library.exists(), "cargo build --release --examples makes {}", library.display());
@@ -169,15 +169,15 @@ fn a_show_that_starts_on_a_slow_disk_is_found() {
     slow.args(["run", "--json", "--rate", "100", "--duration", "30", "--scene"])
         .arg(place.scene_publishing(LONG_QUEUE));
     let publisher = Process::start(slow.env("LD_PRELOAD", preloaded("slow_disk")));
-    // Each of these looks, when it starts, for what killed processes left.
+    // Each of these looks, when it starts, for stale files of killed processes.
     let answers = || place.program().args(["--json", "control", "state"]).output().unwrap().status.success();
     let began = Instant::now();
     while !answers() {
-        assert!(began.elapsed() < Duration::from_secs(60), "nobody finds the show");
+        assert!(began.elapsed() < Duration::from_secs(60), "no client finds the show");
         wait(0.1);
     }
-    // A node's file and a service's, each longer than an unfinished one may stand: else nothing was slow.
-    assert!(began.elapsed() > Duration::from_secs(5), "the disk was as fast as ever");
+    // A node's file and a service's file take longer than an unfinished file may exist: otherwise nothing was slow.
+    assert!(began.elapsed() > Duration::from_secs(5), "the disk was not slowed down");
     let steady = observer(&place);
     steady.1.until("\"status\":{", 300);
     publisher.signal(SIGINT);
@@ -198,7 +198,7 @@ fn a_stepped_wall_clock_moves_the_stamps_and_nothing_else() {
     let monitor = stepped(&["watch", "--json"]);
     let steady = observer(&place);
     let summary = summary(&publisher.output_within(300));
-    // An hour that counted would be 360,000 periods one way, and a run that does not end the other.
+    // A counted hour would be 360,000 periods in one direction, and an endless run in the other.
     assert_eq!(number(&summary, "frames") + number(&summary, "skipped"), 600, "{summary}");
     assert!(number(&summary, "skipped") < 300, "{summary}");
     assert_nothing_lost(&observed(steady), &summary);
@@ -206,7 +206,7 @@ fn a_stepped_wall_clock_moves_the_stamps_and_nothing_else() {
     let lines = json_lines(&monitor.output_within(300));
     let latencies = lines.iter().filter_map(|line| line["latency_ns"]["max"].as_u64());
     assert!(latencies.max().is_some_and(|longest| longest < 3_000_000_000_000), "{lines:?}");
-    // The steps did reach the publisher: its stamps, which are the wall clock's, are an hour ahead and behind.
+    // The steps did reach the publisher: its stamps, which are from the wall clock, are an hour ahead and behind.
     let now = std::time::SystemTime::UNIX_EPOCH.elapsed().unwrap().as_secs() as i64;
     let stamps = lines.iter().filter_map(|line| line["stamp_ns"].as_str()?.parse::<u64>().ok());
     let hours: BTreeSet<_> =
@@ -226,13 +226,13 @@ fn a_stopped_publisher_skips_whole_periods_and_catches_nothing_up() {
     publisher.signal(SIGCONT);
     let summary = summary(&publisher.output_within(300));
     assert_eq!(number(&summary, "frames") + number(&summary, "skipped"), 800, "{summary}");
-    // One incident of five seconds; the machine itself may add stalls, of a period each at the least.
+    // One incident of five seconds; the machine itself may add stalls, of at least a period each.
     let [skipped, overruns] = ["skipped", "overruns"].map(|key| number(&summary, key));
     assert!(skipped >= 498 && overruns >= 1 && overruns - 1 <= skipped - 498, "{summary}");
     assert!(number(&summary["wakeup_ns"], "max") > 4_900_000_000, "{summary}");
     let seen = observed(steady);
     assert_nothing_lost(&seen, &summary);
-    // Coordinated omission: all of the wait is in the latency since the deadline, though no frame was under way.
+    // Coordinated omission: all of the wait is in the latency since the deadline, though no frame was in flight.
     let waited = number(&seen["total"]["since_deadline"], "max");
     assert!(waited > 4_900_000_000, "{seen}");
     assert!(number(&seen["total"]["since_deadline"], "p50") > number(&seen["total"]["since_sent"], "p50"), "{seen}");
@@ -244,7 +244,7 @@ fn of_publishers_that_race_for_a_name_one_wins() {
     let place = Place::new("race");
     for round in 0..5 {
         if round == 3 {
-            // From here on they also find what a dead one left.
+            // From here on they also find the stale files of a dead publisher.
             let doomed = Process::start(place.program().args(["run", "--rate", "100"]));
             observer(&place).1.until("\"status\":{", 300);
             doomed.signal(SIGKILL);
@@ -290,7 +290,7 @@ fn one_subscriber_too_many_is_told_the_limit_and_the_setting() {
     }
 }
 
-/// A shell in which /dev/shm is a small memory of its own.
+/// Returns a shell in which /dev/shm is a separate small file system.
 fn in_small_shared_memory(size: &str, script: &str) -> Command {
     let mut command = Command::new("unshare");
     command.args(if is_root() { vec!["--mount"] } else { vec!["--mount", "--map-root-user"] });
@@ -298,14 +298,14 @@ fn in_small_shared_memory(size: &str, script: &str) -> Command {
     command
 }
 
-/// Requires the right to mount a /dev/shm of one's own.
+/// Requires the right to mount a /dev/shm of its own.
 fn mounts() -> Result<(), String> {
     let output = in_small_shared_memory("1m", "true").output().map_err(|error| format!("no unshare ({error})"))?;
-    let refused = || format!("no mount of one's own may be made here: {}", text(&output.stderr).trim());
+    let refused = || format!("no private mount may be made here: {}", text(&output.stderr).trim());
     if output.status.success() { Ok(()) } else { Err(refused()) }
 }
 
-/// A script run to its end in such a shell, with `$PROGRAM` for the program.
+/// Runs a script to its end in such a shell, with `$PROGRAM` for the program.
 fn with_shared_memory(place: &Place, size: &str, script: &str) -> Output {
     let mut command = in_small_shared_memory(size, script);
     command.current_dir(place.folder()).env("PROGRAM", env!("CARGO_BIN_EXE_bench-dragon"));
@@ -335,9 +335,10 @@ fn shared_memory_that_others_fill_does_not_stop_a_publisher() {
         return;
     }
     let place = Place::new("filled");
-    // As much memory as by default, for queues that last nearly two seconds: longer than a busy machine does not run one.
+    // The default amount of memory, for queues that last nearly two seconds: longer than a busy machine leaves a
+    // process waiting.
     place.scene_publishing("subscribers = 3\nqueue = 170");
-    // The slow one keeps taking frames out of the pool, so that every page of it is written.
+    // The slow subscriber keeps taking frames out of the pool, so that every page of the pool is written.
     let output = with_shared_memory(
         &place,
         "7m",
@@ -355,10 +356,10 @@ fn shared_memory_that_others_fill_does_not_stop_a_publisher() {
     assert_nothing_lost(&lines[1], &lines[0]);
 }
 
-/// Whether a process has a handler for a signal.
+/// Returns true if a process has a handler for a signal.
 fn catches(process: &Process, signal: Signal) -> bool {
     let status = std::fs::read_to_string(format!("/proc/{}/status", process.id())).unwrap();
-    // proc(5): a mask in hexadecimal, the first signal its lowest bit.
+    // proc(5): a mask in hexadecimal; the first signal is its lowest bit.
     let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap().trim();
     u64::from_str_radix(caught, 16).unwrap() >> (signal as u32 - 1) & 1 == 1
 }
@@ -368,12 +369,13 @@ fn a_page_that_cannot_be_had_is_a_sentence() {
     let place = Place::new("page");
     let monitor = Process::start(place.program().arg("watch").arg("--json"));
     let deadline = Instant::now() + Duration::from_secs(60);
-    // It learns to end on request after it has learnt what a page says; Rust itself catches SIGBUS from the beginning.
+    // The process catches SIGTERM after it has installed its handler for page errors; Rust itself catches SIGBUS from
+    // the beginning.
     while !catches(&monitor, SIGTERM) {
         assert!(Instant::now() < deadline, "no start");
         wait(0.05);
     }
-    // What Linux sends where a page of a full /dev/shm is written.
+    // The signal that Linux sends if a page of a full /dev/shm is written.
     monitor.signal(SIGBUS);
     assert!(refusal(&monitor.output_within(300)).contains("/dev/shm is full"));
 }
@@ -400,10 +402,10 @@ fn without_ros2_there_is_no_network_socket() {
             }
         }
     }
-    assert!(sockets > 0, "both wake each other through local sockets, which is what was looked through");
+    assert!(sockets > 0, "both wake each other through local sockets, so the tables list some");
 }
 
-/// Another user reads nothing, unless the program was built to let everybody in.
+/// Another user reads nothing, unless the program was built to admit all users.
 #[test]
 fn another_user_is_kept_out_or_let_in_as_the_build_allows() {
     if !can_run(root("become another user")) {

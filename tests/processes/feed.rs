@@ -1,6 +1,6 @@
-//! The feed that every subscriber command stands on, with real publishers that come and go between its polls.
+//! The feed of every subscriber command, with real publishers that come and go between its polls.
 //!
-//! Every wait has a deadline, and nothing asserts a speed.
+//! Every wait has a deadline, and no test asserts a speed.
 
 use crate::harness;
 
@@ -17,7 +17,7 @@ use bench_dragon::show::{Playback, Show};
 use harness::{Process, program, summary, unique, wait};
 use nix::sys::signal::Signal::SIGKILL;
 
-/// What a feed has handed over, in order: frames by their run and sequence, and how many were missed before each.
+/// Events handed over by a feed, in order: frames by their run and sequence, and the number missed before each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Seen {
     Started(u64),
@@ -58,7 +58,7 @@ fn runs(seen: &[Seen]) -> Vec<u64> {
     seen.iter().filter_map(run).collect()
 }
 
-/// The first and the last sequence of a run, the frames received, and those missed.
+/// Returns the first and the last sequence of a run, the number of frames received, and the number missed.
 fn span(seen: &[Seen], of: u64) -> (u64, u64, u64, u64) {
     let frames: Vec<_> = seen
         .iter()
@@ -81,7 +81,7 @@ fn a_publisher_restarted_between_two_polls_is_a_new_run() {
         poll_until(&mut feed, &mut seen, |seen| seen.len() > 10);
         let published = summary(&first.output_within(300))["frames"].as_u64().unwrap();
         let second = publisher(&name, &["--rate", "100"]);
-        // The feed is not polled until the second one publishes, which another process sees.
+        // The feed is not polled until the second publisher publishes, which another process reports.
         let mut monitor = Process::start(program(&name).args(["watch", "--json"]));
         monitor.lines().until("\"state\":\"moving\"", 300);
         drop(monitor);
@@ -100,8 +100,8 @@ fn a_publisher_restarted_between_two_polls_is_a_new_run() {
     }
 }
 
-/// One that comes when the feed is about to find that the one before has gone, 200 ms after its last frame, is followed from
-/// its first frames on.
+/// A publisher starts when the feed is about to find that the one before has gone, 200 ms after its last frame. The
+/// feed selects the new publisher from its first frames on.
 #[test]
 fn a_publisher_that_is_started_again_at_any_moment_is_followed_at_once() {
     const RATE: u64 = 100;
@@ -125,7 +125,8 @@ fn a_publisher_that_is_started_again_at_any_moment_is_followed_at_once() {
     for run in runs(&seen) {
         let (first, last, received, missed) = span(&seen, run);
         assert_eq!((received, missed), (last - first + 1, 0), "{seen:?}");
-        // Half of it, however slowly it began: it was ignored for seconds.
+        // At least half of the frames arrive, however slowly the publisher began; an earlier version ignored it for
+        // seconds.
         assert!(first < RATE, "{first}: {seen:?}");
     }
     let of_frame = |one: &Seen| if let Seen::Frame { run_id, .. } = one { Some(*run_id) } else { None };
@@ -168,7 +169,7 @@ fn opened(name: &str, scene: &Scene, cues: usize, stage: Stage) -> SharedMemoryP
     SharedMemoryPublisher::open(&config).unwrap()
 }
 
-/// Whoever keeps the services of a scene with few cues open is in the way of no scene with more.
+/// A process that keeps the services of a scene with few cues open does not block a scene with more.
 #[test]
 fn a_scene_with_more_cues_finds_its_services_open() {
     let scene = Scene::paper();
@@ -179,8 +180,8 @@ fn a_scene_with_more_cues_finds_its_services_open() {
     let _more = open(40);
 }
 
-/// Of two publishers the one that sends no frames was there first, and has a stage: nothing is taken for the show's before
-/// a frame has come, and the show's stage comes before that.
+/// Of two publishers the first sends no frames, and has a stage. Nothing is taken for the show's data before a frame
+/// has come, and the show's stage comes before that frame.
 #[test]
 fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {
     let scene = Scene::paper();

@@ -1,5 +1,5 @@
-//! The service of poses in single precision, as a subscriber in Python meets it: each frame is that of `<name>/poses`
-//! rounded, and without `precision = "f32"` there is no such service.
+//! The service of poses in single precision, as a subscriber in Python receives it: each frame is the frame of
+//! `<name>/poses` rounded. Without `precision = "f32"` there is no such service.
 
 use crate::harness;
 
@@ -9,12 +9,12 @@ use harness::{Process, can_run, json_lines, program, python, python_modules, sce
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use serde_json::Value;
 
-/// A scene whose queues hold whatever a subscriber falls behind.
+/// Returns a scene whose queues hold all frames by which a subscriber falls behind.
 fn scene(name: &str, publish: &str) -> std::path::PathBuf {
     scene_file(name, &[("[publish]", &format!("[publish]\nqueue = 480\n{publish}"))])
 }
 
-/// What `check` says of a scene, or `run` when it starts.
+/// Returns the output of `check` for a scene, or of `run` when it starts.
 fn said(name: &str, scene: &std::path::Path, arguments: &[&str]) -> String {
     let output = Process::start(program(name).arg("--scene").arg(scene).args(arguments)).output_within(300);
     text(&output.stdout) + &text(&output.stderr)
@@ -38,7 +38,7 @@ fn every_frame_is_the_whole_one_rounded(every: usize, velocities: bool, expected
     assert!(output.status.success(), "{}", text(&output.stderr));
     let compared: Value = json_lines(&output).pop().unwrap();
     assert!(compared["compared"].as_u64().unwrap() > 20, "{compared} of {frames} frames");
-    assert_eq!(compared["last"], frames - 1, "the last frame came too");
+    assert_eq!(compared["last"], frames - 1, "the last frame arrived too");
     let handles: Vec<_> = compared["handles"].as_array().unwrap().iter().map(|it| it.as_u64().unwrap()).collect();
     assert_eq!(handles, expected.iter().map(|handle| *handle as u64).collect::<Vec<_>>());
 }
@@ -70,7 +70,7 @@ fn nothing_is_there_unasked() {
     let node = node().unwrap();
     let status = service_name(&unique(name), "status").unwrap();
     let is_there = || node.service_builder(&status).publish_subscribe::<LoopStatus>().open().is_ok();
-    // The publisher makes it last.
+    // The publisher creates this service last.
     assert!(
         (0..600).any(|_| is_there() || {
             wait(0.1);

@@ -1,6 +1,6 @@
 //! The live publisher as users meet it: real processes, the real shared memory, subscribers in Rust and in Python.
 //!
-//! Every process is ended by a deadline, and nothing asserts a speed: what a subscriber must have received is what the
+//! Every process ends by a deadline, and no test asserts a speed: a subscriber must have received the frames that the
 //! publisher's own summary counts.
 
 use crate::harness;
@@ -19,10 +19,10 @@ use iceoryx2::prelude::ZeroCopySend;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use nix::sys::signal::Signal::{SIGINT, SIGTERM};
 
-/// What the example subscriber needs of Python.
+/// The Python modules that the example subscriber needs.
 const PEER: [&str; 2] = ["iceoryx2", "numpy"];
 
-/// Returns once something is so, however long a slow machine takes.
+/// Returns once a condition holds, however long a slow machine takes.
 fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
     for _ in 0..3000 {
         if holds() {
@@ -33,14 +33,14 @@ fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
     panic!("five minutes have passed without {what}");
 }
 
-/// Returns once a publisher has made all its services, the status last.
+/// Returns once a publisher has created all its services, the status last.
 fn wait_for_publisher(name: &str) {
     let (node, status) = (node().unwrap(), service_name(name, "status").unwrap());
     let open = || node.service_builder(&status).publish_subscribe::<LoopStatus>().open();
     wait_until("a publisher", || open().is_ok());
 }
 
-/// JSON lines of a process up to one that is the last, each within five minutes.
+/// Returns the JSON lines of a process up to the last one, each within five minutes.
 fn lines_until(lines: &Lines, is_last: impl Fn(&Value) -> bool) -> Vec<Value> {
     let mut read: Vec<Value> = Vec::new();
     while !read.last().is_some_and(&is_last) {
@@ -49,11 +49,11 @@ fn lines_until(lines: &Lines, is_last: impl Fn(&Value) -> bool) -> Vec<Value> {
     read
 }
 
-/// Subscribers that come in the middle and outlast the publisher: none misses a frame, the last one included.
+/// Subscribers that join in the middle and outlast the publisher: none misses a frame, including the last one.
 #[test]
 fn every_subscriber_gets_every_frame_at_60_hz() {
     let watching = Process::start(program("sixty").args(["watch", "--json"]));
-    // However far a subscriber falls behind, the queue holds it.
+    // The queue holds all frames by which a subscriber falls behind.
     let scene = scene_file("sixty", &[("[publish]", "[publish]\nqueue = 480")]);
     let publisher = Process::start(program("sixty").arg("--scene").arg(&scene).args([
         "run",
@@ -68,7 +68,7 @@ fn every_subscriber_gets_every_frame_at_60_hz() {
     let arguments = ["examples/python/subscribe.py", "--json", "--seconds", "10", "--name", &unique("sixty")];
     let python = can_run(python_modules(&PEER)).then(|| Process::start(python().args(arguments)));
 
-    // First what Python prints: it would wait for a full pipe.
+    // Python's output is read first: Python would block on a full pipe.
     let output = python.map(|python| python.output_within(300));
     let summary = summary(&publisher.output_within(300));
     let [published, skipped] = ["frames", "skipped"].map(|key| summary[key].as_u64().unwrap());
@@ -103,7 +103,8 @@ fn every_subscriber_gets_every_frame_at_60_hz() {
     let seconds: Vec<_> = seconds.iter().filter(connected).collect();
     assert!(seconds.iter().all(|second| second["missed"] == 0), "{seconds:?}");
     assert_eq!(seconds.first().unwrap()["state"], "moving");
-    // It may have come after the first frames; from then on it counts every one: by tick, less what was skipped.
+    // The subscriber may have come after the first frames; from then on it counts every frame: by tick, less the
+    // skipped ones.
     let [first, last] = [seconds[0], seconds[seconds.len() - 1]].map(|second| {
         let number = |key: &str| second[key].as_u64().unwrap();
         (number("tick"), number("received"))
@@ -127,7 +128,7 @@ fn a_publisher_that_starts_again_is_no_loss_to_the_python_example() {
     });
     let published = summaries.map(|summary| summary["frames"].as_u64().unwrap());
     let end = json_lines(&subscriber.output_within(60)).pop().unwrap();
-    // It may have found the first publisher a moment after its first frame.
+    // The subscriber may have found the first publisher a moment after its first frame.
     let received = end["received"].as_u64().unwrap();
     assert!(received > published[1] && received <= published[0] + published[1], "{end}");
     assert_eq!((&end["type"], &end["missed"]), (&"end".into(), &0.into()), "{end}");
@@ -154,7 +155,7 @@ fn alerts_come_once_each_and_in_order_in_rust_and_in_python() {
             "--rate",
             &rate.to_string(),
         ]));
-        // The show begins once both get its frames, and is over for each once it has the lock.
+        // The show begins once both get its frames, and is complete for each once it has the lock.
         let (watching, listening) = (monitor.lines(), listener.as_mut().map(Process::lines));
         let mut watched = lines_until(&watching, |line| line["state"] == "moving");
         let mut heard =
@@ -169,8 +170,8 @@ fn alerts_come_once_each_and_in_order_in_rust_and_in_python() {
         let mut levels = watched.clone();
         levels.dedup();
         assert_eq!(levels, names, "at {rate} Hz");
-        // One for each level, and the countdown: 3.57 s of wall time pass while approaching. A machine that stands still
-        // for a second has no frame for one of them.
+        // One for each level, and the countdown: 3.57 s of wall time pass while approaching. A machine that stops for a
+        // second has no frame for one of them.
         let most = names.len() + 3;
         assert!(watched.len() == most || (watched.len() < most && skipped >= rate), "at {rate} Hz: {watched:?}");
         if listening.is_some() {
@@ -196,7 +197,7 @@ fn a_late_subscriber_gets_the_contact_that_has_happened() {
     assert!(alerts[0]["run_id"].as_str().unwrap().parse::<u64>().is_ok(), "a number that JavaScript would round");
     assert!((alerts[0]["event_time"].as_f64().unwrap() - 412.473837682115).abs() < 1e-10);
     let second = lines.iter().rfind(|line| line["type"] == "second").unwrap();
-    assert_eq!(second["sim_time"], alerts[0]["event_time"], "the show is frozen at the contact");
+    assert_eq!(second["sim_time"], alerts[0]["event_time"], "the show has ended at the contact");
 }
 
 #[test]
@@ -288,7 +289,7 @@ fn another_layout_is_refused_with_a_sentence() {
     let old = || node.service_builder(&service).publish_subscribe::<[HandlePose]>().user_header::<OldHeader>();
     let arguments = ["examples/python/subscribe.py", "--seconds", "20", "--name", &name];
 
-    // A publisher of layout 1, and readers and a publisher of today.
+    // A publisher of layout 1, and readers and a publisher of the current layout.
     let kept = old().create().unwrap();
     for refused in [&["watch", "--duration", "10"][..], &["run", "--duration", "10"]] {
         let output = Process::start(program("layouts").args(refused)).output_within(300);
@@ -307,7 +308,7 @@ fn another_layout_is_refused_with_a_sentence() {
     }
     drop(kept);
 
-    // Frames of today and alerts of another layout.
+    // Frames of the current layout and alerts of another layout.
     let [poses, alerts] = ["poses", "alerts"].map(|suffix| service_name(&unique("other"), suffix).unwrap());
     let _poses =
         node.service_builder(&poses).publish_subscribe::<[HandlePose]>().user_header::<FrameHeader>().create().unwrap();
@@ -317,7 +318,7 @@ fn another_layout_is_refused_with_a_sentence() {
     assert_eq!(output.status.code(), Some(1), "{message}");
     assert!(message.contains("/alerts\" exists with another layout of its messages"), "{message}");
 
-    // A publisher of today, and a reader of layout 1.
+    // A publisher of the current layout, and a reader of layout 1.
     let _publisher = Process::start(program("layouts").args(["run", "--json", "--start", "300", "--duration", "60"]));
     let refused = (0..3000).map(|_| old().open().err()).find(|error| {
         wait(0.1);

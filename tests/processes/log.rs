@@ -1,5 +1,5 @@
-//! `run --log` and `verify`, as programs: a conducted show, a turnaround, a show that loops, a publisher that is killed, a
-//! file that takes no more, and a reader of frames in Python that computes the same hashes.
+//! `run --log` and `verify`, as programs: a show under control, a turnaround, a show that loops, a publisher that is
+//! killed, a full file, and a reader of frames in Python that computes the same hashes.
 
 use crate::harness;
 
@@ -11,7 +11,7 @@ use nix::sys::signal::Signal;
 use nix::sys::stat::Mode;
 use serde_json::Value;
 
-/// A scene of the folder `config`, by the safe solver: an unoptimised build makes tables for seconds.
+/// Returns a scene of the folder `config` with the safe solver: an unoptimised build makes tables for seconds.
 fn scene(folder: &Path, name: &str) -> PathBuf {
     let text = std::fs::read_to_string(format!("config/{name}.toml")).unwrap();
     let lines = text.lines().filter(|line| !line.starts_with("accuracy"));
@@ -27,7 +27,7 @@ fn run(name: &str, scene: &Path, log: &Path, arguments: &[&str]) -> Process {
     Process::start(&mut command)
 }
 
-/// Exit code, the line of `verify --json`, and the sentence on standard error.
+/// Returns the exit code, the line of `verify --json`, and the sentence on standard error.
 fn verify(log: &Path) -> (i32, Value, String) {
     let mut command = program("verify");
     let output = command.args(["--json", "verify", log.to_str().unwrap()]).output().unwrap();
@@ -41,7 +41,7 @@ fn proved(log: &Path) -> Value {
     line
 }
 
-/// The same for a run whose end the log has seen, with its summary.
+/// Verifies the log of a run with its end, compares it with the summary, and returns the line.
 fn proved_whole(log: &Path, summary: &Value) -> Value {
     let line = proved(log);
     for field in ["frames", "skipped"] {
@@ -52,7 +52,7 @@ fn proved_whole(log: &Path, summary: &Value) -> Value {
     line
 }
 
-/// The lines of a log that are whole.
+/// Returns the complete lines of a log.
 fn lines_of(log: &Path) -> Vec<String> {
     std::fs::read_to_string(log).unwrap().lines().map(str::to_owned).collect()
 }
@@ -67,7 +67,7 @@ fn of_type<'a>(lines: &'a [Value], kind: &str) -> Vec<&'a Value> {
     lines.iter().filter(|line| line["type"] == kind).collect()
 }
 
-/// Waits until a log has so many seconds.
+/// Waits until a log has `seconds` lines of seconds.
 fn wait_for_seconds(log: &Path, seconds: usize) {
     for _ in 0..1200 {
         if log.exists() && of_type(&lines(log), "second").len() >= seconds {
@@ -109,7 +109,7 @@ fn a_conducted_show_is_proved_with_every_command_at_its_tick() {
     publisher.signal(Signal::SIGINT);
     let summary = summary(&publisher.output_within(20));
     let lines = lines(&log);
-    // A step's answer comes when it is over.
+    // A step is answered when it is complete.
     let logged = lines.iter().filter(|line| !line["code"].is_null());
     let logged: Vec<_> = logged.map(|line| (&line["tick"], &line["code"])).collect();
     let answered: Vec<_> = answers.iter().map(|answer| (&answer["tick"], &answer["code"])).collect();
@@ -121,7 +121,7 @@ fn a_conducted_show_is_proved_with_every_command_at_its_tick() {
     assert_eq!(line["commands"], 12);
     assert_eq!(summary["log"]["frames"], summary["frames"]);
 
-    // Cut behind its last command: what is in no second that was compared does not count.
+    // Cut behind its last command: a command in no compared second does not count.
     let cut = folder.path().join("cut.jsonl");
     let last = lines.iter().rposition(|line| line["type"] == "command").unwrap();
     let kept = lines_of(&log).into_iter().take(last + 1).map(|line| format!("{line}\n"));
@@ -161,7 +161,7 @@ fn a_turnaround_and_a_looping_show_with_skipped_periods_are_proved() {
     let turned = summary(&run("log_turn", &scene_file, &log, &arguments).output_within(60));
     proved_whole(&log, &turned);
 
-    // A third of a second of show, over and over; stopped for a while as by a debugger.
+    // A third of a second of show, repeated; stopped for a while as by a debugger.
     let log = folder.path().join("loop.jsonl");
     let arguments = ["--rate", "200", "--start", "412.2", "--loop", "--end-hold", "0.05"];
     let publisher = run("log_loop", &scene(folder.path(), "paper"), &log, &arguments);
@@ -193,14 +193,14 @@ fn a_publisher_that_is_killed_leaves_every_complete_second() {
     let line = proved(&log);
     assert_eq!((&line["complete"], &line["cut"]), (&false.into(), &false.into()));
     assert!(line["seconds"].as_u64().unwrap() >= 2, "{line}");
-    // Before the first second was over.
+    // A log that ends before the first second is complete.
     let early = folder.path().join("early.jsonl");
     let text_of_log = std::fs::read_to_string(&log).unwrap();
     std::fs::write(&early, format!("{}\n", text_of_log.lines().next().unwrap())).unwrap();
     let (code, line, sentence) = verify(&early);
     assert_eq!((code, &line["verdict"], &line["seconds"]), (1, &"nothing".into(), &0.into()), "{sentence}");
     assert!(sentence.contains("early.jsonl: nothing could be compared"), "{sentence}");
-    // As a machine that loses its power cuts it.
+    // A log cut as by a loss of power.
     let bytes = std::fs::read(&log).unwrap();
     std::fs::write(&log, &bytes[..bytes.len() - 40]).unwrap();
     assert_eq!(proved(&log)["cut"], true);
@@ -212,7 +212,7 @@ fn a_publisher_that_is_killed_leaves_every_complete_second() {
 fn a_file_that_takes_no_more_ends_the_log_and_not_the_stream() {
     let folder = tempfile::tempdir().unwrap();
     let scene = scene(folder.path(), "school");
-    // From the first byte on.
+    // No byte can be written.
     let output =
         run("log_full", &scene, Path::new("/dev/full"), &["--rate", "100", "--duration", "1"]).output_within(60);
     let counts = json_lines(&output).pop().unwrap();
@@ -237,7 +237,7 @@ fn a_file_that_takes_no_more_ends_the_log_and_not_the_stream() {
     assert_eq!((output.status.code(), &json_lines(&output).pop().unwrap()["end"]), (Some(1), &"duration".into()));
     assert!(text(&output.stderr).contains("Broken pipe"), "{}", text(&output.stderr));
 
-    // No such folder: before anything is published.
+    // The folder does not exist: refused before anything is published.
     let output =
         run("log_nowhere", &scene, Path::new("/no/such/folder/x.jsonl"), &["--duration", "1"]).output_within(60);
     assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0));
@@ -258,7 +258,7 @@ fn what_is_no_log_is_refused_in_one_sentence() {
         let (code, _, sentence) = verify(&file);
         assert!(code == 2 && sentence.contains(expected) && sentence.lines().count() == 1, "{code} {sentence}");
     }
-    // Without an end, and without a newline.
+    // A file without an end, and without a newline.
     let (code, _, sentence) = verify(Path::new("/dev/zero"));
     assert!(code == 2 && sentence.contains("line 1: it is longer than 67108864 bytes"), "{code} {sentence}");
     let (code, _, sentence) = verify(&folder.path().join("nothing"));

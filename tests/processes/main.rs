@@ -1,4 +1,4 @@
-//! The program as users start it: publishers, subscribers and commands in processes of their own.
+//! The program as users start it: publishers, subscribers and commands in separate processes.
 
 mod cli;
 mod conductor;

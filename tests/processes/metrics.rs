@@ -1,5 +1,5 @@
-//! The figures for Prometheus: as its own `promtool` and Python's OpenMetrics parser read them, true of a publisher that
-//! plays, stands still and dies.
+//! The figures for Prometheus, as its own `promtool` and Python's OpenMetrics parser read them: correct for a publisher
+//! that plays, pauses and dies.
 
 use crate::harness;
 
@@ -21,8 +21,8 @@ use serde_json::Value;
 const DEADLINE: u64 = 120;
 const OPENMETRICS: &str = "application/openmetrics-text;version=1.0.0,text/plain;version=0.0.4;q=0.5,*/*;q=0.1";
 
-/// Prometheus' own checker: from the Debian package `prometheus`, which `tests/run` unpacks beside the Python peers where
-/// it is not installed.
+/// Returns Prometheus' own checker, from the Debian package `prometheus`. If it is not installed, `tests/run` unpacks
+/// it beside the Python peers.
 fn promtool() -> Result<PathBuf, String> {
     let beside = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/.venv/prometheus/usr/bin/promtool"));
     let path = std::env::var_os("PATH").unwrap_or_default();
@@ -30,7 +30,7 @@ fn promtool() -> Result<PathBuf, String> {
     places.find(|place| place.exists()).ok_or_else(|| "no promtool; tests/run fetches it".to_owned())
 }
 
-/// What a program prints that is given some text.
+/// Returns the output of a program for some input.
 fn given(command: &mut Command, input: &str) -> String {
     let command = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut process = command.spawn().unwrap();
@@ -40,14 +40,14 @@ fn given(command: &mut Command, input: &str) -> String {
     text(&output.stdout) + &text(&output.stderr)
 }
 
-/// The samples of an answer, by their names and labels.
+/// Returns the samples of an answer, by their names and labels.
 fn samples(answer: &str) -> Value {
     let (head, body) = answer.split_once("\r\n\r\n").expect("an answer");
     assert!(head.to_lowercase().contains("content-type: application/openmetrics-text; version=1.0.0; charset=utf-8"));
     serde_json::from_str(&given(python().arg("tests/python/openmetrics_text.py"), body)).unwrap()
 }
 
-/// Asks again and again until the samples are as they should be.
+/// Requests the samples again until they satisfy a condition.
 fn until(url: &str, what: &str, holds: impl Fn(&Value) -> bool) -> Value {
     let mut latest = Value::Null;
     for _ in 0..DEADLINE * 5 {
@@ -60,7 +60,7 @@ fn until(url: &str, what: &str, holds: impl Fn(&Value) -> bool) -> Value {
     panic!("not {what} within {DEADLINE} s: {latest:#}");
 }
 
-/// Every status that a publisher sends, until nobody receives any longer.
+/// Returns every status that a publisher sends, until the receiver is dropped.
 fn statuses_of(name: &str) -> Receiver<LoopStatus> {
     let (sender, receiver) = mpsc::channel();
     let name = unique(name);
@@ -108,7 +108,7 @@ fn prometheus_reads_what_is_true_of_a_publisher() {
     assert_eq!((value("bench_dragon_playback,state=playing"), value("bench_dragon_playback,state=paused")), (1.0, 0.0));
     let (time, clearance) = (value("bench_dragon_simulated_time_seconds"), value("bench_dragon_clearance_meters"));
     assert!((405.0..412.47).contains(&time) && clearance > 0.0 && clearance < 1.0, "{time} s, {clearance} m");
-    // What another subscriber was told of the same moment.
+    // The values that another subscriber received for the same time.
     let frames = value("bench_dragon_frames_published_total");
     let told = loop {
         let status = statuses.recv_timeout(Duration::from_secs(DEADLINE)).unwrap();
@@ -144,7 +144,7 @@ fn prometheus_reads_what_is_true_of_a_publisher() {
         let run = [at("run", "0.5"), at("run", "0.99"), at("run", "0.999"), at("run", "1")];
         assert!(run.is_sorted() && run[3] >= at("second", "1") && run[0] > 0.0 && run[3] < 60.0, "{family}: {run:?}");
     }
-    // What the system says of that process.
+    // The values that the system reports for that process.
     let statm = std::fs::read_to_string(format!("/proc/{}/statm", publisher.id())).unwrap();
     let resident = statm.split(' ').nth(1).unwrap().parse::<f64>().unwrap() * 4096.0;
     let ratio = value("bench_dragon_resident_memory_bytes") / resident;
@@ -153,7 +153,7 @@ fn prometheus_reads_what_is_true_of_a_publisher() {
         playing.as_object().unwrap().keys().find(|key| key.starts_with("bench_dragon_run_info,run_id=")).unwrap();
     assert!(info.ends_with(",scene=paper"), "{info}");
 
-    // The other format, which is what promtool reads.
+    // The other format, which promtool reads.
     let plain = http_get(url, "*/*");
     let (head, body) = plain.split_once("\r\n\r\n").unwrap();
     assert!(head.to_lowercase().contains("content-type: text/plain; version=0.0.4; charset=utf-8"), "{head}");
@@ -173,7 +173,7 @@ fn prometheus_reads_what_is_true_of_a_publisher() {
     publisher.signal(Signal::SIGTERM);
     summary(&publisher.output_within(DEADLINE));
     let down = until(url, "down", |samples| samples["bench_dragon_up"] == 0.0);
-    assert_eq!(down.as_object().unwrap().len(), 4, "nothing is told of one that is gone: {down}");
+    assert_eq!(down.as_object().unwrap().len(), 4, "a publisher that is gone has no other samples: {down}");
     assert!(down["bench_dragon_metrics_frames_received_total"].as_f64() > Some(100.0));
     metrics.signal(Signal::SIGTERM);
     assert!(metrics.output_within(DEADLINE).status.success());
@@ -205,7 +205,7 @@ fn a_foreign_name_for_this_machine_is_answered_nothing() {
     }
 }
 
-/// The dashboard asks for nothing that is not served, in the scene of the documents.
+/// The dashboard requests only figures that are served, in the scene of the documents.
 #[test]
 fn the_dashboard_shows_what_is_served() {
     let dashboard: Value = serde_json::from_str(include_str!("../../docs/grafana/bench-dragon.json")).unwrap();

@@ -1,5 +1,5 @@
-//! What a display shows between two frames, by the readers that users are given: against the safe solver at the very
-//! moments of display.
+//! The poses that a display shows between two frames, by the readers for users, compared with the safe solver at the
+//! exact times of display.
 
 use crate::harness;
 
@@ -13,7 +13,7 @@ fn numbers(line: &Value, field: &str) -> Vec<f64> {
     line[field].as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
 }
 
-/// Frames ten times a second, read by a Python process that displays at random moments.
+/// Tests ten frames a second in a Python process that displays at random times.
 fn python_reader(transport: &str, modules: &[&str]) {
     if !can_run(python_modules(modules)) {
         return;
@@ -40,7 +40,7 @@ fn python_reader(transport: &str, modules: &[&str]) {
         newton.solve(time, &mut chain).unwrap();
         let (x, y, heading) = (numbers(line, "x"), numbers(line, "y"), numbers(line, "heading"));
         assert_eq!((x.len(), y.len(), heading.len()), (224, 224, 224));
-        // A cubic is off by the fourth power of its interval, which is longer where a loaded machine skipped periods.
+        // A cubic is off by the fourth power of its interval, which is longer if a loaded machine skipped periods.
         let longer = (line["interval"].as_f64().unwrap() / 0.1).max(1.0);
         for handle in 0..224 {
             worst = worst.max((x[handle] - chain.x[handle]).hypot(y[handle] - chain.y[handle]) / longer.powi(4));

@@ -1,5 +1,5 @@
-//! `record` and `record --recover`, as programs: read by Python's own MCAP libraries, cut, killed, on a full disk, on one that
-//! takes nothing.
+//! `record` and `record --recover`, as programs: read by Python's own MCAP libraries, cut, killed, on a full disk, on a
+//! disk that accepts nothing.
 
 #[path = "record/mending.rs"]
 mod mending;
@@ -16,8 +16,8 @@ use mcap::{MessageStream, Summary};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
-/// A scene of the folder `config` whose subscribers may fall behind for seconds, by the safe solver: an unoptimised build
-/// makes tables for seconds.
+/// Returns a scene of the folder `config` whose subscribers may fall behind for seconds, with the safe solver: an
+/// unoptimised build makes tables for seconds.
 fn scene(folder: &Path, name: &str, added: &str) -> PathBuf {
     let text = std::fs::read_to_string(format!("config/{name}.toml")).unwrap();
     let lines = text.lines().filter(|line| !line.starts_with("accuracy"));
@@ -37,20 +37,20 @@ fn publisher(name: &str, scene: &Path, arguments: &[&str]) -> Process {
 
 fn recorder(name: &str, file: &Path, arguments: &[&str]) -> Process {
     let program = program(name);
-    // Under nohup the tests ignore SIGHUP, and so would the recorder.
+    // Under nohup the tests ignore SIGHUP, and the recorder would ignore it too.
     let mut command = Command::new("env");
     command.arg("--default-signal=HUP").arg(program.get_program()).args(program.get_args());
     command.args(["--json", "record", "--output", file.to_str().unwrap()]).args(arguments);
     Process::start(&mut command)
 }
 
-/// Ends a recorder; its summary.
+/// Ends a recorder and returns its summary.
 fn stopped(recorder: Process) -> Value {
     recorder.signal(Signal::SIGINT);
     harness::summary(&recorder.output_within(60))
 }
 
-/// Waits until a file has so many bytes.
+/// Waits until a file has `bytes` bytes.
 fn wait_for_bytes(file: &Path, bytes: u64) {
     for _ in 0..3000 {
         if std::fs::metadata(file).is_ok_and(|data| data.len() >= bytes) {
@@ -68,7 +68,7 @@ fn files(summary: &Value) -> Vec<PathBuf> {
 /// A message: topic, sequence, log time, and the hash of its data.
 type Entry = (String, u64, u64, String);
 
-/// The messages of a whole file, in the order in which it has them.
+/// Returns the messages of a complete file, in the order of the file.
 fn entries(file: &[u8]) -> Vec<Entry> {
     assert!(Summary::read(file).unwrap().is_some(), "a file without a summary");
     let entry = |message: mcap::Message<'_>| {
@@ -78,13 +78,13 @@ fn entries(file: &[u8]) -> Vec<Entry> {
     MessageStream::new(file).unwrap().map(|message| entry(message.unwrap())).collect()
 }
 
-/// The log times of the frames in a file.
+/// Returns the log times of the frames in a file.
 fn frame_times(file: &Path) -> Vec<u64> {
     let entries = entries(&std::fs::read(file).unwrap());
     entries.into_iter().filter(|entry| entry.0.ends_with("/handles")).map(|entry| entry.2).collect()
 }
 
-/// Whether a recording has every frame of a publisher, but those that it sent before anybody could subscribe.
+/// Asserts that a recording has every frame of a publisher, except frames sent before a subscriber could connect.
 fn check_whole(recorded: &Value, published: &Value, rate: u64) {
     let entries = entries(&std::fs::read(&files(recorded)[0]).unwrap());
     let sequences: Vec<_> = entries.iter().filter(|entry| entry.0.ends_with("/handles")).map(|entry| entry.1).collect();
@@ -98,7 +98,7 @@ fn check_whole(recorded: &Value, published: &Value, rate: u64) {
     );
 }
 
-/// A recording of some seconds of a small team, whose terminal is closed at the end.
+/// Returns a recording of some seconds of a small team, whose terminal is closed at the end.
 fn small_recording(name: &str, folder: &Path) -> PathBuf {
     let file = folder.join("small.mcap");
     let recorder = recorder(name, &file, &[]);
@@ -147,12 +147,12 @@ fn every_message_of_every_topic_is_what_another_subscriber_got() {
 fn a_recorder_whose_disk_takes_nothing_can_be_stopped() {
     let (name, folder) = ("record_stuck", tempfile::tempdir().unwrap());
     let _publisher = publisher(name, &scene(folder.path(), "paper", ""), &["--rate", "1000", "--start", "100"]);
-    // A pipe that is open and that nobody reads.
+    // An open pipe without a reader.
     let pipe = folder.path().join("pipe.mcap");
     nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).unwrap();
     let _open = std::fs::OpenOptions::new().read(true).write(true).open(&pipe).unwrap();
     let recorder = recorder(name, &pipe, &["--force"]);
-    // The memory of a queue that is full grows no more.
+    // The memory of a full queue does not grow.
     let status = format!("/proc/{}/status", recorder.id());
     let kilobytes = || {
         let status = std::fs::read_to_string(&status).unwrap();
@@ -198,7 +198,7 @@ fn a_recorder_that_is_killed_loses_a_second_and_nobody_notices() {
         last = *times.last().unwrap();
         losses.push(now.saturating_sub(last) as f64 / 1e9);
     }
-    // Under nohup the end of the terminal is not the recorder's.
+    // Under nohup the end of the terminal does not end the recorder.
     let file = folder.path().join("nohup.mcap");
     let mut nohup = Command::new("bash");
     nohup.args(["-c", "trap '' HUP; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_bench-dragon")]);
@@ -218,11 +218,12 @@ fn a_recorder_that_is_killed_loses_a_second_and_nobody_notices() {
         losses[losses.len() / 2],
         losses[losses.len() - 1]
     ));
-    // A loaded machine stops a recorder for seconds; one that wrote only at the end would lose two in the middle.
+    // A loaded machine stops a recorder for seconds; a recorder that wrote only at the end would lose two in the
+    // middle.
     assert!(losses[losses.len() / 2] < 1.2 && losses[losses.len() - 1] < 5.0, "{losses:?}");
 }
 
-/// A recording on a disk that takes no more, which is whole up to there.
+/// Checks a recording on a disk that became full: the file is whole up to that point.
 fn check_full(recorder: Process, file: &Path) {
     let output = recorder.output_within(120);
     let sentence = text(&output.stderr);
@@ -238,13 +239,13 @@ fn check_full(recorder: Process, file: &Path) {
 fn a_full_disk_leaves_a_whole_file() {
     let (name, folder) = ("record_full", tempfile::tempdir().unwrap());
     let _publisher = publisher(name, &scene(folder.path(), "paper", ""), &["--rate", "100", "--start", "100"]);
-    // A file that may have 4 MB.
+    // A file limited to 4 MB.
     let file = folder.path().join("limited.mcap");
     let mut limited = Command::new("bash");
     limited.args(["-c", "ulimit -f 4000; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_bench-dragon")]);
     limited.args(["--name", &unique(name), "--json", "record", "--output", file.to_str().unwrap()]);
     check_full(Process::start(&mut limited), &file);
-    // A device that takes nothing.
+    // A device that accepts nothing.
     let output = recorder(name, Path::new("/dev/full"), &["--force"]).output_within(60);
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
     assert!(text(&output.stderr).contains("/dev/full: No space left on device"), "{}", text(&output.stderr));
@@ -268,7 +269,7 @@ fn files_are_split_by_size_by_time_and_by_run() {
     let (name, folder) = ("record_split", tempfile::tempdir().unwrap());
     let scene = scene(folder.path(), "paper", "");
     let (by_size, by_time) = (folder.path().join("size.mcap"), folder.path().join("time.mcap"));
-    // Somebody else's.
+    // A file of another program.
     std::fs::write(folder.path().join("size-2.mcap"), "kept").unwrap();
     let recorders = [
         recorder(name, &by_size, &["--split", "1MB"]),
@@ -281,7 +282,7 @@ fn files_are_split_by_size_by_time_and_by_run() {
     assert_eq!(std::fs::read(folder.path().join("size-2.mcap")).unwrap(), b"kept");
     let names: Vec<_> =
         files(&size).iter().map(|file| file.file_name().unwrap().to_str().unwrap().to_owned()).collect();
-    // Two runs are two files; how often their size splits them depends on how many frames the machine had time for.
+    // Two runs are two files; the number of splits depends on the number of frames that the machine had time for.
     let count = names.len();
     assert!(count >= 3 && names[..2] == ["size.mcap", "size-3.mcap"], "{names:?}");
     assert_eq!(files(&time).len(), 6, "{time}");
@@ -304,14 +305,15 @@ fn files_are_split_by_size_by_time_and_by_run() {
     }
 }
 
-/// A stage that comes after the first frames is waited for: without it nothing can be replayed.
+/// The recorder waits for a stage that comes after the first frames: without the stage the recording cannot be
+/// replayed.
 #[test]
 fn the_shortest_recording_has_its_stage() {
     let (name, folder) = ("record_short", tempfile::tempdir().unwrap());
     let scene = scene(folder.path(), "school", "");
     let publisher = publisher(name, &scene, &["--rate", "200"]);
     let mut recorded = 0;
-    // How long the shortest is depends on the machine: until a recorder has begun there is nothing in its file.
+    // The shortest duration depends on the machine: until a recorder has begun there is nothing in its file.
     for round in 0.. {
         let file = folder.path().join(format!("{round}.mcap"));
         let seconds = (0.05 + 0.02 * f64::from(round)).to_string();
@@ -366,7 +368,7 @@ fn what_cannot_be_recorded_is_refused_in_one_sentence() {
         assert!(output.status.code() == Some(2) && sentence.contains(expected), "{arguments:?}: {sentence}");
     }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "a refusal leaves no file");
-    // Nobody publishes.
+    // No publisher is running.
     let output = program("record_nobody").args(["record", "-o", new, "--duration", "0.2"]).output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output.stderr).contains("nothing came from"), "{}", text(&output.stderr));

@@ -1,4 +1,4 @@
-//! `replay` as a program: what subscribers of either transport get of it, compared with the recording byte by byte.
+//! `replay` as a program: the messages of subscribers on either transport, compared with the recording byte by byte.
 
 mod files;
 mod played;
@@ -13,7 +13,7 @@ use harness::{Process, can_run, json_lines, program, python, python_modules, tex
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
-/// A scene of the folder `config`, by the safe solver: an unoptimised build makes tables for seconds.
+/// Returns a scene of the folder `config` with the safe solver: an unoptimised build makes tables for seconds.
 fn scene(folder: &Path, name: &str, queue: u32, added: &str) -> PathBuf {
     let text = std::fs::read_to_string(format!("config/{name}.toml")).unwrap();
     let lines = text.lines().filter(|line| !line.starts_with("accuracy"));
@@ -30,13 +30,13 @@ fn recorder(name: &str, file: &Path) -> Process {
     Process::start(command.args(["--json", "record", "--output", file.to_str().unwrap()]))
 }
 
-/// Ends a process that prints a summary.
+/// Ends a process and returns the summary that it prints.
 fn stopped(process: Process) -> Value {
     process.signal(Signal::SIGINT);
     harness::summary(&process.output_within(60))
 }
 
-/// Waits until a file has so many bytes.
+/// Waits until a file has `bytes` bytes.
 fn wait_for_bytes(file: &Path, bytes: u64) {
     for _ in 0..3000 {
         if std::fs::metadata(file).is_ok_and(|data| data.len() >= bytes) {
@@ -53,7 +53,7 @@ fn replay(name: &str, file: &Path, scene: &Path, arguments: &[&str]) -> Command 
     command
 }
 
-/// Exit code and the response as printed.
+/// Returns the exit code and the response as printed.
 fn control(name: &str, arguments: &[&str]) -> (i32, Value, String) {
     let output = program(name).args(["--json", "control"]).args(arguments).output().unwrap();
     let line = json_lines(&output).pop().unwrap_or(Value::Null);
@@ -70,7 +70,7 @@ fn wait_for_publisher(name: &str) {
     panic!("no publisher of {name}");
 }
 
-/// A replay, and what a recorder got of it.
+/// Runs a replay, and returns its summary and the messages that a recorder received.
 fn recorded_replay(name: &str, file: &Path, scene: &Path, arguments: &[&str]) -> (Value, Kept) {
     let kept = file.with_file_name(format!("{name}.mcap"));
     let recorder = recorder(name, &kept);
@@ -80,7 +80,7 @@ fn recorded_replay(name: &str, file: &Path, scene: &Path, arguments: &[&str]) ->
     (summary, read(&kept))
 }
 
-/// A show that was paused, sought and resumed, in a file; no two tests share one.
+/// Records a show that was paused, sought and resumed; each test has its own file.
 fn conducted_recording(name: &str, folder: &Path) -> PathBuf {
     let cues = "[[cues]]\nname = \"soon\"\nat = 409.0\nthen = \"mark\"\n\n\
                 [[cues]]\nname = \"the coil closes\"\nbefore = \"contact\"\nseconds = 0.5\n";
@@ -101,7 +101,7 @@ fn conducted_recording(name: &str, folder: &Path) -> PathBuf {
     file
 }
 
-/// Frames and messages of a replay are those of the recording, but for what tells of this run.
+/// Asserts that frames and messages of a replay are those of the recording, except for the fields of this run.
 fn assert_same(replay: &Kept, recorded: &Kept, skipped: u64) {
     let run = replay.frames[0].run_id();
     assert_ne!(run, recorded.frames[0].run_id());
@@ -120,7 +120,7 @@ fn assert_same(replay: &Kept, recorded: &Kept, skipped: u64) {
         let content = |messages: &[Bytes]| messages.iter().map(|it| it.from(24).to_vec()).collect::<Vec<_>>();
         assert_eq!(content(ours), content(theirs), "{kind}");
         for (message, original) in ours.iter().zip(theirs) {
-            // With the frame that it went with, or the first.
+            // The message goes with the same frame as before, or with the first.
             let at = |kept: &Kept, of: &Bytes| kept.frames.iter().position(|frame| frame.tick() >= of.u64(8));
             assert_eq!(at(replay, message), at(recorded, original), "{kind}");
             assert_eq!(message.run_id(), run);
@@ -166,7 +166,7 @@ fn subscribers_get_the_show_that_was_recorded() {
     let named = |status: &Bytes| status.0.windows(scene.len()).any(|text| text == scene);
     assert!(!replayed.statuses.is_empty() && replayed.statuses.iter().all(named), "the scene's name");
 
-    // From a moment on: each alert and cue still goes with its frame, of which the number is another.
+    // From a time in the middle: each alert and cue still goes with its frame, whose number is different.
     let (_, later) = recorded_replay("replay_later", &file, &publish, &["--start", "411.7"]);
     let from = recorded.frames.iter().position(|frame| frame.sim_time() >= 411.7).unwrap();
     assert_eq!(later.frames.len(), recorded.frames.len() - from);
@@ -182,7 +182,7 @@ fn subscribers_get_the_show_that_was_recorded() {
         let lines: Vec<Value> = lines.rest(120).iter().map(|line| serde_json::from_str(line).unwrap()).collect();
         let frames: Vec<&Value> = lines.iter().filter(|line| line["type"] == "frame").collect();
         let left_out = ["skipped", "discarded"].map(|of| summary[transport][of].as_u64().unwrap_or(0));
-        // While ROS 2 nodes discover one another, some are not sent.
+        // While ROS 2 nodes discover one another, some messages are not sent.
         let discovery = if transport == "ros2" { 100 } else { 0 };
         let sequences: Vec<u64> = frames.iter().map(|frame| frame["sequence"].as_u64().unwrap()).collect();
         assert!(sequences.windows(2).all(|pair| pair[0] < pair[1]), "{transport}: {sequences:?}");
@@ -221,11 +221,11 @@ fn a_replay_can_be_watched_and_not_conducted() {
         let (code, line, sentence) = control(name, command);
         assert_eq!((code, &line["code"]), (1, &"refused".into()), "{command:?}: {line} {sentence}");
     }
-    // One name has one publisher.
+    // A name has one publisher.
     let second = Process::start(&mut replay(name, &file, &scene, &[])).output_within(60);
     assert_eq!(second.status.code(), Some(1), "{}", text(&second.stderr));
     assert!(text(&second.stderr).contains("(--name)"), "{}", text(&second.stderr));
-    // The page gets it as it would a show.
+    // The page receives the replay like a show.
     let mut view = Process::start(program(name).args(["view", "--json", "--port", "0"]));
     let ready: Value = serde_json::from_str(&view.first_line_within(20)).unwrap();
     let address = ready["url"].as_str().unwrap().replace("http://", "ws://") + "frames";

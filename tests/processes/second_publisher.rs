@@ -1,7 +1,8 @@
-//! One show has a name, and its services admit a second publisher: the end of a tunnel to other machines, here a program in
-//! Python. What subscribers of the show count is the show's alone, and its death is noticed though that publisher stays.
+//! A show has one name, and its services admit a second publisher: the end of a tunnel to other machines, here a
+//! program in Python. Subscribers of the show count only the show's messages, and notice its death though that
+//! publisher stays.
 //!
-//! Every wait has a deadline, and nothing asserts a speed.
+//! Every wait has a deadline, and no test asserts a speed.
 
 use crate::harness;
 
@@ -13,7 +14,7 @@ fn object(line: &str) -> Value {
     serde_json::from_str(line).unwrap()
 }
 
-/// The second publisher, once it has all its ports.
+/// Returns the second publisher, once it has all its ports.
 fn second(place: &Place) -> (Process, Lines) {
     let mut command = python();
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/python/second_publisher.py");
@@ -29,7 +30,7 @@ fn show(place: &Place) -> Process {
     Process::start(place.program().args(["run", "--json", "--rate", "100", "--scene"]).arg(scene))
 }
 
-/// Starting a show here is refused because one is running.
+/// Asserts that a show cannot start here because one is running.
 fn assert_refused(place: &Place, command: &[&str]) {
     let output = Process::start(place.program().args(command)).output_within(300);
     let printed = text(&output.stderr);
@@ -38,12 +39,12 @@ fn assert_refused(place: &Place, command: &[&str]) {
     assert_eq!(printed.lines().count(), 1, "{printed}");
 }
 
-/// Lines of a reader up to the first one that reports a tick after this one.
+/// Returns the lines of a reader up to the first one that reports a tick after `tick`.
 fn beyond(lines: &Lines, tick: u64) -> Vec<String> {
     let mut read = Vec::new();
     loop {
         read.extend(lines.all_until("tick", 300));
-        // The one that was waited for.
+        // The last line is the awaited one.
         let (_, behind) = read.last().unwrap().rsplit_once("tick").unwrap();
         let from_digit = behind.trim_start_matches(|it: char| !it.is_ascii_digit());
         let digits = from_digit.split(|it: char| !it.is_ascii_digit()).next();
@@ -53,7 +54,7 @@ fn beyond(lines: &Lines, tick: u64) -> Vec<String> {
     }
 }
 
-/// A tick of the show that it reaches after this was called.
+/// Returns a tick that the show reaches after this call.
 fn tick_to_come(place: &Place) -> u64 {
     let output = Process::start(place.program().args(["watch", "--json", "--duration", "1"])).output_within(300);
     let ticks = text(&output.stdout).lines().map(|line| object(line)["tick"].as_u64()).max();
@@ -76,15 +77,15 @@ fn a_second_publisher_is_admitted_and_nothing_of_it_is_taken_for_the_show() {
     monitored.until("is running", 300);
     observed.until("\"status\":{", 300);
     let (peer, told) = second(&place);
-    // The stage is sent again while it is there, the same one.
+    // The stage is sent again while the second publisher exists, and is the same.
     let [one, other] = [(); 2].map(|()| object(&told.until("\"stage\"", 300)));
     assert_eq!(one, other);
-    // Frames and alerts of another run are not the show's.
+    // Frames and alerts of another run do not belong to the show.
     peer.signal(SIGUSR1);
     (0..50).for_each(|_| drop(told.until("sent", 300)));
     monitored.until("missed 0", 300);
 
-    // The name stays the show's: while it runs, while it is stopped, for whatever publishes.
+    // The name remains the show's, while the show runs and while it is stopped, for every command that publishes.
     assert_refused(&place, &["run"]);
     first.stop();
     assert_refused(&place, &["run", "--duration", "1"]);
@@ -92,10 +93,10 @@ fn a_second_publisher_is_admitted_and_nothing_of_it_is_taken_for_the_show() {
     assert!(!soaked.status.success(), "{}", text(&soaked.stdout));
     first.signal(SIGCONT);
 
-    // It is killed; the other publisher stays, silent, and holds no name.
+    // The show is killed; the other publisher stays, silent, and holds no name.
     peer.signal(SIGUSR1);
     told.until("silent", 300);
-    // What it has sent is read before: of those that are left, one whose frames come would be the next.
+    // The frames that the second publisher has sent are read before: otherwise it would be selected next.
     let after = tick_to_come(&place);
     let mut printed = beyond(&json_lines, after);
     beyond(&monitored, after);
@@ -120,14 +121,15 @@ fn a_second_publisher_is_admitted_and_nothing_of_it_is_taken_for_the_show() {
     printed.extend(json_lines.rest(300));
     let alerts = printed.iter().map(|line| object(line)).filter(|line| line["type"] == "alert");
     let runs: Vec<Value> = alerts.map(|alert| alert["run_id"].clone()).collect();
-    // One for each run: while a second publisher is there the latest is sent again and again, and passed on only once.
+    // One for each run: while a second publisher exists the latest is sent repeatedly, and passed on only once.
     assert!(runs.len() == 2 && runs.iter().all(|run| run != "7"), "{runs:?}");
     monitored.rest(300);
     told.rest(300);
     place.assert_clean();
 }
 
-/// A publisher that was followed while no show was here, and fell silent, does not keep readers from the next show.
+/// A publisher that was selected while no show was running, and then stopped sending, does not keep readers from the
+/// next show.
 #[test]
 fn the_next_show_is_seen_though_another_publisher_was_followed() {
     if !can_run(python_modules(&["iceoryx2", "numpy"])) {

@@ -1,5 +1,5 @@
-//! What leaves the machine, as independent receivers hear it: PosiStageNet by pypsn (and npm's decoder in the long run), OSC
-//! by python-osc. None of them, killed or stopped, costs the publisher or another subscriber a frame.
+//! Network output, as independent receivers decode it: PosiStageNet by pypsn (and npm's decoder in the long run), OSC
+//! by python-osc. No receiver, killed or stopped, costs the publisher or another subscriber a frame.
 
 use crate::harness;
 
@@ -15,9 +15,9 @@ use harness::{
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 
-/// A scene whose publisher is there at once, also where the program is not optimised.
+/// A solver with which the publisher starts at once, even if the program is not optimised.
 const NEWTON: (&str, &str) = ("accuracy = 1e-9", "solver = \"newton\"");
-/// How long anything may take, seconds.
+/// Deadline of every wait, seconds.
 const DEADLINE: u64 = 120;
 
 fn publisher(name: &str, arguments: &[&str]) -> Process {
@@ -41,14 +41,14 @@ fn end(process: Process) -> Value {
     summary(&process.output_within(DEADLINE))
 }
 
-/// What is sent, and how long.
+/// A sender's output and its duration.
 struct Sending<'a> {
     name: &'a str,
     seconds: f64,
     group: Option<&'a str>,
     axes: &'a str,
     first_id: u64,
-    /// The folder of npm's decoder, which then has to see the same.
+    /// The folder of npm's decoder, which must then decode the same.
     npm: Option<&'a str>,
 }
 
@@ -59,13 +59,13 @@ impl Default for Sending<'_> {
 }
 
 impl Sending<'_> {
-    /// What pypsn hears of the paper's team: every tracker of every frame equals the shared memory.
+    /// Asserts that pypsn decodes the paper's team: every tracker of every frame equals the shared memory.
     fn of_the_paper(&self) {
         let publish = || publisher(self.name, &["--start", "250", "--time-scale", "2", "--duration", "600"]);
         self.is_heard(publish, 224, 30);
     }
 
-    /// What pypsn hears of a publisher of so many handles, at least so many frames that are equal.
+    /// Asserts that pypsn decodes a publisher of `handles` handles, with at least `least` frames that are equal.
     fn is_heard(&self, publish: impl FnOnce() -> Process, handles: u64, least: u64) {
         if !can_run(python_modules(&["iceoryx2", "numpy", "pypsn"])) {
             return;
@@ -95,11 +95,7 @@ impl Sending<'_> {
         assert!(number(&heard, "equal") > least, "{}", heard["publishers"]);
         assert!(number(&heard, "unknown") <= number(&heard, "memory_missed"), "{}", heard["publishers"]);
         assert_eq!(number(&heard, "equal") + number(&heard, "unknown"), number(&sent, "frames"));
-        assert_eq!(
-            (number(&heard, "stopped"), number(&sent, "stopped_frames")),
-            (1, 1),
-            "the sender says that it ends"
-        );
+        assert_eq!((number(&heard, "stopped"), number(&sent, "stopped_frames")), (1, 1), "the sender reports its end");
         assert_eq!((number(&heard, "packets"), number(&sent, "unsent_packets")), (number(&sent, "packets"), 0));
         assert_eq!(number(&heard, "trackers"), handles);
         assert!(number(&heard, "largest") <= 1472, "{} bytes", heard["largest"]);
@@ -152,7 +148,7 @@ fn a_second_decoder_sees_the_same() {
     }
 }
 
-/// A frame of one tracker: its status, its position and its speed, at their places in the packet.
+/// Receives a frame of one tracker and returns its status, position and speed, from their places in the packet.
 fn only_tracker(socket: &UdpSocket) -> (f32, [f32; 3], [f32; 3]) {
     let mut packet = [0; 1500];
     loop {
@@ -199,7 +195,7 @@ fn a_desk_is_told_when_the_publisher_dies_and_when_it_is_back() {
     assert!(sent["stopped_frames"].as_u64().unwrap() > 2, "{sent}");
 }
 
-/// Messages with an address, of what a peer has printed.
+/// Returns the messages with an address among the output of a peer.
 fn heard<'a>(messages: &'a [Value], address: &'a str) -> impl Iterator<Item = &'a Value> {
     messages.iter().filter(move |message| message["address"] == address).map(|message| &message["arguments"])
 }
@@ -223,7 +219,7 @@ fn python_osc_hears_every_alert_and_cue_once_and_in_order() {
     let mut peer = Process::start(python().args(["tests/python/osc_peer.py", "--port", &port]));
     let lines = peer.lines();
     lines.until("listening", DEADLINE);
-    // One of the desks is gone, which the other must not notice.
+    // One of the receivers is gone, which must not affect the other.
     let to = [format!("127.0.0.1:{}", free_port()), format!("127.0.0.1:{port}")];
     let sender = Process::start(program(name).args(["send", "osc", "--json", "--to", &to[0], &to[1]]));
     let mut watch = Process::start(program(name).args(["watch", "--json"]));
@@ -271,7 +267,8 @@ fn python_osc_hears_every_alert_and_cue_once_and_in_order() {
     assert!(states.contains(&json!(["contact", 2, "ended", 3])), "{states:?}");
 }
 
-/// Each countdown ends at the contact, and the head is where the safe solver has it at the time beside it.
+/// Asserts that each countdown ends at the contact, and that the head is at the safe solver's place at the time beside
+/// it.
 fn countdown_and_head_are_true(messages: &[Value]) {
     let motion = Scene::paper().motion.with_method(Method::Newton).unwrap();
     let (mut newton, mut chain) = (motion.solver(Velocities::Computed).solver, Chain::new(224));
@@ -281,7 +278,7 @@ fn countdown_and_head_are_true(messages: &[Value]) {
     for (time, head) in times.iter().zip(heads).step_by(20) {
         let time = time[0].as_f64().unwrap();
         newton.solve(time.min(contact), &mut chain).unwrap();
-        // A float of 400 s is a hundred-thousandth of a second off, and so is the head, in metres.
+        // A float of 400 s has an error of a hundred-thousandth of a second, and so does the head, in metres.
         let place = (head[0].as_f64().unwrap() - chain.x[0]).hypot(head[1].as_f64().unwrap() - chain.y[0]);
         assert!(place < 1e-4, "{place} m at {time}");
         let speed = head[3].as_f64().unwrap().hypot(head[4].as_f64().unwrap());
@@ -294,7 +291,7 @@ fn countdown_and_head_are_true(messages: &[Value]) {
         match message["address"].as_str().unwrap() {
             "sim_time" => {
                 let time = message["arguments"][0].as_f64().unwrap();
-                // It stands before the time of the same frame.
+                // The countdown comes before the time of the same frame.
                 if let Some(left) = left.take() {
                     assert!((contact - left - time).abs() < 1e-3, "{left} s left at {time}");
                 }
@@ -311,7 +308,7 @@ fn countdown_and_head_are_true(messages: &[Value]) {
     assert!(countdowns > 10 && over == 1, "{countdowns} countdowns, {over} ends");
 }
 
-/// Waits until a subscriber of its own has received so many frames more, and returns how many it has missed.
+/// Waits until a separate subscriber has received `frames` more frames, and returns the number that it has missed.
 fn further_frames(watched: &Lines, frames: u64) -> u64 {
     let deadline = Instant::now() + Duration::from_secs(DEADLINE);
     let mut first = None;
@@ -325,7 +322,7 @@ fn further_frames(watched: &Lines, frames: u64) -> u64 {
     panic!("no {frames} frames within {DEADLINE} s")
 }
 
-/// A sender of each kind, and where it is heard once it is connected.
+/// Starts a sender of each kind, and waits until each is connected.
 fn senders(name: &str) -> [Process; 3] {
     let ((psn, to_psn), (osc, to_osc)) = (listener(), listener());
     let psn_sender = Process::start(program(name).args(["send", "psn", "--to", &to_psn]));
@@ -336,7 +333,7 @@ fn senders(name: &str) -> [Process; 3] {
     osc.recv(&mut [0; 1500]).unwrap();
     let mut tries = (0..DEADLINE * 10).map(|_| harness::http_get(ready["url"].as_str().unwrap(), "*/*"));
     let is_connected = |answer: String| {
-        // What only a frame tells.
+        // A figure that exists only after a frame.
         let connected = answer.contains("bench_dragon_simulated_time_seconds{");
         if !connected {
             wait(0.1);
@@ -361,7 +358,7 @@ fn a_sender_that_is_killed_or_stopped_costs_nobody_a_frame() {
         }
         // The loop waits for none of them: twice as many frames as their queues hold.
         assert_eq!(further_frames(&watched, 2 * 64), 0, "round {round}");
-        // Some are killed while they are stopped, some after they have gone on.
+        // Some are killed while they are stopped, some after they have continued.
         if round % 2 == 0 {
             senders.iter().for_each(|sender| sender.signal(Signal::SIGCONT));
         }

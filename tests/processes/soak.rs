@@ -1,6 +1,6 @@
-//! The soak test as users meet it: real publisher, real subscribers, a verdict with its exit code, a report.
+//! The soak test as users run it: real publisher, real subscribers, a verdict with its exit code, a report.
 //!
-//! Asserts counts and order, never a speed: every limit on speed is set out of reach, or as low as can be.
+//! Asserts counts and order, never a speed: every limit on speed is out of reach, or as low as possible.
 
 use crate::harness;
 
@@ -20,15 +20,15 @@ use harness::{
     summary, text, unique, wait, wait_until,
 };
 
-/// Limits that any machine keeps. A subscriber that is not run for a while leaves frames in its queue, whose memory the
-/// publisher then touches for the first time: 9 to 13 kB for each of up to 1000.
+/// Limits that any machine keeps. A subscriber that does not run for a while leaves frames in its queue, whose memory
+/// the publisher then touches for the first time: 9 to 13 kB for each of up to 1000.
 const ANY_SPEED: [&str; 6] = ["--max-skipped", "100%", "--max-lateness-p999", "3600s", "--max-rss-growth", "20MB"];
 
 fn number(value: &Value, key: &str) -> u64 {
     value[key].as_u64().unwrap_or_else(|| panic!("no {key} in {value}"))
 }
 
-/// The checks of limits, by name: whether each passed, and its value.
+/// Returns the checks of limits, by name: true if passed, and the value.
 fn checks(report: &Value) -> BTreeMap<&str, (bool, f64)> {
     let all = report["checks"].as_array().unwrap().iter();
     let value = |one: &Value| one["value"].as_f64().unwrap_or(f64::NAN);
@@ -39,7 +39,7 @@ fn checks(report: &Value) -> BTreeMap<&str, (bool, f64)> {
 fn twenty_seconds_pass_with_nothing_missed() {
     let place = Place::new("soak");
     let mut soak = place.program();
-    // A subscriber that keeps up and that the machine does not run for up to a second loses nothing.
+    // A subscriber that keeps up loses nothing, even if the machine does not run it for up to a second.
     soak.arg("--scene").arg(place.scene_publishing("queue = 250"));
     soak.args(["soak", "--json", "--duration", "20s", "--rate", "250", "--report", "report"]);
     soak.args(["--subscribers", "3", "--slow", "1", "--flaky", "1"]).args(ANY_SPEED);
@@ -49,7 +49,7 @@ fn twenty_seconds_pass_with_nothing_missed() {
     assert_eq!(report["verdict"], "PASS");
     let publisher = &report["publisher"];
     let (frames, skipped) = (number(publisher, "frames"), number(publisher, "skipped"));
-    // The publisher starts before, and ends after, the twenty seconds.
+    // The publisher starts before the twenty seconds, and ends after them.
     assert!((5000..7500).contains(&(frames + skipped)), "{publisher}");
     let subscribers = report["subscribers"].as_array().unwrap();
     let roles: Vec<_> = subscribers.iter().map(|one| one["role"].as_str().unwrap()).collect();
@@ -68,7 +68,7 @@ fn twenty_seconds_pass_with_nothing_missed() {
                 assert!((frames..=frames + skipped).contains(&(number(seen, "last_tick") + 1)), "{subscriber}");
                 assert!(number(seen, "received") > 4000, "{subscriber}");
             }
-            // A read every 1.5 s, and a queue that lasts one: a third of all is missed.
+            // A read every 1.5 s, and a queue that lasts one second: a third of all frames is missed.
             "slow" => assert!(number(seen, "missed") > 500, "{subscriber}"),
             _ => assert!(number(subscriber, "incarnations") >= 3, "{subscriber}"),
         }
@@ -84,7 +84,7 @@ fn twenty_seconds_pass_with_nothing_missed() {
     place.assert_clean();
 }
 
-/// The files beside a report say the same, to readers that know nothing of this program: the JSON fits its schema, the
+/// Asserts that the files beside a report agree with it, by independent readers: the JSON fits its schema, the
 /// histograms have the percentiles of the JSON, and the show of the log is that of the frames.
 fn assert_can_be_sent(place: &Place, report: &Value) {
     let publisher = &report["publisher"];
@@ -115,7 +115,7 @@ fn assert_can_be_sent(place: &Place, report: &Value) {
     assert!(!line["step"]["intervals"].as_array().unwrap().is_empty());
 }
 
-/// One page with every plot drawn inside it, which fetches nothing.
+/// Asserts that a report is one page with every plot drawn inside it, which fetches nothing.
 fn assert_is_whole_page(page: &str, subscribers: usize) {
     assert!(page.starts_with("<!DOCTYPE html>") && page.trim_end().ends_with("</html>"));
     // Lateness, step, missed, overruns, memory, shared memory, descriptors, shows; and a latency for each subscriber.
@@ -139,15 +139,15 @@ fn a_scene_of_weak_accuracy_passes_with_the_links_it_promises() {
     let seen = &json_lines(&output).pop().unwrap()["subscribers"][0]["seen"];
     assert_eq!(number(seen, "wrong_links"), 0, "{seen}");
     let worst = seen["worst_link_error"].as_f64().unwrap();
-    // Looser than exact links are, which a subscriber that knows the scene accepts.
+    // Less exact than the links are; a subscriber that knows the scene accepts it.
     assert!((1e-9..2e-5).contains(&worst), "{worst:e} m");
 }
 
-/// Waits until a publisher of this place answers: an unoptimised one makes its tables for seconds.
+/// Waits until a publisher of this place answers: an unoptimised publisher makes its tables for seconds.
 fn until_publishing(place: &Place) {
     let deadline = Instant::now() + Duration::from_secs(60);
     while !place.program().args(["control", "state"]).output().unwrap().status.success() {
-        assert!(Instant::now() < deadline, "nobody publishes");
+        assert!(Instant::now() < deadline, "no publisher answers");
         wait(0.1);
     }
 }
@@ -175,7 +175,7 @@ fn a_broken_limit_fails_even_when_interrupted() {
     place.assert_clean();
 }
 
-/// Eight seconds, or ten minutes where long tests are requested.
+/// Eight seconds, or ten minutes if long tests are requested.
 #[test]
 fn a_conducted_show_obeys_while_clients_are_killed() {
     let place = Place::new("conducted");
@@ -217,7 +217,7 @@ fn a_conducted_show_obeys_while_clients_are_killed() {
     place.assert_clean();
 }
 
-/// Somebody else conducts too: what the conductor did not command is noticed.
+/// A second control client sends commands: the test reports effects of commands that its own client did not send.
 #[test]
 fn a_show_that_somebody_else_conducts_too_fails() {
     let place = Place::new("meddled");
@@ -232,13 +232,13 @@ fn a_show_that_somebody_else_conducts_too_fails() {
     let until = |what: &str, arguments: &[&str], wanted: &dyn Fn(&Value) -> bool| {
         let deadline = Instant::now() + Duration::from_secs(100);
         while !wanted(&control(arguments)) {
-            assert!(Instant::now() < deadline, "{what} did not come about");
+            assert!(Instant::now() < deadline, "{what} did not happen");
             wait(0.05);
         }
     };
-    // The show waits at its start until it is conducted.
+    // The show waits at its start until the first command.
     until("a first command", &["state"], &|state| state["sim_time"].as_f64().is_some_and(|time| time > 0.0));
-    // A jump that is not counted, and a hold that is not expected, each unless the show is held just then.
+    // A jump that is not counted, and a hold that is not expected, unless the show is held at that time.
     until("a seek", &["seek", "5"], &|answer| answer["code"] == "done");
     until("a hold", &["hold"], &|answer| answer["code"] == "done");
     until("a release", &["state"], &|state| state["playback"] != "held");
@@ -249,14 +249,14 @@ fn a_show_that_somebody_else_conducts_too_fails() {
     let checks = checks(&report);
     assert_eq!(checks["jumps of simulated time too many or too few"], (false, 1.0));
     assert!(checks["answers that the command table does not allow"].1 >= 1.0, "{checks:?}");
-    // The seek may have come in the very period in which a step ended, whose frame then contradicts its answer.
+    // The seek may have arrived in the same period in which a step ended; the frame then contradicts the step's answer.
     let faults = report["conducted"]["faults"].as_array().unwrap();
     assert!(faults.iter().any(|fault| fault.as_str().unwrap().contains("expected")), "{faults:?}");
-    // The stream itself is in order: each frame follows from the one before.
+    // The stream itself is in order: each frame follows from the frame before.
     assert_eq!(checks["frames that disobey the commands"], (true, 0.0));
 }
 
-/// Processes that a process has started, and their command lines.
+/// Returns the processes that a process has started, and their command lines.
 fn children(process: &Process) -> Vec<(Pid, String)> {
     let id = process.id();
     let children = std::fs::read_to_string(format!("/proc/{id}/task/{id}/children")).unwrap();
@@ -268,7 +268,7 @@ fn exists(process: Pid) -> bool {
     kill(process, None).is_ok()
 }
 
-/// The report of a soak test whose publisher gets a signal from somebody else.
+/// Returns the report of a soak test whose publisher gets a signal from another process.
 fn report_of_bereft(signal: Signal) -> Value {
     let place = Place::new("bereft");
     let mut soak = place.program();
@@ -296,7 +296,7 @@ fn a_publisher_that_ends_in_good_order_before_its_time_fails_the_test_too() {
     assert_eq!(report_of_bereft(SIGTERM)["publisher"]["end"], "signal");
 }
 
-/// As in a container, whose only program it is.
+/// As in a container whose only program is the soak test.
 #[test]
 fn a_soak_test_can_be_the_first_process_of_its_system() {
     if !can_run(root("make a namespace of processes")) {
@@ -347,7 +347,7 @@ fn what_cannot_be_is_refused_before_it_starts() {
         (&["--conduct", "1", "--subscribers", "8"], "less one for --conduct"),
         (&["--conduct", "1", "--flaky-clients", "9"], "expected at most 8"),
         (&["--flaky-clients", "1"], "--conduct"),
-        // In the publisher's own words.
+        // The publisher's own sentence.
         (&["--cpu", "4096"], "error: --cpu"),
     ];
     for (arguments, named) in cases {
@@ -384,7 +384,8 @@ fn the_status_comes_once_a_second_and_adds_up() {
         }
     }
     let summary = summary(&publisher.output_within(20));
-    // One for every second between the first and the last, which is the end's; a machine that stops for a moment delays one.
+    // One for every second between the first and the last status, which is sent at the end. A machine that stops for a
+    // moment delays one.
     let [first, last] = [&statuses[0], statuses.last().unwrap()];
     let seconds = (last.tick - first.tick) as f64 / 50.0;
     assert!((statuses.len() as f64 - 1.0 - seconds).abs() < 2.0, "{} in {seconds} s", statuses.len());

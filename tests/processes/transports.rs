@@ -1,7 +1,7 @@
-//! What every transport promises, seen from another process: one suite, which each of them runs.
+//! The promises of every transport, tested from another process: one suite, which each transport runs.
 //!
-//! A transport joins by a reader in tests/python/transport_peer.py, a test at the end that calls [`suite`], and, where a
-//! scene has to request it, its settings in [`publisher`].
+//! A transport joins by a reader in tests/python/transport_peer.py, a test at the end that calls [`suite`], and, if a
+//! scene must request it, its settings in [`publisher`].
 
 use crate::harness;
 
@@ -26,9 +26,9 @@ fn peer(transport: &str, name: &str, seconds: u64) -> Command {
     command
 }
 
-/// A publisher over all transports, for so many seconds at most.
+/// Returns a publisher over all transports, for at most `seconds` seconds.
 fn publisher(name: &str, seconds: u64) -> Process {
-    // However far a subscriber falls behind on a loaded machine, the queues hold it.
+    // The queues hold all frames by which a subscriber falls behind on a loaded machine.
     let scene = scene_file(name, &[("[publish]", "[publish]\nqueue = 480")]);
     if cfg!(feature = "ros2") {
         let topics = format!(
@@ -44,7 +44,7 @@ fn publisher(name: &str, seconds: u64) -> Process {
     Process::start(&mut command)
 }
 
-/// What came of a kind, by run, in the order of coming.
+/// Returns the lines of a kind, by run, in the order of arrival.
 fn by_run<'a>(lines: &'a [Value], kind: &str) -> BTreeMap<u64, Vec<&'a Value>> {
     let mut runs: BTreeMap<u64, Vec<&Value>> = BTreeMap::new();
     for line in lines.iter().filter(|line| line["type"] == kind) {
@@ -57,8 +57,8 @@ fn number(line: &Value, field: &str) -> u64 {
     line[field].as_u64().unwrap_or_else(|| panic!("{field} of {line}"))
 }
 
-/// The frames of one run: from the first that came none lost but `left_out`, which the transport counted itself because
-/// it was behind; each with the time of its tick and whole content.
+/// Checks the frames of one run: from the first one on none is lost except `left_out`, which the transport counted
+/// itself because it was behind. Each frame has the time of its tick and complete content.
 fn check_frames(frames: &[&Value], left_out: u64) {
     let [first, last] = [frames.first(), frames.last()].map(|frame| number(frame.unwrap(), "sequence"));
     let lost = last - first + 1 - frames.len() as u64;
@@ -76,7 +76,7 @@ fn check_frames(frames: &[&Value], left_out: u64) {
     }
 }
 
-/// The alerts of one run: the level that holds at the start, then its countdown once a second.
+/// Checks the alerts of one run: the level at the start, then its countdown once a second.
 fn check_alerts(alerts: &[&Value]) {
     for alert in alerts {
         assert_eq!((number(alert, "level"), number(alert, "event")), (1, 2), "{alert}");
@@ -84,13 +84,13 @@ fn check_alerts(alerts: &[&Value]) {
         assert_eq!((number(alert, "event_bench_a"), number(alert, "event_bench_b")), (0, 8), "{alert}");
     }
     let ticks: Vec<u64> = alerts.iter().map(|alert| number(alert, "tick") / RATE).collect();
-    // Over ROS 2 the first one is perhaps sent a second time.
+    // Over ROS 2 the first alert may be sent a second time.
     let again = usize::from(alerts.len() > 1 && alerts[0] == alerts[1]);
     assert!(ticks[again..].windows(2).all(|pair| pair[1] > pair[0]), "one alert a second: {ticks:?}");
     assert!(!ticks.is_empty());
 }
 
-/// The stage of one run: once, and over ROS 2 perhaps a second time.
+/// Checks the stage of one run: once, and over ROS 2 perhaps a second time.
 fn check_stages(stages: &[&Value]) {
     assert!((1..=2).contains(&stages.len()), "{stages:?}");
     for stage in stages {
@@ -107,7 +107,7 @@ fn suite(transport: &str, modules: &[&str]) {
     let ready = early.lines();
     ready.until("ready", 300);
     let first = publisher(&name, 60);
-    // The debug build makes its tables for seconds: the late one waits for what the early one has got.
+    // The debug build makes its tables for seconds: the late subscriber starts after the early one has received frames.
     let mut beginning = ready.all_until("frame", 300);
     for _ in 0..2 {
         beginning.extend(ready.all_until("\"alert\"", 300));
@@ -120,12 +120,12 @@ fn suite(transport: &str, modules: &[&str]) {
     let lines = beginning.into_iter().chain(ready.rest(300));
     let lines: Vec<Value> = lines.map(|line| serde_json::from_str(&line).unwrap()).collect();
 
-    // Shared memory leaves nothing out; a transport with a queue of its own reports what it did.
+    // Shared memory leaves nothing out; a transport with its own queue reports the frames it left out.
     let summaries = [&summary_of_first, &summary_of_second];
     let left_out = summaries.into_iter().filter_map(|summary| summary.get(transport));
     let left_out = left_out.map(|of| number(of, "skipped") + number(of, "discarded")).sum();
 
-    // One that was there before the publisher, through two of them.
+    // A subscriber that started before the publisher, through two publishers.
     let [frames, stages, alerts, statuses] = ["frame", "stage", "alert", "status"].map(|kind| by_run(&lines, kind));
     assert_eq!(frames.len(), 2, "two publishers are two runs");
     for (run, frames) in &frames {
@@ -139,10 +139,10 @@ fn suite(transport: &str, modules: &[&str]) {
     let mut last: Vec<u64> = frames.values().map(|frames| number(frames.last().unwrap(), "sequence") + 1).collect();
     sent.sort_unstable();
     last.sort_unstable();
-    assert_eq!(last, sent, "the last frame came too");
+    assert_eq!(last, sent, "the last frame arrived too");
     assert_eq!(number(lines.last().unwrap(), "publishers"), 0, "the publisher has left: {:?}", lines.last());
 
-    // One that came late: the stage, and the alert that holds.
+    // A late subscriber: the stage, and the alert in effect.
     assert!(late.status.success(), "{}", text(&late.stderr));
     let lines = json_lines(&late);
     let [frames, stages, alerts] = ["frame", "stage", "alert"].map(|kind| by_run(&lines, kind));
@@ -152,7 +152,7 @@ fn suite(transport: &str, modules: &[&str]) {
         check_stages(&stages[run]);
         check_alerts(&alerts[run]);
         assert!(number(frames[0], "tick") > RATE, "it was not late");
-        assert!(number(alerts[run][0], "tick") <= number(frames[0], "tick"), "the alert that holds is not there");
+        assert!(number(alerts[run][0], "tick") <= number(frames[0], "tick"), "the alert in effect is missing");
     }
 }
 

@@ -1,9 +1,10 @@
 //! Two machines joined by iceoryx2's own tunnel over Zenoh: two network namespaces with an iceoryx2 each and the real
-//! `iox2-link-tunnel-zenoh` between them. What crosses, what it costs, what late subscribers get, how a death is noticed.
+//! `iox2-link-tunnel-zenoh` between them. Tests the data that crosses, its cost, late subscribers, and the detection of
+//! a death.
 //!
-//! Only with `BENCH_DRAGON_LONG=1`; `BENCH_DRAGON_TUNNEL` names the tunnel's program, which `tests/run` installs. The figures of
-//! docs/more-machines.md are what `BENCH_DRAGON_LONG=1 cargo test --release --test tunnel -- --nocapture` prints: both
-//! namespaces have one clock, so that latencies are known here. Nothing asserts a speed.
+//! Only with `BENCH_DRAGON_LONG=1`; `BENCH_DRAGON_TUNNEL` names the tunnel's program, which `tests/run` installs.
+//! `BENCH_DRAGON_LONG=1 cargo test --release --test processes tunnel:: -- --nocapture` prints the figures of
+//! docs/more-machines.md: both namespaces have one clock, so that latencies are known here. No test asserts a speed.
 
 use crate::harness;
 
@@ -15,14 +16,14 @@ use harness::{Lines, Place, Process, can_run, long, not_run, python, python_modu
 use nix::sys::signal::Signal::{SIGINT, SIGKILL, SIGTERM};
 use serde_json::Value;
 
-/// What the machine that gets the frames has to have in its config/iceoryx2.toml.
+/// The settings that the receiving machine needs in its config/iceoryx2.toml.
 const MIRROR: &str = "[defaults.publish-subscribe]\nsubscriber-max-buffer-size = 64\nmax-subscribers = 16\n";
 
 fn object(line: &str) -> Value {
     serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}"))
 }
 
-/// The two machines: "left" has the show, "right" gets it.
+/// The two machines: "left" runs the show, "right" receives it.
 struct Machines {
     hosts: Hosts,
     left: Place,
@@ -47,7 +48,7 @@ impl Machines {
     }
 }
 
-/// A program that other programs of this machine do not keep waiting: what is measured is the way between machines.
+/// Returns a program that other programs of this machine do not delay: the test measures the way between machines.
 fn real_time(program: &str) -> Command {
     let mut command = Command::new("chrt");
     command.args(["--fifo", "50", program]);
@@ -59,7 +60,7 @@ fn ended(process: &Process, lines: &Lines) -> Vec<String> {
     lines.rest(60)
 }
 
-/// What a run of `seconds` loses and costs on its way, and how late it is; figures, but for what must not happen at all.
+/// Measures the loss, cost and latency of a run of `seconds`; asserts only what must never happen.
 fn measure(machines: &Machines, rate: u64, seconds: u64, options: [&str; 2]) {
     let (text_of_rate, duration) = (rate.to_string(), (seconds + 8).to_string());
     let run = ["run", "--json", "--rate", &text_of_rate, "--duration", &duration, "--realtime", "80"];
@@ -105,7 +106,7 @@ fn measure(machines: &Machines, rate: u64, seconds: u64, options: [&str; 2]) {
     tunnels.into_iter().for_each(|tunnel| drop(tunnel.output_within(60)));
 }
 
-/// A late subscriber on the far side: what it gets, by kind, until it has seen `frames` frames.
+/// Returns the messages of a late subscriber on the far side within 5 s.
 fn far_peer(machines: &Machines) -> Vec<Value> {
     let mut command = python();
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/python/transport_peer.py");
@@ -115,7 +116,7 @@ fn far_peer(machines: &Machines) -> Vec<Value> {
     text(&output.stdout).lines().map(object).collect()
 }
 
-/// The show crosses whoever was there first, its death is noticed on both machines, and a new one crosses too.
+/// Tests that the show crosses whichever machine was first, and a new show too, and that both notice its death.
 fn lives_and_deaths(machines: &Machines) {
     // No event is near: there is one alert, at the start.
     let run = ["run", "--json", "--rate", "60", "--start", "100"];
@@ -130,12 +131,13 @@ fn lives_and_deaths(machines: &Machines) {
     let [_, line] = all_print("missed 0");
     assert!(line.contains("latency unknown: the frames were sent by another machine's clock"), "{line}");
 
-    // A machine that joins late, and a subscriber on it: the stage and the alert within a second, the state in every frame.
+    // A machine that joins late, and a subscriber on it: the stage and the alert arrive within a second, the state in
+    // every frame.
     right.signal(SIGINT);
     right.output_within(60);
     monitors[1].until("has ended", 60);
     let right = machines.tunnel("right", "--poll 5");
-    // It is the run that it was.
+    // The run is the same as before.
     monitors[1].until("rate", 60);
     let got = far_peer(machines);
     let of = |kind: &str| got.iter().filter(|line| line["type"] == kind).collect::<Vec<_>>();

@@ -1,14 +1,14 @@
-//! The monitor as people see it: `watch` in a terminal, what stands there, its colours, and what its keys do.
+//! The monitor as people see it: `watch` in a terminal, its text, its colours, and the effects of its keys.
 //!
-//! The terminal is a pseudo-terminal, and an emulator where its rows matter; what is checked in it stands in
-//! `tests/python/watch_terminal.py` and `watch_keys.py`. Nothing asserts a speed.
+//! The terminal is a pseudo-terminal, and an emulator if its rows matter. The checks in the emulator are in
+//! `tests/python/watch_terminal.py` and `watch_keys.py`. No test asserts a speed.
 
 use crate::harness;
 
 use harness::{Process, program, python, scene_file, text, unique};
 use serde_json::Value;
 
-/// A scene whose publisher is there at once, also where the program is not optimised.
+/// A solver with which the publisher starts at once, even if the program is not optimised.
 const NEWTON: (&str, &str) = ("accuracy = 1e-9", "solver = \"newton\"");
 
 fn in_a_terminal(scenario: &str) {
@@ -68,7 +68,7 @@ fn cues_are_printed_as_they_are_announced() {
     let figures = ["number", "cue_time", "pauses", "name"];
     let printed: Vec<_> = cues.iter().map(|cue| figures.map(|key| cue[key].to_string())).collect();
     assert_eq!(printed, [["1", "0.6", "false", "\"lamps\""], ["2", "0.8", "true", "\"coil\""]]);
-    // The first frame at or after the cue; one that pauses stands there exactly.
+    // The first frame at or after the cue; a cue that pauses is at the exact time.
     let at = cues[0]["sim_time"].as_f64().unwrap();
     assert!((0.6..0.6 + 0.2).contains(&at), "{at}");
     assert_eq!(cues[1]["sim_time"], 0.8);

@@ -1,4 +1,5 @@
-"""Writes what a replay needs of a recording into a bag, with the package rosbags: its chunks, its definitions, its index.
+"""Writes the parts of a recording that a replay needs into a bag, with the package rosbags: its chunks, its
+definitions, its index.
 
     bag_writer.py RECORDING FOLDER
 """

@@ -1,8 +1,8 @@
-"""Reads a frame and an alert knowing nothing but names, sizes and the order of fields as the design gives them.
+"""Reads a frame and an alert, knowing only names, sizes and the order of fields from the design.
 
     by_design.py --name NAME
 
-Prints one JSON line for the newest frame and one for the alert that holds.
+Prints one JSON line for the newest frame and one for the alert in effect.
 """
 
 import argparse
@@ -19,7 +19,7 @@ HANDLE_POSE = struct.Struct("<5d")
 
 
 def opaque(name, version, size):
-    """So many bytes that are aligned to eight, under a layout's name."""
+    """Returns `size` bytes that are aligned to eight, under a layout's name."""
 
     class Opaque(ctypes.Structure):
         _fields_ = [("words", ctypes.c_uint64 * (size // 8))]
@@ -49,7 +49,7 @@ def main():
             try:
                 return builder().open().subscriber_builder().create()
             except iox2.PublishSubscribeOpenError as error:
-                # Where the disk is busy a service is incomplete for seconds.
+                # If the disk is busy a service is incomplete for seconds.
                 if not any(reason in str(error) for reason in ("DoesNotExist", "HangsInCreation")) or time.monotonic() > deadline:
                     raise
                 time.sleep(0.1)

@@ -1,4 +1,4 @@
-"""Debian's Chromium, driven by Playwright: for the scripts that look at pages."""
+"""Debian's Chromium, driven by Playwright, for the scripts that test pages."""
 
 import contextlib
 import ctypes
@@ -12,9 +12,9 @@ PR_CAPBSET_DROP, CAP_SYS_NICE = 24, 23
 
 @contextlib.contextmanager
 def browsers():
-    """What starts a Chromium. Root's would put itself before all other processes, and those that have to be on time would not
-    be: what is started from here on has no right to."""
-    # Refused to whoever is not root, whose browsers have no such right anyway.
+    """Returns an object that starts a Chromium. As root, Chromium would raise its priority above all other processes,
+    which would then miss their deadlines; processes started from here on have no right to that."""
+    # Refused to users other than root, whose browsers have no such right anyway.
     ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, CAP_SYS_NICE, 0, 0, 0)
     with sync_playwright() as playwright:
         yield playwright.chromium
@@ -22,6 +22,6 @@ def browsers():
 
 @contextlib.contextmanager
 def browser():
-    """A Chromium of its own."""
+    """A separate Chromium."""
     with browsers() as chromium, chromium.launch(executable_path=PROGRAM) as started:
         yield started

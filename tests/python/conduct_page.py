@@ -1,9 +1,9 @@
-"""The page that conducts: the transport bar in Debian's Chromium, with a publisher that has to obey.
+"""The page with control: the transport bar in Debian's Chromium, with a publisher that executes its commands.
 
     conduct_page.py SCENARIO PROGRAM NAME SCENE
 
-Starts its own server and a publisher of SCENE under the service name NAME. Whether the publisher obeys is asked of it by
-another process, `control state`. Ends with exit code 0, or with what it found instead.
+Starts a server and a publisher of SCENE under the service name NAME. Another process, `control state`, reads the state
+of the publisher. Ends with exit code 0, or with a sentence on the error.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ import time
 
 from chromium import browser as chromium
 
-# Nothing here may wait for ever; an alarm still lets everything that was started be ended.
+# No wait here may last forever; an alarm still ends everything that was started.
 WATCHDOG = 300
 CONTACT = 412.473837682115
 
@@ -49,7 +49,7 @@ def server(*arguments):
 
 
 def state():
-    """How the show stands, or None while nobody publishes."""
+    """Returns the state of the show, or None if no publisher runs."""
     asked = subprocess.run([PROGRAM, "--name", NAME, "--json", "control", "state"], capture_output=True)
     return json.loads(asked.stdout) if asked.returncode == 0 else None
 
@@ -64,7 +64,7 @@ def opened(browser, url):
 
 
 def until(condition, what, seconds=60):
-    """The value of a condition as soon as it is true."""
+    """Returns the value of a condition as soon as it is true."""
     deadline = time.monotonic() + seconds
     while not (value := condition()):
         assert time.monotonic() < deadline, f"{what}: not within {seconds} s; the show: {state()}"
@@ -84,7 +84,7 @@ def bar_conducts():
     with publisher("--start", "100") as _, server() as closed, server("--control") as ready, chromium() as browser:
         # Without --control: no bar, and a command is refused with a sentence.
         page = opened(browser, closed["url"])
-        assert closed["token"] is None and not bar_is_shown(page), "the bar is there unasked"
+        assert closed["token"] is None and not bar_is_shown(page), "the bar is there without --control"
         answer = """() => new Promise((done) => {
             const socket = new WebSocket(`ws://${location.host}/frames?rate=1`);
             socket.onopen = () => socket.send('{"command":"pause","id":3}');
@@ -121,7 +121,7 @@ def buttons(page):
 
 
 def place_on_line(page, time):
-    """Where a moment of the show is on the time line."""
+    """Returns the place of a time of the show on the time line."""
     box, end = page.locator("#conduct-seek").bounding_box(), float(page.get_attribute("#conduct-seek", "max"))
     thumb = page.evaluate("parseFloat(getComputedStyle(document.documentElement).fontSize)")
     return box["x"] + thumb / 2 + (box["width"] - thumb) * time / end, box["y"] + box["height"] / 2
@@ -134,18 +134,18 @@ def time_line(page):
     assert [mark[0] for mark in marks] == ["contact", "cue", "cue"], marks
     for (_, at, x), true in zip(marks, [CONTACT, 150.0, 300.0]):
         assert abs(at - true) < 1e-9 and abs(x - place_on_line(page, true)[0]) < 1.5, marks
-    # A drag seeks on its way, some ten times a second at most, and to its end exactly.
+    # A drag seeks on its way, at most about ten times a second, and to its end exactly.
     page.evaluate("(() => { const { send } = WebSocket.prototype; window.sent = []; WebSocket.prototype.send = function (text) { sent.push(text); send.call(this, text); }; })()")
     page.mouse.move(*place_on_line(page, state()["sim_time"]))
     page.mouse.down()
     began = time.monotonic()
     for step in range(60):
         page.mouse.move(*place_on_line(page, 100 + 3 * step))
-    until(lambda: 105 < state()["sim_time"] < 290, "seeks while the hand is on its way")
+    until(lambda: 105 < state()["sim_time"] < 290, "seeks during the drag")
     page.mouse.move(*place_on_line(page, 250))
     took = time.monotonic() - began
     page.mouse.up()
-    until(lambda: abs(state()["sim_time"] - 250) < 0.6, "the seek to where the hand let go")
+    until(lambda: abs(state()["sim_time"] - 250) < 0.6, "the seek to the end of the drag")
     seeks = [text for text in page.evaluate("sent") if '"seek"' in text]
     assert 1 < len(seeks) <= 10 * took + 3, f"{len(seeks)} seeks in {took} s"
     until(lambda: abs(float(page.input_value("#conduct-seek")) - state()["sim_time"]) < 0.1, "the thumb is where the show is")
@@ -159,14 +159,15 @@ def keyboard(page):
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowLeft")
     until(lambda: abs(state()["sim_time"] - before - 5) < 1e-6, "two arrows to the right and one to the left are 5 s")
-    # In the picture, arrows move the picture; the other keys conduct there too. A period of 1/50 s at a rate of 4.
+    # In the picture, arrows move the picture; the other keys also send commands there. A period of 1/50 s at a rate of
+    # 4.
     page.focus("#stage")
     page.keyboard.press("ArrowRight")
     page.keyboard.press(".")
     until(lambda: abs(state()["sim_time"] - before - 5.08) < 1e-6, "a step, and no seek")
     page.keyboard.press("Space")
     until(lambda: state()["playback"] == "playing", "space resumes")
-    # A cue on the way: its name.
+    # A cue that is passed: its name.
     page.keyboard.press("Space")
     until(lambda: state()["playback"] == "paused", "space pauses")
     page.evaluate("document.activeElement.blur()")
@@ -176,7 +177,7 @@ def keyboard(page):
     until(lambda: page.evaluate("!document.getElementById('cue').hidden") and page.inner_text("#cue"), "the cue's name")
     assert page.inner_text("#cue") == "1. lamps"
     seek(page, 299.9)
-    # The second cue pauses: Play goes on from there.
+    # The second cue pauses: Play continues from there.
     until(lambda: (now := state())["playback"] == "paused" and now["sim_time"] == 300.0, "the cue that pauses")
     until(lambda: page.inner_text("#cue") == "2. coil (waiting for go)", "its name")
     page.get_by_role("button", name="Play").click()
@@ -203,11 +204,11 @@ def held(page):
 
 
 def at_the_end(page, browser, url):
-    """A page that comes while the show stands still sets its speed, and at the end the button does what it says."""
+    """A page that loads while the show is paused sets its speed, and at the end the button does as it says."""
     page.close()
     page = opened(browser, url)
     until(lambda: bar_is_shown(page) and page.locator("#conduct-rate option").count() > 1, "the speeds")
-    assert page.locator("#conduct-rate").input_value() == "", "nobody knows the speed of a show that stands still"
+    assert page.locator("#conduct-rate").input_value() == "", "the speed of a paused show is unknown"
     page.keyboard.press("]")
     says(page, "The speed is not known until the show plays.")
     page.get_by_label("Speed").select_option("2 ×")
@@ -230,7 +231,7 @@ def token_and_own_pages():
     with publisher("--start", "100") as _, chromium() as browser, server("--control", "--listen", "0.0.0.0") as ready:
         port = ready["url"].rstrip("/").rsplit(":", 1)[1]
         here = f"http://127.0.0.1:{port}/"
-        # One who has no token, or a wrong one, may watch.
+        # A client without a token, or with a wrong one, may watch.
         for fragment in ["", "#token=0123456789abcdef0123456789abcdef"]:
             page = opened(browser, here + fragment)
             time.sleep(0.5)
@@ -253,11 +254,11 @@ def token_and_own_pages():
             page = browser.new_page()
             page.goto(ready["url"] + "pages")
             assert page.url == ready["url"] + "pages/"
-            until(lambda: page.evaluate("page.time") is not None, "frames on a page of one's own")
+            until(lambda: page.evaluate("page.time") is not None, "frames on the user's own page")
             page.close()
-            assert not gets_frames(browser, elsewhere, ready), "a page from elsewhere is let in unasked"
+            assert not gets_frames(browser, elsewhere, ready), "a page from elsewhere is admitted without a setting"
         with server("--allow-origin", elsewhere) as ready:
-            assert gets_frames(browser, elsewhere, ready), "a page that was let in gets nothing"
+            assert gets_frames(browser, elsewhere, ready), "an admitted page gets nothing"
 
 
 class Quiet(http.server.SimpleHTTPRequestHandler):
@@ -266,7 +267,7 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
 
 
 def gets_frames(browser, elsewhere, ready):
-    """Whether the example page, served from elsewhere, gets frames; or is refused."""
+    """Returns true if the example page, served from elsewhere, gets frames, and false if it is refused."""
     page, closed = browser.new_page(), []
     page.on("console", lambda message: "403" in message.text and closed.append(message.text))
     page.goto(f"{elsewhere}/?{ready['url'].split('/')[2]}")

@@ -1,7 +1,7 @@
-"""Conducts a publisher as a test commands it, and floods it.
+"""Sends a publisher the commands of a test, or a flood of them.
 
     conduct_peer.py --name NAME table      every command in every state, a JSON line each
-    conduct_peer.py --name NAME latency    how long a command takes, in periods and in time
+    conduct_peer.py --name NAME latency    the duration of a command, in periods and in time
     conduct_peer.py --name NAME flood      requests as fast as they go, until killed
 """
 

@@ -1,9 +1,9 @@
-"""Interpolates a publisher's frames at random moments of display, as the examples for Python do.
+"""Interpolates a publisher's frames at random times of display, as the examples for Python do.
 
     display_times.py --transport iceoryx2|ros2 --name NAME --moments N --delay D
 
-Prints a JSON line for each moment until N of them were between two frames: the simulated time, that between the frames on
-both sides of it, which is longer where the publisher skipped some, the places and the headings.
+Prints a JSON line for each time until N of them were between two frames: the simulated time, the interval of the frames
+on both sides, which is longer if the publisher skipped some, the places and the headings.
 """
 
 import argparse
@@ -20,7 +20,7 @@ import hermite  # noqa: E402
 import ros2_display  # noqa: E402
 
 
-# Nothing here waits for ever.
+# No wait here lasts forever.
 WATCHDOG = 250.0
 
 

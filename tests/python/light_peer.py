@@ -2,7 +2,7 @@
 
     light_peer.py --name NAME
 
-Prints a JSON line with what it has compared, and ends with an error where a frame is not its counterpart rounded.
+Prints a JSON line with the counts, and ends with an error if a frame is not its counterpart rounded.
 """
 
 import argparse
@@ -17,7 +17,7 @@ import numpy as np
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
 from bench_dragon_messages import FrameHeader, HandlePose, HandlePose32, handles_of, indices_of  # noqa: E402
 
-# Each message has its own time of sending and its own count.
+# Each message has its own sending time and its own count.
 OF_THE_FRAME = [name for name, _ in FrameHeader._fields_ if name not in ("sent_ns", "handles")]
 
 
@@ -31,7 +31,7 @@ def open_service(node, name, pose):
 
 
 def take(port, into):
-    """Copies what has come: the header and the poses of each frame, by sequence."""
+    """Copies all waiting messages: the header and the poses of each frame, by sequence."""
     while (sample := port.receive()) is not None:
         header = sample.user_header().contents
         poses = handles_of(sample).copy()
@@ -55,7 +55,7 @@ def main():
     list(map(take, ports, frames))
 
     whole, light = frames
-    # One of the two ports was there first.
+    # One of the two ports was connected first.
     first = max(min(whole), min(light))
     assert sorted(light) == list(range(min(light), max(whole) + 1)), "frames are missing"
     compared = [sequence for sequence in whole if sequence >= first]

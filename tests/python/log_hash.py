@@ -1,9 +1,9 @@
-"""Computes the hashes of a log from the frames of another process, knowing nothing but the layout of bytes.
+"""Computes the hashes of a log from the frames of another process, knowing only the layout of bytes.
 
     log_hash.py --name NAME --rate HZ --seconds S
 
-Prints a JSON line for each second of which it has every frame: its number, first and last tick, frames, and BLAKE3 over
-bytes 8 to 23 and 48 to 95 of each header and all bytes of its poses.
+Prints a JSON line for each second with every frame: its number, first and last tick, frames, and BLAKE3 over bytes 8 to
+23 and 48 to 95 of each header and all bytes of its poses.
 """
 
 import argparse
@@ -52,7 +52,7 @@ def main():
                     line = {"type": "second", "second": second, "from": ticks[0], "to": ticks[-1]}
                     print(json.dumps(line | {"frames": len(ticks), "hash": hasher.hexdigest()}), flush=True)
                     printed += 1
-                # The first second may have begun before this program had its subscription.
+                # The first second may have begun before this program had subscribed.
                 hasher = blake3.blake3() if latest is not None or sequence == 0 else None
                 second, ticks = int(tick / arguments.rate), []
             if latest is not None and sequence != latest + 1:

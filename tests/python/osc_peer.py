@@ -1,8 +1,9 @@
-"""A desk that listens to OSC with PyPI's python-osc and prints a JSON line for each message, in the order of their coming.
+"""A lighting desk that receives OSC with PyPI's python-osc and prints a JSON line for each message, in the order of
+arrival.
 
     osc_peer.py --port P
 
-Ends when it hears that frames have stopped.
+Ends with the message that frames have stopped.
 """
 
 import argparse

@@ -1,14 +1,15 @@
-"""A lighting desk that checks what it hears: PosiStageNet as PyPI's pypsn decodes it, against the shared memory.
+"""A lighting desk that checks its input: PosiStageNet as PyPI's pypsn decodes it, compared with the shared memory.
 
     psn_peer.py --name NAME... --port P [--group 236.10.10.10] [--axes x,up,y] [--first-id N] [--id-step N] [--npm FOLDER]
                 [--progress]
 
-Listens to UDP port P and subscribes to the publishers NAME, the first of which has to run already. Ends once no packet has
-come for two seconds after the first. A frame's trackers belong to the publishers by their numbers, STEP apart. Every frame was decoded whole, and each is held against the frame of the shared memory that has the
-same head, every tracker, to float32. Prints a line when it listens, and one with what it has seen. With --npm, the decoder
-of that folder (npm's @jwetzell/posistagenet) gets the same packets and has to see the same in them. With --progress, a line
-five times a second has for each publisher how often its trackers have `stopped`, and how many frames since then were `equal`,
-as far as the head's place tells.
+Listens to UDP port P and subscribes to the publishers NAME, the first of which must be running. Ends when no packet has
+come for two seconds after the first. The numbers of a frame's trackers, STEP apart, tell their publisher. Every frame
+must decode completely. Each is compared, every tracker, to float32, with the frame of the shared memory that has the
+same head. Prints a line when it listens, and one with the counts. With --npm, the decoder of that folder (npm's
+@jwetzell/posistagenet) gets the same packets and must decode the same. With --progress, prints a line five times a
+second. It has for each publisher the number of times its trackers have `stopped`, and the number of frames since then
+that were `equal`, judged by the head's place.
 """
 
 import argparse
@@ -34,7 +35,7 @@ import iceoryx2 as iox2  # noqa: E402
 def listen(port, group):
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    # Room for a slow machine's hesitations; more of it for root.
+    # Room for the delays of a slow machine; more room for root.
     for option in (socket.SO_RCVBUF, getattr(socket, "SO_RCVBUFFORCE", 33)):
         try:
             sock.setsockopt(socket.SOL_SOCKET, option, 1 << 26)
@@ -79,14 +80,14 @@ class Memory(threading.Thread):
                 last, heard = header.sequence, time.monotonic()
                 sample.delete()
                 self.frames[np.float32([handles["x"][0], handles["y"][0]]).tobytes()] = (handles, header.time_scale)
-            # A publisher that has ended: its service is let go of, so that the next one can make it anew.
+            # A publisher that has ended: its service is closed, so that the next publisher can create it again.
             if last is not None and time.monotonic() - heard > 0.5:
                 port = service = None
             time.sleep(0.001)
 
 
 def mapped(axes, vectors):
-    """Vectors (x, y, up) of the stage in a desk's axes."""
+    """Returns vectors (x, y, up) of the stage in a desk's axes."""
     columns = {"x": vectors[:, 0], "y": vectors[:, 1], "up": vectors[:, 2]}
     chosen = [-columns[axis[1:]] if axis[0] == "-" else columns[axis] for axis in axes.split(",")]
     return np.stack(chosen, axis=1)
@@ -101,7 +102,7 @@ def turned(vector, orientations):
 
 
 def compare(trackers, handles, scale, axes, first_id):
-    """The trackers of a frame against all handles of the shared memory's."""
+    """Compares the trackers of a frame with all handles of the frame in shared memory."""
     assert [tracker.id for tracker in trackers] == list(range(first_id, first_id + len(handles)))
     zero = np.zeros(len(handles))
     vectors = lambda x, y: mapped(axes, np.stack([x, y, zero], axis=1))  # noqa: E731
@@ -116,7 +117,8 @@ def compare(trackers, handles, scale, axes, first_id):
 
 
 def hold_against(trackers, memory, axes, first_id):
-    """What one publisher's trackers of a frame are: `equal` to the shared memory's, `stopped`, or `unknown` to it."""
+    """Returns the result for one publisher's trackers of a frame: `equal` to the shared memory's, `stopped`, or
+    `unknown` to it."""
     if trackers[0].status == 0:
         assert {tracker.status for tracker in trackers} == {0.0}
         assert all(tuple(tracker.speed) == (0, 0, 0) for tracker in trackers), "it stands still"
@@ -129,7 +131,7 @@ def hold_against(trackers, memory, axes, first_id):
 
 
 def chunks(part):
-    """The chunks of a part of a PosiStageNet packet: the number of each, and what is in it."""
+    """Returns the chunks of a part of a PosiStageNet packet: the number and the content of each."""
     at = 0
     while at + 4 <= len(part):
         number, length = struct.unpack_from("<HH", part, at)
@@ -139,7 +141,7 @@ def chunks(part):
 
 
 class Progress:
-    """What has come so far, by the heads alone: to decode whole frames meanwhile would keep the memory waiting."""
+    """Counts so far, by the heads alone: decoding whole frames would delay the thread that reads the memory."""
 
     def __init__(self, memories, axes, first_id, id_step):
         self.memories, self.axes = memories, axes
@@ -168,14 +170,14 @@ class Progress:
 
 
 def head_key(position, axes):
-    """A head's place in a desk's axes, as the shared memory's frames are found by."""
+    """Returns a head's place in a desk's axes, the key of the shared memory's frames."""
     place = dict(zip([axis.strip("-") for axis in axes.split(",")], position))
     sign = {axis.strip("-"): -1 if axis[0] == "-" else 1 for axis in axes.split(",")}
     return np.float32([place["x"] * sign["x"], place["y"] * sign["y"]]).tobytes()
 
 
 def decode_again(folder, packets, frames, names):
-    """The same packets through npm's decoder: the same trackers in every frame."""
+    """Decodes the same packets with npm's decoder: it must find the same trackers in every frame."""
     script = pathlib.Path(__file__).with_name("psn_npm.mjs")
     lines = b"\n".join(map(base64.b64encode, packets)) + b"\n"
     result = subprocess.run(["node", script, folder], input=lines, stdout=subprocess.PIPE, check=True)
@@ -241,7 +243,7 @@ def main():
             begun = None
     assert begun is None, "the last frame is whole"
     ids = [frame_id for frame_id, _ in frames]
-    # npm's decoder takes a frame with the number 0 for one without a number.
+    # npm's decoder reads a frame with the number 0 as a frame without a number.
     assert all(later == sooner % 255 + 1 for sooner, later in zip(ids, ids[1:])), "none is lost"
 
     seen = [{"equal": 0, "unknown": 0, "stopped": 0, "changes": []} for _ in memories]

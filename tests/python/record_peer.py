@@ -1,11 +1,11 @@
-"""Keeps all that an independent subscriber gets, and compares it with recordings of the same show.
+"""Keeps all messages of an independent subscriber, and compares them with recordings of the same show.
 
     record_peer.py subscribe --name NAME --kept FILE
     record_peer.py compare --name NAME --kept FILE --recordings FILE...
 
-`subscribe` prints `ready`, then `frame` at the first frame, and ends when a publisher has come and gone: FILE then holds the
-bytes of every message. `compare` decodes every message of every topic of the recordings with mcap-ros2-support, and the
-same files with rosbags; it prints how many there are by topic, or fails.
+`subscribe` prints `ready`, then `frame` at the first frame, and ends when a publisher has come and gone: FILE then
+holds the bytes of every message. `compare` decodes every message of every topic of the recordings with
+mcap-ros2-support, and the same files with rosbags; it prints their number by topic, or fails.
 """
 
 import argparse
@@ -85,7 +85,7 @@ def subscribe(name, kept):
 
 
 def same(decoded, expected, where):
-    """Every field of a ctypes structure in a decoded message, bit for bit but for what is no number."""
+    """Asserts that a decoded message has every field of a ctypes structure, bit for bit except for NaN."""
     for field, _ in expected._fields_:
         ours, theirs = getattr(expected, field), getattr(decoded, field)
         equal(theirs, ours, f"{where}.{field}")
@@ -114,7 +114,7 @@ def stamped(message, stamp_ns, where):
 
 
 def at(pose, handle, where):
-    """A pose lies where a handle does and turns as it does."""
+    """Asserts that a pose has the place and heading of a handle."""
     position, turn = pose.position, pose.orientation
     assert (position.x, position.y, position.z) == (handle.x, handle.y, 0.0), where
     assert (turn.x, turn.y) == (0.0, 0.0) and turn.w >= 0.0, where
@@ -129,7 +129,7 @@ class Comparison:
             for header, poses in kept["poses"]
         ]
         self.by_stamp = {header.stamp_ns: (header, handles) for header, handles in self.frames}
-        self.seldom = {kind: [of.from_buffer_copy(raw) for raw in kept.get(kind, [])] for kind, of in KINDS.items()}
+        self.events = {kind: [of.from_buffer_copy(raw) for raw in kept.get(kind, [])] for kind, of in KINDS.items()}
         self.seen, self.counts, self.first = defaultdict(list), Counter(), None
 
     def message(self, topic, stamp_ns, sequence, message):
@@ -138,12 +138,12 @@ class Comparison:
         if kind not in KINDS and kind not in ("/diagnostics", "path"):
             self.first = self.first or stamp_ns
             if stamp_ns < self.frames[0][0].stamp_ns:
-                return  # Whoever polls more often has a publisher's first frames.
+                return  # A process that polls more often has a publisher's first frames.
         index = len(self.seen[topic])
         self.seen[topic].append(stamp_ns)
         where = f"{topic} {index}"
         if kind in KINDS:
-            expected = self.seldom[kind][index]
+            expected = self.events[kind][index]
             assert stamp_ns == expected.stamp_ns, where
             stamped(message, stamp_ns, where)
             same(message, expected, where)
@@ -186,14 +186,14 @@ class Comparison:
             assert math.dist((position.x, position.y), middle) < 1e-12, where
 
     def diagnostics(self, message, index, stamp_ns, where):
-        status = self.seldom["status"][index]
+        status = self.events["status"][index]
         assert stamp_ns == status.stamp_ns, where
         stamped(message, stamp_ns, where)
         loop, dragon = message.status
         assert (loop.hardware_id, loop.name, dragon.name) == (self.name, f"{self.name}: loop", f"{self.name}: dragon")
         values = {pair.key: pair.value for pair in loop.values}
         assert int(values["skipped periods"]) == status.skipped, where
-        before = self.seldom["status"][index - 1] if index else None
+        before = self.events["status"][index - 1] if index else None
         # Each run begins without a skip.
         before = before.skipped if before and before.run_id == status.run_id else 0
         # A tenth of a second's periods is an error, by default.
@@ -203,7 +203,7 @@ class Comparison:
         assert values["sim_time (s)"] == f"{status.sim_time:.3f}", where
 
     def path(self, message, index, stamp_ns, where):
-        stage = self.seldom["stage"][index]
+        stage = self.events["stage"][index]
         assert stamp_ns == stage.stamp_ns and len(message.poses) > 100, where
         for pose in message.poses:
             x, y = pose.pose.position.x, pose.pose.position.y
@@ -231,7 +231,7 @@ def compare(name, kept, recordings):
                 comparison.message(channel.topic, raw.publish_time, raw.sequence, message)
             attachments = {attachment.name: json.loads(attachment.data) for attachment in reader.iter_attachments()}
             attached = attachments["bench_dragon.json"]
-            assert attached["name"] == name and attached["stage"]["benches"] == comparison.seldom["stage"][0].benches
+            assert attached["name"] == name and attached["stage"]["benches"] == comparison.events["stage"][0].benches
             assert int(attached["run_id"]) == comparison.frames[0][0].run_id
             assert min(times) >= comparison.first, "a time before all frames"
             sizes.append(len(times))
@@ -241,9 +241,9 @@ def compare(name, kept, recordings):
     for topic, seen in comparison.seen.items():
         kind = topic.removeprefix(f"/{name}/")
         if kind in KINDS:
-            assert len(seen) == len(comparison.seldom[kind]), (topic, len(seen), len(comparison.seldom[kind]))
+            assert len(seen) == len(comparison.events[kind]), (topic, len(seen), len(comparison.events[kind]))
         elif kind == "markers":
-            # They begin with the stage, for which a subscriber may have to wait.
+            # Markers begin with the stage, for which a subscriber may have to wait.
             assert len(seen) > len(stamps) / 2 and seen == stamps[-len(seen) :], f"{len(seen)} of {len(stamps)} markers"
         elif kind not in ("/diagnostics", "path"):
             assert seen == stamps, f"{topic}: {len(seen)} of {len(stamps)} frames"
@@ -252,7 +252,7 @@ def compare(name, kept, recordings):
 
 
 def with_rosbags(recordings, sizes):
-    """Opens the recordings by themselves, reads every message, and compares the definitions of the standard types."""
+    """Opens the recordings alone, reads every message, and compares the definitions of the standard types."""
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 

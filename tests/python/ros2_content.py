@@ -1,9 +1,9 @@
-"""Compares one ROS 2 topic, bit for bit, with the shared memory it goes beside.
+"""Compares one ROS 2 topic, bit for bit, with the shared memory of the same publisher.
 
     ros2_content.py --name NAME --seconds S --topic handles|poses --reliability reliable|best_effort
 
-Reads the raw CDR (decoding it in Python would be slower than the publisher) and prints one JSON line: how many
-messages came, how many sequences are missing between the first and the last, how many were compared and differ.
+Reads the raw CDR (decoding it in Python would be slower than the publisher) and prints one JSON line: the number of
+messages, of sequences missing between the first and the last, of compared messages, and of those that differ.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from ros2_peer import TOPICS, quality
 
-# CDR: 4 bytes that stand for little-endian, then sec, nanosec, and "stage" with its length.
+# CDR: 4 bytes for little-endian, then sec, nanosec, and "stage" with its length.
 STAMP = struct.Struct("<4xiI")
 AFTER_HEADER = 4 + 24
 # run_id to deadline_ns, three numbers, handles to reserved.
@@ -28,15 +28,15 @@ ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 
 
 def of_handles(raw):
-    """Stamp and handles (x, y, heading, vx, vy) of a HandlePoses."""
-    # The frame header; then the length of the sequence, and four bytes so that its numbers are aligned.
+    """Returns stamp and handles (x, y, heading, vx, vy) of a HandlePoses."""
+    # The frame header; then the length of the sequence, and four bytes that align its numbers.
     count = struct.unpack_from("<I", raw, AFTER_HEADER + FRAME_HEADER)[0]
     first = AFTER_HEADER + FRAME_HEADER + 8
     return np.frombuffer(raw, "<f8", 5 * count, first).reshape(count, 5)
 
 
 def of_poses(raw):
-    """Positions of a PoseArray."""
+    """Returns the positions of a PoseArray."""
     count = struct.unpack_from("<I", raw, AFTER_HEADER - 4)[0]
     return np.frombuffer(raw, "<f8", 7 * count, AFTER_HEADER).reshape(count, 7)[:, :2]
 
@@ -52,7 +52,7 @@ def main():
     participant = DomainParticipant(0)
     topic = Topic(participant, f"rt/{arguments.name}/{arguments.topic}", TOPICS[arguments.topic])
     reader = DataReader(participant, topic, qos=quality(arguments.reliability, "volatile"))
-    # Only now: what comes over shared memory before the match has nothing to be compared with.
+    # Only now: earlier messages over shared memory have no counterpart.
     shared = SharedMemory(arguments.name)
     frames = {}
     messages = {}

@@ -2,11 +2,11 @@
 
     ros2_control_peer.py --name NAME [--domain D] [--bare] [--fresh N | --flood N] [SERVICE[=VALUE] ...]
 
-Before each request and response stand the client (uint64) and the number of the call (int64). Prints a JSON line for each
-response, or null where none came within some seconds. With --bare the 16 bytes are left out, as in the mapping of
-rmw_fastrtps_cpp. With --fresh, N clients, each a participant of its own, make their first call to the first service. With
---flood, one client calls the first service N times without waiting for a response. Without a call, prints which topics
-there are below NAME with their types, those of services too, and /clock and /tf.
+Before each request and response come the client (uint64) and the number of the call (int64). Prints a JSON line for
+each response, or null if none came within some seconds. With --bare the 16 bytes are left out, as in the mapping of
+rmw_fastrtps_cpp. With --fresh, N clients, each with its own participant, make their first call to the first service.
+With --flood, one client calls the first service N times without waiting for a response. Without a call, prints the
+topics below NAME with their types, including those of services, and /clock and /tf.
 """
 
 import argparse
@@ -91,7 +91,7 @@ HEADER = [("client", idl.uint64), ("sequence", idl.int64)]
 
 
 def ends(service, bare):
-    """The types of a service's request and response."""
+    """Returns the types of a service's request and response."""
     package, name, request, response = SERVICES[service]
     header = [] if bare else HEADER
     of = lambda direction, fields: struct(f"{package}::srv::dds_::{name}_{direction}_", header + fields)
@@ -99,7 +99,7 @@ def ends(service, bare):
 
 
 def argument(service, text):
-    """The only field of a request."""
+    """Returns the only field of a request."""
     kind = SERVICES[service][2][0][1]
     if kind is State:
         return State(state=int(text))
@@ -153,7 +153,7 @@ class Client:
         while time.monotonic() < end:
             for sample in self.reader.take(N=10):
                 fields = getattr(sample, "__dataclass_fields__", None)
-                # The notice that a publisher has gone comes as a sample that holds nothing.
+                # The notice that a publisher has gone comes as an empty sample.
                 if fields is None:
                     continue
                 if self.bare or (sample.client, sample.sequence) == (self.number, self.sequence):
@@ -163,8 +163,8 @@ class Client:
 
 
 def endpoints(participant, name, topics, seconds):
-    """The topics below a name with their types, by who reads and who writes: once there are so many of them, and half a
-    second later."""
+    """Returns the topics below a name with their types, by readers and writers, half a second after there are at least
+    `topics` of them."""
     found = {"read": {}, "written": {}}
     kinds = [("read", BuiltinTopicDcpsSubscription), ("written", BuiltinTopicDcpsPublication)]
     readers = [(what, BuiltinDataReader(participant, kind)) for what, kind in kinds]
@@ -186,19 +186,19 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--name", required=True)
     parser.add_argument("--domain", type=int, default=0)
-    parser.add_argument("--seconds", type=float, default=20.0, help="that a response may take")
+    parser.add_argument("--seconds", type=float, default=20.0, help="greatest wait for a response")
     parser.add_argument("--bare", action="store_true")
     parser.add_argument("--fresh", type=int, default=0)
     parser.add_argument("--flood", type=int, default=0)
-    parser.add_argument("--topics", type=int, default=1, help="to wait for, where there is no call")
+    parser.add_argument("--topics", type=int, default=1, help="topics to wait for if there is no call")
     parser.add_argument("calls", nargs="*")
     arguments = parser.parse_args()
 
-    # A peer that runs wild is not to take the machine with it.
+    # A peer out of control must not take the machine's memory.
     resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
     if arguments.fresh:
 
-        # None is taken down while others are made.
+        # No client is removed while others are created.
         clients = []
 
         def first_call(_):
@@ -221,7 +221,7 @@ def main():
         for _ in range(arguments.flood):
             client.send("")
         print(json.dumps(client.sequence), flush=True)
-        # Until it is killed: its process does not take what it is sent.
+        # Until it is killed: the process does not read its messages.
         time.sleep(arguments.seconds)
         return
     clients = {}
@@ -230,7 +230,7 @@ def main():
         if service not in clients:
             clients[service] = Client(participant, arguments.name, service, arguments.bare)
             if not clients[service].ready(60):
-                sys.exit(f"nobody serves {service}")
+                sys.exit(f"no server for {service}")
         print(json.dumps({"call": call, "response": clients[service].call(text, arguments.seconds)}), flush=True)
 
 

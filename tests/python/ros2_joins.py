@@ -1,10 +1,10 @@
-"""A ROS 2 user without ROS who looks at the alerts now and then: Cyclone DDS subscribers, one after the other.
+"""A ROS 2 user without ROS who reads the alerts from time to time: Cyclone DDS subscribers, one after the other.
 
     ros2_joins.py --name NAME --joins N [--pause SECONDS] [--beside] [--volatile] [--seed S]
 
-Each joins at a random moment and stays until its first alert, and a little longer. Prints for each a JSON line: when it was
-made, in nanoseconds of CLOCK_REALTIME, and the alerts that it got. With --beside one that stays is there, too. With --volatile
-they do not ask for what was sent before.
+Each joins at a random time and stays until its first alert, and a little longer. Prints for each a JSON line: the time
+of its creation, in nanoseconds of CLOCK_REALTIME, and its alerts. With --beside another subscriber stays all the time.
+With --volatile they do not request earlier messages.
 """
 
 import argparse

@@ -2,8 +2,8 @@
 
     ros2_peer.py --name NAME --seconds S [--topic handles:reliable:volatile] ...
 
-Prints a JSON line for every message of the requested topics and one line at the end. The program's own types are
-read from the .msg files, so that a drift between those and the wire shows.
+Prints a JSON line for every message of the requested topics and one line at the end. The program's own types are read
+from the .msg files, so that a difference between these and the wire is found.
 """
 
 import argparse
@@ -38,7 +38,7 @@ PRIMITIVES = {
 
 
 def message(package, name, fields):
-    """A final IDL struct of the type that ROS 2 calls package/msg/name."""
+    """Returns a final IDL struct of the type that ROS 2 calls package/msg/name."""
 
     def body(namespace):
         namespace["__annotations__"] = dict(fields)
@@ -118,7 +118,7 @@ TFMessage = message("tf2_msgs", "TFMessage", [("transforms", idl.sequence[Transf
 
 
 def from_file(name, known):
-    """The type that a .msg file of this repository defines."""
+    """Returns the type that a .msg file of this repository defines."""
     fields = []
     for line in (MSG / f"{name}.msg").read_text().splitlines():
         line = line.split("#")[0].strip()
@@ -156,7 +156,7 @@ TOPICS = {
 
 
 def plain(value):
-    """The message as JSON can hold it; what is no number is null."""
+    """Returns the message as JSON can hold it; NaN becomes null."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, (list, tuple, bytes)):
@@ -167,7 +167,7 @@ def plain(value):
 
 
 def shortened(kind, sample):
-    """Of a frame only the first three handles and the last, so that the reader keeps up."""
+    """Returns only the first three handles of a frame and the last, so that the reader keeps up."""
     if kind in ("handles", "poses"):
         count = len(sample.poses)
         sample.poses = sample.poses[:3] + sample.poses[-1:]
@@ -204,7 +204,7 @@ def main():
         idle = True
         for wanted, kind, reader in readers:
             for sample in reader.take(N=100):
-                # The notice that a publisher has gone comes as a sample that holds nothing.
+                # The notice that a publisher has gone comes as an empty sample.
                 if not isinstance(sample, TOPICS[kind]):
                     continue
                 idle = False

@@ -1,4 +1,4 @@
-"""Reads the hash of a scene's text out of a publisher's stage, knowing its name, its size and where the hash lies.
+"""Reads the hash of a scene's text from a publisher's stage, knowing its name, its size and the offset of the hash.
 
     scene_hash.py --name NAME --scene FILE
 
@@ -14,7 +14,7 @@ import blake3
 import iceoryx2 as iox2
 from by_design import opaque
 
-# Nine numbers of eight bytes and four of four stand before it.
+# Nine numbers of eight bytes and four of four come before the hash.
 HASH = slice(9 * 8 + 4 * 4, 9 * 8 + 4 * 4 + 32)
 SIZE = HASH.stop + 32 * 64 + 4 * 16 + 32 * 80
 
@@ -34,7 +34,7 @@ def main():
             stages = service.open().subscriber_builder().create()
             break
         except iox2.PublishSubscribeOpenError as error:
-            # Where the disk is busy a service is incomplete for seconds.
+            # If the disk is busy a service is incomplete for seconds.
             if not any(reason in str(error) for reason in ("DoesNotExist", "HangsInCreation")) or time.monotonic() > deadline:
                 raise
             time.sleep(0.02)

@@ -1,9 +1,11 @@
-"""The second publisher of a show's services, as the end of a tunnel to other machines is one: silent, or with a run of its own.
+"""The second publisher of a show's services, such as the end of a tunnel to other machines: silent, or with its own
+run.
 
     second_publisher.py --name NAME
 
-Prints a JSON line once it has all ports, with whether a third publisher was refused, and one for every stage that comes.
-SIGUSR1 has it send frames and alerts of run 7, the next one has it send no more, which it prints; SIGTERM ends it.
+Prints a JSON line once it has all ports, with true if a third publisher was refused, and one for every stage it
+receives. On SIGUSR1 it sends frames and alerts of run 7, on the next one it stops sending, which it prints; SIGTERM
+ends it.
 """
 
 import argparse

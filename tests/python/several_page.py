@@ -2,8 +2,8 @@
 
     several_page.py SCENARIO PROGRAM NAME
 
-Starts its own server and publishers under the service names NAME_a and NAME_b, looks at what the page shows and draws, and
-asks the publishers themselves what they do. Ends with exit code 0, or with what it found instead.
+Starts a server and publishers under the service names NAME_a and NAME_b, tests the words and the picture of the page,
+and reads the state of the publishers themselves. Ends with exit code 0, or with a sentence on the error.
 """
 
 import contextlib
@@ -23,7 +23,7 @@ PROCESSION = ["--scene", "config/procession.toml"]
 STILL_A = ["run", "--quiet", "--json", "--start", "300", "--time-scale", "1e-6"]
 STILL_B = [*PROCESSION, "run", "--quiet", "--json", "--start", "20", "--time-scale", "1e-6"]
 DEFICIENCIES = ("none", "protanopia", "deuteranopia", "tritanopia", "achromatopsia")
-# How far beyond a board the middle of the line around it is, pixels.
+# Distance of the middle of the line around a board from the board's edge, pixels.
 CASING = 2.5
 
 
@@ -48,7 +48,7 @@ def publisher(name, arguments):
 
 
 def places_of(arguments, second):
-    """Where the handles of a scene are, as `solve` has them."""
+    """Returns the places of a scene's handles from `solve`."""
     command = [PROGRAM, *arguments, "solve", "--at", str(second)]
     rows = csv.DictReader(subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines())
     return numpy.array([[float(row["x"]), float(row["y"])] for row in rows])
@@ -56,7 +56,7 @@ def places_of(arguments, second):
 
 def both_drawn(page):
     until(page, "picture.dragons.length === 2 && picture.dragons.every((one) => one.head !== null)", "both dragons")
-    # The camera moves to where both are.
+    # The camera moves until both are in the picture.
     time.sleep(4)
 
 
@@ -65,7 +65,7 @@ def row(page, name):
 
 
 def beside(handles, bench, side, pixel):
-    """A line of places beside a board, so many pixels beyond its edge, without its rounded ends."""
+    """Returns a line of places beside a board, `pixel` pixels beyond its edge, without its rounded ends."""
     front, rear = handles[bench], handles[bench + 1]
     along = (front - rear) / numpy.linalg.norm(front - rear)
     across = numpy.array([-along[1], along[0]])
@@ -76,7 +76,7 @@ def beside(handles, bench, side, pixel):
 def two_on_one_stage():
     handles = {A: truth_at(300.0), B: places_of(PROCESSION, 20)}
     with server() as url, publisher(A, STILL_A), publisher(B, STILL_B), browser(viewport={"width": 1600, "height": 900}) as (page, complaints):
-        # Words would lie on some boards.
+        # Words would cover some boards.
         page.goto(f"{url}#nolabels")
         both_drawn(page)
         pixels, to_pixel, scale = canvas_pixels(page)
@@ -84,7 +84,7 @@ def two_on_one_stage():
         for name, places in handles.items():
             middles = to_pixel((places[:-1] + places[1:]) / 2)
             assert ((middles >= 0) & (middles < [wide, high])).all(), f"{name} is not all in the picture"
-            # Both ends have signs.
+            # Both ends have signs on them.
             missing = [bench for bench, (x, y) in enumerate(middles[1:-1], 1) if not is_board(pixels[y, x])]
             assert not missing, f"{name}: no board is drawn where benches {missing} (from 0) are"
         for name in (A, B):
@@ -116,7 +116,8 @@ SQUARES = """async () => {
 
 
 def told_apart(page, handles):
-    """By their casings: one a whole line, one dashed, both with a contrast of 3 to the ground, for eyes of any kind."""
+    """The casings differ: one is a whole line, one dashed, both with a contrast of 3 to the ground, in every colour
+    vision."""
     vision = page.context.new_cdp_session(page)
     to_pixel = projection(page)
     pixel = 1 / numpy.hypot(*(to_pixel(1, 0) - to_pixel(0, 0)))
@@ -150,7 +151,8 @@ def told_apart(page, handles):
 
 
 def chosen_by_hand(page, handles):
-    """A click on a bench shows that dragon's; so does a row, and Escape gives the figures back."""
+    """A click on a bench shows the figures of that dragon; a click on a row does too, and Escape brings the figures
+    back."""
     to_pixel = projection(page)
     x, y = to_pixel(*((handles[B][0] + handles[B][1]) / 2))
     page.mouse.click(x, y)
@@ -201,7 +203,7 @@ def one_dies_alone():
 
 
 def light(page, handles):
-    """How light the boards of each are, below which no word lies."""
+    """Returns the lightness of the boards of each dragon, where no word lies on them."""
     pixels, to_pixel, _ = canvas_pixels(page)
     mean = {}
     for name, places in handles.items():
@@ -217,7 +219,7 @@ def state(name):
 
 
 def both(playback, what, seconds=30):
-    """Waits until the two publishers are so."""
+    """Waits until the two publishers are in the given state."""
     deadline = time.monotonic() + seconds
     while (now := [state(name)["playback"] for name in (A, B)]) != playback:
         assert time.monotonic() < deadline, f"{what}: {now}, not {playback}"
@@ -251,7 +253,7 @@ def bar_conducts_one_or_all():
         until(page, "document.getElementById('conduct-toggle').textContent === 'Play'", "the button is Play")
         toggle.click()
         both(["playing", "playing"], "all play")
-        # A hold is for all, whoever is chosen.
+        # A hold is for all dragons, independent of the selected one.
         whom.select_option(A)
         hold.click()
         both(["held", "held"], "both are held")
@@ -260,7 +262,7 @@ def bar_conducts_one_or_all():
         until(page, f"document.getElementById('conduct-answer').textContent.startsWith('{A}: Resume is refused')", "whose refusal")
         hold.click()
         both(["paused", "paused"], "both are released")
-        # Beyond the end of one, that one stands at its end.
+        # Beyond the end of one show, that show stays at its end.
         whom.select_option("")
         page.evaluate("(() => { const line = document.getElementById('conduct-seek'); line.value = line.max; line.onchange(); })()")
         longest = page.evaluate("Number(document.getElementById('conduct-seek').max)")
@@ -268,12 +270,12 @@ def bar_conducts_one_or_all():
         while abs(max(now := [state(name)["sim_time"] for name in (A, B)]) - longest) > 1e-6 or min(now) < 100:
             assert time.monotonic() < deadline, f"the end of both: {now}, {longest}"
             time.sleep(0.05)
-        # One is gone: a hold reaches the other, and the bar says where it did not arrive.
+        # One publisher is gone: a hold reaches the other, and the bar names the publisher that it did not reach.
         first.kill()
         until(page, "picture.dragons[0].head === null", "its death")
         hold.click()
         both([None, "held"], "the one that is left is held")
-        until(page, f"document.getElementById('conduct-answer').textContent.includes('{A}: ')", "where the hold did not arrive")
+        until(page, f"document.getElementById('conduct-answer').textContent.includes('{A}: ')", "the name of the publisher without a hold")
         assert not complaints, complaints
 
 

@@ -1,9 +1,9 @@
-"""Reads what a soak test has written, by libraries that know nothing of the program that wrote it.
+"""Reads the files of a soak test, with libraries that are independent of the program.
 
     soak_report.py STEM SCHEMA
 
-Validates STEM.json against the schema, and that the schema refuses the report with each of its objects' fields left out
-in turn, with one more field, and with another name. Adds up the intervals of STEM.hgrm. Prints a JSON line: the fields
+Validates STEM.json against the schema. The schema must refuse the report with each of its objects' fields left out in
+turn, with one more field, and with another name. Adds up the intervals of STEM.hgrm. Prints a JSON line: the fields
 that were left out, and for each tag the intervals, the number of values, and percentiles.
 """
 
@@ -20,7 +20,8 @@ HOUR_NS = 3_600_000_000_000
 
 
 def objects(value, path=()):
-    """Every object of a report but for those whose keys are data, with its path. Of each array the first element."""
+    """Returns every object of a report, except those whose keys are data, with its path; of each array the first
+    element."""
     if isinstance(value, dict):
         if "answers" not in path:
             yield path
@@ -37,7 +38,8 @@ def at(report, path):
 
 
 def value_at(histogram, share):
-    """What at least this share of all values is at most. The library itself rounds the rank to the nearest."""
+    """Returns the value that at least this share of all values does not exceed. The library itself rounds the rank to
+    the nearest."""
     rank = math.ceil(share * histogram.get_total_count())
     for step in histogram.get_recorded_iterator():
         if step.total_count_to_this_value >= rank:

@@ -13,7 +13,7 @@ import numpy
 
 from stage_picture import CONTACT, PROGRAM, browser, drawn, play, publisher, server, until
 
-# How many places the head was drawn at in four seconds, and how many frames came.
+# Number of places of the drawn head in four seconds, and number of frames received.
 PLACES = """() => new Promise((done) => {
     const seen = new Set(), start = performance.now(), before = picture.received;
     const look = () => {
@@ -44,7 +44,7 @@ def motion_is_smooth_at_any_rate():
 
 
 def solved_at(times):
-    """x, y, heading of every handle at each of some times, by the exact solver."""
+    """Returns x, y, heading of every handle at each of some times, by the exact solver."""
     moments = ",".join(repr(time) for time in times)
     command = [PROGRAM, "solve", "--at", moments, "--json"]
     lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout
@@ -54,8 +54,9 @@ def solved_at(times):
 
 
 def between_frames_is_where_the_solver_has_it():
-    """At 10 Hz: single precision is 6.7e-7 m up to 16 m from the centre, straight lines would be 0.14 mm off. At the start of the
-    show, where the bends are widest: there four frames that a busy machine leaves out in a row cost 2.4e-7 m."""
+    """At 10 Hz: single precision is 6.7e-7 m up to 16 m from the centre, straight lines would be 0.14 mm off. The test
+    is at the start of the show, where the bends are widest: there four frames that a busy machine leaves out in a row
+    cost 2.4e-7 m."""
     random = numpy.random.default_rng()
     with server() as url, publisher("--rate", "10"), browser() as (page, complaints):
         page.goto(url)
@@ -66,7 +67,7 @@ def between_frames_is_where_the_solver_has_it():
             time.sleep(random.uniform(0.02, 0.15))
             samples.append(page.evaluate("[picture.shown.time, [...picture.shown.handles]]"))
         assert not complaints, complaints
-    # As shares of a frame's distance: most moments are those of no frame.
+    # As shares of the interval of two frames: most times are between frames.
     shares = [10 * moment % 1 for moment, _ in samples]
     assert sum(0.15 < share < 0.85 for share in shares) >= 10, f"only frames were drawn: {shares}"
     worst, turned = 0.0, 0.0
@@ -92,7 +93,7 @@ PICTURES = """() => new Promise((done) => {
 
 
 def loops_are_not_joined():
-    """Whatever is drawn while the show loops lies on the spiral; between an end and a beginning it would not."""
+    """Every picture drawn while the show loops lies on the spiral; an interpolation between end and start would not."""
     options = ["--start", "411", "--rate", "10", "--loop", "--end-hold", "0"]
     with server() as url, publisher(*options), browser(viewport={"width": 640, "height": 480}) as (page, complaints):
         page.goto(url)
@@ -112,7 +113,7 @@ def loops_are_not_joined():
     assert beside.max() < 1e-3, f"a handle is drawn {beside.max()} m beside the path at {times[beside.max(axis=1).argmax()]} s"
 
 
-# A reader of three handles at (cubic in t, parabola in t), frames a second apart; what it gives at moments in ms.
+# A reader of three handles at (cubic in t, parabola in t), frames a second apart; its results at times in ms.
 READ = """async ([frames, moments]) => {
     const { HermiteReader } = await import("/hermite.js"), reader = new HermiteReader(8);
     const empty = reader.at(0);
@@ -122,7 +123,7 @@ READ = """async ([frames, moments]) => {
 
 
 def interpolation_keeps_its_rules():
-    """Of the module that any page can take, apart from the page."""
+    """Tests the module that any page can use, apart from the page."""
     curves = [(lambda t, k=k: (1 + k + t * (2 - t * (3 - t)), 5 - k + t * (1 + 2 * t))) for k in range(3)]
     rates = lambda t: (2 - 6 * t + 3 * t * t, 1 + 4 * t)
 
@@ -163,7 +164,7 @@ def interpolation_keeps_its_rules():
         for later in (frame(1, epoch=1), frame(1, epoch=1, time=0.5)):
             for moment, handles in at([frame(0), later], 400, 999):
                 assert moment == 0 and numpy.array_equal(handles[:, :2], place(0)), "something lies between two epochs"
-        # Another run's frames are forgotten.
+        # Frames of another run are dropped.
         ((moment, _),) = at([frame(0), frame(1, run="2")], 400)
         assert moment == 1, "a frame of another run is shown"
         assert not complaints, complaints

@@ -2,9 +2,9 @@
 
     stage_picture.py SCENARIO PROGRAM NAME
 
-Starts its own server and publishers under the service name NAME, looks at what the page shows and draws, and compares
-it with the exact positions in tests/truth. Ends with exit code 0, or with what it found instead. The motion between
-two frames is looked at in stage_motion.py.
+Starts a server and publishers under the service name NAME, tests the words and the picture of the page, and compares
+the picture with the exact positions in tests/truth. Ends with exit code 0, or with a sentence on the error.
+stage_motion.py tests the motion between two frames.
 """
 
 import base64
@@ -28,7 +28,7 @@ import chromium
 TRUTH = pathlib.Path(__file__).resolve().parents[1] / "truth" / "paper_scene_exact.csv"
 CONTACT = 412.473837682115
 WIDTH, HEAD_LENGTH, BODY_LENGTH = 0.30, 3.41, 2.20
-# Nothing here may wait for ever; an alarm still lets everything that was started be ended.
+# No wait here may last forever; an alarm still ends everything that was started.
 WATCHDOG = 150
 STILL = ["--start", "300", "--time-scale", "1e-6"]
 
@@ -57,7 +57,7 @@ def server(port=0):
 
 @contextlib.contextmanager
 def browser(**context):
-    """A page of a Chromium of its own, and a list of everything it complains about."""
+    """Returns a page of a separate Chromium, and a list of all its error messages."""
     with chromium.browser() as running:
         yield opened(running, **context)
 
@@ -72,7 +72,7 @@ def opened(running, **context):
 
 
 def until(page, script, what, seconds=30):
-    """The value of a script as soon as it is true."""
+    """Returns the value of a script as soon as it is true."""
     deadline = time.monotonic() + seconds
     while not (value := page.evaluate(script)):
         assert time.monotonic() < deadline, f"{what}: not within {seconds} s; the page shows {words(page)!r}"
@@ -95,7 +95,7 @@ def truth_at(second):
 
 
 def canvas_pixels(page):
-    """The canvas's own pixels, and how places of the stage (metres) become pixels of it."""
+    """Returns the canvas's own pixels, and the function from places of the stage (metres) to its pixels."""
     width, height, data, origin, unit = page.evaluate(
         """() => {
             const canvas = document.getElementById("stage"), {width, height} = canvas;
@@ -112,12 +112,12 @@ def canvas_pixels(page):
 
 
 def is_board(colours):
-    """In the light theme, boards and their marks are the only thing that is not bright."""
+    """In the light theme, only boards and their marks are not bright."""
     return colours.min(axis=-1) < 160
 
 
 def outside_of_board(places, front, rear, length):
-    """The distance from each place to a board whose handles are at `front` and `rear`, 0 inside it."""
+    """Returns the distance from each place to a board whose handles are at `front` and `rear`, 0 inside it."""
     along = (front - rear) / numpy.linalg.norm(front - rear)
     offset = places - (front + rear) / 2
     u = numpy.maximum(numpy.abs(offset @ along) - length / 2, 0)
@@ -126,7 +126,7 @@ def outside_of_board(places, front, rear, length):
 
 
 def outside_of_boards(places, handles):
-    """The distance from each place to the nearest board."""
+    """Returns the distance from each place to the nearest board."""
     lengths = [HEAD_LENGTH] + [BODY_LENGTH] * (len(handles) - 2)
     boards = zip(handles, handles[1:], lengths)
     return numpy.min([outside_of_board(places, *board) for board in boards], axis=0)
@@ -165,7 +165,7 @@ def boards_are_where_the_truth_has_them():
 
 
 def shows_who_it_is(page, handles):
-    """A click on the head's board shows its number, place and speed; so does a number typed."""
+    """A click on the head's board shows its number, place and speed; a typed number does too."""
     x, y = page.evaluate("([x, y]) => picture.toPixel(x, y)", ((handles[0] + handles[1]) / 2).tolist())
     box = page.locator("#stage").bounding_box()
     page.mouse.click(box["x"] + x, box["y"] + y)
@@ -243,7 +243,7 @@ def pinch(page, box):
 
 
 def fits(page):
-    """Nothing is cut off at the side, and the words stay in their boxes."""
+    """Nothing is cut off at the sides, and the words stay in their boxes."""
     cut = page.evaluate(
         """() => [...document.querySelectorAll("body, header, h1, #left, #alert, footer, nav")]
             .filter((one) => one.scrollWidth > one.clientWidth + 1 && getComputedStyle(one).display !== "inline")
@@ -281,7 +281,7 @@ def show_ends_in_contact():
 
 
 def listen(page):
-    """Keeps what a screen reader would announce."""
+    """Keeps the announcements of a screen reader."""
     page.evaluate(
         """() => {
             window.heard = [];
@@ -344,7 +344,7 @@ def publishers_come_and_go():
                 until(page, f"picture.run !== null && picture.run !== '{first}' && picture.time >= 200", "its return")
             assert not complaints, complaints
         until(page, "document.getElementById('state').textContent.includes('server')", "the server's death")
-        # From here on the browser itself reports each vain try to connect.
+        # From here on the browser itself reports each failed connection.
         with server(int(url.rstrip("/").rsplit(":", 1)[1])), publisher("--start", "150"):
             until(page, "picture.head !== null && picture.time >= 150", "the server's return")
 
@@ -372,7 +372,7 @@ def five_at_once():
 
 
 def foreign_pages_are_refused():
-    """A page of another server on this very machine, which no other rule of the browser keeps away."""
+    """A page of another server on the same machine, which no other rule of the browser keeps away."""
     elsewhere = http.server.ThreadingHTTPServer(("127.0.0.1", 0), http.server.BaseHTTPRequestHandler)
     threading.Thread(target=elsewhere.serve_forever, daemon=True).start()
     with server() as url, publisher(*STILL), browser() as (page, _):
@@ -390,7 +390,7 @@ def foreign_pages_are_refused():
 
 
 def play(*scenarios):
-    """Runs the one that was named on the command line."""
+    """Runs the scenario that was named on the command line."""
     signal.signal(signal.SIGALRM, lambda *_: sys.exit(f"{SCENARIO} took more than {WATCHDOG} s"))
     signal.alarm(WATCHDOG)
     {scenario.__name__: scenario for scenario in scenarios}[SCENARIO]()

@@ -1,4 +1,4 @@
-"""The stage picture where it is put: in a kiosk, in another page's frame, on small screens, in forced colours, before a
+"""The stage picture in its places: in a kiosk, in another page's frame, on small screens, in forced colours, before a
 show that ended long ago, and with 5,000 benches. Same browser and arguments as stage_picture.py.
 
     stage_places.py SCENARIO PROGRAM NAME
@@ -18,9 +18,9 @@ import chromium
 from stage_picture import BODY_LENGTH, HEAD_LENGTH, browser, drawn, opened, play, publisher, server, started, until, words
 from stage_show import at, luminance, projection, shot, spread
 
-# Before the contact, at a hundredth of the speed: little changes while it is looked at.
+# Before the contact, at a hundredth of the speed: little changes during the test.
 APPROACH = ["--start", "410", "--time-scale", "0.01"]
-# What is needed at a glance, and is cut off by the window, by a scrolling panel or by the buttons at its foot.
+# Important elements that are cut off by the window, by a scrolling panel or by the buttons at its foot.
 CUT = """() => {
     const nav = document.querySelector("nav").getBoundingClientRect();
     const place = (one) => [one, one.getBoundingClientRect()];
@@ -38,7 +38,7 @@ def approaching(page, url, address=""):
 
 
 def undimmed(page):
-    """A picture that was dimmed while nothing came takes a moment to be itself again."""
+    """Waits for a picture that was dimmed while no frames came: it takes a moment to be bright again."""
     until(page, "picture.drawn > 0 && getComputedStyle(document.getElementById('stage')).opacity === '1'", "a picture that is not dimmed", 120)
 
 
@@ -66,7 +66,7 @@ def nothing_needed_is_cut_off():
 
 
 def another_page(html):
-    """The address of a page that another server of this machine serves."""
+    """Returns the address of a page that another server of this machine serves."""
     class Page(http.server.BaseHTTPRequestHandler):
         def do_GET(self):
             self.send_response(200)
@@ -85,13 +85,13 @@ def another_page(html):
 def bar_speaks_chinese(page):
     texts = page.evaluate("[...document.querySelectorAll('#conduct, #conduct *')].flatMap((one) => [one.title, one.getAttribute('aria-label') ?? '']).join() + document.getElementById('conduct').innerText")
     assert "暂停" in texts and "从头开始" in texts and "碰撞" in texts and not re.search("[A-Za-z]{2,}", texts), texts
-    # A refused command: what is not paused takes no step.
+    # A refused command: a show that is not paused accepts no step.
     page.click("#conduct-step")
     until(page, "document.getElementById('conduct-answer').textContent === '单步被拒绝：演出播放中。'", "a refusal in Chinese")
 
 
 def kiosk_shows_no_buttons():
-    """As `chromium --kiosk` shows it: in a window of its own, not in full screen by the button."""
+    """As `chromium --kiosk` shows it: in a separate window, not in full screen by the button."""
     with server() as url, started("view", "--json", "--port", "0", "--control") as conducted, publisher(*APPROACH), tempfile.TemporaryDirectory() as profile:
         conduct = re.search(r"http://[^\"]+", conducted.stdout.readline()).group()
         with chromium.browsers() as browsers:
@@ -114,7 +114,7 @@ def forced_colours_keep_their_meaning():
         for name in ("#meter", "#legend"):
             colours = {tuple(colour) for colour in cut(name).reshape(-1, 4)}
             assert len(colours) > 2, f"{name} has the colours {colours}"
-        # The number below does not lie on the words above it: their letters reach from top to bottom.
+        # The number does not lie on the words above it: their letters reach from top to bottom.
         ink = luminance(cut("#until")) < 0.3
         rows = numpy.flatnonzero(ink.any(axis=1))
         assert rows[-1] - rows[0] > 0.5 * len(ink), f"of {len(ink)} rows of 'Contact in' {rows} have ink"
@@ -122,7 +122,7 @@ def forced_colours_keep_their_meaning():
 
 
 def frozen_before_it_was_seen():
-    """The speeds before the contact cannot be known: head, body and tail have colours of their own, and words say so."""
+    """The speeds before the contact are unknown: head, body and tail have their own colours, and words name them."""
     with server() as url, publisher("--start", "412.5"), browser(viewport={"width": 1280, "height": 800}) as (page, complaints):
         until_frozen = "picture.drawn > 0 && document.body.dataset.level === 'contact' && document.getElementById('speeds').textContent === 'at rest'"
         page.goto(url)
@@ -131,7 +131,7 @@ def frozen_before_it_was_seen():
         until(page, "document.getElementById('scale').innerText.replaceAll(/\\s+/g, ' ').trim() === 'tail body head'", "words for the colours")
         pixels, to_pixel = shot(page)[..., :3].astype(int), projection(page)
         handles = numpy.array(page.evaluate("[...picture.shown.handles]")).reshape(-1, 5)[:, :2]
-        # Beside the middles, where the signs of head and tail are not.
+        # Beside the middles, away from the signs of head and tail.
         colour = lambda bench, share: pixels[tuple(to_pixel(*(handles[bench] + share * (handles[bench + 1] - handles[bench]))).astype(int)[::-1])]
         head, body, tail = colour(0, 0.66), colour(100, 0.5), colour(222, 0.3)
         for one in (head, body, tail):
@@ -160,7 +160,7 @@ def long_scene():
 
 
 def five_thousand_boards_are_drawn():
-    """Each where a chain on the spiral, computed here, has it; nothing between the turns."""
+    """Each board is on a chain on the spiral that is computed here; the space between the turns is empty."""
     middles, links = chain(100.0)
     with long_scene() as scene, server() as url, publisher("--scene", scene, "--start", "100", "--time-scale", "1e-6", "--rate", "5"), browser(viewport={"width": 1920, "height": 1080}) as (page, complaints):
         for address in ("", "show,nolabels"):
@@ -169,7 +169,8 @@ def five_thousand_boards_are_drawn():
             undimmed(page)
             pixels, to_pixel = shot(page), projection(page)
             ground = luminance(pixels[3, -3])
-            # A quarter of a link from the handles, where no lantern is. A turn is some five pixels wide: the neighbours count.
+            # A quarter of a link from the handles, away from the lanterns. A turn is some five pixels wide: the
+            # neighbours count.
             board = numpy.array([to_pixel(*(middle + share * link)) for share in (-0.25, 0.25) for middle, link in zip(middles, links)])
             radius = numpy.hypot(*middles.T)
             gaps = numpy.array([to_pixel(*(middle * (1 + 0.275 / r))) for middle, r in zip(middles, radius)])
@@ -181,7 +182,8 @@ def five_thousand_boards_are_drawn():
 
 
 def chain(seconds, benches=5000, pitch=0.55, turns=60):
-    """Middles and links of the boards of config/long.toml: the head `seconds` metres further in, each handle behind by bisection."""
+    """Returns middles and links of the boards of config/long.toml: the head `seconds` metres further in, each handle
+    behind by bisection."""
     a = pitch / (2 * math.pi)
     length = lambda theta: a / 2 * (theta * math.sqrt(1 + theta * theta) + math.asinh(theta))
     place = lambda theta: numpy.array([a * theta * math.cos(theta), a * theta * math.sin(theta)])

@@ -1,5 +1,5 @@
-"""What the stage picture says is proved: of the very scene that a certificate is of, and of no other. Same browser and
-arguments as stage_picture.py.
+"""The proved results in the stage picture: only those of the scene with the certificate. Same browser and arguments as
+stage_picture.py.
 
     stage_proofs.py SCENARIO PROGRAM NAME
 """
@@ -19,7 +19,7 @@ from stage_places import CUT, approaching
 
 CONFIG = pathlib.Path(__file__).resolve().parents[2] / "config"
 PROVED = "[...document.querySelectorAll(':is(#proofs, #beyond):not([hidden]) li')].filter((one) => one.checkVisibility()).map((one) => one.textContent)"
-# How many lines are said to be proved at every picture, with the run that it is of: once in a row.
+# Number of proved lines at every picture, with the run of the picture; each change once.
 WATCH = """() => {
     window.said = [];
     const look = () => {
@@ -49,7 +49,7 @@ class Scenes:
         return started("--scene", str(scene), "run", "--quiet", "--json", *arguments)
 
     def before_contact(self):
-        """A while before the contact, slowly."""
+        """A time before the contact, played slowly."""
         return ["--start", str(self.results["contact"]["time_lo"] - 3), "--time-scale", "0.01"]
 
 
@@ -75,7 +75,7 @@ class View:
             time.sleep(0.05)
 
     def checked(self):
-        """The verdict on its certificate, once it is there."""
+        """Returns the verdict on its certificate, once it exists."""
         found = lambda: [line for line in map(json.loads, self.printed) if line["type"] == "certificate"]
         self.until(lambda _: found(), "a verdict")
         return found()[0]
@@ -103,12 +103,12 @@ def nanoseconds(seconds, rounding):
 
 
 def between(result):
-    """The interval of a result in whole nanoseconds, rounded outward from the exact value of the doubles."""
+    """Returns the interval of a result in whole nanoseconds, rounded outward from the exact value of the doubles."""
     return nanoseconds(result["time_lo"], decimal.ROUND_FLOOR), nanoseconds(result["time_hi"], decimal.ROUND_CEILING)
 
 
 def kept_from(page, what):
-    """A picture is drawn, its stage is there, and nothing is said to be proved, now or in the next second."""
+    """Asserts that a picture is drawn, its stage is there, and no proved result is shown, now or in the next second."""
     drawn(page)
     for _ in range(20):
         assert page.evaluate(PROVED) == [], f"{what}: {page.evaluate(PROVED)}"
@@ -117,9 +117,9 @@ def kept_from(page, what):
 
 
 def checked_while_it_is_seen():
-    """The page is there before the certificate has been checked: it gets the result without being loaded again."""
+    """The page is loaded before the certificate has been checked: it gets the result without being loaded again."""
     with scenes() as given, browser() as (page, complaints):
-        # The rest of the certificate comes when the page has been seen.
+        # The rest of the certificate comes after the page has been loaded.
         pipe = given.folder / "pipe.jsonl"
         subprocess.run(["mkfifo", pipe], check=True)
         lines, seen = given.certificate.read_text(encoding="utf-8").splitlines(keepends=True), threading.Event()
@@ -152,7 +152,7 @@ def checked_while_it_is_seen():
                     assert result["status"] == "none" and "proved, none" in line, f"{line}: {result}"
             assert page.get_by_role("list", name="Proved by a certificate").count() == 2
             until(page, "document.getElementById('conduct-events').textContent.includes(', proved')", "the mark on the time line")
-            # One who comes later is told at once, in Chinese.
+            # A later page gets the results at once, in Chinese.
             later, _ = opened(page.context.browser)
             later.goto(f"{shown.url}#lang=zh")
             said = until(later, PROVED, "what is proved, in Chinese")
@@ -167,7 +167,7 @@ def checked_while_it_is_seen():
 
 
 def nothing_of_another_scene():
-    """A letter of a comment is another scene; a certificate with a changed number proves nothing."""
+    """A letter of a comment makes another scene; a certificate with a changed number proves nothing."""
     with scenes() as given, browser() as (page, complaints):
         with view("--certificate", str(given.certificate)) as shown, given.publisher(given.other, *given.before_contact()):
             page.goto(shown.url)
@@ -176,7 +176,7 @@ def nothing_of_another_scene():
             shown.until(lambda it: it.warnings(), "that the certificate is of another scene")
             time.sleep(1.5)
             assert len(shown.warnings()) == 1 and "another text" in shown.warnings()[0], shown.logged
-            # A page that stays reports each vain try to reach a server that has ended.
+            # An open page reports each failed connection to a server that has ended.
             page.goto("about:blank")
         lines = given.certificate.read_text(encoding="utf-8").splitlines(keepends=True)
         at = next(at for at, line in enumerate(lines) if json.loads(line)["type"] == "contact")
@@ -190,7 +190,7 @@ def nothing_of_another_scene():
             verdict = shown.checked()
             assert verdict["verdict"] == "refused" and f"line {at + 1}: it does not follow" in verdict["problem"], verdict
             kept_from(page, "a certificate with a changed number")
-            # The two outputs are read by a thread each.
+            # A separate thread reads each of the two outputs.
             shown.until(lambda it: it.errors(), "the log's line on it")
             errors = shown.errors()
             assert len(errors) == 1 and f"line {at + 1}: it does not follow" in errors[0], shown.logged
@@ -198,7 +198,7 @@ def nothing_of_another_scene():
 
 
 def gone_with_its_scene():
-    """A publisher that is started again under its name with another scene; and again with the first."""
+    """A publisher that is started again under its name with another scene, and again with the first."""
     with scenes() as given, browser() as (page, complaints), view("--certificate", str(given.certificate)) as shown:
         page.goto(shown.url)
         page.evaluate(WATCH)
@@ -223,7 +223,7 @@ def gone_with_its_scene():
 
 
 def one_of_two_is_proved():
-    """Of several dragons, the one whose scene it is."""
+    """Of several dragons, only the one with the certified scene has proved results."""
     with scenes() as given, browser() as (page, complaints):
         jade = f"{NAME}_jade"
         child = [PROGRAM, "--name", jade, "--scene", str(given.other), "run", "--quiet", "--json", *given.before_contact()]
@@ -248,7 +248,8 @@ def one_of_two_is_proved():
 
 
 def seen_where_there_is_little_room():
-    """The line of what can come in the show is seen at every size, with and without the transport bar, and nothing else goes."""
+    """The line of possible events of the show is visible at every size, with and without the transport bar, and no
+    other element is lost."""
     cut = CUT.replace("#time,", "#time, #proofs, #proofs li,").replace(".figure, #time", ".figure, #time, #proofs")
     assert cut.count("#proofs") == 3
     with scenes() as given, browser() as (page, complaints), given.publisher(given.own, *given.before_contact()):
@@ -262,7 +263,7 @@ def seen_where_there_is_little_room():
                     wide = page.evaluate("[...document.querySelectorAll('#proofs, #beyond, #proofs li, #beyond li, footer')].filter((one) => one.scrollWidth > one.clientWidth + 1).map((one) => one.id || one.tagName)")
                     assert not wide, f"{width} x {height}, {language}: {wide} overflow"
                     stage = page.locator("#stage").bounding_box()
-                    # On the smallest of them the transport bar has taken that much before.
+                    # On the smallest size the transport bar had already taken that much.
                     assert width == 360 or stage["width"] * stage["height"] > 0.3 * width * height, f"{width} x {height}: the picture has {stage}"
         assert not complaints, complaints
 

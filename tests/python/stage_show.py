@@ -1,5 +1,5 @@
 """The stage picture on a stage, in the same browser and with the same arguments as stage_picture.py: the words after #,
-what is coming and where, what stays when a publisher dies, colours, contrast, languages.
+the coming event and its place, the picture after a publisher's death, colours, contrast, languages.
 
     stage_show.py SCENARIO PROGRAM NAME
 """
@@ -18,9 +18,9 @@ import numpy
 from stage_picture import BODY_LENGTH, HEAD_LENGTH, PROGRAM, STILL, WIDTH, browser, drawn, opened, play, publisher, server, truth_at, until, words
 
 SIZES = [(1280, 800), (3840, 2160), (390, 844)]
-# Where the paper's contact is, and when, by the reference of 38 digits.
+# Place and time of the paper's contact, by the reference of 38 digits.
 PLACE, CONTACT = (1.474, 2.111), 412.473837682115
-# A picture of what the browser shows, as it shows it: (height, width, 4).
+# The browser's picture, as it is shown: (height, width, 4).
 DECODE = """async (png) => {
     const bytes = Uint8Array.from(atob(png), (letter) => letter.charCodeAt(0));
     const image = await createImageBitmap(new Blob([bytes], {type: "image/png"}), {premultiplyAlpha: "none"});
@@ -31,7 +31,7 @@ DECODE = """async (png) => {
     for (let k = 0; k < data.length; k += 8192) text += String.fromCharCode(...data.subarray(k, k + 8192));
     return [image.width, image.height, btoa(text)];
 }"""
-# Everything that is painted beside the picture: elements with a place of their own that can be seen.
+# Everything that is painted beside the picture: visible elements with their own place.
 SEEN = """[...document.body.querySelectorAll("*")].filter((one) => !one.matches("main, canvas") && one.checkVisibility({opacityProperty: true, visibilityProperty: true})
     && one.getClientRects().length && !one.matches(".unseen")).map((one) => one.id || one.tagName)"""
 
@@ -42,7 +42,7 @@ def shot(page, **how):
 
 
 def luminance(colours):
-    """Relative luminance, WCAG 2."""
+    """Returns the relative luminance, WCAG 2."""
     part = numpy.asarray(colours)[..., :3] / 255
     linear = numpy.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
     return linear @ [0.2126, 0.7152, 0.0722]
@@ -54,14 +54,14 @@ def contrast(one, other):
 
 
 def spread(pixels):
-    """The contrast between the lightest and the darkest colour that more than a stray pixel has."""
+    """Returns the contrast between the lightest and the darkest colour that more than a stray pixel has."""
     light = numpy.sort(luminance(pixels).ravel())
     few = max(2, len(light) // 200)
     return (light[-few] + 0.05) / (light[few - 1] + 0.05)
 
 
 def projection(page):
-    """From places of the stage to pixels of the screen, as the camera stands now."""
+    """Returns the function from places of the stage to pixels of the screen, with the present camera."""
     origin, right, up = map(numpy.array, page.evaluate("[picture.toPixel(0, 0), picture.toPixel(1, 0), picture.toPixel(0, 1)]"))
     box = page.locator("#stage").bounding_box()
     corner = numpy.array([box["x"], box["y"]])
@@ -83,12 +83,12 @@ def show_paints_nothing_but_the_picture():
             page.locator("#stage").focus()
             page.keyboard.press("Tab")
             page.keyboard.press("Shift+Tab")
-            # A browser that falls behind says for a moment that nothing comes.
+            # A browser that falls behind reports for a moment that no frames come.
             until(page, f"({SEEN}).length === 0", f"{width} x {height}: nothing but the picture")
             box = page.locator("#stage").bounding_box()
             assert (box["x"], box["y"], box["width"], box["height"]) == (0, 0, width, height), box
             pixels = shot(page)
-            # Nothing but the night, and a thin line of the path, along every edge: no panel, no frame.
+            # Only the night, and a thin line of the path, are along every edge: no panel, no frame.
             for edge in (pixels[:6], pixels[-6:], pixels[:, :6], pixels[:, -6:]):
                 assert luminance(edge).max() < 0.04, f"{width} x {height}: something is painted along an edge"
             for bench in (3, 100, 221):
@@ -98,7 +98,7 @@ def show_paints_nothing_but_the_picture():
         page.goto("about:blank")
         page.goto(f"{url}#show,transparent,nolabels")
         drawn(page)
-        # What was dimmed before the first frame takes a moment to be whole.
+        # A picture that was dimmed before the first frame takes a moment to be bright.
         until(page, "getComputedStyle(document.getElementById('stage')).opacity === '1'", "a picture that is not dimmed")
         pixels, (x, y) = shot(page, omit_background=True), at(page, *((handles[100] + handles[101]) / 2)).astype(int)
         assert (pixels[[2, 2, -3, -3], [2, -3, 2, -3], 3] == 0).all(), "a transparent picture has a ground"
@@ -131,7 +131,7 @@ def fixed_views(page, url, handles):
 
 
 def what_is_coming_is_named_and_seen():
-    # A quarter as fast as in life, so that a slow machine has time to look.
+    # A quarter of the real speed, so that a slow machine has time to test.
     with server() as url, publisher("--start", "406.5", "--time-scale", "0.25") as child, browser(viewport={"width": 1280, "height": 800}) as (page, complaints):
         dark, chinese = (opened(page.context.browser, viewport={"width": 1280, "height": 800}) for _ in range(2))
         for (one, _), address in [((page, complaints), "light"), (dark, "dark"), (chinese, "lang=zh")]:
@@ -161,14 +161,14 @@ def what_is_coming_is_named_and_seen():
 
 
 def rings_what_comes(page, danger):
-    """A dashed ring of 19 pixels around the place of the coming contact, with a cross, and words beside it."""
+    """A dashed ring of 19 pixels is around the place of the coming contact, with a cross, and words beside it."""
     pixels, (x, y) = shot(page), at(page, *PLACE)
     is_danger = lambda px, py: (numpy.abs(pixels[round(py) - 1 : round(py) + 2, round(px) - 1 : round(px) + 2, :3].astype(int) - danger).max(axis=-1) < 40).any()
     around = [is_danger(x + 19 * math.cos(a), y + 19 * math.sin(a)) for a in numpy.linspace(0, 2 * math.pi, 72)]
     assert 0.4 < numpy.mean(around), f"{100 * numpy.mean(around):.0f} % of a ring around {PLACE}"
     for dx, dy in [(1, 0), (-1, 0), (0, 1), (0, -1)]:
         assert is_danger(x + 23 * dx, y + 23 * dy), f"no cross around {PLACE}, towards {dx, dy}"
-        # Around the arm: its colour where it is purest, pixels being smoothed, against its edge.
+        # Around the arm: its purest colour, since pixels are smoothed, against its edge.
         patch = [pixels[round(y + out * dy + k * dx), round(x + out * dx + k * dy)] for out in (21, 22, 23) for k in range(-4, 5)]
         core = min(patch, key=lambda one: numpy.abs(one[:3].astype(int) - danger).max())
         assert max(contrast(core, one) for one in patch) >= 3, f"the cross towards {dx, dy}: {core} in {patch}"
@@ -211,7 +211,7 @@ def signs_have_contrast(page):
 
 
 def outline_has_contrast(to_pixel, pixels, handles, bench, what):
-    """Across the long sides of a board, somewhere along each, the outline has a light and a dark line."""
+    """Somewhere along each long side of a board, the outline has a light and a dark line."""
     along = (handles[bench] - handles[bench + 1]) / numpy.linalg.norm(handles[bench] - handles[bench + 1])
     across, middle = numpy.array([-along[1], along[0]]), (handles[bench] + handles[bench + 1]) / 2
     pixel = 1 / numpy.hypot(*(to_pixel(1, 0) - to_pixel(0, 0)))
@@ -224,7 +224,7 @@ def outline_has_contrast(to_pixel, pixels, handles, bench, what):
 
 
 def speaks_chinese(page):
-    """All of it; the transport bar is looked at in stage_places.py."""
+    """All words are Chinese; stage_places.py tests the transport bar."""
     assert page.evaluate("document.documentElement.lang") == "zh-Hans"
     assert "第 9 节板凳" in page.get_by_role("alert").inner_text() and "(1.474, 2.111) m" in page.get_by_role("alert").inner_text().replace("\xa0", " "), words(page)
     page.keyboard.press("?")
@@ -252,7 +252,7 @@ def the_last_picture_stays():
             stays(before, shot(page), places)
             until(show, "document.getElementById('notice').checkVisibility()", "words on the picture alone")
             until(show, "getComputedStyle(document.getElementById('stage')).opacity === '0.4'", "a dimmed show")
-            # The notice lies below.
+            # The notice is below this part.
             now, then = (luminance(pixels[:450]).std() for pixels in (shot(show), before_show))
             assert 0.1 * then < now < 0.6 * then, f"the lights of the show spread over {now}, after {then}"
             assert not complaints, complaints
@@ -263,8 +263,8 @@ def the_last_picture_stays():
 
 
 def stays(before, after, places):
-    """Boards are where they were, less dark than they were on the light ground, and still to be told from it."""
-    # The notice lies on some.
+    """Boards are where they were, less dark than before on the light ground, and still distinct from it."""
+    # The notice covers some boards.
     places = places[places[:, 1] < 480]
     ground = luminance(after[5, -5])
     then, now = (luminance(pixels[places[:, 1], places[:, 0]]) for pixels in (before, after))
@@ -274,7 +274,7 @@ def stays(before, after, places):
 
 def colours_mean_the_same_all_along():
     """A turnaround, through its turn, where a handle reaches 1.6 times the head's speed, and to its end: one scale of
-    colours; and its end is counted down to."""
+    colours, and a countdown to its end."""
     scene = "config/turnaround.toml"
     rows = subprocess.run([PROGRAM, "events", "--scene", scene, "--json"], capture_output=True, text=True, check=True).stdout.splitlines()
     end = next(event["time"] for event in map(json.loads, rows) if event["event"] == "path_end")
@@ -303,14 +303,14 @@ def colours_mean_the_same_all_along():
 
 
 def colourful(page):
-    """How far the colours of the picture are from grey, on the hundredth pixel from the top."""
+    """Returns the distance of the picture's colours from grey, on the hundredth pixel from the top."""
     box = page.locator("#stage").bounding_box()
     pixels = shot(page)[:, int(box["x"]) :, :3].astype(int)
     return numpy.percentile(pixels.max(axis=-1) - pixels.min(axis=-1), 99)
 
 
 def nothing_is_complained_about():
-    """Through loops, themes, views and sound; ten minutes with BENCH_DRAGON_LONG=1."""
+    """No error messages through loops, themes, views and sound; ten minutes with BENCH_DRAGON_LONG=1."""
     seconds = 600 if os.environ.get("BENCH_DRAGON_LONG") == "1" else 6
     signal.alarm(seconds + 120)
     with server() as url, publisher("--start", "408.5", "--loop"), browser(viewport={"width": 640, "height": 480}) as (page, complaints):
@@ -337,7 +337,7 @@ def nothing_is_complained_about():
 
 
 def heap(page):
-    """Megabytes that JavaScript holds, once what nobody needs is gone."""
+    """Returns the megabytes that JavaScript holds after garbage collection."""
     session = page.context.new_cdp_session(page)
     session.send("HeapProfiler.collectGarbage")
     used = session.send("Runtime.getHeapUsage")["usedSize"]

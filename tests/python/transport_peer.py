@@ -1,10 +1,10 @@
-"""A subscriber of either transport, which prints what it gets in one form, whatever the transport.
+"""A subscriber of either transport, which prints its messages in one form, whatever the transport.
 
     transport_peer.py --transport iceoryx2|ros2 --name NAME --seconds S
 
-Prints a JSON line for every frame, alert, stage and status, in the order in which it takes them, and one at the end.
-It may be started before the publisher, and stays while publishers come and go; after SIGTERM, until the last of them has
-gone and all that it sent is taken.
+Prints a JSON line for every frame, alert, stage and status, in the order of reading, and one at the end. It may be
+started before the publisher, and stays while publishers come and go. After SIGTERM it stays until the last of them has
+gone and all its messages are read.
 """
 
 import argparse
@@ -48,7 +48,7 @@ class Iceoryx2:
                 self.services[kind] = (builder.user_header(header) if header else builder).open()
                 self.ports[kind] = self.services[kind].subscriber_builder().create()
             except iox2.PublishSubscribeOpenError:
-                pass  # Not there yet.
+                pass  # The service does not exist yet.
 
     def take(self):
         self.open()
@@ -118,7 +118,7 @@ def main():
     end = time.monotonic() + arguments.seconds
     over = False
     while not over:
-        # Looked at before what is left is taken.
+        # Tested before the remaining messages are read.
         over = time.monotonic() >= end or (bool(told) and peer.publishers() == 0)
         for kind, message, handles, count in peer.take():
             line = {"type": kind} | {field: getattr(message, field) for field in FIELDS[kind]}

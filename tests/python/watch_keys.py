@@ -1,9 +1,9 @@
-"""The keys of `watch`: in a pseudo-terminal, with a publisher that has to obey.
+"""The keys of `watch`: in a pseudo-terminal, with a publisher that executes their commands.
 
     watch_keys.py SCENARIO PROGRAM NAME SCENE
 
-Starts its own publisher of SCENE under the service name NAME, and asks it how it stands with `control state`. Ends with
-exit code 0, or with what it found instead.
+Starts a publisher of SCENE under the service name NAME, and reads its state with `control state`. Ends with exit code
+0, or with a sentence on the error.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ import termios
 import threading
 import time
 
-# Nothing here may wait for ever; an alarm still lets everything that was started be ended.
+# No wait here may last forever; an alarm still ends everything that was started.
 WATCHDOG = 200
 LEFT, RIGHT = "\x1b[D", "\x1b[C"
 
@@ -39,7 +39,7 @@ def publisher(*arguments):
 
 
 def state():
-    """How the show stands, or None while nobody publishes."""
+    """Returns the state of the show, or None if no publisher runs."""
     asked = subprocess.run([PROGRAM, "--name", NAME, "--json", "control", "state"], capture_output=True)
     return json.loads(asked.stdout) if asked.returncode == 0 else None
 
@@ -53,7 +53,7 @@ def until(condition, what, seconds=60):
 
 
 class Watch:
-    """The monitor in a terminal of its own, of which it is the foreground."""
+    """The monitor in a separate terminal, in its foreground."""
 
     def __init__(self):
         self.output = b""
@@ -61,7 +61,7 @@ class Watch:
         if self.child == 0:
             os.execv(PROGRAM, [PROGRAM, "--name", NAME, "watch"])
         fcntl.ioctl(self.master, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
-        # A terminal whose output nobody reads stops who writes to it.
+        # A terminal whose output is not read blocks the processes that write to it.
         self.reader = threading.Thread(target=self.read, daemon=True)
         self.reader.start()
         self.shows("? lists the keys")
@@ -77,7 +77,7 @@ class Watch:
         os.close(self.master)
 
     def read(self):
-        # At its end a terminal has no output but an error.
+        # At its end a terminal returns an error instead of output.
         with contextlib.suppress(OSError):
             while printed := os.read(self.master, 65536):
                 self.output += printed
@@ -108,10 +108,10 @@ def keys_conduct():
         assert state()["playback"] == "paused", "nothing is sent without a key"
         watch.press("?")
         watch.shows("Keys: space pauses and resumes")
-        # The start waits: space goes on from there too.
+        # The start waits: space continues from there too.
         watch.press(" ")
         until(lambda: state()["playback"] == "playing", "space resumes")
-        # The rate is that of the frames.
+        # The rate is the rate of the frames.
         until(lambda: state()["sim_time"] > 101, "the show plays")
         watch.press("]]")
         until(lambda: state()["time_scale"] == 4.0, "] twice makes 4 of 1")
@@ -131,7 +131,7 @@ def keys_conduct():
         watch.shows("resume is refused: the show is held")
         watch.press("r")
         until(lambda: state()["playback"] == "paused", "r releases")
-        # Escape by hand is no beginning of a sequence: the two keys behind it count.
+        # Escape by hand does not begin a sequence: the two keys after it count.
         watch.press("\x1b")
         time.sleep(0.5)
         watch.press("[")
@@ -152,7 +152,7 @@ def keys_conduct():
 
 
 def terminal_is_restored():
-    # Nobody publishes: a command is one sentence, and every way out gives the terminal back.
+    # No publisher runs: a command prints one sentence, and every exit restores the terminal.
     with Watch() as watch:
         until(watch.reads_keys, "keys are read")
         watch.press("h")
@@ -169,7 +169,7 @@ def terminal_is_restored():
     with Watch() as watch:
         until(watch.reads_keys, "keys are read")
         watch.press("\x1a")
-        # Its session has no shell: the stop is seen by its parent, as a shell would.
+        # Its session has no shell: its parent sees the stop, as a shell would.
         done, status = os.waitpid(watch.child, os.WUNTRACED)
         assert done and os.WIFSTOPPED(status), "Ctrl-Z stops it"
         assert not watch.reads_keys(), "a stopped program leaves the terminal as it was"
@@ -192,8 +192,8 @@ def terminal_is_restored():
 
 
 def foreground_later():
-    # A shell starts it in the background, with the terminal's keys its own, and brings it to the front by fg, which sends no
-    # signal to a program that runs.
+    # A shell starts it in the background, while the shell owns the terminal's keys. fg brings it to the front, and
+    # sends no signal to a running program.
     with publisher("--start", "100", "--paused"):
         child, master = pty.fork()
         if child == 0:
@@ -217,7 +217,7 @@ def foreground_later():
         os.write(master, b"q")
 
         def ended():
-            # The monitor may have read it instead.
+            # The monitor may have read the line instead.
             os.write(master, b"exit\n")
             time.sleep(0.2)
             return os.waitpid(child, os.WNOHANG)[0]

@@ -2,7 +2,7 @@
 
     watch_terminal.py SCENARIO PROGRAM NAME
 
-Starts its own publisher under the service name NAME. Ends with exit code 0, or with what it found instead.
+Starts a publisher under the service name NAME. Ends with exit code 0, or with a sentence on the error.
 """
 
 import contextlib
@@ -19,10 +19,10 @@ import time
 
 import pyte
 
-# Nothing here may wait for ever; an alarm still lets everything that was started be ended.
+# No wait here may last forever; an alarm still ends everything that was started.
 WATCHDOG = 90
 ROWS = 24
-# An alert a second, so that lines scroll up above the figures while those are redrawn.
+# An alert a second, so that lines scroll up above the figures while the figures are redrawn.
 PUBLISHER = ["run", "--quiet", "--json", "--start", "405", "--time-scale", "0.5", "--rate", "50"]
 NUMBER = r"-?\d+\.\d+"
 FIGURES = [
@@ -37,7 +37,7 @@ ALERT = (
     rf" {{0,9}}{NUMBER} s  approaching contact: bench 1 \(the head\) and bench 9 at \(1\.474, 2\.111\) m in {NUMBER} s; "
     rf"nearest now are bench \d+( \(the head\))? and bench \d+, {NUMBER} m apart \(counting from 1\)"
 )
-# The words of an alert begin behind its time, on each of its rows.
+# The words of an alert begin after its time, on each of its rows.
 INDENT = " " * 14
 COLOUR = re.compile(rb"\x1b\[[0-9;:]*m")
 
@@ -81,7 +81,7 @@ class Terminal:
         os.close(self.master)
 
     def read(self, seconds):
-        """Shows what is printed within some time."""
+        """Shows the output of the next `seconds`."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0 and select.select([self.master], [], [], left)[0]:
             printed = os.read(self.master, 65536)
@@ -95,21 +95,21 @@ class Terminal:
             self.read_until_quiet()
 
     def read_until_quiet(self):
-        """Shows what is printed until nothing has been for a while."""
+        """Shows the output until there has been none for a while."""
         before = None
         while before != len(self.output):
             before = len(self.output)
             self.read(0.1)
 
     def rows(self):
-        """The rows down to the cursor, those that have scrolled out of the top included."""
+        """Returns the rows down to the cursor, including those that have scrolled out of the top."""
         shown = [row.rstrip() for row in self.screen.display]
-        assert not any(shown[self.screen.cursor.y :]), "something stands behind the cursor:\n" + "\n".join(shown)
+        assert not any(shown[self.screen.cursor.y :]), "text follows the cursor:\n" + "\n".join(shown)
         scrolled = ["".join(row[column].data for column in range(self.columns)) for row in self.screen.history.top]
         return [row.rstrip() for row in scrolled] + shown[: self.screen.cursor.y]
 
     def lines(self):
-        """The rows, with the indented ones that continue an alert joined to it."""
+        """Returns the rows; the indented rows that continue an alert are joined to it."""
         lines = []
         for row in self.rows():
             if row.startswith(INDENT):
@@ -139,7 +139,8 @@ def figures_are_redrawn_in_place():
         with publisher() as running:
             for each in every:
                 each.read_until(is_publishing)
-            # Whatever has been redrawn by then, nothing else stands there, until several seconds of alerts have come.
+            # However much has been redrawn by then, the terminal shows nothing else, until several seconds of alerts
+            # have come.
             alerts = []
             while len(alerts) < 6:
                 for each in every:
@@ -151,7 +152,7 @@ def figures_are_redrawn_in_place():
             # Wide enough for a whole alert.
             assert any(re.fullmatch(ALERT, row) for row in wide.rows()), "\n".join(wide.rows())
             print("\n".join(terminal.rows()))
-            # Where the terminal is narrower, a figure's line is cut and takes one row all the same.
+            # If the terminal is narrower, a figure's line is cut and still takes one row.
             for each in [narrow, narrowest]:
                 rows = each.rows()
                 assert [row[:4] for row in rows[-6:]] == ["t   ", "rate", "late", "head", "publ", "late"], "\n".join(rows)

@@ -1,5 +1,6 @@
 //! The repository itself: pages, generated files, manifests, dependencies, words.
 
+mod command_table;
 mod features;
 #[path = "../harness/mod.rs"]
 mod harness;

@@ -1,17 +1,18 @@
-//! The messages of other languages: `crates/messages/src/layouts.rs` and the enums in `crates/messages/src/state.rs` are the one place where
-//! fields, types, versions, constants and their comments are written. `msgs/msg/*.msg` and
-//! `examples/python/bench_dragon_messages.py` are generated from it: after a change run
+//! The messages of other languages: `crates/messages/src/layouts.rs` and the enums in `crates/messages/src/state.rs`
+//! are the single source of fields, types, versions, constants and their comments. `msgs/msg/*.msg` and
+//! `examples/python/bench_dragon_messages.py` are generated from these: after a change run
 //!
 //! ```text
 //! BENCH_DRAGON_WRITE=1 cargo test --test repository msgs::
 //! ```
 //!
-//! and commit what it writes; without the variable the first test fails where a file is another. A new field takes its
-//! line in the layout, the next version in the layout's `type_name`, and its value where the message is filled in. A
-//! new message also takes its line in `ros::MESSAGES`, in `msgs/CMakeLists.txt` and in the comparisons below.
+//! and commit the written files. Without the variable the first test fails if a file differs. A new field needs its
+//! line in the layout, the next version in the layout's `type_name`, and its value in the code that fills in the
+//! message. A new message also needs its line in `ros::MESSAGES`, in `msgs/CMakeLists.txt` and in the comparisons
+//! below.
 //!
-//! The generator reads the text of the sources and does not check itself: all other tests compare the files with the
-//! compiled Rust types, by what serde writes of them and by where their fields lie in memory.
+//! The generator reads the text of the sources and does not check itself. All other tests compare the files with the
+//! compiled Rust types, by serde's output and by the offsets of their fields in memory.
 #![cfg(feature = "ros2")]
 
 mod memory;
@@ -48,8 +49,8 @@ fn read(file: &str) -> String {
     std::fs::read_to_string(path(file)).unwrap_or_default()
 }
 
-/// The generated files, written first where that is requested, with a sentence on each that is not as it should be. All
-/// tests that read the files start here.
+/// The generated files, written first if requested, with a sentence on each difference. All tests that read the files
+/// start here.
 static DIFFERENCES: LazyLock<Vec<String>> = LazyLock::new(|| {
     let source = Source::read();
     let interfaces = ros::MESSAGES.iter();
@@ -76,10 +77,10 @@ static DIFFERENCES: LazyLock<Vec<String>> = LazyLock::new(|| {
     differences
 });
 
-/// The lines that only one of two texts has, by their longest common subsequence.
+/// Returns the lines that only one of two texts has, by their longest common subsequence.
 fn difference(found: &str, wanted: &str) -> String {
     let (found, wanted): (Vec<_>, Vec<_>) = (found.lines().collect(), wanted.lines().collect());
-    // How many lines the ends of both texts, from a line of each on, have in common.
+    // Number of lines that the ends of both texts, from a line of each on, have in common.
     let mut common = vec![vec![0; wanted.len() + 1]; found.len() + 1];
     for (i, j) in (0..found.len()).rev().flat_map(|i| (0..wanted.len()).rev().map(move |j| (i, j))) {
         let skipped = common[i + 1][j].max(common[i][j + 1]);
@@ -141,7 +142,7 @@ fn interface(name: &str) -> Interface {
     interface
 }
 
-/// What serde writes for a message: (type, field) in the words of ROS 2, nested layouts taken apart.
+/// Returns serde's output for a message: (type, field) in the words of ROS 2, with nested layouts expanded.
 fn on_the_wire<T: Serialize>(message: &T) -> Vec<(String, String)> {
     let mut tracer = Tracer::new(TracerConfig::default());
     let (format, _) = tracer.trace_value(&mut Samples::new(), message).unwrap();
@@ -217,15 +218,15 @@ fn type_names_are_those_that_ros_2_gives_the_interface_files() {
     }
 }
 
-/// The names of numbers, as the compiled enums and constants have them.
+/// The names of numbers in the compiled enums and constants.
 struct Names {
     states: Vec<&'static str>,
     levels: Vec<&'static str>,
     playback: Vec<&'static str>,
     segments: Vec<&'static str>,
-    /// All that lead to a state, by its number.
+    /// All events that lead to a state, by its number.
     events: BTreeMap<u32, &'static str>,
-    /// Those that an alert can be about.
+    /// The events that an alert can be about.
     alerted: BTreeMap<u32, &'static str>,
 }
 
@@ -272,7 +273,8 @@ fn constants_are_the_states_levels_events_playback_and_segments() {
     }
 }
 
-/// A layout as Python has to see it: its name for iceoryx2, its size, and each field's name, type, offset and size.
+/// Returns a layout as Python must see it: its name for iceoryx2, its size, and each field's name, type, offset and
+/// size.
 fn layout<T: Serialize + ZeroCopySend + Default>() -> Value {
     let value = T::default();
     let members = memory::members(&value);
@@ -285,11 +287,11 @@ fn layout<T: Serialize + ZeroCopySend + Default>() -> Value {
     let fields: Vec<_> = fields.collect();
     let filled: usize = members.iter().map(|(_, _, size)| size).sum();
     assert_eq!(filled, size_of::<T>(), "there is padding");
-    // SAFETY: a name alone is read.
+    // SAFETY: only a name is read.
     json!([unsafe { <T as ZeroCopySend>::type_name() }, size_of::<T>(), fields])
 }
 
-/// Prints what Python knows of the layouts, in the words of ROS 2, and the names of numbers.
+/// Prints Python's data on the layouts, in the words of ROS 2, and the names of numbers.
 const SCRIPT: &str = r#"
 import ctypes, json, sys
 sys.path.insert(0, "examples/python")

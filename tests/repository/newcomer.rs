@@ -1,10 +1,10 @@
-//! A newcomer's half hour: every command that a page prints for copying is taken from there and run, in a copy of the
-//! repository, in the order of the page. What is not run is on the lists of `list.rs`, each with its reason.
+//! A newcomer's half hour: every command that a page prints for copying is read from the page and run, in a copy of the
+//! repository, in the order of the page. The lists of `list.rs` name the commands that are not run, each with its
+//! reason.
 //!
 //! `bench-dragon` and `cargo run --release --` are the program that Cargo has built for this test. Each page has a
-//! checkout, a network and an iceoryx2 of its own, so that no two of them meet. Programs that run until they are
-//! stopped stay until the section ends, or until the next one of their kind begins; then Ctrl-C has to end them with
-//! code 0.
+//! separate checkout, network and iceoryx2, so that pages do not interfere. Programs that run until they are stopped
+//! continue until the section ends, or until the next one of their kind begins; then Ctrl-C must end them with code 0.
 
 mod list;
 mod pages;
@@ -21,17 +21,17 @@ use list::{INSTEAD, LONG, LOOKED_UP, NEEDS, NOT_HERE};
 use pages::{Printed, Section, sections, without_variables};
 use reader::Reader;
 
-/// How many pages are read at once: most of a page is waiting.
+/// Number of pages that are read at once: most of a page's time is waiting.
 const READERS: usize = 4;
 
-/// What becomes of a command.
+/// The treatment of a command.
 enum Verdict {
     Run(String),
     LookedUp,
     NotRun(String),
 }
 
-/// The pages of the repository, but for the history.
+/// Returns the pages of the repository, except the history.
 fn pages_of(root: &Path) -> Vec<String> {
     let folders = ["", "docs", "examples", "fuzz", "msgs", "config", "benches"];
     let names = folders.iter().flat_map(|folder| {
@@ -43,12 +43,12 @@ fn pages_of(root: &Path) -> Vec<String> {
     pages
 }
 
-/// The line of a list for a command.
+/// Returns the line of a list for a command.
 fn line_for(command: &str, list: &[list::Line]) -> Option<list::Line> {
     list.iter().find(|(beginning, _)| without_variables(command).starts_with(beginning)).copied()
 }
 
-/// Whether the text only names a subcommand.
+/// Returns true if the text only names a subcommand.
 fn is_mention(printed: &Printed) -> bool {
     let words = Vec::from_iter(printed.text.split(' '));
     printed.inline && words.len() == 2 && words[0] == "bench-dragon" && !words[1].starts_with('-')
@@ -71,7 +71,7 @@ fn verdict(printed: &Printed) -> Verdict {
     }
     match line_for(text, NEEDS) {
         Some((_, programs)) if !programs.split(' ').all(is_installed) => {
-            return Verdict::NotRun(format!("needs {programs}, not all of which are here"));
+            return Verdict::NotRun(format!("needs {programs}, which are not all installed"));
         }
         _ => (),
     }
@@ -83,7 +83,7 @@ fn verdict(printed: &Printed) -> Verdict {
     Verdict::Run(replaced)
 }
 
-/// Runs the commands of a page; what went wrong.
+/// Runs the commands of a page and returns the errors.
 fn read(root: &Path, page: &str, sections: &[Section]) -> Vec<String> {
     let mut reader = None;
     let mut failures = Vec::new();
@@ -101,7 +101,7 @@ fn read(root: &Path, page: &str, sections: &[Section]) -> Vec<String> {
     failures
 }
 
-/// Prints what is not run and what is run in another form.
+/// Prints the commands that are not run, and those that are run in another form.
 fn report(commands: &[&Printed]) {
     let (mut run, mut looked_up, mut not_run) = (0, 0, Vec::new());
     for printed in commands {
@@ -123,7 +123,7 @@ fn report(commands: &[&Printed]) {
     aloud(&format!("{all} commands: {run} run, {looked_up} of tests and benchmarks looked up, {left} not run"));
 }
 
-/// A line of a list that meets no command hides that a page has changed.
+/// Asserts that every line of a list matches a command: an unused line hides a change of a page.
 fn assert_lists_are_met(commands: &[&Printed]) {
     let begins =
         |beginning: &str| commands.iter().any(|printed| without_variables(&printed.text).starts_with(beginning));
@@ -132,7 +132,7 @@ fn assert_lists_are_met(commands: &[&Printed]) {
     let mut idle = Vec::from_iter(beginnings.filter(|beginning| !begins(beginning)));
     let parts = INSTEAD.iter().map(|line| line.0);
     idle.extend(parts.filter(|part| !commands.iter().any(|printed| printed.text.contains(part))));
-    assert!(idle.is_empty(), "lines of tests/newcomer/list.rs that no page needs: {idle:#?}");
+    assert!(idle.is_empty(), "lines of tests/repository/newcomer/list.rs that no page needs: {idle:#?}");
 }
 
 #[test]
@@ -146,7 +146,7 @@ fn every_command_of_the_pages_runs() {
     let commands = Vec::from_iter(sections.flat_map(|section| &section.commands));
     assert!(commands.len() > 100, "{} commands on {} pages", commands.len(), pages.len());
     assert_lists_are_met(&commands);
-    if !can_run(root("give each page a network of its own"))
+    if !can_run(root("give each page a separate network"))
         || !can_run(python_modules(&["iceoryx2", "numpy", "cyclonedds", "websockets", "mcap", "mcap_ros2"]))
     {
         return;

@@ -1,11 +1,12 @@
-//! The crates depend on each other as the table of ARCHITECTURE.md states, and the borders that no compiler holds are kept.
+//! The crates depend on each other as the table of ARCHITECTURE.md states, and boundaries that the compiler does not
+//! check are kept.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use toml::Table;
 
-/// The crates of the workspace, by their folder.
+/// Returns the crates of the workspace, by their folder.
 fn crates() -> Vec<String> {
     let folders = std::fs::read_dir("crates").unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
     let mut names: Vec<_> = folders.filter(|name| Path::new(&format!("crates/{name}/Cargo.toml")).exists()).collect();
@@ -13,14 +14,14 @@ fn crates() -> Vec<String> {
     names
 }
 
-/// The crates of this workspace that a manifest names among its dependencies.
+/// Returns the crates of this workspace that a manifest names among its dependencies.
 fn dependencies(name: &str) -> BTreeSet<String> {
     let manifest: Table = std::fs::read_to_string(format!("crates/{name}/Cargo.toml")).unwrap().parse().unwrap();
     let normal = manifest.get("dependencies").and_then(|table| table.as_table()).cloned().unwrap_or_default();
     normal.keys().filter_map(|key| key.strip_prefix("bench-dragon-")).map(str::to_owned).collect()
 }
 
-/// All Rust files below a folder.
+/// Returns all Rust files below a folder.
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let below = |path: PathBuf| match path.is_dir() {
@@ -47,14 +48,14 @@ fn the_architecture_page_lists_every_crate_with_its_dependencies() {
     assert_eq!(listed, found);
 }
 
-/// The checker of certificates shares no code with the search that writes them: its manifest names no crate of this
-/// workspace, and the compiler holds the rest.
+/// The checker of certificates shares no code with the search that writes them. Its manifest names no crate of this
+/// workspace, so the compiler rejects shared code.
 #[test]
 fn the_checker_stands_alone() {
     assert_eq!(dependencies("proof"), BTreeSet::new());
 }
 
-/// The crate `testing` is part of no program.
+/// No program depends on the crate `testing`.
 #[test]
 fn no_crate_depends_on_the_testing_crate() {
     assert!(crates().iter().all(|name| !dependencies(name).contains("testing")));

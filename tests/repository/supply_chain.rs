@@ -1,5 +1,5 @@
-//! What the program is made of: licences, versions and sources are those that deny.toml allows, and what is packaged is
-//! all that the program needs. deny.toml itself is read here, so that `cargo deny` and this test cannot differ.
+//! The parts of the program: licences, versions and sources are those that deny.toml allows, and the package contains
+//! all that the program needs. The test reads deny.toml itself, so that `cargo deny` and this test cannot differ.
 
 use crate::harness;
 
@@ -11,14 +11,14 @@ use serde_json::Value;
 use spdx::{Expression, ParseMode};
 use toml::Table;
 
-/// The first of deny.toml's targets: what cargo has of other platforms' crates is not on every machine.
+/// The first of deny.toml's targets: cargo does not have other platforms' crates on every machine.
 const TARGET: &str = "x86_64-unknown-linux-gnu";
 
 fn deny() -> Table {
     include_str!("../../deny.toml").parse().unwrap()
 }
 
-/// The texts of a list in deny.toml.
+/// Returns the texts of a list in deny.toml.
 fn list(section: &str, field: &str) -> BTreeSet<String> {
     let deny = deny();
     let list = deny[section][field].as_array().unwrap();
@@ -38,7 +38,7 @@ fn every_licence_is_one_that_is_allowed() {
     assert!(list("graph", "targets").contains(TARGET));
     let text = cargo(&["metadata", "--format-version", "1", "--locked", "--offline", "--filter-platform", TARGET]);
     let metadata: Value = serde_json::from_str(&text).unwrap();
-    // The crates of this platform, those of the tests included: others are listed too, without having been loaded.
+    // The crates of this platform, including those of the tests: other crates are listed without having been loaded.
     let needed = metadata["resolve"]["nodes"].as_array().unwrap();
     let needed: BTreeSet<&str> = needed.iter().map(|node| node["id"].as_str().unwrap()).collect();
     let packages = metadata["packages"].as_array().unwrap();
@@ -47,7 +47,7 @@ fn every_licence_is_one_that_is_allowed() {
     for package in packages.iter().filter(|package| needed.contains(package["id"].as_str().unwrap())) {
         let (name, licence) = (&package["name"], package["license"].as_str());
         let licence = licence.unwrap_or_else(|| panic!("{name} names no licence"));
-        // Some still write a slash for OR.
+        // Some crates still write a slash for OR.
         let expression = Expression::parse_mode(licence, ParseMode::LAX).unwrap();
         let is_allowed = |requirement: &spdx::LicenseReq| allowed.contains(&requirement.to_string());
         assert!(expression.evaluate(is_allowed), "{name} is {licence}, expected one of {allowed:?}");
@@ -87,7 +87,7 @@ fn no_crate_is_there_twice_but_those_that_are_listed() {
         let numbers = release.split('.').map(|number| number.parse().unwrap()).collect();
         versions.entry(name).or_default().insert(numbers);
     }
-    // Of each name all but the newest.
+    // All versions of each name except the newest.
     let mut old: BTreeSet<(String, Vec<u64>)> = BTreeSet::new();
     for (name, versions) in versions {
         old.extend(versions.iter().rev().skip(1).map(|version| (name.to_owned(), version.clone())));
@@ -99,18 +99,18 @@ fn no_crate_is_there_twice_but_those_that_are_listed() {
         let begins: Vec<u64> = version.split('.').map(|number| number.parse().unwrap()).collect();
         let before = old.len();
         old.retain(|(other, version)| other != name || !version.starts_with(&begins));
-        assert!(old.len() < before, "deny.toml lists {listed}, which is there no more");
+        assert!(old.len() < before, "deny.toml lists {listed}, which no longer exists");
     }
     assert!(old.is_empty(), "not in deny.toml: {old:?}");
 }
 
-/// The program as `cargo install` leaves it: one file, started where there is no repository.
+/// The program as `cargo install` leaves it: one file, started outside the repository.
 #[test]
 fn the_program_needs_nothing_besides_itself() {
     let folder = tempfile::tempdir().unwrap();
     let program = folder.path().join("bench-dragon");
     copy_program(&program);
-    // What is compiled in as a place of this repository would be looked for at run time; source lines of panics are not.
+    // A compiled-in path of this repository would be opened at run time; source paths of panics are not opened.
     let name = unique("installed");
     let run = |arguments: &[&str]| {
         let mut command = Command::new(&program);

@@ -1,4 +1,5 @@
-//! ROS 2 topics as subscribers in other processes get them: Cyclone DDS as the wire peer, with types made from `msgs/`.
+//! ROS 2 topics as subscribers in other processes receive them: Cyclone DDS as the wire peer, with types made from
+//! `msgs/`.
 #![cfg(feature = "ros2")]
 
 use crate::harness;
@@ -13,7 +14,7 @@ use harness::{
 };
 use serde_json::Value;
 
-/// A Cyclone DDS process that prints what it gets of these topics.
+/// Returns a Cyclone DDS process that prints its messages of these topics.
 fn peer(name: &str, seconds: &str, topics: &[&str]) -> Command {
     let mut command = python();
     command.args(["tests/python/ros2_peer.py", "--name", &unique(name), "--seconds", seconds]);
@@ -30,12 +31,12 @@ fn content(name: &str, topic: &str, reliability: &str, seconds: &str) -> Command
     command
 }
 
-/// The messages of a topic.
+/// Returns the messages of a topic.
 fn messages<'a>(lines: &'a [Value], topic: &str) -> Vec<&'a Value> {
     lines.iter().filter(|line| line["topic"] == topic).map(|line| &line["message"]).collect()
 }
 
-/// How many messages each topic brought, and from how many publishers at the end: the peer's last line.
+/// Returns the number of messages and of publishers of each topic at the end: the peer's last line.
 fn end(output: &Output) -> Value {
     let last = json_lines(output).pop().filter(|line| line["type"] == "end");
     last.unwrap_or_else(|| panic!("the peer ended with {}: {}", output.status, text(&output.stderr)))
@@ -88,7 +89,7 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs
         "--duration",
         "23",
     ]));
-    // The contact is half a second after the start; ten seconds later somebody comes.
+    // The contact is half a second after the start; ten seconds later a subscriber joins.
     wait(10.5);
     let topics = [
         "alerts:reliable:transient_local",
@@ -99,13 +100,13 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs
         "handles",
         "poses",
     ];
-    // On a busy machine four seconds were too few for one of the two that come late.
+    // On a busy machine four seconds were too short for one of the two late topics.
     let output = Process::start(&mut peer("late", "10", &topics)).output_within(40);
     let lines = json_lines(&output);
     assert!(!lines.is_empty(), "{}", text(&output.stderr));
 
     let alerts = messages(&lines, topics[0]);
-    // The one that holds, perhaps twice.
+    // The alert in effect, perhaps twice.
     assert!(alerts.len() <= 2 && alerts.iter().all(|alert| alert["tick"] == alerts[0]["tick"]), "{alerts:?}");
     let alert = alerts[0];
     assert_eq!((&alert["level"], &alert["event"]), (&2.into(), &2.into()));
@@ -163,7 +164,7 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs
 
     assert!(handles.len() > 20 && end(&output)["counts"]["poses"].as_u64().unwrap() > 20);
     let summary = summary(&publisher.output_within(30));
-    // A thirtieth of a second is left out only where both of its periods were skipped.
+    // A thirtieth of a second is left out only if both of its periods were skipped.
     let number = |value: &Value| value.as_u64().unwrap();
     let [frames, skipped] = ["frames", "skipped"].map(|key| number(&summary[key]));
     let offered = number(&summary["ros2"]["frames"]) + number(&summary["ros2"]["skipped"]);
@@ -202,7 +203,7 @@ fn markers_show_what_is_coming_and_where() {
     assert!(nearest.ends_with("(counting from 1)"), "{sentence}");
     let named: Vec<_> = of("numbers").iter().map(|marker| marker["text"].as_str().unwrap()).collect();
     assert!(named.starts_with(&["bench 1 (the head)", "bench 9"]) && named.len() <= 4, "{named:?}");
-    // Red is what it will happen to, as on the page.
+    // Red boards are those of the coming event, as on the page.
     let red = |bench: usize| {
         markers[bench]["color"]["r"].as_f64().unwrap() > 0.8 && markers[bench]["color"]["g"].as_f64().unwrap() < 0.2
     };
@@ -266,7 +267,7 @@ fn a_reliable_subscriber_that_stops_reading_holds_nobody_up() {
     if !can_run(python_modules(&["cyclonedds"])) {
         return;
     }
-    // 5,000 benches fill the memory that a topic may take within six seconds.
+    // 5,000 benches fill within six seconds the memory that a topic may use.
     let scene = scene_file(
         "stopped",
         &[("benches = 223", "benches = 5000"), ("start_turn = 16", "start_turn = 60"), ("[alerts]", "#[alerts]")],
@@ -279,7 +280,7 @@ fn a_reliable_subscriber_that_stops_reading_holds_nobody_up() {
     let publisher = Process::start(run.args(["--scene", scene.to_str().unwrap(), "run", "--json", "--duration", "20"]));
     let mut stopped = Process::start(&mut peer("stopped", "60", &["handles"]));
     let lines = stopped.lines();
-    // Its first message.
+    // The first message of the subscriber.
     lines.until("handles", 60);
     stopped.stop();
     let output = publisher.output_within(60);
@@ -303,7 +304,7 @@ fn without_being_asked_there_is_no_dds_thread_and_no_network_socket() {
     });
     let (threads, sockets) = of_process(plain.id());
     assert_eq!((dds_threads(&threads), sockets), (0, 0), "{threads:?}");
-    // That the same look finds them where they are.
+    // Proves that the same test finds threads and sockets if they exist.
     let (threads, sockets) = of_process(requested.id());
     assert!(dds_threads(&threads) >= 2 && sockets >= 2, "{threads:?}, {sockets} sockets");
 }
@@ -312,7 +313,7 @@ fn dds_threads(threads: &[String]) -> usize {
     threads.iter().filter(|name| name.contains("DDS") || name.contains("ros2")).count()
 }
 
-/// The names of a process's threads and the number of its network sockets.
+/// Returns the names of a process's threads and the number of its network sockets.
 fn of_process(process: u32) -> (Vec<String>, usize) {
     let folder = |name: &str| std::fs::read_dir(format!("/proc/{process}/{name}")).unwrap().flatten();
     let threads = folder("task").map(|task| std::fs::read_to_string(task.path().join("comm")).unwrap()).collect();
@@ -332,7 +333,7 @@ fn of_process(process: u32) -> (Vec<String>, usize) {
     (threads, sockets)
 }
 
-/// What ROS 2 makes of `ROS_STATIC_PEERS=10.77.0.1` for Cyclone DDS.
+/// The configuration that ROS 2 makes of `ROS_STATIC_PEERS=10.77.0.1` for Cyclone DDS.
 const STATIC_PEER: &str = "<CycloneDDS><Domain><Discovery><ParticipantIndex>auto</ParticipantIndex>\
     <Peers><Peer Address=\"10.77.0.1\"/></Peers></Discovery></Domain></CycloneDDS>";
 

@@ -1,5 +1,5 @@
-//! Conducting a running publisher over ROS 2: Cyclone DDS calls as `rmw_cyclonedds_cpp` does, ros2-client's own client as
-//! `rmw_fastrtps_cpp` does, both from other processes than the publisher; what came of it is read over shared memory.
+//! Control of a running publisher over ROS 2. Cyclone DDS calls as `rmw_cyclonedds_cpp` does, ros2-client's own client
+//! as `rmw_fastrtps_cpp` does, both from other processes than the publisher. The effect is read over shared memory.
 #![cfg(feature = "ros2")]
 
 mod clients;
@@ -12,7 +12,7 @@ use enhanced::{Empty, Features, Outcome, State, Time, Trigger, enhanced};
 use harness::{Process, can_run, json_lines, long, program, python, python_modules, summary, text, unique, wait};
 use serde_json::{Value, json};
 
-/// A ROS 2 domain that other processes of this machine do not use meanwhile.
+/// Returns a ROS 2 domain that other processes of this machine do not use meanwhile.
 fn domain() -> u16 {
     20 + (std::process::id() % 80) as u16
 }
@@ -27,7 +27,7 @@ fn publisher(name: &str, rmw: &str, arguments: &[&str]) -> Process {
         }
         wait(0.1);
     }
-    // One that runs has to be ended before it can be asked what it printed.
+    // A running process must end before the test can read its output.
     process.signal(nix::sys::signal::Signal::SIGINT);
     panic!("no publisher: {}", text(&process.output_within(20).stderr));
 }
@@ -35,7 +35,7 @@ fn publisher(name: &str, rmw: &str, arguments: &[&str]) -> Process {
 const CYCLONE: &str = "rmw_cyclonedds_cpp";
 const FAST: &str = "rmw_fastrtps_cpp";
 
-/// Exit code and response of `control`, over shared memory.
+/// Returns exit code and response of `control`, over shared memory.
 fn control(name: &str, arguments: &[&str]) -> (i32, Value) {
     let output = program(name).args(["--json", "control"]).args(arguments).output().unwrap();
     (output.status.code().unwrap(), json_lines(&output).pop().unwrap_or(Value::Null))
@@ -48,7 +48,7 @@ fn peer(name: &str, arguments: &[&str]) -> Command {
     command
 }
 
-/// The responses to these calls, one after the other, of one Cyclone client.
+/// Returns the responses to these calls, one after the other, of one Cyclone client.
 fn call(name: &str, calls: &[&str]) -> Vec<Value> {
     let output = Process::start(&mut peer(name, calls)).output_within(120);
     assert!(output.status.success(), "{}", text(&output.stderr));
@@ -61,7 +61,7 @@ fn ended(publisher: Process) -> (Value, String) {
     (summary(&output), text(&output.stderr))
 }
 
-/// What step, set and reset answer: the code, and whether there is a sentence.
+/// Returns the answer of step, set or reset: the code, and true if there is a sentence.
 fn result(response: &Value) -> (u64, bool) {
     let result = &response["result"];
     (result["result"].as_u64().unwrap_or_else(|| panic!("{response}")), result["error_message"] != "")
@@ -86,7 +86,7 @@ fn a_cyclone_client_conducts_by_every_service() {
     assert!(features["features"]["custom_info"].as_str().unwrap().contains("bench-dragon"));
     state(2, &paused);
     assert_eq!((is_paused, rate), (json!({"paused": true}), json!({"rate": 1.0})));
-    // It is answered once the steps are over.
+    // The answer comes once the steps are complete.
     assert_eq!(result(&stepped), (1, false));
     let close = |time: &Value, expected: f64| (time.as_f64().unwrap() - expected).abs() < 1e-9;
     assert!(close(&here()["sim_time"], 50.0 + 7.0 / 60.0), "{}", here());
@@ -112,7 +112,7 @@ fn a_cyclone_client_conducts_by_every_service() {
     assert_eq!((is_paused, success(&played)), (json!({"paused": false}), false));
     assert_eq!((&here()["playback"], &here()["time_scale"]), (&"playing".into(), &0.5.into()));
 
-    // Stopped is paused and reset; paused at the start after a reset is stopped.
+    // Stopped means paused and reset; paused at the start after a reset is stopped.
     let calls = [
         "set_simulation_state=0",
         "get_simulation_state",
@@ -154,7 +154,7 @@ fn a_cyclone_client_conducts_by_every_service() {
         assert_eq!(call(name, &[service]), std::slice::from_ref(&empty), "{service}");
         assert_eq!(here()["playback"], playback, "{service}");
     }
-    // The pause was no waiting for go.
+    // The pause was not a wait for go.
     let [go, release, hold] = call(name, &["go", "release", "hold"]).try_into().unwrap();
     assert_eq!([&go, &release, &hold].map(success), [false, false, true]);
     assert!(go["message"].as_str().unwrap().contains("waits for nothing"), "{go}");
@@ -203,7 +203,7 @@ fn a_hold_is_latched_against_every_other_call() {
         assert_eq!(before[key], after[key], "{key}");
     }
     assert_eq!(after["playback"], "held");
-    // What it was before: paused, at the rate that nobody has changed.
+    // The state before: paused, at the unchanged rate.
     assert_eq!(call(name, &["release", "get_rate"])[1], json!({"rate": 1.0}));
     assert_eq!(control(name, &["state"]).1["playback"], "paused");
     let (_, printed) = ended(publisher);
@@ -273,7 +273,7 @@ fn without_the_flag_there_is_no_service_and_with_it_those_of_the_standards() {
         assert_eq!(written[&topic("rr", "Reply")], format!("{package}::srv::dds_::{kind}_Response_"));
     }
     publishers.into_iter().for_each(|publisher| drop(ended(publisher)));
-    // Whoever wants the services has to want ROS 2.
+    // The services require ROS 2.
     let output = Process::start(program("alone").args(["run", "--ros2-control", "--duration", "1"])).output_within(60);
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("--ros2-control"), "{}", text(&output.stderr));
@@ -337,7 +337,7 @@ fn a_fast_dds_client_conducts_by_every_service() {
     assert_eq!(state().state, 0);
     assert_eq!(player("resume", "Resume"), Empty(0));
     assert_eq!(here()["playback"], "playing");
-    // As Resume is since Lyrical: with a time.
+    // Resume since Lyrical: with a time.
     player("pause", "Pause");
     assert_eq!(
         enhanced::<_, Empty>(name, "resume", ("rosbag2_interfaces", "Resume"), Time { sec: 0, nanosec: 0 }),

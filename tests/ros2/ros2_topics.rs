@@ -1,4 +1,4 @@
-//! The ROS 2 topics of standard types, and the cues, as a Cyclone DDS subscriber gets them.
+//! The ROS 2 topics of standard types, and the cues, as a Cyclone DDS subscriber receives them.
 #![cfg(feature = "ros2")]
 
 use crate::harness;
@@ -8,7 +8,7 @@ use std::process::Command;
 use harness::{Process, can_run, json_lines, long, program, python, python_modules, scene_file, summary, text, unique};
 use serde_json::Value;
 
-/// A Cyclone DDS process that prints what it gets of these topics.
+/// Returns a Cyclone DDS process that prints its messages of these topics.
 fn peer(name: &str, seconds: &str, topics: &[&str]) -> Command {
     let mut command = python();
     command.args(["tests/python/ros2_peer.py", "--name", &unique(name), "--seconds", seconds]);
@@ -18,7 +18,7 @@ fn peer(name: &str, seconds: &str, topics: &[&str]) -> Command {
     command
 }
 
-/// The messages of a topic.
+/// Returns the messages of a topic.
 fn messages<'a>(lines: &'a [Value], topic: &str) -> Vec<&'a Value> {
     lines.iter().filter(|line| line["topic"] == topic).map(|line| &line["message"]).collect()
 }
@@ -37,7 +37,7 @@ fn cues_path_clock_and_transforms_are_those_of_the_show() {
     std::fs::write(&scene, format!("{of_scene}\n{topics}\n{cues}")).unwrap();
     let mut run = program("shown");
     run.args(["--scene", scene.to_str().unwrap(), "run", "--json", "--paused", "--start", "50.25"]);
-    // /clock and /tf are of the whole domain.
+    // /clock and /tf belong to the whole domain.
     let publisher = Process::start(run.args(["--duration", "300"]).env("ROS_DOMAIN_ID", "9"));
     let topics = ["handles", "clock", "tf", "path:reliable:transient_local", "cues:reliable:transient_local"];
     let mut subscriber = Process::start(peer("shown", "300", &topics).args(["--domain", "9"]));
@@ -55,7 +55,7 @@ fn cues_path_clock_and_transforms_are_those_of_the_show() {
     until(&mut lines, &latest);
     let so_far = messages(&lines, "clock").len();
     until(&mut lines, &|lines| messages(lines, "clock").len() > so_far + 2 && messages(lines, "tf").len() > so_far + 2);
-    // One that comes later gets the latest cue, and the path.
+    // A late subscriber gets the latest cue, and the path.
     let late = Process::start(peer("shown", "2", &topics[3..]).args(["--domain", "9"])).output_within(60);
     let late = json_lines(&late);
     assert!(latest(&late) && !messages(&late, topics[3]).is_empty(), "{late:?}");
@@ -65,7 +65,7 @@ fn cues_path_clock_and_transforms_are_those_of_the_show() {
 
     let number = |value: &Value| value.as_f64().unwrap();
     let mut cues = messages(&lines, topics[4]);
-    // The first subscriber gets what holds a second time, in case it was still being discovered.
+    // The first subscriber gets the message in effect twice, in case it was still being discovered.
     cues.dedup();
     let names: Vec<_> = cues.iter().map(|cue| (cue["number"].clone(), cue["name"].clone())).collect();
     assert_eq!(names, [(1, "first"), (2, "second"), (3, "third")].map(|(number, name)| (number.into(), name.into())));
@@ -108,7 +108,7 @@ fn cues_path_clock_and_transforms_are_those_of_the_show() {
         assert!((ticks - ticks.round()).abs() < 1e-6, "{time} is between two frames");
     }
 
-    // Head and tail as the frame of the same stamp has them.
+    // Head and tail as in the frame of the same stamp.
     let mut compared = 0;
     for message in messages(&lines, "tf") {
         let transforms = message["transforms"].as_array().unwrap();
@@ -129,10 +129,10 @@ fn cues_path_clock_and_transforms_are_those_of_the_show() {
             assert!(error.sin().abs() < 1e-9 && error.cos() > 0.0, "{transform} and {handle}");
         }
     }
-    assert!(compared > 2, "{compared} transforms are of a frame that came");
+    assert!(compared > 2, "{compared} transforms belong to a received frame");
 }
 
-/// The alerts of `joins` subscribers, one after the other, each with when it was made: its first, and all of them.
+/// Returns for `joins` subscribers, one after the other, the time of creation and all alerts.
 fn joined(name: &str, joins: u32, further: &[&str]) -> Vec<(u64, Vec<u64>)> {
     let mut command = python();
     command.args(["tests/python/ros2_joins.py", "--name", &unique(name), "--joins", &joins.to_string()]);
@@ -145,8 +145,9 @@ fn joined(name: &str, joins: u32, further: &[&str]) -> Vec<(u64, Vec<u64>)> {
     joined.collect()
 }
 
-/// A countdown raises an alert each second. Whoever comes gets the one that holds and none before it, whether somebody
-/// had been there and left or nobody ever was; beside somebody who stays, the last of what he gets at once.
+/// A countdown raises an alert each second. A new subscriber gets the alert in effect and no earlier one, whether
+/// earlier subscribers have left or there were none. Beside a subscriber that stays, the current alert is the last of
+/// those it gets at once.
 #[test]
 fn a_late_subscriber_gets_the_current_alert_and_none_before_it() {
     if !can_run(python_modules(&["cyclonedds"])) {
@@ -167,17 +168,17 @@ fn a_late_subscriber_gets_the_current_alert_and_none_before_it() {
         }
         published.clone()
     };
-    // Alerts that nobody on ROS 2 gets.
+    // Alerts without a subscriber on ROS 2.
     let first = publish_until(0)[0];
     publish_until(first + 3_000_000_000);
     let joins = if long() { 50 } else { 12 };
     for (made, alerts) in joined("countdown", joins, &[]) {
         let published = publish_until(made.max(alerts[0]));
-        // What was stamped just before was on its way.
+        // An alert that was stamped just before may still be in flight.
         let current = published.iter().rfind(|stamp| **stamp + 200_000_000 < made).unwrap();
         assert!(alerts[0] >= *current, "{} ms old", (current - alerts[0]) / 1_000_000);
     }
-    // Who does not ask for what was sent before gets none of it.
+    // A subscriber that does not request earlier messages gets none of them.
     for (made, alerts) in joined("countdown", joins / 4, &["--volatile"]) {
         assert!(alerts.first() > Some(&made), "{alerts:?} of before {made}");
     }

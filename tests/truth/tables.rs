@@ -10,7 +10,7 @@ pub struct Row {
     pub speed: f64,
 }
 
-/// The rows of a CSV file whose first two columns are time and handle, and whose last three are x, y and speed.
+/// Returns the rows of a CSV file whose first two columns are time and handle, and whose last three are x, y and speed.
 pub fn table(text: &str) -> Vec<Row> {
     let row = |line: &str| {
         let fields: Vec<f64> = line.split(',').map(|field| field.parse().unwrap()).collect();

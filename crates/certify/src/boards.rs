@@ -1,5 +1,4 @@
-//! Lemmas 2 and 3 of `docs/proofs.md`: boards that are apart over a step, and Lemma 5: boards that have a point in common.
-//! Only [`super`] uses it.
+//! Lemmas 2, 3 and 5 of `docs/proofs.md`: boards that are apart over a step, and boards that have a point in common.
 
 use super::capsule::Capsule;
 use super::interval::{Interval, Vector, cross, dot, minus, norm, norm_squared};
@@ -8,7 +7,7 @@ use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::separation::closest_points_board_board;
 use bench_dragon_motion::model::team::Team;
 
-/// What boards are like, in intervals.
+/// Size of a board, in intervals.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shape {
     pub inset: Interval,
@@ -21,13 +20,13 @@ pub(super) struct MovingBoard {
     front: Capsule,
     rear: Capsule,
     link: Interval,
-    /// Beyond each handle, as a share of the link.
+    /// Length of the board beyond each handle, as a share of the link.
     share: Interval,
     half_width: Interval,
-    /// Doubles near its middle and its half length; the radius holds the whole board about the middle at every moment.
+    /// A point near the middle, in doubles. The disc of `radius` metres about it holds the board at every moment.
     centre: [f64; 2],
     radius: f64,
-    /// Unit direction, nearly.
+    /// Unit direction, approximate.
     direction: [f64; 2],
 }
 
@@ -42,8 +41,8 @@ impl Shape {
         let along = minus(front.point, rear.point).map(Interval::middle);
         let length = along[0].hypot(along[1]);
         let share = self.inset.over(link);
-        // Any point is s of the way between the handles, s in [-e, 1 + e], and half a width aside; the middle of the two
-        // handles moves no more than both do.
+        // Every point is s of the way between the handles, s in [-e, 1 + e], and half a width aside. The middle of the
+        // two handles moves no more than both handles do.
         let slack = [front, rear]
             .iter()
             .fold(Interval::ZERO, |sum, capsule| sum + Interval::point(capsule.half) + Interval::point(capsule.radius));
@@ -53,7 +52,7 @@ impl Shape {
         MovingBoard { front, rear, link, share, half_width: self.half_width, centre, radius, direction }
     }
 
-    /// The furthest from the origin that a point of a board can be.
+    /// Returns the greatest distance from the origin of a point of the board.
     pub fn outermost(&self, board: &MovingBoard) -> f64 {
         let furthest =
             |capsule: &Capsule| norm(capsule.point) + Interval::point(capsule.half) + Interval::point(capsule.radius);
@@ -61,7 +60,8 @@ impl Shape {
         (furthest(&board.front).max(furthest(&board.rear)) + corner).hi
     }
 
-    /// The nearest to the origin that a point of a board can be whose handles are both `radius` or more from it.
+    /// Returns the least distance from the origin of a point of a board whose two handles are at least `radius` from
+    /// the origin.
     pub fn innermost(&self, radius: f64, link: Interval) -> f64 {
         let radius = Interval::point(radius);
         let quarter = link.square() * 0.25;
@@ -74,7 +74,7 @@ impl Shape {
 }
 
 impl MovingBoard {
-    /// Whether two boards are proved to be further apart than `metres`, not below 0, by the circles about them.
+    /// Returns true if the circles about two boards prove a distance of more than `metres`, which is at least 0.
     pub fn is_further_than(&self, metres: f64, other: &Self) -> bool {
         let between = [0, 1].map(|axis| Interval::point(self.centre[axis]) - Interval::point(other.centre[axis]));
         let apart = norm_squared(between);
@@ -82,12 +82,13 @@ impl MovingBoard {
         reach.square().is_below(apart)
     }
 
-    /// Whether two boards are proved to be apart.
+    /// Returns true if two boards are proved to be apart.
     pub fn is_apart_from(&self, other: &Self) -> bool {
         self.is_apart_by(0.0, other)
     }
 
-    /// Whether two boards are proved to be further apart than `metres`; below 0: to overlap less deeply.
+    /// Returns true if two boards are proved to be further apart than `metres`. A negative number means an overlap less
+    /// deep.
     pub fn is_apart_by(&self, metres: f64, other: &Self) -> bool {
         if self.is_further_than(metres.max(0.0), other) {
             return true;
@@ -99,7 +100,7 @@ impl MovingBoard {
         axes.into_iter().any(is_separated) || metres > 0.0 && is_separated(self.towards(other))
     }
 
-    /// From this board to the nearest point of another, by the middles of their capsules.
+    /// Returns the vector from this board to the nearest point of the other, by the middles of their capsules.
     fn towards(&self, other: &Self) -> [f64; 2] {
         let [one, other] = [self, other].map(|board| {
             let [front, rear] =
@@ -125,7 +126,7 @@ impl MovingBoard {
         (self.support(towards, length) + other.support(back, length) + gap).is_negative()
     }
 
-    /// The largest n . x, from above.
+    /// Returns an upper bound of n . x over the board.
     fn support(&self, n: Vector, length: f64) -> Interval {
         let Self { front, rear, share, .. } = self;
         let ends = |capsule: &Capsule| {
@@ -143,7 +144,7 @@ impl MovingBoard {
         axis + self.half_width * across.over(self.link).min(Interval::point(length))
     }
 
-    /// Whether a point is proved to be in the board at every moment of the step.
+    /// Returns true if a point is proved to be in the board at every moment of the step.
     pub fn holds(&self, point: Vector) -> bool {
         let slack =
             |capsule: &Capsule| Interval::within((Interval::point(capsule.half) + Interval::point(capsule.radius)).hi);

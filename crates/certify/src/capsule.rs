@@ -1,4 +1,4 @@
-//! Spans of the path and the capsules that hold their points. See "Capsules" in `docs/proofs.md`. Only [`super`] uses it.
+//! Spans of the path and the capsules that hold their points. See "Capsules" in `docs/proofs.md`.
 
 use serde::Serialize;
 
@@ -14,19 +14,19 @@ pub struct Span(pub Place, pub Place);
 pub(super) struct Capsule {
     /// A place m of the span.
     pub middle: Place,
-    /// Its point.
+    /// The point at m.
     pub point: Vector,
-    /// The tangent there.
+    /// The tangent at m.
     pub tangent: Vector,
-    /// At least the metres from m to either end.
+    /// Upper bound of the distance from m to either end, metres.
     pub half: f64,
-    /// At least the radius of the disc that is added to the tangent's stretch.
+    /// Upper bound of the radius of the disc that is added to the tangent's stretch, metres.
     pub radius: f64,
-    /// At least the curvature anywhere in the span, 1/m.
+    /// Upper bound of the curvature in the span, 1/m.
     pub curvature: f64,
 }
 
-/// A span with what lemmas ask of it.
+/// A span with its end points and its capsule.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Spanned {
     pub span: Span,
@@ -45,17 +45,17 @@ impl Capsule {
         Self { middle, point: curve.point(middle.1), tangent: curve.tangent(middle.1), half, radius, curvature }
     }
 
-    /// How far n . x can be from n . point.
+    /// Returns a bound of |n . x - n . point| over the capsule.
     pub fn reach(&self, n: Vector, length: f64) -> Interval {
         dot(n, self.tangent).abs() * self.half + Interval::point(length) * self.radius
     }
 
-    /// The distance of a point here from one there, at most.
+    /// Returns an upper bound of the distance of a point of this capsule from a point of the other.
     pub fn most_apart(&self, other: &Self) -> f64 {
         (norm(minus(self.point, other.point)) + self.slack(other)).hi
     }
 
-    /// By how much points can be elsewhere than in the middle.
+    /// Returns an upper bound of the sum of two distances: of a point of each capsule from its middle.
     fn slack(&self, other: &Self) -> Interval {
         Interval::point(self.half)
             + Interval::point(other.half)
@@ -63,7 +63,7 @@ impl Capsule {
             + Interval::point(other.radius)
     }
 
-    /// The square of the distance of any place of the span from a point, by Taylor's formula.
+    /// Returns the squared distances of all places of the span from a point, by Taylor's formula.
     pub fn distance_squared(&self, x: Vector) -> Interval {
         let Self { point, tangent, half, curvature, radius, .. } = *self;
         let between = minus(point, x);
@@ -74,25 +74,26 @@ impl Capsule {
         norm_squared(between) + Interval::within((linear + square).hi)
     }
 
-    /// t . (u - x) over all u here and x there, t being the tangent at u, or at x.
+    /// Returns t . (u - x) for all u of this capsule and x of the other. t is the tangent at u, or at x.
     pub fn product(&self, other: &Self, at_other: bool) -> Interval {
         let at = if at_other { other } else { self };
         self.component(other, at.tangent, at.turned())
     }
 
-    /// n . (u - x) over all u here and x there, n being the unit normal to the left at u, or at x.
+    /// Returns n . (u - x) for all u of this capsule and x of the other. n is the unit normal to the left at u, or at
+    /// x.
     pub fn across(&self, other: &Self, at_other: bool) -> Interval {
         let at = if at_other { other } else { self };
         let [x, y] = at.tangent;
         self.component(other, [-y, x], at.turned())
     }
 
-    /// At least how far a tangent here is from that of the middle.
+    /// Returns an upper bound of the difference between a tangent of the span and the tangent at the middle.
     pub fn turned(&self) -> Interval {
         Interval::point(self.curvature) * self.half
     }
 
-    /// n . (u - x) over all u here and x there for all n no further than `turned` from a unit vector.
+    /// Returns n . (u - x) for all u of this capsule, x of the other, and n within `turned` of a unit vector.
     fn component(&self, other: &Self, unit: Vector, turned: Interval) -> Interval {
         let along = |capsule: &Self| dot(unit, capsule.tangent).abs() * capsule.half;
         let off = along(self)
@@ -112,7 +113,7 @@ impl Spanned {
     }
 }
 
-/// A capsule moved back along its own tangent, for handles on one straight line.
+/// Returns a capsule moved back along its own tangent, for handles on one straight line.
 pub(super) fn moved_back(capsule: &Capsule, metres: Interval) -> Capsule {
     Capsule { point: minus(capsule.point, scaled(capsule.tangent, metres)), ..*capsule }
 }

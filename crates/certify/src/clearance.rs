@@ -1,14 +1,14 @@
-//! The least clearance of a show between two numbers: steps of the head over which no two boards can be nearer, and one place
-//! at which two are as near. Only [`super`] uses it. Lemma 6 of `docs/proofs.md`.
+//! Enclosure of the least clearance of a show: steps of the head that prove the lower bound, and one place that proves
+//! the upper bound. Lemma 6 of `docs/proofs.md`.
 
 use super::boards::MovingBoard;
 use super::capsule::{Span, Spanned};
-use super::carriers::{Carriers, Knots, knots_of};
+use super::first_order::When;
+use super::first_order_step::{FirstOrderStep, StepPoints, step_points};
+use super::grid::GridPoint;
 use super::interval::Interval;
-use super::knot::Knot;
 use super::lines::Links;
 use super::path::{Curve, ExactPath, Place};
-use super::relative::When;
 use super::search::{LEAST, path_end};
 use super::step::{Chain, Claim, Listed, Obstacle, PADS};
 use bench_dragon_messages::state::EventKind;
@@ -17,52 +17,52 @@ use bench_dragon_motion::contact::LeastClearance;
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::timeline::TimedEvent;
 
-/// Metres between which the least clearance is enclosed, with room for the rounding of both.
+/// Width of the enclosure in metres, with room for the rounding of both ends.
 const WIDTH: f64 = 0.9e-9;
 
-/// What a step that succeeded, and one that did not, do to the length of the next.
+/// Factors of the step length after a step that is shown, and after a step that is not.
 const GROWTH: f64 = 1.25;
 const SHRINK: f64 = 0.5;
 
-/// Metres, as a share of the way, of the shortest step.
+/// The shortest step, as a share of the path length in metres.
 const LEAST_STEP: f64 = 1e-14;
 
-/// Metres, as a share of the way, by which the show's end may be off by rounding.
+/// Rounding error of the show's end, as a share of the path length in metres.
 const END_SLACK: f64 = 1e-13;
 
-/// Metres before a lock to which a show is searched that ends with it, in turn: the nearer, the less the handle that is lost
-/// can still move.
+/// Distances in metres before a lock at which the search may stop, tried in this order. The nearer the stop, the less
+/// the lost handle can still move.
 const BEFORE_LOCK: [f64; 3] = [1e-9, 3e-11, 1e-12];
 
-/// How far behind a contact, in links, boards are expected to overlap surely.
+/// Distance behind a contact, in links, at which boards are expected to overlap surely.
 const TOUCH: f64 = 1e-3;
 
-/// Steps after which the search gives up where nothing else is requested.
+/// Default limit of steps.
 pub const MOST_CLEARANCE_STEPS: u64 = 100_000;
 
-/// The least clearance of a show between two numbers.
+/// An enclosure of the least clearance of a show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClearanceEnclosure {
-    /// Metres: no two boards that share no handle are nearer, from the start up to `until`.
+    /// Lower bound in metres, for all boards that share no handle, from the start up to `until`.
     pub lo: f64,
-    /// Metres: two boards are no further apart than this, at one place of the show.
+    /// Upper bound in metres: two boards are as near at one place of the show.
     pub hi: f64,
-    /// Metres of travel of the head at that place, nearly.
+    /// Travel of the head at that place in metres, approximate.
     pub travelled: f64,
-    /// The two benches, counted from 0, the one nearer the head first.
+    /// The bench of the two that is nearer the head, counted from 0.
     pub bench_a: usize,
-    /// The second of them.
+    /// The other bench.
     pub bench_b: usize,
-    /// Metres of travel up to which that is proved, where it is not up to the show's end.
+    /// Travel in metres up to which `lo` is proved, if not up to the show's end.
     pub until: Option<f64>,
-    /// Steps that were tried.
+    /// Number of steps tried.
     pub steps: u64,
 }
 
-/// Encloses the least clearance of all pairs of boards which share no handle, from the start until the show freezes at
-/// `freeze`: within a nanometre, unless the search gives up after `most_steps`. `hint` is what the ordinary search has
-/// found, which only tells where to look. `progress` gets the share of the way that is done, from 0 to 1. `None` where not
-/// even the hint can be shown.
+/// Encloses the least clearance of all pairs of boards that share no handle, from the start until the show ends at
+/// `freeze`. The enclosure is a nanometre wide, unless the search gives up after `most_steps`. `hint` is the result of
+/// the ordinary search; it only suggests where to search. `progress` receives the share that is done, from 0 to 1.
+/// Returns `None` if not even the hint can be shown.
 pub fn enclose_least_clearance(
     motion: &Motion,
     freeze: &TimedEvent,
@@ -89,7 +89,7 @@ pub fn enclose_least_clearance(
     }
 }
 
-/// A clearance that two boards have at most, and where.
+/// An upper bound of the clearance of two boards, and its place.
 #[derive(Debug, Clone, Copy)]
 struct Upper {
     value: f64,
@@ -97,34 +97,34 @@ struct Upper {
     benches: [usize; 2],
 }
 
-/// The steps of one search.
+/// The state of one search.
 pub(super) struct Descent<'a> {
     chain: Chain<'a>,
-    at: Knot,
+    at: GridPoint,
     links: Links,
     covered: bool,
     step: f64,
     steps: u64,
     most_steps: u64,
-    /// Metres of travel of the show's end.
+    /// Travel at the end of the show, metres.
     end: f64,
-    /// What two boards are apart at most somewhere; boards are looked at where this or `floor` is known.
+    /// The upper bound that is known. Boards are tested only if this or `floor` is set.
     upper: Option<Upper>,
-    /// What two boards have to be further apart than, where that is fixed.
+    /// A fixed lower bound to prove, in metres.
     floor: Option<f64>,
 }
 
-/// A step of which not all was shown.
+/// A step that was not shown completely.
 struct Refused {
     obstacle: Obstacle,
     nearer: Option<Upper>,
 }
 
 impl<'a> Descent<'a> {
-    /// Steps from the start to `end`, metres of travel.
+    /// Creates a search from the start to `end`, metres of travel.
     pub fn new(chain: Chain<'a>, end: f64, most_steps: u64) -> Self {
         let step = 0.25 * chain.team.shortest_link();
-        let at = Knot::at(Place(0, 0.0), 0.0);
+        let at = GridPoint::at(Place(0, 0.0), 0.0);
         let mut descent = Self {
             chain,
             at,
@@ -138,43 +138,44 @@ impl<'a> Descent<'a> {
             floor: None,
         };
         let before = -LEAST * (1.0 + descent.chain.path.length());
-        descent.at = descent.beside(0.0, -1.0, |travelled| travelled.hi <= 0.0).unwrap_or_else(|| descent.knot(before));
+        descent.at =
+            descent.beside(0.0, -1.0, |travelled| travelled.hi <= 0.0).unwrap_or_else(|| descent.grid_point(before));
         descent
     }
 
-    /// The nearest knot to one side of a place of the head of which something is sure.
-    fn beside(&self, travelled: f64, side: f64, holds: impl Fn(Interval) -> bool) -> Option<Knot> {
+    /// Returns the nearest grid point on one side of a place for which `holds` is proved.
+    fn beside(&self, travelled: f64, side: f64, holds: impl Fn(Interval) -> bool) -> Option<GridPoint> {
         let Chain { path, exact, .. } = &self.chain;
         let least = f64::EPSILON * (1.0 + path.length());
-        let mut knots = (0..40).map(|power| Knot::new(path, exact, travelled + side * least * 2f64.powi(power)));
-        knots.find(|knot| holds(exact.travelled(knot.head)))
+        let mut points = (0..40).map(|power| GridPoint::new(path, exact, travelled + side * least * 2f64.powi(power)));
+        points.find(|point| holds(exact.travelled(point.head)))
     }
 
-    /// The least clearance from the start to `target`.
+    /// Encloses the least clearance from the start to `target`.
     fn least(
         mut self,
         hint: &LeastClearance,
-        target: &Knot,
+        target: &GridPoint,
         progress: &mut dyn FnMut(f64),
     ) -> Option<ClearanceEnclosure> {
         let until = self.descend(hint, target, progress)?;
         Some(self.enclosed(self.upper?, until))
     }
 
-    /// The least clearance of a show that ends with a lock.
+    /// Encloses the least clearance of a show that ends with a lock.
     fn least_until_lock(
         mut self,
         lock: &Event,
         hint: &LeastClearance,
         progress: &mut dyn FnMut(f64),
     ) -> Option<ClearanceEnclosure> {
-        let target = self.knot(self.end);
+        let target = self.grid_point(self.end);
         if let Some(until) = self.descend(hint, &target, progress)? {
             return Some(self.enclosed(self.upper?, Some(until)));
         }
         let is_shown = BEFORE_LOCK.iter().any(|before| {
-            let target = self.knot(lock.travelled - before);
-            // As near as can be shown.
+            let target = self.grid_point(lock.travelled - before);
+            // An incomplete approach is no error: the lock is tried from there.
             let _ = self.at.travelled < target.travelled && self.go_to(&target, progress).is_some();
             self.stays_to_lock(lock)
         });
@@ -182,25 +183,30 @@ impl<'a> Descent<'a> {
         Some(self.enclosed(self.upper?, until))
     }
 
-    /// Goes to `target`, or returns how far it came; `None` where nothing is known of the hint.
-    fn descend(&mut self, hint: &LeastClearance, target: &Knot, progress: &mut dyn FnMut(f64)) -> Option<Option<f64>> {
+    /// Goes to `target`. Returns the travel that it reached if it stopped before; `None` if the hint cannot be shown.
+    fn descend(
+        &mut self,
+        hint: &LeastClearance,
+        target: &GridPoint,
+        progress: &mut dyn FnMut(f64),
+    ) -> Option<Option<f64>> {
         let end = self.end;
         let inside = |travelled: Interval| travelled.lo >= 0.0 && travelled.hi <= end;
         let side = if hint.travelled < 0.5 * end { 1.0 } else { -1.0 };
-        let knot = self.beside(hint.travelled.clamp(0.0, end), side, inside)?;
+        let point = self.beside(hint.travelled.clamp(0.0, end), side, inside)?;
         let benches = [hint.bench_a, hint.bench_b].map(|bench| bench as usize);
-        self.upper = Some(self.upper_between(knot.clone(), knot, benches)?);
+        self.upper = Some(self.upper_between(point.clone(), point, benches)?);
         Some(self.go_to(target, progress))
     }
 
-    /// Whether no two boards are nearer than the least that is known from here to a lock: the handle that is lost there stays
-    /// until then between two places that it cannot pass, and those behind it follow.
+    /// Returns true if no two boards are nearer than the threshold from here to a lock. Until then the lost handle
+    /// stays between two places that it cannot pass, and the handles behind it follow.
     fn stays_to_lock(&mut self, lock: &Event) -> bool {
         let link = lock.bench_a.unwrap_or(0) as usize;
         let most = TOUCH * self.chain.team.shortest_link();
         let least = 2.0 * (lock.travelled - self.at.travelled).max(BEFORE_LOCK[2]);
         (0..40).map(|power| least * 2f64.powi(power)).take_while(|beyond| *beyond < most).any(|beyond| {
-            let mut to = self.knot(lock.travelled + beyond);
+            let mut to = self.grid_point(lock.travelled + beyond);
             let (chain, at, mut end) = (&self.chain, &mut self.at, to.clone());
             let Some(mut handles) = chain.spans(at, &mut to, link) else { return false };
             let Some(last) = chain.spans(&mut to, &mut end, link) else { return false };
@@ -210,16 +216,16 @@ impl<'a> Descent<'a> {
         })
     }
 
-    /// Whether all boards are apart while the last of some handles is anywhere in a window, and those before it in their
-    /// spans.
+    /// Returns true if all boards are apart while the last of `handles` is anywhere in the window and the others are in
+    /// their spans.
     fn are_apart_behind(&self, handles: Vec<Spanned>, window: Span, pads: f64) -> bool {
         let chain = &self.chain;
         let [mut from, mut to] = [window.0, window.1].map(|place| {
-            let mut knot = Knot::at(place, self.at.travelled);
-            knot.handles = vec![knot.handles[0]; handles.len()];
-            knot
+            let mut point = GridPoint::at(place, self.at.travelled);
+            point.handles = vec![point.handles[0]; handles.len()];
+            point
         });
-        // Lemma 4, where it is handle 1 that is lost.
+        // Lemma 4 applies if handle 1 is lost.
         let is_covered = handles.len() == 2 && chain.start.is_some_and(|start| chain.exact.in_order(start, window.0));
         let links = if is_covered { self.links } else { Links::All };
         let mut listed = Listed::behind(chain, handles, pads);
@@ -231,32 +237,32 @@ impl<'a> Descent<'a> {
         self.boards_are_apart(&listed, None, links).is_ok()
     }
 
-    /// Metres of travel up to which the search has come.
+    /// Returns the metres of travel up to which the search has come.
     fn travelled(&self) -> f64 {
         self.chain.exact.travelled(self.at.head).lo.max(0.0)
     }
 
-    /// The same steps on an inward spiral alone, where it is known that no two boards touch and no link locks with the head,
-    /// or with the front handle of any other link, at the first place or further out: then the first two links are enough
-    /// from there on ("The least pitch" in `docs/proofs.md`).
+    /// Restricts the steps to the first two links, for an inward spiral. Precondition: no two boards touch and no link
+    /// locks while the head, or the front handle of any link, is at the first place or further out. See "The least
+    /// pitch" in `docs/proofs.md`.
     pub fn after_all_further_out(mut self) -> Self {
         self.links = Links::Front;
         self.chain.start = Some(Place(0, f64::INFINITY));
         self
     }
 
-    /// Where the head is.
+    /// Returns the place of the head.
     pub fn head(&self) -> Place {
         self.at.head
     }
 
-    /// Whether no two boards touch, and no link locks, from the start to `target`.
-    pub fn stays_clear_to(mut self, target: &Knot, progress: &mut dyn FnMut(f64)) -> bool {
+    /// Returns true if no two boards touch, and no link locks, from the start to `target`.
+    pub fn stays_clear_to(mut self, target: &GridPoint, progress: &mut dyn FnMut(f64)) -> bool {
         self.floor = Some(0.0);
         self.go_to(target, progress).is_none()
     }
 
-    /// The least clearance of a show that is frozen from its start.
+    /// Encloses the least clearance of a show that ends at its start.
     fn at_start(mut self, hint: &LeastClearance) -> Option<ClearanceEnclosure> {
         let after = self.beside(0.0, 1.0, |travelled| travelled.lo >= 0.0)?;
         let benches = [hint.bench_a, hint.bench_b].map(|bench| bench as usize);
@@ -265,8 +271,8 @@ impl<'a> Descent<'a> {
         Some(self.enclosed(self.upper?, until))
     }
 
-    /// The least clearance of a show that freezes at its first contact: 0, if boards are apart at the start, overlap a
-    /// little behind the contact, and handles go continuously between the two.
+    /// Encloses the least clearance of a show that ends at its first contact. It is 0 if boards are apart at the start,
+    /// overlap shortly after the contact, and handles move continuously between the two.
     fn touch(mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Option<ClearanceEnclosure> {
         let benches = [event.bench_a?, event.bench_b?].map(|bench| bench as usize);
         let touch = Upper { value: 0.0, travelled: event.travelled, benches };
@@ -277,9 +283,9 @@ impl<'a> Descent<'a> {
         let far = TOUCH * self.chain.team.shortest_link();
         let overlapping =
             (0..40).map(|power| 1e-12 * 2f64.powi(power)).take_while(|beyond| *beyond < far).find_map(|beyond| {
-                let knot = self.knot(event.travelled + beyond);
-                let upper = self.upper_between(knot.clone(), knot.clone(), benches)?;
-                (upper.value < 0.0).then_some(knot)
+                let point = self.grid_point(event.travelled + beyond);
+                let upper = self.upper_between(point.clone(), point.clone(), benches)?;
+                (upper.value < 0.0).then_some(point)
             })?;
         until = until.or_else(|| self.go_to(&overlapping, progress));
         self.upper = Some(touch);
@@ -291,29 +297,29 @@ impl<'a> Descent<'a> {
         ClearanceEnclosure { lo: self.threshold(), hi, travelled, bench_a, bench_b, until, steps: self.steps }
     }
 
-    /// The clearance of two boards with the head anywhere between two places, from above.
-    fn upper_between(&self, mut from: Knot, mut to: Knot, benches: [usize; 2]) -> Option<Upper> {
+    /// Returns an upper bound of the clearance of two boards with the head anywhere between two places.
+    fn upper_between(&self, mut from: GridPoint, mut to: GridPoint, benches: [usize; 2]) -> Option<Upper> {
         let mut middle = from.clone();
         PADS.iter().find_map(|pads| {
-            let mut carriers = Carriers::new(&self.chain, &knots_of(&mut from, &mut middle, &mut to), *pads);
-            while carriers.listed.handles.len() <= benches[1] + 1 {
-                carriers.extend(knots_of(&mut from, &mut middle, &mut to), Links::All).ok()?;
+            let mut first_order =
+                FirstOrderStep::new(&self.chain, &step_points(&mut from, &mut middle, &mut to), *pads);
+            while first_order.listed.handles.len() <= benches[1] + 1 {
+                first_order.extend(step_points(&mut from, &mut middle, &mut to), Links::All).ok()?;
             }
-            let [one, other] = benches.map(|bench| carriers.board(bench));
+            let [one, other] = benches.map(|bench| first_order.board(bench));
             Some(Upper { value: one.at_most(&other, When::Always), travelled: to.travelled, benches })
         })
     }
 
-    /// Goes to a knot, or as far as it can be shown that nothing is nearer than the least that is known: then returns how
-    /// far.
-    fn go_to(&mut self, target: &Knot, progress: &mut dyn FnMut(f64)) -> Option<f64> {
+    /// Goes to `target`. Returns the travel that it reached if a step before cannot be shown.
+    fn go_to(&mut self, target: &GridPoint, progress: &mut dyn FnMut(f64)) -> Option<f64> {
         let least = LEAST_STEP * (1.0 + self.chain.path.length());
         let longest = self.chain.team.shortest_link();
         while self.at.head != target.head {
             let remaining = target.travelled - self.at.travelled;
             let length = self.step.min(remaining);
             let mut to =
-                if self.step >= 0.9 * remaining { target.clone() } else { self.knot(self.at.travelled + length) };
+                if self.step >= 0.9 * remaining { target.clone() } else { self.grid_point(self.at.travelled + length) };
             self.steps += 1;
             let given_up = match self.show(&mut to) {
                 Ok(()) => {
@@ -351,20 +357,20 @@ impl<'a> Descent<'a> {
         self.floor.is_some() || self.upper.is_some()
     }
 
-    /// What two boards have to be further apart than.
+    /// Returns the clearance in metres that pairs of boards must exceed.
     fn threshold(&self) -> f64 {
         self.floor.or(self.upper.map(|upper| upper.value - WIDTH)).unwrap_or(f64::NEG_INFINITY)
     }
 
-    pub fn knot(&self, travelled: f64) -> Knot {
-        Knot::new(self.chain.path, &self.chain.exact, travelled)
+    pub fn grid_point(&self, travelled: f64) -> GridPoint {
+        GridPoint::new(self.chain.path, &self.chain.exact, travelled)
     }
 
-    /// Shows a step from where the search is, and what follows for the next.
-    fn show(&mut self, to: &mut Knot) -> Result<(), Refused> {
-        let mut middle = self.knot(0.5 * self.at.travelled + 0.5 * to.travelled);
+    /// Shows a step from the current place, and prepares the next.
+    fn show(&mut self, to: &mut GridPoint) -> Result<(), Refused> {
+        let mut middle = self.grid_point(0.5 * self.at.travelled + 0.5 * to.travelled);
         let mut from = std::mem::replace(&mut self.at, to.clone());
-        let shown = self.show_between(&mut Knots { from: &mut from, middle: &mut middle, to });
+        let shown = self.show_between(&mut StepPoints { from: &mut from, middle: &mut middle, to });
         self.at = from;
         let (body_forward, start, second) = shown?;
         self.chain.start.get_or_insert(start.1);
@@ -379,11 +385,12 @@ impl<'a> Descent<'a> {
         Ok(())
     }
 
-    /// Whether every link behind the head's goes forward, and the spans of handles 1 and 2.
-    fn show_between(&self, knots: &mut Knots) -> Result<(bool, Span, Option<Span>), Refused> {
+    /// Shows a step with growing pads. Returns true if every link behind the head's goes forward, with the spans of
+    /// handles 1 and 2.
+    fn show_between(&self, points: &mut StepPoints) -> Result<(bool, Span, Option<Span>), Refused> {
         let mut refused = None;
         for pads in PADS {
-            match self.show_with(knots, pads) {
+            match self.show_with(points, pads) {
                 Err(Refused { obstacle: Obstacle::Link(link), .. }) => {
                     refused = refused.or(Some(Refused { obstacle: Obstacle::Link(link), nearer: None }));
                 }
@@ -393,34 +400,37 @@ impl<'a> Descent<'a> {
         Err(refused.unwrap_or(Refused { obstacle: Obstacle::Link(0), nearer: None }))
     }
 
-    fn show_with(&self, knots: &mut Knots, pads: f64) -> Result<(bool, Span, Option<Span>), Refused> {
-        let mut carriers = Carriers::new(&self.chain, knots, pads);
-        while carriers.listed.handles.len() <= self.chain.team.benches && !self.is_enough(&carriers.listed, self.links)
+    fn show_with(&self, points: &mut StepPoints, pads: f64) -> Result<(bool, Span, Option<Span>), Refused> {
+        let mut first_order = FirstOrderStep::new(&self.chain, points, pads);
+        while first_order.listed.handles.len() <= self.chain.team.benches
+            && !self.is_enough(&first_order.listed, self.links)
         {
-            let knots = knots_of(knots.from, knots.middle, knots.to);
-            carriers.extend(knots, self.links).map_err(|obstacle| Refused { obstacle, nearer: None })?;
+            let points = step_points(points.from, points.middle, points.to);
+            first_order.extend(points, self.links).map_err(|obstacle| Refused { obstacle, nearer: None })?;
         }
         if self.looks_at_boards() {
-            self.boards_are_apart(&carriers.listed, Some(&carriers), self.links).map_err(|benches| {
-                let [one, other] = benches.map(|bench| carriers.board(bench.min(carriers.listed.handles.len() - 2)));
-                let travelled = self.chain.exact.travelled(carriers.at);
-                let inside =
-                    travelled.lo >= 0.0 && travelled.hi <= self.end && benches[1] + 1 < carriers.listed.handles.len();
+            self.boards_are_apart(&first_order.listed, Some(&first_order), self.links).map_err(|benches| {
+                let [one, other] =
+                    benches.map(|bench| first_order.board(bench.min(first_order.listed.handles.len() - 2)));
+                let travelled = self.chain.exact.travelled(first_order.at);
+                let inside = travelled.lo >= 0.0
+                    && travelled.hi <= self.end
+                    && benches[1] + 1 < first_order.listed.handles.len();
                 let nearer = inside
                     .then(|| Upper {
                         value: one.at_most(&other, When::Middle),
-                        travelled: knots.middle.travelled,
+                        travelled: points.middle.travelled,
                         benches,
                     })
                     .filter(|nearer| self.upper.is_some_and(|upper| nearer.value < upper.value - 1e-3 * WIDTH));
                 Refused { obstacle: Obstacle::Pair(benches[0], benches[1]), nearer }
             })?;
         }
-        let handles = &carriers.listed.handles;
-        Ok((carriers.listed.body_forward, handles[1].span, handles.get(2).map(|second| second.span)))
+        let handles = &first_order.listed.handles;
+        Ok((first_order.listed.body_forward, handles[1].span, handles.get(2).map(|second| second.span)))
     }
 
-    /// Whether the handles that are listed are all that a step needs.
+    /// Returns true if the listed handles suffice for a step.
     fn is_enough(&self, listed: &Listed, links: Links) -> bool {
         let last = listed.handles.len() - 1;
         if last < 2 {
@@ -436,17 +446,24 @@ impl<'a> Descent<'a> {
         }
     }
 
-    /// Shows that no two boards come as near as the least that is known, all of them or those with board 0 or 1; or two
-    /// of which it cannot be shown.
-    fn boards_are_apart(&self, listed: &Listed, carriers: Option<&Carriers>, links: Links) -> Result<(), [usize; 2]> {
+    /// Shows that no two boards come as near as the threshold: all pairs, or the pairs with board 0 or 1.
+    ///
+    /// # Errors
+    /// A pair of which it cannot be shown.
+    fn boards_are_apart(
+        &self,
+        listed: &Listed,
+        first_order: Option<&FirstOrderStep>,
+        links: Links,
+    ) -> Result<(), [usize; 2]> {
         let (chain, benches, threshold) = (&self.chain, self.chain.team.benches, self.threshold());
         let count = listed.handles.len() - 1;
         let boards: Vec<_> = (0..count).map(|bench| chain.board(&listed.handles, bench)).collect();
         let is_spiral = matches!(chain.exact.segments[0].curve, Curve::Inward { .. });
         let firsts = if links == Links::All { count } else { count.min(2) };
         let far = threshold.max(0.0);
-        let are_apart = |[a, b]: [usize; 2]| match carriers {
-            Some(carriers) => carriers.are_apart([a, b], threshold),
+        let are_apart = |[a, b]: [usize; 2]| match first_order {
+            Some(first_order) => first_order.are_apart([a, b], threshold),
             None => boards[a].is_apart_by(threshold, &boards[b]),
         };
         for (a, board) in boards[..firsts].iter().enumerate() {
@@ -461,7 +478,7 @@ impl<'a> Descent<'a> {
                 }
             }
             let next = count.max(a + 2);
-            if next < benches && !beyond && !self.is_apart_from_rest((a, board), listed, carriers, next) {
+            if next < benches && !beyond && !self.is_apart_from_rest((a, board), listed, first_order, next) {
                 return Err([a, next]);
             }
         }
@@ -472,12 +489,12 @@ impl<'a> Descent<'a> {
         Ok(())
     }
 
-    /// Whether a board is apart from those from `next` on, which are not listed.
+    /// Returns true if a board is apart from the boards from `next` on, which are not listed.
     fn is_apart_from_rest(
         &self,
         (a, board): (usize, &MovingBoard),
         listed: &Listed,
-        carriers: Option<&Carriers>,
+        first_order: Option<&FirstOrderStep>,
         next: usize,
     ) -> bool {
         let threshold = self.threshold();
@@ -485,9 +502,9 @@ impl<'a> Descent<'a> {
             return listed.is_beyond(threshold.max(0.0), board, listed.handles.len() - 1);
         }
         board.is_further_than(threshold.max(0.0), &listed.straight_run(next))
-            || match carriers {
-                Some(carriers) => {
-                    carriers.board(a).is_further_than(threshold, &carriers.straight_run(next), When::Always)
+            || match first_order {
+                Some(first_order) => {
+                    first_order.board(a).is_further_than(threshold, &first_order.straight_run(next), When::Always)
                 }
                 None => board.is_apart_by(threshold, &listed.straight_run(next)),
             }

@@ -1,26 +1,26 @@
-//! Enclosures of pi, sine and cosine, arctangent and logarithm, from their series. Only [`super`] uses it.
+//! Enclosures of pi, sine and cosine, arctangent and logarithm, from their series.
 
 use super::interval::Interval;
 
-/// Pi over 2 in three doubles of 26 digits, so that their products with a whole number below 2^27 are exact.
+/// Pi / 2 as a sum of three doubles of 26 bits each: their products with a whole number below 2^27 are exact.
 const HALF_PI: [f64; 3] = [1.5707963109016418, 1.5893254712295857e-8, 6.123233932053594e-17];
 
-/// More than pi over 2 exceeds the sum of [`HALF_PI`].
+/// Upper bound of pi / 2 minus the sum of [`HALF_PI`].
 const HALF_PI_REST: f64 = 6.4e-25;
 
-/// The greatest argument of [`sin_cos`]: beyond it the whole range is returned.
+/// The greatest argument of [`sin_cos`]. Beyond it the result is the whole range.
 const GREATEST_ARGUMENT: f64 = 2e8;
 
-/// Pi.
+/// Returns pi.
 pub(super) fn pi() -> Interval {
     let [high, middle, low] = HALF_PI.map(Interval::point);
     (high + (middle + (low + Interval { lo: 0.0, hi: HALF_PI_REST }))) * 2.0
 }
 
-/// Sine and cosine of a double.
+/// Returns sine and cosine of a double.
 ///
-/// x = k pi / 2 + y with |y| <= 0.79; then the series of y to y^19 and y^20, whose remainders are below the first term left
-/// out, 0.79^21 / 21! < 2e-22 (the terms alternate and fall).
+/// x = k pi / 2 + y with |y| <= 0.79. The series of y end with y^19 and y^20. Terms alternate and fall, so the
+/// remainder is below the next term, 0.79^21 / 21! < 2e-22.
 pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     if x.is_nan() || x.abs() > GREATEST_ARGUMENT {
         let any = Interval::within(1.0);
@@ -45,30 +45,30 @@ pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     }
 }
 
-/// n! / (n - 2)! of the terms of the sine: each term is the one before times -y^2 over this.
+/// Divisors of the terms of the sine, n (n - 1): each term is the term before it times -y^2 over this.
 const ODD: [f64; 9] = [6.0, 20.0, 42.0, 72.0, 110.0, 156.0, 210.0, 272.0, 342.0];
 
-/// The same for the cosine.
+/// Divisors of the terms of the cosine.
 const EVEN: [f64; 10] = [2.0, 12.0, 30.0, 56.0, 90.0, 132.0, 182.0, 240.0, 306.0, 380.0];
 
-/// 1 - s/q1 (1 - s/q2 (1 - ...)), which is the series whose terms have these quotients.
+/// Returns 1 - s/q1 (1 - s/q2 (1 - ...)), the sum of the series whose terms have the divisors q1, q2, ...
 fn alternating(s: Interval, quotients: &[f64]) -> Interval {
     quotients.iter().rev().fold(Interval::ONE, |sum, quotient| {
-        // A quotient of whole numbers below 2^53: its reciprocal is off by one rounding.
+        // Divisors are whole numbers below 2^53: their reciprocals have one rounding.
         let reciprocal = Interval::outward(1.0 / quotient, 1.0 / quotient);
         Interval::ONE - s * reciprocal * sum
     })
 }
 
-/// Arctangent of what is not negative.
+/// Returns the arctangent of a number of at least 0.
 ///
-/// atan x = 2 atan(x / (1 + sqrt(1 + x^2))), four times: then x < 0.0985 and the series to x^17 leaves less than
-/// x 0.0985^18 / 19 < x 5e-20.
+/// The identity atan x = 2 atan(x / (1 + sqrt(1 + x^2))) is applied four times. Then x < 0.0985, and the series to x^17
+/// leaves less than x 0.0985^18 / 19 < 5e-20 x.
 pub(super) fn atan(x: Interval) -> Interval {
     let mut reduced = x;
     for _ in 0..4 {
         reduced = reduced.over(Interval::ONE + (Interval::ONE + reduced.square()).sqrt());
-        // The quotient grows with x to 1: what rounding adds beyond that is not there.
+        // The quotient grows with x to 1: values outside come from rounding.
         reduced = Interval { lo: reduced.lo.max(0.0), hi: reduced.hi.min(1.0) };
     }
     let square = reduced.square();
@@ -79,9 +79,9 @@ pub(super) fn atan(x: Interval) -> Interval {
     reduced * (series + Interval::within(5e-20)) * 16.0
 }
 
-/// Natural logarithm of what is positive.
+/// Returns the natural logarithm of a positive number.
 ///
-/// x = 2^k m with m from the root of 1/2 to that of 2; ln m = 2 atanh z, z = (m - 1) / (m + 1), |z| < 0.172; the series to
+/// x = 2^k m with m from sqrt(1/2) to sqrt(2). ln m = 2 atanh z with z = (m - 1) / (m + 1), |z| < 0.172. The series to
 /// z^21 leaves less than z^23 / 23 / (1 - z^2) < 1e-18 z.
 pub(super) fn ln(x: Interval) -> Interval {
     let Interval { lo, hi } = x;
@@ -107,7 +107,7 @@ fn ln_of(x: f64) -> Interval {
 /// ln 2 = 0.693147180559945309417...
 const LN_2: Interval = Interval { lo: 0.693_147_180_559_945_2, hi: 0.693_147_180_559_945_4 };
 
-/// x = 2^exponent mantissa, mantissa from 0.7 to 1.42, exactly.
+/// Splits x = 2^exponent mantissa exactly, with a mantissa from 0.7 to 1.42.
 fn split(x: f64) -> (i32, f64) {
     let bits = x.to_bits();
     // Eleven bits fit.

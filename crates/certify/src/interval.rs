@@ -1,8 +1,8 @@
-//! Real numbers held between two doubles.
+//! Interval arithmetic in doubles, rounded outward.
 //!
-//! Every operation rounds its lower end down and its upper end up, by one unit in the last place more than IEEE 754
-//! arithmetic can be off in any rounding mode: nothing here depends on the mode in force. Ends may be infinite; where an
-//! operation has no meaning (a division by an interval that holds 0) the result is the whole line. Only [`super`] uses it.
+//! Every operation moves both ends outward by one unit in the last place more than the greatest rounding error in any
+//! IEEE 754 rounding mode. So the result does not depend on the mode in force. Ends may be infinite. An operation
+//! without a meaning, such as a division by an interval that holds 0, returns the whole line.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
@@ -21,28 +21,28 @@ impl Interval {
     pub const ONE: Self = Self::point(1.0);
     const LINE: Self = Self { lo: f64::NEG_INFINITY, hi: f64::INFINITY };
 
-    /// The double itself.
+    /// Returns the interval of one number.
     pub const fn point(value: f64) -> Self {
         Self { lo: value, hi: value }
     }
 
-    /// From `lo` to `hi`, both rounded to nearest: one unit in the last place further out each. What is not a number
-    /// bounds nothing.
+    /// Returns the interval from `lo` to `hi`, which are rounded to nearest, with one unit in the last place more at
+    /// each end. Returns the whole line if one of them is NaN.
     pub(super) fn outward(lo: f64, hi: f64) -> Self {
         if lo.is_nan() || hi.is_nan() { Self::LINE } else { Self { lo: lo.next_down(), hi: hi.next_up() } }
     }
 
-    /// All numbers within `radius` of 0.
+    /// Returns all numbers within `radius` of 0.
     pub fn within(radius: f64) -> Self {
         Self { lo: -radius, hi: radius }
     }
 
-    /// The greatest absolute value.
+    /// Returns the greatest absolute value.
     pub fn magnitude(self) -> f64 {
         self.lo.abs().max(self.hi.abs())
     }
 
-    /// A double near the middle.
+    /// Returns a double near the middle.
     pub fn middle(self) -> f64 {
         0.5 * self.lo + 0.5 * self.hi
     }
@@ -55,7 +55,7 @@ impl Interval {
         self.hi < 0.0
     }
 
-    /// Whether every number here is below every number there.
+    /// Returns true if every number of `self` is below every number of `other`.
     pub fn is_below(self, other: Self) -> bool {
         self.hi < other.lo
     }
@@ -67,13 +67,13 @@ impl Interval {
         Self { lo: lo.max(0.0), hi }
     }
 
-    /// The square root; of what is negative, 0.
+    /// Returns the square root, and 0 for negative numbers.
     pub fn sqrt(self) -> Self {
         let Self { lo, hi } = Self::outward(self.lo.max(0.0).sqrt(), self.hi.max(0.0).sqrt());
         Self { lo: lo.max(0.0), hi }
     }
 
-    /// The quotient; the whole line where the divisor may be 0.
+    /// Returns the quotient, or the whole line if the divisor may be 0.
     pub fn over(self, divisor: Self) -> Self {
         if divisor.lo <= 0.0 && divisor.hi >= 0.0 {
             return Self::LINE;
@@ -101,7 +101,7 @@ impl Interval {
     }
 }
 
-/// The hull of four numbers rounded to nearest, outward.
+/// Returns the hull of four numbers that are rounded to nearest, rounded outward.
 fn hull([a, b, c, d]: [f64; 4]) -> Interval {
     if a.is_nan() || b.is_nan() || c.is_nan() || d.is_nan() {
         return Interval::LINE;

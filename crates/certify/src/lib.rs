@@ -1,24 +1,25 @@
-//! Events with a proof: enclosures of every handle over steps of the head, rounded outward, from which it follows when
-//! contact, stall, lock and the path's end happen for the first time, or that they do not.
+//! Certified events. The search encloses every handle over steps of the head, rounded outward. From the enclosures
+//! follows when contact, stall, lock and path end first happen, or that they do not.
 //!
-//! In: a scene's motion, its events as the ordinary search found them, its text. Out: the lines of a certificate, and what
-//! they prove. The `events` command calls it; `proof` checks what it writes, with code of its own. The ordinary search only
-//! tells where to look: what it has missed makes the proof fail. Lemmas and file: `docs/proofs.md`.
+//! In: a scene's motion, its text, and its events from the ordinary search. Out: the lines of a certificate and the
+//! events that they prove. The `events` command calls it; the crate `proof` checks the lines with code of its own. The
+//! ordinary search only suggests where to search: an event that it misses makes the proof fail. Lemmas and file format:
+//! `docs/proofs.md`.
 
 mod boards;
 mod capsule;
-mod carriers;
 mod clearance;
 mod elementary;
+mod first_order;
+mod first_order_step;
+mod grid;
 mod interval;
-mod knot;
 mod lines;
 mod link;
 mod lock;
 mod path;
 mod pitch;
 pub mod plan;
-mod relative;
 mod search;
 pub mod speed;
 mod step;
@@ -27,7 +28,7 @@ use std::io;
 
 pub use capsule::Span;
 pub use clearance::{ClearanceEnclosure, MOST_CLEARANCE_STEPS, enclose_least_clearance};
-pub use lines::{FORMAT, Line, Links, Outcome, Status, Step};
+pub use lines::{CertificateLine, CertifiedEvent, FORMAT, Links, Status, Step};
 pub use path::Place;
 
 use bench_dragon_motion::Motion;
@@ -37,18 +38,18 @@ use bench_dragon_motion::model::path::Path;
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::timeline::Timeline;
 
-/// Steps after which the search gives up where nothing else is requested: some minutes, and hundreds of megabytes.
+/// Default limit of steps: some minutes, and hundreds of megabytes.
 pub const MOST_STEPS: u64 = 400_000;
 
-/// Why there is no certificate.
+/// The reason for a missing certificate.
 #[derive(Debug, thiserror::Error)]
 pub enum CertifyError {
-    /// It cannot be written.
+    /// The certificate cannot be written.
     #[error(transparent)]
     Write(#[from] io::Error),
 }
 
-/// What the search is given.
+/// Input of the search.
 #[derive(Clone, Copy)]
 pub(crate) struct Given<'a> {
     scene: &'a str,
@@ -60,8 +61,8 @@ pub(crate) struct Given<'a> {
     most_steps: u64,
 }
 
-/// Certifies the events of a motion. `scene` is the text that states it. Each line of the certificate is given to `write`;
-/// `progress` gets the share of the motion that is done, from 0 to 1. After `most_steps` the search gives up.
+/// Certifies the events of a motion. `scene` is the text of its scene. `write` receives each line of the certificate,
+/// `progress` the share of the motion that is done, from 0 to 1. The search gives up after `most_steps`.
 ///
 /// # Errors
 /// [`CertifyError::Write`]
@@ -70,9 +71,9 @@ pub fn certify(
     timeline: &Timeline,
     scene: &str,
     most_steps: u64,
-    write: &mut dyn FnMut(&Line) -> io::Result<()>,
+    write: &mut dyn FnMut(&CertificateLine) -> io::Result<()>,
     progress: &mut dyn FnMut(f64),
-) -> Result<Vec<Outcome>, CertifyError> {
+) -> Result<Vec<CertifiedEvent>, CertifyError> {
     let events: Vec<Event> = timeline.events().iter().map(|timed| timed.event).collect();
     let given = Given {
         scene,
@@ -83,7 +84,7 @@ pub fn certify(
         events: &events,
         most_steps,
     };
-    search::Search::new(given, write).run(progress)
+    search::CertificateSearch::new(given, write).run(progress)
 }
 
 #[cfg(test)]

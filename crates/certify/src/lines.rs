@@ -1,4 +1,5 @@
-//! The lines of a certificate: see "The file" in `docs/proofs.md`. The search writes them, a command prints its results.
+//! The lines of a certificate: see "The file" in `docs/proofs.md`. The search writes them; the `events` command prints
+//! their results.
 
 use serde::Serialize;
 
@@ -6,23 +7,23 @@ use super::capsule::Span;
 use super::path::Place;
 use bench_dragon_messages::state::EventKind;
 
-/// The number of the file's form.
+/// The version of the file format.
 pub const FORMAT: u32 = 1;
 
-/// Which links a step shows to hold.
+/// The links for which a step is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Links {
-    /// All of them.
+    /// All links.
     All,
-    /// Those of boards 0 and 1: the others follow from what was shown before.
+    /// The links of boards 0 and 1. The other links follow from earlier steps.
     Front,
 }
 
 /// A line of a certificate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
-pub enum Line<'a> {
+pub enum CertificateLine<'a> {
     /// The first line.
     Certificate {
         /// [`FORMAT`].
@@ -42,7 +43,7 @@ pub enum Line<'a> {
         from: Place,
         /// The last place of the head.
         to: Place,
-        /// Where the handles from 1 on are.
+        /// The spans of the handles from 1 on.
         spans: Vec<Span>,
         /// The point, metres.
         point: [f64; 2],
@@ -55,88 +56,88 @@ pub enum Line<'a> {
         from: Place,
         /// The last place of the head.
         to: Place,
-        /// Where the handles from 1 to behind the link are.
+        /// The spans of the handles from 1 to the rear of the link.
         spans: Vec<Span>,
     },
     /// A link has no continuous follower.
     Lock {
         /// The link, counted from 0.
         link: usize,
-        /// Where the head goes from the end of the last step.
+        /// The place to which the head goes from the end of the last step.
         to: Place,
-        /// Where the handles from 1 to the link's front are meanwhile.
+        /// The spans of the handles from 1 to the link's front meanwhile.
         spans: Vec<Span>,
-        /// Where they are at the end.
+        /// Their spans at the end.
         last: Vec<Span>,
-        /// Places behind and ahead of the link's follower that it cannot pass, where it vanishes.
+        /// For a follower that vanishes: places behind and ahead of it that it cannot pass.
         #[serde(skip_serializing_if = "Option::is_none")]
         window: Option<Span>,
-        /// A place ahead of the follower that it cannot pass, and one that it would have to be at or ahead of, where a
-        /// nearer place comes to be at the distance.
+        /// For a follower that jumps: a place ahead of it that it cannot pass, and a place that the next follower is at
+        /// or ahead of.
         #[serde(skip_serializing_if = "Option::is_none")]
         jump: Option<Span>,
     },
-    /// The last step has come to the path's end.
+    /// The last step has reached the path's end.
     PathEnd,
-    /// What follows for one kind of event.
-    Result(Outcome),
+    /// The result for one kind of event.
+    Result(CertifiedEvent),
 }
 
-/// A step of the head, and what holds all the while.
+/// A step of the head, and the statements that hold throughout it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Step {
-    /// The links that are shown.
+    /// The links that the step shows.
     pub links: Links,
-    /// Where the head begins.
+    /// The first place of the head.
     pub from: Place,
-    /// Where the head ends.
+    /// The last place of the head.
     pub to: Place,
     /// No link stalls in this step or before.
     pub moving: bool,
     /// No boards touch in this step or before.
     pub clear: bool,
-    /// Where the handles from 1 on are.
+    /// The spans of the handles from 1 on.
     pub spans: Vec<Span>,
 }
 
-/// What is proved of one kind of event.
+/// The proved result for one kind of event.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Outcome {
-    /// The kind.
+pub struct CertifiedEvent {
+    /// The kind of event.
     #[serde(serialize_with = "name")]
     pub event: EventKind,
-    /// What is known.
+    /// The result.
     #[serde(flatten)]
     pub status: Status,
 }
 
-/// What is known of one kind of event.
+/// A result for one kind of event.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "status", rename_all = "snake_case")]
 pub enum Status {
-    /// The first one is between two times.
+    /// The first event of this kind is between two times.
     Proved {
-        /// Simulated seconds, at the earliest.
+        /// Earliest time, simulated seconds.
         time_lo: f64,
-        /// Simulated seconds, at the latest.
+        /// Latest time, simulated seconds.
         time_hi: f64,
-        /// The bench, counted from 0, or the first of two, of which it is true at the latest time.
+        /// The bench that stalls or locks, or the first of two that touch, at the latest time; counted from 0.
         bench_a: Option<usize>,
         /// The second bench.
         bench_b: Option<usize>,
     },
-    /// There is none before the motion ends.
+    /// There is no such event before the motion ends.
     None {
-        /// Simulated seconds: what is meant where a lock ends the motion, which happens after that. `None` where the path's
-        /// end does, and for the path's end itself.
+        /// Simulated seconds up to which this is proved, if a lock ends the motion: the lock is later. `None` if the
+        /// path's end ends the motion, and for the path's end itself.
         #[serde(skip_serializing_if = "Option::is_none")]
         time_lo: Option<f64>,
     },
-    /// There is none before a time; beyond that nothing is known.
+    /// There is no such event before a time. Later is not known.
     Undecided {
         /// Simulated seconds.
         time_lo: f64,
-        /// Why not, in words.
+        /// The reason, in words.
         because: String,
     },
 }

@@ -1,4 +1,4 @@
-//! Lemma 1 of `docs/proofs.md`: the follower of a span is in another span. Only [`super`] uses it.
+//! Lemma 1 of `docs/proofs.md`: the follower of a span is in another span.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -6,24 +6,24 @@ use super::capsule::{Capsule, Span, Spanned};
 use super::interval::{Interval, minus, norm_squared};
 use super::path::ExactPath;
 
-/// Halvings of a stretch in which places are to be nearer than the link.
+/// Limit of halvings of a stretch whose places must be nearer than the link.
 const MOST_HALVINGS: u32 = 24;
 
-/// Below pi / 2.
+/// A number below pi / 2.
 const QUARTER: f64 = FRAC_PI_2 - 1e-12;
 
-/// What Lemma 1 says of the front product.
+/// The sign of the front product, by Lemma 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Front {
-    /// The rear handle goes forward with the front one.
+    /// The rear handle moves forward when the front handle does.
     Forward,
-    /// It goes backward.
+    /// The rear handle moves backward when the front handle moves forward.
     Backward,
-    /// It may turn round.
+    /// The rear handle may turn round.
     Unknown,
 }
 
-/// The front product's sign, if the follower of every place of `front` is proved to be in `rear`.
+/// Returns the sign of the front product if the follower of every place of `front` is proved to be in `rear`.
 pub(super) fn follower_within(path: &ExactPath, front: &Spanned, rear: &Spanned, link: Interval) -> Option<Front> {
     let sign = one_place_within(path, front, rear, link)?;
     let near = path.turning(rear.span.0, front.span.1) < QUARTER
@@ -31,8 +31,8 @@ pub(super) fn follower_within(path: &ExactPath, front: &Spanned, rear: &Spanned,
     near.then_some(sign)
 }
 
-/// The front product's sign, if for every place of `front` exactly one place of `rear`, neither of its ends, is proved to be
-/// at the distance: the follower, unless a nearer place is.
+/// Returns the sign of the front product if, for every place of `front`, exactly one inner place of `rear` is proved to
+/// be at the link's distance. That place is the follower unless a nearer place is at the distance.
 pub(super) fn one_place_within(path: &ExactPath, front: &Spanned, rear: &Spanned, link: Interval) -> Option<Front> {
     let (u, x) = (&front.capsule, &rear.capsule);
     if !path.in_order(rear.span.1, front.span.0) || !u.product(x, true).is_positive() {
@@ -54,7 +54,7 @@ pub(super) fn one_place_within(path: &ExactPath, front: &Spanned, rear: &Spanned
     holds.then_some(sign)
 }
 
-/// Whether every place of a stretch is proved to be of kind (a) or (b).
+/// Returns true if every place of a stretch is proved to be of kind (a) or (b).
 pub(super) fn nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Interval, halvings: u32) -> bool {
     let Span(first, last) = stretch;
     if path.turning(first, front.span.1) < QUARTER {
@@ -70,15 +70,15 @@ pub(super) fn nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Int
         && nearer(path, front, Span(middle, last), link, halvings - 1)
 }
 
-/// Whether all places of a stretch are proved to be nearer than the link to all of `front`, in one piece: by Taylor's
-/// formula along the stretch.
+/// Returns true if all places of a stretch are proved to be nearer than the link to all of `front`. Taylor's formula is
+/// applied to the whole stretch.
 fn is_nearer(stretch: &Capsule, front: &Spanned, link: Interval) -> bool {
     let Capsule { point, half, radius, .. } = front.capsule;
     let spread = Interval::within((Interval::point(half) + Interval::point(radius)).hi);
     stretch.distance_squared(point.map(|part| part + spread)).is_below(link.square())
 }
 
-/// Whether all places of a stretch are proved to be nearer than the link to all of `front`.
+/// Returns true if all places of a stretch are proved to be nearer than the link to all of `front`.
 pub(super) fn all_nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Interval, halvings: u32) -> bool {
     if is_nearer(&Capsule::new(path, stretch), front, link) {
         return true;

@@ -1,31 +1,31 @@
-//! What shows that a link locks: places that its follower cannot pass, and none between them in the end. Lemma 5 of
-//! `docs/proofs.md`. Only [`super`] uses it.
+//! Proof of a lock: places that the follower of a link cannot pass, with no follower between them in the end. Lemma 5
+//! of `docs/proofs.md`.
 
 use super::capsule::{Span, Spanned};
+use super::grid::{GridPoint, place, span};
 use super::interval::Interval;
-use super::knot::{Knot, place, span};
 use super::link::{all_nearer, one_place_within};
 use super::path::Place;
 use super::step::Chain;
 use bench_dragon_motion::model::root::{bisect_predicate, golden_section_min};
 
-/// Places between the handles of a link at which a nearer follower is looked for, and how many times as far from the
-/// follower as the one before each is.
+/// Number of places between the handles of a link at which a nearer follower is searched for, and the ratio of their
+/// distances from the follower.
 const JUMP_SAMPLES: i32 = 400;
 const JUMP_RATIO: f64 = 1.05;
 
-/// Halvings of the stretch in which a link that locks has no follower any more.
+/// Limit of halvings of the stretch in which a link that locks has no follower any more.
 const LOCK_HALVINGS: u32 = 12;
 
 impl Chain<'_> {
-    /// Places behind and ahead of the follower of a link that it cannot pass while the front is in `front`, and between
-    /// which there is none for any front in `last`.
-    pub fn lock_window(&self, at: &mut Knot, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
+    /// Returns places behind and ahead of the follower of a link that it cannot pass while the front is in `front`.
+    /// Between them is no follower for any front in `last`.
+    pub fn lock_window(&self, at: &mut GridPoint, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
         let Chain { path, exact, team, links, .. } = self;
         at.extend_to(link + 1, path, team).ok()?;
         let (before, rear) = (at.handles[link].param, at.handles[link + 1].param);
         let origin = path.point(before);
-        // Where the distance is greatest: the rear product changes its sign some way behind the follower.
+        // The distance is greatest where the rear product changes its sign, some way behind the follower.
         let product = |metres: f64| {
             let place = path.param_at(path.travelled(rear) - metres);
             path.tangent(place).dot(&(origin - path.point(place)))
@@ -57,9 +57,9 @@ impl Chain<'_> {
         })
     }
 
-    /// Where the follower of a link stays while the front is in `front`, until it is lost, if the link is lost with the front
-    /// in `last`, at the end of that.
-    pub fn until_lock(&self, at: &mut Knot, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
+    /// Returns a span of the follower of a link while the front is in `front`, until the follower is lost. Requires
+    /// that the link is lost with the front in `last`, at the end of `front`.
+    pub fn until_lock(&self, at: &mut GridPoint, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
         let exact = &self.exact;
         let begins = self.spans(&mut at.clone(), &mut at.clone(), link + 1)?[link + 1].span;
         let window = self.lock_window(at, link, front, last).or_else(|| {
@@ -75,9 +75,9 @@ impl Chain<'_> {
         (exact.in_order(window.0, begins.0) && exact.in_order(begins.1, window.1)).then_some(window)
     }
 
-    /// A place ahead of the follower of a link that is nearer than the link for all of `front`, and one ahead of that which
-    /// is further away for all of `last`.
-    pub fn lock_jump(&self, at: &mut Knot, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
+    /// Returns two places ahead of the follower of a link. The first is nearer than the link for all of `front`; the
+    /// second, ahead of it, is further than the link for all of `last`.
+    pub fn lock_jump(&self, at: &mut GridPoint, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
         let Chain { path, exact, team, links, .. } = self;
         at.extend_to(link + 1, path, team).ok()?;
         let rear = at.handles[link + 1].param;
@@ -88,7 +88,8 @@ impl Chain<'_> {
             let at = path.point(path.param_at(travelled));
             (at.x - origin[0]).hypot(at.y - origin[1])
         };
-        // The furthest place ahead of the first that is nearer than its neighbours, however near to the follower it is.
+        // The furthest place ahead of the first sample that is nearer than its neighbours, at any distance from the
+        // follower.
         let sampled = |k: i32| from + (to - from) * JUMP_RATIO.powi(k - JUMP_SAMPLES);
         let falling = (1..JUMP_SAMPLES).find(|k| distance(sampled(*k)) > distance(sampled(k - 1)))?;
         let peak = (falling..JUMP_SAMPLES).max_by(|j, k| distance(sampled(*j)).total_cmp(&distance(sampled(*k))))?;

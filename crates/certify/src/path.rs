@@ -1,5 +1,5 @@
 //! The path in intervals: places, points, tangents, and bounds of curvature, length and turning. See the definitions in
-//! `docs/proofs.md`. Only [`super`] uses it.
+//! `docs/proofs.md`.
 
 use serde::Serialize;
 
@@ -21,13 +21,13 @@ pub(super) enum Curve {
     Arc { origin: Vector, direction: Vector, inward: Vector, radius: Interval },
 }
 
-/// A segment: its curve and the coordinates between which it is, in the direction of travel.
+/// A segment: its curve, and its first and last coordinates in the direction of travel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Segment {
     pub curve: Curve,
     pub begin: Interval,
     pub end: Interval,
-    /// Metres of travel of the head where it begins; of the first segment, where it ends.
+    /// Travel of the head at the segment's start, metres; for the first segment, at its end.
     travelled: Interval,
 }
 
@@ -40,7 +40,7 @@ pub(super) struct ExactPath {
 const FAR: f64 = f64::INFINITY;
 
 impl Curve {
-    /// Whether the coordinate grows with travel.
+    /// Returns true if the coordinate grows with travel.
     fn grows(&self) -> bool {
         !matches!(self, Self::Inward { .. })
     }
@@ -49,7 +49,7 @@ impl Curve {
         self.point_of(Interval::point(at), sin_cos(at))
     }
 
-    /// The point at a coordinate with the sine and cosine of the same.
+    /// Returns the point at a coordinate from the coordinate's sine and cosine.
     fn point_of(&self, at: Interval, (sine, cosine): (Interval, Interval)) -> Vector {
         match *self {
             Self::Inward { a } => scaled([cosine, sine], a * at),
@@ -77,7 +77,7 @@ impl Curve {
         }
     }
 
-    /// The curvatures between two coordinates, 1/m: positive to the left.
+    /// Returns the curvatures between two coordinates, 1/m, positive to the left.
     fn bend(&self, one: f64, other: f64) -> Interval {
         let of_spiral = |a: Interval| {
             let at = |theta: f64| {
@@ -98,7 +98,8 @@ impl Curve {
         }
     }
 
-    /// How fast that changes between two coordinates, 1/m per metre of travel: theta (theta^2 + 4) / (a^2 w^6) downwards.
+    /// Returns the rate of the curvature between two coordinates, 1/m per metre of travel: -theta (theta^2 + 4) / (a^2
+    /// w^6).
     fn bend_rate(&self, one: f64, other: f64) -> Interval {
         match *self {
             Self::Inward { a } | Self::Outward { a } => {
@@ -110,7 +111,7 @@ impl Curve {
         }
     }
 
-    /// The most metres that are between two coordinates.
+    /// Returns an upper bound of the metres between two coordinates.
     fn length(&self, one: Interval, other: Interval) -> f64 {
         let between = (one - other).abs();
         match *self {
@@ -122,7 +123,7 @@ impl Curve {
         }
     }
 
-    /// The most radians by which the path turns between two coordinates.
+    /// Returns an upper bound of the radians by which the path turns between two coordinates.
     fn turning(&self, one: Interval, other: Interval) -> f64 {
         let between = (one - other).abs();
         match *self {
@@ -136,14 +137,14 @@ impl Curve {
     }
 }
 
-/// Metres of a spiral from its centre to theta: a/2 (theta w + asinh theta), asinh theta = ln(theta + w).
+/// Returns the metres of a spiral from its centre to theta: a/2 (theta w + asinh theta), asinh theta = ln(theta + w).
 fn spiral_length(a: Interval, theta: Interval) -> Interval {
     let w = (Interval::ONE + theta.square()).sqrt();
     a * (theta * w + ln(theta + w)) * 0.5
 }
 
 impl ExactPath {
-    /// The path of a scene.
+    /// Creates the path of a scene.
     pub fn new(description: &PathDescription) -> Self {
         match description {
             PathDescription::Spiral { pitch, start_turn } => {
@@ -163,7 +164,7 @@ impl ExactPath {
                 let (start, tangent) = (inward.point_of(theta, turn), inward.tangent_of(theta, turn));
                 let right: Vector = [tangent[1], -tangent[0]];
                 let first = Curve::Arc { origin: start, direction: tangent, inward: right, radius: first_radius };
-                // The end of arc 2 and its tangent are known; its beginning follows, angle radians back.
+                // The end of arc 2 and its tangent are known. Its begin is `angle` radians back.
                 let (sine, cosine) = sin_cos_of(angle);
                 let middle = first.point_of(angle, (sine, cosine));
                 let direction = first.tangent_of(angle, (sine, cosine));
@@ -191,23 +192,25 @@ impl ExactPath {
         }
     }
 
-    /// An inward spiral alone, of `a` metres per radian, whose end at the centre the head reaches after so many metres.
+    /// Creates an inward spiral alone, of `a` metres per radian. The head reaches its end at the centre after
+    /// `travelled` metres.
     pub fn inward(a: Interval, travelled: Interval) -> Self {
         let (curve, begin) = (Curve::Inward { a }, Interval::point(FAR));
         Self { segments: vec![Segment { curve, begin, end: Interval::ZERO, travelled }] }
     }
 
-    /// The segment of a place.
+    /// Returns the curve at a place.
     pub fn curve(&self, place: Place) -> &Curve {
         &self.segments[place.0].curve
     }
 
-    /// Whether `x` comes before `y` on the way, or is the same.
+    /// Returns true if `x` is before `y` on the path, or equal.
     pub fn in_order(&self, x: Place, y: Place) -> bool {
         x.0 < y.0 || x.0 == y.0 && if self.curve(x).grows() { x.1 <= y.1 } else { x.1 >= y.1 }
     }
 
-    /// Whether a place is strictly inside its segment; the last one goes on beyond its end, but not through a centre.
+    /// Returns true if a place is strictly inside its segment. The last segment continues beyond its end, but not
+    /// through a centre.
     pub fn is_inside(&self, Place(segment, at): Place) -> bool {
         let Some(Segment { curve, begin, end, .. }) = self.segments.get(segment) else { return false };
         let last = segment + 1 == self.segments.len();
@@ -221,7 +224,8 @@ impl ExactPath {
         }
     }
 
-    /// A place `metres` further on (back, where negative), strictly inside its segment: about as far, and never less.
+    /// Returns a place `metres` further on, or back if negative, strictly inside its segment. The distance is about
+    /// `metres`, and never less.
     pub fn moved(&self, place: Place, metres: f64) -> Place {
         let Place(segment, at) = place;
         let Segment { curve, begin, end, .. } = &self.segments[segment];
@@ -249,17 +253,17 @@ impl ExactPath {
             return Place(segment, end.hi);
         }
         let beyond = if metres >= 0.0 { self.after(segment) } else { self.before(segment) };
-        // On a first segment there is nothing to fall off.
+        // The first segment has no beginning to fall off.
         beyond.unwrap_or(Place(segment, begin.middle()))
     }
 
-    /// The first place that is surely on the segment after this one.
+    /// Returns the first place that is surely on the segment after this one.
     fn after(&self, segment: usize) -> Option<Place> {
         let Segment { curve, begin, .. } = self.segments.get(segment + 1)?;
         Some(Place(segment + 1, if curve.grows() { begin.hi.next_up() } else { begin.lo.next_down() }))
     }
 
-    /// The last place that is surely on the segment before this one.
+    /// Returns the last place that is surely on the segment before this one.
     fn before(&self, segment: usize) -> Option<Place> {
         let before = segment.checked_sub(1)?;
         Some(self.last_inside(before))
@@ -270,8 +274,8 @@ impl ExactPath {
         Place(segment, if curve.grows() { end.lo.next_down() } else { end.hi.next_up() })
     }
 
-    /// A place between two: half way on one segment, else the end of the earlier one's segment or the begin of the later
-    /// one's. `None` where there is none.
+    /// Returns a place between two: the middle on one segment, else the end of the earlier segment or the beginning of
+    /// the later one. `None` if there is none.
     pub fn between(&self, x: Place, y: Place) -> Option<Place> {
         if x.0 == y.0 {
             let middle = 0.5 * x.1 + 0.5 * y.1;
@@ -284,7 +288,7 @@ impl ExactPath {
         self.after(x.0).filter(|begin| *begin != y && self.in_order(*begin, y))
     }
 
-    /// The sum over the stretches of segments between two places.
+    /// Returns the sum over the stretches of segments between two places.
     fn sum(&self, x: Place, y: Place, of: impl Fn(&Curve, Interval, Interval) -> f64) -> f64 {
         let mut sum = Interval::ZERO;
         for segment in x.0..=y.0 {
@@ -296,26 +300,26 @@ impl ExactPath {
         sum.hi
     }
 
-    /// At least the metres between two places.
+    /// Returns an upper bound of the metres between two places.
     pub fn length(&self, x: Place, y: Place) -> f64 {
         self.sum(x, y, Curve::length)
     }
 
-    /// At least the radians by which the path turns between two places.
+    /// Returns an upper bound of the radians by which the path turns between two places.
     pub fn turning(&self, x: Place, y: Place) -> f64 {
         self.sum(x, y, Curve::turning)
     }
 
-    /// At least the curvature anywhere between two places, 1/m.
+    /// Returns an upper bound of the curvature between two places, 1/m.
     pub fn curvature(&self, x: Place, y: Place) -> f64 {
         self.bend(x, y).magnitude()
     }
 
-    /// The curvatures anywhere between two places, 1/m: positive to the left.
+    /// Returns the curvatures between two places, 1/m, positive to the left.
     pub fn bend(&self, x: Place, y: Place) -> Interval {
         let bends = (x.0..=y.0).map(|segment| {
             let Segment { curve, begin, end, .. } = &self.segments[segment];
-            // What is outside the segment by rounding bends more, if anything.
+            // A place that is outside the segment by rounding bends more, if anything.
             let from = if segment == x.0 { x.1 } else { begin.lo };
             let to = if segment == y.0 { y.1 } else { end.lo };
             curve.bend(from, to)
@@ -324,12 +328,13 @@ impl ExactPath {
         bends.reduce(hull).unwrap_or(Interval::ZERO)
     }
 
-    /// How fast the curvature changes between two places of one segment, 1/m per metre; `None` if there are two.
+    /// Returns the rate of the curvature between two places of one segment, 1/m per metre; `None` for places of two
+    /// segments.
     pub fn bend_rate(&self, x: Place, y: Place) -> Option<Interval> {
         (x.0 == y.0).then(|| self.curve(x).bend_rate(x.1, y.1))
     }
 
-    /// Metres of travel of the head at a place.
+    /// Returns the travel of the head at a place, metres.
     pub fn travelled(&self, Place(segment, at): Place) -> Interval {
         let Segment { curve, begin, end, travelled } = &self.segments[segment];
         let at = Interval::point(at);
@@ -343,7 +348,7 @@ impl ExactPath {
     }
 }
 
-/// A route: a line without a begin up to the start, then its steps.
+/// Creates a route: a line without a beginning up to the start, then the steps.
 fn route(start: Vector, heading_turns: f64, steps: &[RouteStep]) -> ExactPath {
     let (zero, mut turns) = (Interval::ZERO, Interval::point(heading_turns));
     let mut origin = start;
@@ -373,13 +378,13 @@ fn route(start: Vector, heading_turns: f64, steps: &[RouteStep]) -> ExactPath {
     ExactPath { segments }
 }
 
-/// The direction so many turns counter-clockwise from x.
+/// Returns the direction `turns` turns counter-clockwise from x.
 fn of_turns(turns: Interval) -> Vector {
     let (sine, cosine) = sin_cos_of(pi() * 2.0 * turns);
     [cosine, sine]
 }
 
-/// Sine and cosine of an interval: those of its middle, each off by no more than its radius.
+/// Returns sine and cosine of an interval: those of its middle, each off by no more than the interval's radius.
 fn sin_cos_of(x: Interval) -> (Interval, Interval) {
     let middle = x.middle();
     let radius = (x - Interval::point(middle)).magnitude();

@@ -1,8 +1,8 @@
-//! Teams on inward spirals: boards that overlap with each of the pitches between two, and a pitch with which none touch, from
-//! however far the head comes. Only [`super`] uses it; [`crate::plan`] calls what it exports. "The least pitch" and Lemma 8 in
-//! `docs/proofs.md`.
+//! Proofs for teams that come in on inward spirals from any distance: boards overlap with every pitch of an interval,
+//! or no boards touch with one pitch. [`crate::plan`] calls it. "The least pitch" and Lemma 8 in `docs/proofs.md`.
 //!
-//! With the spiral's a = pitch / 2 pi as the unit of length every spiral is the same, and the team's lengths are intervals.
+//! With the spiral's a = pitch / 2 pi as the unit of length, all spirals are equal and the team's lengths are
+//! intervals.
 
 mod far;
 
@@ -10,8 +10,8 @@ use super::boards::Shape;
 use super::capsule::Span;
 use super::clearance::Descent;
 use super::elementary::{pi, sin_cos};
+use super::grid::GridPoint;
 use super::interval::Interval;
-use super::knot::Knot;
 use super::lines::Links;
 use super::path::{ExactPath, Place};
 use super::step::{Chain, Claim, Listed, PADS, links_of};
@@ -19,14 +19,14 @@ use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::model::path::Path;
 use bench_dragon_motion::model::team::Team;
 
-/// Pitches from one to another, metres per turn, and where a team on such a spiral is looked at.
+/// An interval of pitches, and a position of a team on such a spiral.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pitches<'a> {
     /// The team.
     pub team: &'a Team,
-    /// The least of them.
+    /// Least pitch, metres per turn.
     pub from: f64,
-    /// The greatest of them.
+    /// Greatest pitch, metres per turn.
     pub to: f64,
     /// Polar angle of the head's front handle, radians.
     pub theta: f64,
@@ -35,27 +35,27 @@ pub(crate) struct Pitches<'a> {
 }
 
 impl Pitches<'_> {
-    /// a = pitch / 2 pi of all of them.
+    /// Returns a = pitch / 2 pi of all pitches, metres per radian.
     fn radius_per_radian(&self) -> Interval {
         Interval { lo: self.from, hi: self.to }.over(pi() * 2.0)
     }
 
-    /// Whether with each of them the head is further than `radius` metres from the centre.
+    /// Returns true if, with every pitch, the head is further than `radius` metres from the centre.
     pub fn are_outside(&self, radius: f64) -> bool {
         Interval::point(radius).over(self.radius_per_radian()).is_below(Interval::point(self.theta))
     }
 
-    /// Whether with each of them the two boards are proved to overlap.
+    /// Returns true if, with every pitch, the two boards are proved to overlap.
     pub fn all_overlap(&self) -> bool {
         let Self { team, from, to, theta, benches } = *self;
         if benches[0] + 2 > benches[1] || benches[1] >= team.benches {
             return false;
         }
         let a = self.radius_per_radian();
-        // The path and the team serve to guess where handles are.
+        // The path and the team only give the starting guess of the handles.
         let [wide, narrow] = [from, to].map(|pitch| Path::spiral(pitch, theta / std::f64::consts::TAU));
         let handle = benches[1] + 1;
-        let mut ends = [Knot::at(Place(0, theta), 0.0), Knot::at(Place(0, theta), 0.0)];
+        let mut ends = [GridPoint::at(Place(0, theta), 0.0), GridPoint::at(Place(0, theta), 0.0)];
         let [first, last] = &mut ends;
         if first.extend_to(handle, &wide, team).is_err() || last.extend_to(handle, &narrow, team).is_err() {
             return false;
@@ -77,16 +77,16 @@ impl Pitches<'_> {
     }
 }
 
-/// Pieces of three quarters of a turn that are looked at for a lock.
+/// Limit of pieces, three quarters of a turn at first, that are searched for a lock.
 const MOST_PIECES: u32 = 10_000;
 
-/// Whether it is proved that the head's link locks before the head, coming from far outside, is `radius` metres from the
-/// centre, with every pitch from one to another.
+/// Returns true if the head's link is proved to lock with every pitch of an interval: while the head comes in from far
+/// outside, before it is at `radius`, metres from the centre.
 pub(crate) fn head_locks(team: &Team, (from, to): (f64, f64), radius: f64) -> bool {
     let radians = |metres: Interval, pitch: f64| metres.over(Interval::point(pitch).over(pi() * 2.0));
     let theta = Interval::point(radians(Interval::point(radius), from).hi);
     let square = radians(links_of(team)[0], to).square();
-    // The greatest of D = theta^2 + (theta + delta)^2 - 2 theta (theta + delta) cos delta over pieces, by Taylor's formula.
+    // D = theta^2 + (theta + delta)^2 - 2 theta (theta + delta) cos delta is bounded over pieces by Taylor's formula.
     let mut pieces = vec![(0.0, 1.5 * pi().hi)];
     let mut looked_at = 0;
     while let Some((first, last)) = pieces.pop() {
@@ -115,24 +115,24 @@ pub(crate) fn head_locks(team: &Team, (from, to): (f64, f64), radius: f64) -> bo
     Interval::ONE.is_below(theta)
 }
 
-/// Metres from the centre beyond which no two boards touch and no link locks, wherever further out the head is: little more
-/// than the least for which Lemma 8 shows that, if not below `radius`. `None` where it shows it of none that is sensible.
+/// Returns a distance from the centre, at least `radius` and little more than the least. By Lemma 8 no two boards touch
+/// and no link locks while the head is further out. Returns `None` if the lemma shows it for no sensible distance.
 pub(crate) fn clear_beyond(team: &Team, pitch: f64, radius: f64) -> Option<f64> {
     far::least_radius(team, pitch, radius)
 }
 
-/// Turns from which on no steps are tried: what a scene may have.
+/// Limit of turns of a scene: no steps are tried beyond.
 const MOST_TURNS: f64 = 1e7;
 
-/// Whether it is proved that a team whose head comes in on a spiral of this pitch, from however far, has no two boards that
-/// touch and no link that locks until its front handle is `radius` metres from the centre. `progress` gets the share of the
-/// way that is done.
+/// Returns true if a team is proved to reach `radius`, metres from the centre, on a spiral of this pitch from any
+/// distance. Until the head's front handle is there, no two boards touch and no link locks. `progress` receives the
+/// share of the way that is done.
 pub(crate) fn reaches(team: &Team, pitch: f64, radius: f64, most_steps: u64, progress: &mut dyn FnMut(f64)) -> bool {
     let Some(begin) = clear_beyond(team, pitch, radius) else { return false };
     if begin <= radius {
         return true;
     }
-    // The head begins a little further out, or by rounding a little less so: that is looked at below.
+    // The head begins a little further out. Rounding may take that back, which is checked below.
     let start_turn = begin * (1.0 + 1e-9) / pitch;
     if start_turn > MOST_TURNS {
         return false;
@@ -142,7 +142,7 @@ pub(crate) fn reaches(team: &Team, pitch: f64, radius: f64, most_steps: u64, pro
     let exact = ExactPath::new(&description);
     let a = Interval::point(pitch).over(pi() * 2.0);
     let theta = Interval::point(radius).over(a).lo;
-    let end = Knot::at(Place(0, theta), exact.travelled(Place(0, theta)).middle());
+    let end = GridPoint::at(Place(0, theta), exact.travelled(Place(0, theta)).middle());
     let travelled = end.travelled;
     let descent = Descent::new(Chain::new(&path, exact, team), travelled, most_steps).after_all_further_out();
     begin <= (a * descent.head().1).lo && descent.stays_clear_to(&end, progress)

@@ -1,8 +1,8 @@
 //! Answers for the choreographer: the least pitch with which a team still reaches a radius, and the greatest speed at
 //! which no handle is too fast.
 //!
-//! In: a team or a scene. Out: two numbers between which the answer is, proved, with where it is decided. The `plan` command
-//! prints them.
+//! In: a team or a scene. Out: two numbers that enclose the answer, proved, and the place that decides it. The `plan`
+//! command prints them.
 
 mod pitch;
 mod speed;
@@ -11,7 +11,7 @@ mod trial;
 pub use pitch::{LeastPitch, Overlap, least_pitch};
 pub use speed::{GreatestSpeed, greatest_speed};
 
-/// A question that has no answer, in one sentence.
+/// The reason, in one sentence, for a question without an answer.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct PlanError(String);

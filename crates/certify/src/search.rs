@@ -1,12 +1,12 @@
-//! The search: steps of the head from the start to the end of the motion, halved where their claims cannot be shown, and
-//! at each event that the ordinary search has found, the lines that show it. Only [`super`] uses it.
+//! The search for a certificate: steps of the head from the start to the end of the motion. A step whose claims cannot
+//! be shown is halved. At each event of the ordinary search, the search writes the line that proves the event.
 
 use std::io;
 
 use super::capsule::Spanned;
+use super::grid::{GridPoint, place};
 use super::interval::Interval;
-use super::knot::{Knot, place};
-use super::lines::{Line, Links, Outcome, Status};
+use super::lines::{CertificateLine, CertifiedEvent, Links, Status};
 use super::path::{ExactPath, Place};
 use super::step::{Chain, Claim, Obstacle, Shown};
 use super::{CertifyError, Given};
@@ -14,41 +14,41 @@ use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::model::path::Path;
 
-/// Seconds on each side of an event between which it is proved to be.
+/// Half width of the proved interval of an event, seconds.
 const AROUND: f64 = 3e-10;
 
-/// Metres, as a share of the way, below which doubles tell no places apart.
+/// Distance that doubles can resolve, as a share of the path length in metres.
 pub(super) const LEAST: f64 = 7e-13;
 
-/// What a step that succeeded, and one that did not, do to the length of the next.
+/// Factors of the step length after a step that is shown, and after a step that is not.
 const GROWTH: f64 = 1.3;
 const SHRINK: f64 = 0.5;
 
-/// How near an event, in links, a step that cannot be shown is taken to be in the way of the event's own proof.
+/// Distance from an event, in links, within which a failed step is explained by the event.
 const NEAR: f64 = 1e-3;
 
-pub(super) struct Search<'a, 'w> {
+pub(super) struct CertificateSearch<'a, 'w> {
     given: Given<'a>,
     chain: Chain<'a>,
-    write: &'w mut dyn FnMut(&Line) -> io::Result<()>,
-    /// Where the last step ended.
-    at: Knot,
+    write: &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>,
+    /// The end of the last step.
+    at: GridPoint,
     links: Links,
-    /// Claims that steps still make.
+    /// The claims that steps still make.
     moving: bool,
     clear: bool,
-    /// Whether Lemma 4 may still be used.
+    /// True if Lemma 4 may still be used.
     covered: bool,
     proofs: [Option<Status>; 4],
-    /// Metres of the next step that is tried.
+    /// Length of the next step to try, metres.
     step: f64,
     steps: u64,
 }
 
-/// Why the search cannot go on.
+/// The reason for the end of a search.
 enum Halt {
     Error(CertifyError),
-    /// At the place that it has come to.
+    /// No step from the current place can be shown.
     Stuck(String),
 }
 
@@ -60,22 +60,23 @@ impl From<io::Error> for Halt {
 
 const KINDS: [EventKind; 4] = [EventKind::Contact, EventKind::Stall, EventKind::Lock, EventKind::PathEnd];
 
-impl<'a, 'w> Search<'a, 'w> {
-    pub fn new(given: Given<'a>, write: &'w mut dyn FnMut(&Line) -> io::Result<()>) -> Self {
+impl<'a, 'w> CertificateSearch<'a, 'w> {
+    pub fn new(given: Given<'a>, write: &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>) -> Self {
         let exact = ExactPath::new(given.description);
         let chain = Chain::new(given.path, exact, given.team);
-        // A motion that begins earlier passes through all that this one does.
+        // The steps begin a little before the start: a motion that begins earlier includes this one.
         let before = -LEAST * (1.0 + given.path.length());
-        let at = Knot::new(given.path, &chain.exact, before);
+        let at = GridPoint::new(given.path, &chain.exact, before);
         let step = 0.25 * given.team.shortest_link();
         let (links, proofs) = (Links::All, [const { None }; 4]);
         Self { given, chain, write, at, links, moving: true, clear: true, covered: true, proofs, step, steps: 0 }
     }
 
     /// Writes the certificate and returns what it proves.
-    pub fn run(mut self, progress: &mut dyn FnMut(f64)) -> Result<Vec<Outcome>, CertifyError> {
+    pub fn run(mut self, progress: &mut dyn FnMut(f64)) -> Result<Vec<CertifiedEvent>, CertifyError> {
         let (version, scene) = (env!("CARGO_PKG_VERSION"), self.given.scene);
-        (self.write)(&Line::Certificate { format: super::FORMAT, version, scene }).map_err(CertifyError::Write)?;
+        (self.write)(&CertificateLine::Certificate { format: super::FORMAT, version, scene })
+            .map_err(CertifyError::Write)?;
         let stuck = match self.motion(progress) {
             Ok(()) => None,
             Err(Halt::Error(error)) => return Err(error),
@@ -86,22 +87,22 @@ impl<'a, 'w> Search<'a, 'w> {
             Some(Status::Proved { time_lo, .. }) => Some(time_lo),
             _ => None,
         };
-        let outcomes = KINDS.map(|event| {
+        let events = KINDS.map(|event| {
             let found = self.proofs[event as usize].take();
             let status = found.unwrap_or_else(|| match (&stuck, event) {
                 (Some(because), _) => Status::Undecided { time_lo: until, because: because.clone() },
                 (None, EventKind::PathEnd) => Status::None { time_lo: None },
                 (None, _) => Status::None { time_lo: lock },
             });
-            Outcome { event, status }
+            CertifiedEvent { event, status }
         });
-        for outcome in &outcomes {
-            (self.write)(&Line::Result(outcome.clone())).map_err(CertifyError::Write)?;
+        for event in &events {
+            (self.write)(&CertificateLine::Result(event.clone())).map_err(CertifyError::Write)?;
         }
-        Ok(outcomes.into())
+        Ok(events.into())
     }
 
-    /// The whole motion, event by event.
+    /// Proves the whole motion, event by event.
     fn motion(&mut self, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
         let end = self.given.events.last().map_or(self.given.path.length(), |event| event.travelled);
         let mut progress = |at: f64| progress((at / end).clamp(0.0, 1.0));
@@ -111,8 +112,8 @@ impl<'a, 'w> Search<'a, 'w> {
                 EventKind::PathEnd => {
                     let beyond = path_end(&self.chain.exact, self.given.path);
                     self.go_to(event.travelled - self.around(), None, &mut progress)?;
-                    self.go_to_knot(&beyond, None, &mut progress)?;
-                    (self.write)(&Line::PathEnd)?;
+                    self.go_to_point(&beyond, None, &mut progress)?;
+                    (self.write)(&CertificateLine::PathEnd)?;
                     self.proofs[EventKind::PathEnd as usize] = Some(self.at_path_end());
                 }
                 kind => {
@@ -128,21 +129,21 @@ impl<'a, 'w> Search<'a, 'w> {
         Ok(())
     }
 
-    /// Metres on each side of an event.
+    /// Returns the metres on each side of an event.
     fn around(&self) -> f64 {
         (AROUND * self.given.head_speed).min(1e-8).max(LEAST * (1.0 + self.given.path.length()))
     }
 
-    /// Time at a place of the head, from below and above, and never below 0.
+    /// Returns an enclosure of the time at a place of the head, at least 0.
     fn time(&self, place: Place) -> Interval {
         let time = self.chain.exact.travelled(place).over(Interval::point(self.given.head_speed));
-        // Room for the rounding of a `lead_in` that the scene states otherwise.
+        // Covers the rounding of a `lead_in` that the scene gives in other digits.
         let slack = 1e-14 * (1.0 + time.magnitude());
         Interval { lo: (time.lo - slack).max(0.0), hi: (time.hi + slack).max(0.0) }
     }
 
-    fn knot(&self, travelled: f64) -> Knot {
-        Knot::new(self.chain.path, &self.chain.exact, travelled)
+    fn grid_point(&self, travelled: f64) -> GridPoint {
+        GridPoint::new(self.chain.path, &self.chain.exact, travelled)
     }
 
     fn at_path_end(&self) -> Status {
@@ -152,7 +153,7 @@ impl<'a, 'w> Search<'a, 'w> {
         Status::Proved { time_lo: self.time(before).lo, time_hi: self.time(after).hi, bench_a: None, bench_b: None }
     }
 
-    /// Places at which an event of doubtful digits is tried to be shown, from near to far.
+    /// Returns travels beyond an event, from near to far, at which the search tries to show it.
     fn beyond(&self, event: &Event) -> impl Iterator<Item = f64> + use<> {
         let around = self.around().max(2.0 * (event.travelled - self.at.travelled));
         let (at, most) = (event.travelled, NEAR * self.given.team.shortest_link());
@@ -162,24 +163,32 @@ impl<'a, 'w> Search<'a, 'w> {
             .map(move |far| at + far)
     }
 
-    /// See [`Search::go_to_knot`].
+    /// Goes to a travel: see [`CertificateSearch::go_to_point`].
     fn go_to(&mut self, travelled: f64, event: Option<&Event>, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
         if travelled <= self.at.travelled {
             return Ok(());
         }
-        let target = self.knot(travelled);
-        self.go_to_knot(&target, event, progress)
+        let target = self.grid_point(travelled);
+        self.go_to_point(&target, event, progress)
     }
 
-    /// Goes in steps to a knot, or so near to an event that a step cannot be shown for its sake. A claim that cannot be
-    /// shown at any length of the step is given up.
-    fn go_to_knot(&mut self, target: &Knot, event: Option<&Event>, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+    /// Goes in steps to a grid point, or so near to an event that the event prevents a step. A claim that cannot be
+    /// shown with any step length is given up.
+    fn go_to_point(
+        &mut self,
+        target: &GridPoint,
+        event: Option<&Event>,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<(), Halt> {
         let least = 0.01 * LEAST * (1.0 + self.given.path.length());
         let longest = self.given.team.shortest_link();
         while self.at.head != target.head {
             let remaining = target.travelled - self.at.travelled;
-            let mut to =
-                if self.step >= 0.9 * remaining { target.clone() } else { self.knot(self.at.travelled + self.step) };
+            let mut to = if self.step >= 0.9 * remaining {
+                target.clone()
+            } else {
+                self.grid_point(self.at.travelled + self.step)
+            };
             let claim = Claim { links: self.links, moving: self.moving, clear: self.clear };
             match self.chain.show(&mut self.at, &mut to, claim) {
                 Ok(shown) => {
@@ -189,7 +198,7 @@ impl<'a, 'w> Search<'a, 'w> {
                 }
                 Err(obstacle) if self.step.min(remaining) > least => {
                     self.step = SHRINK * self.step.min(remaining);
-                    // Turns of handles behind the first are not followed by the links of boards 0 and 1 alone.
+                    // The links of boards 0 and 1 do not show turns of the handles behind.
                     if self.links == Links::Front && obstacle == Obstacle::Stall(1) && !self.moving {
                         self.links = Links::All;
                     }
@@ -206,7 +215,7 @@ impl<'a, 'w> Search<'a, 'w> {
         Ok(())
     }
 
-    fn accept(&mut self, to: Knot, shown: Shown) -> Result<(), Halt> {
+    fn accept(&mut self, to: GridPoint, shown: Shown) -> Result<(), Halt> {
         let Shown { step, body_forward } = shown;
         let exact = &self.chain.exact;
         if self.chain.start.is_none() {
@@ -220,7 +229,7 @@ impl<'a, 'w> Search<'a, 'w> {
         {
             self.links = Links::Front;
         }
-        (self.write)(&Line::Step(step))?;
+        (self.write)(&CertificateLine::Step(step))?;
         self.at = to;
         self.steps += 1;
         if self.steps > self.given.most_steps {
@@ -229,7 +238,7 @@ impl<'a, 'w> Search<'a, 'w> {
         Ok(())
     }
 
-    /// Drops a claim that cannot be shown here, or the whole search.
+    /// Gives up a claim that cannot be shown here, or the whole search.
     fn give_up(&mut self, obstacle: Obstacle) -> Result<(), Halt> {
         let time_lo = self.time(self.at.head).lo;
         match obstacle {
@@ -272,28 +281,29 @@ impl<'a, 'w> Search<'a, 'w> {
         Status::Proved { time_lo: self.time(from).lo, time_hi: self.time(to).hi, bench_a, bench_b }
     }
 
-    /// Boards that overlap before anything has moved.
+    /// Handles boards that overlap at the start.
     fn overlap_at_start(&mut self, event: &Event) -> Result<(), Halt> {
-        let (from, mut to) = (self.at.clone(), self.knot(LEAST * (1.0 + self.given.path.length())));
+        let (from, mut to) = (self.at.clone(), self.grid_point(LEAST * (1.0 + self.given.path.length())));
         self.clear = false;
         let status = if self.touch(event, from, &mut to)? {
             let [bench_a, bench_b] = [event.bench_a, event.bench_b].map(|bench| bench.map(|bench| bench as usize));
             Status::Proved { time_lo: 0.0, time_hi: 0.0, bench_a, bench_b }
         } else {
-            let because = "the boards that overlap from the start do so too little for doubles".to_owned();
+            let because = "the boards that overlap from the start overlap too little for doubles".to_owned();
             Status::Undecided { time_lo: 0.0, because }
         };
         self.proofs[EventKind::Contact as usize] = Some(status);
         Ok(())
     }
 
-    /// Writes that two boards have a point in common with the head between two knots, if that can be shown.
-    fn touch(&mut self, event: &Event, mut from: Knot, to: &mut Knot) -> Result<bool, Halt> {
+    /// Writes the contact line if two boards are proved to have a common point while the head is between two grid
+    /// points. Returns true if so.
+    fn touch(&mut self, event: &Event, mut from: GridPoint, to: &mut GridPoint) -> Result<bool, Halt> {
         let benches = [event.bench_a, event.bench_b].map(|bench| bench.unwrap_or(0) as usize);
         let Some(handles) = self.chain.spans(&mut from, to, benches[1] + 1) else { return Ok(false) };
         let Some(point) = self.chain.common_point(&handles, benches) else { return Ok(false) };
         let spans = handles[1..].iter().map(|handle| handle.span).collect();
-        (self.write)(&Line::Contact { benches, from: from.head, to: to.head, spans, point })?;
+        (self.write)(&CertificateLine::Contact { benches, from: from.head, to: to.head, spans, point })?;
         Ok(true)
     }
 
@@ -312,7 +322,7 @@ impl<'a, 'w> Search<'a, 'w> {
                 return Ok(());
             }
         }
-        let because = "whether the boards that come so near do touch cannot be shown with doubles".to_owned();
+        let because = "doubles cannot tell whether the boards touch that come so near".to_owned();
         let status = Status::Undecided { time_lo: self.time(earliest).lo, because };
         self.proofs[EventKind::Contact as usize] = Some(status);
         Ok(())
@@ -336,12 +346,12 @@ impl<'a, 'w> Search<'a, 'w> {
                 |handles: &Vec<Spanned>| handles[link].capsule.product(&handles[link + 1].capsule, false).is_negative();
             if let Some(handles) = handles.filter(stalled) {
                 let (head, spans) = (self.at.head, handles[1..].iter().map(|handle| handle.span).collect());
-                (self.write)(&Line::Stall { link, from: head, to: head, spans })?;
+                (self.write)(&CertificateLine::Stall { link, from: head, to: head, spans })?;
                 self.proofs[EventKind::Stall as usize] = Some(self.proved(earliest, head, event.bench_a, None));
                 return Ok(());
             }
         }
-        let because = "whether the link that comes so near a stall does stall cannot be shown with doubles".to_owned();
+        let because = "doubles cannot tell whether the link stalls that comes so near a stall".to_owned();
         self.proofs[EventKind::Stall as usize] = Some(Status::Undecided { time_lo: self.time(earliest).lo, because });
         Ok(())
     }
@@ -349,7 +359,7 @@ impl<'a, 'w> Search<'a, 'w> {
     fn lock(&mut self, event: &Event) -> Result<(), Halt> {
         let link = event.bench_a.unwrap_or(0) as usize;
         for travelled in self.beyond(event) {
-            let mut to = self.knot(travelled);
+            let mut to = self.grid_point(travelled);
             let Some(handles) = self.chain.spans(&mut self.at, &mut to, link) else { continue };
             let mut end = to.clone();
             let Some(last) = self.chain.spans(&mut to, &mut end, link) else { continue };
@@ -361,24 +371,22 @@ impl<'a, 'w> Search<'a, 'w> {
                 continue;
             }
             let spans = |handles: &[Spanned]| handles[1..].iter().map(|handle| handle.span).collect();
-            let line = Line::Lock { link, to: to.head, spans: spans(&handles), last: spans(&last), window, jump };
+            let line =
+                CertificateLine::Lock { link, to: to.head, spans: spans(&handles), last: spans(&last), window, jump };
             (self.write)(&line)?;
             self.proofs[EventKind::Lock as usize] = Some(self.proved(self.at.head, to.head, event.bench_a, None));
             return Ok(());
         }
-        Err(Halt::Stuck(format!(
-            "whether bench {} (counting from 1) locks there cannot be shown with doubles",
-            link + 1
-        )))
+        Err(Halt::Stuck(format!("doubles cannot tell whether bench {} (counting from 1) locks there", link + 1)))
     }
 }
 
-/// A knot at the path's end or beyond it.
-pub(super) fn path_end(exact: &ExactPath, path: &Path) -> Knot {
+/// Returns a grid point at the path's end or beyond it.
+pub(super) fn path_end(exact: &ExactPath, path: &Path) -> GridPoint {
     let length = path.length();
     let end = place(path.param_at(length));
     let beyond = exact.moved(end, LEAST * (1.0 + length));
     let inward = matches!(exact.segments[beyond.0].curve, super::path::Curve::Inward { .. });
     let head = if inward { Place(beyond.0, 0.0) } else { beyond };
-    Knot::at(head, length)
+    GridPoint::at(head, length)
 }

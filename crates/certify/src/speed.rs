@@ -1,8 +1,8 @@
-//! The greatest speed of any handle over the head's, enclosed: branch and bound over the head's travel. See "Lemma 7"
-//! in `docs/proofs.md`.
+//! Enclosure of the greatest ratio of a handle's speed to the head's, by branch and bound over the head's travel. See
+//! "Lemma 7" in `docs/proofs.md`.
 //!
-//! In: a scene's motion and the travel between which handles are looked at. Out: two numbers between which the greatest
-//! ratio is, proved; nothing rests on a solver or on samples. `plan` calls it.
+//! In: a scene's motion, and the end of the travel. Out: two numbers that enclose the greatest ratio; the proof does
+//! not depend on a solver or on samples. `plan` calls it.
 
 mod step;
 
@@ -10,39 +10,39 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use self::step::{Bounds, Speeds};
+use super::grid::{GridPoint, place};
 use super::interval::Interval;
-use super::knot::{Knot, place};
 use super::path::{ExactPath, Place};
 use super::step::Chain;
 use bench_dragon_motion::Motion;
 
-/// Metres, as a share of the way, below which doubles tell no places apart.
+/// Distance that doubles can resolve, as a share of the path length in metres.
 const LEAST: f64 = 1e-14;
 
-/// Handles that are enclosed before the search gives up: half a minute to a minute.
+/// Limit of handles to enclose: half a minute to a minute.
 const MOST_HANDLES: u64 = 8_000_000;
 
-/// The greatest speed of any handle over the head's.
+/// The greatest ratio of a handle's speed to the head's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GreatestRatio {
-    /// At least so fast is the handle at the travel.
+    /// Lower bound: the ratio of `handle` at `travelled`.
     pub lo: f64,
-    /// No handle is ever faster; infinite where the search was given up before there was a bound.
+    /// Upper bound for all handles; infinite if the search was given up before it had a bound.
     pub hi: f64,
     /// The handle, counted from 0.
     pub handle: usize,
-    /// Metres of the head's travel at which it is at least as fast as `lo`.
+    /// Travel of the head at which the handle has at least the ratio `lo`, metres.
     pub travelled: f64,
-    /// A speed of it there that is meant, between what is proved of it.
+    /// Approximate ratio of the handle there, inside its enclosure.
     pub ratio: f64,
-    /// Whether `hi` is within the tolerance of `lo`.
+    /// True if `hi` is within the tolerance of `lo`.
     pub proved: bool,
-    /// Steps of the head that were enclosed.
+    /// Number of steps of the head that were enclosed.
     pub steps: u64,
 }
 
 impl GreatestRatio {
-    /// A positive number over the ratio, from below and above.
+    /// Returns a lower and an upper bound of a positive number divided by the ratio.
     pub fn divide(&self, number: f64) -> (f64, f64) {
         if self.hi == 1.0 {
             return (number, number);
@@ -52,61 +52,61 @@ impl GreatestRatio {
     }
 }
 
-/// A step of the head that may hold what is faster.
-struct Step {
+/// A step of the head that may hold a greater ratio.
+struct OpenStep {
     upper: f64,
     from: f64,
     to: f64,
 }
 
-impl PartialEq for Step {
+impl PartialEq for OpenStep {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
 
-impl Eq for Step {}
+impl Eq for OpenStep {}
 
-impl PartialOrd for Step {
+impl PartialOrd for OpenStep {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl Ord for Step {
+impl Ord for OpenStep {
     fn cmp(&self, other: &Self) -> Ordering {
         self.upper.total_cmp(&other.upper).then(other.from.total_cmp(&self.from))
     }
 }
 
-/// The greatest speed of any handle over the head's while the head goes from its start so many metres, to a share of
-/// `tolerance`. `progress` gets a share of the work, from 0 to 1.
+/// Encloses the greatest ratio of a handle's speed to the head's over the first `travelled` metres of the head, to a
+/// share of `tolerance`. `progress` receives the share of the work that is done, from 0 to 1.
 pub fn greatest_ratio(motion: &Motion, travelled: f64, tolerance: f64, progress: &mut dyn FnMut(f64)) -> GreatestRatio {
     let exact = ExactPath::new(motion.description());
     let speeds = Speeds { chain: Chain::new(motion.path(), exact, motion.team()) };
-    Search { speeds, end: travelled, least: LEAST * (1.0 + motion.path().length()) }.run(tolerance, progress)
+    RatioSearch { speeds, end: travelled, least: LEAST * (1.0 + motion.path().length()) }.run(tolerance, progress)
 }
 
-struct Search<'a> {
+struct RatioSearch<'a> {
     speeds: Speeds<'a>,
     end: f64,
-    /// Metres that doubles tell apart.
+    /// Distance that doubles can resolve, metres.
     least: f64,
 }
 
-impl Search<'_> {
+impl RatioSearch<'_> {
     fn run(&self, tolerance: f64, progress: &mut dyn FnMut(f64)) -> GreatestRatio {
-        // The head itself.
+        // The ratio of the head itself.
         let mut best =
             GreatestRatio { lo: 1.0, hi: 1.0, handle: 0, travelled: 0.0, ratio: 1.0, proved: false, steps: 0 };
         let exact = &self.speeds.chain.exact;
         let from = self.beyond(0.0, -1.0, |place| exact.travelled(place).hi <= 0.0);
         let to = self.beyond(self.end, 1.0, |place| exact.travelled(place).lo >= self.end);
         let Some((from, to)) = from.zip(to) else { return GreatestRatio { hi: f64::INFINITY, ..best } };
-        let mut open = BinaryHeap::from([Step { upper: f64::INFINITY, from, to }]);
+        let mut open = BinaryHeap::from([OpenStep { upper: f64::INFINITY, from, to }]);
         let (mut settled, mut handles) = (1.0f64, 0);
         let enough = |best: &GreatestRatio, upper: f64| upper <= best.lo * (1.0 + tolerance);
-        while let Some(Step { upper, from, to }) = open.pop() {
+        while let Some(OpenStep { upper, from, to }) = open.pop() {
             let middle = 0.5 * from + 0.5 * to;
             let done = enough(&best, upper);
             if done || handles > MOST_HANDLES || to - from < self.least {
@@ -127,7 +127,7 @@ impl Search<'_> {
                 if enough(&best, upper) {
                     settled = settled.max(upper);
                 } else {
-                    open.push(Step { upper, from, to });
+                    open.push(OpenStep { upper, from, to });
                 }
             }
             let wide = (open.peek().map_or(settled, |step| step.upper) / best.lo - 1.0).max(tolerance);
@@ -136,22 +136,23 @@ impl Search<'_> {
         GreatestRatio { hi: settled, proved: true, ..best }
     }
 
-    /// Metres of travel a little to one side, of whose place it is sure.
+    /// Returns a travel a little to one side whose place is proved to be beyond.
     fn beyond(&self, travelled: f64, side: f64, is_beyond: impl Fn(Place) -> bool) -> Option<f64> {
         let mut others = (0..40).map(|power| travelled + side * self.least * 2f64.powi(power));
-        others.find(|other| is_beyond(self.knot(*other).head))
+        others.find(|other| is_beyond(self.grid_point(*other).head))
     }
 
     fn bounds(&self, from: f64, to: f64) -> Option<Bounds> {
-        let [mut from, mut middle, mut to] = [from, 0.5 * from + 0.5 * to, to].map(|travelled| self.knot(travelled));
+        let [mut from, mut middle, mut to] =
+            [from, 0.5 * from + 0.5 * to, to].map(|travelled| self.grid_point(travelled));
         self.speeds.over(&mut from, &mut middle, &mut to)
     }
 
-    fn knot(&self, travelled: f64) -> Knot {
+    fn grid_point(&self, travelled: f64) -> GridPoint {
         let Chain { path, exact, .. } = &self.speeds.chain;
         if travelled <= self.end {
-            return Knot::new(path, exact, travelled);
+            return GridPoint::new(path, exact, travelled);
         }
-        Knot::at(exact.moved(place(path.param_at(self.end)), travelled - self.end), travelled)
+        GridPoint::at(exact.moved(place(path.param_at(self.end)), travelled - self.end), travelled)
     }
 }

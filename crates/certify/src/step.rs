@@ -1,9 +1,9 @@
-//! One step of the head: the spans of the handles, and whether the lemmas hold over them. Only [`super`] uses it.
+//! One step of the head: the spans of the handles, and the lemmas over them.
 
 use super::boards::{MovingBoard, Shape};
 use super::capsule::{Span, Spanned, moved_back};
+use super::grid::{GridPoint, span};
 use super::interval::Interval;
-use super::knot::{Knot, span};
 use super::lines::{Links, Step};
 use super::link::{Front, follower_within};
 use super::path::{Curve, ExactPath, Place};
@@ -14,7 +14,7 @@ use bench_dragon_motion::model::path::Path;
 use bench_dragon_motion::model::separation::overlap_centre;
 use bench_dragon_motion::model::team::Team;
 
-/// What a step is to show.
+/// The statements that a step must show.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Claim {
     pub links: Links,
@@ -22,7 +22,7 @@ pub(super) struct Claim {
     pub clear: bool,
 }
 
-/// What could not be shown of a step.
+/// The part of a step that could not be shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Obstacle {
     /// A link's follower cannot be enclosed.
@@ -36,7 +36,7 @@ pub(super) enum Obstacle {
 }
 
 impl Obstacle {
-    /// Whether an event of a kind is what stands in the way.
+    /// Returns true if an event of this kind explains the obstacle.
     pub fn is_of(self, kind: EventKind) -> bool {
         match self {
             Self::Pair(..) => kind == EventKind::Contact,
@@ -47,10 +47,10 @@ impl Obstacle {
     }
 }
 
-/// A step that holds.
+/// A step that is shown.
 pub(super) struct Shown {
     pub step: Step,
-    /// Whether every link behind the head's surely goes forward.
+    /// True if every link behind the head's surely goes forward.
     pub body_forward: bool,
 }
 
@@ -61,17 +61,17 @@ pub(super) struct Chain<'a> {
     pub team: &'a Team,
     pub links: [Interval; 2],
     pub shape: Shape,
-    /// A bound of S of Lemma 4: no earlier than where handle 1 started.
+    /// A bound of S of Lemma 4: a place no earlier than the start of handle 1.
     pub start: Option<Place>,
 }
 
-/// How much longer than the rounding of doubles a span is made, at both ends.
+/// Length added to both ends of a span, as a multiple of the rounding of doubles.
 const PAD: f64 = 64.0 * f64::EPSILON;
 
-/// How many times that is tried, in turn.
+/// Multiples of the pad, tried in this order.
 pub(super) const PADS: [f64; 3] = [1.0, 16.0, 256.0];
 
-/// Metres between the handles of the head's bench, and of every other.
+/// Returns the metres between the handles of the head's bench, and of every other bench.
 pub(super) fn links_of(team: &Team) -> [Interval; 2] {
     [team.head_length, team.body_length].map(|length| Interval::point(length) - Interval::point(team.hole_inset) * 2.0)
 }
@@ -81,17 +81,20 @@ impl<'a> Chain<'a> {
         Self { path, exact, team, links: links_of(team), shape: Shape::new(team), start: None }
     }
 
-    /// Metres between the handles of a bench.
+    /// Returns the metres between the handles of a bench.
     pub fn link(&self, bench: usize) -> Interval {
         self.links[bench.min(1)]
     }
 
-    /// Shows a claim over the step between two knots, or tells what stands in the way.
-    pub fn show(&self, from: &mut Knot, to: &mut Knot, claim: Claim) -> Result<Shown, Obstacle> {
+    /// Shows a claim over the step between two grid points.
+    ///
+    /// # Errors
+    /// The obstacle.
+    pub fn show(&self, from: &mut GridPoint, to: &mut GridPoint, claim: Claim) -> Result<Shown, Obstacle> {
         let mut unlinked = None;
         for pads in PADS {
             match self.show_with(from, to, claim, pads) {
-                // Where spans that are wider are long enough for the links, it is something else that stands in the way.
+                // If wider spans are long enough for the links, the obstacle is another.
                 Err(Obstacle::Link(link)) => unlinked = unlinked.or(Some(link)),
                 other => return other,
             }
@@ -99,7 +102,7 @@ impl<'a> Chain<'a> {
         Err(Obstacle::Link(unlinked.unwrap_or(0)))
     }
 
-    fn show_with(&self, from: &mut Knot, to: &mut Knot, claim: Claim, pads: f64) -> Result<Shown, Obstacle> {
+    fn show_with(&self, from: &mut GridPoint, to: &mut GridPoint, claim: Claim, pads: f64) -> Result<Shown, Obstacle> {
         let mut listed = Listed::new(self, Span(from.head, to.head), pads);
         while listed.handles.len() <= self.team.benches && !listed.is_enough(claim) {
             listed.extend(from, to, claim)?;
@@ -113,16 +116,17 @@ impl<'a> Chain<'a> {
         Ok(Shown { step, body_forward: listed.body_forward })
     }
 
-    /// Handles 0 to `handle` between two knots, if Lemma 1 holds for every link between them.
-    pub fn spans(&self, from: &mut Knot, to: &mut Knot, handle: usize) -> Option<Vec<Spanned>> {
+    /// Returns handles 0 to `handle` between two grid points, if Lemma 1 holds for every link between them.
+    pub fn spans(&self, from: &mut GridPoint, to: &mut GridPoint, handle: usize) -> Option<Vec<Spanned>> {
         self.spans_until(from, to, |handles| handles.len() > handle)
     }
 
-    /// Handles from 0 on between two knots, until they are enough, if Lemma 1 holds for every link between them.
+    /// Returns handles from 0 on between two grid points until `enough` holds, if Lemma 1 holds for every link between
+    /// them.
     pub fn spans_until(
         &self,
-        from: &mut Knot,
-        to: &mut Knot,
+        from: &mut GridPoint,
+        to: &mut GridPoint,
         enough: impl Fn(&[Spanned]) -> bool,
     ) -> Option<Vec<Spanned>> {
         let claim = Claim { links: Links::All, moving: false, clear: false };
@@ -135,7 +139,7 @@ impl<'a> Chain<'a> {
         })
     }
 
-    /// A point that is surely in both boards.
+    /// Returns a point that is proved to be in both boards.
     pub fn common_point(&self, handles: &[Spanned], benches: [usize; 2]) -> Option<[f64; 2]> {
         let (inset, width) = (self.shape.inset.middle(), 2.0 * self.shape.half_width.middle());
         let boards = benches.map(|bench| {
@@ -150,19 +154,19 @@ impl<'a> Chain<'a> {
         benches.iter().all(holds).then_some(point)
     }
 
-    /// The board of a bench over listed handles.
+    /// Returns the board of a bench from listed handles.
     pub fn board(&self, handles: &[Spanned], bench: usize) -> MovingBoard {
         self.shape.board(handles[bench].capsule, handles[bench + 1].capsule, self.link(bench))
     }
 }
 
-/// The handles of a step that have been enclosed.
+/// The handles of a step that are enclosed so far.
 pub(super) struct Listed<'c, 'a> {
     chain: &'c Chain<'a>,
     pub handles: Vec<Spanned>,
     pad: f64,
     pads: f64,
-    /// Whether every link behind the head's surely goes forward.
+    /// True if every link behind the head's surely goes forward.
     pub body_forward: bool,
 }
 
@@ -172,18 +176,20 @@ impl<'c, 'a> Listed<'c, 'a> {
         Self { chain, handles, pad: 0.0, pads, body_forward: true }
     }
 
-    /// Goes on behind handles that are enclosed already, the last of them in exactly the span between two knots.
+    /// Continues behind handles that are already enclosed. The span between the two grid points must be the last
+    /// handle's.
     pub fn behind(chain: &'c Chain<'a>, handles: Vec<Spanned>, pads: f64) -> Self {
         Self { chain, handles, pad: 0.0, pads, body_forward: true }
     }
 
-    /// Whether a handle is on a straight line without a beginning.
+    /// Returns true if a handle is on a straight line without a beginning.
     pub fn is_on_line(&self, handle: usize) -> bool {
         let Chain { exact, .. } = self.chain;
         self.handles[handle].span.1.0 == 0 && matches!(exact.segments[0].curve, Curve::Line { .. })
     }
 
-    /// At least how far all handles from this one on are from the centre; minus infinity where they may be anywhere.
+    /// Returns a lower bound of the distance from the centre of all handles from this one on; minus infinity if
+    /// unknown.
     fn ring(&self, handle: usize) -> f64 {
         let Place(segment, theta) = self.handles[handle].span.1;
         match self.chain.exact.segments[0].curve {
@@ -196,14 +202,14 @@ impl<'c, 'a> Listed<'c, 'a> {
         self.is_beyond(0.0, &self.chain.board(&self.handles, board), from_handle)
     }
 
-    /// Whether all boards whose handles are this one or behind it are further than `metres` from one further in.
+    /// Returns true if all boards from `from_handle` on are further than `metres` from a board further in.
     pub fn is_beyond(&self, metres: f64, inner: &MovingBoard, from_handle: usize) -> bool {
         let Chain { shape, links, .. } = self.chain;
         shape.innermost(self.ring(from_handle), links[1])
             > (Interval::point(shape.outermost(inner)) + Interval::point(metres)).hi
     }
 
-    /// Whether the handles that are listed are all that the claim needs.
+    /// Returns true if the listed handles suffice for the claim.
     fn is_enough(&self, claim: Claim) -> bool {
         let last = self.handles.len() - 1;
         if last < 2 {
@@ -218,8 +224,8 @@ impl<'c, 'a> Listed<'c, 'a> {
         }
     }
 
-    /// Encloses one handle more.
-    pub fn extend(&mut self, from: &mut Knot, to: &mut Knot, claim: Claim) -> Result<(), Obstacle> {
+    /// Encloses one more handle.
+    pub fn extend(&mut self, from: &mut GridPoint, to: &mut GridPoint, claim: Claim) -> Result<(), Obstacle> {
         let Chain { path, exact, team, start, .. } = self.chain;
         let link = self.handles.len() - 1;
         let solved = from.extend_to(link + 1, path, team).and_then(|()| to.extend_to(link + 1, path, team));
@@ -258,7 +264,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         Ok(())
     }
 
-    /// Shows that boards are apart: all of them, or those of boards 0 and 1.
+    /// Shows that boards are apart: all of them, or boards 0 and 1 from the others.
     fn boards_are_apart(&self, links: Links) -> Result<(), Obstacle> {
         let (chain, benches) = (self.chain, self.chain.team.benches);
         let listed = self.handles.len() - 1;
@@ -299,7 +305,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         Ok(())
     }
 
-    /// The boards from `first` to the last, all on the line on which the last listed handle is.
+    /// Returns the boards from `first` to the last as one, on the line of the last listed handle.
     pub fn straight_run(&self, first: usize) -> MovingBoard {
         let (chain, listed) = (self.chain, self.handles.len() - 1);
         let link = chain.links[1];

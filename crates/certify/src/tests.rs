@@ -1,4 +1,4 @@
-//! Intervals against numbers of 192 bits, and elementary functions against those of another library.
+//! Intervals against numbers of 192 bits, and elementary functions against another library.
 
 use astro_float::{BigFloat, Consts, RoundingMode};
 
@@ -20,7 +20,7 @@ impl Random {
         bits ^ (bits >> 31)
     }
 
-    /// Of either sign, of sizes that a search meets and of some that it does not, now and then 0 or a power of two.
+    /// Returns a number of either sign, of sizes inside and outside those of a search; sometimes 0 or a power of two.
     fn number(&mut self) -> f64 {
         let bits = self.bits();
         match bits % 16 {
@@ -58,7 +58,7 @@ fn a_million_operations_hold_what_192_bits_find() {
     let mut random = Random(1);
     for _ in 0..170_000 {
         let (a, b) = (random.interval(), random.interval());
-        // The ends are where rounding could lose something; what is between them follows for operations that are monotone.
+        // Rounding can only lose something at the ends. Numbers between follow, since the operations are monotone.
         let x = if random.bits().is_multiple_of(2) { a.lo } else { a.hi };
         let y = if random.bits().is_multiple_of(2) { b.lo } else { b.hi };
         let (p, q) = (exact(x), exact(y));
@@ -76,7 +76,7 @@ fn a_million_operations_hold_what_192_bits_find() {
 
 #[test]
 fn every_end_is_within_three_units_of_the_last_place() {
-    // A type that returned the whole line would hold everything.
+    // The whole line would hold every result: this test refutes it.
     let mut random = Random(2);
     for _ in 0..10_000 {
         let (x, y) = (random.number(), random.number());

@@ -1,11 +1,11 @@
 //! A subscriber's ends of a publisher's services: the thin layer over iceoryx2. In: a name. Out: what is in the queues.
 //!
-//! It keeps no counts: when to open, read and let go is up to the [`feed`](super::feed), which calls it. In `followed`, whose
-//! messages are read where a service has more than one publisher.
+//! It keeps no counts: the [`feed`](super::feed), which calls it, decides when to open, to read and to disconnect. A
+//! service can have more than one publisher: `selected` has the one whose messages are read.
 
-mod followed;
+mod selected;
 
-use std::cell::{Cell, RefCell};
+use std::cell::RefCell;
 use std::time::{Duration, Instant};
 
 use iceoryx2::identifiers::UniqueNodeId;
@@ -23,13 +23,13 @@ use crate::shared_memory::{CLOCK, OpenError, check_room_to_subscribe, node, rese
 use bench_dragon_messages::{
     CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus, Stage,
 };
-use followed::{Followed, OfRun, Origin, publishers};
+use selected::{OfRun, Origin, Selected, publishers};
 
 type Receiver<Payload, Header> = Port<ipc::Service, Payload, Header>;
 type PoseSample = Sample<ipc::Service, [HandlePose], FrameHeader>;
 
-/// How long publishers that have sent nothing are left alone before they are tried again.
-const BYSTANDER_INTERVAL: Duration = Duration::from_secs(5);
+/// How long stale publishers are not connected to again.
+const STALE_INTERVAL: Duration = Duration::from_secs(5);
 
 /// A publisher's services, as far as they exist.
 pub struct Connection {
@@ -37,21 +37,34 @@ pub struct Connection {
     poses_service: PortFactory<ipc::Service, [HandlePose], FrameHeader>,
     alerts: Option<Receiver<CollisionAlert, ()>>,
     cues: Option<Receiver<Cue, ()>>,
-    /// Whether the show has cues: where it has none there is no such service to look for.
+    /// True if the show has cues: a show without cues has no such service.
     expects_cues: bool,
     status: Option<Receiver<LoopStatus, ()>>,
     status_service: Option<PortFactory<ipc::Service, LoopStatus, ()>>,
     stage: Option<Receiver<Stage, ()>>,
     tick: Option<Listener<ipc::Service>>,
-    followed: Cell<Option<Followed>>,
-    /// Whether another publisher is followed since that was last asked.
-    follows_another: Cell<bool>,
-    /// Whether another publisher has sent frames since the latest of the one that is followed.
-    passes_over: Cell<bool>,
-    /// The frame that decided whom to follow, until it is handed over: what explains it goes before.
-    first: RefCell<Option<PoseSample>>,
-    /// The latest status of each publisher that came before it was known whom to follow.
-    held_statuses: RefCell<Vec<(Origin, LoopStatus)>>,
+    selection: Selection,
+}
+
+/// The publisher whose messages are handed over, where a service has more than one.
+enum Selection {
+    /// No frame has come.
+    Undecided {
+        /// The latest status of each publisher.
+        statuses: Vec<(Origin, LoopStatus)>,
+    },
+    /// Frames come.
+    Following {
+        selected: Selected,
+        /// True until [`Connection::follows_another`] is called.
+        is_new: bool,
+        /// True if another publisher has sent frames since the latest frame of the selected publisher.
+        passes_over: bool,
+        /// The frame that selected the publisher, until it is handed over: the stage goes before.
+        first: Option<PoseSample>,
+        /// The statuses received before that frame.
+        statuses: Vec<(Origin, LoopStatus)>,
+    },
 }
 
 /// A subscriber's node, with which it opens services.
@@ -59,44 +72,44 @@ pub struct Subscription {
     node: Node<ipc::Service>,
     name: String,
     wake: Wake,
-    /// Publishers that do not send, and since when that is known: the ends of tunnels to other machines. To hold on to their
-    /// services would keep the tunnel open.
-    bystanders: RefCell<(Instant, Vec<Origin>)>,
+    /// Publishers that do not send, and since when that is known: the ends of tunnels to other machines. Open services
+    /// would keep the tunnel open.
+    stale_publishers: RefCell<(Instant, Vec<Origin>)>,
 }
 
-/// How a subscriber learns that a frame has come.
+/// The way in which a subscriber notices a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wake {
     /// The publisher wakes it, which costs the publisher some microseconds for every frame.
     OnFrame,
-    /// It polls as often as it likes, which costs the publisher nothing.
+    /// It polls, which costs the publisher nothing.
     Never,
 }
 
 impl Subscription {
-    /// A subscription to the services of `name`, none of which need exist yet.
+    /// Creates a subscription to the services of `name`, which need not exist yet.
     ///
     /// # Errors
-    /// [`OpenError`] for a name that iceoryx2 cannot take, or where this process may not use the shared memory.
+    /// [`OpenError`] for a name that iceoryx2 refuses, or if this process may not use the shared memory.
     pub fn new(name: &str, wake: Wake) -> Result<Self, OpenError> {
         service_name(name, "poses")?;
         check_room_to_subscribe()?;
         stale_files::spawn_reaper();
-        let bystanders = RefCell::new((Instant::now(), Vec::new()));
-        Ok(Self { node: node()?, name: name.to_owned(), wake, bystanders })
+        let stale_publishers = RefCell::new((Instant::now(), Vec::new()));
+        Ok(Self { node: node()?, name: name.to_owned(), wake, stale_publishers })
     }
 
-    /// Connects to the publisher, or `None` while there is none.
+    /// Connects to the publisher. Returns `None` while no publisher runs.
     ///
     /// # Errors
-    /// [`OpenError`] where its services exist and cannot be used.
+    /// [`OpenError`] if its services exist and cannot be used.
     pub fn connect(&self) -> Result<Option<Connection>, OpenError> {
         let name = service_name(&self.name, "poses")?;
         let opened =
             self.node.service_builder(&name).publish_subscribe::<[HandlePose]>().user_header::<FrameHeader>().open();
         let poses_service = match opened {
             Ok(service) => service,
-            // Not there yet, or just coming or going.
+            // It does not exist yet, or is being created or removed.
             Err(Open::DoesNotExist | Open::HangsInCreation | Open::IsMarkedForDestruction) => return Ok(None),
             Err(Open::IncompatibleTypes | Open::VersionMismatch) => {
                 return Err(OpenError::Incompatible(name.to_string()));
@@ -105,8 +118,9 @@ impl Subscription {
                 return Err(OpenError::Failed { service: name.to_string(), reason: format!("{error:?}") });
             }
         };
-        // Other subscribers keep a service when its publisher has gone. One more would keep it from being made anew.
-        if self.only_bystanders(&publishers(&poses_service)) {
+        // Other subscribers keep a service whose publisher has gone. One more would prevent the next publisher from creating
+        // it again.
+        if self.only_stale_publishers(&publishers(&poses_service)) {
             self.service::<CollisionAlert>("alerts")?;
             self.service::<Cue>("cues")?;
             self.service::<LoopStatus>("status")?;
@@ -132,38 +146,34 @@ impl Subscription {
             status_service: self.service("status")?,
             stage: self.receiver("stage")?,
             tick: self.listener(),
-            followed: Cell::new(None),
-            follows_another: Cell::new(false),
-            passes_over: Cell::new(false),
-            first: RefCell::new(None),
-            held_statuses: RefCell::new(Vec::new()),
+            selection: Selection::Undecided { statuses: Vec::new() },
         };
         reserve_pages()?;
         Ok(Some(connection))
     }
 
-    /// Lets go of a connection from which nothing more comes. Publishers that remain are not connected to again for a while,
-    /// unless a show is here: then one of them may be the next show's, which is about to send.
+    /// Closes a connection whose publisher has gone. The remaining publishers count as stale for a while, unless a show
+    /// runs here: then one of them may belong to the next show, which is about to send.
     pub fn leave(&self, connection: Connection) {
         let remaining = publishers(&connection.poses_service);
         // In this order: a show serves commands before it has a publisher.
-        let bystanders = if self.show_is_here() { Vec::new() } else { remaining };
-        self.bystanders.replace((Instant::now(), bystanders));
+        let stale_publishers = if self.show_is_here() { Vec::new() } else { remaining };
+        self.stale_publishers.replace((Instant::now(), stale_publishers));
     }
 
-    /// Whether there is nobody to connect to.
-    fn only_bystanders(&self, publishers: &[Origin]) -> bool {
-        let (since, bystanders) = &*self.bystanders.borrow();
+    /// Returns true if there is no publisher, or stale publishers only.
+    fn only_stale_publishers(&self, publishers: &[Origin]) -> bool {
+        let (since, stale_publishers) = &*self.stale_publishers.borrow();
         publishers.is_empty()
-            || since.elapsed() < BYSTANDER_INTERVAL && publishers.iter().all(|it| bystanders.contains(it))
+            || since.elapsed() < STALE_INTERVAL && publishers.iter().all(|it| stale_publishers.contains(it))
     }
 
-    /// Whether a show of this name runs in this shared memory: only a show serves commands.
+    /// Returns true if a show of this name runs in this shared memory: only a show serves commands.
     pub fn show_is_here(&self) -> bool {
         !self.shows_here().is_empty()
     }
 
-    /// The nodes with which shows of this name serve commands.
+    /// Returns the nodes with which shows of this name serve commands.
     fn shows_here(&self) -> Vec<UniqueNodeId> {
         let mut nodes = Vec::new();
         let Ok(name) = service_name(&self.name, "control") else { return nodes };
@@ -177,21 +187,21 @@ impl Subscription {
         nodes
     }
 
-    /// Whether frames are passed over that a show here may send, in favour of those of another process: the end of a tunnel
-    /// that was followed while no show was here.
+    /// Returns true if frames are passed over that a show of this machine may send, because another process is selected:
+    /// the end of a tunnel, selected while no show ran here.
     pub fn passes_over_the_show(&self, connection: &Connection) -> bool {
-        let Some(followed) = connection.followed.get().filter(|_| connection.passes_over.get()) else { return false };
+        let Selection::Following { selected, passes_over: true, .. } = &connection.selection else { return false };
         let process = |node: &UniqueNodeId| node.pid::<ipc::Service>().ok();
         let shows = self.shows_here();
-        !shows.is_empty() && shows.iter().all(|show| process(show) != process(&followed.origin.node))
+        !shows.is_empty() && shows.iter().all(|show| process(show) != process(&selected.origin.node))
     }
 
-    /// Opens what was not there when the connection was made: a publisher makes its services one after another, and
-    /// one without alerts never makes that one.
+    /// Opens services that did not exist when the connection was made: a publisher creates its services one after another,
+    /// and a publisher without alerts never creates that service.
     ///
     /// # Errors
-    /// [`OpenError::Full`] where a service is there now and the memory for it is not, [`OpenError::Incompatible`] where
-    /// its messages have another layout.
+    /// [`OpenError::Full`] if a new service has no memory left, [`OpenError::Incompatible`] if its messages have another
+    /// layout.
     pub fn open_missing_services(&self, connection: &mut Connection) -> Result<(), OpenError> {
         let missing = connection.missing();
         if connection.alerts.is_none() {
@@ -211,21 +221,21 @@ impl Subscription {
         if connection.missing() < missing { reserve_pages() } else { Ok(()) }
     }
 
-    /// Whether the publisher whose frames come is there and alive, or any where none have come. Cleans up after one that was
-    /// killed.
+    /// Returns true if the selected publisher is alive, or any publisher if none is selected. Cleans up after killed
+    /// publishers.
     pub fn publisher_is_alive(&self, connection: &Connection) -> bool {
         let _ = self.node.try_cleanup_dead_nodes();
         let of_frames = publishers(&connection.poses_service);
-        let is_there = match connection.followed.get() {
-            Some(followed) => of_frames.contains(&followed.origin),
-            None => !of_frames.is_empty(),
+        let is_there = match &connection.selection {
+            Selection::Following { selected, .. } => of_frames.contains(&selected.origin),
+            Selection::Undecided { .. } => !of_frames.is_empty(),
         };
-        // One that ends sends its last status after its last frame, from a node that has no frames.
+        // A publisher that ends sends its last status after its last frame, from a node that has no frames.
         let of_status = connection.status_service.as_ref().map_or_else(Vec::new, publishers);
         is_there || of_status.iter().any(|status| of_frames.iter().all(|frames| frames.node != status.node))
     }
 
-    /// A port of a service that may be absent: a scene can be without alerts.
+    /// Returns a port of a service that may be absent: a scene can be without alerts.
     fn receiver<Message: ZeroCopySend + std::fmt::Debug>(
         &self,
         service: &str,
@@ -233,7 +243,7 @@ impl Subscription {
         Ok(self.service(service)?.and_then(|service| service.subscriber_builder().create().ok()))
     }
 
-    /// A service that may be absent. One with another layout is refused.
+    /// Returns a service that may be absent. A service with another layout is refused.
     fn service<Message: ZeroCopySend + std::fmt::Debug>(
         &self,
         service: &str,
@@ -256,49 +266,52 @@ impl Subscription {
 }
 
 impl Connection {
-    /// Services that are not open.
+    /// Returns the number of services that are not open.
     fn missing(&self) -> usize {
         let Self { alerts, cues, status, stage, tick, .. } = self;
         let open = [alerts.is_some(), cues.is_some(), status.is_some(), stage.is_some(), tick.is_some()];
         open.into_iter().filter(|open| !open).count()
     }
 
-    /// Waits until a frame is announced, or for `timeout` but at least 1 ms; not at all where that is zero.
+    /// Waits until a frame is announced, or for `timeout` but at least 1 ms. Does not wait if `timeout` is zero.
     pub fn wait(&self, timeout: Duration) {
         if timeout.is_zero() {
             return;
         }
-        // iceoryx2 takes less than a microsecond for "for ever".
+        // iceoryx2 waits without limit if the timeout is less than a microsecond.
         let timeout = timeout.max(Duration::from_millis(1));
         let waited = self.tick.as_ref().map(|tick| tick.timed_wait(|_| (), timeout));
         if !matches!(waited, Some(Ok(_))) {
-            // Without the event service there is nothing to wake on.
+            // Without the event service nothing wakes this thread.
             std::thread::sleep(timeout.min(Duration::from_millis(20)));
         }
     }
 
-    /// Whether the service names the clock of this process, so that moments of CLOCK_MONOTONIC in its frames can be
-    /// compared with those here. It tells of who made the service: a tunnel may use one that a show of this machine has
-    /// left.
+    /// Returns true if the service names the clock of this process, so that moments of CLOCK_MONOTONIC in its frames can be
+    /// compared with moments here. The name is that of the creator: a tunnel may use a service that a show of this machine
+    /// has left.
     pub fn names_clock(&self) -> bool {
         let clock = monotonic_clock_name();
         self.poses_service.attributes().iter().any(|it| it.key() == CLOCK && it.value() == clock.as_str())
     }
 
-    /// Whether, since this was last asked, a frame has decided to follow a publisher, or another one than before.
-    pub fn follows_another(&self) -> bool {
-        self.follows_another.take()
+    /// Returns true if a publisher was selected, or another one than before, since the last call.
+    pub fn follows_another(&mut self) -> bool {
+        match &mut self.selection {
+            Selection::Following { is_new, .. } => std::mem::take(is_new),
+            Selection::Undecided { .. } => false,
+        }
     }
 
-    /// Hands the frames that have come to `each`, oldest first; how many there were. They are at most as many as the queue
-    /// holds: a publisher that is faster than `each` would otherwise keep the caller here.
-    pub fn frames(&self, mut each: impl FnMut(&FrameHeader, &[HandlePose])) -> usize {
+    /// Passes the frames that have come to `each`, oldest first, and returns their number. They are at most as many as the
+    /// queue holds: otherwise a publisher that is faster than `each` would keep the caller here.
+    pub fn frames(&mut self, mut each: impl FnMut(&FrameHeader, &[HandlePose])) -> usize {
         let (mut count, mut received) = (0, 0);
         while received < self.poses.buffer_size()
             && let Some(sample) = self.next_frame()
         {
             received += 1;
-            if self.follow(Origin::of(sample.header()), sample.user_header().run_id) {
+            if self.select(Origin::of(sample.header()), sample.user_header().run_id) {
                 each(sample.user_header(), sample.payload());
                 count += 1;
             }
@@ -306,71 +319,73 @@ impl Connection {
         count
     }
 
-    /// Hands the newest frame to `take` and drops those before it; `None` where none has come.
-    pub fn newest_frame<Taken>(&self, take: impl FnOnce(&FrameHeader, &[HandlePose]) -> Taken) -> Option<Taken> {
+    /// Passes the newest frame to `take` and drops the older ones. Returns `None` if no frame has come.
+    pub fn newest_frame<Taken>(&mut self, take: impl FnOnce(&FrameHeader, &[HandlePose]) -> Taken) -> Option<Taken> {
         let mut newest = None;
         while let Some(sample) = self.next_frame() {
-            if self.follow(Origin::of(sample.header()), sample.user_header().run_id) {
+            if self.select(Origin::of(sample.header()), sample.user_header().run_id) {
                 newest = Some(sample);
             }
         }
         newest.map(|sample| take(sample.user_header(), sample.payload()))
     }
 
-    /// The next alert, if one has come.
-    pub fn alert(&self) -> Option<CollisionAlert> {
+    /// Returns the next alert, if one has come.
+    pub fn alert(&mut self) -> Option<CollisionAlert> {
+        self.decide();
         self.next(self.alerts.as_ref())
     }
 
-    /// Whether there is a service of cues to open.
+    /// Sets whether there is a service of cues to open.
     pub fn expect_cues(&mut self, expected: bool) {
         self.expects_cues = expected;
     }
 
-    /// The next cue, if one has come.
-    pub fn cue(&self) -> Option<Cue> {
+    /// Returns the next cue, if one has come.
+    pub fn cue(&mut self) -> Option<Cue> {
+        self.decide();
         self.next(self.cues.as_ref())
     }
 
-    /// The next status, if one has come.
-    pub fn status(&self) -> Option<LoopStatus> {
-        if !self.is_decided() {
-            return None;
-        }
-        let held = self.held_statuses.take().into_iter().find(|(origin, status)| self.admits(*origin, status.run_id));
+    /// Returns the next status, if one has come.
+    pub fn status(&mut self) -> Option<LoopStatus> {
+        self.decide();
+        let Selection::Following { statuses, .. } = &mut self.selection else { return None };
+        let held = std::mem::take(statuses).into_iter().find(|(origin, status)| self.admits(*origin, status.run_id));
         held.map(|(_, status)| status).or_else(|| self.next(self.status.as_ref()))
     }
 
-    /// Takes in the statuses that come before a frame has decided whose are handed over; whether any came. A publisher
-    /// of few frames is known by them to be alive.
-    pub fn hold_statuses(&self) -> bool {
-        let Some(port) = self.status.as_ref().filter(|_| self.followed.get().is_none()) else { return false };
-        let mut held = self.held_statuses.borrow_mut();
+    /// Buffers statuses received before a publisher is selected. Returns true if any arrived: a publisher of few frames is
+    /// known by its statuses to be alive.
+    pub fn hold_statuses(&mut self) -> bool {
+        let Selection::Undecided { statuses } = &mut self.selection else { return false };
+        let Some(port) = &self.status else { return false };
         let mut any = false;
         while let Ok(Some(sample)) = port.receive() {
             let origin = Origin::of(sample.header());
-            held.retain(|(known, _)| *known != origin);
-            if held.len() == MOST_PUBLISHERS {
-                held.remove(0);
+            statuses.retain(|(known, _)| *known != origin);
+            if statuses.len() == MOST_PUBLISHERS {
+                statuses.remove(0);
             }
-            held.push((origin, *sample));
+            statuses.push((origin, *sample));
             any = true;
         }
         any
     }
 
-    /// The next stage, if one has come.
-    pub fn stage(&self) -> Option<Stage> {
+    /// Returns the next stage, if one has come.
+    pub fn stage(&mut self) -> Option<Stage> {
+        self.decide();
         self.next(self.stage.as_ref())
     }
 
-    /// The next message that belongs to the frames that are followed. Before a frame has come, messages stay in their
-    /// queues: they could be of a publisher that sends no frames.
+    /// Returns the next message that belongs to the frames of the selected publisher. Before a publisher is selected,
+    /// messages stay in their queues: their publisher may send no frames.
     fn next<Message: ZeroCopySend + std::fmt::Debug + Copy + OfRun>(
         &self,
         port: Option<&Receiver<Message, ()>>,
     ) -> Option<Message> {
-        let port = port.filter(|_| self.is_decided())?;
+        let (Selection::Following { .. }, Some(port)) = (&self.selection, port) else { return None };
         while let Some(sample) = port.receive().ok().flatten() {
             if self.admits(Origin::of(sample.header()), sample.run_id()) {
                 return Some(*sample);
@@ -379,47 +394,60 @@ impl Connection {
         None
     }
 
-    /// The next frame of any publisher, if one has come.
-    fn next_frame(&self) -> Option<PoseSample> {
-        self.first.take().or_else(|| self.poses.receive().ok().flatten())
+    /// Returns the next frame of any publisher, if one has come.
+    fn next_frame(&mut self) -> Option<PoseSample> {
+        let first = match &mut self.selection {
+            Selection::Following { first, .. } => first.take(),
+            Selection::Undecided { .. } => None,
+        };
+        first.or_else(|| self.poses.receive().ok().flatten())
     }
 
-    /// Whether it is known whom to follow; if not, the next frame decides, where one has come. Every publisher sends
-    /// frames all the time, in pauses too.
-    fn is_decided(&self) -> bool {
-        if self.followed.get().is_none()
+    /// Selects the publisher of the next frame, if none is selected and a frame has come. Every publisher sends frames all
+    /// the time, also while paused.
+    fn decide(&mut self) {
+        if matches!(self.selection, Selection::Undecided { .. })
             && let Some(sample) = self.next_frame()
         {
-            self.follow(Origin::of(sample.header()), sample.user_header().run_id);
-            self.first.replace(Some(sample));
+            self.select(Origin::of(sample.header()), sample.user_header().run_id);
+            if let Selection::Following { first, .. } = &mut self.selection {
+                *first = Some(sample);
+            }
         }
-        self.followed.get().is_some()
     }
 
-    /// Whether a frame is handed over. The first decides whose frames are from then on, until that publisher has gone or
-    /// the connection is left.
-    fn follow(&self, origin: Origin, run_id: u64) -> bool {
-        let latest = self.followed.get();
-        let is_same = latest.is_some_and(|followed| followed.origin == origin);
-        let follows = is_same || latest.is_none_or(|followed| !self.is_listed(followed.origin));
-        if follows {
-            self.followed.set(Some(Followed { origin, run_id }));
-            self.passes_over.set(false);
-            self.follows_another.set(self.follows_another.get() || !is_same);
-        } else {
-            self.passes_over.set(true);
+    /// Returns true if a frame is handed over. The first frame selects its publisher, until that publisher has gone or the
+    /// connection is left.
+    fn select(&mut self, origin: Origin, run_id: u64) -> bool {
+        match &mut self.selection {
+            Selection::Undecided { statuses } => {
+                self.selection = Selection::Following {
+                    selected: Selected { origin, run_id },
+                    is_new: true,
+                    passes_over: false,
+                    first: None,
+                    statuses: std::mem::take(statuses),
+                };
+                true
+            }
+            Selection::Following { selected, is_new, passes_over, .. } => {
+                let is_same = selected.origin == origin;
+                let follows = is_same || !publishers(&self.poses_service).contains(&selected.origin);
+                if follows {
+                    *selected = Selected { origin, run_id };
+                    *is_new |= !is_same;
+                }
+                *passes_over = !follows;
+                follows
+            }
         }
-        follows
     }
 
-    /// Whether a message is handed over: it comes from where the frames come from, or the next run begins with it.
+    /// Returns true if a message is handed over: its node is that of the frames, or the next run begins with it.
     fn admits(&self, origin: Origin, run_id: u64) -> bool {
-        self.followed.get().is_some_and(|followed| {
-            followed.origin.node == origin.node || followed.run_id == run_id || !self.is_listed(followed.origin)
-        })
-    }
-
-    fn is_listed(&self, origin: Origin) -> bool {
-        publishers(&self.poses_service).contains(&origin)
+        let Selection::Following { selected, .. } = &self.selection else { return false };
+        selected.origin.node == origin.node
+            || selected.run_id == run_id
+            || !publishers(&self.poses_service).contains(&selected.origin)
     }
 }

@@ -265,8 +265,7 @@ pub fn standing(response: &ControlResponse) -> String {
 
 /// Why a command was not obeyed, in a sentence; `None` where it was.
 pub fn refusal(response: &ControlResponse, command: Command) -> Option<String> {
-    let (number_of_command, value) = command.number_and_value();
-    let name = Command::NAMES[number_of_command as usize];
+    let (name, value) = (command.name(), command.number_and_value().1);
     let playback = response.playback_state().map_or("in an unknown state", PlaybackState::name);
     match response.result() {
         Some(Code::Done | Code::Already) => None,

@@ -1,7 +1,7 @@
-//! A stretch of a motion as one SVG that moves by itself, for pages that show pictures and run no programs.
+//! A stretch of a motion as one animated SVG, for pages that show pictures but run no programs.
 //!
-//! Every board is a rectangle that SMIL moves and turns from moment to moment; a viewer without SMIL sees the last one.
-//! Between two moments boards move evenly, so that the picture is only as true as its moments are close.
+//! Every board is a rectangle that SMIL moves and turns from sample to sample; a viewer without SMIL shows the last
+//! sample. Boards move linearly between samples, so the error grows with the distance of the samples.
 
 use svg::node::element::{Animate, AnimateTransform, Group, Rectangle};
 
@@ -12,39 +12,39 @@ use super::{Drawing, Surroundings, benches, marks, metres, rounded, sheet};
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::solve::Chain;
 
-/// Seconds for which the last moment stands before the picture begins again.
+/// Seconds for which the last sample stays before the picture starts again.
 const HOLD: f64 = 4.0;
 
-/// How many colours a board takes on.
+/// Number of colours of a board.
 const COLOURS: usize = 16;
 
-/// The most numbers that a countdown shows.
+/// The greatest number of values in a countdown.
 const MOST_NUMBERS: f64 = 200.0;
 
-/// The times of a moving picture.
-struct Score {
-    /// Moments that are different, and those after them in which the last one stands.
-    moments: usize,
+/// The times of an animation.
+struct KeyTimes {
+    /// Number of samples, and the number of further steps for which the last one stays.
+    samples: usize,
     held: usize,
-    /// Seconds from one moment to the next.
+    /// Seconds between samples.
     step: f64,
 }
 
-impl Score {
+impl KeyTimes {
     fn steps(&self) -> usize {
-        self.moments - 1 + self.held
+        self.samples - 1 + self.held
     }
 
     fn seconds(&self) -> f64 {
         self.steps() as f64 * self.step
     }
 
-    /// The moment that is shown at a step.
-    fn moment(&self, step: usize) -> usize {
-        step.min(self.moments - 1)
+    /// Returns the sample that is shown at a step.
+    fn sample(&self, step: usize) -> usize {
+        step.min(self.samples - 1)
     }
 
-    /// The part of the whole at which a time since the start comes.
+    /// Returns a time since the start as a fraction of the whole.
     fn part(&self, seconds: f64) -> String {
         rounded((seconds / self.seconds()).clamp(0.0, 1.0), 5)
     }
@@ -59,7 +59,7 @@ impl Score {
         animation.set("dur", self.duration()).set("repeatCount", "indefinite")
     }
 
-    /// Shows what is otherwise hidden from one second to another.
+    /// Shows a hidden element from one second to another.
     fn shown(&self, from: f64, to: f64) -> Animate {
         let values = ["hidden", "visible", "hidden"].map(str::to_owned);
         let times = ["0".to_owned(), self.part(from), self.part(to)];
@@ -72,13 +72,12 @@ impl Score {
 }
 
 impl Drawing<'_> {
-    /// One SVG that shows the chains of times that stand equally far apart, at least two of them, one after the other in
-    /// real time, and begins again.
-    pub fn animated(&self, moments: &[(f64, Chain)]) -> String {
+    /// Returns one SVG that shows chains at equal intervals in real time, at least two of them, and starts again.
+    pub fn animated(&self, samples: &[(f64, Chain)]) -> String {
         let palette = self.look.theme.palette();
-        let [(from, _), .., (until, last)] = moments else { return String::new() };
-        let step = (until - from) / (moments.len() - 1) as f64;
-        let score = Score { moments: moments.len(), held: (HOLD / step).ceil() as usize, step };
+        let [(from, _), .., (until, last)] = samples else { return String::new() };
+        let step = (until - from) / (samples.len() - 1) as f64;
+        let key_times = KeyTimes { samples: samples.len(), held: (HOLD / step).ceil() as usize, step };
         let happened = marks::happened(self.timeline, *until);
         let now = happened.iter().rev().find(|past| past.tense == Tense::Present);
         let touching: Vec<usize> = now.into_iter().flat_map(Happened::benches).map(|bench| bench as usize).collect();
@@ -91,14 +90,14 @@ impl Drawing<'_> {
         let reach = team.longest_link() + 2.0 * team.hole_inset;
         let view = self.camera.view().padded(reach);
         for bench in (0..team.benches).rev() {
-            let way: Vec<Board> = moments.iter().map(|(_, chain)| benches::board(team, chain, bench)).collect();
+            let way: Vec<Board> = samples.iter().map(|(_, chain)| benches::board(team, chain, bench)).collect();
             if !way.iter().any(|board| view.contains(board.centre)) {
                 continue;
             }
-            let colours = (0..=COLOURS).map(|colour| score.moment(colour * score.steps() / COLOURS));
+            let colours = (0..=COLOURS).map(|colour| key_times.sample(colour * key_times.steps() / COLOURS));
             let colours: Vec<String> =
-                colours.map(|moment| self.fill(moments[moment].1.speed[bench], palette)).collect();
-            let mut board = moving(&way, &colours, &score, &self.camera, bench);
+                colours.map(|sample| self.fill(samples[sample].1.speed[bench], palette)).collect();
+            let mut board = moving(&way, &colours, &key_times, &self.camera, bench);
             if bench == 0 {
                 let upright = lying(&way[0]);
                 let sign = benches::head_sign(&upright, &self.camera, palette);
@@ -109,7 +108,7 @@ impl Drawing<'_> {
             }
             if touching.contains(&bench) {
                 let rim = benches::outline(&lying(&way[0]), palette.danger, 3.0, &self.camera);
-                board = board.adding(rim.add(score.shown(until - from, score.seconds())));
+                board = board.adding(rim.add(key_times.shown(until - from, key_times.seconds())));
             }
             boards = boards.add(board.finished());
         }
@@ -119,28 +118,35 @@ impl Drawing<'_> {
         for past in happened.iter().filter(|past| past.tense == Tense::Present) {
             if let Some(place) = past.place(&self.camera) {
                 let sign = past.sign(self.camera.sheet(place), palette);
-                marks = marks.add(sign.add(score.shown(until - from, score.seconds())));
+                marks = marks.add(sign.add(key_times.shown(until - from, key_times.seconds())));
             }
         }
         document = document.add(Group::new().set("clip-path", "url(#frame)").add(stage).add(marks));
         if self.look.surroundings == Surroundings::Caption {
-            document = document.add(self.countdown(*from, *until, now, &score, palette));
+            document = document.add(self.countdown(*from, *until, now, &key_times, palette));
         }
-        // From the end to the beginning through the ground.
+        // From the end back to the start, the picture fades through the ground.
         let veil = Rectangle::new().set("width", super::WIDTH).set("height", rounded(self.height, 4));
-        let dim = score.animate("opacity", &["1", "0", "0", "1"].map(str::to_owned));
-        let times = ["0".to_owned(), score.part(0.8), score.part(score.seconds() - 0.8), "1".to_owned()];
+        let dim = key_times.animate("opacity", &["1", "0", "0", "1"].map(str::to_owned));
+        let times = ["0".to_owned(), key_times.part(0.8), key_times.part(key_times.seconds() - 0.8), "1".to_owned()];
         let veil = veil.set("fill", palette.ground).set("opacity", 0).add(dim.set("keyTimes", times.join(";")));
         self.finished(&document.add(veil))
     }
 
-    /// The seconds up to the event with which the stretch ends, and the event; without one, the time.
-    fn countdown(&self, from: f64, until: f64, now: Option<&Happened>, score: &Score, palette: &Palette) -> Group {
+    /// Returns a countdown of seconds to the event that ends the stretch, and the event; without an event, the time.
+    fn countdown(
+        &self,
+        from: f64,
+        until: f64,
+        now: Option<&Happened>,
+        key_times: &KeyTimes,
+        palette: &Palette,
+    ) -> Group {
         let (x, y) = (28.0, 46.0);
         let mut group = Group::new().set("id", "countdown");
         let every = ((until - from) / MOST_NUMBERS).ceil().max(1.0);
         let heading = now.map_or("time".to_owned(), |now| now.timed.event.kind.name().replace('_', " "));
-        let until_event = score.shown(0.0, until - from);
+        let until_event = key_times.shown(0.0, until - from);
         let quiet = |content: &str| sheet::words(content, (x, y), 22, palette.quiet);
         let number = |content: &str| sheet::words(content, (x, y + 52.0), 54, palette.ink).set("font-weight", 700);
         let hidden = |text: svg::node::element::Text| text.set("visibility", "hidden");
@@ -148,7 +154,7 @@ impl Drawing<'_> {
             Some(_) => hidden(quiet(&format!("{heading} in"))).add(until_event),
             None => quiet(&heading),
         });
-        // Each number stands until the next: of a countdown the seconds that are begun.
+        // Each number stays until the next. A countdown shows started seconds.
         let numbers = ((until - from) / every).ceil() as u64;
         for k in 0..numbers {
             let (begins, ends, shown) = match now {
@@ -159,9 +165,10 @@ impl Drawing<'_> {
                 None => (k as f64 * every, (k + 1) as f64 * every, from + k as f64 * every),
             };
             let shown = number(&format!("{} s", rounded(shown, 0)));
-            group = group.add(hidden(shown).add(score.shown(begins.max(0.0), ends)));
+            group = group.add(hidden(shown).add(key_times.shown(begins.max(0.0), ends)));
         }
-        let last = [score.shown(until - from, score.seconds()), score.shown(until - from, score.seconds())];
+        let last =
+            [key_times.shown(until - from, key_times.seconds()), key_times.shown(until - from, key_times.seconds())];
         let [one, other] = last;
         match now {
             None => group.add(number(&format!("{} s", rounded(until, 1))).add(one)),
@@ -181,7 +188,7 @@ impl Drawing<'_> {
     }
 }
 
-/// The board at the origin along x.
+/// Returns the board at the origin, along x.
 fn lying(board: &Board) -> Board {
     Board {
         centre: bench_dragon_motion::model::Point::origin(),
@@ -190,7 +197,7 @@ fn lying(board: &Board) -> Board {
     }
 }
 
-/// A board that moves: what turns is added to it, then it is put where it moves.
+/// An animated board: rotating elements in a group that is translated.
 struct Moving {
     bench: usize,
     turning: Group,
@@ -211,10 +218,10 @@ impl Moving {
     }
 }
 
-fn moving(way: &[Board], colours: &[String], score: &Score, camera: &Camera, bench: usize) -> Moving {
+fn moving(way: &[Board], colours: &[String], key_times: &KeyTimes, camera: &Camera, bench: usize) -> Moving {
     // A third of a unit of the sheet.
     let decimals = (3.0 * camera.scale).log10().ceil().max(0.0) as usize;
-    let steps = || (0..=score.steps()).map(|step| way[score.moment(step)]);
+    let steps = || (0..=key_times.steps()).map(|step| way[key_times.sample(step)]);
     let centres: Vec<String> = steps()
         .map(|board| format!("{} {}", rounded(board.centre.x, decimals), rounded(board.centre.y, decimals)))
         .collect();
@@ -222,7 +229,7 @@ fn moving(way: &[Board], colours: &[String], score: &Score, camera: &Camera, ben
     let angles: Vec<String> = steps()
         .map(|board| {
             let heading = board.axis.y.atan2(board.axis.x);
-            // The shorter way from one heading to the next, so that no board spins once round.
+            // The shorter way from one heading to the next, so that no board makes a full turn.
             turned += before.map_or(heading, |before: bench_dragon_motion::model::Vector| {
                 before.perp(&board.axis).atan2(before.dot(&board.axis))
             });
@@ -236,10 +243,10 @@ fn moving(way: &[Board], colours: &[String], score: &Score, camera: &Camera, ben
         rectangle.set("width", metres(2.0 * board.half_length)).set("height", metres(2.0 * board.half_width));
     let mut rectangle = rectangle.set("fill", colours.last().map_or("none", String::as_str));
     if colours.iter().any(|colour| *colour != colours[0]) {
-        rectangle = rectangle.add(score.animate("fill", colours));
+        rectangle = rectangle.add(key_times.animate("fill", colours));
     }
     let last = angles.last().map_or("0", String::as_str).to_owned();
     let turning = Group::new().set("transform", format!("rotate({last})"));
-    let turning = turning.add(score.transform("rotate", &angles)).add(rectangle);
-    Moving { bench, turning, translate: score.transform("translate", &centres), centres }
+    let turning = turning.add(key_times.transform("rotate", &angles)).add(rectangle);
+    Moving { bench, turning, translate: key_times.transform("translate", &centres), centres }
 }

@@ -1,4 +1,4 @@
-//! The benches of a chain: their true rectangles in metres, coloured by speed, with the signs of head and tail.
+//! The benches of a chain: their true rectangles in metres, coloured by speed, with signs at head and tail.
 
 use svg::node::element::{Circle, Group, Path, Polygon, Polyline};
 
@@ -11,28 +11,29 @@ use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::model::{Point, Vector};
 use bench_dragon_motion::solve::Chain;
 
-/// Speeds from the slowest to the fastest handle, metres per second: the ends of the colour scale.
+/// The range of handle speeds, metres per second: the ends of the colour scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Speeds {
-    /// The least.
+    /// The least speed.
     pub least: f64,
-    /// The greatest.
+    /// The greatest speed.
     pub greatest: f64,
 }
 
 impl Speeds {
-    /// Of no handle.
+    /// The range of no handle.
     pub const NONE: Self = Self { least: f64::INFINITY, greatest: f64::NEG_INFINITY };
 
-    /// Takes in the handles of a chain.
+    /// Extends the range to the handles of a chain.
     pub fn include(&mut self, chain: &Chain) {
         for speed in chain.speed.iter().filter(|speed| speed.is_finite()) {
             (self.least, self.greatest) = (self.least.min(*speed), self.greatest.max(*speed));
         }
     }
 
-    /// The colour scale: from backwards at the head's speed to three times that at most, and no narrower than a
-    /// thousandth of it to either side, so that rounding has no colour. `None` where no speed is known.
+    /// Returns the colour scale, or `None` if no speed is known. It reaches at most from the negative head speed to
+    /// three times the head speed. It reaches at least a thousandth to either side of the head speed, so that rounding
+    /// has no colour.
     pub fn scale(&self, head_speed: f64) -> Option<ColourScale> {
         if self.least > self.greatest {
             return None;
@@ -48,50 +49,50 @@ impl Speeds {
     }
 }
 
-/// Which speeds have which colours.
+/// The assignment of colours to speeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColourScale {
-    /// Metres per second at its slow end.
+    /// The speed at the slow end, metres per second.
     pub least: f64,
-    /// Metres per second at its fast end.
+    /// The speed at the fast end, metres per second.
     pub greatest: f64,
-    /// Whether some handles are slower still.
+    /// True if some handles are slower than the slow end.
     pub some_below: bool,
-    /// Whether some handles are faster still.
+    /// True if some handles are faster than the fast end.
     pub some_above: bool,
 }
 
 impl ColourScale {
-    /// Where a speed lies on the scale, from 0 to 1.
+    /// Returns the position of a speed on the scale, from 0 to 1.
     pub fn part(&self, speed: f64) -> f64 {
         (speed - self.least) / (self.greatest - self.least)
     }
 }
 
-/// The board of a bench. The heading keeps digits that two handles far from the origin have lost.
+/// Returns the board of a bench. The heading keeps digits that the difference of two far handles has lost.
 pub fn board(team: &Team, chain: &Chain, bench: usize) -> Board {
     let (sine, cosine) = chain.heading[bench].sin_cos();
     let front = Point::new(chain.x[bench], chain.y[bench]);
     Board::from_front(front, Vector::new(cosine, sine), team.link(bench), team.hole_inset, team.width)
 }
 
-/// The box of a board.
+/// Returns the box of a board.
 pub fn extent(board: &Board) -> StageBox {
     let mut extent = StageBox::EMPTY;
     board.corners().into_iter().for_each(|corner| extent.include(corner));
     extent
 }
 
-/// The benches of which any part may lie in a box, with their boards, the head first.
+/// Returns the benches that may have a part in a box, with their boards, the head first.
 pub fn seen(team: &Team, chain: &Chain, view: &StageBox) -> Vec<(usize, Board)> {
     let boards = (0..team.benches).map(|bench| (bench, board(team, chain, bench)));
     boards.filter(|(_, board)| extent(board).meets(view)).collect()
 }
 
-/// The pairs of benches, of those given, whose boards overlap, and by how many metres; the lower bench first. Boards that
-/// share a handle never count.
+/// Returns the pairs of the given benches whose boards overlap, the lower bench first, with the overlap in metres.
+/// Boards that share a handle never count.
 pub fn overlapping(boards: &[(usize, Board)], tolerance: f64) -> Vec<(usize, usize, f64)> {
-    // Sorted by their left ends: only those that begin before a board ends can overlap it.
+    // Sorted by left ends: only boards that begin before a board's right end can overlap it.
     let mut sorted: Vec<(StageBox, usize, &Board)> =
         boards.iter().map(|(bench, board)| (extent(board), *bench, board)).collect();
     sorted.sort_by(|a, b| a.0.least.x.total_cmp(&b.0.least.x));
@@ -109,17 +110,17 @@ pub fn overlapping(boards: &[(usize, Board)], tolerance: f64) -> Vec<(usize, usi
     pairs
 }
 
-/// The corners of a board as an SVG list of points.
+/// Returns the corners of a board as an SVG list of points.
 pub fn corners(board: &Board) -> String {
     let corners = board.corners().map(|corner| format!("{},{}", metres(corner.x), metres(corner.y)));
     corners.join(" ")
 }
 
-/// The boards and their handles, the tail's below and the head's on top.
+/// Returns the boards and their handles, the tail at the bottom and the head on top.
 pub fn group(boards: &[(usize, Board)], fill: impl Fn(usize) -> String, camera: &Camera, palette: &Palette) -> Group {
     let mut group = Group::new().set("id", "benches").set("stroke-linejoin", "round");
     let width = boards.first().map_or(0.0, |(_, board)| 2.0 * board.half_width);
-    // From this width on an edge can be seen, and from that on a hole.
+    // Minimum widths for a visible edge and for a visible hole.
     if width * camera.scale > 5.0 {
         group = group.set("stroke", palette.ground).set("stroke-width", camera.metres(0.8));
     }
@@ -130,7 +131,7 @@ pub fn group(boards: &[(usize, Board)], fill: impl Fn(usize) -> String, camera: 
     group
 }
 
-/// The holes of the handles, where they are large enough to be seen.
+/// Returns the holes of the handles, if they are large enough to be seen.
 pub fn handles(team: &Team, chain: &Chain, camera: &Camera, palette: &Palette) -> Group {
     let mut group = Group::new().set("id", "handles").set("fill", palette.ground);
     if team.width * camera.scale < 14.0 {
@@ -144,15 +145,15 @@ pub fn handles(team: &Team, chain: &Chain, camera: &Camera, palette: &Palette) -
     group
 }
 
-/// The outline of a board, so many units wide, and less on a board that is hardly wider.
+/// Returns the outline of a board, `units` wide, or thinner on a board that is hardly wider.
 pub fn outline(board: &Board, colour: &str, units: f64, camera: &Camera) -> Polygon {
     let units = units.min(units * 0.3 * board.half_width * camera.scale).max(0.4 * units);
     let outline = Polygon::new().set("points", corners(board)).set("fill", "none");
     outline.set("stroke", colour).set("stroke-width", camera.metres(units)).set("stroke-linejoin", "round")
 }
 
-/// Chevrons in the direction of travel, light on dark or dark on light whatever the board's colour; on a board too narrow
-/// for them a single larger one at its front.
+/// Returns chevrons in the direction of travel, with contrast to any board colour. A board too narrow for them gets a
+/// single larger one at its front.
 pub fn head_sign(board: &Board, camera: &Camera, palette: &Palette) -> Group {
     let (length, width) = (board.half_length, board.half_width);
     let place = |along: f64, across: f64| board.centre + along * board.axis + across * board.across();
@@ -172,7 +173,7 @@ pub fn head_sign(board: &Board, camera: &Camera, palette: &Palette) -> Group {
     group
 }
 
-/// Bars across the end, longer than the board is wide where that is too narrow to be seen.
+/// Returns bars across the end, longer than the board's width if that is too narrow to be seen.
 pub fn tail_sign(board: &Board, camera: &Camera, palette: &Palette) -> Path {
     let (length, width) = (board.half_length, board.half_width.max(4.0 / camera.scale));
     let place = |along: f64, across: f64| {

@@ -1,4 +1,4 @@
-//! From metres of the stage to units of the sheet: which part of the stage a picture shows, and where on the sheet.
+//! Conversion from metres of the stage to units of the sheet.
 
 use super::rounded;
 use bench_dragon_motion::model::Point;
@@ -13,50 +13,50 @@ pub struct StageBox {
 }
 
 impl StageBox {
-    /// The box of nothing.
+    /// The empty box.
     pub const EMPTY: Self = Self {
         least: Point::new(f64::INFINITY, f64::INFINITY),
         greatest: Point::new(f64::NEG_INFINITY, f64::NEG_INFINITY),
     };
 
-    /// The box of a width and a height about a point.
+    /// Creates the box with this centre, width and height.
     pub fn around(centre: Point, width: f64, height: f64) -> Self {
         let half = nalgebra::Vector2::new(0.5 * width, 0.5 * height);
         Self { least: centre - half, greatest: centre + half }
     }
 
-    /// Makes the box hold a point.
+    /// Extends the box to a point.
     pub fn include(&mut self, point: Point) {
         self.least = self.least.inf(&point);
         self.greatest = self.greatest.sup(&point);
     }
 
-    /// Metres across.
+    /// Returns the width in metres.
     pub fn width(&self) -> f64 {
         self.greatest.x - self.least.x
     }
 
-    /// Metres from the bottom to the top.
+    /// Returns the height in metres.
     pub fn height(&self) -> f64 {
         self.greatest.y - self.least.y
     }
 
-    /// The point in the middle.
+    /// Returns the centre.
     pub fn centre(&self) -> Point {
         nalgebra::center(&self.least, &self.greatest)
     }
 
-    /// The same middle, larger by a margin on every side.
+    /// Returns the box with the same centre and a margin on every side.
     pub fn padded(&self, margin: f64) -> Self {
         Self::around(self.centre(), self.width() + 2.0 * margin, self.height() + 2.0 * margin)
     }
 
-    /// Whether a point lies in it.
+    /// Returns true if a point is in the box.
     pub fn contains(&self, point: Point) -> bool {
         (self.least.x..=self.greatest.x).contains(&point.x) && (self.least.y..=self.greatest.y).contains(&point.y)
     }
 
-    /// Whether two boxes have a point in common.
+    /// Returns true if two boxes have a point in common.
     pub fn meets(&self, other: &Self) -> bool {
         self.least.x <= other.greatest.x
             && other.least.x <= self.greatest.x
@@ -64,7 +64,7 @@ impl StageBox {
             && other.least.y <= self.greatest.y
     }
 
-    /// The least and the greatest distance from the origin of a point in it, metres.
+    /// Returns the least and the greatest distance from the origin of a point in the box, metres.
     pub fn radii(&self) -> (f64, f64) {
         let nearest = Point::origin().sup(&self.least).inf(&self.greatest);
         let farthest = self.least.coords.abs().sup(&self.greatest.coords.abs());
@@ -72,70 +72,73 @@ impl StageBox {
     }
 }
 
-/// A rectangle of the sheet in its own units, y downward.
+/// A rectangle of the sheet in sheet units, y downward.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
-    /// Its left edge.
+pub struct Viewport {
+    /// The left edge.
     pub left: f64,
-    /// Its upper edge.
+    /// The upper edge.
     pub top: f64,
-    /// How wide it is.
+    /// The width.
     pub width: f64,
-    /// How high it is.
+    /// The height.
     pub height: f64,
 }
 
-impl Frame {
-    /// Its right edge.
+impl Viewport {
+    /// Returns the right edge.
     pub fn right(&self) -> f64 {
         self.left + self.width
     }
 
-    /// Its lower edge.
+    /// Returns the lower edge.
     pub fn bottom(&self) -> f64 {
         self.top + self.height
     }
 }
 
-/// Which part of the stage stands in which frame of the sheet.
+/// The mapping of a part of the stage to a viewport of the sheet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
-    /// Where on the sheet.
-    pub frame: Frame,
-    /// The point of the stage in the middle of the frame.
+    /// The viewport on the sheet.
+    pub viewport: Viewport,
+    /// The point of the stage in the middle of the viewport.
     pub centre: Point,
-    /// Units of the sheet for a metre.
+    /// Sheet units per metre.
     pub scale: f64,
 }
 
 impl Camera {
-    /// A camera that shows all of a box, and more of the stage where the frame has another shape.
-    pub fn showing(shown: &StageBox, frame: Frame) -> Self {
-        let scale = (frame.width / shown.width()).min(frame.height / shown.height());
-        Self { frame, centre: shown.centre(), scale }
+    /// Creates a camera that shows all of a box, and more of the stage if the viewport has another aspect ratio.
+    pub fn showing(shown: &StageBox, viewport: Viewport) -> Self {
+        let scale = (viewport.width / shown.width()).min(viewport.height / shown.height());
+        Self { viewport, centre: shown.centre(), scale }
     }
 
-    /// What is in the frame.
+    /// Returns the part of the stage in the viewport.
     pub fn view(&self) -> StageBox {
-        StageBox::around(self.centre, self.frame.width / self.scale, self.frame.height / self.scale)
+        StageBox::around(self.centre, self.viewport.width / self.scale, self.viewport.height / self.scale)
     }
 
-    /// Where a point of the stage stands on the sheet.
+    /// Returns the position of a stage point on the sheet.
     pub fn sheet(&self, point: Point) -> (f64, f64) {
         let away = self.scale * (point - self.centre);
-        (self.frame.left + 0.5 * self.frame.width + away.x, self.frame.top + 0.5 * self.frame.height - away.y)
+        (
+            self.viewport.left + 0.5 * self.viewport.width + away.x,
+            self.viewport.top + 0.5 * self.viewport.height - away.y,
+        )
     }
 
-    /// The attribute `transform` of a group that is drawn in metres, y upward.
+    /// Returns the attribute `transform` of a group that is drawn in metres, y upward.
     pub fn transform(&self) -> String {
         let (x, y) = self.sheet(Point::origin());
         format!("matrix({scale} 0 0 -{scale} {x} {y})", scale = self.scale)
     }
 
-    /// So many units of the sheet in metres, for widths of lines in that group.
+    /// Returns a width in sheet units as metres, for lines in that group.
     pub fn metres(&self, units: f64) -> String {
         let metres = units / self.scale;
-        // Six digits, however far away the camera is.
+        // Six digits at any distance of the camera.
         let decimals = (6.0 - metres.abs().log10().floor()).clamp(0.0, 15.0);
         rounded(metres, decimals as usize)
     }

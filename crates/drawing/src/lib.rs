@@ -1,10 +1,10 @@
-//! The stage as a picture: a moment of a motion as SVG text, and a stretch of it as one SVG that moves.
+//! Pictures of the stage: a chain at one time as SVG text, or a stretch of a motion as one animated SVG.
 //!
-//! In: a motion, its events, chains at times, a [`Look`]. Out: text. Pure. `draw` calls it; the plots of `trade` and of the
-//! soak report take their colours from [`palette`].
+//! In: a motion, its events, chains at times, a [`Look`]. Out: text. Pure. `draw` calls it. The plots of `trade` and of
+//! the soak report take their colours from [`palette`].
 //!
-//! The stage is drawn in metres, y upward, within a group whose transform puts it on the sheet, and clipped at the frame:
-//! whoever opens the file in an editor finds true coordinates.
+//! The stage is drawn in metres, y upward, in a group whose transform maps it to the sheet, clipped at the viewport. So
+//! an editor shows true coordinates.
 
 pub mod animation;
 mod benches;
@@ -26,18 +26,18 @@ use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::solve::Chain;
 use bench_dragon_motion::timeline::Timeline;
 use benches::{ColourScale, Speeds};
-use camera::{Camera, Frame, StageBox};
+use camera::{Camera, StageBox, Viewport};
 pub use look::{Framing, Length, Look, Surroundings, Theme};
 use marks::{Happened, Tense};
 use palette::Palette;
 
-/// Units across a sheet, whatever its size in print or on a screen.
+/// Width of a sheet in its own units, for any size in print or on a screen.
 const WIDTH: f64 = 960.0;
 
-/// The face of all words, that of the page.
+/// The font of all text, the same as on the page.
 const FACE: &str = "system-ui, sans-serif";
 
-/// What is there at the moments of a picture or of a sequence of them.
+/// The content of a picture, or of a sequence of pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
     boards: StageBox,
@@ -46,10 +46,10 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// Of no moment.
+    /// No content.
     pub const NONE: Self = Self { boards: StageBox::EMPTY, speeds: Speeds::NONE, last: 0.0 };
 
-    /// Takes in the chain at a time.
+    /// Adds the chain at a time.
     pub fn include(&mut self, motion: &Motion, time: f64, chain: &Chain) {
         for bench in 0..motion.team().benches {
             let corners = benches::board(motion.team(), chain, bench).corners();
@@ -72,7 +72,7 @@ pub struct Drawing<'a> {
 }
 
 impl<'a> Drawing<'a> {
-    /// Drawings of a motion that is called `name`, at moments of which `extent` has all that is there.
+    /// Creates the drawings of a motion called `name`. `extent` holds the content of all pictures.
     pub fn new(name: &'a str, motion: &'a Motion, timeline: &'a Timeline, extent: &Extent, look: Look) -> Self {
         let shown = match look.framing {
             Framing::Everything => {
@@ -80,34 +80,34 @@ impl<'a> Drawing<'a> {
                 boards.padded(0.04 * boards.width().max(boards.height()) + motion.team().width)
             }
             Framing::Radius(radius) => StageBox::around(Point::origin(), 2.0 * radius, 2.0 * radius),
-            // As high as the frame allows: the width alone is given.
+            // Only the width is given: the height follows from the viewport.
             Framing::View(centre, across) => StageBox::around(centre, across, f64::MIN_POSITIVE),
         };
-        // A team in a straight line still has room beside it, and a tower is not higher than a page.
+        // A straight team still gets space beside it, and a tall one is not higher than a page.
         let shape = match look.framing {
             Framing::View(..) => 1.0,
             _ => (shown.height() / shown.width()).clamp(0.3, 1.3),
         };
         let rows =
             1 + marks::happened(timeline, extent.last).iter().filter(|past| past.timed.event.place.is_some()).count();
-        let (frame, height) = match look.surroundings {
+        let (viewport, height) = match look.surroundings {
             Surroundings::Words => {
                 let (above, below) = sheet::margins(rows);
-                let height = look.sheet_height().unwrap_or(above + below + shape * sheet::frame_width());
+                let height = look.sheet_height().unwrap_or(above + below + shape * sheet::viewport_width());
                 let height = height.max(above + below + 50.0);
-                (sheet::frame(height, rows), height)
+                (sheet::viewport(height, rows), height)
             }
             Surroundings::Caption | Surroundings::Nothing => {
                 let height = look.sheet_height().unwrap_or(shape * WIDTH);
-                (Frame { left: 0.0, top: 0.0, width: WIDTH, height }, height)
+                (Viewport { left: 0.0, top: 0.0, width: WIDTH, height }, height)
             }
         };
-        let camera = Camera::showing(&shown, frame);
+        let camera = Camera::showing(&shown, viewport);
         let scale = extent.speeds.scale(motion.head_speed());
         Self { name, motion, timeline, look, height, camera, scale }
     }
 
-    /// The SVG of a chain at a time.
+    /// Returns the SVG of a chain at a time.
     pub fn svg(&self, time: f64, chain: &Chain) -> String {
         let palette = self.look.theme.palette();
         let happened = marks::happened(self.timeline, time);
@@ -153,7 +153,7 @@ impl<'a> Drawing<'a> {
             }
         }
         let mut document = self.document(time, chain, palette);
-        // The clip path is of the sheet, whatever the group within is drawn in.
+        // The clip path is in sheet units, whatever the units of the group.
         document = document.add(Group::new().set("clip-path", "url(#frame)").add(stage).add(marks));
         if self.look.surroundings == Surroundings::Words {
             let coloured = boards.iter().any(|(bench, _)| chain.speed[*bench].is_finite());
@@ -174,17 +174,17 @@ impl<'a> Drawing<'a> {
         self.finished(&document)
     }
 
-    /// The text of a document, with the dark rules where they are wanted.
+    /// Returns the text of a document, with the dark rules if requested.
     fn finished(&self, document: &Document) -> String {
         let svg = document.to_string();
         if self.look.theme == Theme::Auto { palette::with_dark_rules(&svg) } else { svg }
     }
 
-    /// An empty sheet with its ground, its clip path and what it says to those who do not see it.
+    /// Returns an empty sheet with its ground, its clip path, and its text for screen readers.
     fn document(&self, time: f64, chain: &Chain, palette: &Palette) -> Document {
         let part = self.height / WIDTH;
         let ground = Rectangle::new().set("width", WIDTH).set("height", rounded(self.height, 4));
-        let clip = ClipPath::new().set("id", "frame").add(sheet::outline(self.camera.frame));
+        let clip = ClipPath::new().set("id", "frame").add(sheet::outline(self.camera.viewport));
         Document::new()
             .set("viewBox", format!("0 0 {WIDTH} {}", rounded(self.height, 4)))
             .set("width", self.look.width.attribute(1.0))
@@ -196,14 +196,14 @@ impl<'a> Drawing<'a> {
             .add(ground.set("fill", palette.ground))
     }
 
-    /// The group of the stage, in metres.
+    /// Returns the group of the stage, in metres.
     fn stage(&self) -> Group {
         Group::new().set("id", "stage").set("transform", self.camera.transform())
     }
 
     fn path(&self, palette: &Palette) -> Path {
         let path = Path::new().set("id", "path").set("d", route::data(self.motion, &self.camera)).set("fill", "none");
-        // Finer where many turns stand close together.
+        // Finer where turns are close together.
         let turns = match self.motion.description() {
             PathDescription::Spiral { pitch, .. } | PathDescription::Turnaround { pitch, .. } => {
                 pitch * self.camera.scale
@@ -221,7 +221,8 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// Where the name of a board stands: beside it, away from the middle of the picture, unless a mark is there.
+    /// Returns the position of a board's name: beside the board, away from the middle of the picture, unless a mark is
+    /// there.
     fn beside(&self, board: &Board, marks: &[(f64, f64)]) -> (f64, f64) {
         let (x, y) = self.camera.sheet(board.centre);
         let across = board.across();
@@ -229,10 +230,10 @@ impl<'a> Drawing<'a> {
         let side = if across.dot(&outward) < 0.0 { -across } else { across };
         let away = board.half_width * self.camera.scale + 16.0;
         let places = [1.0, -1.0].map(|sign| (x + sign * 2.2 * away * side.x, y - sign * away * side.y));
-        let frame = self.camera.frame;
+        let viewport = self.camera.viewport;
         let free = |(x, y): &(f64, f64)| {
-            (frame.left + 30.0..frame.right() - 30.0).contains(x)
-                && (frame.top + 20.0..frame.bottom() - 10.0).contains(y)
+            (viewport.left + 30.0..viewport.right() - 30.0).contains(x)
+                && (viewport.top + 20.0..viewport.bottom() - 10.0).contains(y)
                 && marks.iter().all(|(a, b)| (x - a).abs() > 60.0 || (y - b).abs() > 34.0)
         };
         places.into_iter().find(free).unwrap_or(places[0])
@@ -240,7 +241,7 @@ impl<'a> Drawing<'a> {
 
     fn overlaps(&self, chain: &Chain) -> Vec<(usize, usize, f64)> {
         let team = self.motion.team();
-        // What overlaps a board in the picture may itself lie beyond its edge.
+        // A board that overlaps a visible board may be outside the picture.
         let reach = team.longest_link() + 2.0 * team.hole_inset + team.width;
         let near = benches::seen(team, chain, &self.camera.view().padded(reach));
         benches::overlapping(&near, 1e-9 * team.longest_link())
@@ -250,7 +251,7 @@ impl<'a> Drawing<'a> {
         format!("{} at {} s", self.name, rounded(time, 3))
     }
 
-    /// What is to be said of the time, and its colour.
+    /// Returns the line below the title, and its colour.
     fn subtitle<'p>(
         &self,
         time: f64,
@@ -274,7 +275,7 @@ impl<'a> Drawing<'a> {
         (next.unwrap_or_default(), palette.quiet)
     }
 
-    /// The picture in words.
+    /// Returns the picture in words.
     fn description(&self, chain: &Chain) -> String {
         let team = self.motion.team();
         let (x, y) = (rounded(chain.x[0], 3), rounded(chain.y[0], 3));
@@ -293,7 +294,7 @@ impl<'a> Drawing<'a> {
     }
 }
 
-/// The benches to outline and what they do: those that touch at this very time, or those that overlap.
+/// Returns the benches to outline and their state: touching at this time, or overlapping.
 fn outlined(happened: &[Happened], overlaps: &[(usize, usize, f64)]) -> (Vec<usize>, &'static str) {
     let touching = happened.iter().filter(|past| past.tense == Tense::Present);
     let touching = touching.filter(|past| past.timed.event.bench_b.is_some()).flat_map(Happened::benches);
@@ -305,7 +306,7 @@ fn outlined(happened: &[Happened], overlaps: &[(usize, usize, f64)]) -> (Vec<usi
     (benches, what)
 }
 
-/// What a bench is called in the picture, if it is: the head, the tail, and few that touch.
+/// Returns the name of a bench in the picture: for the head, the tail, and touching benches if they are few.
 fn name(bench: usize, last: usize, outlined: &[usize]) -> Option<String> {
     let concerned = outlined.len() <= 4 && outlined.contains(&bench);
     match bench {
@@ -317,12 +318,12 @@ fn name(bench: usize, last: usize, outlined: &[usize]) -> Option<String> {
     }
 }
 
-/// Metres as SVG data: to a tenth of a micrometre.
+/// Returns metres as SVG data, to a tenth of a micrometre.
 fn metres(value: f64) -> String {
     rounded(value, 7)
 }
 
-/// Text without the control characters that XML does not take.
+/// Returns text without the control characters that XML forbids.
 fn text(content: &str) -> String {
     let allowed = |letter: &char| !letter.is_control() && !matches!(letter, '\u{fffe}' | '\u{ffff}');
     content.chars().filter(allowed).collect()

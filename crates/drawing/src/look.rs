@@ -1,4 +1,4 @@
-//! How a picture looks: its colours, what it shows, what stands about that, its size. What `draw` reads from its options.
+//! The look of a picture: colours, framing, surroundings, size. `draw` reads it from its options.
 
 use super::WIDTH;
 use super::palette::{self, Palette};
@@ -12,12 +12,12 @@ pub enum Theme {
     Light,
     /// On a dark ground.
     Dark,
-    /// Light, and dark where the viewer prefers that and knows style rules, as browsers do.
+    /// Light, or dark if the viewer prefers dark and knows style rules, as browsers do.
     Auto,
 }
 
 impl Theme {
-    /// The palette in which the picture is drawn.
+    /// Returns the palette of the picture.
     pub(super) fn palette(self) -> &'static Palette {
         match self {
             Self::Light | Self::Auto => &palette::LIGHT,
@@ -26,23 +26,23 @@ impl Theme {
     }
 }
 
-/// Which part of the stage is shown.
+/// The part of the stage to show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Framing {
     /// The box of every board at every time of the picture.
     Everything,
-    /// The square about the origin that reaches so many metres to each side.
+    /// The square about the origin with this half width, metres.
     Radius(f64),
-    /// So many metres across about a point.
+    /// A width in metres about a point.
     View(Point, f64),
 }
 
-/// What stands about the stage.
+/// The content around the stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Surroundings {
     /// Title, axes and legend.
     Words,
-    /// The stage fills the sheet, with words over it: the countdown of a picture that moves.
+    /// The stage fills the sheet, with text over it: the countdown of an animation.
     Caption,
     /// Nothing: the stage fills the sheet.
     Nothing,
@@ -65,7 +65,7 @@ impl Length {
         }
     }
 
-    /// A part of this length as an attribute's value.
+    /// Returns a part of this length as the value of an attribute.
     pub(super) fn attribute(self, part: f64) -> String {
         match self {
             Self::Millimetres(length) => rounded(part * length, 4) + "mm",
@@ -74,23 +74,23 @@ impl Length {
     }
 }
 
-/// How a picture looks.
+/// The look of a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
-    /// Its colours.
+    /// The colours.
     pub theme: Theme,
-    /// Which part of the stage it shows.
+    /// The part of the stage.
     pub framing: Framing,
-    /// What stands about the stage.
+    /// The content around the stage.
     pub surroundings: Surroundings,
-    /// How wide it is.
+    /// The width.
     pub width: Length,
-    /// How high it is; as high as what it shows where nothing is given.
+    /// The height. By default it follows from the content.
     pub height: Option<Length>,
 }
 
 impl Look {
-    /// Units of the sheet's height, where one is given.
+    /// Returns the sheet's height in sheet units, if a height is given.
     pub(super) fn sheet_height(&self) -> Option<f64> {
         self.height.map(|height| WIDTH * height.pixels() / self.width.pixels())
     }

@@ -1,5 +1,5 @@
-//! What has happened by a time and what overlaps then: the marks of a picture and their words. The present tense is for
-//! what is so at this very time; whatever was before is told in the past tense.
+//! The events that have happened by a time, and the overlaps at that time, as marks and sentences. The present tense is
+//! for events at that time, the past tense for earlier ones.
 
 use svg::node::element::{Circle, Group, Path};
 
@@ -11,15 +11,15 @@ use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::timeline::{TimedEvent, Timeline};
 
-/// Seconds about an event that are its own time: a time typed with six decimals is still the event's.
+/// Seconds about an event that count as its time: a time typed with six decimals still matches.
 const NOW: f64 = 1e-6;
 
-/// Whether an event is now or was before.
+/// The tense of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tense {
-    /// It is now.
+    /// The event is now.
     Present,
-    /// It was.
+    /// The event was before.
     Past,
 }
 
@@ -28,11 +28,11 @@ pub enum Tense {
 pub struct Happened {
     /// The event.
     pub timed: TimedEvent,
-    /// Whether that is now.
+    /// Its tense.
     pub tense: Tense,
 }
 
-/// The events that have happened by a time, in order.
+/// Returns the events that have happened by a time, in order.
 pub fn happened(timeline: &Timeline, time: f64) -> Vec<Happened> {
     let passed = timeline.events().iter().filter(|timed| timed.time <= time + NOW);
     let tense = |timed: &TimedEvent| if timed.time < time - NOW { Tense::Past } else { Tense::Present };
@@ -40,12 +40,12 @@ pub fn happened(timeline: &Timeline, time: f64) -> Vec<Happened> {
 }
 
 impl Happened {
-    /// The benches concerned, from 0.
+    /// Returns the benches of the event, from 0.
     pub fn benches(&self) -> impl Iterator<Item = u32> + use<> {
         [self.timed.event.bench_a, self.timed.event.bench_b].into_iter().flatten()
     }
 
-    /// What happens or has happened, and where, in a team of so many benches; benches count from 1.
+    /// Returns the sentence of the event for a team of `benches` benches, counted from 1 in words.
     pub fn sentence(&self, place: &str, benches: usize) -> String {
         let who: Vec<String> = self.benches().map(|bench| bench_name(bench, benches as u32)).collect();
         let who = who.join(" and ");
@@ -63,8 +63,8 @@ impl Happened {
         sentence + " (counting from 1)"
     }
 
-    /// The mark at the place of the event: of a contact a ring and a cross, of a stall a diamond, of a lock a square. In
-    /// the colour of danger where it is now, quiet where it was.
+    /// Returns the mark of the event: a ring and a cross for a contact, a diamond for a stall, a square for a lock. It
+    /// has the colour of danger if the event is now, a quiet colour if it was before.
     pub fn sign(&self, (x, y): (f64, f64), palette: &Palette) -> Group {
         let colour = match self.tense {
             Tense::Present => palette.danger,
@@ -95,13 +95,13 @@ impl Happened {
         group
     }
 
-    /// Where it happened, if that is in the picture.
+    /// Returns the place of the event, if it is in the picture.
     pub fn place(&self, camera: &Camera) -> Option<Point> {
         self.timed.event.place.filter(|place| camera.view().contains(*place))
     }
 }
 
-/// Which pairs overlap now, in words for people; `None` where none do.
+/// Returns the pairs that overlap now, in words; `None` without any.
 pub fn overlap_sentence(pairs: &[(usize, usize, f64)], benches: usize) -> Option<String> {
     let deepest = pairs.iter().copied().max_by(|a, b| a.2.total_cmp(&b.2))?;
     let name = |bench: usize| bench_name(bench as u32, benches as u32);

@@ -1,7 +1,7 @@
-//! The colours of every picture that this program makes: those of the stage page's style sheet, for light and for dark.
+//! The colours of all pictures of this program: those of the stage page's style sheet, light and dark.
 //!
-//! `tests/draw` compares them with `src/subscribers/view/style.css`. Drawings take one palette; plots are made in the
-//! light one and get the dark one by [`with_dark_rules`], which a viewer that prefers dark applies.
+//! `tests/draw` compares them with the page's `style.css`. Drawings use one palette. Plots are made in the light
+//! palette and get the dark one by [`with_dark_rules`], which a viewer that prefers dark applies.
 
 use std::fmt::Write;
 
@@ -11,21 +11,21 @@ pub const SHADES: usize = 32;
 /// The colours of one theme, as `#rrggbb`. Each has the name of its variable in the style sheet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Palette {
-    /// Behind everything.
+    /// The background.
     pub ground: &'static str,
-    /// Words, and the outline of the head.
+    /// Text, and the outline of the head.
     pub ink: &'static str,
-    /// Words that are less important.
+    /// Less important text.
     pub quiet: &'static str,
     /// The path.
     pub faint: &'static str,
-    /// The frame.
+    /// The viewport's outline.
     pub line: &'static str,
-    /// What touches or overlaps.
+    /// Boards that touch or overlap.
     pub danger: &'static str,
-    /// What is coming.
+    /// Events ahead.
     pub warning: &'static str,
-    /// A board whose speed is not known, or that stands.
+    /// A board without a known speed, or that stands still.
     pub still: &'static str,
     /// The slowest board.
     pub slow: &'static str,
@@ -65,8 +65,8 @@ pub const DARK: Palette = Palette {
     fast: "#ffd24a",
 };
 
-/// Colours of the lines of a plot in the order in which they are taken: on a light ground, and on a dark one. They are
-/// told apart by people who do not see red and green, too (after Okabe and Ito).
+/// Colours of the lines of a plot, in order, on a light and on a dark ground. People who do not see red and green can
+/// distinguish them (after Okabe and Ito).
 pub const SERIES: [(&str, &str); 7] = [
     ("#0072b2", "#56b4e9"),
     ("#b86e00", "#e69f00"),
@@ -78,7 +78,7 @@ pub const SERIES: [(&str, &str); 7] = [
 ];
 
 impl Palette {
-    /// The colours with the names of their variables in the style sheet.
+    /// Returns the colours with the names of their variables in the style sheet.
     pub fn named(&self) -> [(&'static str, &'static str); 11] {
         [
             ("ground", self.ground),
@@ -95,7 +95,7 @@ impl Palette {
         ]
     }
 
-    /// A colour of the scale from slow (0) to fast (1).
+    /// Returns a colour of the scale from slow (0) to fast (1).
     pub fn shade(&self, part: f64) -> String {
         let step = ((part.clamp(0.0, 1.0) * SHADES as f64) as usize).min(SHADES - 1);
         let part = step as f64 / (SHADES - 1) as f64;
@@ -107,7 +107,7 @@ impl Palette {
     }
 }
 
-/// Red, green and blue of `#rrggbb`; black for any other text.
+/// Returns red, green and blue of `#rrggbb`; black for any other text.
 pub fn channels(hex: &str) -> [u8; 3] {
     let number = u32::from_str_radix(hex.trim_start_matches('#'), 16).unwrap_or(0);
     let [_, red, green, blue] = number.to_be_bytes();
@@ -123,7 +123,7 @@ fn mixed(from: &str, to: &str, part: f64) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
-/// Each light colour with the dark one that stands for it.
+/// Returns each light colour with its dark counterpart.
 fn pairs() -> impl Iterator<Item = (String, String)> {
     let named = LIGHT.named().into_iter().zip(DARK.named()).map(|((_, light), (_, dark))| (light, dark));
     let series = SERIES.into_iter();
@@ -132,8 +132,8 @@ fn pairs() -> impl Iterator<Item = (String, String)> {
     owned.chain(parts.map(|part| (LIGHT.shade(part), DARK.shade(part))))
 }
 
-/// Style rules that turn the light colours that occur in `svg` into the dark ones where the viewer prefers dark. A rule
-/// is stronger than an attribute, and a program that knows no rules draws the light colours.
+/// Returns style rules that replace the light colours of `svg` by the dark ones if the viewer prefers dark. A rule
+/// overrides an attribute; a program without style rules draws the light colours.
 pub fn dark_rules(svg: &str) -> String {
     let mut rules = String::new();
     let mut seen = Vec::new();
@@ -152,7 +152,7 @@ pub fn dark_rules(svg: &str) -> String {
     format!("@media(prefers-color-scheme:dark){{{rules}}}")
 }
 
-/// An SVG in light colours, with the rules that make it dark where the viewer prefers that.
+/// Returns an SVG in light colours with the rules that make it dark if the viewer prefers dark.
 pub fn with_dark_rules(svg: &str) -> String {
     let rules = dark_rules(svg);
     match svg.find('>') {

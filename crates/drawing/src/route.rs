@@ -11,14 +11,14 @@ use bench_dragon_motion::model::path::{OutlineKind, SegmentOutline};
 use bench_dragon_motion::model::spiral::Direction;
 use bench_dragon_motion::model::{Point, Vector};
 
-/// Cubic curves for a turn of a spiral: none is further than 0.02 mm from it at the paper's scale.
+/// Cubic curves per turn of a spiral: their error is at most 0.02 mm at the paper's scale.
 const CURVES_PER_TURN: f64 = 24.0;
 
-/// Turns that stand closer than so many units of the sheet are not drawn: they would be a grey disc.
+/// Sheet units between turns below which a spiral is not drawn: it would be a grey disc.
 const LEAST_PITCH: f64 = 1.5;
 
-/// The data of the path in the picture of a camera. What lies behind the start is drawn as far as the picture goes: the
-/// team stands there.
+/// Returns the data of the path in the picture of a camera. The path behind the start, where the team stands, is drawn
+/// to the edge of the picture.
 pub fn data(motion: &Motion, camera: &Camera) -> String {
     let view = camera.view();
     let mut data = String::new();
@@ -43,7 +43,7 @@ pub fn data(motion: &Motion, camera: &Camera) -> String {
             OutlineKind::Spiral { direction: Direction::Outward, pitch, first, last } => {
                 spiral(&mut data, Direction::Outward, pitch, (first, last), camera);
             }
-            // Drawn above, with what lies behind the start.
+            // Drawn above, with the path behind the start.
             OutlineKind::Spiral { direction: Direction::Inward, .. } => {}
         }
     }
@@ -63,7 +63,7 @@ fn line(data: &mut String, from: Point, to: Point) {
     let _ = write!(data, "M{}L{}", pair(from), pair(to));
 }
 
-/// The point of an arc after a part of its length.
+/// Returns the point of an arc after a part of its length.
 fn arc_point(segment: &SegmentOutline, curvature: f64, part: f64) -> Point {
     let left = direction(segment.heading + FRAC_PI_2);
     let centre = segment.start + left / curvature;
@@ -73,7 +73,8 @@ fn arc_point(segment: &SegmentOutline, curvature: f64, part: f64) -> Point {
 fn arc(data: &mut String, segment: &SegmentOutline, curvature: f64) {
     let radius = metres(1.0 / curvature.abs());
     let left = u8::from(curvature > 0.0);
-    // A third of a turn at most: the large-arc flag is never needed, and a whole circle is none of a kind.
+    // At most a third of a turn each: the large-arc flag is never needed, and a whole circle is not one arc, which SVG
+    // does not allow.
     let steps = (curvature.abs() * segment.length / (TAU / 3.0)).ceil().max(1.0);
     let _ = write!(data, "M{}", pair(segment.start));
     for step in 1..=steps as u64 {
@@ -82,7 +83,7 @@ fn arc(data: &mut String, segment: &SegmentOutline, curvature: f64) {
     }
 }
 
-/// Metres per radian outward, in the direction of a polar angle: a e(theta).
+/// Returns a e(theta), metres per radian outward, in the direction of a polar angle.
 fn unwound(way: Direction, pitch: f64, theta: f64) -> Vector {
     let radius_per_radian = match way {
         Direction::Inward => pitch / TAU,
@@ -95,7 +96,7 @@ fn spiral_point(way: Direction, pitch: f64, theta: f64) -> Point {
     Point::from(theta * unwound(way, pitch, theta))
 }
 
-/// The turns of a spiral between two polar angles that the picture can show, as cubic curves.
+/// Appends the turns of a spiral between two polar angles that the picture can show, as cubic curves.
 fn spiral(data: &mut String, direction: Direction, pitch: f64, (from, to): (f64, f64), camera: &Camera) {
     if pitch * camera.scale < LEAST_PITCH {
         return;
@@ -107,7 +108,8 @@ fn spiral(data: &mut String, direction: Direction, pitch: f64, (from, to): (f64,
     }
     let steps = ((to - from) / TAU * CURVES_PER_TURN).ceil();
     let step = (to - from) / steps;
-    // The handles of a circle's cubic (4/3 tan(step / 4) of its radius) in place of a third of the step: three digits more.
+    // The handles of a circle's cubic, 4/3 tan(step / 4) of its radius, in place of a third of the step: three more
+    // digits.
     let handle = 4.0 / 3.0 * (0.25 * step).tan();
     let at = |theta: f64| {
         // d/dtheta of a theta e(theta) is a e + a theta e'.
@@ -125,7 +127,7 @@ fn spiral(data: &mut String, direction: Direction, pitch: f64, (from, to): (f64,
 
 #[cfg(test)]
 mod tests {
-    use super::super::camera::{Frame, StageBox};
+    use super::super::camera::{StageBox, Viewport};
     use super::*;
     use bench_dragon_motion::Method;
     use bench_dragon_motion::model::curve::Side;
@@ -135,11 +137,11 @@ mod tests {
     const TEAM: Team = Team { benches: 20, head_length: 3.41, body_length: 2.2, width: 0.3, hole_inset: 0.275 };
 
     fn camera(width: f64) -> Camera {
-        let frame = Frame { left: 0.0, top: 0.0, width: 1000.0, height: 1000.0 };
-        Camera::showing(&StageBox::around(Point::origin(), width, width), frame)
+        let viewport = Viewport { left: 0.0, top: 0.0, width: 1000.0, height: 1000.0 };
+        Camera::showing(&StageBox::around(Point::origin(), width, width), viewport)
     }
 
-    /// The points of the data of cubic curves, four for each.
+    /// Returns the points of the data of cubic curves, four for each.
     fn curves(data: &str) -> Vec<[Point; 4]> {
         let numbers: Vec<f64> = data.split(['M', 'C', ' ']).filter_map(|number| number.parse().ok()).collect();
         let points: Vec<Point> = numbers.chunks(2).map(|pair| Point::new(pair[0], pair[1])).collect();
@@ -175,8 +177,8 @@ mod tests {
         let description = PathDescription::Spiral { pitch: 0.55, start_turn: 2000.0 };
         let motion = Motion::new(description, TEAM, 1.0, Method::Newton).unwrap();
         assert_eq!(data(&motion, &camera(1000.0)), "");
-        let frame = Frame { left: 0.0, top: 0.0, width: 1000.0, height: 1000.0 };
-        let near = Camera::showing(&StageBox::around(Point::new(1000.0, 0.0), 4.0, 4.0), frame);
+        let viewport = Viewport { left: 0.0, top: 0.0, width: 1000.0, height: 1000.0 };
+        let near = Camera::showing(&StageBox::around(Point::new(1000.0, 0.0), 4.0, 4.0), viewport);
         let turns = curves(&data(&motion, &near)).len() as f64 / CURVES_PER_TURN;
         assert!((7.0..12.0).contains(&turns), "{turns} turns");
     }

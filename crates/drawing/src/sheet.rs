@@ -1,10 +1,10 @@
-//! What stands about the stage on the sheet: the title, the axes, and a legend of what is in the picture, all outside the
-//! frame, so that nothing of the stage is covered.
+//! The surroundings of the stage on the sheet: the title, the axes, and a legend. They are outside the viewport, so
+//! that nothing of the stage is covered.
 
 use svg::node::element::{Definitions, Group, LinearGradient, Path, Rectangle, Stop, Text};
 
 use super::benches::ColourScale;
-use super::camera::{Camera, Frame};
+use super::camera::{Camera, Viewport};
 use super::marks::Happened;
 use super::palette::Palette;
 use super::{FACE, WIDTH, rounded, text};
@@ -12,54 +12,54 @@ use super::{FACE, WIDTH, rounded, text};
 const LEFT: f64 = 62.0;
 const RIGHT: f64 = 18.0;
 const TOP: f64 = 84.0;
-/// What the numbers and the name of the lower axis take.
+/// Sheet units for the numbers and the name of the lower axis.
 const AXIS: f64 = 40.0;
-/// A row of the legend.
+/// Height of a row of the legend.
 const ROW: f64 = 28.0;
 const BOTTOM: f64 = 14.0;
 
-/// What the legend has to explain.
+/// The content that the legend explains.
 pub struct Contents<'a> {
-    /// The ends of the colour scale, metres per second, where any board is coloured by it.
+    /// The colour scale, metres per second, if it colours any board.
     pub scale: Option<ColourScale>,
-    /// Whether the head's signs are in the frame.
+    /// True if the head's signs are in the viewport.
     pub head: bool,
-    /// Whether the tail's are.
+    /// True if the tail's signs are in the viewport.
     pub tail: bool,
-    /// What the outlined boards do, if any are outlined.
+    /// The state of the outlined boards, if any.
     pub outlined: Option<&'static str>,
-    /// The events whose marks are in the frame, with their words.
+    /// The events whose marks are in the viewport, with their words.
     pub events: &'a [(Happened, String)],
 }
 
-/// Units that the sheet takes beyond the frame, downward, with so many rows in the legend.
+/// Returns the sheet units above and below the viewport, with `rows` rows in the legend.
 pub fn margins(rows: usize) -> (f64, f64) {
     (TOP, AXIS + ROW * rows as f64 + BOTTOM)
 }
 
-/// The frame of a sheet of a height, with so many rows in the legend.
-pub fn frame(height: f64, rows: usize) -> Frame {
+/// Returns the viewport of a sheet of this height, with `rows` rows in the legend.
+pub fn viewport(height: f64, rows: usize) -> Viewport {
     let (above, below) = margins(rows);
-    Frame { left: LEFT, top: above, width: frame_width(), height: height - above - below }
+    Viewport { left: LEFT, top: above, width: viewport_width(), height: height - above - below }
 }
 
-/// How wide the frame is.
-pub fn frame_width() -> f64 {
+/// Returns the width of the viewport.
+pub fn viewport_width() -> f64 {
     WIDTH - LEFT - RIGHT
 }
 
-/// Words on the sheet.
+/// Returns text on the sheet.
 pub fn words(content: &str, (x, y): (f64, f64), size: u32, colour: &str) -> Text {
     let words = Text::new(text(content)).set("x", rounded(x, 2)).set("y", rounded(y, 2));
     words.set("font-family", FACE).set("font-size", size).set("fill", colour)
 }
 
-/// Units that words take on a line, about.
+/// Returns the approximate width of a line of text, sheet units.
 pub fn width_of(content: &str, size: f64) -> f64 {
     content.chars().map(|letter| if letter > '\u{2e7f}' { size } else { 0.55 * size }).sum()
 }
 
-/// Words cut to so many units.
+/// Returns text cut to a width in sheet units.
 fn fitted(content: &str, size: f64, most: f64) -> String {
     if width_of(content, size) <= most {
         return content.to_owned();
@@ -74,16 +74,16 @@ fn fitted(content: &str, size: f64, most: f64) -> String {
     fitted + "\u{2026}"
 }
 
-/// The title and the line below it.
+/// Returns the title and the line below it.
 pub fn title(title: &str, below: &str, colour: &str, palette: &Palette) -> Group {
-    let title = words(&fitted(title, 27.0, frame_width()), (LEFT, 38.0), 26, palette.ink).set("font-weight", 700);
-    let below = words(&fitted(below, 16.0, frame_width()), (LEFT, 64.0), 16, colour);
+    let title = words(&fitted(title, 27.0, viewport_width()), (LEFT, 38.0), 26, palette.ink).set("font-weight", 700);
+    let below = words(&fitted(below, 16.0, viewport_width()), (LEFT, 64.0), 16, colour);
     Group::new().set("id", "title").add(title).add(below)
 }
 
-/// The frame, and numbers in metres along it.
+/// Returns the viewport's outline with numbers in metres.
 pub fn axes(camera: &Camera, palette: &Palette) -> Group {
-    let (frame, view) = (camera.frame, camera.view());
+    let (viewport, view) = (camera.viewport, camera.view());
     let step = round_step(130.0 / camera.scale);
     let decimals = (-step.log10().floor()).max(0.0) as usize;
     let mut ticks = String::new();
@@ -91,44 +91,45 @@ pub fn axes(camera: &Camera, palette: &Palette) -> Group {
     for x in multiples(step, view.least.x, view.greatest.x) {
         let (at, _) = camera.sheet(nalgebra::Point2::new(x, 0.0));
         let at = rounded(at, 3);
-        ticks += &format!("M{at} {bottom}v6", bottom = frame.bottom());
-        let number = words(&rounded(x, decimals), (0.0, frame.bottom() + 22.0), 14, palette.quiet);
+        ticks += &format!("M{at} {bottom}v6", bottom = viewport.bottom());
+        let number = words(&rounded(x, decimals), (0.0, viewport.bottom() + 22.0), 14, palette.quiet);
         group = group.add(number.set("x", at).set("text-anchor", "middle"));
     }
     for y in multiples(step, view.least.y, view.greatest.y) {
         let (_, at) = camera.sheet(nalgebra::Point2::new(0.0, y));
-        ticks += &format!("M{left} {at}h-6", left = frame.left, at = rounded(at, 3));
-        let number = words(&rounded(y, decimals), (frame.left - 11.0, at + 5.0), 14, palette.quiet);
+        ticks += &format!("M{left} {at}h-6", left = viewport.left, at = rounded(at, 3));
+        let number = words(&rounded(y, decimals), (viewport.left - 11.0, at + 5.0), 14, palette.quiet);
         group = group.add(number.set("text-anchor", "end"));
     }
-    let unit = words("metres", (frame.right(), frame.bottom() + 38.0), 14, palette.quiet).set("text-anchor", "end");
+    let unit =
+        words("metres", (viewport.right(), viewport.bottom() + 38.0), 14, palette.quiet).set("text-anchor", "end");
     let ticks = Path::new().set("d", ticks).set("fill", "none").set("stroke", palette.quiet);
-    group.add(ticks).add(outline(frame).set("stroke", palette.quiet).set("fill", "none")).add(unit)
+    group.add(ticks).add(outline(viewport).set("stroke", palette.quiet).set("fill", "none")).add(unit)
 }
 
-/// A frame as an element.
-pub fn outline(frame: Frame) -> Rectangle {
-    let corner = Rectangle::new().set("x", rounded(frame.left, 3)).set("y", rounded(frame.top, 3));
-    corner.set("width", rounded(frame.width, 3)).set("height", rounded(frame.height, 3))
+/// Returns a viewport as an element.
+pub fn outline(viewport: Viewport) -> Rectangle {
+    let corner = Rectangle::new().set("x", rounded(viewport.left, 3)).set("y", rounded(viewport.top, 3));
+    corner.set("width", rounded(viewport.width, 3)).set("height", rounded(viewport.height, 3))
 }
 
-/// The greatest of 1, 2, 5 times a power of ten that is at most this.
+/// Returns the greatest of 1, 2, 5 times a power of ten that is at most `most`.
 fn round_step(most: f64) -> f64 {
     let power = 10f64.powf(most.log10().floor());
     [5.0, 2.0, 1.0].into_iter().map(|one| one * power).find(|step| *step <= most).unwrap_or(power)
 }
 
-/// The multiples of a step from one number to another.
+/// Returns the multiples of a step from one number to another.
 fn multiples(step: f64, from: f64, to: f64) -> impl Iterator<Item = f64> {
     let (first, last) = ((from / step).ceil(), (to / step).floor());
-    // The step leaves some ten of them in a picture; far from the origin, where a step is rounding, none too many.
+    // A picture has some ten of them. Far from the origin a step may be lost in rounding, so their number is limited.
     (0..1000).map(move |k| first + f64::from(k)).take_while(move |k| *k <= last).map(move |k| k * step)
 }
 
-/// The legend, row by row below the frame: what is in the picture and nothing else.
+/// Returns the legend, row by row below the viewport, for the content of the picture only.
 pub fn legend(contents: &Contents, camera: &Camera, palette: &Palette) -> Group {
     let mut group = Group::new().set("id", "legend");
-    let mut row = Row { x: LEFT, y: camera.frame.bottom() + AXIS + 0.5 * ROW };
+    let mut row = Row { x: LEFT, y: camera.viewport.bottom() + AXIS + 0.5 * ROW };
     let Row { x, y } = row;
     if let Some(scale) = &contents.scale {
         let bar = Rectangle::new().set("x", x).set("y", rounded(y - 7.0, 2)).set("width", 110).set("height", 14);
@@ -158,19 +159,19 @@ pub fn legend(contents: &Contents, camera: &Camera, palette: &Palette) -> Group 
         let (x, y) = (row.x + 11.0, row.y);
         let small = Group::new().set("transform", format!("translate({x} {}) scale(0.55)", rounded(y, 2)));
         group = group.add(small.add(event.sign((0.0, 0.0), palette)));
-        group = group.add(row.after(22.0, &fitted(sentence, 15.0, frame_width() - 40.0), palette));
+        group = group.add(row.after(22.0, &fitted(sentence, 15.0, viewport_width() - 40.0), palette));
     }
     group
 }
 
-/// Where the next entry of the legend stands.
+/// The position of the next entry of the legend.
 struct Row {
     x: f64,
     y: f64,
 }
 
 impl Row {
-    /// The words after a sample so many units wide; what follows stands behind them.
+    /// Returns the text to the right of a sample `sample` units wide, and moves on behind it.
     fn after(&mut self, sample: f64, content: &str, palette: &Palette) -> Text {
         let x = self.x + sample + 8.0;
         self.x = x + width_of(content, 15.0) + 24.0;
@@ -180,7 +181,7 @@ impl Row {
 
 fn speed_words(scale: &ColourScale) -> String {
     let ColourScale { least, greatest, .. } = scale;
-    // As many digits as tell the two ends apart.
+    // As many digits as distinguish the two ends.
     let decimals = (1.0 - (greatest - least).log10().floor()).clamp(0.0, 12.0) as usize;
     let or = |beyond: bool, words: &'static str| if beyond { words } else { "" };
     let (slow, fast) = (or(scale.some_below, " or less"), or(scale.some_above, " or more"));
@@ -195,12 +196,12 @@ fn gradient(palette: &Palette) -> Definitions {
     Definitions::new().add(gradient)
 }
 
-/// Words in the picture, with a rim of the ground's colour so that they are read over boards.
+/// Returns text in the picture, with a rim in the ground's colour so that it can be read over boards.
 pub fn label(content: &str, (x, y): (f64, f64), colour: &str, camera: &Camera, palette: &Palette) -> Group {
     let half = 0.5 * width_of(content, 16.0) + 6.0;
-    let Frame { left, top, .. } = camera.frame;
-    let x = x.min(camera.frame.right() - half).max(left + half);
-    let y = y.min(camera.frame.bottom() - 10.0).max(top + 20.0);
+    let Viewport { left, top, .. } = camera.viewport;
+    let x = x.min(camera.viewport.right() - half).max(left + half);
+    let y = y.min(camera.viewport.bottom() - 10.0).max(top + 20.0);
     let place = |colour| words(content, (x, y + 5.0), 16, colour).set("text-anchor", "middle").set("font-weight", 600);
     let rim = place(palette.ground).set("stroke", palette.ground).set("stroke-width", 5);
     Group::new().add(rim.set("stroke-linejoin", "round")).add(place(colour))

@@ -20,7 +20,7 @@ impl FrameHeader {
 impl ControlResponse {
     /// What became of the command, or `None` for a number that this layout does not know.
     pub fn result(&self) -> Option<Code> {
-        of_number(&Code::ALL, self.code)
+        Code::of_number(self.code)
     }
 
     /// Whether the show plays, or `None` for a number that this layout does not know.

@@ -12,3 +12,6 @@ pub mod sentence;
 pub mod state;
 
 pub use layouts::*;
+
+/// The bytes that one queue of frames, or one topic's history, takes by default at most: 64 MB.
+pub const QUEUE_BYTES: usize = 64_000_000;

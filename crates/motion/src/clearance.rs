@@ -15,6 +15,7 @@ mod tests;
 
 use crate::model::Point;
 use crate::model::board::Board;
+use crate::model::elementary::hypot;
 use crate::model::path::Path;
 use crate::model::separation::{closest_points_board_board, signed_distance_board_board};
 use crate::model::team::Team;
@@ -186,7 +187,7 @@ impl ClearanceMonitor {
 }
 
 fn circle_radius(team: &Team, bench: usize) -> f64 {
-    (0.5 * team.link(bench) + team.hole_inset).hypot(0.5 * team.width)
+    hypot(0.5 * team.link(bench) + team.hole_inset, 0.5 * team.width)
 }
 
 /// How far any point of a board moves at most per metre that its handles move.

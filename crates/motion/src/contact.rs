@@ -50,7 +50,7 @@ mod reach;
 mod search;
 
 use crate::linkage::NoFollower;
-use crate::model::curve::Segment;
+use crate::model::curve::Curve;
 use crate::model::path::{Param, Path};
 use crate::model::root::golden_section_min;
 use crate::model::team::Team;
@@ -99,13 +99,8 @@ impl<'a> ConservativeAdvancement<'a> {
         let places = |turns: &[f64]| turns.iter().map(|travelled| path.param_at(*travelled)).collect();
         let mut curves = Vec::with_capacity(path.segments());
         for segment in 0..path.segments() {
-            let curve = |segment| path.segment(Param { segment, at: path.first(segment) });
-            let same = segment > 0
-                && match (curve(segment - 1), curve(segment)) {
-                    (Segment::Line(_), Segment::Line(_)) => true,
-                    (Segment::Arc(one), Segment::Arc(other)) => one.signed_curvature() == other.signed_curvature(),
-                    _ => false,
-                };
+            let curvature = |segment| path.segment_at(segment).constant_curvature();
+            let same = segment > 0 && curvature(segment).is_some() && curvature(segment - 1) == curvature(segment);
             curves.push(if same { curves[segment - 1] } else { segment });
         }
         Self { path, team, head_turns: places(head_turns), body_turns: places(body_turns), curves }
@@ -152,13 +147,9 @@ impl<'a> ConservativeAdvancement<'a> {
     /// its shape; `None` where it is not on one.
     fn rigid_until(&self, travelled: f64) -> Option<f64> {
         let head = self.path.param_at(travelled);
-        let along = |chord: f64| match self.path.segment(head) {
-            Segment::Line(_) => Some(chord),
-            Segment::Arc(arc) => {
-                (chord <= 2.0 * arc.radius).then(|| 2.0 * arc.radius * (0.5 * chord / arc.radius).asin())
-            }
-            Segment::Spiral(_) => None,
-        };
+        let segment = self.path.segment(head);
+        segment.constant_curvature()?;
+        let along = |chord: f64| segment.arc_over(chord);
         let body = (self.team.benches - 1) as f64 * along(self.team.link(1))?;
         // Room for the rounding of what it sums up.
         let length = (1.0 + 1e-7) * (along(self.team.link(0))? + body);

@@ -232,7 +232,7 @@ impl Search<'_> {
     /// The rear handle of a link; where rounding leaves none in the last digits, at the last place before.
     fn rear_point(&self, travelled: f64, link: usize) -> Option<Point> {
         let digit = f64::EPSILON * (travelled + self.team.link(link));
-        let earlier = (0..40).map(|power| travelled - digit * f64::from(power).exp2());
+        let earlier = (0..40).map(|power| travelled - digit * 2f64.powi(power));
         let mut places = [travelled].into_iter().chain(earlier).take_while(|at| *at >= 0.0);
         places.find_map(|at| self.rear(at, link)).map(|rear| self.path.point(rear))
     }

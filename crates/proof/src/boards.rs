@@ -1,6 +1,6 @@
-//! Boards that are apart: Lemmas 2 and 3 of docs/proofs.md. Only `proof` uses it.
+//! Boards that are apart: Lemmas 2 and 3 of docs/proofs.md.
 //!
-//! In which direction two boards are apart is chosen by doubles; that they are is decided by intervals.
+//! Doubles choose the direction in which two boards may be apart; intervals prove it.
 
 use std::cell::OnceCell;
 
@@ -8,12 +8,12 @@ use super::capsule::Capsule;
 use super::interval::{Interval, Vector};
 use super::scene::Team;
 
-/// Directions tried for every pair, best first, before it is given up.
+/// Limit of directions tried for a pair, the best first.
 const MOST_TRIES: usize = 4;
-/// Metres that two boards must be apart by doubles in one of the eight fixed directions for that one to be tried first.
+/// Distance by doubles, metres, from which on one of the eight fixed directions is tried first.
 const CLEARLY_APART: f64 = 1e-2;
 
-/// A direction.
+/// A direction, of any length.
 struct Axis {
     n: Vector,
     norm: Interval,
@@ -47,7 +47,7 @@ pub(super) struct Board<'a> {
 }
 
 impl<'a> Board<'a> {
-    /// A board between its handles.
+    /// Creates a board between its handles.
     pub fn new(front: &'a Capsule, rear: &'a Capsule, length: Interval, team: &Team) -> Self {
         let middle = front.point.minus(&rear.point);
         let overhang = &team.hole_inset / &length;
@@ -56,7 +56,7 @@ impl<'a> Board<'a> {
         Self { front, rear, middle, length, overhang, half_width, rough, compass: Default::default() }
     }
 
-    /// H(n): at least the largest n . x over the board.
+    /// Returns H(n): an upper bound of n . x over the board.
     fn extent(&self, axis: &Axis) -> Interval {
         let Axis { n, norm } = axis;
         let projected = |capsule: &Capsule| {
@@ -81,7 +81,7 @@ impl<'a> Board<'a> {
         self.compass[direction].get_or_init(|| self.extent(&Axis::new(COMPASS[direction])))
     }
 
-    /// Whether Lemma 2 shows the two boards to be apart.
+    /// Returns true if Lemma 2 shows the two boards to be apart.
     pub fn is_apart_from(&self, other: &Self) -> bool {
         let apart = |n: [f64; 2]| -self.rough.extent(n) - other.rough.extent([-n[0], -n[1]]);
         let fixed = (0..8).map(|direction| (direction, apart(COMPASS[direction])));
@@ -147,7 +147,7 @@ impl Rough {
         [(front[0] - rear[0]) / self.length, (front[1] - rear[1]) / self.length]
     }
 
-    /// [`Board::extent`].
+    /// As [`Board::extent`].
     fn extent(&self, n: [f64; 2]) -> f64 {
         let norm = n[0].hypot(n[1]);
         let ((f, f_slack), (r, r_slack)) = (self.front.projected(n, norm), self.rear.projected(n, norm));
@@ -174,8 +174,8 @@ impl Rough {
         [at(-e, -v), at(-e, v), at(1.0 + e, -v), at(1.0 + e, v)]
     }
 
-    /// Directions in which another board may be apart: the normals of all edges, and from the corner of one to the
-    /// nearest of the other.
+    /// Returns directions in which another board may be apart: the normals of all edges, and the direction between the
+    /// nearest corners.
     fn axes(&self, other: &Self) -> [[f64; 2]; 9] {
         let of_edges = |board: &Self| {
             let [x, y] = board.direction();
@@ -191,8 +191,9 @@ impl Rough {
     }
 }
 
-/// Lemma 3, *Ring*: whether boards whose handles are at most `reach` metres from the centre of the spiral are apart from
-/// all body boards whose handles are on it, at least `ring` from its centre.
+/// Returns true if Lemma 3, *Ring*, shows boards near the centre of the spiral to be apart from all body boards further
+/// out. The handles of the former are at most `reach` metres from the centre, those of the latter at least `ring`
+/// metres.
 pub(super) fn is_inside_ring(team: &Team, reach: &Interval, ring: &Interval) -> bool {
     let half_link = team.link(1) * Interval::new(0.5);
     let half_width = &team.width * Interval::new(0.5);
@@ -204,7 +205,7 @@ pub(super) fn is_inside_ring(team: &Team, reach: &Interval, ring: &Interval) -> 
     outer.is_below(&inner)
 }
 
-/// Whether a point is in a board wherever its handles are in their spans (Lemma 5, *Contact*).
+/// Returns true if a point is in a board for all positions of its handles in their spans (Lemma 5, *Contact*).
 pub(super) fn covers(board: &Board, point: &Vector) -> bool {
     let all = |capsule: &Capsule| {
         let along = capsule.tangent.scaled(&capsule.half.around_zero());

@@ -1,5 +1,4 @@
-//! Where the places of a span are, and what the front and rear products of two spans can be (docs/proofs.md,
-//! "Capsules"). Only `proof` uses it.
+//! Positions over a span, and the front and rear products of two spans (docs/proofs.md, "Capsules").
 
 use super::interval::{Interval, Vector};
 use super::path::{At, Path, Place, Span};
@@ -12,9 +11,9 @@ pub(super) struct Capsule {
     pub point: Vector,
     /// t(m).
     pub tangent: Vector,
-    /// h: at least the metres from m to either end.
+    /// h: an upper bound of the metres from m to either end.
     pub half: Interval,
-    /// K: at least the curvature anywhere.
+    /// K: an upper bound of the curvature over the span, 1/m.
     pub curvature: Interval,
     /// K h^2 / 2.
     pub sag: Interval,
@@ -23,7 +22,7 @@ pub(super) struct Capsule {
 }
 
 impl Capsule {
-    /// The capsule of a span of places that are in order.
+    /// Creates the capsule of a span whose places are in order.
     pub fn new(path: &Path, span: Span) -> Self {
         let Span(lo, hi) = span;
         let between = |place: Place| path.has(place) && path.in_order(lo, place) && path.in_order(place, hi);
@@ -36,7 +35,7 @@ impl Capsule {
         Self { span, point, tangent, half, curvature, sag, turn }
     }
 
-    /// The same places, `metres` further back on a line.
+    /// Returns the capsule moved back `metres` on a line.
     pub fn behind(&self, metres: &Interval) -> Self {
         Self { point: self.point.minus(&self.tangent.scaled(metres)), ..self.clone() }
     }
@@ -48,11 +47,11 @@ pub(super) struct Pair<'a> {
     pub rear: &'a Capsule,
     /// p(m_u) - p(m_x).
     middle: Vector,
-    /// At least |d|.
+    /// An upper bound of |d|.
     pub distance: Interval,
-    /// At least the distance of d from p(m_u) - p(m_x) across both directions.
+    /// An upper bound of the distance of d from p(m_u) - p(m_x), without the parts along both directions.
     sag: Interval,
-    /// At least |t(m_u) . t(m_x)|.
+    /// An upper bound of |t(m_u) . t(m_x)|.
     pub along: Interval,
 }
 
@@ -64,19 +63,19 @@ impl<'a> Pair<'a> {
         Self { front, rear, middle, distance, sag: (&front.sag + &rear.sag).upper(), along }
     }
 
-    /// t . d for all tangents t of `of`, which is one of the two; `other` is the other one.
+    /// Returns t . d for all tangents t of `of`. `of` and `other` are the two spans.
     fn product(&self, of: &Capsule, other: &Capsule) -> Interval {
         // |t(m) . V| is h for the capsule's own V, since t(m) is a unit vector.
         let slack = &of.half + &other.half * &self.along + &self.sag + &of.turn * &self.distance;
         of.tangent.dot(&self.middle) + slack.around_zero()
     }
 
-    /// The front product f(u, x) = t(u) . d.
+    /// Returns the front product f(u, x) = t(u) . d.
     pub fn front_product(&self) -> Interval {
         self.product(self.front, self.rear)
     }
 
-    /// The rear product g(u, x) = t(x) . d.
+    /// Returns the rear product g(u, x) = t(x) . d.
     pub fn rear_product(&self) -> Interval {
         self.product(self.rear, self.front)
     }

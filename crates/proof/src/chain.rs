@@ -1,4 +1,4 @@
-//! The chain over the spans of its handles: Lemma 1 for each link that is listed. Only `proof` uses it.
+//! The chain over the spans of its handles: Lemma 1 for each listed link.
 
 use super::capsule::Capsule;
 use super::interval::Interval;
@@ -6,11 +6,11 @@ use super::link;
 use super::path::{Place, Span};
 use super::scene::Scene;
 
-/// Handles 0 (the head) to as many as are listed, each somewhere in its span while the head goes over its own.
+/// The listed handles, from handle 0 (the head) on. Each is in its span while the head is in the head's span.
 pub(super) struct Chain {
-    /// Of each handle.
+    /// The capsule of each handle.
     pub capsules: Vec<Capsule>,
-    /// Of each link, the front product at its follower.
+    /// The front product at its follower, for each link.
     pub products: Vec<Interval>,
 }
 
@@ -18,7 +18,7 @@ impl Chain {
     /// Checks Lemma 1 for all links over the spans of the head and of the handles 1, 2, ...
     ///
     /// # Errors
-    /// What does not follow.
+    /// The link that does not follow.
     pub fn check(scene: &Scene, head: Span, spans: &[Span]) -> Result<Self, String> {
         let (path, team) = (&scene.path, &scene.team);
         if spans.len() > team.benches {
@@ -37,19 +37,19 @@ impl Chain {
         Ok(Self { capsules, products })
     }
 
-    /// The handle that is listed last.
+    /// Returns the last listed handle.
     pub fn last(&self) -> usize {
         self.capsules.len() - 1
     }
 
-    /// Whether the last handle is on segment 0, a line: then so are all behind it (Lemma 3, *Line*).
+    /// Returns true if the last handle is on segment 0, a line: then all handles behind it are too (Lemma 3, *Line*).
     pub fn ends_on_line(&self, scene: &Scene) -> bool {
         let Span(_, latest) = self.capsules[self.last()].span;
         latest.0 == 0 && scene.path.is_line(0)
     }
 }
 
-/// Whether a span is one: two places strictly inside segments, in order.
+/// Checks that a span is valid: two places strictly inside segments, in order.
 pub(super) fn span_is_one(scene: &Scene, Span(lo, hi): Span) -> Result<(), String> {
     for Place(segment, coordinate) in [lo, hi] {
         if !scene.path.has(Place(segment, coordinate)) {

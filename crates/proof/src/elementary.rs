@@ -1,5 +1,5 @@
-//! Sine, cosine, logarithm and arc tangent of intervals, by their series with the remainder that Taylor's formula or a
-//! geometric series leaves. Only `proof` uses it.
+//! Sine, cosine, logarithm and arctangent of intervals, by series with the remainder of Taylor's formula or of a
+//! geometric series.
 
 use std::sync::LazyLock;
 
@@ -7,12 +7,12 @@ use super::interval::Interval;
 
 /// Terms of the series of sine and of cosine: the remainder is at most 0.8^29 / 29! < 2e-34.
 const TERMS: usize = 14;
-/// Terms of the series of arc tangent and of its hyperbolic twin: for |z| <= 0.34 the remainder is below 1e-42.
+/// Terms of the series of arctangent and of its hyperbolic twin: for |z| <= 0.34 the remainder is below 1e-42.
 const SLOW_TERMS: usize = 45;
 
-/// Half of pi.
+/// Pi / 2.
 static QUARTER: LazyLock<Interval> = LazyLock::new(|| atan(&Interval::new(1.0)) * Interval::new(2.0));
-/// 1 / n! for n up to twice `TERMS` and one more.
+/// 1 / n! for n up to 2 `TERMS` + 1.
 static INVERSE_FACTORIALS: LazyLock<Vec<Interval>> = LazyLock::new(|| {
     let first = std::iter::once(Interval::new(1.0));
     let rest = (1..=2 * TERMS + 1).scan(Interval::new(1.0), |last, n| {
@@ -26,21 +26,21 @@ static LN_2: LazyLock<Interval> = LazyLock::new(|| {
     odd_series(&third, 1.0) * Interval::new(2.0)
 });
 
-/// `turns` full turns in radians.
+/// Returns `turns` full turns in radians.
 pub(super) fn turns(turns: f64) -> Interval {
     &*QUARTER * Interval::new(4.0) * Interval::new(turns)
 }
 
-/// A quarter of a turn in radians.
+/// Returns a quarter of a turn in radians.
 pub(super) fn quarter_turn() -> &'static Interval {
     &QUARTER
 }
 
-/// Sine and cosine.
+/// Returns sine and cosine.
 pub(super) fn sin_cos(angle: &Interval) -> (Interval, Interval) {
     let quarters = (angle.rough() / std::f64::consts::FRAC_PI_2).round();
     let rest = angle - &*QUARTER * Interval::new(quarters);
-    // Where so many quarters have been taken off that nothing is known of the rest, nothing is known of the values.
+    // After too many quarter turns the rest is unknown, and so are the values.
     if !(quarters.abs() < 1e15 && rest.abs().is_below(&Interval::new(0.8))) {
         let anything = Interval::new(1.0).around_zero();
         return (anything.clone(), anything);
@@ -54,11 +54,11 @@ pub(super) fn sin_cos(angle: &Interval) -> (Interval, Interval) {
     }
 }
 
-/// Sine and cosine of an angle of at most 0.8. The remainder after the power n of Taylor's formula is at most
+/// Returns sine and cosine of an angle of at most 0.8. The remainder after the power n of Taylor's formula is at most
 /// |angle|^(n + 1) / (n + 1)!, since no derivative is greater than 1.
 fn series(angle: &Interval) -> (Interval, Interval) {
     let square = -angle.square();
-    // Horner's scheme in -angle^2 from the last term, whose coefficient takes up the remainder: |angle| <= 1.
+    // Horner's scheme in -angle^2 from the last term. Its coefficient includes the remainder, since |angle| <= 1.
     let sum = |first: usize| {
         let last = first + 2 * TERMS;
         (0..TERMS).rev().fold(INVERSE_FACTORIALS[last].around_zero(), |sum, term| {
@@ -68,8 +68,8 @@ fn series(angle: &Interval) -> (Interval, Interval) {
     (sum(1) * angle, sum(0))
 }
 
-/// z + s z^3 / 3 + z^5 / 5 + s z^7 / 7 + ..., s being `sign`: the arc tangent for -1, its hyperbolic twin for 1. What is
-/// left out is at most |z|^(2 n + 1) / (1 - z^2), n terms being taken.
+/// Returns z + s z^3 / 3 + z^5 / 5 + s z^7 / 7 + ..., with s = `sign`. The sum is the arctangent for -1, its hyperbolic
+/// twin for 1. The remainder after n terms is at most |z|^(2 n + 1) / (1 - z^2).
 fn odd_series(z: &Interval, sign: f64) -> Interval {
     if !z.abs().is_below(&Interval::new(0.34)) {
         return Interval::new(0.0) / Interval::new(0.0);
@@ -83,7 +83,7 @@ fn odd_series(z: &Interval, sign: f64) -> Interval {
     sum * z
 }
 
-/// The arc tangent of a number that is not negative: four times its angle is halved, and is then at most pi / 32.
+/// Returns the arctangent of a number of at least 0. Four halvings bring its angle to at most pi / 32.
 pub(super) fn atan(tangent: &Interval) -> Interval {
     let one = Interval::new(1.0);
     // tan(a / 2) = tan(a) / (1 + sqrt(1 + tan(a)^2)).
@@ -92,7 +92,7 @@ pub(super) fn atan(tangent: &Interval) -> Interval {
     odd_series(&small, -1.0) * Interval::new(16.0)
 }
 
-/// The natural logarithm of a positive number: ln(2^k y) = k ln 2 + 2 artanh((y - 1) / (y + 1)).
+/// Returns the natural logarithm of a positive number: ln(2^k y) = k ln 2 + 2 artanh((y - 1) / (y + 1)).
 pub(super) fn ln(number: &Interval) -> Interval {
     let exponent = number.rough().log2().round().clamp(-1000.0, 1000.0);
     // Two to the power of `-exponent`, bit by bit.

@@ -1,4 +1,4 @@
-//! Events that do happen: Lemma 5 of docs/proofs.md. Only `proof` uses it.
+//! Events that happen: Lemma 5 of docs/proofs.md.
 
 use super::boards::{Board, covers};
 use super::chain::{Chain, span_is_one};
@@ -8,34 +8,35 @@ use super::path::{Place, Span};
 use super::scene::Scene;
 use super::steps::Steps;
 
-/// What has been shown to happen.
+/// The events that are shown so far.
 #[derive(Default)]
 pub(super) struct Events {
-    /// The benches that overlap, and where the head is then; if that is before the start, they do at the start.
+    /// The benches that overlap, and the place of the head. A place before the start means an overlap at the start.
     pub contact: Option<([usize; 2], Place)>,
-    /// The link that has stalled, and where the head is then; as above.
+    /// The link that has stalled, and the place of the head, as above.
     pub stall: Option<(usize, Place)>,
     /// The end of the motion.
     pub finish: Option<Finish>,
 }
 
-/// How the motion ends.
+/// The end of a motion.
 pub(super) enum Finish {
-    /// The link whose follower is not continuous, and where the head is then.
+    /// The link whose follower is not continuous, and the place of the head.
     Lock(usize, Place),
     /// The path's end has been reached.
     PathEnd,
 }
 
-/// How a lock shows.
+/// The evidence of a lock.
 pub(super) enum LockShown {
-    /// In the end no place of this span around the follower is at the link's length any more.
+    /// In the end no place of this span around the follower is at the link's length.
     Vanishes(Span),
-    /// In the end a place ahead of this span's end is at the link's length, and none could pass its beginning.
+    /// In the end a place ahead of this span's end is at the link's length, and no follower could pass the span's
+    /// beginning.
     Jumps(Span),
 }
 
-/// That an event with the head at `to` is one of the motion: from its start to the path's end.
+/// Checks that an event with the head at `to` is inside the motion, from its start to the path's end.
 fn check_is_in_motion(scene: &Scene, to: Place) -> Result<(), String> {
     if !Interval::new(0.0).is_at_most(&scene.path.travelled(to)) {
         return Err("the head has not come to the start".to_owned());
@@ -44,10 +45,10 @@ fn check_is_in_motion(scene: &Scene, to: Place) -> Result<(), String> {
 }
 
 impl Events {
-    /// Lemma 5, *Contact*.
+    /// Checks and adds a contact: Lemma 5, *Contact*.
     ///
     /// # Errors
-    /// What does not follow.
+    /// The condition that does not follow.
     pub fn add_contact(
         &mut self,
         scene: &Scene,
@@ -70,7 +71,7 @@ impl Events {
         match steps.end {
             Some(end) if end != to => return Err("it is not where the last step ended".to_owned()),
             None if !scene.path.travelled(from).is_at_most(&Interval::new(0.0)) => {
-                return Err("no step comes before it, and it begins beyond the start".to_owned());
+                return Err("no step precedes it, and it begins beyond the start".to_owned());
             }
             _ => {}
         }
@@ -86,10 +87,10 @@ impl Events {
         Ok(())
     }
 
-    /// Lemma 5, *Stall*.
+    /// Checks and adds a stall: Lemma 5, *Stall*.
     ///
     /// # Errors
-    /// What does not follow.
+    /// The condition that does not follow.
     pub fn add_stall(
         &mut self,
         scene: &Scene,
@@ -118,10 +119,10 @@ impl Events {
         Ok(())
     }
 
-    /// Lemma 5, *Lock*.
+    /// Checks and adds a lock: Lemma 5, *Lock*.
     ///
     /// # Errors
-    /// What does not follow.
+    /// The condition that does not follow.
     pub fn add_lock(
         &mut self,
         scene: &Scene,
@@ -170,10 +171,10 @@ impl Events {
                     return Err("the jump is not between the rear's span and the front's".to_owned());
                 }
                 if !cannot_be_at(w) {
-                    return Err("where the jump begins may be at the link's length (Lemma 5)".to_owned());
+                    return Err("the beginning of the jump may be at the link's length (Lemma 5)".to_owned());
                 }
                 if !link::is_farther(path, front_at_end, y, &squared) {
-                    return Err("where the jump ends may be too near in the end (Lemma 5)".to_owned());
+                    return Err("the end of the jump may be too near in the end (Lemma 5)".to_owned());
                 }
             }
         }
@@ -181,10 +182,10 @@ impl Events {
         Ok(())
     }
 
-    /// *Path end.*
+    /// Checks and adds the path's end: *Path end.*
     ///
     /// # Errors
-    /// What does not follow.
+    /// The condition that does not follow.
     pub fn add_path_end(&mut self, scene: &Scene, steps: &Steps) -> Result<(), String> {
         if !steps.end.is_some_and(|end| scene.path.is_at_end(end)) {
             return Err("the last step did not come to the end of the path".to_owned());

@@ -1,9 +1,9 @@
-//! Real numbers between two binary numbers of 128 bits: the arithmetic of the checker. Only `proof` uses it.
+//! Interval arithmetic of the checker, with ends of 128 bits.
 //!
 //! Every operation returns an interval that holds the result for all numbers of its operands: lower ends are rounded
-//! down, upper ends up. It rests on `+`, `-`, `*`, `/` and the comparisons of `astro-float` alone. What has no value (a
-//! division by an interval that holds 0, a root of what may be negative) is not a number, and so is all that is
-//! computed from it; no comparison with it is true.
+//! down, upper ends up. It relies only on `+`, `-`, `*`, `/` and the comparisons of `astro-float`. An operation without
+//! a value is NaN: a division by an interval that holds 0, or a root of a number that may be negative. NaN propagates,
+//! and every comparison with it is false.
 
 use std::borrow::Borrow;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -21,7 +21,7 @@ pub(super) struct Interval {
     hi: BigFloat,
 }
 
-/// Where an interval lies.
+/// The sign of an interval's numbers.
 #[derive(Clone, Copy, PartialEq)]
 enum Side {
     NotNegative,
@@ -30,8 +30,8 @@ enum Side {
 }
 
 impl Interval {
-    /// The interval of a single number, exactly; but for the numbers below 1e-307, which `astro-float` does not take over
-    /// right: they are held between the least that it does and its negative.
+    /// Creates the interval of a single number, exactly. `astro-float` converts subnormal numbers wrongly, so they
+    /// become the interval between the least normal number and its negative.
     pub fn new(number: f64) -> Self {
         if number.is_subnormal() {
             return Self::new(f64::MIN_POSITIVE).around_zero();
@@ -40,13 +40,13 @@ impl Interval {
         Self { lo: end.clone(), hi: end }
     }
 
-    /// From one number to another.
+    /// Creates the interval between two numbers.
     #[cfg(test)]
     pub fn between(lo: BigFloat, hi: BigFloat) -> Self {
         Self { lo, hi }
     }
 
-    /// Both ends.
+    /// Returns both ends.
     #[cfg(test)]
     pub fn ends(&self) -> (&BigFloat, &BigFloat) {
         (&self.lo, &self.hi)
@@ -70,52 +70,52 @@ impl Interval {
         self.lo.is_nan() || self.hi.is_nan()
     }
 
-    /// Whether every number here is less than every number there.
+    /// Returns true if every number of `self` is less than every number of `other`.
     pub fn is_below(&self, other: &Self) -> bool {
         self.hi < other.lo
     }
 
-    /// Whether no number here is greater than any number there.
+    /// Returns true if no number of `self` is greater than any number of `other`.
     pub fn is_at_most(&self, other: &Self) -> bool {
         self.hi <= other.lo
     }
 
-    /// Whether every number is greater than 0.
+    /// Returns true if every number is greater than 0.
     pub fn is_positive(&self) -> bool {
         !self.is_not_a_number() && self.lo.is_positive() && !self.lo.is_zero()
     }
 
-    /// Whether every number is less than 0.
+    /// Returns true if every number is less than 0.
     pub fn is_negative(&self) -> bool {
         !self.is_not_a_number() && self.hi.is_negative() && !self.hi.is_zero()
     }
 
-    /// Whether no number is less than 0.
+    /// Returns true if no number is less than 0.
     pub fn is_not_negative(&self) -> bool {
         !self.is_not_a_number() && self.side() == Side::NotNegative
     }
 
-    /// The upper end alone.
+    /// Returns the upper end alone.
     pub fn upper(&self) -> Self {
         Self { lo: self.hi.clone(), hi: self.hi.clone() }
     }
 
-    /// All numbers from the negative of the upper end to it.
+    /// Returns all numbers from the negative of the upper end to the upper end.
     pub fn around_zero(&self) -> Self {
         Self { lo: negative(&self.hi), hi: self.hi.clone() }
     }
 
-    /// The greater of the two.
+    /// Returns the greater of the two.
     pub fn max(&self, other: &Self) -> Self {
         Self { lo: greater(&self.lo, &other.lo), hi: greater(&self.hi, &other.hi) }
     }
 
-    /// The smaller of the two.
+    /// Returns the smaller of the two.
     pub fn min(&self, other: &Self) -> Self {
         Self { lo: smaller(&self.lo, &other.lo), hi: smaller(&self.hi, &other.hi) }
     }
 
-    /// The size without the sign.
+    /// Returns the absolute value.
     pub fn abs(&self) -> Self {
         match self.side() {
             _ if self.is_not_a_number() => Self::not_a_number(),
@@ -125,13 +125,13 @@ impl Interval {
         }
     }
 
-    /// The square.
+    /// Returns the square.
     pub fn square(&self) -> Self {
         let size = self.abs();
         Self { lo: size.lo.mul(&size.lo, BITS, Down), hi: size.hi.mul(&size.hi, BITS, Up) }
     }
 
-    /// The square root.
+    /// Returns the square root.
     pub fn sqrt(&self) -> Self {
         if !self.is_not_negative() {
             return Self::not_a_number();
@@ -139,7 +139,7 @@ impl Interval {
         Self { lo: root(&self.lo).0, hi: root(&self.hi).1 }
     }
 
-    /// A double near the middle, to choose by and never to prove by.
+    /// Returns a double near the middle, for choices and never for proofs.
     pub fn rough(&self) -> f64 {
         let lo = rough(&self.lo);
         lo + (rough(&self.hi) - lo) / 2.0
@@ -168,8 +168,8 @@ fn smaller(a: &BigFloat, b: &BigFloat) -> BigFloat {
     if b < a { b.clone() } else { a.clone() }
 }
 
-/// Numbers below and above the root of a number that is not negative: whatever s > 0 is, the root lies between s and
-/// x / s. Near the root, one step of Newton's method brings the two together.
+/// Returns numbers below and above the root of a number of at least 0: for every s > 0, the root lies between s and x
+/// / s. Near the root, one step of Newton's method brings the two together.
 fn root(x: &BigFloat) -> (BigFloat, BigFloat) {
     if x.is_zero() {
         return (zero(), zero());
@@ -184,7 +184,7 @@ fn root(x: &BigFloat) -> (BigFloat, BigFloat) {
     (smaller(&s, &x.div(&s, BITS, Down)), greater(&s, &x.div(&s, BITS, Up)))
 }
 
-/// The double towards zero from a number.
+/// Returns the nearest double towards zero.
 fn rough(number: &BigFloat) -> f64 {
     let Some((words, _, sign, exponent, _)) = number.as_raw_parts() else { return f64::NAN };
     let leading = words.last().copied().unwrap_or(0) >> 11;
@@ -217,7 +217,7 @@ fn difference(a: &Interval, b: &Interval) -> Interval {
     Interval { lo: a.lo.sub(&b.hi, BITS, Down), hi: a.hi.sub(&b.lo, BITS, Up) }
 }
 
-/// Which ends make the least and the greatest product follows from the signs.
+/// Returns the product. The signs decide which ends make the least and the greatest product.
 fn product(a: &Interval, b: &Interval) -> Interval {
     use Side::{Across, NotNegative, NotPositive};
     let of = |x: &BigFloat, y: &BigFloat, z: &BigFloat, w: &BigFloat| Interval {
@@ -247,13 +247,13 @@ fn quotient(a: &Interval, b: &Interval) -> Interval {
     if !b.is_positive() || a.is_not_a_number() {
         return Interval::not_a_number();
     }
-    // The least quotient has the greatest divisor where the dividend is positive, else the least.
+    // The least quotient has the greatest divisor if the dividend is positive, else the least.
     let least_by = if a.lo.is_negative() { &b.lo } else { &b.hi };
     let greatest_by = if a.hi.is_negative() { &b.hi } else { &b.lo };
     Interval { lo: a.lo.div(least_by, BITS, Down), hi: a.hi.div(greatest_by, BITS, Up) }
 }
 
-/// The operator between any two of `Interval` and `&Interval`.
+/// Implements an operator between any two of `Interval` and `&Interval`.
 macro_rules! operator {
     ($operator:ident, $method:ident, $computed:ident) => {
         impl<I: Borrow<Interval>> $operator<I> for &Interval {
@@ -284,42 +284,42 @@ pub(super) struct Vector {
 }
 
 impl Vector {
-    /// The vector of two numbers, exactly.
+    /// Creates the vector of two numbers, exactly.
     pub fn new(x: f64, y: f64) -> Self {
         Self { x: Interval::new(x), y: Interval::new(y) }
     }
 
-    /// The scalar product.
+    /// Returns the scalar product.
     pub fn dot(&self, other: &Self) -> Interval {
         &self.x * &other.x + &self.y * &other.y
     }
 
-    /// The determinant of the two vectors as columns.
+    /// Returns the determinant of the two vectors as columns.
     pub fn cross(&self, other: &Self) -> Interval {
         &self.x * &other.y - &self.y * &other.x
     }
 
-    /// The square of the length.
+    /// Returns the squared length.
     pub fn norm_squared(&self) -> Interval {
         self.x.square() + self.y.square()
     }
 
-    /// The length.
+    /// Returns the length.
     pub fn norm(&self) -> Interval {
         self.norm_squared().sqrt()
     }
 
-    /// The vector `factor` times as long.
+    /// Returns the vector `factor` times as long.
     pub fn scaled(&self, factor: &Interval) -> Self {
         Self { x: &self.x * factor, y: &self.y * factor }
     }
 
-    /// The sum.
+    /// Returns the sum.
     pub fn plus(&self, other: &Self) -> Self {
         Self { x: &self.x + &other.x, y: &self.y + &other.y }
     }
 
-    /// The difference.
+    /// Returns the difference.
     pub fn minus(&self, other: &Self) -> Self {
         Self { x: &self.x - &other.x, y: &self.y - &other.y }
     }

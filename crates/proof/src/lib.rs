@@ -1,8 +1,8 @@
-//! The checker of certificates of events: what docs/proofs.md says of a file, and nothing else. `verify`,
-//! `check --certificate` and `view --certificate` call it.
+//! The checker of certificates of events: the rules of docs/proofs.md, and nothing else. `verify`, `check
+//! --certificate` and `view --certificate` call it.
 //!
-//! In: the lines of a certificate. Out: what it proves, or the first line that does not follow. It uses no other room:
-//! no geometry, no parsing and no solver of the program, only that page, which it has in common with the search.
+//! In: the lines of a certificate. Out: its proved events, or the first line that does not follow. It depends on no
+//! other crate of this workspace: it shares neither geometry, parsing nor solver with the search, only that page.
 
 mod boards;
 mod capsule;
@@ -16,10 +16,6 @@ mod path;
 mod results;
 mod scene;
 mod steps;
-/// Returns BLAKE3 of a scene's text, the name under which the messages of a show and a certificate mean the same scene.
-pub fn scene_hash(text: &str) -> [u8; 32] {
-    *blake3::hash(text.as_bytes()).as_bytes()
-}
 
 #[cfg(test)]
 mod tests;
@@ -29,59 +25,64 @@ use std::io::{self, BufRead, Read};
 use serde::Serialize;
 
 use self::events::{Events, LockShown};
-use self::lines::Line;
-pub use self::lines::{EventKind, Outcome, Status};
+use self::lines::ParsedLine;
+pub use self::lines::{EventKind, ProvedEvent, Status};
 use self::path::Span;
 use self::scene::Scene;
 use self::steps::{Step, Steps};
 
-/// The form of the file.
+/// The version of the file format.
 const FORMAT: u32 = 1;
-/// Bytes of the longest line.
+/// Limit of the length of a line, bytes.
 const LONGEST_LINE: u64 = 1 << 28;
 
-/// What a certificate proves.
+/// The content of a valid certificate.
 #[derive(Debug, Clone, Serialize)]
 pub struct Proved {
-    /// The text of the scene that it is about.
+    /// The text of its scene.
     pub scene: String,
-    /// The version of the program that wrote it.
+    /// The version of the program that wrote the certificate.
     pub version: String,
-    /// Contact, stall, lock and path end, in this order.
-    pub results: Vec<Outcome>,
-    /// Steps checked.
+    /// The results for contact, stall, lock and path end, in this order.
+    pub results: Vec<ProvedEvent>,
+    /// Number of steps checked.
     pub steps: u64,
-    /// Links checked, in all steps.
+    /// Number of links checked, in all steps.
     pub links: u64,
-    /// Pairs of boards checked, in all steps.
+    /// Number of pairs of boards checked, in all steps.
     pub pairs: u64,
 }
 
-/// Why a file proves nothing.
+/// The reason to refuse a file.
 #[derive(Debug, thiserror::Error)]
 pub enum Refused {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("{0}")]
     Unreadable(io::Error),
-    /// It has not the form of a certificate.
+    /// The file has not the form of a certificate.
     #[error("line {line}: {problem}")]
     Form {
         /// The line, from 1.
         line: u64,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
-    /// It has the form of one, but a line does not follow from those before it.
+    /// The form is right, but a line does not follow from the lines before it.
     #[error("line {line}: {problem}")]
     DoesNotFollow {
         /// The line, from 1.
         line: u64,
-        /// What does not follow.
+        /// The condition that does not follow.
         problem: String,
     },
 }
 
-/// The text of the scene that a certificate is about, from its first line. Nothing else of it is checked.
+/// Returns BLAKE3 of a scene's text. The messages of a show and a certificate identify a scene by it.
+pub fn scene_hash(text: &str) -> [u8; 32] {
+    *blake3::hash(text.as_bytes()).as_bytes()
+}
+
+/// Returns the text of a certificate's scene from the first line. The rest is not checked.
 ///
 /// # Errors
 /// [`Refused::Form`] for a line that is not the first of a certificate.
@@ -91,10 +92,10 @@ pub fn scene_of(first_line: &[u8]) -> Result<String, Refused> {
     Ok(Checker::begin(parsed).map_err(form)?.proved.scene)
 }
 
-/// Checks a certificate. `progress` is told how many bytes have been read.
+/// Checks a certificate. `progress` receives the number of bytes read.
 ///
 /// # Errors
-/// [`Refused`]: the first line that is wrong.
+/// [`Refused`] for the first wrong line.
 pub fn verify(mut lines: impl BufRead, progress: &mut dyn FnMut(u64)) -> Result<Proved, Refused> {
     let mut bytes = 0;
     let mut checker: Option<Checker> = None;
@@ -107,7 +108,7 @@ pub fn verify(mut lines: impl BufRead, progress: &mut dyn FnMut(u64)) -> Result<
         }
         bytes += read as u64;
         progress(bytes);
-        let parsed: Line = serde_json::from_slice(&text).map_err(|error| form(error.to_string()))?;
+        let parsed: ParsedLine = serde_json::from_slice(&text).map_err(|error| form(error.to_string()))?;
         match (&mut checker, parsed) {
             (None, first) => checker = Some(Checker::begin(first).map_err(form)?),
             (Some(checker), parsed) => {
@@ -122,7 +123,7 @@ pub fn verify(mut lines: impl BufRead, progress: &mut dyn FnMut(u64)) -> Result<
     }
 }
 
-/// A certificate as far as it has been checked.
+/// The state of the check.
 struct Checker {
     scene: Scene,
     steps: Steps,
@@ -131,8 +132,8 @@ struct Checker {
 }
 
 impl Checker {
-    fn begin(first: Line) -> Result<Self, String> {
-        let Line::Certificate { format, version, scene: text } = first else {
+    fn begin(first: ParsedLine) -> Result<Self, String> {
+        let ParsedLine::Certificate { format, version, scene: text } = first else {
             return Err("the first line is not that of a certificate".to_owned());
         };
         if format != FORMAT {
@@ -143,22 +144,22 @@ impl Checker {
         Ok(Self { scene, steps: Steps::new(), events: Events::default(), proved })
     }
 
-    fn add(&mut self, line: Line) -> Result<(), String> {
+    fn add(&mut self, line: ParsedLine) -> Result<(), String> {
         let Self { scene, steps, events, proved } = self;
-        let is_result = matches!(line, Line::Result(_));
+        let is_result = matches!(line, ParsedLine::Result(_));
         if !is_result && (events.finish.is_some() || !proved.results.is_empty()) {
             return Err("nothing but results can follow a lock, the path's end or a result".to_owned());
         }
         match line {
-            Line::Certificate { .. } => Err("a second first line".to_owned()),
-            Line::Step { links, from, to, moving, clear, spans } => {
+            ParsedLine::Certificate { .. } => Err("a second first line".to_owned()),
+            ParsedLine::Step { links, from, to, moving, clear, spans } => {
                 steps.add(scene, Step { links, head: Span(from, to), moving, clear, spans })
             }
-            Line::Contact { benches, from, to, spans, point } => {
+            ParsedLine::Contact { benches, from, to, spans, point } => {
                 events.add_contact(scene, steps, benches, Span(from, to), &spans, point)
             }
-            Line::Stall { link, from, to, spans } => events.add_stall(scene, steps, link, Span(from, to), &spans),
-            Line::Lock { link, to, spans, last, window, jump } => {
+            ParsedLine::Stall { link, from, to, spans } => events.add_stall(scene, steps, link, Span(from, to), &spans),
+            ParsedLine::Lock { link, to, spans, last, window, jump } => {
                 let shown = match (window, jump) {
                     (Some(window), None) => LockShown::Vanishes(window),
                     (None, Some(jump)) => LockShown::Jumps(jump),
@@ -166,8 +167,8 @@ impl Checker {
                 };
                 events.add_lock(scene, steps, (link, to), (&spans, &last), shown)
             }
-            Line::PathEnd {} => events.add_path_end(scene, steps),
-            Line::Result(outcome) => {
+            ParsedLine::PathEnd {} => events.add_path_end(scene, steps),
+            ParsedLine::Result(outcome) => {
                 results::check(scene, steps, events, &outcome, &proved.results)?;
                 proved.results.push(outcome);
                 Ok(())

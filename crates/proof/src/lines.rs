@@ -1,13 +1,13 @@
-//! The lines of a certificate (docs/proofs.md, "The file"). Only `proof` uses it.
+//! The lines of a certificate (docs/proofs.md, "The file").
 
 use serde::{Deserialize, Serialize};
 
 use super::path::{Place, Span};
 
-/// A line.
+/// A line of a certificate.
 #[derive(Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
-pub(super) enum Line {
+pub(super) enum ParsedLine {
     Certificate {
         format: u32,
         version: String,
@@ -45,10 +45,10 @@ pub(super) enum Line {
         jump: Option<Span>,
     },
     PathEnd {},
-    Result(Outcome),
+    Result(ProvedEvent),
 }
 
-/// Which links a step is about.
+/// The links that a step shows.
 #[derive(Deserialize, Clone, Copy, PartialEq)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Links {
@@ -70,39 +70,39 @@ pub enum EventKind {
     PathEnd,
 }
 
-/// How much is proved of an event.
+/// The status of a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
-    /// It happens, for the first time, between two times.
+    /// The first such event is between two times.
     Proved,
-    /// It does not happen before the motion ends, or where a lock ends it, before `time_lo`.
+    /// There is no such event before the motion ends; if a lock ends it, before `time_lo`.
     None,
-    /// It does not happen before a time.
+    /// There is no such event before a time.
     Undecided,
 }
 
-/// What a certificate proves of one kind of event.
+/// The proved result for one kind of event.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Outcome {
-    /// Which event.
+pub struct ProvedEvent {
+    /// The kind of event.
     pub event: EventKind,
-    /// How much of it.
+    /// The status.
     pub status: Status,
-    /// Seconds before which it does not happen.
+    /// Seconds before which the event does not happen.
     #[serde(default)]
     pub time_lo: Option<f64>,
-    /// Seconds by which it has happened.
+    /// Seconds by which the event has happened.
     #[serde(default)]
     pub time_hi: Option<f64>,
     /// The bench of a link that has stalled or locked at `time_hi`, or the first of two that overlap then.
     #[serde(default)]
     pub bench_a: Option<usize>,
-    /// The other one.
+    /// The second bench.
     #[serde(default)]
     pub bench_b: Option<usize>,
-    /// Why it is undecided, as whoever wrote the certificate says.
+    /// The reason for `undecided`, from the program that wrote the certificate. It is not checked.
     #[serde(default)]
     pub because: Option<String>,
 }

@@ -1,5 +1,5 @@
 //! The path of a certificate, in intervals: its curves, its places and their order, and bounds of length, curvature and
-//! turning between two places (docs/proofs.md, "Definitions" and "Capsules"). Only `proof` uses it.
+//! turning between two places (docs/proofs.md, "Definitions" and "Capsules").
 
 use std::cmp::Ordering;
 
@@ -8,18 +8,18 @@ use serde::Deserialize;
 use super::elementary;
 use super::interval::{Interval, Vector};
 
-/// A place as the file has it: the segment, and the coordinate on it.
+/// A place: the segment, and the coordinate on it.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub(super) struct Place(pub usize, pub f64);
 
-/// A span as the file has it, the earlier end first.
+/// A span, the earlier end first.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub(super) struct Span(pub Place, pub Place);
 
-/// A curve by its coordinate.
+/// A curve, as a function of its coordinate.
 #[expect(clippy::large_enum_variant, reason = "a path has few, and each is made once")]
 pub(super) enum Curve {
-    /// Towards the centre: the coordinate falls with travel. `a` is metres of radius per radian.
+    /// Towards the centre: the coordinate falls with travel. `a` is in metres of radius per radian.
     Inward { a: Interval },
     /// Away from the centre, turned by half a turn.
     Outward { a: Interval },
@@ -37,13 +37,13 @@ pub(super) struct At {
 }
 
 impl Curve {
-    /// An arc that begins at `origin` with `direction`; `to_left` is 1 where its centre is on the left, else -1.
+    /// Creates an arc that begins at `origin` with `direction`. `to_left` is 1 if its centre is on the left, else -1.
     pub fn arc(origin: Vector, direction: Vector, to_left: Interval, radius: Interval) -> Self {
         let to_centre = Vector { x: -(&direction.y * &to_left), y: &direction.x * &to_left };
         Self::Arc { origin, direction, to_centre, radius }
     }
 
-    /// Point and tangent at a coordinate.
+    /// Returns point and tangent at a coordinate.
     pub fn at(&self, coordinate: &Interval) -> At {
         match self {
             Self::Inward { a } => spiral_at(a, coordinate),
@@ -65,7 +65,7 @@ impl Curve {
         }
     }
 
-    /// Metres of travel from one coordinate to another.
+    /// Returns the metres of travel from one coordinate to another.
     pub fn metres(&self, from: &Interval, to: &Interval) -> Interval {
         match self {
             Self::Inward { a } => spiral_metres(a, from) - spiral_metres(a, to),
@@ -75,17 +75,17 @@ impl Curve {
         }
     }
 
-    /// At least the metres from one coordinate to a later one.
+    /// Returns an upper bound of the metres from one coordinate to a later one.
     fn metres_bound(&self, from: &Interval, to: &Interval) -> Interval {
         match self {
-            // A radian is a w metres long, most at the greater angle.
+            // The radian at angle theta is a w(theta) metres long, most at the greater angle.
             Self::Inward { a } => a * w(from) * (from - to),
             Self::Outward { a } => a * w(to) * (to - from),
             Self::Line { .. } | Self::Arc { .. } => self.metres(from, to),
         }
     }
 
-    /// At least the curvature anywhere from one coordinate to a later one.
+    /// Returns an upper bound of the curvature from one coordinate to a later one, 1/m.
     fn curvature_bound(&self, from: &Interval, to: &Interval) -> Interval {
         match self {
             Self::Inward { a } => spiral_curvature(a, to),
@@ -95,7 +95,7 @@ impl Curve {
         }
     }
 
-    /// At least the radians by which the path turns from one coordinate to a later one.
+    /// Returns an upper bound of the radians by which the path turns from one coordinate to a later one.
     fn turning_bound(&self, from: &Interval, to: &Interval) -> Interval {
         let spiral = |outer: &Interval, inner: &Interval| {
             let square = inner.square();
@@ -109,7 +109,7 @@ impl Curve {
         }
     }
 
-    /// A double near the metres per unit of the coordinate, negative where it falls with travel.
+    /// Returns a double near the metres per unit of the coordinate, negative if the coordinate falls with travel.
     fn rough_speed(&self, coordinate: f64) -> f64 {
         match self {
             Self::Inward { a } => -a.rough() * coordinate.hypot(1.0),
@@ -133,7 +133,7 @@ fn spiral_at(a: &Interval, theta: &Interval) -> At {
     At { point, tangent }
 }
 
-/// Metres from the centre: a / 2 (theta w + asinh theta).
+/// Returns the metres from the centre: a / 2 (theta w + asinh theta).
 fn spiral_metres(a: &Interval, theta: &Interval) -> Interval {
     let w = w(theta);
     let asinh = elementary::ln(&(theta + &w));
@@ -146,25 +146,25 @@ fn spiral_curvature(a: &Interval, theta: &Interval) -> Interval {
     (square + Interval::new(2.0)) / (a * &w_squared * w_squared.sqrt())
 }
 
-/// A curve with the coordinates at which it begins (none for the first segment) and ends (none for one that goes on).
+/// A curve with its first coordinate (none for the first segment) and its last (none without an end).
 pub(super) struct Segment {
     pub curve: Curve,
     pub begin: Option<Interval>,
     pub end: Option<Interval>,
 }
 
-/// Where a path ends.
+/// The end of a path.
 pub(super) enum PathEnd {
-    /// At a coordinate of its last segment.
+    /// A coordinate of its last segment.
     Coordinate(Interval),
-    /// Where its length has been travelled.
+    /// The path's length, travelled.
     Travelled,
 }
 
 /// The whole path.
 pub(super) struct Path {
     segments: Vec<Segment>,
-    /// Metres from the start to where each segment begins; for the first, to where it ends.
+    /// Metres from the start to each segment's start; for the first segment, to its end.
     travelled: Vec<Interval>,
     path_end: PathEnd,
     /// Metres from the start to the path's end.
@@ -172,7 +172,7 @@ pub(super) struct Path {
 }
 
 impl Path {
-    /// The path of its segments; the first ends `ahead` metres after the start.
+    /// Creates the path of these segments. The first segment ends `ahead` metres after the start.
     pub fn new(segments: Vec<Segment>, ahead: Interval, path_end: PathEnd, length: Interval) -> Self {
         let mut travelled = vec![ahead.clone()];
         let mut so_far = ahead;
@@ -185,15 +185,15 @@ impl Path {
         Self { segments, travelled, path_end, length }
     }
 
-    /// Point and tangent of a place.
+    /// Returns point and tangent of a place.
     pub fn at(&self, place: Place) -> At {
         self.segments[place.0].curve.at(&Interval::new(place.1))
     }
 
-    /// Metres from the start; negative before it.
+    /// Returns the metres from the start, negative before it.
     pub fn travelled(&self, place: Place) -> Interval {
         let segment = &self.segments[place.0];
-        // The first segment is measured from its end, the others from their beginning.
+        // The first segment is measured from its end, the other segments from their beginning.
         let anchor = if place.0 == 0 { &segment.end } else { &segment.begin };
         match anchor {
             Some(anchor) => &self.travelled[place.0] + segment.curve.metres(anchor, &Interval::new(place.1)),
@@ -202,7 +202,7 @@ impl Path {
         }
     }
 
-    /// Whether the place is certainly at the end of the path or beyond it.
+    /// Returns true if the place is certainly at the end of the path or beyond it.
     pub fn is_at_end(&self, place: Place) -> bool {
         match &self.path_end {
             PathEnd::Coordinate(end) if place.0 + 1 == self.segments.len() => {
@@ -214,7 +214,7 @@ impl Path {
         }
     }
 
-    /// Whether the place is certainly not beyond the end of the path.
+    /// Returns true if the place is certainly not beyond the end of the path.
     pub fn is_within(&self, place: Place) -> bool {
         match &self.path_end {
             PathEnd::Coordinate(end) if place.0 + 1 == self.segments.len() => {
@@ -230,8 +230,8 @@ impl Path {
         matches!(self.segments[segment].curve, Curve::Inward { .. })
     }
 
-    /// Whether the place is one: a number strictly inside a segment. The centre of a spiral that is the whole path is
-    /// one as well: it is no junction.
+    /// Returns true if the place is valid: a number strictly inside a segment. The centre of a spiral that is the whole
+    /// path is valid too, since it is no junction.
     pub fn has(&self, place: Place) -> bool {
         let Some(segment) = self.segments.get(place.0).filter(|_| place.1.is_finite()) else { return false };
         if self.segments.len() == 1 {
@@ -243,24 +243,24 @@ impl Path {
             && segment.end.as_ref().is_none_or(|end| before(&at, end))
     }
 
-    /// The order of two places on the way.
+    /// Returns the order of two places on the path.
     pub fn order(&self, a: Place, b: Place) -> Ordering {
         // Both are strictly inside their segments, and numbers.
         let along = a.1.partial_cmp(&b.1).unwrap_or(Ordering::Equal);
         a.0.cmp(&b.0).then(if self.falls(a.0) { along.reverse() } else { along })
     }
 
-    /// Whether a is before b or the same.
+    /// Returns true if a is before b, or equal.
     pub fn in_order(&self, a: Place, b: Place) -> bool {
         self.order(a, b) != Ordering::Greater
     }
 
-    /// Whether the segment is a line.
+    /// Returns true if the segment is a line.
     pub fn is_line(&self, segment: usize) -> bool {
         matches!(self.segments[segment].curve, Curve::Line { .. })
     }
 
-    /// Metres from the centre at a place of an inward spiral.
+    /// Returns the metres from the centre at a place of an inward spiral.
     pub fn spiral_radius(&self, place: Place) -> Option<Interval> {
         match &self.segments[place.0].curve {
             Curve::Inward { a } => Some(a * Interval::new(place.1)),
@@ -268,7 +268,7 @@ impl Path {
         }
     }
 
-    /// The parts of a span in each segment: its curve, and the coordinates at the ends.
+    /// Returns the parts of a span in each segment: its curve, and the coordinates at the ends.
     fn parts(&self, from: Place, to: Place) -> impl Iterator<Item = (usize, Interval, Interval)> {
         (from.0..=to.0).map(move |index| {
             let nothing = || Interval::new(0.0) / Interval::new(0.0);
@@ -280,7 +280,7 @@ impl Path {
         })
     }
 
-    /// At least the metres from one place to a later one.
+    /// Returns an upper bound of the metres from one place to a later one.
     pub fn metres_bound(&self, from: Place, to: Place) -> Interval {
         let parts = self.parts(from, to);
         parts
@@ -289,7 +289,7 @@ impl Path {
             .upper()
     }
 
-    /// At least the curvature anywhere from one place to a later one.
+    /// Returns an upper bound of the curvature from one place to a later one, 1/m.
     pub fn curvature_bound(&self, from: Place, to: Place) -> Interval {
         let parts = self.parts(from, to);
         parts
@@ -298,7 +298,7 @@ impl Path {
             .upper()
     }
 
-    /// At least the radians by which the path turns from one place to a later one.
+    /// Returns an upper bound of the radians by which the path turns from one place to a later one.
     pub fn turning_bound(&self, from: Place, to: Place) -> Interval {
         let parts = self.parts(from, to);
         parts
@@ -307,7 +307,8 @@ impl Path {
             .upper()
     }
 
-    /// A place between two others, near the middle. Which one it is proves nothing: whoever uses it sees to that.
+    /// Returns a place near the middle of two others. No proof depends on the choice: callers check that the place is
+    /// between.
     pub fn middle(&self, from: Place, to: Place) -> Place {
         if from.0 == to.0 {
             return Place(from.0, from.1 + (to.1 - from.1) / 2.0);

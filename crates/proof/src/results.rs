@@ -1,65 +1,65 @@
-//! Whether a result follows from the steps and the events. Only `proof` uses it.
+//! Checks that a result follows from the steps and the events.
 
 use super::events::{Events, Finish};
 use super::interval::Interval;
-use super::lines::{EventKind, Outcome, Status};
+use super::lines::{EventKind, ProvedEvent, Status};
 use super::path::Place;
 use super::scene::Scene;
 use super::steps::Steps;
 
-/// The order in which results stand.
+/// The order of the results.
 const ORDER: [EventKind; 4] = [EventKind::Contact, EventKind::Stall, EventKind::Lock, EventKind::PathEnd];
 
-/// What is known of an event.
+/// The state of knowledge of an event.
 struct Known {
-    /// Seconds before which it does not happen.
+    /// Seconds before which the event does not happen.
     not_before: Interval,
-    /// Seconds by which it has happened, and the benches.
+    /// Seconds by which the event has happened, and its benches.
     by: Option<(Interval, Option<usize>, Option<usize>)>,
-    /// Whether it does not happen before the motion ends.
+    /// True if the event does not happen before the motion ends.
     never: bool,
 }
 
-/// Checks a result, `earlier` being those before it.
+/// Checks a result. `earlier` are the results before it.
 ///
 /// # Errors
-/// What does not follow.
+/// The condition that does not follow.
 pub(super) fn check(
     scene: &Scene,
     steps: &Steps,
     events: &Events,
-    outcome: &Outcome,
-    earlier: &[Outcome],
+    outcome: &ProvedEvent,
+    earlier: &[ProvedEvent],
 ) -> Result<(), String> {
-    let Some(expected) = ORDER.get(earlier.len()) else { return Err("a result too many".to_owned()) };
+    let Some(expected) = ORDER.get(earlier.len()) else { return Err("a result too many, expected four".to_owned()) };
     if outcome.event != *expected {
         return Err("the results are not contact, stall, lock and path_end in this order".to_owned());
     }
     let known = known(scene, steps, events, *expected);
-    let Outcome { time_lo, time_hi, bench_a, bench_b, .. } = outcome;
+    let ProvedEvent { time_lo, time_hi, bench_a, bench_b, .. } = outcome;
     let begins = |lo: f64| lo.is_finite() && lo >= 0.0 && Interval::new(lo).is_at_most(&known.not_before);
     match (outcome.status, time_lo, time_hi) {
         (Status::None, lo, None) if known.never && bench_a.is_none() && bench_b.is_none() => {
-            // Between the last step and the lock nothing is known: there the claim has to say how far it goes.
+            // Between the last step and the lock nothing is known, so a claim must state up to when it holds.
             let up_to_a_lock = matches!(events.finish, Some(Finish::Lock(..))) && *expected != EventKind::PathEnd;
             match lo {
                 Some(lo) if up_to_a_lock && begins(*lo) => Ok(()),
                 None if !up_to_a_lock => Ok(()),
-                _ => Err("up to when there is none does not follow".to_owned()),
+                _ => Err("the time_lo of status none does not follow".to_owned()),
             }
         }
-        (Status::None, ..) => Err("that there is none does not follow".to_owned()),
+        (Status::None, ..) => Err("the status none does not follow".to_owned()),
         (Status::Undecided, Some(lo), None) if begins(*lo) && bench_a.is_none() && bench_b.is_none() => Ok(()),
-        (Status::Undecided, ..) => Err("that it does not happen before time_lo does not follow".to_owned()),
+        (Status::Undecided, ..) => Err("the status undecided with this time_lo does not follow".to_owned()),
         (Status::Proved, Some(lo), Some(hi)) => {
-            let Some((by, a, b)) = known.by else { return Err("that it happens does not follow".to_owned()) };
+            let Some((by, a, b)) = known.by else { return Err("the status proved does not follow".to_owned()) };
             if (a, b) != (*bench_a, *bench_b) {
                 return Err("the benches are not those of the event".to_owned());
             }
             if begins(*lo) && hi.is_finite() && by.is_at_most(&Interval::new(*hi)) {
                 Ok(())
             } else {
-                Err("that it happens from time_lo to time_hi does not follow".to_owned())
+                Err("the interval from time_lo to time_hi does not follow".to_owned())
             }
         }
         (Status::Proved, ..) => Err("a time is missing".to_owned()),

@@ -1,5 +1,5 @@
-//! The scene of a certificate: from its text to the team, the path and the speed, in intervals that hold the real
-//! numbers that are meant. It reads only what a proof needs. Only `proof` uses it.
+//! Reads the text of a scene: team, path and speed, in intervals that hold the real numbers of the text. Other fields
+//! are ignored.
 
 use serde::Deserialize;
 
@@ -7,10 +7,10 @@ use super::elementary;
 use super::interval::{Interval, Vector};
 use super::path::{Curve, Path, PathEnd, Segment};
 
-/// The greatest number of benches, and of pieces of a path.
+/// Limit of benches, and of pieces of a path.
 const MOST: usize = 1_000_000;
 
-/// What a certificate is about.
+/// The scene of a certificate.
 pub(super) struct Scene {
     pub team: Team,
     pub path: Path,
@@ -18,7 +18,7 @@ pub(super) struct Scene {
     pub head_speed: Interval,
 }
 
-/// The benches.
+/// The team of benches.
 pub(super) struct Team {
     pub benches: usize,
     pub width: Interval,
@@ -28,18 +28,18 @@ pub(super) struct Team {
 }
 
 impl Team {
-    /// Metres between the two handles of a bench.
+    /// Returns the metres between the two handles of a bench.
     pub fn link(&self, bench: usize) -> &Interval {
         if bench == 0 { &self.head_link } else { &self.body_link }
     }
 
-    /// Metres of the links from bench `first` to bench `last` in one line.
+    /// Returns the metres of the links from bench `first` to bench `last` in one line.
     pub fn links(&self, first: usize, last: usize) -> Interval {
         self.link(first) + self.link(1) * Interval::new((last - first) as f64)
     }
 }
 
-/// The fields of a scene that a proof needs; the others are about publishing it.
+/// The fields of a scene that a proof needs. The other fields concern the publisher.
 #[derive(Deserialize)]
 struct Text {
     team: TeamText,
@@ -117,7 +117,7 @@ impl Scene {
     /// Reads a scene.
     ///
     /// # Errors
-    /// A sentence for a text that is no scene.
+    /// A sentence for a text that is not a scene.
     pub fn read(text: &str) -> Result<Self, String> {
         let text: Text = toml::from_str(text).map_err(|error| error.message().trim().replace('\n', ", "))?;
         let team = text.team.read()?;
@@ -154,7 +154,7 @@ impl TeamText {
     }
 }
 
-/// The metres per radian of radius.
+/// Returns the metres of radius per radian.
 fn growth(pitch: f64) -> Result<Interval, String> {
     Ok(positive("path.pitch", pitch)? / elementary::turns(1.0))
 }
@@ -180,7 +180,8 @@ fn turnaround(text: &PathText, team: &Team) -> Result<Path, String> {
         (Some(metres), None) if *metres == 0.0 => Interval::new(0.0),
         (Some(metres), None) => positive("path.lead_in", *metres)?,
         (None, Some(turns)) => {
-            // 2 pi start_turn is not less than turn_radius / a: both sides over 2 pi, times the pitch.
+            // 2 pi start_turn is not less than turn_radius / a: both sides are divided by 2 pi and multiplied by the
+            // pitch.
             let outside = radius.is_at_most(&(positive("path.start_turn", *turns)? * Interval::new(*pitch)));
             if !outside {
                 return Err("path.start_turn is inside the turn".to_owned());
@@ -250,7 +251,7 @@ fn route(start: [f64; 2], heading_turns: f64, pieces: &[PieceText]) -> Result<Pa
         (origin, direction) = (at.point, at.tangent);
         segments.push(Segment { curve, begin: Some(zero()), end: Some(end.clone()) });
     }
-    // The last goes on beyond the path's end.
+    // The last segment continues beyond the path's end.
     if let Some(last) = segments.last_mut() {
         last.end = None;
     }

@@ -1,5 +1,4 @@
-//! The steps of a certificate, and what follows from all of them so far: the rules of a step, Lemmas 3 and 4 of
-//! docs/proofs.md. Only `proof` uses it.
+//! The steps of a certificate and their consequences: the rules of a step, Lemmas 3 and 4 of docs/proofs.md.
 
 use super::boards::{Board, is_inside_ring};
 use super::capsule::Capsule;
@@ -9,7 +8,7 @@ use super::lines::Links;
 use super::path::{Place, Span};
 use super::scene::Scene;
 
-/// A step as the file has it.
+/// A step of the file.
 pub(super) struct Step {
     pub links: Links,
     pub head: Span,
@@ -18,25 +17,25 @@ pub(super) struct Step {
     pub spans: Vec<Span>,
 }
 
-/// What follows from the steps so far.
+/// The consequences of the steps so far.
 pub(super) struct Steps {
-    /// Where the head came to.
+    /// The end of the last step.
     pub end: Option<Place>,
-    /// Where the last moving step, and the last clear one, came to.
+    /// The ends of the last moving step and of the last clear step.
     pub moving_end: Option<Place>,
     pub clear_end: Option<Place>,
-    /// Whether all steps were.
+    /// True if all steps were moving, and if all were clear.
     pub all_moving: bool,
     pub all_clear: bool,
     /// Spans of the last step.
     pub spans: Vec<Span>,
     /// Lemma 4: S is not beyond this place, the end of handle 1's span in the first step.
     start_of_second: Option<Place>,
-    /// Lemma 4: whether handle 2 has come to S.
+    /// Lemma 4: true if handle 2 has come to S.
     has_come: bool,
-    /// Lemma 4: whether f > 0 for all links but the head's in every step.
+    /// Lemma 4: true if f > 0 for all links but the head's in every step.
     bodies_moving: bool,
-    /// Counts for whoever reads the result.
+    /// Counts for the report.
     pub steps: u64,
     pub links: u64,
     pub pairs: u64,
@@ -60,16 +59,16 @@ impl Steps {
         }
     }
 
-    /// Checks a step and adds what it proves.
+    /// Checks a step and adds its consequences.
     ///
     /// # Errors
-    /// What does not follow.
+    /// The condition that does not follow.
     pub fn add(&mut self, scene: &Scene, step: Step) -> Result<(), String> {
         let Step { links, head, moving, clear, spans } = step;
         let Span(from, to) = head;
         span_is_one(scene, head).map_err(|problem| format!("the head: {problem}"))?;
         match self.end {
-            Some(end) if end != from => return Err("it does not begin where the one before ended".to_owned()),
+            Some(end) if end != from => return Err("it does not begin where the step before it ended".to_owned()),
             Some(_) if from == to => return Err("it is empty".to_owned()),
             None if !scene.path.travelled(from).is_at_most(&Interval::new(0.0)) => {
                 return Err("the first step begins beyond the start".to_owned());
@@ -92,7 +91,7 @@ impl Steps {
         Ok(())
     }
 
-    /// That the step is about all links, and what Lemma 4 will need of it.
+    /// Checks that the step shows all links, and prepares Lemma 4.
     fn check_all(&mut self, scene: &Scene, chain: &Chain, start_of_second: Place) -> Result<(), String> {
         if chain.last() < scene.team.benches && !chain.ends_on_line(scene) {
             return Err("not all links are listed, and the last handle listed is not on a line without end".to_owned());
@@ -104,7 +103,7 @@ impl Steps {
         Ok(())
     }
 
-    /// Lemma 4 for the links that are not listed.
+    /// Checks Lemma 4 for the links that are not listed.
     fn check_front(&mut self, scene: &Scene, chain: &Chain, start_of_second: Place) -> Result<(), String> {
         if scene.team.benches == 1 {
             return Ok(());
@@ -130,10 +129,10 @@ impl Steps {
             return Ok(());
         }
         if !self.all_moving {
-            return Err("it is said to be moving after one that was not".to_owned());
+            return Err("it claims to be moving after a step that does not".to_owned());
         }
         if let Some(link) = chain.products.iter().position(|product| !product.is_positive()) {
-            return Err(format!("it is said to be moving, but link {link} may stall"));
+            return Err(format!("it claims to be moving, but link {link} may stall"));
         }
         self.moving_end = Some(to);
         Ok(())
@@ -145,7 +144,7 @@ impl Steps {
             return Ok(());
         }
         if !self.all_clear {
-            return Err("it is said to be clear after one that was not".to_owned());
+            return Err("it claims to be clear after a step that does not".to_owned());
         }
         self.pairs += check_clear(scene, links, chain)?;
         self.clear_end = Some(to);
@@ -153,8 +152,8 @@ impl Steps {
     }
 }
 
-/// That no two boards touch that share no handle, or in a step about the front links, none that share none with board 0
-/// or 1. Returns the number of pairs.
+/// Checks that no two boards touch that share no handle. A step of the front links concerns only the pairs with boards 0
+/// and 1. Returns the number of pairs.
 fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String> {
     let team = &scene.team;
     let boards: Vec<Board> = (chain.capsules.windows(2).enumerate())
@@ -165,7 +164,7 @@ fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String
     for a in 0..about {
         for b in a + 2..boards.len() {
             if !boards[a].is_apart_from(&boards[b]) {
-                return Err(format!("it is said to be clear, but benches {a} and {b} may touch (Lemma 2)"));
+                return Err(format!("it claims to be clear, but benches {a} and {b} may touch (Lemma 2)"));
             }
             pairs += 1;
         }
@@ -177,18 +176,18 @@ fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String
         check_line(scene, chain, &boards[..about])?;
         return Ok(pairs + about as u64);
     }
-    // Only a step about the front links comes here.
+    // Only a step of the front links gets here.
     check_ring(scene, chain)?;
     Ok(pairs + about as u64)
 }
 
-/// Lemma 3, *Line*: that the boards `about` are apart from those behind the last handle listed, all on one line, and
-/// these among themselves.
+/// Checks Lemma 3, *Line*: the boards behind the last listed handle are on one line. The boards `about` are apart from
+/// them, and they are apart from each other.
 fn check_line(scene: &Scene, chain: &Chain, about: &[Board]) -> Result<(), String> {
     let team = &scene.team;
     let last = chain.last();
     if !(&team.hole_inset + &team.hole_inset).is_below(team.link(1)) {
-        return Err("it is said to be clear, but benches on a line touch (Lemma 3)".to_owned());
+        return Err("it claims to be clear, but benches on a line touch (Lemma 3)".to_owned());
     }
     for (a, board) in about.iter().enumerate() {
         // The first board of the run that shares no handle with this one.
@@ -204,24 +203,23 @@ fn check_line(scene: &Scene, chain: &Chain, about: &[Board]) -> Result<(), Strin
         };
         let rear = front.behind(&length);
         if !board.is_apart_from(&Board::new(&front, &rear, length, team)) {
-            return Err(format!("it is said to be clear, but bench {a} may touch one on the line (Lemmas 2 and 3)"));
+            return Err(format!("it claims to be clear, but bench {a} may touch one on the line (Lemmas 2 and 3)"));
         }
     }
     Ok(())
 }
 
-/// Lemma 3, *Ring*: that boards 0 and 1 are apart from all behind the last handle listed.
+/// Checks Lemma 3, *Ring*: boards 0 and 1 are apart from all boards behind the last listed handle.
 fn check_ring(scene: &Scene, chain: &Chain) -> Result<(), String> {
     let Span(_, latest) = chain.capsules[chain.last()].span;
     let ring = scene.path.spiral_radius(latest).filter(|_| latest.0 == 0);
-    let ring =
-        ring.ok_or("it is said to be clear, but the last handle listed is not on segment 0, a line or spiral")?;
+    let ring = ring.ok_or("it claims to be clear, but the last handle listed is not on segment 0, a line or spiral")?;
     let reach = (chain.capsules.iter().take(3))
         .map(|capsule| capsule.point.norm() + &capsule.half)
         .fold(Interval::new(0.0), |most, metres| most.max(&metres));
     if is_inside_ring(&scene.team, &reach, &ring) {
         Ok(())
     } else {
-        Err("it is said to be clear, but benches 0 and 1 may touch one that is not listed (Lemma 3)".to_owned())
+        Err("it claims to be clear, but benches 0 and 1 may touch one that is not listed (Lemma 3)".to_owned())
     }
 }

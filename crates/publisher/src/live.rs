@@ -1,21 +1,23 @@
 //! The live loop: wait for the deadline, compute the frame, hand it to the publishers, count.
 //!
-//! In: [`Frames`] and a [`Clock`]. Out: frames to every [`Publisher`], samples and alerts to a queue that never blocks.
+//! In: a [`FrameSource`] and a [`Clock`]. Out: frames to every [`Publisher`], samples and alerts to a queue that never blocks.
 //! Knows no transport and no solver. The `run` command calls [`run_loop`] on a thread of its own, and [`statistics`] on
 //! another, which empties that queue.
 
 pub mod control;
 pub mod realtime;
+pub mod show_source;
 pub mod statistics;
 #[cfg(test)]
 mod tests;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use bench_dragon_messages::control::Command;
+use bench_dragon_messages::control::{Command, CommandRecord};
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, LoopStatus};
-use bench_dragon_show::convert::{Stamps, collision_alert, cue, frame_header};
-use bench_dragon_show::{Frame, Outcome, Show};
+use bench_dragon_motion::solve::Chain;
+use bench_dragon_show::convert::Stamps;
+use bench_dragon_show::{Frame, Outcome};
 
 use bench_dragon_client::clock::{Clock, Deadlines};
 use control::Doors;
@@ -24,49 +26,62 @@ use statistics::Sample;
 /// Nanoseconds between two calls of [`Publisher::maintain`].
 const MAINTENANCE_NS: u64 = 100_000_000;
 
-/// Alerts and cues that are messages already, since they come from a recording. Their run and stamp are not used.
-#[derive(Debug, Default)]
-pub struct Messages {
-    /// The alerts, in order.
-    pub alerts: Vec<CollisionAlert>,
-    /// The cues, in order.
-    pub cues: Vec<Cue>,
+/// Counts of a show since its start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ShowCounts {
+    /// Times the show began again after its end.
+    pub shows_played: u64,
+    /// Contacts that no search had found.
+    pub unforeseen_contacts: u64,
+    /// Frames without a solution, which repeated the frame before.
+    pub unsolved_frames: u64,
 }
 
-impl Messages {
-    /// None.
-    pub const NONE: &'static Self = &Self { alerts: Vec::new(), cues: Vec::new() };
-}
-
-/// A frame on its way out, with what goes out beside it.
+/// A frame as every publisher gets it.
 #[derive(Debug, Clone, Copy)]
 pub struct Outgoing<'a> {
     /// The frame's header, complete but for `sent_ns`, which the publisher sets just before sending.
     pub header: &'a FrameHeader,
-    /// The frame.
-    pub frame: &'a Frame,
-    /// What goes out beside it and is not of the frame.
-    pub messages: &'a Messages,
+    /// The positions of the handles.
+    pub chain: &'a Chain,
+    /// The alerts of this frame, in order.
+    pub alerts: &'a [CollisionAlert],
+    /// The cues of this frame, in order.
+    pub cues: &'a [Cue],
+    /// The commands applied before this frame, in order.
+    pub commands: &'a [CommandRecord],
+    /// The counts up to this frame.
+    pub counts: ShowCounts,
 }
 
 impl<'a> Outgoing<'a> {
-    /// A frame with its own alerts and cues.
+    /// Creates a frame without alerts and cues.
     pub fn new(header: &'a FrameHeader, frame: &'a Frame) -> Self {
-        Self { header, frame, messages: Messages::NONE }
-    }
-
-    /// The alerts that go with the frame.
-    pub fn alerts(self) -> impl Iterator<Item = CollisionAlert> {
-        let FrameHeader { run_id, stamp_ns, .. } = *self.header;
-        let own = self.frame.alerts.iter().map(move |alert| collision_alert(self.header, alert));
-        own.chain(self.messages.alerts.iter().map(move |alert| CollisionAlert { run_id, stamp_ns, ..*alert }))
-    }
-
-    /// The cues that go with the frame.
-    pub fn cues(self) -> impl Iterator<Item = Cue> {
-        let FrameHeader { run_id, stamp_ns, .. } = *self.header;
-        let own = self.frame.cues.iter().map(move |reached| cue(self.header, reached));
-        own.chain(self.messages.cues.iter().map(move |cue| Cue { run_id, stamp_ns, ..*cue }))
+        let Frame {
+            // These are in the header.
+            tick: _,
+            sim_time: _,
+            time_scale: _,
+            state: _,
+            playback: _,
+            min_clearance: _,
+            epoch: _,
+            cue: _,
+            // These become messages first: `show_source`.
+            alerts: _,
+            cues: _,
+            chain,
+            commands,
+            shows_played,
+            unforeseen_contacts,
+            unsolved_frames,
+        } = frame;
+        let counts = ShowCounts {
+            shows_played: *shows_played,
+            unforeseen_contacts: *unforeseen_contacts,
+            unsolved_frames: *unsolved_frames,
+        };
+        Self { header, chain, alerts: &[], cues: &[], commands, counts }
     }
 }
 
@@ -101,48 +116,29 @@ pub trait StatusPublisher {
 #[error("{0}")]
 pub struct PublishError(pub String);
 
-/// What a period brings.
+/// The result of a period.
 #[derive(Debug, Clone, Copy)]
 pub enum Period<'a> {
-    /// A frame, and what goes out beside it.
-    Frame(&'a Frame, &'a Messages),
-    /// Nothing.
+    /// A frame.
+    Frame(Outgoing<'a>),
+    /// No frame is due.
     Empty,
-    /// Nothing, as all that follow: the loop ends.
+    /// The frames are over: the loop ends.
     Over,
 }
 
-impl<'a> From<&'a Frame> for Period<'a> {
-    fn from(frame: &'a Frame) -> Self {
-        Self::Frame(frame, Messages::NONE)
-    }
-}
+/// The source of the loop's frames, by tick.
+pub trait FrameSource {
+    /// Returns the result of the period `tick`. Each call's tick is greater than the one before. The stamps go into the
+    /// header, the alerts and the cues.
+    fn frame(&mut self, tick: u64, stamps: Stamps) -> Period<'_>;
 
-/// Where frames come from, by tick.
-pub trait Frames {
-    /// What the period `tick` brings. Each call's tick is greater than the one before.
-    fn frame(&mut self, tick: u64) -> Period<'_>;
-
-    /// Obeys a command at the beginning of the period `tick`, before its frame. `None` for one that is answered by
-    /// [`finished_step`](Self::finished_step).
+    /// Executes a command at the beginning of the period `tick`, before its frame. Returns `None` for a step, which
+    /// [`finished_step`](Self::finished_step) answers.
     fn command(&mut self, tick: u64, command: Command) -> Option<Outcome>;
 
-    /// The answer to the step that was over, or broken off, at `tick`.
+    /// Returns the answer to the step that ended at `tick`, or was broken off.
     fn finished_step(&mut self, tick: u64) -> Option<Outcome>;
-}
-
-impl Frames for Show {
-    fn frame(&mut self, tick: u64) -> Period<'_> {
-        Show::frame(self, tick).into()
-    }
-
-    fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
-        Show::command(self, tick, command)
-    }
-
-    fn finished_step(&mut self, tick: u64) -> Option<Outcome> {
-        Show::finished_step(self, tick)
-    }
 }
 
 /// How the loop runs.
@@ -236,7 +232,7 @@ pub struct Reports {
 /// The first [`PublishError`], with what was counted until then.
 pub fn run_loop<C: Clock>(
     clock: &C,
-    frames: &mut dyn Frames,
+    source: &mut dyn FrameSource,
     doors: &mut Doors,
     publishers: &mut [Box<dyn Publisher>],
     options: LoopOptions,
@@ -272,11 +268,11 @@ pub fn run_loop<C: Clock>(
             stamp_ns: clock.realtime_ns(),
             deadline_ns: deadlines.of(tick),
         };
-        doors.take_one(frames, tick);
-        let (frame, messages) = match frames.frame(tick) {
-            Period::Frame(frame, messages) => (frame, messages),
+        doors.take_one(source, tick);
+        let outgoing = match source.frame(tick, stamps) {
+            Period::Frame(outgoing) => outgoing,
             Period::Empty => {
-                doors.finish_step(frames, tick);
+                doors.finish_step(source, tick);
                 tick += 1;
                 continue;
             }
@@ -285,8 +281,6 @@ pub fn run_loop<C: Clock>(
                 return Ok(counts);
             }
         };
-        let header = frame_header(frame, stamps);
-        let outgoing = Outgoing { header: &header, frame, messages };
         for publisher in publishers.iter_mut() {
             if let Err(error) = publisher.publish(outgoing) {
                 counts.end = End::Error;
@@ -294,19 +288,20 @@ pub fn run_loop<C: Clock>(
             }
         }
         counts.frames += 1;
+        let ShowCounts { shows_played, unforeseen_contacts, unsolved_frames } = outgoing.counts;
         let sample = Sample {
             tick,
-            sim_time: frame.sim_time,
-            shows_played: frame.shows_played,
-            unforeseen_contacts: frame.unforeseen_contacts,
-            unsolved_frames: frame.unsolved_frames,
+            sim_time: outgoing.header.sim_time,
+            shows_played,
+            unforeseen_contacts,
+            unsolved_frames,
             counts,
             lateness_ns: woke_ns.saturating_sub(deadline_ns),
             step_ns: clock.monotonic_ns().saturating_sub(woke_ns),
             subscribers: publishers.iter().map(|publisher| publisher.subscribers()).sum(),
         };
         report(&mut reports, outgoing, sample);
-        doors.finish_step(frames, tick);
+        doors.finish_step(source, tick);
         publishers.iter_mut().for_each(|publisher| publisher.prepare());
         tick += 1;
     }
@@ -340,12 +335,12 @@ fn wait<C: Clock>(
 /// Hands the statistics thread what it counts, and the alerts. Where that thread is behind by the whole queue, the
 /// sample or the line on the terminal is lost, never the frame or the alert that was published.
 fn report(reports: &mut Reports, outgoing: Outgoing<'_>, sample: Sample) {
-    for alert in outgoing.alerts() {
-        let announcement = Announcement::Alert { alert, time_scale: outgoing.header.time_scale };
+    for alert in outgoing.alerts {
+        let announcement = Announcement::Alert { alert: *alert, time_scale: outgoing.header.time_scale };
         let _ = reports.announcements.push(announcement);
     }
-    for cue in outgoing.cues() {
-        let _ = reports.announcements.push(Announcement::Cue(cue));
+    for cue in outgoing.cues {
+        let _ = reports.announcements.push(Announcement::Cue(*cue));
     }
     let _ = reports.samples.push(sample);
 }

@@ -25,15 +25,14 @@ use rtrb::{Consumer, Producer, RingBuffer};
 
 use crate::live::{Counts, Deliveries, Outgoing, PublishError, Publisher, StatusPublisher};
 use crate::transports::{Transport, TransportError};
-use bench_dragon_messages::LoopStatus;
 use bench_dragon_messages::control::{Code, Command, CommandRecord};
+use bench_dragon_messages::{LoopStatus, QUEUE_BYTES};
 use hash::{HANDLE_WORDS, HEADER_WORDS, columns, header_words};
 use lines::ShowLine;
 use writer::LogWriter;
 
-/// Seconds of frames that the thread may fall behind before frames are lost, and the memory that these may take.
+/// Seconds of frames that the thread may fall behind before frames are lost.
 const QUEUED_SECONDS: f64 = 5.0;
-const QUEUED_BYTES: usize = 64_000_000;
 /// Frames that the queue holds at least.
 const LEAST_FRAMES: usize = 4;
 /// Words that frames leave free: for commands, and for the ticks of lost frames.
@@ -135,7 +134,7 @@ impl LogOutcome {
 /// The queue for frames of so many handles, all of its memory in place.
 pub(super) fn queue(handles: usize, rate: f64) -> (LogPublisher, LogReader) {
     let frame = words_of(handles);
-    let affordable = QUEUED_BYTES / (frame * size_of::<f64>());
+    let affordable = QUEUE_BYTES / (frame * size_of::<f64>());
     let frames = ((rate * QUEUED_SECONDS) as usize).min(affordable).max(LEAST_FRAMES);
     queue_of(frames * frame, RESERVED_WORDS)
 }
@@ -177,19 +176,19 @@ impl LogPublisher {
 
 impl Publisher for LogPublisher {
     fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
-        let Outgoing { header, frame, .. } = outgoing;
+        let Outgoing { header, chain, commands, .. } = outgoing;
         let tick = header.tick;
         if self.shared.missing_from.load(Ordering::Relaxed) != NEVER {
             return Ok(());
         }
-        let handles = frame.chain.handles();
+        let handles = chain.handles();
         self.frame_words = words_of(handles);
-        let (room, of_commands) = (self.queue.slots(), frame.commands.len() * RECORD_WORDS);
+        let (room, of_commands) = (self.queue.slots(), commands.len() * RECORD_WORDS);
         if room < of_commands + RECORD_WORDS {
             self.shared.missing_from.store(tick, Ordering::Release);
             return Ok(());
         }
-        for record in &frame.commands {
+        for record in commands {
             let code = |code: Code| code as u64;
             self.push_record(match *record {
                 CommandRecord::Given { command, code: answered } => {
@@ -206,7 +205,7 @@ impl Publisher for LogPublisher {
         let mut words = [FRAME, tick, handles as u64, 0, 0, 0, 0, 0, 0, 0, 0];
         words[FRAME_WORDS - HEADER_WORDS..].copy_from_slice(&header_words(header));
         self.push(&words.map(f64::from_bits));
-        columns(&frame.chain).iter().for_each(|column| self.push(column));
+        columns(chain).iter().for_each(|column| self.push(column));
         Ok(())
     }
 
@@ -312,7 +311,7 @@ impl LogReader {
                 continue;
             }
             record.commit_all();
-            let code = |number: u64| Code::ALL.get(number as usize).copied();
+            let code = |number: u64| u32::try_from(number).ok().and_then(Code::of_number);
             match kind {
                 LOST => writer.lost(tick),
                 STEP_FINISHED => code(third).into_iter().for_each(|code| {

@@ -13,10 +13,8 @@ use std::time::{Duration, Instant};
 
 use crate::mcap::recorder::{RecordError, Recorded, Recorder};
 use bench_dragon_client::feed::FeedEvent;
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, QUEUE_BYTES, Stage};
 
-/// The bytes of frames that may wait.
-const QUEUED_BYTES: usize = 64_000_000;
 /// How often the thread does what is due.
 const MAINTAIN_INTERVAL: Duration = Duration::from_millis(50);
 /// How long the feed's end waits for room before it looks again.
@@ -95,7 +93,7 @@ impl RecordQueue {
     pub fn handle(&self, event: &FeedEvent<'_>, over: impl Fn() -> bool) {
         let item = match event {
             FeedEvent::Frame { header, handles, missed } => {
-                while self.shared.queued_bytes.load(Ordering::Acquire) > QUEUED_BYTES {
+                while self.shared.queued_bytes.load(Ordering::Acquire) > QUEUE_BYTES {
                     if over() {
                         return;
                     }

@@ -19,18 +19,19 @@ use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::mcap::reader::{Contents, ReadError, Recording};
 use bench_dragon_messages::control::{Code, Command};
-use bench_dragon_messages::{FrameHeader, HandlePose};
-use bench_dragon_publisher::live::{Frames, Messages, Period};
+use bench_dragon_messages::state::PlaybackState;
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, QUEUE_BYTES};
+use bench_dragon_motion::solve::Chain;
+use bench_dragon_publisher::live::{FrameSource, Outgoing, Period, ShowCounts};
 use bench_dragon_ros2_messages::HandlePoses;
-use bench_dragon_show::convert::read_frame;
-use bench_dragon_show::{Frame, Outcome};
+use bench_dragon_show::Outcome;
+use bench_dragon_show::convert::Stamps;
 use pass::{Pass, Recorded, Start};
 
 /// Seconds of frames that are read ahead.
 const QUEUED_SECONDS: f64 = 2.0;
-/// The least of frames in that queue, and the memory that more may take.
+/// The least number of frames in that queue.
 const QUEUED_FRAMES: usize = 4;
-const QUEUED_BYTES: usize = 64_000_000;
 /// How often the thread looks for room in the queue.
 const ROOM_INTERVAL: Duration = Duration::from_millis(2);
 /// How often it is looked for the first frame: once a replay.
@@ -56,12 +57,16 @@ pub struct ReplayOptions {
     pub looping: bool,
 }
 
-/// A frame with what goes out beside it.
-struct Moment {
-    /// The period since the beginning of the replay.
+/// A recorded frame with its alerts and cues.
+struct QueuedFrame {
+    /// The period, counted from the start of the replay.
     due: u64,
-    frame: Frame,
-    messages: Messages,
+    header: FrameHeader,
+    playback: PlaybackState,
+    chain: Chain,
+    alerts: Vec<CollisionAlert>,
+    cues: Vec<Cue>,
+    shows_played: u64,
 }
 
 /// What both ends of the queue know.
@@ -75,11 +80,11 @@ struct Shared {
 
 /// The loop's end: the frames.
 pub struct Replay {
-    filled: Consumer<Box<Moment>>,
-    free: Producer<Box<Moment>>,
+    filled: Consumer<Box<QueuedFrame>>,
+    free: Producer<Box<QueuedFrame>>,
     /// The one that was sent last, and the one that is next.
-    sent: Option<Box<Moment>>,
-    next: Option<Box<Moment>>,
+    sent: Option<Box<QueuedFrame>>,
+    next: Option<Box<QueuedFrame>>,
     /// Periods by which everything is later.
     behind: u64,
     shared: Arc<Shared>,
@@ -140,9 +145,8 @@ impl Prepared {
         // Besides those in the queue one is being filled, one is next and one was sent last.
         let (mut loop_free, free) = RingBuffer::new(frames + 3);
         for _ in 0..frames + 3 {
-            let messages = Messages::default();
             // The ring has just as many places.
-            let _ = loop_free.push(Box::new(Moment { due: 0, frame: Frame::new(handles), messages }));
+            let _ = loop_free.push(Box::new(QueuedFrame::new(handles)));
         }
         let shared = Arc::new(Shared::default());
         let reading = Arc::clone(&shared);
@@ -169,7 +173,7 @@ impl Prepared {
     }
 
     fn frames_ahead(&self, handles: usize) -> usize {
-        let affordable = QUEUED_BYTES / (handles.max(1) * size_of::<HandlePose>());
+        let affordable = QUEUE_BYTES / (handles.max(1) * size_of::<HandlePose>());
         ((self.rate * QUEUED_SECONDS) as usize).min(affordable).max(QUEUED_FRAMES)
     }
 
@@ -192,16 +196,15 @@ impl Prepared {
                     (Pace::Even(_), Some(_)) => due.saturating_add(1),
                 };
                 span = Some([first, header]);
-                let Some(mut moment) = queue.room() else { return Ok(()) };
-                fill(&mut moment, recorded, due)?;
-                let frame = &mut moment.frame;
+                let Some(mut frame) = queue.room() else { return Ok(()) };
+                frame.fill(recorded, due)?;
                 frame.shows_played = shows;
-                frame.epoch = frame.epoch.wrapping_add(epochs);
+                frame.header.epoch = frame.header.epoch.wrapping_add(epochs);
                 // A product with 1 would be the same bits; this is plain to see.
                 if speed != 1.0 {
-                    frame.time_scale *= speed;
+                    frame.header.time_scale *= speed;
                 }
-                queue.push(moment);
+                queue.push(frame);
             }
             let Some([first, last]) = span.filter(|_| self.options.looping) else { return Ok(()) };
             shows += 1;
@@ -213,30 +216,30 @@ impl Prepared {
 
 /// The thread's ends of the queues.
 struct Queue<'a> {
-    filled: Producer<Box<Moment>>,
-    free: Consumer<Box<Moment>>,
+    filled: Producer<Box<QueuedFrame>>,
+    free: Consumer<Box<QueuedFrame>>,
     shared: &'a Shared,
 }
 
 impl Queue<'_> {
-    /// A moment to fill, once there is one; `None` where no more are wanted.
-    fn room(&mut self) -> Option<Box<Moment>> {
+    /// Waits for a frame to fill. Returns `None` once the loop or the command has ended.
+    fn room(&mut self) -> Option<Box<QueuedFrame>> {
         loop {
             if self.shared.stop.load(Ordering::Acquire) || self.filled.is_abandoned() {
                 return None;
             }
             if !self.filled.is_full()
-                && let Ok(moment) = self.free.pop()
+                && let Ok(frame) = self.free.pop()
             {
-                return Some(moment);
+                return Some(frame);
             }
             std::thread::sleep(ROOM_INTERVAL);
         }
     }
 
-    fn push(&mut self, moment: Box<Moment>) {
+    fn push(&mut self, frame: Box<QueuedFrame>) {
         // Only this end fills the queue, and there was room.
-        let _ = self.filled.push(moment);
+        let _ = self.filled.push(frame);
     }
 }
 
@@ -258,31 +261,66 @@ fn check(recorded: &Recorded, handles: usize, span: Option<[FrameHeader; 2]>) ->
     Err(ReadError::Frame(reason))
 }
 
-/// Makes a moment that of a frame which is due in a period.
-fn fill(moment: &mut Moment, recorded: Recorded, due: u64) -> Result<(), ReadError> {
-    let Recorded { frame: message, alerts, cues } = recorded;
-    let header = message.frame;
-    moment.due = due;
-    let unknown = |field| ReadError::Frame(format!("whose {field} this version does not know"));
-    read_frame(&header, &message.poses, &mut moment.frame).map_err(unknown)?;
-    // What is older than the replay is of its first period.
-    let period = |tick: u64| due.saturating_sub(header.tick.saturating_sub(tick));
-    let Messages { alerts: outgoing_alerts, cues: outgoing_cues } = &mut moment.messages;
-    outgoing_alerts.clear();
-    outgoing_alerts.extend(alerts.into_iter().map(|mut alert| {
-        alert.tick = period(alert.tick);
-        alert
-    }));
-    outgoing_cues.clear();
-    outgoing_cues.extend(cues.into_iter().map(|mut cue| {
-        cue.tick = period(cue.tick);
-        cue
-    }));
-    Ok(())
+impl QueuedFrame {
+    fn new(handles: usize) -> Self {
+        Self {
+            due: 0,
+            header: FrameHeader::default(),
+            playback: PlaybackState::Playing,
+            chain: Chain::new(handles),
+            alerts: Vec::new(),
+            cues: Vec::new(),
+            shows_played: 0,
+        }
+    }
+
+    /// Takes the contents of a recorded frame that is due in the period `due`.
+    fn fill(&mut self, recorded: Recorded, due: u64) -> Result<(), ReadError> {
+        let Recorded { frame: HandlePoses { header: _, frame: header, poses }, alerts, cues } = recorded;
+        let unknown = |field| ReadError::Frame(format!("whose {field} this version does not know"));
+        header.frame_state().ok_or_else(|| unknown("state"))?;
+        self.playback = header.playback_state().ok_or_else(|| unknown("playback"))?;
+        (self.due, self.alerts, self.cues) = (due, alerts, cues);
+        self.header = FrameHeader { handles: poses.len() as u32, reserved: 0, ..header };
+        // A recording holds no signed speeds: they keep their zeros.
+        let Chain { x, y, heading, speed: _, vx, vy } = &mut self.chain;
+        for numbers in [&mut *x, &mut *y, &mut *heading, &mut *vx, &mut *vy] {
+            numbers.clear();
+        }
+        for pose in poses {
+            let HandlePose { x: pose_x, y: pose_y, heading: pose_heading, vx: pose_vx, vy: pose_vy } = pose;
+            x.push(pose_x);
+            y.push(pose_y);
+            heading.push(pose_heading);
+            vx.push(pose_vx);
+            vy.push(pose_vy);
+        }
+        // A message older than the replay gets the tick of its first period.
+        let period = |tick: u64| due.saturating_sub(header.tick.saturating_sub(tick));
+        self.alerts.iter_mut().for_each(|alert| alert.tick = period(alert.tick));
+        self.cues.iter_mut().for_each(|cue| cue.tick = period(cue.tick));
+        Ok(())
+    }
+
+    /// Makes the messages those of this run, in the period `tick`.
+    fn stamp(&mut self, tick: u64, stamps: Stamps, behind: u64) {
+        let Stamps { run_id, sequence, stamp_ns, deadline_ns } = stamps;
+        let header = &mut self.header;
+        (header.run_id, header.sequence, header.tick) = (run_id, sequence, tick);
+        (header.stamp_ns, header.sent_ns, header.deadline_ns) = (stamp_ns, 0, deadline_ns);
+        for alert in &mut self.alerts {
+            (alert.run_id, alert.stamp_ns) = (run_id, stamp_ns);
+            alert.tick = alert.tick.saturating_add(behind);
+        }
+        for cue in &mut self.cues {
+            (cue.run_id, cue.stamp_ns) = (run_id, stamp_ns);
+            cue.tick = cue.tick.saturating_add(behind);
+        }
+    }
 }
 
-impl Frames for Replay {
-    fn frame(&mut self, tick: u64) -> Period<'_> {
+impl FrameSource for Replay {
+    fn frame(&mut self, tick: u64, stamps: Stamps) -> Period<'_> {
         if self.next.is_none() {
             // Read before the queue: what was put there before it was left is then still sent.
             let over = self.filled.is_abandoned();
@@ -301,23 +339,22 @@ impl Frames for Replay {
         }
         self.behind += tick - due;
         if let Some(used) = std::mem::replace(&mut self.sent, self.next.take()) {
-            // The ring has a place for every moment there is.
+            // The ring has a place for every frame.
             let _ = self.free.push(used);
         }
-        let Some(Moment { frame, messages, .. }) = self.sent.as_deref_mut() else { return Period::Empty };
-        frame.tick = tick;
-        let behind = self.behind;
-        messages.alerts.iter_mut().for_each(|alert| alert.tick = alert.tick.saturating_add(behind));
-        messages.cues.iter_mut().for_each(|cue| cue.tick = cue.tick.saturating_add(behind));
-        Period::Frame(frame, messages)
+        let Some(sent) = self.sent.as_deref_mut() else { return Period::Empty };
+        sent.stamp(tick, stamps, self.behind);
+        let QueuedFrame { header, chain, alerts, cues, shows_played, .. } = sent;
+        let counts = ShowCounts { shows_played: *shows_played, ..ShowCounts::default() };
+        Period::Frame(Outgoing { header, chain, alerts, cues, commands: &[], counts })
     }
 
     /// Tells how the recorded show stands, and refuses everything else.
     fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
         let code = if command == Command::State { Code::Done } else { Code::Refused };
         // A command that comes before the first frame is answered with it.
-        let Moment { frame, .. } = self.sent.as_deref().or(self.next.as_deref())?;
-        let Frame { sim_time, time_scale, playback, cue, .. } = *frame;
+        let QueuedFrame { header, playback, .. } = self.sent.as_deref().or(self.next.as_deref())?;
+        let (FrameHeader { sim_time, time_scale, cue, .. }, playback) = (*header, *playback);
         Some(Outcome { code, tick, sim_time, time_scale, playing_rate: time_scale, playback, cue })
     }
 

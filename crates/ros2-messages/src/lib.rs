@@ -185,7 +185,9 @@ impl Pose {
 
     /// A handle's pose.
     pub fn of(handle: &HandlePose) -> Self {
-        Self::flat(handle.x, handle.y, handle.heading)
+        // A pose has no velocity.
+        let HandlePose { x, y, heading, vx: _, vy: _ } = *handle;
+        Self::flat(x, y, heading)
     }
 }
 

@@ -62,7 +62,7 @@ fn turn_of(segment: &StageSegment) -> f64 {
 
 /// The pose at a share, from 0 to 1, of a segment: of its length, or of a spiral's polar angle.
 fn pose_at(segment: &StageSegment, pitch: f64, share: f64) -> Pose {
-    let StageSegment { x, y, heading, length, curvature, theta_first, theta_last, kind, .. } = *segment;
+    let StageSegment { x, y, heading, length, curvature, theta_first, theta_last, kind, reserved: _ } = *segment;
     match kind {
         SEGMENT_ARC => {
             let here = heading + share * curvature * length;

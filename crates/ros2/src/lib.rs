@@ -116,7 +116,18 @@ pub fn open_on(
     config: &TransportConfig,
     settings: &Ros2Settings,
 ) -> Result<Box<dyn Transport>, Ros2Error> {
-    let TransportConfig { name, handles, alerts, cues, loop_rate, stage, .. } = *config;
+    let TransportConfig {
+        name,
+        handles,
+        alerts,
+        cues,
+        single_precision: _,
+        queue: _,
+        subscribers: _,
+        ros2: _,
+        loop_rate,
+        stage,
+    } = *config;
     check_name(name)?;
     if let Some(rate) = settings.rate.filter(|rate| *rate > loop_rate) {
         log::warn!("publish.ros2.rate is {rate}, more than the loop's {loop_rate}: ROS 2 gets {loop_rate} a second");

@@ -16,14 +16,12 @@ use serde::Serialize;
 
 use super::matching::Matches;
 use super::{Ros2Config, Ros2Error};
-use bench_dragon_messages::Stage;
+use bench_dragon_messages::{QUEUE_BYTES, Stage};
 use bench_dragon_ros2_messages::MessageType;
 use bench_dragon_ros2_messages::settings::{Durability, Qos, Reliability, Topic};
 
 /// How long a subscriber that has died counts as slow: its lease.
 const LEASE_SECONDS: f64 = 12.0;
-/// The memory that one topic may keep for slow subscribers.
-const UNACKNOWLEDGED_BYTES: f64 = 64_000_000.0;
 /// RustDDS's own limit.
 const UNACKNOWLEDGED_MESSAGES: f64 = 8192.0;
 /// How long a subscriber that has just been matched is given to match in turn. Now and then RustDDS does not deliver what it
@@ -232,7 +230,7 @@ fn policies(qos: Qos, bytes: usize, rate: f64) -> QosPolicies {
         Durability::TransientLocal => policy::Durability::TransientLocal,
     };
     let depth = qos.depth as i32;
-    let affordable = (UNACKNOWLEDGED_BYTES / bytes as f64).min(UNACKNOWLEDGED_MESSAGES);
+    let affordable = (QUEUE_BYTES as f64 / bytes as f64).min(UNACKNOWLEDGED_MESSAGES);
     let max_samples = ((LEASE_SECONDS * rate).min(affordable) as i32).max(depth);
     QosPolicyBuilder::new()
         .reliability(reliability)

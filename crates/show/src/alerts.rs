@@ -1,7 +1,7 @@
-//! The alert rules: from the timeline and the clearance to a level that does not flicker, and the alerts that go out.
+//! The alert rules: from the timeline and the clearance to a level with hysteresis, and to alerts.
 //!
-//! In: a frame's tick, time and nearest pair, and the events. Out: the level, and the alerts of that frame. Called by
-//! the show, once a frame.
+//! In: a frame's tick, time and nearest pair, and the events. Out: the level, and the alerts of that frame. The show
+//! calls it once per frame.
 
 #[cfg(test)]
 mod tests;
@@ -12,17 +12,17 @@ use bench_dragon_motion::timeline::{TimedEvent, Timeline};
 
 use bench_dragon_messages::state::Level;
 
-/// More alerts than this cannot go with one frame: contact, stall and lock, all passed in one step. Approaching and
-/// clear go alone.
+/// The greatest number of alerts of one frame: contact, stall and lock, all passed in one step. Approaching and clear
+/// are alone.
 pub const MOST_PER_FRAME: usize = 3;
 
-/// How far clearance must have opened again, as a multiple of the clearance that raised the level: without a gap
-/// between the two, a clearance that swings about the threshold would make the level flicker.
+/// Clearance at which the level may be released, as a multiple of the clearance that raised it. Without this
+/// hysteresis, a clearance that oscillates about the threshold would make the level flicker.
 const HYSTERESIS_RATIO: f64 = 1.5;
 
-/// How long it must have stayed that open, as a share of the approach time. The gap alone does not do: as the paper's
-/// head passes from one bench to the next its clearance swings from 0.050 m up to 0.082 m and back within 4 s, and
-/// stays above 0.075 m for 0.6 s of them.
+/// Time for which the clearance must stay that wide, as a share of the approach time. The ratio alone is not enough. As
+/// the paper's head passes from one bench to the next, its clearance rises from 0.050 m to 0.082 m and falls back
+/// within 4 s. It is above 0.075 m for 0.6 s.
 const RELEASE_HOLD: f64 = 0.1;
 
 /// A change of the alert level or a step of the countdown.
@@ -30,32 +30,32 @@ const RELEASE_HOLD: f64 = 0.1;
 pub struct Alert {
     /// The level.
     pub level: Level,
-    /// What the alert is about: the next contact, stall or lock while the level is clear or approaching, if there is
-    /// one; else the one that has happened.
+    /// The event of the alert. While the level is clear or approaching: the next contact, stall or lock, if any. Else:
+    /// the latest event that has happened.
     pub event: Option<TimedEvent>,
-    /// The nearest two boards in the frame; `None` under three benches.
+    /// The nearest two boards in the frame; `None` with fewer than three benches.
     pub nearest: Option<PairClearance>,
 }
 
-/// The level now, and what is needed to decide the next.
+/// The state of the alert level.
 #[derive(Debug, Clone)]
 pub struct LevelTracker {
     rules: AlertRules,
     rate: f64,
-    /// The level announced last; `None` before the first frame.
+    /// The level that was announced last; `None` before the first frame.
     announced: Option<Level>,
-    /// The tick at which it was announced.
+    /// The tick of that announcement.
     announced_tick: u64,
-    /// Whole seconds of wall time since then that have been counted down.
+    /// Whole seconds of wall time counted down since then.
     seconds_counted: u64,
-    /// Time of the last frame of this show; before the first, none.
+    /// Time of the previous frame of this showing; `None` before the first.
     previous_time: Option<f64>,
-    /// Since when the clearance has been wide enough to release the level.
+    /// Time since which the clearance is wide enough to release the level.
     open_since: Option<f64>,
 }
 
 impl LevelTracker {
-    /// The level before the first frame of a run at `rate` frames per second.
+    /// Creates the state before the first frame of a run at `rate` frames per second.
     pub fn new(rules: AlertRules, rate: f64) -> Self {
         Self {
             rules,
@@ -68,31 +68,31 @@ impl LevelTracker {
         }
     }
 
-    /// The level now.
+    /// Returns the current level.
     pub fn current(&self) -> Level {
         self.announced.unwrap_or(Level::Clear)
     }
 
-    /// The show begins again: the next frame decides the level anew, and announces it if it is another one.
+    /// Prepares for a new showing: the next frame decides the level again, and announces it if it has changed.
     ///
-    /// The countdown is of wall time and runs on.
+    /// The countdown is in wall time and continues.
     pub fn restart(&mut self) {
         self.previous_time = None;
         self.open_since = None;
     }
 
-    /// The next frame announces its level, whatever that is.
+    /// Makes the next frame announce its level, changed or not.
     pub fn forget(&mut self) {
         self.restart();
         self.announced = None;
     }
 
-    /// Decides the level of a frame and adds the alerts that go with it. `tick` grows from call to call, through every
-    /// restart; `sim_time` does not fall but at a restart.
+    /// Decides the level of a frame and adds the frame's alerts. `tick` grows from call to call, also across restarts.
+    /// `sim_time` falls only at a restart.
     ///
-    /// Every event since the last frame is announced, however many a step has passed, so that what a subscriber
-    /// receives of them does not depend on the rate. The first frame of a show announces the latest event passed alone.
-    /// Nothing is counted down while the show stands still (`moves` is false).
+    /// Every event since the previous frame is announced, even if one step passes several: so the alerts do not depend
+    /// on the rate. The first frame of a showing announces only the latest event passed. The countdown stops while the
+    /// show stands still (`moves` is false).
     pub fn update(
         &mut self,
         tick: u64,
@@ -125,7 +125,7 @@ impl LevelTracker {
         self.previous_time = Some(sim_time);
     }
 
-    /// Takes a level on; whether it is another one than that announced last.
+    /// Sets the level. Returns true if it differs from the level announced last.
     fn announce_if_changed(&mut self, level: Level, tick: u64) -> bool {
         let changed = self.announced != Some(level);
         if changed {
@@ -136,7 +136,7 @@ impl LevelTracker {
         changed
     }
 
-    /// `Approaching` or `Clear`, where no event has passed.
+    /// Returns `Approaching` or `Clear`, before the first event.
     fn level_before_events(
         &mut self,
         sim_time: f64,
@@ -145,7 +145,7 @@ impl LevelTracker {
     ) -> Level {
         let AlertRules { approach_time, approach_clearance } = self.rules;
         let event_is_near = next.is_some_and(|timed| timed.time - sim_time <= approach_time);
-        // Without a pair there is nothing to be near.
+        // Without a pair no boards are near.
         let clearance = nearest.map_or(f64::INFINITY, |nearest| nearest.value);
         let open = clearance > HYSTERESIS_RATIO * approach_clearance;
         self.open_since = if open { self.open_since.or(Some(sim_time)) } else { None };
@@ -158,7 +158,7 @@ impl LevelTracker {
         if event_is_near || boards_are_near { Level::Approaching } else { Level::Clear }
     }
 
-    /// Whether another second of wall time has passed since the level was announced.
+    /// Returns true if another second of wall time has passed since the level was announced.
     fn second_is_over(&mut self, tick: u64) -> bool {
         let seconds = ((tick - self.announced_tick) as f64 / self.rate) as u64;
         let over = seconds > self.seconds_counted;

@@ -1,8 +1,8 @@
 //! The show clock: from ticks and commands to simulated time.
 //!
-//! Pure, and from integers: sim0 + time_scale * (tick - tick0) / rate, with a new (sim0, tick0, time_scale) at each
-//! command and each loop, never accumulated: nothing drifts, and the same ticks with the same commands give the same bits.
-//! Called by the show.
+//! Pure and computed from integers: sim0 + time_scale * (tick - tick0) / rate, with a new (sim0, tick0, time_scale) at
+//! each command and each loop. Nothing is accumulated, so nothing drifts. The same ticks with the same commands give
+//! the same bits. The show calls it.
 
 #[cfg(test)]
 mod tests;
@@ -13,29 +13,29 @@ use super::Playback;
 use bench_dragon_messages::control::{Code, Command, RATES};
 use bench_dragon_messages::state::PlaybackState;
 
-/// Where a show is at a tick.
+/// The state of the clock at a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShowTime {
     /// Simulated seconds since the start of the scene.
     pub sim_time: f64,
-    /// Simulated seconds per second, as in force: 0 while paused or held, unchanged once the show has ended.
+    /// Simulated seconds per second of wall time in force: 0 while paused or held, unchanged after the end of the show.
     pub time_scale: f64,
-    /// Whether simulated time advances.
+    /// The playback state: it tells whether simulated time advances.
     pub playback: PlaybackState,
     /// Jumps of simulated time so far: loops, seeks, restarts.
     pub epoch: u32,
-    /// Times the show has been played to its end and begun again.
+    /// Number of times that the show has ended and started again.
     pub shows_played: u64,
-    /// Cues that lie behind, in the order of their times.
+    /// Number of cues passed, in the order of their times.
     pub cues_passed: usize,
 }
 
-/// A moment of the show that is announced once it is reached.
+/// The time of a cue.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CueTime {
     /// Simulated seconds.
     pub time: f64,
-    /// Whether the show pauses there and waits for [`Command::Go`].
+    /// True if the show pauses at the cue and waits for [`Command::Go`].
     pub pauses: bool,
 }
 
@@ -46,37 +46,39 @@ enum Mode {
     Held,
 }
 
-/// The clock of a show whose end is known.
+/// The clock of a show with a known end.
 #[derive(Debug, Clone)]
 pub struct ShowClock {
     rate: f64,
     start: f64,
     freeze_time: f64,
-    /// Periods for which a looping show stands at its end; `None` where it does not begin again.
+    /// Periods for which a looping show stands at its end; `None` if it does not loop.
     end_hold: Option<u64>,
-    /// In the order of their times.
+    /// The cues in the order of their times.
     cues: Vec<CueTime>,
-    /// The moment that the present stretch began at, and its tick; while time stands still, where it stands.
+    /// The simulated time at the beginning of the current stretch, with its tick; the current time while time stands
+    /// still.
     sim0: f64,
     tick0: u64,
     time_scale: f64,
-    /// The first tick of this stretch that is at or past the freeze.
+    /// The first tick of this stretch at or past the end of the show.
     ended_tick: u64,
     mode: Mode,
-    /// The tick at which a step is over.
+    /// The tick at which a step ends.
     step_end: Option<u64>,
     step_outcome: Option<Code>,
-    /// Whether the pause is one that [`Command::Go`] ends.
+    /// True if [`Command::Go`] ends the pause.
     waits: bool,
     epoch: u32,
     shows_played: u64,
     cues_passed: usize,
-    /// Cues reached since [`ShowClock::clear_reached`]; never grows.
+    /// Cues reached since [`ShowClock::clear_reached`]. Its capacity is reserved in advance.
     reached: Vec<usize>,
 }
 
 impl ShowClock {
-    /// The clock of a show that freezes at `freeze_time`, in simulated seconds. `cues` are in the order of their times.
+    /// Creates the clock of a show that ends at `freeze_time`, in simulated seconds. `cues` are in the order of their
+    /// times.
     pub fn new(playback: &Playback, freeze_time: f64, cues: Vec<CueTime>) -> Self {
         let Playback { start, time_scale, rate, at_end, end_hold, paused, .. } = *playback;
         let end_hold = match at_end {
@@ -107,40 +109,41 @@ impl ShowClock {
         clock
     }
 
-    /// Simulated seconds at which the show freezes.
+    /// Returns the simulated time at which the show ends, seconds.
     pub fn freeze_time(&self) -> f64 {
         self.freeze_time
     }
 
-    /// Simulated seconds per second while the show plays.
+    /// Returns the simulated seconds per second of wall time while the show plays.
     pub fn playing_rate(&self) -> f64 {
         self.time_scale
     }
 
-    /// Cues reached since the last [`clear_reached`](Self::clear_reached), by their place in the order of times.
+    /// Returns the cues reached since the last [`clear_reached`](Self::clear_reached), as indices in the order of
+    /// times.
     pub fn reached(&self) -> &[usize] {
         &self.reached
     }
 
-    /// Forgets the cues reached so far.
+    /// Clears the list of cues reached.
     pub fn clear_reached(&mut self) {
         self.reached.clear();
     }
 
-    /// How the last step ended, where [`take_step_outcome`](Self::take_step_outcome) has not reported it yet.
+    /// Returns the result of the last step, if [`take_step_outcome`](Self::take_step_outcome) has not returned it yet.
     pub fn step_outcome(&self) -> Option<Code> {
         self.step_outcome
     }
 
-    /// How the last step ended, once.
+    /// Returns the result of the last step, once.
     pub fn take_step_outcome(&mut self) -> Option<Code> {
         self.step_outcome.take()
     }
 
-    /// Where the show is at a tick, which is not before any tick given so far.
+    /// Advances to a tick, which must not decrease, and returns the state there.
     pub fn advance(&mut self, tick: u64) -> ShowTime {
         while self.advances() {
-            // A step ends before what comes after it.
+            // A step ends before anything later.
             let until = self.step_end.map_or(tick, |end| end.min(tick));
             let time = self.sim_time(until);
             let ahead = &self.cues[self.cues_passed..];
@@ -166,8 +169,8 @@ impl ShowClock {
         self.at(tick)
     }
 
-    /// Obeys a command at the beginning of the period `tick`. `None` for a step, which is answered by
-    /// [`take_step_outcome`](Self::take_step_outcome) once it is over.
+    /// Executes a command at the beginning of the period `tick`. Returns `None` for a step:
+    /// [`take_step_outcome`](Self::take_step_outcome) returns its result later.
     pub fn apply(&mut self, tick: u64, command: Command) -> Option<Code> {
         let now = self.advance(tick).sim_time;
         if self.mode == Mode::Held && !matches!(command, Command::State | Command::Hold | Command::Release) {
@@ -221,7 +224,7 @@ impl ShowClock {
         })
     }
 
-    /// Where the show is at a tick of the present stretch.
+    /// Returns the state at a tick of the current stretch.
     fn at(&self, tick: u64) -> ShowTime {
         let advances = self.advances();
         let sim_time = if advances { self.sim_time(tick) } else { self.sim0.min(self.freeze_time) };
@@ -248,19 +251,19 @@ impl ShowClock {
         self.unclamped(tick - self.tick0).min(self.freeze_time)
     }
 
-    /// Simulated seconds so many ticks after the beginning of the stretch, if the show never froze.
+    /// Returns the simulated time `ticks` ticks after the beginning of the stretch, as if the show had no end.
     fn unclamped(&self, ticks: u64) -> f64 {
         self.sim0 + self.time_scale * ticks as f64 / self.rate
     }
 
-    /// Begins a stretch.
+    /// Starts a stretch.
     fn begin(&mut self, tick: u64, time: f64) {
         (self.tick0, self.sim0) = (tick, time);
         self.ended_tick = tick.saturating_add(self.ticks_to_end());
     }
 
-    /// Ticks from the beginning of this stretch to the first at or past the freeze. By bisection, since the time of a
-    /// tick is rounded and never falls.
+    /// Returns the ticks from the beginning of this stretch to the first tick at or past the end. Bisection is exact:
+    /// the rounded time of a tick never falls.
     fn ticks_to_end(&self) -> u64 {
         let (mut low, mut high) = (0, u64::MAX);
         while low < high {
@@ -279,7 +282,7 @@ impl ShowClock {
         self.mode = mode;
     }
 
-    /// To another time: a new epoch, in which no cue is reached by having been jumped over.
+    /// Jumps to another time: a new epoch, in which the cues jumped over are not reached.
     fn jump(&mut self, tick: u64, time: f64) -> Code {
         self.finish_step(Code::Refused);
         self.epoch = self.epoch.wrapping_add(1);
@@ -288,7 +291,7 @@ impl ShowClock {
         Code::Done
     }
 
-    /// The show begins again at the tick `first`, and as often again as it is over before `until`.
+    /// Starts the show again at the tick `first`, and again for each showing that ends before `until`.
     fn begin_again(&mut self, first: u64, until: u64) {
         self.begin(first, self.start);
         self.cues_passed = self.cues_before(self.start);
@@ -304,7 +307,7 @@ impl ShowClock {
         self.cues.partition_point(|cue| cue.time < time)
     }
 
-    /// Passes cues up to a place in their order.
+    /// Passes cues up to an index in their order.
     fn reach(&mut self, passed: usize) {
         for cue in self.cues_passed..passed {
             if self.reached.len() < 2 * self.cues.len() {

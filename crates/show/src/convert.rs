@@ -1,15 +1,17 @@
-//! From frames, chains, alerts and motions to the layouts, and from a layout's numbers back to states, levels and events.
-//!
-//! Each conversion stands here and nowhere else. Called by the loop and the transports, and by every subscriber that
-//! wants more than a number.
+//! Conversions from frames, chains, alerts and motions to the message layouts. Every type is destructured in full, so
+//! that a new field cannot be lost.
 
 use crate::alerts::Alert;
 use crate::{Frame, Outcome, ReachedCue, Show};
 use bench_dragon_messages::state::FrameState;
 use bench_dragon_motion::Motion;
+use bench_dragon_motion::clearance::PairClearance;
+use bench_dragon_motion::event::Event;
 use bench_dragon_motion::model::path::{OutlineKind, SegmentOutline};
 use bench_dragon_motion::model::spiral::Direction;
+use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::solve::Chain;
+use bench_dragon_motion::timeline::TimedEvent;
 
 use bench_dragon_messages::{
     CollisionAlert, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32, MOST_CUES, MOST_EVENTS, MOST_SEGMENTS,
@@ -17,10 +19,10 @@ use bench_dragon_messages::{
     Stage, StageCue, StageEvent, StageSegment,
 };
 
-/// A route of the most steps, and the line on which its team stands, fit into a stage.
+/// A stage has room for a route of the most steps and the line on which its team stands.
 const _: () = assert!(crate::scene::path::MOST_STEPS < MOST_SEGMENTS);
 
-/// What of a header is not the frame's own but the run's.
+/// The header fields that the publisher sets: they do not follow from the frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stamps {
     /// The run.
@@ -29,48 +31,64 @@ pub struct Stamps {
     pub sequence: u64,
     /// CLOCK_REALTIME now, ns.
     pub stamp_ns: u64,
-    /// CLOCK_MONOTONIC at which the period should have begun, ns.
+    /// CLOCK_MONOTONIC of the period's scheduled start, ns.
     pub deadline_ns: u64,
 }
 
-/// The header of a frame, complete but for `sent_ns`, which a publisher sets just before sending.
+/// Returns the header of a frame. Its `sent_ns` is 0: a publisher sets the field just before sending.
 pub fn frame_header(frame: &Frame, stamps: Stamps) -> FrameHeader {
     let Stamps { run_id, sequence, stamp_ns, deadline_ns } = stamps;
+    let Frame {
+        tick,
+        sim_time,
+        time_scale,
+        state,
+        playback,
+        ref chain,
+        min_clearance,
+        epoch,
+        cue,
+        alerts: _,
+        cues: _,
+        commands: _,
+        shows_played: _,
+        unforeseen_contacts: _,
+        unsolved_frames: _,
+    } = *frame;
     FrameHeader {
         run_id,
         sequence,
-        tick: frame.tick,
+        tick,
         stamp_ns,
         sent_ns: 0,
         deadline_ns,
-        sim_time: frame.sim_time,
-        time_scale: frame.time_scale,
-        min_clearance: frame.min_clearance,
-        handles: frame.chain.handles() as u32,
-        state: frame.state as u32,
-        playback: frame.playback as u32,
-        cue: frame.cue,
-        epoch: frame.epoch,
+        sim_time,
+        time_scale,
+        min_clearance,
+        handles: chain.handles() as u32,
+        state: state as u32,
+        playback: playback as u32,
+        cue,
+        epoch,
         reserved: 0,
     }
 }
 
-/// One handle of a chain. Panics if there is no such handle.
+/// Returns the pose of one handle of a chain.
+///
+/// # Panics
+/// If the chain has no such handle.
 pub fn handle_pose(chain: &Chain, handle: usize) -> HandlePose {
-    HandlePose {
-        x: chain.x[handle],
-        y: chain.y[handle],
-        heading: chain.heading[handle],
-        vx: chain.vx[handle],
-        vy: chain.vy[handle],
-    }
+    let Chain { x, y, heading, speed: _, vx, vy } = chain;
+    HandlePose { x: x[handle], y: y[handle], heading: heading[handle], vx: vx[handle], vy: vy[handle] }
 }
 
-/// All handles of a chain, the head first. Walking the arrays side by side leaves out the checks that asking for one handle
-/// after the other costs: a frame is written in a third to a sixth of the time.
+/// Returns the poses of all handles of a chain, the head first. The iterator zips the arrays, which saves a bounds
+/// check per handle: writing a frame takes a third to a sixth of the time.
 pub fn handle_poses(chain: &Chain) -> impl ExactSizeIterator<Item = HandlePose> {
-    let places = chain.x.iter().zip(&chain.y).zip(&chain.heading);
-    places.zip(chain.vx.iter().zip(&chain.vy)).map(|(((x, y), heading), (vx, vy))| HandlePose {
+    let Chain { x, y, heading, speed: _, vx, vy } = chain;
+    let places = x.iter().zip(y).zip(heading);
+    places.zip(vx.iter().zip(vy)).map(|(((x, y), heading), (vx, vy))| HandlePose {
         x: *x,
         y: *y,
         heading: *heading,
@@ -79,107 +97,130 @@ pub fn handle_poses(chain: &Chain) -> impl ExactSizeIterator<Item = HandlePose> 
     })
 }
 
-/// One handle in single precision, each number rounded to the nearest.
+/// Returns a pose in single precision, each number rounded to nearest.
 pub fn handle_pose_32(pose: HandlePose) -> HandlePose32 {
     let HandlePose { x, y, heading, vx, vy } = pose;
     HandlePose32 { x: x as f32, y: y as f32, heading: heading as f32, vx: vx as f32, vy: vy as f32 }
 }
 
-/// Which handles a decimated frame has: the head, each `every`-th handle from there on, and always the tail.
+/// The choice of handles for a decimated frame: the head, every `every`-th handle behind it, and always the tail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Decimation {
     /// Handles of the team, at least 2.
     pub handles: usize,
-    /// One handle in how many, at least 1.
+    /// The stride in handles, at least 1.
     pub every: usize,
 }
 
 impl Decimation {
-    /// The number of handles in a decimated frame.
+    /// Returns the number of poses in a decimated frame.
     pub fn poses(self) -> usize {
         (self.handles - 1).div_ceil(self.every) + 1
     }
 
-    /// The handle at an index of a decimated frame.
+    /// Returns the handle at an index of a decimated frame.
     pub fn handle(self, index: usize) -> usize {
         (index * self.every).min(self.handles - 1)
     }
 }
 
-/// Makes `frame` the one of a message, without alerts, cues and commands. What a message does not have is left as it is:
-/// signed speeds, and what is counted over a run.
-///
-/// # Errors
-/// The name of the field whose number this layout does not know; `frame` is not usable then.
-pub fn read_frame(header: &FrameHeader, poses: &[HandlePose], frame: &mut Frame) -> Result<(), &'static str> {
-    frame.state = header.frame_state().ok_or("state")?;
-    frame.playback = header.playback_state().ok_or("playback")?;
-    let FrameHeader { tick, sim_time, time_scale, min_clearance, epoch, cue, .. } = *header;
-    frame.tick = tick;
-    (frame.sim_time, frame.time_scale, frame.min_clearance) = (sim_time, time_scale, min_clearance);
-    (frame.epoch, frame.cue) = (epoch, cue);
-    let Chain { x, y, heading, vx, vy, .. } = &mut frame.chain;
-    for numbers in [&mut *x, y, heading, vx, vy] {
-        numbers.clear();
-    }
-    for pose in poses {
-        x.push(pose.x);
-        y.push(pose.y);
-        heading.push(pose.heading);
-        vx.push(pose.vx);
-        vy.push(pose.vy);
-    }
-    Ok(())
+/// The header fields that alerts and cues repeat.
+struct FrameStamp {
+    run_id: u64,
+    tick: u64,
+    stamp_ns: u64,
+    sim_time: f64,
 }
 
-/// The message of an alert that goes with a frame.
+impl From<&FrameHeader> for FrameStamp {
+    fn from(header: &FrameHeader) -> Self {
+        let FrameHeader {
+            run_id,
+            sequence: _,
+            tick,
+            stamp_ns,
+            sent_ns: _,
+            deadline_ns: _,
+            sim_time,
+            time_scale: _,
+            min_clearance: _,
+            handles: _,
+            state: _,
+            playback: _,
+            cue: _,
+            epoch: _,
+            reserved: _,
+        } = *header;
+        Self { run_id, tick, stamp_ns, sim_time }
+    }
+}
+
+/// Returns the message of an alert that goes with a frame.
 pub fn collision_alert(header: &FrameHeader, alert: &Alert) -> CollisionAlert {
-    let FrameHeader { run_id, tick, stamp_ns, sim_time, .. } = *header;
-    let mut message =
-        CollisionAlert { run_id, tick, stamp_ns, sim_time, level: alert.level as u32, ..Default::default() };
-    if let Some(nearest) = alert.nearest {
-        let midpoint = nalgebra::center(&nearest.point_a, &nearest.point_b);
-        message.clearance = nearest.value;
-        (message.x, message.y) = (midpoint.x, midpoint.y);
-        (message.bench_a, message.bench_b) = (nearest.bench_a as u32, nearest.bench_b as u32);
+    let FrameStamp { run_id, tick, stamp_ns, sim_time } = header.into();
+    let Alert { level, event, nearest } = *alert;
+    let none = (f64::NAN, f64::NAN, f64::NAN, NO_BENCH, NO_BENCH);
+    let (clearance, x, y, bench_a, bench_b) = nearest.map_or(none, |pair| {
+        let PairClearance { value, bench_a, bench_b, point_a, point_b } = pair;
+        let midpoint = nalgebra::center(&point_a, &point_b);
+        (value, midpoint.x, midpoint.y, bench_a as u32, bench_b as u32)
+    });
+    let none = (f64::NAN, f64::NAN, 0, [NO_BENCH; 2], None);
+    let (event_time, time_to_event, event, event_benches, place) = event.map_or(none, |timed| {
+        let TimedEvent { event: Event { kind, travelled: _, bench_a, bench_b, place }, time } = timed;
+        let benches = [bench_a, bench_b].map(|bench| bench.unwrap_or(NO_BENCH));
+        (time, time - sim_time, FrameState::from(kind) as u32, benches, place)
+    });
+    let (event_x, event_y) = place.map_or((f64::NAN, f64::NAN), |place| (place.x, place.y));
+    CollisionAlert {
+        run_id,
+        tick,
+        stamp_ns,
+        sim_time,
+        event_time,
+        time_to_event,
+        clearance,
+        x,
+        y,
+        event_x,
+        event_y,
+        level: level as u32,
+        bench_a,
+        bench_b,
+        event,
+        event_bench_a: event_benches[0],
+        event_bench_b: event_benches[1],
     }
-    if let Some(timed) = alert.event {
-        message.event_time = timed.time;
-        message.time_to_event = timed.time - sim_time;
-        message.event = FrameState::from(timed.event.kind) as u32;
-        message.event_bench_a = timed.event.bench_a.unwrap_or(NO_BENCH);
-        message.event_bench_b = timed.event.bench_b.unwrap_or(NO_BENCH);
-        if let Some(place) = timed.event.place {
-            (message.event_x, message.event_y) = (place.x, place.y);
-        }
-    }
-    message
 }
 
-/// The message of a cue that a frame has reached.
+/// Returns the message of a cue that a frame has reached.
 pub fn cue(header: &FrameHeader, reached: &ReachedCue) -> Cue {
-    let FrameHeader { run_id, tick, stamp_ns, sim_time, .. } = *header;
-    let ReachedCue { number, time, pauses, ref name } = *reached;
-    let (pauses, name) = (u32::from(pauses), SceneName::new(name));
-    Cue { run_id, tick, stamp_ns, sim_time, cue_time: time, number, pauses, name }
+    let FrameStamp { run_id, tick, stamp_ns, sim_time } = header.into();
+    let StageCue { time: cue_time, number, pauses, name } = stage_cue(reached);
+    Cue { run_id, tick, stamp_ns, sim_time, cue_time, number, pauses, name }
 }
 
-/// The response to a request with this id.
+fn stage_cue(reached: &ReachedCue) -> StageCue {
+    let ReachedCue { number, time, pauses, name } = reached;
+    StageCue { time: *time, number: *number, pauses: u32::from(*pauses), name: SceneName::new(name) }
+}
+
+/// Returns the response to the request with this id.
 pub fn control_response(id: u64, outcome: &Outcome) -> ControlResponse {
-    let Outcome { code, tick, sim_time, time_scale, playback, cue, .. } = *outcome;
+    let Outcome { code, tick, sim_time, time_scale, playing_rate: _, playback, cue } = *outcome;
     let (code, playback) = (code as u32, playback as u32);
     ControlResponse { id, tick, sim_time, time_scale, code, playback, cue, reserved: 0 }
 }
 
-/// The stage of a motion, and the time line of the show that plays it. `scene_hash` is BLAKE3 of the scene's text, zeros
-/// where there is none.
+/// Returns the stage of a motion with the events and cues of its show. `scene_hash` is BLAKE3 of the scene's text, or
+/// zeros without a text.
 pub fn stage(run_id: u64, stamp_ns: u64, scene_hash: [u8; SCENE_HASH_BYTES], motion: &Motion, show: &Show) -> Stage {
-    let team = motion.team();
+    let Team { benches, head_length, body_length, width, hole_inset } = *motion.team();
     let mut path = [StageSegment::default(); MOST_SEGMENTS];
     let (mut segments, mut pitch, mut start_turn) = (0, f64::NAN, f64::NAN);
     for (slot, outline) in path.iter_mut().zip(motion.outline()) {
         *slot = stage_segment(&outline);
-        if let OutlineKind::Spiral { direction: Direction::Inward, pitch: metres, first, .. } = outline.kind {
+        if let OutlineKind::Spiral { direction: Direction::Inward, pitch: metres, first, last: _ } = outline.kind {
             (pitch, start_turn) = (metres, first / std::f64::consts::TAU);
         }
         segments += 1;
@@ -187,24 +228,24 @@ pub fn stage(run_id: u64, stamp_ns: u64, scene_hash: [u8; SCENE_HASH_BYTES], mot
     let mut timeline = [StageEvent::default(); MOST_EVENTS];
     let events = show.timeline().events();
     for (slot, timed) in timeline.iter_mut().zip(events) {
-        *slot = StageEvent { time: timed.time, state: FrameState::from(timed.event.kind) as u32, reserved: 0 };
+        let TimedEvent { time, event: Event { kind, travelled: _, bench_a: _, bench_b: _, place: _ } } = *timed;
+        *slot = StageEvent { time, state: FrameState::from(kind) as u32, reserved: 0 };
     }
     let mut cue_list = [StageCue::default(); MOST_CUES];
     for (slot, cue) in cue_list.iter_mut().zip(show.cues()) {
-        let ReachedCue { number, time, pauses, ref name } = *cue;
-        *slot = StageCue { time, number, pauses: u32::from(pauses), name: SceneName::new(name) };
+        *slot = stage_cue(cue);
     }
     Stage {
         run_id,
         stamp_ns,
         pitch,
         start_turn,
-        hole_inset: team.hole_inset,
-        head_length: team.head_length,
-        body_length: team.body_length,
-        width: team.width,
+        hole_inset,
+        head_length,
+        body_length,
+        width,
         freeze_time: show.freeze_time(),
-        benches: team.benches as u32,
+        benches: benches as u32,
         segments,
         events: events.len().min(MOST_EVENTS) as u32,
         cues: show.cues().len() as u32,
@@ -215,19 +256,20 @@ pub fn stage(run_id: u64, stamp_ns: u64, scene_hash: [u8; SCENE_HASH_BYTES], mot
     }
 }
 
-/// The segment of a stage.
+/// Returns the stage segment of a path segment.
 pub fn stage_segment(outline: &SegmentOutline) -> StageSegment {
-    let (kind, curvature, theta_first, theta_last) = match outline.kind {
+    let SegmentOutline { kind, start, heading, length } = *outline;
+    let (kind, curvature, theta_first, theta_last) = match kind {
         OutlineKind::Line => (SEGMENT_LINE, 0.0, f64::NAN, f64::NAN),
         OutlineKind::Arc { curvature } => (SEGMENT_ARC, curvature, f64::NAN, f64::NAN),
-        OutlineKind::Spiral { direction: Direction::Inward, first, last, .. } => {
-            (SEGMENT_INWARD_SPIRAL, f64::NAN, first, last)
-        }
-        OutlineKind::Spiral { direction: Direction::Outward, first, last, .. } => {
-            (SEGMENT_OUTWARD_SPIRAL, f64::NAN, first, last)
+        OutlineKind::Spiral { direction, pitch: _, first, last } => {
+            let kind = match direction {
+                Direction::Inward => SEGMENT_INWARD_SPIRAL,
+                Direction::Outward => SEGMENT_OUTWARD_SPIRAL,
+            };
+            (kind, f64::NAN, first, last)
         }
     };
-    let SegmentOutline { start, heading, length, .. } = *outline;
     StageSegment { x: start.x, y: start.y, heading, length, curvature, theta_first, theta_last, kind, reserved: 0 }
 }
 
@@ -236,10 +278,7 @@ mod tests {
     use bench_dragon_messages::state::{EventKind, Level};
 
     use super::*;
-    use bench_dragon_motion::clearance::PairClearance;
-    use bench_dragon_motion::event::Event;
     use bench_dragon_motion::model::Point;
-    use bench_dragon_motion::timeline::TimedEvent;
 
     const NEAREST: PairClearance = PairClearance {
         value: 0.25,

@@ -1,7 +1,7 @@
-//! The show: from a scene and a tick to one [`Frame`], the same bits every time.
+//! The show: from a scene and a tick to one [`Frame`], always with the same bits.
 //!
-//! In: a scene, its timeline, and ticks. Out: frames. Knows the solver, the events and the alert rules; knows no wall
-//! clock and no transport. The live loop calls it.
+//! In: a scene, its timeline, and ticks. Out: frames. The show uses the solver, the events and the alert rules, but no
+//! wall clock and no transport. The live loop calls it.
 
 pub mod alerts;
 pub mod clock;
@@ -29,44 +29,43 @@ use bench_dragon_messages::state::{FrameState, PlaybackState};
 use clock::{CueTime, ShowClock, ShowTime};
 pub use playback::{Playback, StartError};
 
-/// One moment of the show.
+/// The state of the show in one period.
 #[derive(Debug, Clone)]
 pub struct Frame {
     /// The number of the period.
     pub tick: u64,
     /// Simulated seconds since the start of the scene.
     pub sim_time: f64,
-    /// Simulated seconds per second of wall time, as in force: 0 while paused or held, unchanged once the show has ended.
+    /// Simulated seconds per second of wall time in force: 0 while paused or held, unchanged after the end of the show.
     pub time_scale: f64,
     /// The latest event passed, or `Approaching`, or `Moving`.
     pub state: FrameState,
-    /// Whether simulated time advances.
+    /// The playback state: it tells whether simulated time advances.
     pub playback: PlaybackState,
-    /// Where every handle is.
+    /// The pose of every handle.
     pub chain: Chain,
-    /// Metres between the nearest two boards that share no handle; NaN where none is computed.
+    /// Metres between the nearest two boards that share no handle; NaN if it is not computed.
     pub min_clearance: f64,
-    /// The alerts that go with this frame, in order. Its memory is reserved once.
+    /// The alerts that go with this frame, in order. Its capacity is reserved in advance.
     pub alerts: Vec<Alert>,
     /// Jumps of simulated time so far: loops, seeks, restarts.
     pub epoch: u32,
-    /// The latest cue passed, counted from 1 in the order of their times; 0 where none has been.
+    /// The latest cue passed, counted from 1 in the order of times; 0 if none.
     pub cue: u32,
-    /// The cues reached since the frame before, in order. Its memory is reserved once.
+    /// The cues reached since the previous frame, in order. Its capacity is reserved in advance.
     pub cues: Vec<ReachedCue>,
-    /// What the show was commanded at the beginning of this period, and a step that was over, in order. Its memory is
-    /// reserved once.
+    /// The commands at the beginning of this period and a finished step, in order. Its capacity is reserved in advance.
     pub commands: Vec<CommandRecord>,
-    /// Times the show has been played to its end and begun again.
+    /// Number of times that the show has ended and started again.
     pub shows_played: u64,
-    /// Contacts so far that no search had found: boards that overlapped before any contact was due.
+    /// Number of contacts that no search had found: boards that overlapped before the next contact of the timeline.
     pub unforeseen_contacts: u64,
-    /// Frames so far for whose time there was no solution, so that the one before was shown again.
+    /// Number of frames without a solution: the previous chain was kept.
     pub unsolved_frames: u64,
 }
 
 impl Frame {
-    /// A frame of so many handles, all at the origin, before anything has happened.
+    /// Creates a frame of `handles` handles, all at the origin, before the first period.
     pub fn new(handles: usize) -> Self {
         Self {
             tick: 0,
@@ -91,70 +90,71 @@ impl Frame {
 /// A cue that a frame has reached.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReachedCue {
-    /// Its number, from 1 in the order of the cues' times.
+    /// The cue's number, from 1 in the order of times.
     pub number: u32,
-    /// Simulated seconds at which it is.
+    /// The cue's time, simulated seconds.
     pub time: f64,
-    /// Whether the show waits there for [`Command::Go`].
+    /// True if the show waits at the cue for [`Command::Go`].
     pub pauses: bool,
-    /// Its name.
+    /// The cue's name.
     pub name: Arc<str>,
 }
 
-/// How a command was answered, and how the show stands then.
+/// The result of a command, and the state of the show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
-    /// What became of the command.
+    /// The result code.
     pub code: Code,
-    /// The period at whose beginning it was obeyed, or a step was over.
+    /// The period at whose beginning the command was executed, or in which a step ended.
     pub tick: u64,
     /// Simulated seconds of that period.
     pub sim_time: f64,
-    /// Simulated seconds per second, as in force.
+    /// Simulated seconds per second of wall time in force.
     pub time_scale: f64,
-    /// Simulated seconds per second while the show plays; kept through a pause.
+    /// Simulated seconds per second while the show plays. A pause keeps it.
     pub playing_rate: f64,
-    /// Whether simulated time advances.
+    /// The playback state.
     pub playback: PlaybackState,
-    /// The latest cue passed, from 1.
+    /// The latest cue passed, from 1; 0 if none.
     pub cue: u32,
 }
 
-/// A scene being played.
+/// A scene in play.
 pub struct Show {
     clock: ShowClock,
     solver: Box<dyn Solver>,
     solver_reason: String,
     velocities: Velocities,
-    /// What the head travels in a simulated second; not a number where the method does not follow the path exactly.
+    /// Travel of the head per simulated second, metres; NaN if the method does not follow the path exactly.
     metres_per_second: f64,
     timeline: Timeline,
     clearance: Option<ClearanceMonitor>,
     level: Option<LevelTracker>,
-    /// Metres of overlap that no search has let pass; `None` where the solver does not follow the searched motion.
+    /// Greatest overlap in metres that rounding explains before a contact; `None` if the solver does not follow the
+    /// searched motion.
     overlap_tolerance: Option<f64>,
-    /// The time that the chain was asked for, and whether it moves then.
+    /// The time requested for the chain, and true if the chain moves then.
     solved: Option<(f64, bool)>,
-    /// The time at which it stands: not a number before the first solution.
+    /// The time of the solution; NaN before the first.
     solved_at: f64,
-    /// In the order of their times.
+    /// The cues in the order of their times.
     cues: Vec<ReachedCue>,
     missing_cues: Vec<String>,
-    /// What the next frame reports of commands.
+    /// The command records of the next frame.
     commands: Vec<CommandRecord>,
-    /// Whether a step has begun whose end no frame has reported.
+    /// True after the beginning of a step until a frame reports its end.
     stepping: bool,
     frame: Frame,
 }
 
-/// Metres of overlap before the contact, as a share of the longest link, that rounding explains in an exact frame.
+/// Overlap before the contact that rounding explains in an exact frame, as a share of the longest link.
 const ROUNDING_OVERLAP: f64 = 1e-9;
 
 impl Show {
-    /// A show of `scene`, whose events `timeline` holds.
+    /// Creates a show of `scene` with the events of `timeline`.
     ///
     /// # Errors
-    /// A start before the scene's own or after the motion's end.
+    /// The start is before the scene's start or not before the motion's end.
     pub fn new(scene: &Scene, timeline: Timeline, playback: Playback) -> Result<Self, StartError> {
         let end = timeline.end();
         if !(playback.start >= 0.0 && playback.start < end.time) {
@@ -193,40 +193,40 @@ impl Show {
         })
     }
 
-    /// The cues of this show, in the order of their times.
+    /// Returns the cues of this show in the order of their times.
     pub fn cues(&self) -> &[ReachedCue] {
         &self.cues
     }
 
-    /// The names of cues before an event that does not happen, or before the scene's start.
+    /// Returns the names of the cues without a time: before an event that does not happen, or before the scene's start.
     pub fn missing_cues(&self) -> &[String] {
         &self.missing_cues
     }
 
-    /// The solver of this show and why it was chosen, for people.
+    /// Returns the name of this show's solver and the reason for its choice, for people.
     pub fn solver_reason(&self) -> &str {
         &self.solver_reason
     }
 
-    /// The events of this show, in order.
+    /// Returns the events of this show in order.
     pub fn timeline(&self) -> &Timeline {
         &self.timeline
     }
 
-    /// Simulated seconds at which the show freezes.
+    /// Returns the simulated time at which the show ends, seconds.
     pub fn freeze_time(&self) -> f64 {
         self.clock.freeze_time()
     }
 
-    /// Pairs of boards tested for their separation so far: none where the scene has no alerts.
+    /// Returns the number of pairs of boards tested so far: 0 for a scene without alerts.
     pub fn pairs_tested(&self) -> u64 {
         self.clearance.as_ref().map_or(0, |monitor| monitor.counters().pairs)
     }
 
-    /// Obeys a command at the beginning of the period `tick`, before its frame. `None` for a step, which
-    /// [`finished_step`](Self::finished_step) answers once it is over.
+    /// Executes a command at the beginning of the period `tick`, before its frame. Returns `None` for a step:
+    /// [`finished_step`](Self::finished_step) returns its result later.
     pub fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
-        // A step that is over by now came before the command.
+        // A step that has ended precedes the command.
         self.clock.advance(tick);
         self.record_finished_step();
         let code = self.clock.apply(tick, command);
@@ -235,14 +235,14 @@ impl Show {
         self.stepping |= code.is_none();
         let code = code?;
         if code == Code::Done && matches!(command, Command::Seek(_) | Command::Restart) {
-            // The level after this is published anew, even where it is the same as before.
+            // The next level is published even if it is the same as before.
             self.level.iter_mut().for_each(LevelTracker::forget);
         }
         Some(self.outcome(tick, code))
     }
 
-    /// The answer to the step that was over, or was broken off, at `tick`. To be called after its frame, and before a
-    /// command, which may be the next step.
+    /// Returns the result of the step that ended, or was interrupted, at `tick`. Must be called after the frame and
+    /// before a command, which may be the next step.
     pub fn finished_step(&mut self, tick: u64) -> Option<Outcome> {
         self.clock.advance(tick);
         self.record_finished_step();
@@ -250,7 +250,7 @@ impl Show {
         Some(self.outcome(tick, code))
     }
 
-    /// Notes for the next frame that a step is over, once.
+    /// Records the end of a step once, for the next frame.
     fn record_finished_step(&mut self) {
         if self.stepping
             && let Some(code) = self.clock.step_outcome()
@@ -266,10 +266,9 @@ impl Show {
         Outcome { code, tick, sim_time, time_scale, playing_rate, playback, cue: cues_passed as u32 }
     }
 
-    /// The frame of a tick: time, chain, clearance, state, alerts, cues.
+    /// Computes the frame of a tick: time, chain, clearance, state, alerts, cues.
     ///
-    /// Ticks are given in increasing order; some may be left out. The same ticks with the same commands give the same
-    /// bits.
+    /// Ticks must increase; some may be skipped. The same ticks with the same commands give the same bits.
     pub fn frame(&mut self, tick: u64) -> &Frame {
         let ShowTime { sim_time, time_scale, playback, epoch, shows_played, cues_passed } = self.clock.advance(tick);
         let jumped = epoch != self.frame.epoch;
@@ -289,7 +288,7 @@ impl Show {
         &self.frame
     }
 
-    /// Brings the chain to a time. A show that stands still is solved once.
+    /// Solves the chain for a time. A show that stands still is solved once.
     fn solve(&mut self, sim_time: f64) {
         let moves = self.frame.playback == PlaybackState::Playing;
         if self.solved == Some((sim_time, moves)) {
@@ -314,7 +313,7 @@ impl Show {
         least
     }
 
-    /// Boards that overlap while no contact has happened are a contact now, whatever the searches found.
+    /// Records a contact if boards overlap although no contact has happened: the searches missed it.
     fn record_unforeseen_contact(&mut self, closest: Option<PairClearance>) {
         let (Some(tolerance), Some(closest)) = (self.overlap_tolerance, closest) else { return };
         let time = self.frame.sim_time;
@@ -350,7 +349,7 @@ impl Show {
     }
 }
 
-/// The cues of a scene in the order of their times, and the names of those that have none.
+/// Returns the cues of a scene in the order of their times, and the names of the cues without a time.
 fn cues(scene: &Scene, timeline: &Timeline) -> (Vec<ReachedCue>, Vec<String>) {
     let (mut cues, mut missing) = (Vec::new(), Vec::new());
     for cue in &scene.cues {
@@ -367,20 +366,20 @@ fn cues(scene: &Scene, timeline: &Timeline) -> (Vec<ReachedCue>, Vec<String>) {
     (cues, missing)
 }
 
-/// Solves at `time`, or at the latest moment before it at which there is a solution, and returns that moment.
+/// Solves at `time`, or at the latest earlier time with a solution. Returns that time.
 ///
-/// The time of a lock, multiplied by the speed again, can lie past the lock by the last digit; the paper's solver is
-/// one of its own time steps ahead. Nothing else steps back, and nothing does so by more than 1e-4 of the time.
+/// Two cases need an earlier time, by at most 1e-4 of the time. The time of a lock multiplied by the speed can lie past
+/// the lock by the last digit. The paper's solver is ahead by one of its own time steps.
 ///
 /// # Errors
-/// [`NoFollower`] where there is none as near; `chain` is then unspecified.
+/// [`NoFollower`] if there is none so near. `chain` is then unspecified.
 pub fn solve_at_or_just_before(solver: &mut dyn Solver, time: f64, chain: &mut Chain) -> Result<f64, NoFollower> {
     let mut back = f64::EPSILON * time;
     let mut at = time;
     while let Err(none) = solver.solve(at, chain) {
         at = time - back;
         back *= 2.0;
-        // Not a number, and a time of 0, end it too.
+        // Also ends for NaN and for a time of 0.
         if !(back > 0.0 && back <= 1e-4 * time) {
             return Err(none);
         }

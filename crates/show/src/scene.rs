@@ -1,7 +1,7 @@
-//! The file a user writes, checked once and turned into the types of the model.
+//! The scene file, checked once and converted to the types of the model.
 //!
-//! In: TOML text, or what the command line overrides. Out: a [`Scene`], whose existence is the proof that every number
-//! is in range and that the start is legal. Errors name the file, the line, the field and what was expected.
+//! In: TOML text, or overrides from the command line. Out: a [`Scene`]: all its numbers are in range and its start is
+//! legal. Errors name the file, the line, the field and the expected value.
 
 pub mod accepted;
 pub mod cue;
@@ -29,14 +29,14 @@ use bench_dragon_motion::solve::paper::PaperRules;
 use bench_dragon_motion::{Method, Motion, MotionError};
 use bench_dragon_ros2_messages::settings::Ros2Settings;
 
-/// The paper's scene, as built into the program.
+/// The paper's scene, built into the program.
 const PAPER: &str = include_str!("../../../config/paper.toml");
-/// Subscribers that each iceoryx2 service admits at once by default.
+/// Default limit of subscribers of each iceoryx2 service.
 const DEFAULT_SUBSCRIBERS: usize = 8;
-/// Seconds of wall time for which a looping show stands at its end by default.
+/// Default wall time for which a looping show stands at its end, seconds.
 const DEFAULT_END_HOLD: f64 = 5.0;
 
-/// Input that cannot be used, in one sentence that names the place and what was expected.
+/// Invalid input, in one sentence that names the place and the expected value.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{}", printable(.0))]
 pub struct SceneError(String);
@@ -45,35 +45,35 @@ pub struct SceneError(String);
 #[derive(Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum SolverName {
-    /// Exact motion, each follower bracketed.
+    /// Exact motion: each follower is bracketed.
     Newton,
-    /// Exact motion, every handle interpolated in a table of where such chains stand.
+    /// Exact motion: every handle is interpolated in a table of followers.
     FollowerTable,
     /// The paper's rules.
     Paper,
 }
 
-/// What `run` does when two boards touch.
+/// The reaction of `run` to a contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OnContact {
-    /// The show freezes at the contact.
+    /// The show ends at the contact.
     Stop,
     /// The show continues.
     Continue,
 }
 
-/// What `run` does once the show has frozen.
+/// The behaviour of `run` at the end of the show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AtEnd {
-    /// It publishes the frozen frame until it is ended.
+    /// It publishes the last frame until it is stopped.
     Hold,
-    /// It begins again at the start.
+    /// It starts again.
     Loop,
 }
 
-/// When to warn of what lies ahead.
+/// The limits for warnings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AlertRules {
     /// Simulated seconds before an event.
@@ -82,7 +82,7 @@ pub struct AlertRules {
     pub approach_clearance: f64,
 }
 
-/// A scene: what is danced, how exactly, and how it is published.
+/// A scene: its motion, its accuracy, and how it is published.
 ///
 /// # Examples
 ///
@@ -102,51 +102,52 @@ pub struct AlertRules {
 pub struct Scene {
     /// The scene's name; by default the stem of its file.
     pub name: String,
-    /// The team on its path, and how exactly it is followed.
+    /// The team on its path, with the accuracy.
     pub motion: Motion,
-    /// What happens at a contact.
+    /// The reaction to a contact.
     pub on_contact: OnContact,
-    /// What happens at the end.
+    /// The behaviour at the end of the show.
     pub at_end: AtEnd,
     /// Seconds of wall time for which a looping show stands at its end.
     pub end_hold: f64,
-    /// The moments that have names, in the order of the file.
+    /// The cues, in the order of the file.
     pub cues: Vec<Cue>,
-    /// When to warn; `None` where the scene requests no alerts.
+    /// The limits for warnings; `None` for a scene without alerts.
     pub alerts: Option<AlertRules>,
     /// Frames per second.
     pub rate: f64,
-    /// Whether velocities are computed.
+    /// The velocities: computed or not.
     pub velocities: Velocities,
-    /// The service of poses in single precision beside that of whole frames; `None` where the scene asks for none.
+    /// The service of poses in single precision beside the service of whole frames; `None` without one.
     pub single_precision: Option<SinglePrecision>,
-    /// Frames a subscriber may fall behind, where the scene states it.
+    /// Frames that a subscriber may fall behind, if the scene states it.
     pub queue: Option<usize>,
-    /// Subscribers that each iceoryx2 service admits at once.
+    /// Limit of subscribers of each iceoryx2 service.
     pub subscribers: usize,
-    /// The ROS 2 topics; `None` where the scene requests none.
+    /// The ROS 2 topics; `None` without them.
     pub ros2: Option<Ros2Settings>,
 }
 
 impl Scene {
-    /// The scene of the paper, which is built in.
+    /// Returns the built-in scene of the paper.
     pub fn paper() -> Self {
-        // A test parses the built-in text, and nothing can change it afterwards.
+        // A test parses the built-in text, which is constant.
         SceneText::paper().parse().expect("the built-in scene is valid")
     }
 
     /// Reads a scene from a file.
     ///
     /// # Errors
-    /// One sentence for a file that cannot be read or used.
+    /// One sentence for a file that cannot be read or is invalid.
     pub fn load(file: &FilePath) -> Result<Self, SceneError> {
         SceneText::load(file)?.parse()
     }
 
-    /// Reads a scene from TOML text. `file` is how errors call it, `stem` its name where it gives none itself.
+    /// Reads a scene from TOML text. `file` is the file's name in errors, `stem` the scene's name if the text gives
+    /// none.
     ///
     /// # Errors
-    /// One sentence that names the file, the line, the field and what was expected.
+    /// One sentence that names the file, the line, the field and the expected value.
     pub fn parse(text: &str, file: &str, stem: &str) -> Result<Self, SceneError> {
         let source = Source { text, file };
         let deserializer = toml::Deserializer::parse(text).map_err(|error| source.toml_error(&error, ""))?;
@@ -155,18 +156,18 @@ impl Scene {
         raw.validated(&source, stem)
     }
 
-    /// The benches.
+    /// Returns the team.
     pub fn team(&self) -> &Team {
         self.motion.team()
     }
 
-    /// Whether a show of this scene stops at a contact: it computes none without alerts.
+    /// Returns true if a show of this scene stops at a contact. Without alerts no contact is computed.
     pub fn stops_at_contact(&self) -> bool {
         self.alerts.is_some() && self.on_contact == OnContact::Stop
     }
 }
 
-/// The text being read, for finding lines.
+/// The text being read, for line numbers.
 struct Source<'a> {
     text: &'a str,
     file: &'a str,
@@ -177,10 +178,10 @@ impl Source<'_> {
         self.text.as_bytes().iter().take(offset).filter(|byte| **byte == b'\n').count() + 1
     }
 
-    /// What the TOML reader refused, in one sentence.
+    /// Converts an error of the TOML reader into one sentence.
     fn toml_error(&self, error: &toml::de::Error, field: &str) -> SceneError {
         let place = error.span().map_or(String::new(), |span| format!(", line {}", self.line(span.start)));
-        // What carries its place in the text is wrapped in a field that no user wrote.
+        // `Spanned` values are wrapped in a field that no user wrote.
         let field = field.replace(".$__serde_spanned_private_value", "");
         let field = if field.is_empty() || field == "." { String::new() } else { format!("{field}: ") };
         let message = error.message().trim().replace('\n', ", ");
@@ -197,7 +198,7 @@ impl Source<'_> {
         SceneError(format!("{}, line {}: {sentence}", self.file, self.line(offset)))
     }
 
-    /// A name, which is printed as it is.
+    /// Returns a name without control characters, since it is printed unchanged.
     fn printable(&self, field: &str, value: &Spanned<String>) -> Result<String, SceneError> {
         let name = value.get_ref();
         if name.chars().any(char::is_control) {
@@ -350,7 +351,7 @@ impl RawTeam {
             hole_inset: length("team.hole_inset", &self.hole_inset)?,
         };
         for (field, board) in [("head_length", &self.head_length), ("body_length", &self.body_length)] {
-            // Anything shorter has its two holes in one place, or crosswise.
+            // A shorter board has its two holes in one place, or crosswise.
             if *board.get_ref() - 2.0 * team.hole_inset < Accepted::LENGTH.least {
                 let sentence = format!(
                     "team.{field} is {} and leaves no bench between its holes, expected more than twice \
@@ -367,11 +368,12 @@ impl RawTeam {
 }
 
 impl RawMotion {
-    /// The paper's rules are one step ahead of the time: the first frame is where the first step ends.
+    /// Returns the error of a first step that is too long. The paper's rules are one step ahead of the time: the first
+    /// frame is at the end of the first step.
     fn first_step_error(&self, source: &Source, time_step: f64) -> SceneError {
         let sentence = format!(
-            "motion.paper.time_step is {time_step}, after which the head is so near the centre that a bench is folded back \
-             on itself, expected a shorter one"
+            "motion.paper.time_step is {time_step}, after which the head is so near the centre that a bench is folded \
+             back on itself, expected a shorter one"
         );
         let given = self.paper.as_ref().and_then(|paper| paper.get_ref().time_step.as_ref());
         source.field_error(given.unwrap_or(&self.head_speed), &sentence)

@@ -1,4 +1,4 @@
-//! A show that is conducted: still while paused, where it stands after a seek, its cues.
+//! A show under commands: still while paused, at its place after a seek, its cues.
 
 use super::*;
 use crate::scene::AtEnd;
@@ -10,7 +10,7 @@ const RATE: f64 = 50.0;
 fn show(extra: &str, change: impl FnOnce(&mut Playback)) -> Show {
     let text = format!("{}\n{extra}", include_str!("../../../config/paper.toml"));
     let scene = Scene::parse(&text, "test", "test").unwrap();
-    // The safe solver needs no table, which an unoptimised build makes for seconds.
+    // The safe solver needs no table: an unoptimised build would spend seconds on it.
     let scene = Scene { motion: scene.motion.with_method(Method::Newton).unwrap(), ..scene };
     let mut playback = Playback { rate: RATE, ..Playback::of(&scene) };
     change(&mut playback);
@@ -69,7 +69,7 @@ fn a_looping_show_stands_at_its_end_before_it_begins_again() {
     let mut show = show("", |playback| {
         (playback.start, playback.at_end, playback.end_hold) = (412.4, AtEnd::Loop, 2.0);
     });
-    // 0.0738 s at 50 Hz: the fourth frame after the first has ended, and stands for 100 periods.
+    // 0.0738 s at 50 Hz: the fourth frame after the first is at the end, and stays for 100 periods.
     let end = show.freeze_time();
     for tick in 4..=104 {
         let frame = show.frame(tick);
@@ -105,14 +105,14 @@ fn cues_are_reached_once_in_the_order_of_their_times() {
     let reached = |frame: &Frame| frame.cues.iter().map(|cue| cue.number).collect::<Vec<_>>();
     assert_eq!((reached(show.frame(49)), show.frame(49).cue), (vec![], 0));
     assert_eq!((reached(show.frame(50)), show.frame(50).cue), (vec![1], 1));
-    // One step over the cue that pauses, and far beyond: the show waits there.
+    // One step over the pausing cue and far beyond: the show waits at the cue.
     let frame = show.frame(100_000).clone();
     assert_eq!((frame.sim_time, frame.playback, reached(&frame)), (3.0, PlaybackState::Paused, vec![2]));
     assert_eq!(show.command(100_001, Command::Go).unwrap().code, Code::Done);
     assert_eq!(show.command(100_002, Command::Go).unwrap().code, Code::Refused);
     let frame = show.frame(100_001 + 50).clone();
     assert_eq!((frame.sim_time, reached(&frame)), (4.0, vec![]));
-    // Over the last one by a seek, which announces none, and back before it, from where it comes again.
+    // A seek over the last cue announces none; back before the cue, it is reached again.
     show.command(100_100, Command::Seek(410.0)).unwrap();
     assert_eq!((reached(show.frame(100_100)), show.frame(100_100).cue), (vec![], 3));
     show.command(100_101, Command::Seek(407.0)).unwrap();

@@ -1,13 +1,11 @@
-//! Conducting a soak test: random commands from a seed, each answer checked against a model of the command table and
-//! against the frames, and what came of it.
+//! Random commands of a soak test, from a seed. Each answer is checked against the table of commands and the frames.
 //!
-//! The hidden command `soak-conductor` runs a [`conductor`], a client of the publisher in a process of its own, which
-//! prints [`Conducted`] once a second; the [`fleet`](super::fleet) reads it. [`commands`] is the list, [`model`] the
-//! table.
+//! The hidden command `soak-conductor` runs a [`load_generator`] in its own process, a client of the publisher. The
+//! process prints [`Conducted`] once a second, which the [`fleet`](super::fleet) reads.
 
+mod answers;
 pub mod commands;
-pub mod conductor;
-pub mod model;
+pub mod load_generator;
 mod record;
 
 use std::collections::BTreeMap;

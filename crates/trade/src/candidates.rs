@@ -1,5 +1,5 @@
-//! The solvers that are measured: what every wish for accuracy selects, on all instructions; the safe solver; the
-//! paper's. Called by [`super::measure`] only.
+//! The solvers to measure: the selections for several requested accuracies, on all instruction sets; the safe solver;
+//! the paper's solver. Only [`super::measure`] calls it.
 
 use std::time::Instant;
 
@@ -10,25 +10,29 @@ use bench_dragon_motion::solve::selection;
 use bench_dragon_motion::solve::table::{FollowerTable, Instructions};
 use bench_dragon_show::scene::Scene;
 
-/// The wishes for accuracy that are measured, metres; the last gets the most exact table there is.
-const WISHES: [f64; 5] = [1e-4, 1e-6, 1e-7, 1e-9, 1e-18];
+/// The requested accuracies, metres. The last selects the most exact table.
+const REQUESTED_ACCURACIES: [f64; 5] = [1e-4, 1e-6, 1e-7, 1e-9, 1e-18];
 
-/// All candidates for a scene, the most exact table on the fastest instructions first.
+/// Returns all candidates for a scene, the most exact table on the fastest instructions first.
 pub(super) fn candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<Candidate> {
     let (path, team, head_speed) = (scene.motion.path(), *scene.team(), scene.motion.head_speed());
     let exact_contact = contact.map(|errors| errors.exact);
     let mut candidates = Vec::new();
-    for accuracy in WISHES.into_iter().rev() {
-        // A large team may have room for the tables of weaker wishes alone.
+    for accuracy in REQUESTED_ACCURACIES.into_iter().rev() {
+        // A large team may only have memory for the tables of lower accuracies.
         let Some(selection) = selection::cheapest(path, team, head_speed, scene.velocities, accuracy) else { continue };
         let (table, make_s) = (selection.table.for_frames(), selection.made_in.as_secs_f64());
-        let wish = if accuracy < WISHES[WISHES.len() - 2] { "best".to_owned() } else { format!("{accuracy:e} m") };
+        let requested = if accuracy < REQUESTED_ACCURACIES[REQUESTED_ACCURACIES.len() - 2] {
+            "best".to_owned()
+        } else {
+            format!("{accuracy:e} m")
+        };
         candidates.extend(Instructions::available().into_iter().filter_map(|instructions| {
             let solver: FollowerTable = table.clone().with_instructions(instructions)?;
             Some(Candidate {
-                name: format!("follower_table {wish} ({}, {})", instructions.name(), solver.format()),
+                name: format!("follower_table {requested} ({}, {})", instructions.name(), solver.format()),
                 warm_up_frames: WARM_UP_FRAMES,
-                // All of them follow one motion, whose contact is found once.
+                // All candidates follow one motion: the contact is the same.
                 contact_time_error: exact_contact,
                 accuracy: Some(accuracy),
                 memory_bytes: solver.memory_bytes(),
@@ -54,11 +58,11 @@ pub(super) fn candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<C
     candidates
 }
 
-/// The paper's solver with its own numbers and others, on a spiral.
+/// Returns the paper's solver with its own numbers and with others, on a spiral.
 fn paper_candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<Candidate> {
     let (path, team, head_speed) = (scene.motion.path(), *scene.team(), scene.motion.head_speed());
     let Some((spiral, start)) = path.as_spiral() else { return Vec::new() };
-    // The Euler steps of one show; where there are too many, the finest would take minutes.
+    // Euler steps of one show. The finest steps would take minutes if there are too many.
     let steps_to_end = |time_step: f64| path.length() / head_speed / time_step;
     let standard = PaperRules::default();
     let mut rules: Vec<(String, PaperRules)> = [1e-2, 1e-3, 1e-4, 1e-5]

@@ -1,5 +1,5 @@
-//! What looking for collisions costs on a scene: the live clearance and all pairs per frame, the exact search and sampled
-//! ones. Called by [`super::measure`] only.
+//! The cost of collision search on a scene: per frame, the live clearance and all pairs; per show, the exact search and
+//! sampled searches. Only [`super::measure`] calls it.
 
 use std::time::Instant;
 
@@ -10,11 +10,11 @@ use bench_dragon_motion::solve::Chain;
 use bench_dragon_motion::timeline::Timeline;
 use bench_dragon_show::scene::Scene;
 
-/// Seconds between two samples of a contact search that samples.
+/// Sampling intervals of the sampled contact searches, seconds.
 const SAMPLING_INTERVALS: [f64; 3] = [1.0, 0.1, 0.01];
 
-/// All pairs against the live way, and sampled searches against the exact one. `exact_error` is the error of the
-/// contact in `timeline`, `solve_ns` what the fastest solver takes for a frame.
+/// Measures all pairs against the live clearance, and sampled searches against the exact search. `exact_error` is the
+/// error of the contact in `timeline`, `solve_ns` the time of the fastest solver per frame.
 pub(super) fn measure(
     scene: &Scene,
     timeline: &Timeline,
@@ -55,7 +55,7 @@ pub(super) fn measure(
     measurements
 }
 
-/// The first sample at or after `contact` at which boards overlap, simulated seconds.
+/// Returns the first sample at or after `contact` at which boards overlap, simulated seconds.
 fn first_overlapping_sample(scene: &Scene, contact: f64, end: f64, interval: f64) -> Option<f64> {
     let mut solver = scene.motion.solver(scene.velocities).solver;
     let mut chain = Chain::new(scene.team().handles());
@@ -66,7 +66,7 @@ fn first_overlapping_sample(scene: &Scene, contact: f64, end: f64, interval: f64
     })
 }
 
-/// Nanoseconds of the live clearance, the median over runs of frames evenly over the show.
+/// Returns the nanoseconds of the live clearance: the median over runs of frames, evenly over the show.
 fn live_clearance_ns(scene: &Scene, end: f64) -> f64 {
     const RUNS: usize = 20;
     const RUN: usize = 40;
@@ -91,7 +91,7 @@ fn live_clearance_ns(scene: &Scene, end: f64) -> f64 {
     median(times)
 }
 
-/// Nanoseconds of all pairs, the median over a few frames of the show.
+/// Returns the nanoseconds of all pairs: the median over a few frames of the show.
 fn all_pairs_ns(scene: &Scene, end: f64) -> f64 {
     let mut solver = scene.motion.solver(scene.velocities).solver;
     let mut chain = Chain::new(scene.team().handles());

@@ -1,9 +1,9 @@
-//! The error at the moment of display against bytes per second: what a publishing rate buys for readers that hold,
-//! that interpolate linearly, and that interpolate by Hermite.
+//! The error at the time of display against bytes per second: the gain of a publishing rate for readers that hold, and
+//! for readers with linear or Hermite interpolation.
 //!
 //! In: a scene, its timeline, a display. Out: one [`DisplayMeasurement`] per reader, rate and precision. The stream is
-//! simulated: every frame arrives at its deadline, so that transport adds neither delay nor jitter. Nothing here reads a
-//! clock; the same scene gives the same errors.
+//! simulated: every frame arrives at its deadline, so transport adds neither delay nor jitter. No clock is read: the
+//! same scene gives the same errors.
 
 use serde::Serialize;
 
@@ -18,23 +18,22 @@ use bench_dragon_show::convert::handle_pose;
 use bench_dragon_show::scene::Scene;
 use bench_dragon_show::solve_at_or_just_before;
 
-/// The publishing rates that are measured, hertz.
+/// The publishing rates, hertz.
 pub const RATES: [f64; 9] = [1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 240.0, 1000.0];
-/// Seconds whose display moments are measured, up to the last whole second before the freeze.
+/// Length of the window of display samples, seconds. It ends at the last whole second before the end of the show.
 pub const WINDOW: f64 = 2.0;
-/// Further display moments, spread evenly over the show.
-pub const SPREAD_MOMENTS: usize = 20;
-/// The fewest and the most display moments in the window, whatever the display's rate.
-const WINDOW_MOMENTS: [usize; 2] = [120, 2000];
-/// Seconds between a moment and what a clock of whole nanoseconds makes of it, at most: two roundings.
+/// Number of further display samples, spread evenly over the show.
+pub const SPREAD_SAMPLES: usize = 20;
+/// The least and the greatest number of display samples in the window, for any display rate.
+const WINDOW_SAMPLES: [usize; 2] = [120, 2000];
+/// Greatest rounding error of a clock of whole nanoseconds, seconds: two roundings.
 const CLOCK_ROUNDING: f64 = 2e-9;
 
-/// How a reader fills the time between two frames. None of them extrapolates: where the next frame has not arrived,
-/// each holds the last.
+/// The interpolation between two frames. No reader extrapolates: without the next frame, each holds the last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Reader {
-    /// The last frame, as it is.
+    /// The last frame.
     Hold,
     /// Straight lines between positions.
     Linear,
@@ -43,10 +42,10 @@ pub enum Reader {
 }
 
 impl Reader {
-    /// All of them.
+    /// All readers.
     pub const ALL: [Self; 3] = [Self::Hold, Self::Linear, Self::Hermite];
 
-    /// The name in tables and in JSON.
+    /// Returns the name in tables and in JSON.
     pub fn name(self) -> &'static str {
         match self {
             Self::Hold => "hold",
@@ -56,21 +55,21 @@ impl Reader {
     }
 }
 
-/// The numbers in a frame's poses. Headers are double in both.
+/// The precision of a frame's poses. Headers are always double.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Precision {
-    /// As published: 40 bytes a handle.
+    /// 64 bits per number, as published: 40 bytes per handle.
     Double,
-    /// Rounded to 32 bits: 20 bytes a handle. What `precision = "f32"` publishes.
+    /// 32 bits per number: 20 bytes per handle. `precision = "f32"` publishes it.
     Single,
 }
 
 impl Precision {
-    /// Both of them.
+    /// Both precisions.
     pub const ALL: [Self; 2] = [Self::Double, Self::Single];
 
-    /// Bytes of one frame's message.
+    /// Returns the bytes of one frame's message.
     fn frame_bytes(self, handles: usize) -> f64 {
         let pose = match self {
             Self::Double => size_of::<HandlePose>(),
@@ -80,48 +79,48 @@ impl Precision {
     }
 }
 
-/// A display, and what publishing costs.
+/// A display, and the cost of publishing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Display {
-    /// Pictures per second.
+    /// Display rate, pictures per second.
     pub rate: f64,
-    /// Seconds by which every reader's display runs behind the stream; `None` for 0 with [`Reader::Hold`] and one
-    /// publishing period with the others.
+    /// Delay of every reader's display behind the stream, seconds. `None` means 0 for [`Reader::Hold`] and one
+    /// publishing period for the others.
     pub delay: Option<f64>,
-    /// Nanoseconds that the publisher takes to compute a frame.
+    /// Time of the publisher to compute a frame, nanoseconds.
     pub frame_ns: f64,
 }
 
-/// What a reader of a stream shows, and what the stream costs.
+/// The error of a reader of a stream, and the cost of the stream.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DisplayMeasurement {
-    /// Always `display`; distinguishes this line from those of the solvers.
+    /// Always `display`: distinguishes this line from the lines of the solvers.
     pub r#type: &'static str,
     /// The reader.
     pub reader: Reader,
-    /// Frames published per second.
+    /// Publishing rate, frames per second.
     pub rate_hz: f64,
-    /// Pictures displayed per second.
+    /// Display rate, pictures per second.
     pub display_rate_hz: f64,
-    /// Seconds by which the display runs behind the stream.
+    /// Delay of the display behind the stream, seconds.
     pub delay_s: f64,
-    /// The largest distance of a handle on display from where it is at the simulated time meant to be on display,
-    /// metres.
+    /// The greatest distance of a displayed handle from its true position at the simulated time of the display, metres.
     pub max_position_error: f64,
-    /// Bytes of headers and poses per second, without what a transport adds.
+    /// Bytes of headers and poses per second, without the overhead of a transport.
     pub bytes_per_second: f64,
-    /// The numbers in the poses.
+    /// The precision of the poses.
     pub precision: Precision,
-    /// Share of a core that computing the frames takes, without transport.
+    /// Share of a core for computing the frames, without transport.
     pub cpu_share: f64,
-    /// Whether no other has both fewer bytes per second and a smaller error; errors below the noise are equal.
+    /// True if no other measurement has both fewer bytes per second and a smaller error. Errors below the noise are
+    /// equal.
     pub on_front: bool,
 }
 
 /// Measures every reader at every rate on `scene`. `progress` receives the share of the work that is done, from 0 to 1.
 ///
 /// # Errors
-/// A sentence where the scene has no solution at a moment before its freeze.
+/// A sentence for a scene without a solution at a sample before its end.
 pub fn measure(
     scene: &Scene,
     timeline: &Timeline,
@@ -129,7 +128,7 @@ pub fn measure(
     progress: &mut dyn FnMut(f64),
 ) -> Result<Vec<DisplayMeasurement>, String> {
     let end = last_frame_time(timeline.freeze(scene.stops_at_contact()).time);
-    let truth = truth(scene, &display_moments(end, display.rate))?;
+    let truth = truth(scene, &display_times(end, display.rate))?;
     let noise = noise(scene, &truth);
     let mut measurements = Vec::new();
     for (index, rate) in RATES.into_iter().enumerate() {
@@ -161,46 +160,46 @@ pub fn measure(
     Ok(measurements)
 }
 
-/// The last whole second before the freeze: all rates have a frame there, so that none is charged for the frozen frame,
-/// which comes at another phase for each. The freeze itself in a show of less than a second.
+/// Returns the last whole second before the end of the show, or the end of a show shorter than a second. All rates have
+/// a frame there: so no rate is charged for the last frame, which has another phase at each rate.
 fn last_frame_time(freeze: f64) -> f64 {
     if freeze >= 1.0 { freeze.floor() } else { freeze }
 }
 
-/// Simulated times on display, in order. A display and a stream run by clocks of their own, so their phase drifts: the
-/// multiples of the golden ratio spread the display's moments evenly over its period, and thereby over that of any
-/// stream.
-fn display_moments(end: f64, display_rate: f64) -> Vec<f64> {
+/// Returns the simulated times of the display samples, in order. Display and stream have separate clocks, so their
+/// phase drifts. Multiples of the golden ratio spread the samples evenly over the display's period, and so over the
+/// period of any stream.
+fn display_times(end: f64, display_rate: f64) -> Vec<f64> {
     let golden = 0.5 * (5f64.sqrt() - 1.0);
     let window = WINDOW.min(end);
     let pictures = (window * display_rate).ceil().max(1.0);
-    let count = (pictures as usize).clamp(WINDOW_MOMENTS[0], WINDOW_MOMENTS[1]);
+    let count = (pictures as usize).clamp(WINDOW_SAMPLES[0], WINDOW_SAMPLES[1]);
     let in_window = (0..count).map(|k| {
-        // Of a fast display some pictures are left out; a slow one passes the window several times.
+        // A fast display skips some pictures; a slow one passes the window several times.
         let picture = (k as f64 * (pictures / count as f64).max(1.0)).floor() % pictures;
         let phase = (k as f64 * golden).fract();
         end - window + window * (picture + phase) / pictures
     });
-    let spread = (0..SPREAD_MOMENTS).map(|k| end * (k as f64 + golden) / SPREAD_MOMENTS as f64);
-    let mut moments: Vec<f64> = in_window.chain(spread).collect();
-    moments.sort_unstable_by(f64::total_cmp);
-    moments
+    let spread = (0..SPREAD_SAMPLES).map(|k| end * (k as f64 + golden) / SPREAD_SAMPLES as f64);
+    let mut samples: Vec<f64> = in_window.chain(spread).collect();
+    samples.sort_unstable_by(f64::total_cmp);
+    samples
 }
 
-/// Where the handles are at one moment.
-struct Moment {
+/// The true positions of the handles at one time.
+struct DisplaySample {
     time: f64,
     chain: Chain,
 }
 
-/// The safe solver's chains. Always with velocities: they carry a moment over the rounding of the clock.
-fn truth(scene: &Scene, times: &[f64]) -> Result<Vec<Moment>, String> {
+/// Returns the safe solver's chains. They always have velocities, which correct for the rounding of the clock.
+fn truth(scene: &Scene, times: &[f64]) -> Result<Vec<DisplaySample>, String> {
     let exact = scene.motion.with_method(Method::Newton).map_err(|error| error.to_string())?;
     let mut solver = exact.solver(Velocities::Computed).solver;
     let solved = times.iter().map(|&time| {
         let mut chain = Chain::new(scene.team().handles());
         solve(solver.as_mut(), time, &mut chain)?;
-        Ok(Moment { time, chain })
+        Ok(DisplaySample { time, chain })
     });
     solved.collect()
 }
@@ -209,17 +208,17 @@ fn solve(solver: &mut dyn Solver, time: f64, chain: &mut Chain) -> Result<(), St
     solve_at_or_just_before(solver, time, chain).map(|_| ()).map_err(|none| format!("the chain at {time} s: {none}"))
 }
 
-/// Metres below which errors are rounding, as [`super::Measurement::noise`].
-fn noise(scene: &Scene, truth: &[Moment]) -> f64 {
+/// Returns the metres below which errors are rounding, as [`super::Measurement::noise`].
+fn noise(scene: &Scene, truth: &[DisplaySample]) -> f64 {
     let head_speed = scene.motion.head_speed();
-    let of_moment = |Moment { time, chain }: &Moment| {
+    let of_sample = |DisplaySample { time, chain }: &DisplaySample| {
         let of_handle = |handle: usize| {
             let reach = chain.x[handle].hypot(chain.y[handle]) + head_speed * time;
             8.0 * f64::EPSILON * reach * (chain.speed[handle] / head_speed).abs().max(1.0)
         };
         (0..chain.handles()).map(of_handle).fold(0.0, f64::max)
     };
-    truth.iter().map(of_moment).fold(0.0, f64::max)
+    truth.iter().map(of_sample).fold(0.0, f64::max)
 }
 
 /// A published frame, in both precisions.
@@ -230,13 +229,13 @@ struct Published {
     poses: [Vec<HandlePose>; 2],
 }
 
-/// A stream of frames at one rate, computed where a display moment needs them.
+/// A stream of frames at one rate, computed on demand.
 struct Stream {
     solver: Box<dyn Solver>,
     rate: f64,
     end: f64,
     chain: Chain,
-    /// The last two frames computed: display moments come in order, and each needs the frames on either side.
+    /// The last two frames computed: samples come in order, and each needs the frames on both sides.
     latest: [Option<Published>; 2],
 }
 
@@ -246,26 +245,26 @@ impl Stream {
         Self { solver, rate, end, chain: Chain::new(scene.team().handles()), latest: [None, None] }
     }
 
-    /// The largest error of a reader over all moments, in both precisions, metres.
-    fn errors(&mut self, reader: Reader, delay: f64, truth: &[Moment]) -> Result<[f64; 2], String> {
+    /// Returns the greatest error of a reader over all samples, in both precisions, metres.
+    fn errors(&mut self, reader: Reader, delay: f64, truth: &[DisplaySample]) -> Result<[f64; 2], String> {
         let mut worst = [0.0; 2];
         let mut shown = Vec::new();
-        for moment in truth {
-            let tick = (moment.time * self.rate).floor() as u64;
+        for sample in truth {
+            let tick = (sample.time * self.rate).floor() as u64;
             let before = self.frame(tick)?;
-            let has_arrived = (tick + 1) as f64 <= (moment.time + delay) * self.rate * (1.0 + 4.0 * f64::EPSILON);
+            let has_arrived = (tick + 1) as f64 <= (sample.time + delay) * self.rate * (1.0 + 4.0 * f64::EPSILON);
             let is_published = (tick + 1) as f64 <= self.end * self.rate;
             let next =
                 if reader != Reader::Hold && has_arrived && is_published { Some(self.frame(tick + 1)?) } else { None };
             for (precision, worst) in worst.iter_mut().enumerate() {
-                let time = show(reader, &before, next.as_ref(), precision, moment.time, &mut shown);
-                *worst = worse(*worst, distance(&moment.chain, time - moment.time, &shown));
+                let time = show(reader, &before, next.as_ref(), precision, sample.time, &mut shown);
+                *worst = worse(*worst, distance(&sample.chain, time - sample.time, &shown));
             }
         }
         Ok(worst)
     }
 
-    /// The frame of a tick.
+    /// Returns the frame of a tick.
     fn frame(&mut self, tick: u64) -> Result<Published, String> {
         if let Some(frame) = self.latest.iter().flatten().find(|frame| frame.tick == tick) {
             return Ok(frame.clone());
@@ -290,20 +289,20 @@ impl Stream {
     }
 }
 
-/// CLOCK_MONOTONIC at a simulated time, for a show that began at 0.
+/// Returns CLOCK_MONOTONIC at a simulated time, for a show that began at 0.
 fn nanoseconds(sim_time: f64) -> u64 {
     (1e9 * sim_time).round() as u64
 }
 
-/// What 32 bits keep of a pose.
+/// Returns a pose rounded to 32 bits.
 fn single(pose: &HandlePose) -> HandlePose {
     let round = |value: f64| f64::from(value as f32);
     let HandlePose { x, y, heading, vx, vy } = *pose;
     HandlePose { x: round(x), y: round(y), heading: round(heading), vx: round(vx), vy: round(vy) }
 }
 
-/// Fills `shown` with what a reader shows at a simulated time between two frames, and returns the simulated time that
-/// it is meant to be: the same, or what the reader's clock of whole nanoseconds makes of it.
+/// Fills `shown` with the reader's picture at a simulated time between two frames. Returns the simulated time of the
+/// picture: `time`, or its rounding to whole nanoseconds by the reader's clock.
 fn show(
     reader: Reader,
     before: &Published,
@@ -337,8 +336,8 @@ fn show(
     time
 }
 
-/// The largest distance of a handle from where it is `later` seconds after a chain's moment, metres. What lies within the
-/// rounding of the clock is no longer than the velocity times that, to 1e-17 m.
+/// Returns the greatest distance of a handle from its position `later` seconds after the chain's time, metres. Within
+/// the rounding of the clock, a linear motion is exact to 1e-17 m.
 fn distance(chain: &Chain, later: f64, shown: &[HandlePose]) -> f64 {
     let of_handle = |(handle, pose): (usize, &HandlePose)| {
         let x = chain.x[handle] + later * chain.vx[handle];

@@ -1,7 +1,7 @@
-//! Accuracy against cost, measured: every solver on one scene and this machine, against the high-precision reference.
+//! Accuracy against cost: measures every solver on one scene and this machine, against the high-precision reference.
 //!
-//! In: a scene and its timeline. Out: one [`Measurement`] per solver. The `trade` command prints and draws them, and what
-//! [`display`] measures: the error at the moment of display against bytes per second.
+//! In: a scene and its timeline. Out: one [`Measurement`] per solver. The `trade` command prints and draws them, with
+//! the results of [`display`]: the error at the time of display against bytes per second.
 
 mod candidates;
 mod collision;
@@ -22,74 +22,74 @@ use bench_dragon_motion::solve::{Chain, Solver, Velocities};
 use bench_dragon_motion::timeline::Timeline;
 use bench_dragon_show::scene::Scene;
 
-/// Moments at which the error is taken, spread evenly over the show.
-pub const SPREAD_MOMENTS: usize = 200;
-/// Further moments, spread evenly over its last second.
-pub const LAST_SECOND_MOMENTS: usize = 10;
-/// Frames of warming up before each moment: it is a running show that is measured.
+/// Number of samples of the error, spread evenly over the show.
+pub const SPREAD_SAMPLES: usize = 200;
+/// Number of further samples, spread evenly over the last second.
+pub const LAST_SECOND_SAMPLES: usize = 10;
+/// Warm-up frames before each sample, as in a running show.
 const WARM_UP_FRAMES: usize = 4;
-/// The most frames that are timed, so that slow solvers and long shows end too.
+/// Limit of timed frames per solver, for slow solvers and long shows.
 const TIMED_FRAMES: usize = 26_000;
-/// The longest time spent timing one solver, seconds.
+/// Limit of the time to measure one solver, seconds.
 const TIMING_LIMIT: f64 = 0.7;
 
-/// What one solver costs and how far it is off.
+/// The cost and the error of one solver.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Measurement {
     /// The solver and its settings.
     pub solver: String,
-    /// The requested accuracy, metres; `None` for a solver that is not chosen by its accuracy.
+    /// The requested accuracy, metres; `None` for a solver that is not selected by accuracy.
     pub accuracy: Option<f64>,
-    /// Whether the wish is met wherever the motion itself does not multiply roundings by more; see
+    /// True if the requested accuracy is met, except where the motion itself amplifies rounding: see
     /// [`Measurement::noise`].
     pub meets: Option<bool>,
-    /// Nanoseconds per frame, the median over the show, without what reading the clock costs.
+    /// Nanoseconds per frame: the median over the show, without the time of reading the clock.
     pub frame_ns: f64,
-    /// Nanoseconds per frame that 99 of 100 frames stay below.
+    /// Nanoseconds per frame: the 99th percentile.
     pub frame_ns_p99: f64,
-    /// Frames that were timed, evenly over the show in runs.
+    /// Number of timed frames, in runs evenly over the show.
     pub frames_timed: usize,
-    /// The largest distance of a handle from the truth, metres.
+    /// The greatest distance of a handle from its true position, metres.
     pub max_position_error: f64,
-    /// Metres below which errors are rounding: the most that 8 eps (r + distance travelled) is at any moment, times the
-    /// speed of the handle over that of the head where that is more. The same for all solvers.
+    /// Metres below which errors are rounding: the greatest 8 eps (r + distance travelled) max(1, ratio of the handle's
+    /// speed to the head's) at any sample. The same for all solvers.
     pub noise: f64,
-    /// The largest relative error of a handle's speed; `None` without velocities.
+    /// The greatest relative error of a handle's speed; `None` without velocities.
     pub max_speed_error: Option<f64>,
-    /// Seconds by which this solver's contact is off; `None` where there is no contact.
+    /// Error of this solver's contact time, seconds; `None` without a contact.
     pub contact_time_error: Option<f64>,
-    /// The largest error of a link's length, metres.
+    /// The greatest error of a link's length, metres.
     pub max_link_error: f64,
-    /// Bytes that the solver holds.
+    /// Memory of the solver, bytes.
     pub memory_bytes: usize,
-    /// Bytes of a table that a frame reads for a handle; `None` for a solver without one.
+    /// Table bytes that a frame reads per handle; `None` for a solver without a table.
     pub bytes_per_handle: Option<f64>,
-    /// Seconds that making the solver takes, once, measuring included.
+    /// Time to make the solver, once, including its measurements, seconds.
     pub make_s: f64,
-    /// What collisions cost on this scene; stands with the first solver only.
+    /// The cost of collision search on this scene; only with the first solver.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub collision: Vec<CollisionMeasurement>,
-    /// Whether no other solver is both faster and more exact; errors below the noise are equal.
+    /// True if no other solver is both faster and more exact. Errors below the noise are equal.
     pub on_front: bool,
 }
 
-/// What one way to look for collisions costs and by how much it misses the contact.
+/// The cost of one method of collision search, and its error of the contact.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CollisionMeasurement {
-    /// The way.
+    /// The method.
     pub method: String,
     /// Nanoseconds per frame for the least clearance; `None` for a search.
     pub frame_ns: Option<f64>,
-    /// Seconds that finding the contact takes from the start of the scene.
+    /// Time to find the contact from the start of the scene, seconds.
     pub search_s: Option<f64>,
-    /// Seconds by which it finds the contact too late; `None` where there is none, and for a way that looks at frames.
+    /// Delay of the contact that it finds, seconds; `None` without a contact, and for a method per frame.
     pub contact_time_error: Option<f64>,
 }
 
-/// A solver to be measured.
+/// A solver to measure.
 struct Candidate {
     name: String,
-    /// Frames played before one that is measured.
+    /// Frames played before a measured one.
     warm_up_frames: usize,
     solver: Box<dyn Solver>,
     contact_time_error: Option<f64>,
@@ -99,26 +99,26 @@ struct Candidate {
     make_s: f64,
 }
 
-/// The truth at one moment.
-struct Moment {
+/// The true positions at one time.
+struct ReferenceSample {
     time: f64,
     handles: Vec<ReferenceHandle>,
 }
 
-/// Measures every solver on `scene`. `progress` is called with the share of the work that is done, from 0 to 1.
+/// Measures every solver on `scene`. `progress` receives the share of the work that is done, from 0 to 1.
 ///
 /// # Errors
-/// A sentence where the reference cannot be had.
+/// A sentence if the reference has no solution.
 pub fn measure(scene: &Scene, timeline: &Timeline, progress: &mut dyn FnMut(f64)) -> Result<Vec<Measurement>, String> {
     let end = timeline.end().time;
-    let moments = truth(scene, end, &mut |share| progress(0.5 * share))?;
+    let samples = truth(scene, end, &mut |share| progress(0.5 * share))?;
     let contact = contact_errors(scene, timeline)?;
-    let noise = noise(scene, &moments);
+    let noise = noise(scene, &samples);
     let candidates = candidates::candidates(scene, contact);
     let count = candidates.len() as f64;
     let mut measurements = Vec::new();
     for (index, candidate) in candidates.into_iter().enumerate() {
-        measurements.push(measured(scene, candidate, &moments, noise, end));
+        measurements.push(measured(scene, candidate, &samples, noise, end));
         progress(0.5 + 0.5 * (index + 1) as f64 / count);
     }
     mark_pareto_front(&mut measurements);
@@ -128,60 +128,60 @@ pub fn measure(scene: &Scene, timeline: &Timeline, progress: &mut dyn FnMut(f64)
     Ok(measurements)
 }
 
-/// The high-precision reference of a scene.
+/// Returns the high-precision reference of a scene.
 fn reference(scene: &Scene) -> Result<Reference, String> {
     let motion = &scene.motion;
     Reference::new(*motion.team(), motion.description(), motion.head_speed())
 }
 
-/// The reference at all moments. At the lock itself there is a solution only up to rounding, so the last moment is a
+/// Returns the reference at all samples. At the lock itself the solution is lost in rounding, so the last sample is a
 /// thousandth of a second earlier.
-fn truth(scene: &Scene, end: f64, progress: &mut dyn FnMut(f64)) -> Result<Vec<Moment>, String> {
+fn truth(scene: &Scene, end: f64, progress: &mut dyn FnMut(f64)) -> Result<Vec<ReferenceSample>, String> {
     let last_second = 1f64.min(0.5 * end);
-    let spread = (0..SPREAD_MOMENTS).map(|k| (end - last_second) * k as f64 / SPREAD_MOMENTS as f64);
-    let last = (0..LAST_SECOND_MOMENTS)
-        .map(|k| end - last_second + (last_second * 0.999) * k as f64 / (LAST_SECOND_MOMENTS - 1) as f64);
+    let spread = (0..SPREAD_SAMPLES).map(|k| (end - last_second) * k as f64 / SPREAD_SAMPLES as f64);
+    let last = (0..LAST_SECOND_SAMPLES)
+        .map(|k| end - last_second + (last_second * 0.999) * k as f64 / (LAST_SECOND_SAMPLES - 1) as f64);
     let times: Vec<f64> = spread.chain(last).collect();
     let (first, second) = times.split_at(times.len() / 2);
     std::thread::scope(|scope| {
-        let second = scope.spawn(|| moments(scene, second, &mut |_| ()));
-        let mut all = moments(scene, first, progress)?;
+        let second = scope.spawn(|| samples(scene, second, &mut |_| ()));
+        let mut all = samples(scene, first, progress)?;
         all.extend(second.join().map_err(|_| "the reference's second thread panicked".to_owned())??);
         Ok(all)
     })
 }
 
-fn moments(scene: &Scene, times: &[f64], progress: &mut dyn FnMut(f64)) -> Result<Vec<Moment>, String> {
+fn samples(scene: &Scene, times: &[f64], progress: &mut dyn FnMut(f64)) -> Result<Vec<ReferenceSample>, String> {
     let mut reference = reference(scene)?;
-    let mut moments = Vec::with_capacity(times.len());
+    let mut samples = Vec::with_capacity(times.len());
     for &time in times {
         let handles = reference.handles(time).map_err(|none| format!("the reference at {time} s: {none}"))?;
-        moments.push(Moment { time, handles });
-        progress(moments.len() as f64 / times.len() as f64);
+        samples.push(ReferenceSample { time, handles });
+        progress(samples.len() as f64 / times.len() as f64);
     }
-    Ok(moments)
+    Ok(samples)
 }
 
-/// What rounding does to a pose by itself, at most: see [`Measurement::noise`].
-fn noise(scene: &Scene, moments: &[Moment]) -> f64 {
+/// Returns an upper bound of the rounding of a pose: see [`Measurement::noise`].
+fn noise(scene: &Scene, samples: &[ReferenceSample]) -> f64 {
     let speed = scene.motion.head_speed();
     let of_handle = |time: f64, handle: &ReferenceHandle| {
         let reach = handle.x.high.hypot(handle.y.high) + speed * time;
         8.0 * f64::EPSILON * reach * (handle.speed / speed).abs().max(1.0)
     };
-    let all = moments.iter().flat_map(|moment| moment.handles.iter().map(|handle| of_handle(moment.time, handle)));
+    let all = samples.iter().flat_map(|sample| sample.handles.iter().map(|handle| of_handle(sample.time, handle)));
     all.fold(0.0, f64::max)
 }
 
-/// By how much the contact times of the exact motion and of the paper's rule are off, seconds.
+/// Errors of the contact times of the exact motion and of the paper's rule, seconds.
 #[derive(Debug, Clone, Copy)]
 struct ContactErrors {
     exact: f64,
     paper: f64,
 }
 
-/// The gap of the two boards in the reference, at the time found for the contact, over the speed at which it closes.
-/// `None` without a contact or with one at the very start.
+/// Returns the gap of the two boards in the reference at the contact's time, divided by its closing speed. `None`
+/// without a contact or with one at the very start.
 fn contact_errors(scene: &Scene, timeline: &Timeline) -> Result<Option<ContactErrors>, String> {
     let Some(contact) = timeline.find(EventKind::Contact) else { return Ok(None) };
     let (Some(a), Some(b)) = (contact.event.bench_a, contact.event.bench_b) else { return Ok(None) };
@@ -207,8 +207,8 @@ fn contact_errors(scene: &Scene, timeline: &Timeline) -> Result<Option<ContactEr
     Ok(Some(ContactErrors { exact, paper }))
 }
 
-fn measured(scene: &Scene, mut candidate: Candidate, moments: &[Moment], noise: f64, end: f64) -> Measurement {
-    let errors = errors(scene, &mut candidate, moments);
+fn measured(scene: &Scene, mut candidate: Candidate, samples: &[ReferenceSample], noise: f64, end: f64) -> Measurement {
+    let errors = errors(scene, &mut candidate, samples);
     let mut times = frame_times(scene, candidate.solver.as_mut(), end);
     times.sort_unstable();
     let quantile = |share| quantile(&times, share);
@@ -232,12 +232,12 @@ fn measured(scene: &Scene, mut candidate: Candidate, moments: &[Moment], noise: 
     }
 }
 
-/// The time below which a share of sorted times lies, nanoseconds; not a number where there are none.
+/// Returns the time below which a share of sorted times lies, nanoseconds; NaN without times.
 fn quantile(times: &[u64], share: f64) -> f64 {
     times.get((share * times.len() as f64) as usize).map_or(f64::NAN, |ns| *ns as f64)
 }
 
-/// Nanoseconds that the solver chosen for `scene` takes for a frame, the median over the show, as
+/// Returns the nanoseconds per frame of the solver chosen for `scene`, the median over the show, as
 /// [`Measurement::frame_ns`].
 pub fn publisher_frame_ns(scene: &Scene, timeline: &Timeline) -> f64 {
     let mut solver = scene.motion.solver(scene.velocities).solver;
@@ -253,18 +253,18 @@ struct Errors {
     link: f64,
 }
 
-fn errors(scene: &Scene, candidate: &mut Candidate, moments: &[Moment]) -> Errors {
+fn errors(scene: &Scene, candidate: &mut Candidate, samples: &[ReferenceSample]) -> Errors {
     let mut chain = Chain::new(scene.team().handles());
     let mut worst = Errors::default();
-    for moment in moments {
+    for sample in samples {
         for frame in (0..=candidate.warm_up_frames).rev() {
-            let time = (moment.time - frame as f64 / scene.rate).max(0.0);
-            // The paper's solver runs ahead of the truth and so locks a little earlier; that moment is left out.
+            let time = (sample.time - frame as f64 / scene.rate).max(0.0);
+            // The paper's solver is ahead of the truth, so it locks a little earlier. That sample is left out.
             if candidate.solver.solve(time, &mut chain).is_err() {
                 return worst;
             }
         }
-        for (i, truth) in moment.handles.iter().enumerate() {
+        for (i, truth) in sample.handles.iter().enumerate() {
             let error = truth.x.error_of(chain.x[i]).hypot(truth.y.error_of(chain.y[i]));
             worst.position = worse(worst.position, error);
             worst.speed = worse(worst.speed, ((chain.speed[i] - truth.speed) / truth.speed).abs());
@@ -277,13 +277,13 @@ fn errors(scene: &Scene, candidate: &mut Candidate, moments: &[Moment]) -> Error
     worst
 }
 
-/// The greater of two errors; what is not a number is worst.
+/// Returns the greater of two errors. NaN is the worst.
 fn worse(one: f64, other: f64) -> f64 {
     if one >= other || one.is_nan() { one } else { other }
 }
 
-/// Nanoseconds of each frame. Where the show has too many frames, or the solver is too slow for all, runs of frames
-/// evenly over the show are timed.
+/// Returns the nanoseconds of each frame. If there are too many frames, or the solver is too slow for all, runs of
+/// frames evenly over the show are timed.
 fn frame_times(scene: &Scene, solver: &mut dyn Solver, end: f64) -> Vec<u64> {
     const RUN: usize = 50;
     let mut chain = Chain::new(scene.team().handles());
@@ -317,7 +317,7 @@ fn frame_times(scene: &Scene, solver: &mut dyn Solver, end: f64) -> Vec<u64> {
     times
 }
 
-/// Nanoseconds that reading the clock adds to what is timed, the median of many.
+/// Returns the nanoseconds that reading the clock adds to a measured time, the median of many.
 fn clock_ns() -> u64 {
     let mut times: Vec<u64> = (0..1001).map(|_| Instant::now().elapsed().as_nanos() as u64).collect();
     times.sort_unstable();
@@ -332,7 +332,8 @@ fn mark_pareto_front(measurements: &mut [Measurement]) {
     }
 }
 
-/// Which points of cost and error no other is below in one and not above in the other.
+/// Returns the points on the Pareto front of cost and error: no other point is less in one and not greater in the
+/// other.
 fn pareto_front(points: &[(f64, f64)]) -> Vec<bool> {
     let is_beaten =
         |(cost, error): &(f64, f64)| points.iter().any(|(c, e)| c <= cost && e <= error && (c < cost || e < error));

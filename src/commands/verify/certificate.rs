@@ -3,7 +3,7 @@
 use std::io::BufRead;
 
 use bench_dragon::messages::hexadecimal;
-use bench_dragon::proof::{EventKind, Outcome, Proved, Refused, Status, scene_hash};
+use bench_dragon::proof::{EventKind, Proved, ProvedEvent, Refused, Status, scene_hash};
 use bench_dragon::show::scene::printable;
 use serde::Serialize;
 use serde_json::json;
@@ -81,8 +81,8 @@ pub fn reason(shown: &str, refused: &Refused) -> String {
     }
 }
 
-/// Returns a sentence on what is proved of an event.
-fn sentence(outcome: &Outcome) -> String {
+/// What is proved of an event, in a sentence.
+fn sentence(outcome: &ProvedEvent) -> String {
     let event = match outcome.event {
         EventKind::Contact => "contact",
         EventKind::Stall => "stall",

@@ -3,7 +3,7 @@
 use fastrand::Rng;
 use serde_json::{Value, json};
 
-/// All numbers that are not whole in a value: coordinates, times, points.
+/// Collects all numbers of a value that are not whole: coordinates, times, points.
 fn numbers<'a>(value: &'a mut Value, found: &mut Vec<&'a mut Value>) {
     match value {
         Value::Number(number) if number.is_f64() => found.push(value),
@@ -13,14 +13,14 @@ fn numbers<'a>(value: &'a mut Value, found: &mut Vec<&'a mut Value>) {
     }
 }
 
-/// A number moved by a share of it, from a tenth to one in 10^15.
+/// Returns the number changed by a share of itself, from a tenth to one in 10^15.
 fn moved(number: &Value, random: &mut Rng) -> Option<Value> {
     let number = number.as_f64()?;
     let share = 10f64.powi(-random.i32(1..16)) * random.f64();
     Some(json!(if random.bool() { number * (1.0 + share) } else { number * (1.0 - share) }))
 }
 
-/// Changes a certificate in one place, and says how; `None` where the change is none.
+/// Changes a certificate in one place and returns a description of the change; `None` if nothing changed.
 pub fn change(lines: &mut Vec<Value>, random: &mut Rng) -> Option<String> {
     let before = lines.clone();
     let last = lines.len() - 4;
@@ -28,7 +28,7 @@ pub fn change(lines: &mut Vec<Value>, random: &mut Rng) -> Option<String> {
     let step = random.usize(1..last);
     let what = match random.u8(..9) {
         0 => {
-            // A step that is longer or shorter, with the next one from there.
+            // A step becomes longer or shorter, and the next one begins at its end.
             let to = lines[step].get_mut("to")?.get_mut(1)?;
             *to = moved(to, random)?;
             let end = to.clone();
@@ -84,7 +84,7 @@ pub fn change(lines: &mut Vec<Value>, random: &mut Rng) -> Option<String> {
             format!("{field} in line {}", index + 1)
         }
         _ => {
-            // A digit of the scene.
+            // Changes a character of the scene.
             let mut text = lines[0]["scene"].as_str()?.to_owned().into_bytes();
             let digits: Vec<usize> = (0..text.len()).filter(|at| text[*at].is_ascii_digit()).collect();
             let at = *random.choice(&digits)?;

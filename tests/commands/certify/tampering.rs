@@ -6,7 +6,7 @@ use super::changes::change;
 use super::truth::{certificate, is_true, timeline};
 use super::{check, harness, scene_text};
 
-/// What was changed is refused; or the claims that are accepted are true of the scene that they are about.
+/// A changed certificate is refused, or its accepted claims are true of its scene.
 #[test]
 fn what_is_changed_is_refused_or_true() {
     let changes = if harness::long() { 1000 } else { 60 };
@@ -25,7 +25,8 @@ fn what_is_changed_is_refused_or_true() {
                 continue;
             };
             accepted += 1;
-            // A scene that the program does not take (the checker does not hold a direction to one turn, say).
+            // The program refuses some scenes that the checker accepts: the checker does not limit a direction to one
+            // turn, for example.
             let Some(timeline) = timeline(&proved.scene) else {
                 undecided += 1;
                 continue;

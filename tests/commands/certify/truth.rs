@@ -1,17 +1,17 @@
-//! Certificates of scenes, and what the ordinary search says of the same scenes. Shared by the tests of certificates and
-//! their fuzz target.
+//! Certificates of scenes, and the ordinary search's results for the same scenes. Shared by the tests of certificates
+//! and their fuzz target.
 
-use bench_dragon::certify::{self, Line};
+use bench_dragon::certify::{self, CertificateLine};
 use bench_dragon::messages::state::EventKind as Kind;
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::proof::{EventKind, Outcome, Status};
+use bench_dragon::proof::{EventKind, ProvedEvent, Status};
 use bench_dragon::show::scene::Scene;
 use serde_json::Value;
 
-/// Seconds by which a time of the ordinary search may be beside the true one.
+/// Greatest error of a time of the ordinary search, seconds.
 const ERROR: f64 = 1e-9;
 
-/// The scene of a text as far as a certificate is about it.
+/// Returns the part of a scene's text that a certificate is about.
 pub fn scene(text: &str) -> Option<Scene> {
     let mut table: toml::Table = text.parse().ok()?;
     table.retain(|key, _| ["team", "path", "motion"].contains(&key));
@@ -19,17 +19,17 @@ pub fn scene(text: &str) -> Option<Scene> {
     Scene::parse(&toml::to_string(&table).ok()?, "scene.toml", "scene").ok()
 }
 
-/// What the ordinary search finds in a scene.
+/// Returns the events that the ordinary search finds in a scene.
 pub fn timeline(text: &str) -> Option<Timeline> {
     Some(scene(text)?.motion.timeline(&mut |_| {}))
 }
 
-/// The lines of a scene's certificate.
+/// Returns the lines of a scene's certificate.
 pub fn certificate(text: &str) -> Vec<Value> {
     let scene = Scene::parse(text, "scene.toml", "scene").unwrap();
     let timeline = scene.motion.timeline(&mut |_| {});
     let mut lines = Vec::new();
-    let mut write = |line: &Line| {
+    let mut write = |line: &CertificateLine| {
         lines.push(serde_json::to_value(line).unwrap());
         Ok::<(), std::io::Error>(())
     };
@@ -37,8 +37,8 @@ pub fn certificate(text: &str) -> Vec<Value> {
     lines
 }
 
-/// Whether what is claimed of an event is what the ordinary search found.
-pub fn is_true(outcome: &Outcome, timeline: &Timeline) -> bool {
+/// Returns true if the claim about an event agrees with the ordinary search.
+pub fn is_true(outcome: &ProvedEvent, timeline: &Timeline) -> bool {
     let kind = match outcome.event {
         EventKind::Contact => Kind::Contact,
         EventKind::Stall => Kind::Stall,

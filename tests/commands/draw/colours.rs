@@ -1,8 +1,8 @@
-//! The colours, against the page's style sheet.
+//! The colours of a picture, compared with the page's style sheet.
 
 use super::*;
 
-/// The custom properties of the block of a style sheet that begins with a selector.
+/// Returns the custom properties of the block of a style sheet that begins with a selector.
 fn properties<'a>(css: &'a str, selector: &str) -> BTreeMap<&'a str, &'a str> {
     let block = css.split_once(&format!("\n{selector} {{")).unwrap_or_else(|| panic!("no {selector}")).1;
     let declarations = block.split_once('}').unwrap().0.split(';');
@@ -25,7 +25,7 @@ fn the_colours_are_those_of_the_page() {
 fn a_theme_has_its_own_colours_and_auto_has_both() {
     let draw = |theme: &str| answer(&["draw", "--at", "contact", "--theme", theme]);
     let has = |svg: &str, palette: &Palette| {
-        // Colours of the scale can be alike in both.
+        // Colours of the scale may be the same in both palettes.
         let names = ["ground", "ink", "quiet", "faint", "danger"];
         let colours = palette.named().into_iter().filter(|(name, _)| names.contains(name));
         colours.filter(|(_, colour)| svg.contains(&format!("=\"{colour}\""))).count()
@@ -37,7 +37,7 @@ fn a_theme_has_its_own_colours_and_auto_has_both() {
     let (rules, after) = rest.split_once("</style>").unwrap();
     assert_eq!(format!("{before}{after}"), light, "auto is light with rules");
     Document::parse(&auto).unwrap();
-    // Each colour that is drawn has a rule with the dark one.
+    // Each drawn colour has a rule with the dark colour.
     for attribute in ["fill", "stroke", "stop-color"] {
         for part in light.split(&format!("{attribute}=\"#")).skip(1) {
             let rule = format!("[{attribute}=\"#{}\"]{{{attribute}:#", &part[..6]);

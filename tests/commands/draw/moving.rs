@@ -1,4 +1,4 @@
-//! Sequences of pictures, and pictures that move.
+//! Sequences of pictures, and animated pictures.
 
 use super::*;
 
@@ -46,7 +46,7 @@ fn pictures_of_a_sequence_have_one_camera_and_true_times() {
     }
 }
 
-/// The values of an animation of an element's first child of a kind.
+/// Returns the values of an animation of an element's first child of a kind.
 fn values<'a>(node: &Node<'a, '_>, kind: &str) -> Vec<&'a str> {
     let of_kind = |node: &Node| node.attribute("type") == Some(kind);
     let animation = node.descendants().find(of_kind).unwrap();
@@ -64,7 +64,7 @@ fn a_picture_that_moves_begins_and_ends_where_solve_has_the_boards() {
         for (bench, board) in boards(&paper, time).iter().enumerate() {
             let group = with_id(&svg, &format!("bench-{bench}")).unwrap();
             let (places, angles) = (values(&group, "translate"), values(&group, "rotate"));
-            // 9 steps of half a second, and 4 s at the end.
+            // There are 9 steps of half a second, and 4 s at the end.
             assert_eq!((places.len(), angles.len()), (19, 19));
             let at = |values: &[&str]| values[if last { values.len() - 1 } else { 0 }].to_owned();
             let place = at(&places);
@@ -80,7 +80,7 @@ fn a_picture_that_moves_begins_and_ends_where_solve_has_the_boards() {
             let off = (angle.to_radians() - heading).sin().hypot((angle.to_radians() - heading).cos() - 1.0);
             assert!(off < 2e-3, "bench {bench} at {time} is turned by {angle}");
             if last {
-                // Where nothing moves, the last moment stands.
+                // A viewer without animation shows the last time.
                 assert_eq!(group.attribute("transform"), Some(format!("translate({place})").as_str()));
                 let fill = group.descendants().find_map(|node| node.attribute("fill").filter(|fill| *fill != "none"));
                 colours.insert(fill.unwrap().to_owned());

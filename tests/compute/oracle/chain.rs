@@ -1,9 +1,10 @@
-//! A team on a path: where its handles are, all places that they come through, and the first stall and lock of any link.
+//! A team on a path: the places of its handles, the stretches that they cover, and the first stall and lock of any
+//! link.
 //!
-//! A handle's place is a function of the one ahead of it, so the stretch of path that it covers while the head goes from
-//! one place to another is the image of the stretch that the handle ahead covers: as long as the follower does not jump,
-//! what lies between its places at the ends and those where it turns round. No event between two configurations is
-//! missed that way, however briefly it lasts.
+//! A handle's place is a function of the place of the handle ahead. While the head goes from one place to another, the
+//! handle therefore covers the image of the stretch that the handle ahead covers. As long as the follower does not
+//! jump, this image lies between its places at the ends and at its turning points. So no event between two
+//! configurations is missed, however short.
 
 use super::geometry::{Param, Path, Vector};
 use super::links::{Configuration, Link};
@@ -54,14 +55,14 @@ pub struct Handle {
     pub place: Param,
     pub point: Vector,
     pub tangent: Vector,
-    /// Metres per metre of the head, forward.
+    /// Speed over the head's, positive forward.
     pub speed: f64,
-    /// Cosines at the front and the rear handle of the bench that this handle leads; NaN for the last.
+    /// Cosine at the front handle of the bench that this handle leads; NaN for the last handle.
     pub front_cosine: f64,
     pub rear_cosine: f64,
 }
 
-/// Metres before a lock in which rounding may have put the team past it.
+/// Returns the distance before a lock within which rounding may have put the team past it, metres.
 pub fn last_bits(lock: f64) -> f64 {
     1e-12 * (1.0 + lock)
 }
@@ -81,7 +82,7 @@ impl<'a> Chain<'a> {
         &self.links[bench.min(1)]
     }
 
-    /// Whether both searches for stalls and jumps came to their end.
+    /// Returns true if both searches for stalls and jumps were complete.
     pub fn is_complete(&self) -> bool {
         self.links.iter().all(|link| link.complete)
     }
@@ -102,27 +103,27 @@ impl<'a> Chain<'a> {
         Pose { head, handles }
     }
 
-    /// Whether a link stands at the start where its follower has jumped: such a start is illegal.
+    /// Returns true if a link stands at the start where its follower has jumped: such a start is illegal.
     pub fn starts_beyond_a_jump(&self) -> bool {
         let beyond =
             |(bench, handle): (usize, &Handle)| self.link(bench).jumps.iter().any(|jump| jump.0 <= handle.place.s);
         self.pose(0.0).handles[..self.team.benches].iter().enumerate().any(beyond)
     }
 
-    /// What the handle behind covers.
+    /// Returns the stretch that the handle behind covers.
     fn image(&self, bench: usize, span: Span) -> Span {
         let link = self.link(bench);
         let ends = [span.low, span.high].into_iter().map(|place| self.path.follower(place, link.length));
         Span::around(ends.chain(link.stalls_between(span.low.s, span.high.s).map(|configuration| configuration.rear)))
     }
 
-    /// What each handle covers while the head goes from one pose to another, no lock being between.
+    /// Returns the stretch that each handle covers while the head goes from one pose to another, with no lock between.
     pub fn spans(&self, from: &Pose, to: &Pose) -> Vec<Span> {
         let mut spans = Vec::with_capacity(from.handles.len());
         let mut turns = false;
         for (k, (one, other)) in from.handles.iter().zip(&to.handles).enumerate() {
             let mut span = Span::around([one.place, other.place].into_iter());
-            // Only behind a handle that turns round is there more than the ends determine.
+            // Only behind a handle that turns round do the ends not determine the stretch.
             if turns {
                 let image = self.image(k - 1, spans[k - 1]);
                 span = Span::around([span.low, span.high, image.low, image.high].into_iter());
@@ -133,7 +134,7 @@ impl<'a> Chain<'a> {
         spans
     }
 
-    /// The first bench of which `happens` holds of the stretch that its front handle covers from the start on.
+    /// Returns the first bench for whose front handle `happens` holds on the stretch covered since the start.
     fn first_bench(&self, head: f64, happens: impl Fn(&Link, Span) -> bool) -> Option<usize> {
         let mut span = Span { low: self.path.place_at(0.0), high: self.path.place_at(head) };
         for bench in 0..self.team.benches {
@@ -148,11 +149,11 @@ impl<'a> Chain<'a> {
         None
     }
 
-    /// The least metres of the head up to `most` at which `happens` holds of some bench's stretch.
+    /// Returns the least distance of the head up to `most` at which `happens` holds for some bench's stretch, metres.
     fn first(&self, most: f64, happens: impl Fn(&Link, Span) -> bool) -> Option<(f64, usize)> {
         self.first_bench(most, &happens)?;
         let (mut low, mut high) = (0.0, most);
-        // Stretches only grow, so what holds once holds ever after.
+        // Stretches only grow, so a condition that holds once holds for every longer stretch.
         loop {
             let middle = 0.5 * (low + high);
             if middle <= low || middle >= high {
@@ -160,12 +161,13 @@ impl<'a> Chain<'a> {
             }
             if self.first_bench(middle, &happens).is_some() { high = middle } else { low = middle }
         }
-        // In the last bits before one link's jump its follower may be past the jump, and the next link's with it.
+        // In the last bits before one link's jump its follower may be past the jump, and the next link's follower with
+        // it.
         let bench = self.first_bench((high + last_bits(high)).min(most), &happens)?;
         Some((high, bench))
     }
 
-    /// The first lock of any link: metres of the head, the bench, and whether it may be none.
+    /// Returns the first lock of any link: metres of the head, the bench, and true if the lock is doubtful.
     pub fn lock(&self) -> Option<(f64, usize, bool)> {
         let jumps = |link: &Link, span: Span| link.jump_between(span.low.s, span.high.s).is_some();
         let (at, bench) = self.first(self.path.end, jumps)?;
@@ -174,7 +176,7 @@ impl<'a> Chain<'a> {
         Some((at, bench, nearest.is_some_and(|(_, doubtful)| *doubtful)))
     }
 
-    /// The first stall of any link, before the end of the motion.
+    /// Returns the first stall of any link before the end of the motion.
     pub fn stall(&self, end: f64) -> Option<(f64, usize)> {
         let start = self.pose(0.0);
         if let Some(bench) = start.handles.iter().position(|handle| handle.front_cosine <= 0.0) {

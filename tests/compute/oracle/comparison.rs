@@ -1,22 +1,22 @@
-//! The checker's verdict on a scene, with the program's events beside it: each kind happens in both or neither, at one
-//! place of the head and of one bench or pair; or it is ambiguous, being within rounding of not happening at all.
+//! The checker's result for a scene beside the program's events. Each kind of event happens in both or neither, at one
+//! place of the head and for one bench or pair; otherwise it must be ambiguous, within rounding of not happening.
 
 use super::Event;
 use super::chain::{Chain, Team, last_bits};
 use super::contact::{Boards, Touch};
 use super::geometry::{Path, Vector};
 
-/// What the checker reports of a scene. Times are metres of the head.
+/// The checker's result for a scene. Times are metres of the head.
 pub struct Verdict {
     pub contact: Result<Option<Touch>, String>,
     pub stall: Option<(f64, usize)>,
     pub lock: Option<(f64, usize)>,
     pub end: f64,
-    /// Why the checker is not sure.
+    /// Reasons why the checker is not sure.
     pub doubts: Vec<String>,
 }
 
-/// The checker's own events of a team on a path.
+/// Returns the checker's own events of a team on a path.
 pub fn verdict(chain: &Chain) -> Verdict {
     let mut doubts = Vec::new();
     if !chain.is_complete() {
@@ -37,11 +37,11 @@ pub fn verdict(chain: &Chain) -> Verdict {
     Verdict { contact, stall, lock: lock.map(|(at, bench, _)| (at, bench)), end, doubts }
 }
 
-/// The checker's and the program's events side by side.
+/// The checker's events and the program's, compared.
 pub struct Comparison {
-    /// Metres of the head by which times may differ.
+    /// Greatest difference of two times, metres of the head.
     tolerance: f64,
-    /// Metres by which the checker's own figures are rounded.
+    /// Rounding of the checker's own figures, metres.
     rounding: f64,
     pub compared: Vec<&'static str>,
     pub failures: Vec<String>,
@@ -49,7 +49,7 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Where there is nothing to compare.
+    /// Returns a failure in which there are no events to compare.
     pub fn failed(sentence: String) -> Self {
         let failures = vec![sentence];
         Self { tolerance: 0.0, rounding: 0.0, compared: Vec::new(), failures, ambiguous: Vec::new() }
@@ -59,7 +59,7 @@ impl Comparison {
         let chain = Chain::new(path, team);
         let verdict = verdict(&chain);
         let start = chain.pose(0.0);
-        // Of the scene, in metres.
+        // Size of the scene, metres.
         let size = path.extent(start.handles[team.benches].place);
         let tolerance = 1e-9 * (size / 100.0).max(1.0);
         // A hundred roundings of place and distance.
@@ -90,7 +90,7 @@ impl Comparison {
                 }
             }
             (Some((at, bench)), _) => {
-                // A start at the very lock, and a lock at the very end of the path.
+                // Doubtful: a start at the very lock, and a lock at the very end of the path.
                 let doubtful = at <= self.tolerance || chain.path.end - at <= self.tolerance;
                 self.disagree(doubtful, format!("lock at {at:.13} of bench {bench}, the program reports {lock:?}"));
             }
@@ -108,7 +108,7 @@ impl Comparison {
     }
 
     fn stalls(&mut self, verdict: &Verdict, chain: &Chain, event: Option<&Event>) {
-        // A cosine that is zero within rounding, at a place that both find in the motion.
+        // Doubtful: a cosine that is zero within rounding, at a place that both find in the motion.
         let grazes =
             |at: f64| chain.pose(at.min(verdict.end)).handles.iter().any(|handle| handle.front_cosine.abs() < 1e-12);
         match (verdict.stall, event) {
@@ -156,7 +156,7 @@ impl Comparison {
                 }
             }
             (Some(touch), _) => {
-                // How deep the boards go into each other before they part again, and how well the time is known.
+                // The depth of the overlap before the boards part again, and the accuracy of the time.
                 let deepest = (0..60)
                     .map(|k| (touch.head + 1e-12 * 2f64.powi(k)).min(verdict.end))
                     .map(|head| boards.gap(head, touch.benches))
@@ -170,7 +170,8 @@ impl Comparison {
                 self.disagree(doubtful, sentence);
             }
             (None, Some(event)) => {
-                // In the last bits before a lock handles go as the root of what is missing: some 1e-4 of a link.
+                // In the last bits before a lock handles move as the root of the remaining distance: about 1e-4 of a
+                // link.
                 let last = verdict.end - event.time <= self.tolerance;
                 let head = if last { (verdict.end - self.tolerance).max(0.0) } else { event.time };
                 let slack = if last { 1e-3 } else { 1e-11 + self.rounding };

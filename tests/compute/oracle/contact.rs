@@ -1,4 +1,4 @@
-//! The first contact of any two boards that share no handle, by steps that are certain to hold none.
+//! The first contact of any two boards that share no handle, by steps that certainly contain no contact.
 
 use super::chain::{Chain, Pose, Span};
 use super::geometry::{Vector, left_of};
@@ -19,20 +19,21 @@ impl Board {
         self.half[0] * self.along.dot(&axis).abs() + self.half[1] * left_of(self.along).dot(&axis).abs()
     }
 
-    /// Whether a point is on the board, give or take so many metres.
+    /// Returns true if a point is on the board, within `slack` metres.
     fn holds(&self, point: Vector, slack: f64) -> bool {
         let offset = point - self.centre;
         offset.dot(&self.along).abs() <= self.half[0] + slack && offset.perp(&self.along).abs() <= self.half[1] + slack
     }
 }
 
-/// The gap between the shadows of two boards on an axis that leads from the first to the second.
+/// Returns the gap between the shadows of two boards on an axis that leads from the first to the second.
 fn gap_along(axis: Vector, one: &Board, other: &Board) -> f64 {
     axis.dot(&(other.centre - one.centre)) - one.reach_along(axis) - other.reach_along(axis)
 }
 
-/// The largest gap between two boards on an axis across one of their sides, and that axis. It is positive where they are
-/// apart (and then no more than their distance); if not, its negative is the least way that parts them.
+/// Returns the largest gap between two boards on an axis across one of their sides, and that axis. The gap is positive
+/// if the boards are apart, and then at most their distance; its negative is otherwise the shortest way that parts
+/// them.
 fn largest_gap(one: &Board, other: &Board) -> (f64, Vector) {
     let towards = other.centre - one.centre;
     let axes = [one.along, left_of(one.along), other.along, left_of(other.along)];
@@ -67,33 +68,33 @@ impl Boards<'_> {
         (0..benches).flat_map(move |a| (a + 2..benches).map(move |b| (a, b)))
     }
 
-    /// The gap of one pair.
+    /// Returns the gap of one pair.
     pub fn gap(&self, head: f64, (a, b): (usize, usize)) -> f64 {
         let boards = self.boards(&self.chain.pose(head));
         largest_gap(&boards[a], &boards[b]).0
     }
 
-    /// The pair with the least gap.
+    /// Returns the pair with the least gap.
     pub fn least_gap(&self, head: f64) -> Option<(f64, (usize, usize))> {
         let boards = self.boards(&self.chain.pose(head));
         let gaps = self.pairs().map(|(a, b)| (largest_gap(&boards[a], &boards[b]).0, (a, b)));
         gaps.min_by(|one, other| one.0.total_cmp(&other.0))
     }
 
-    /// Whether a point is on both boards of a pair, give or take so many metres.
+    /// Returns true if a point is on both boards of a pair, within `slack` metres.
     pub fn both_hold(&self, head: f64, (a, b): (usize, usize), point: Vector, slack: f64) -> bool {
         let boards = self.boards(&self.chain.pose(head));
         boards[a].holds(point, slack) && boards[b].holds(point, slack)
     }
 
-    /// How far a point of a board goes at most while its handles go a metre: a corner is front (1 - l) + rear l + m
-    /// (across), with l up to inset / link beyond both ends and m = width / 2 link.
+    /// Returns the greatest movement of a point of a board per metre of its handles. A corner is front (1 - l) + rear l
+    /// + m (across), with l up to inset / link beyond both ends and m = width / 2 link.
     fn overhang(&self, bench: usize) -> f64 {
         let team = self.chain.team;
         1.0 + (2.0 * team.hole_inset + team.width) / team.link(bench)
     }
 
-    /// The first contact up to `end`, before which there is no lock. An error where the work is too much.
+    /// Returns the first contact up to `end`, with no lock before `end`; an error if the work is too much.
     pub fn first_contact(&self, end: f64) -> Result<Option<Touch>, String> {
         if let Some((_, benches)) = self.least_gap(0.0).filter(|(gap, _)| *gap <= 0.0) {
             return Ok(Some(Touch { head: 0.0, benches }));
@@ -116,7 +117,7 @@ impl Boards<'_> {
             } else if let Some((_, benches)) = self.least_gap(head).filter(|(gap, _)| *gap <= 0.0) {
                 return Ok(Some(Touch { head, benches }));
             } else {
-                // As far as doubles resolve it, nothing happens in the last bit.
+                // Within the resolution of doubles, nothing happens in the last bit.
                 here = next;
                 step *= 2.0;
             }
@@ -127,17 +128,17 @@ impl Boards<'_> {
         Err(format!("contact: searched up to {} m only", here.head))
     }
 
-    /// Whether certainly no two boards touch while the head goes from one pose to another.
+    /// Returns true if certainly no two boards touch while the head goes from one pose to another.
     fn is_clear(&self, from: &Pose, to: &Pose) -> bool {
         let spans = self.chain.spans(from, to);
-        // How far each handle gets from where it is at first.
+        // The greatest distance of each handle from its first place.
         let moved: Vec<f64> = spans
             .iter()
             .zip(&from.handles)
             .map(|(span, handle)| (span.high.s - handle.place.s).max(handle.place.s - span.low.s))
             .collect();
         let (before, after) = (self.boards(from), self.boards(to));
-        // Computed only where two boards come near.
+        // Computed only if two boards come near each other.
         let mut strays: Option<Vec<f64>> = None;
         let by = |bench: usize, ways: &[f64]| self.overhang(bench) * ways[bench].max(ways[bench + 1]);
         for a in 0..before.len() {
@@ -163,7 +164,7 @@ impl Boards<'_> {
                 }
                 let strays = strays.get_or_insert_with(|| self.strays(from, to, &spans));
                 let stray = by(a, strays) + by(b, strays);
-                // Were all handles to go straight from first to last, the gap on a fixed axis would be concave in time.
+                // If all handles went straight from first to last, the gap on a fixed axis would be concave in time.
                 let clear = [axis, last_axis, (axis + last_axis).normalize()]
                     .into_iter()
                     .any(|axis| gap_along(axis, one, other).min(gap_along(axis, &after[a], &after[b])) > stray);
@@ -175,14 +176,15 @@ impl Boards<'_> {
         true
     }
 
-    /// How far each handle may be from a straight and even way from one pose to the other; infinity if unknown.
+    /// Returns the greatest deviation of each handle from a straight and even way between two poses; infinity if
+    /// unknown.
     ///
-    /// A velocity that stays within `wander` of what it is at first strays by half of that times the step. From handle
-    /// to handle, v' = v f / c, and the cosines change as path and bench turn.
+    /// A velocity that stays within `wander` of its first value deviates by half of that times the step. From handle to
+    /// handle, v' = v f / c, and the cosines change as path and bench turn.
     fn strays(&self, from: &Pose, to: &Pose, spans: &[Span]) -> Vec<f64> {
         let step = to.head - from.head;
         let turned: Vec<f64> = spans.iter().map(|span| self.chain.path.turned(span.low, span.high)).collect();
-        // The front handle's speed: how much it may change.
+        // The change of the front handle's speed.
         let mut change = 0.0;
         let mut strays = Vec::with_capacity(spans.len());
         for (k, (one, other)) in from.handles.iter().zip(&to.handles).enumerate() {
@@ -191,7 +193,7 @@ impl Boards<'_> {
             if k + 1 == spans.len() {
                 break;
             }
-            // The bench turns as fast as its handles go across it; both change little in a step short enough.
+            // The bench turns as fast as its handles move across it; both change little in a short step.
             let link = self.chain.team.link(k);
             let rate = |pose: &Pose| {
                 let (front, rear) = (&pose.handles[k], &pose.handles[k + 1]);

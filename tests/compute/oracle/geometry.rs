@@ -1,6 +1,6 @@
 //! The checker's own paths: lines, arcs and spirals by metres of travel, and the follower on them.
 //!
-//! A path has no beginning: a route starts with a straight line without end behind its start, a spiral comes in from
+//! A path has no beginning: a route starts with an endless straight line behind its start, a spiral comes in from
 //! infinity. So every handle has a follower everywhere.
 
 use std::f64::consts::TAU;
@@ -10,7 +10,7 @@ pub type Vector = nalgebra::Vector2<f64>;
 /// A place on a path.
 #[derive(Clone, Copy, Debug)]
 pub struct Param {
-    /// Metres of travel: the head starts at 0, the team stands behind it.
+    /// Metres of travel: the head starts at 0, and the team stands behind it.
     pub s: f64,
     piece: usize,
     /// Metres since the start of a line, radians since the start of an arc, the polar angle on a spiral.
@@ -23,7 +23,7 @@ enum Curve {
         start: Vector,
         tangent: Vector,
     },
-    /// `turn` is 1 where it turns left, -1 where it turns right; `phase` is the polar angle of its start.
+    /// `turn` is 1 to the left, -1 to the right; `phase` is the polar angle of the start.
     Arc {
         centre: Vector,
         radius: f64,
@@ -40,23 +40,23 @@ enum Curve {
 #[derive(Clone, Copy, Debug)]
 struct Piece {
     curve: Curve,
-    /// Metres of travel where it starts; -infinity for the first.
+    /// Metres of travel at its start; -infinity for the first curve.
     begin: f64,
     /// Coordinates of its start and end.
     first: f64,
     last: f64,
-    /// Metres of travel, and radians the path has turned whichever way, at coordinate `anchor`.
+    /// Metres of travel, and radians that the path has turned in either direction, at coordinate `anchor`.
     anchor: f64,
     anchor_s: f64,
     anchor_turned: f64,
 }
 
-/// Length of r = a theta from the centre.
+/// Returns the length of r = a theta from the centre.
 fn spiral_length(radius_per_radian: f64, theta: f64) -> f64 {
     0.5 * radius_per_radian * (theta * 1f64.hypot(theta) + theta.asinh())
 }
 
-/// The polar angle so many metres from the centre. The length is convex and at least a theta^2 / 2, so that
+/// Returns the polar angle at `length` metres from the centre. The length is convex and at least a theta^2 / 2, so
 /// Newton's steps come down from that guess and never pass the root.
 fn spiral_angle(radius_per_radian: f64, length: f64) -> f64 {
     let length = length.max(0.0);
@@ -95,7 +95,7 @@ impl Curve {
         }
     }
 
-    /// Metres from coordinate `from` to `to`.
+    /// Returns the metres from coordinate `from` to `to`.
     fn metres(&self, from: f64, to: f64) -> f64 {
         match *self {
             Self::Line { .. } => to - from,
@@ -116,8 +116,8 @@ impl Curve {
         }
     }
 
-    /// Radians by which the direction turns from coordinate `from` to `to`; the tangent of a spiral has the polar angle
-    /// theta + atan(theta) + constant.
+    /// Returns the radians by which the direction turns from coordinate `from` to `to`; the tangent of a spiral has the
+    /// polar angle theta + atan(theta) + constant.
     fn turned(&self, from: f64, to: f64) -> f64 {
         match *self {
             Self::Line { .. } => 0.0,
@@ -126,7 +126,7 @@ impl Curve {
         }
     }
 
-    /// The first coordinate from `q` back to `first` that is not nearer to `centre` than `reach`.
+    /// Returns the first coordinate from `q` back to `first` that is not nearer to `centre` than `reach`.
     fn leaves(&self, q: f64, first: f64, centre: Vector, reach: f64) -> Option<f64> {
         let by = match *self {
             Self::Line { tangent, .. } => {
@@ -160,8 +160,8 @@ impl Curve {
     }
 }
 
-/// As [`Curve::leaves`]: sphere tracing. Over x metres back the square of the distance grows by at most
-/// 2 (rate) x + (1 + reach curvature) x^2, so the first place at `reach` is never passed.
+/// As [`Curve::leaves`], by sphere tracing. Over x metres back the square of the distance grows by at most 2 (rate) x +
+/// (1 + reach curvature) x^2, so the first place at `reach` is never passed.
 fn leaves_spiral(
     curve: &Curve,
     radius_per_radian: f64,
@@ -172,7 +172,7 @@ fn leaves_spiral(
     reach: f64,
 ) -> Option<f64> {
     let mut theta = q;
-    // Far more than any path needs: near a fold steps shrink as the square root of what is missing.
+    // Far more steps than any path needs: near a fold steps shrink as the square root of the remaining distance.
     for _ in 0..1_000_000 {
         let (point, tangent) = curve.point_and_tangent(theta);
         let offset = point - centre;
@@ -189,7 +189,7 @@ fn leaves_spiral(
         let root = (rate * rate + second_derivative_bound * lacking).sqrt();
         let metres = if rate > 0.0 { lacking / (rate + root) } else { (root - rate) / second_derivative_bound };
         let radians = metres / (radius_per_radian * 1f64.hypot(theta));
-        // Metres per radian grow outward: with those at the step's outer end no step is too long.
+        // Metres per radian grow outward: with the metres per radian at the step's outer end no step is too long.
         let radians =
             if outward < 0.0 { metres / (radius_per_radian * 1f64.hypot(theta + radians)) } else { radians.min(0.25) };
         let next = theta - outward * radians;
@@ -227,7 +227,7 @@ impl Path {
         path
     }
 
-    /// `lead_in` metres before the turn the head starts.
+    /// Returns a turnaround whose head starts `lead_in` metres before the turn.
     pub fn turnaround(pitch: f64, turn_radius: f64, arc_ratio: f64, lead_in: f64, lead_out: f64) -> Self {
         let radius_per_radian = pitch / TAU;
         let theta = turn_radius / radius_per_radian;
@@ -257,7 +257,7 @@ impl Path {
         path
     }
 
-    /// The length of a piece without beginning is counted from its end, at coordinate `last`.
+    /// Adds a first curve without beginning, whose length is counted from its end at coordinate `last`.
     fn begin_with(&mut self, curve: Curve, last: f64, anchor_s: f64) {
         let first = if let Curve::Line { .. } = curve { f64::NEG_INFINITY } else { f64::INFINITY };
         let begin = f64::NEG_INFINITY;
@@ -300,7 +300,7 @@ impl Path {
         self.point_and_tangent(place).0
     }
 
-    /// Radians by which the path turns, whichever way, from one place to another further on.
+    /// Returns the radians by which the path turns, in either direction, from one place to another further on.
     pub fn turned(&self, behind: Param, ahead: Param) -> f64 {
         let at = |place: Param| {
             let piece = &self.pieces[place.piece];
@@ -309,7 +309,8 @@ impl Path {
         (at(ahead) - at(behind)).abs()
     }
 
-    /// The first place backward from `from` that is not nearer to it than `reach`: the follower, for a link's length.
+    /// Returns the first place backward from `from` that is not nearer to it than `reach`: the follower, for a link's
+    /// length.
     pub fn follower(&self, from: Param, reach: f64) -> Param {
         let centre = self.point(from);
         let (mut index, mut q) = (from.piece, from.q);
@@ -319,19 +320,20 @@ impl Path {
                 let s = piece.anchor_s + piece.curve.metres(piece.anchor, q);
                 return Param { s, piece: index, q };
             }
-            // The first piece has no beginning, so it is always left.
+            // The first curve has no beginning, so the search always leaves its circle there.
             index -= 1;
             q = self.pieces[index].last;
         }
     }
 
-    /// Whether all four places are on one line or one circle, where a team moves as one rigid body.
+    /// Returns true if all four places are on one line or one circle, where a team moves as one rigid body.
     pub fn is_even(&self, places: [Param; 4]) -> bool {
         let piece = places[0].piece;
         places.iter().all(|place| place.piece == piece) && !matches!(self.pieces[piece].curve, Curve::Spiral { .. })
     }
 
-    /// The largest coordinate of the path from a place on: of its pieces' ends, and a circle's whole width.
+    /// Returns the largest coordinate of the path from a place on: of the ends of its curves, and a circle's whole
+    /// width.
     pub fn extent(&self, from: Param) -> f64 {
         let ends = self.pieces.iter().map(|piece| {
             let wide = if let Curve::Arc { radius, .. } = piece.curve { 2.0 * radius } else { 0.0 };

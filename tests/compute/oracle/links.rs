@@ -1,19 +1,20 @@
-//! What one link can do anywhere on a path: at which places of its front handle it stalls, and where its follower jumps.
+//! The stalls and jumps of one link anywhere on a path, by the place of its front handle.
 //!
 //! Both depend on the place of the front handle alone, so a path is searched once for each length of link, by halving
 //! until a stretch is certain to hold neither.
 
 use super::geometry::{Param, Path};
 
-/// Jumps below this share of the link cannot be distinguished from a follower that is merely very fast: over the last
-/// bit of its place near a fold, 1e-13 m in 100, a follower moves by the root of that.
+/// Jumps below this share of the link cannot be distinguished from a very fast follower: over the last bit of its place
+/// near a fold, 1e-13 m in 100, a follower moves by the root of that.
 const DOUBTFUL_JUMP: f64 = 3e-6;
-/// Below this share of the link a jump is none.
+/// A smaller jump, as a share of the link, is not counted.
 const LEAST_JUMP: f64 = 1e-9;
-/// What the rounding of two places can add to the way between them, in roundings of the largest number about.
+/// Error that the rounding of two places can add to the distance between them, in roundings of the largest number
+/// involved.
 const ROUNDINGS: f64 = 32.0;
-/// Configurations after which the search gives up, some seconds. Where an arc's diameter is within a share x of the
-/// link, it takes several hundred over the root of x.
+/// Configurations after which the search gives up: some seconds. If an arc's diameter is within a share x of the link,
+/// the search takes several hundred over the root of x.
 const MOST_CONFIGURATIONS: usize = 20_000_000;
 
 #[derive(Clone, Copy)]
@@ -28,12 +29,12 @@ pub struct Configuration {
 pub struct Link<'a> {
     path: &'a Path,
     pub length: f64,
-    /// Places of the front handle where the front cosine changes its sign, and the followers there: they turn round.
+    /// Places of the front handle at which the front cosine changes its sign, and the followers there: they turn round.
     pub stalls: Vec<Configuration>,
-    /// Metres of travel of the front handle where the follower jumps, and whether the jump is too small to be sure. Past
-    /// the first that is sure no handle goes, and nothing is searched.
+    /// Metres of travel of the front handle at which the follower jumps, and true if the jump is too small to be sure.
+    /// No handle goes past the first sure jump, so nothing is searched there.
     pub jumps: Vec<(f64, bool)>,
-    /// Whether the search came to its end.
+    /// True if the search was complete.
     pub complete: bool,
     locked: bool,
     configurations: usize,
@@ -43,7 +44,7 @@ impl<'a> Link<'a> {
     pub fn new(path: &'a Path, length: f64) -> Self {
         let (stalls, jumps) = (Vec::new(), Vec::new());
         let mut link = Self { path, length, stalls, jumps, complete: true, locked: false, configurations: 0 };
-        // Out on the first piece, a line or a spiral that grows ever straighter, the calm has no end.
+        // On the first curve, a line or a spiral that grows ever straighter, the stretch without events has no end.
         let mut from = -length;
         while !link.is_regular(path.place_at(from), path.place_at(from)) {
             from *= 2.0;
@@ -68,8 +69,8 @@ impl<'a> Link<'a> {
         Configuration { front, rear, front_cosine: bench.dot(&tangent), rear_cosine: bench.dot(&rear_tangent) }
     }
 
-    /// A path that turns by less than `MOST` in the 1.4 links behind every front handle: its chord is at least
-    /// 1.4 cos(MOST / 2) > 1 link, and grows all the way. So there is neither stall nor jump.
+    /// Returns true for a path that turns by less than `MOST` in the 1.4 links behind every front handle: its chord is
+    /// at least 1.4 cos(MOST / 2) > 1 link, and grows all the way. So there is neither stall nor jump.
     fn is_regular(&self, from: Param, to: Param) -> bool {
         const MOST: f64 = 1.5;
         self.path.turned(self.path.place_at(from.s - 1.4 * self.length), to) < MOST
@@ -105,11 +106,12 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Whether the follower is certainly continuous between two configurations; the metres in which it stays then.
+    /// Returns the metres in which the follower stays if it is certainly continuous between two configurations.
     ///
-    /// With the front handle at most h from the first one's, what is nearer than link - h there stays nearer than the
-    /// link. From that place back, over `range` metres, the angle between path and bench changes by at most `change`;
-    /// where its cosine stays above half of what it is now, the distance grows all the way, from below the link to more.
+    /// With the front handle at most h from its first place, a place that was nearer than link - h remains nearer than
+    /// the link. From that place back, over `range` metres, the angle between path and bench changes by at most
+    /// `change`. If its cosine stays above half of its value now, the distance grows all the way, from below the link
+    /// to above it.
     fn continuous(&self, configuration: &Configuration, other: &Configuration) -> Option<f64> {
         let size = configuration.front.s.abs() + self.path.point(configuration.front).norm() + self.length;
         let h = (other.front.s - configuration.front.s).abs() + ROUNDINGS * f64::EPSILON * size;
@@ -128,8 +130,8 @@ impl<'a> Link<'a> {
         (across < 0.5 && change < 1.5 && kept && stays).then_some(range)
     }
 
-    /// Whether the front cosine certainly has one sign between two configurations, the follower staying in `range`
-    /// metres.
+    /// Returns true if the front cosine certainly has one sign between two configurations, with the follower within
+    /// `range` metres.
     fn keeps_sign(&self, one: &Configuration, other: &Configuration, range: f64) -> bool {
         let h = other.front.s - one.front.s;
         let change = self.path.turned(one.front, other.front) + 1.1 * (range + h) / (self.length - 2.0 * h);
@@ -137,12 +139,12 @@ impl<'a> Link<'a> {
         (one.front_cosine > 0.0) == (other.front_cosine > 0.0) && margin > change
     }
 
-    /// All stalls of a front handle between two places.
+    /// Returns all stalls of a front handle between two places.
     pub fn stalls_between(&self, low: f64, high: f64) -> impl Iterator<Item = &Configuration> {
         self.stalls.iter().filter(move |configuration| low <= configuration.front.s && configuration.front.s <= high)
     }
 
-    /// The first jump in the list of a front handle between two places.
+    /// Returns the first jump in the list of a front handle between two places.
     pub fn jump_between(&self, low: f64, high: f64) -> Option<&(f64, bool)> {
         self.jumps.iter().find(|(at, _)| low <= *at && *at <= high)
     }

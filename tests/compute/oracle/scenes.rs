@@ -9,7 +9,7 @@ use super::geometry::{Path, RouteSegment, Vector};
 
 pub const FAMILIES: [&str; 6] = ["spiral", "turnaround", "route", "tight bends", "U-turn", "S-bend"];
 
-/// The team and the path of a scene; its head speed is 1 m/s.
+/// Returns the team and the path of a scene; its head speed is 1 m/s.
 pub fn read(text: &str) -> (Team, Path) {
     let scene: Table = text.parse().unwrap();
     let float = |table: &Value, field: &str| {
@@ -68,7 +68,7 @@ impl Random {
         low + (high - low) * (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Every order of magnitude is as likely as any other.
+    /// Returns a number for which every order of magnitude is equally likely.
     fn magnitude(&mut self, low: f64, high: f64) -> f64 {
         self.between(low.ln(), high.ln()).exp()
     }
@@ -81,7 +81,7 @@ impl Random {
 fn team_text(random: &mut Random, benches: f64, head_link: f64, body_link: f64) -> String {
     let width = random.between(0.05, 0.6);
     let inset = random.between(0.0, 0.4);
-    // Ends of boards that reach over half a link overlap at once with those of the next but one: now and then only.
+    // Ends of boards that reach over half a link overlap at once with the next board but one, so they are rare.
     let most = if random.chance(0.9) { 0.45 * head_link.min(body_link) } else { 0.4 };
     let inset = inset.min(most).max(0.001);
     let [head, body] = [head_link, body_link].map(|link| link + 2.0 * inset);
@@ -102,10 +102,10 @@ pub fn arc(radius: f64, turns: f64, left: bool) -> String {
     format!("[[path.pieces]]\nkind = \"arc\"\nradius = {radius:?}\nside = \"{side}\"\nturns = {turns:?}\n")
 }
 
-/// A scene of a family.
+/// Returns a scene of a family.
 pub fn random_scene(family: usize, random: &mut Random) -> String {
     let pieces = "[path]\nkind = \"pieces\"\n";
-    // Head and body links: the paper's, or of any proportions.
+    // Head and body links of the paper, or of any proportions.
     let (head, body) = match random.chance(0.3) {
         true => (2.86, 1.65),
         false => (random.magnitude(0.5, 5.0), random.magnitude(0.5, 5.0)),
@@ -114,7 +114,7 @@ pub fn random_scene(family: usize, random: &mut Random) -> String {
         "spiral" => {
             let (head, body) = (random.magnitude(0.2, 20.0), random.magnitude(0.2, 20.0));
             let pitch = random.magnitude(0.05, 50.0);
-            // Near enough that the way in is no more than some hundred links, far enough that most starts are legal.
+            // Near enough that the way in is at most some hundred links, and far enough that most starts are legal.
             let radius = random.between(0.5, 4.0) * head.max(body) + random.between(0.2, 2.0) * pitch;
             let team = team_text(random, 60.0, head, body);
             format!(
@@ -163,7 +163,7 @@ pub fn random_scene(family: usize, random: &mut Random) -> String {
                     _ => arc(random.magnitude(0.005, 0.3), random.between(0.02, 0.35), random.chance(0.5)),
                 };
             }
-            // A head on a small circle has the team behind it go to and fro.
+            // A head on a small circle makes the team behind it go to and fro.
             text + &match random.chance(0.3) {
                 true => arc(random.magnitude(0.01, 0.3), random.between(1.0, 4.0), random.chance(0.5)),
                 false => line(random.between(1.0, 10.0)),

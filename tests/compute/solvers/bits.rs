@@ -1,8 +1,8 @@
-//! The same bits every time.
+//! Frames have the same bits in every run.
 
 use super::*;
 
-/// A hash of all bits of frames over a show.
+/// Returns a hash of all bits of frames over a show.
 fn hash_of_frames(subject: &Subject, solver: &mut dyn Solver) -> u64 {
     let mut chain = Chain::new(subject.motion.team().handles());
     let mut hash = 0xcbf2_9ce4_8422_2325u64;
@@ -16,9 +16,9 @@ fn hash_of_frames(subject: &Subject, solver: &mut dyn Solver) -> u64 {
     hash
 }
 
-/// The bits of frames, as they were when these hashes were written down: a change that changes a bit shows here.
+/// The bits of frames equal the recorded hashes: a change of any bit fails this test.
 ///
-/// The hashes are for the C library's sine and cosine on x86-64 with FMA, which the making of a table uses.
+/// The hashes hold for the C library's sine and cosine on x86-64 with FMA, which the table's construction uses.
 #[test]
 fn frames_have_the_bits_they_had() {
     let golden: &[(&str, &str, u64)] = &GOLDEN;

@@ -2,13 +2,13 @@
 
 use super::*;
 
-/// Numbers between two others, evenly by magnitude.
+/// Returns numbers between two others, evenly by magnitude.
 fn magnitude(least: f64, most: f64) -> impl Strategy<Value = f64> {
     (least.log10()..most.log10()).prop_map(|exponent| 10f64.powf(exponent))
 }
 
 fn spirals() -> impl Strategy<Value = Subject> {
-    // Links against the pitch, and the start in links from the centre: most of the plain ranges are illegal starts.
+    // Links relative to the pitch, and the start in links from the centre: most of the plain ranges are illegal starts.
     (
         1usize..40,
         magnitude(1e-3, 1e4),
@@ -25,7 +25,7 @@ fn spirals() -> impl Strategy<Value = Subject> {
         .prop_filter("a show of some length", |subject| subject.end > 0.0)
 }
 
-/// Routes and turnarounds, bends down to a third of a link included.
+/// Returns routes and turnarounds, with bends down to a third of a link.
 fn routes() -> impl Strategy<Value = Subject> {
     let step = (0.3..8.0f64, 0.05..0.7f64, any::<bool>(), any::<bool>()).prop_map(|(size, turns, left, line)| {
         let side = if left { Side::Left } else { Side::Right };
@@ -48,7 +48,8 @@ fn routes() -> impl Strategy<Value = Subject> {
     )
 }
 
-/// Routes whose first segment is up to 1,000 km long and ends at the origin of coordinates, at times about its end.
+/// Returns routes whose first segment is up to 1,000 km long and ends at the origin of coordinates, at times near its
+/// end.
 fn routes_from_afar() -> impl Strategy<Value = (Subject, f64)> {
     (magnitude(1e3, 1e6), 0.0..1.0f64, 0.0..0.8f64, 1usize..12, 0.3..3.0f64, 0.0..1.0f64).prop_map(
         |(far, heading_turns, bend, benches, link, share)| {
@@ -60,7 +61,7 @@ fn routes_from_afar() -> impl Strategy<Value = (Subject, f64)> {
             } else {
                 RouteStep::Arc { side: Side::Left, radius: 0.5 * far, turns: 0.5 }
             };
-            // The half circle begins square to the way to its end.
+            // The half circle begins perpendicular to the way to its end.
             let heading_turns = if bend < 0.4 { heading_turns } else { heading_turns - 0.25 };
             let length = if bend < 0.4 { far } else { PI * 0.5 * far };
             let last = RouteStep::Arc { side: Side::Right, radius: size, turns: 0.1 + bend / 2.0 };
@@ -74,7 +75,7 @@ fn routes_from_afar() -> impl Strategy<Value = (Subject, f64)> {
     )
 }
 
-/// A subject at a time of its first 99.5 %.
+/// Returns a subject at a time in its first 99.5 %.
 fn at_some_time(subjects: impl Strategy<Value = Subject>) -> impl Strategy<Value = (Subject, f64)> {
     (subjects, 0.0..0.995f64).prop_map(|(subject, share)| {
         let time = share * subject.end;
@@ -82,7 +83,8 @@ fn at_some_time(subjects: impl Strategy<Value = Subject>) -> impl Strategy<Value
     })
 }
 
-/// Random subjects: every solver at a random time, the velocities as central differences, and how often a table served.
+/// Tests random subjects: every solver at a random time, the velocities as central differences, and the share of table
+/// frames.
 fn random_subjects(cases: u32, subjects: impl Strategy<Value = (Subject, f64)>, least_share_of_tables: f64) {
     let long = std::env::var("BENCH_DRAGON_LONG").is_ok_and(|value| value == "1");
     let cases = if long { 10_000 } else { cases };

@@ -2,7 +2,7 @@
 
 use fastrand::Rng;
 
-/// Numbers at which things break, as people write them.
+/// Numbers at limits, as people write them.
 pub const NUMBERS: [&str; 34] = [
     "0",
     "-0.0",
@@ -40,12 +40,12 @@ pub const NUMBERS: [&str; 34] = [
     "0.1",
 ];
 
-/// One of several things.
+/// Returns one of several values.
 pub fn one<'of, T>(of: &'of [T], random: &mut Rng) -> &'of T {
     &of[random.usize(..of.len())]
 }
 
-/// Changes some bytes, wherever they are: flips, cuts, copies, numbers at their limits.
+/// Changes some bytes anywhere: flips, cuts, copies, numbers at their limits.
 pub fn changed(input: &[u8], random: &mut Rng) -> Vec<u8> {
     let mut bytes = input.to_vec();
     for _ in 0..1 + random.usize(..4) {
@@ -83,9 +83,9 @@ pub fn changed(input: &[u8], random: &mut Rng) -> Vec<u8> {
     bytes
 }
 
-/// Puts another number, or one near it, in the place of one in a text.
+/// Replaces a number in a text by another, or by a nearby one.
 pub fn renumbered(text: &str, random: &mut Rng) -> String {
-    // Where numbers are: runs of what numbers are made of that begin with a digit or a minus.
+    // Places of numbers: runs of characters of numbers that begin with a digit or a minus.
     let bytes = text.as_bytes();
     let is_part = |byte: u8| byte.is_ascii_digit() || b".eE+-".contains(&byte);
     let mut places = Vec::new();

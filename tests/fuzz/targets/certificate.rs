@@ -1,5 +1,5 @@
-//! Certificates of events as `verify` reads them: refused with a sentence, or what they claim is what the ordinary search
-//! finds.
+//! Certificates of events as `verify` reads them: refused with a sentence, or accepted with claims that agree with the
+//! ordinary search.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, OnceLock};
@@ -27,7 +27,7 @@ fn run(data: &[u8]) -> bool {
         return false;
     }
     match verify(data, &mut |_| ()) {
-        // What the file holds may stand in the sentence: the command escapes it.
+        // The sentence may contain text of the file: the command escapes it.
         Err(refused) => {
             let sentence = refused.to_string();
             let line = sentence.strip_prefix("line ").and_then(|rest| rest.split_once(": "));
@@ -39,7 +39,7 @@ fn run(data: &[u8]) -> bool {
         Ok(proved) => {
             assert_eq!(proved.results.len(), 4, "{:?}", proved.results);
             check_steps(data, [proved.steps, proved.links]);
-            // What the program itself does not take as a scene, or would search for long, has no other check.
+            // Scenes that the program refuses, or would search for long, have no other check.
             let Some(timeline) = timeline_of(&proved.scene) else { return true };
             for outcome in &proved.results {
                 assert!(is_true(outcome, &timeline), "accepted, but not true: {outcome:?}");
@@ -49,8 +49,8 @@ fn run(data: &[u8]) -> bool {
     }
 }
 
-/// That as many steps were checked as there are, with the links that they list, and that each begins where the one before
-/// ended.
+/// Asserts that the number of checked steps and links is that of the file, and that each step begins where the step
+/// before ended.
 fn check_steps(data: &[u8], proved: [u64; 2]) {
     let (mut steps, mut links, mut end) = (0, 0, None);
     for line in data.split(|byte| *byte == b'\n').filter(|line| !line.is_empty()) {
@@ -66,7 +66,7 @@ fn check_steps(data: &[u8], proved: [u64; 2]) {
     assert_eq!(proved, [steps, links], "steps and links");
 }
 
-/// What the ordinary search finds in a scene, which it does once; `None` where it would take long.
+/// Returns the events that the ordinary search finds in a scene, searched once; `None` if the search would take long.
 fn timeline_of(text: &str) -> Option<Timeline> {
     static KNOWN: OnceLock<Mutex<HashMap<String, Option<Timeline>>>> = OnceLock::new();
     let mut known = KNOWN.get_or_init(Mutex::default).lock().unwrap_or_else(|error| error.into_inner());
@@ -80,8 +80,8 @@ fn timeline_of(text: &str) -> Option<Timeline> {
     known.get(text).cloned().flatten()
 }
 
-/// Certificates of small scenes of few steps: a line, one on which boards overlap from the start, a bend, and a stall and a
-/// lock on a spiral.
+/// Returns certificates of small scenes of few steps: a line, a line on which boards overlap from the start, a bend,
+/// and a stall and a lock on a spiral.
 fn seeds() -> Vec<Vec<u8>> {
     let line = "kind = \"pieces\"\n[[path.pieces]]\nkind = \"line\"\nlength = 0.1\n";
     let bend = "kind = \"pieces\"\n[[path.pieces]]\nkind = \"arc\"\nradius = 5.0\nside = \"left\"\nturns = 0.01\n";
@@ -116,7 +116,7 @@ fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
         _ => (),
     }
     if random.u8(..3) == 0 {
-        // What is shown of an event, and what is claimed of one.
+        // The data of an event, and the claims about it.
         let is_event = |line: &Value| !["step", "certificate"].contains(&line["type"].as_str().unwrap_or_default());
         let events: Vec<usize> = (0..lines.len()).filter(|at| is_event(&lines[*at])).collect();
         let Some(at) = events.get(random.usize(..events.len().max(1))) else { return changed(data, random) };
@@ -132,7 +132,7 @@ fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
         return texts.iter().map(|line| format!("{line}\n")).collect::<String>().into_bytes();
     }
     for _ in 0..1 + random.usize(..3) {
-        // Lines that an earlier change has left without their fields are not changed by name again.
+        // Lines that have lost their fields in an earlier change are not changed by name again.
         if lines.len() > 6 && lines[0]["scene"].is_string() {
             change(&mut lines, random);
         }
@@ -140,7 +140,7 @@ fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
     lines.iter().map(|line| format!("{line}\n")).collect::<String>().into_bytes()
 }
 
-/// One number of a line that is not whole, times a factor.
+/// Returns a line with one of its numbers that is not whole multiplied by a factor.
 fn scaled(line: &Value, factor: f64, random: &mut Rng) -> Value {
     fn count(value: &Value) -> usize {
         match value {

@@ -1,4 +1,4 @@
-//! Command lines, an argument a line: understood, or refused with a sentence and exit code 2. Nothing is carried out.
+//! Command lines, an argument a line: parsed, or refused with a sentence and exit code 2. No command is executed.
 
 #[path = "../../../src/main.rs"]
 #[allow(dead_code, unused_imports, reason = "the program's sources, of which its command line is used")]
@@ -18,13 +18,13 @@ use super::bytes::{NUMBERS, changed, one, renumbered};
 pub const TARGET: Target =
     Target { name: "command_line", run, seeds, mutate, cases: 4000, hung: Duration::from_secs(5) };
 
-/// Arguments of a case.
+/// Most arguments of a case.
 const MOST_ARGUMENTS: usize = 40;
 
 fn run(data: &[u8]) -> bool {
     let Ok(text) = std::str::from_utf8(data) else { return false };
     let arguments: Vec<&str> = text.lines().take(MOST_ARGUMENTS).collect();
-    // Names of hosts are looked up in the network.
+    // Names of hosts would be looked up in the network.
     if arguments.iter().any(|argument| argument.starts_with("--to") || *argument == "send") && !is_numeric(&arguments) {
         return false;
     }
@@ -41,7 +41,7 @@ fn run(data: &[u8]) -> bool {
     }
 }
 
-/// Numbers that a person gives to an option, wherever it stands: its name, from, to.
+/// Numbers that a person gives to an option, of any command: its name, from, to.
 const RANGES: [(&str, f64, f64); 7] = [
     ("duration", 5e-324, 1e9),
     ("realtime", 1.0, 99.0),
@@ -52,7 +52,7 @@ const RANGES: [(&str, f64, f64); 7] = [
     ("max_skipped", 0.0, 1.0),
 ];
 
-/// That what was accepted is within its range, and a time what it says.
+/// Asserts that accepted values are within their ranges, and that a time equals its text.
 fn check_values(matches: &clap::ArgMatches) {
     if let Some((_, of)) = matches.subcommand() {
         check_values(of);
@@ -77,14 +77,14 @@ fn check_refusal(error: &clap::Error, arguments: &[&str]) {
     assert!([0, 2].contains(&error.exit_code()) && !shown.is_empty(), "{arguments:?}: {shown}");
     assert_eq!(error.exit_code() == 0, !error.use_stderr(), "{arguments:?}: {shown}");
     if error.kind() == ErrorKind::ValueValidation {
-        // Which value of what, and what is wrong with it.
+        // The sentence names the value and its option, and gives the error.
         let reason = shown.split_once(">': ").or_else(|| shown.split_once("': ")).map(|(_, reason)| reason.trim());
         let is_one = reason.is_some_and(|reason| !reason.is_empty() && !reason.starts_with("For more"));
         assert!(is_one, "{arguments:?}: {shown}");
     }
 }
 
-/// Whether no argument that could be a host is a name.
+/// Returns true if no argument that could be a host is a name.
 fn is_numeric(arguments: &[&str]) -> bool {
     let is_host = |text: &&&str| text.contains(':') || text.contains("--to");
     arguments
@@ -95,12 +95,12 @@ fn is_numeric(arguments: &[&str]) -> bool {
         && !arguments.windows(2).any(|pair| pair[0] == "--to" && !pair[1].starts_with(|c: char| c.is_ascii_digit()))
 }
 
-/// What command lines are made of.
+/// The words of command lines.
 struct Words {
     /// Every subcommand, a line each: `send` and `psn`.
     commands: Vec<String>,
     options: Vec<String>,
-    /// Each subcommand with each option of its own.
+    /// Each subcommand with each of its options.
     pairs: Vec<String>,
 }
 

@@ -1,7 +1,7 @@
-//! Control requests as the bytes that a client writes, through the queues of a door to the clock of a show.
+//! Control requests as the bytes that a client writes, through the command queues to the clock of a show.
 //!
-//! The first byte chooses how the show is played; then follow requests (a `ControlRequest`, 24 bytes), each with one byte
-//! that tells how many periods later it comes.
+//! The first byte selects how the show is played. Requests follow (a `ControlRequest`, 24 bytes), each with a byte for
+//! the number of periods until the request arrives.
 
 use std::sync::OnceLock;
 use std::time::Duration;
@@ -11,6 +11,7 @@ use bench_dragon::messages::state::PlaybackState;
 use bench_dragon::messages::{ControlRequest, ControlResponse};
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::publisher::live::control::{Answer, Doors, door};
+use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::ros2::Mapping;
 use bench_dragon::show::convert::control_response;
 use bench_dragon::show::scene::{AtEnd, OnContact, Scene};
@@ -22,13 +23,13 @@ use super::bytes::{NUMBERS, changed, one};
 
 pub const TARGET: Target = Target { name: "control", run, seeds, mutate, cases: 20_000, hung: Duration::from_secs(10) };
 
-/// Bytes of a request, and of one with its periods.
+/// Bytes of a request, and of a request with its periods.
 const REQUEST: usize = size_of::<ControlRequest>();
 const STEP: usize = REQUEST + 1;
-/// Requests of a case.
+/// Most requests of a case.
 const MOST_REQUESTS: usize = 200;
 
-/// The scene, with a cue at which it pauses or without.
+/// Returns the scene, with or without a cue at which it pauses.
 fn scene(pauses: bool) -> &'static (Scene, Timeline) {
     static SCENES: [OnceLock<(Scene, Timeline)>; 2] = [OnceLock::new(), OnceLock::new()];
     SCENES[usize::from(pauses)].get_or_init(|| {
@@ -57,16 +58,18 @@ fn run(data: &[u8]) -> bool {
         paused: bit(4),
         start: if bit(5) { 3.0 } else { 0.0 },
     };
-    let mut show = Show::new(scene, timeline.clone(), playback).expect("a start before the end");
+    let show = Show::new(scene, timeline.clone(), playback).expect("a start before the end");
+    let mut show = ShowSource::new(show);
     let (port, mut door) = door();
     let mut doors = Doors::new(vec![port]);
     let (mut tick, mut epoch, mut held_at) = (0u64, 0u32, None);
-    // Commands without an answer, by their tickets.
+    // Unanswered commands, by their tickets.
     let mut sent: Vec<(u64, u64, Command, Option<Code>)> = Vec::new();
     for step in requests.chunks_exact(STEP).take(MOST_REQUESTS) {
         let request = request(&step[..REQUEST]);
         check_mappings(&step[..REQUEST]);
-        // As the door over shared memory passes it on: what cannot be understood is answered with how the show stands.
+        // As the command queue over shared memory passes it on: the answer to an unknown command is the state of the
+        // show.
         let (command, instead) = match Command::of_number(request.command, request.value) {
             Ok(command) => (command, None),
             Err(code) => (Command::State, Some(code)),
@@ -78,10 +81,10 @@ fn run(data: &[u8]) -> bool {
         let before = tick;
         tick = tick.saturating_add(if periods < 200 { periods + 1 } else { 1 << (periods - 200).min(40) });
         doors.take_one(&mut show, tick);
-        let frame = show.frame(tick);
+        let frame = show.show.frame(tick);
         assert!((0.0..=20.0).contains(&frame.sim_time), "{} s at tick {tick}", frame.sim_time);
         assert!(frame.chain.x.iter().chain(&frame.chain.y).all(|number| number.is_finite()));
-        // In so many periods it may have come round.
+        // After more periods the epoch may have wrapped around.
         let is_short = tick - before < 1 << 30;
         assert!(!is_short || frame.epoch.wrapping_sub(epoch) < u32::MAX / 2, "the epoch goes back");
         assert!(frame.time_scale == 0.0 || (1e-6..=1e6).contains(&frame.time_scale), "{} x", frame.time_scale);
@@ -89,7 +92,7 @@ fn run(data: &[u8]) -> bool {
         assert!(is_moving || frame.chain.vx.iter().all(|speed| *speed == 0.0), "{:?} moves", frame.playback);
         epoch = frame.epoch;
         if frame.playback == PlaybackState::Held {
-            // Nothing moves a show that is held.
+            // A held show does not move.
             assert_eq!(*held_at.get_or_insert(frame.sim_time), frame.sim_time, "tick {tick}: {command:?}");
             assert_eq!(frame.time_scale, 0.0);
         } else {
@@ -98,7 +101,7 @@ fn run(data: &[u8]) -> bool {
         doors.finish_step(&mut show, tick);
         while let Some(Answer { ticket, outcome }) = door.answer() {
             let of_ticket =
-                sent.iter().position(|(sent, ..)| *sent == ticket).expect("an answer to what was sent, once");
+                sent.iter().position(|(sent, ..)| *sent == ticket).expect("one answer to a command that was sent");
             let (_, id, command, instead) = sent.remove(of_ticket);
             let code = instead.unwrap_or(outcome.code);
             let response: ControlResponse = control_response(id, &Outcome { code, ..outcome });
@@ -109,14 +112,14 @@ fn run(data: &[u8]) -> bool {
                 assert_eq!(outcome.sim_time, time, "a seek");
             }
         }
-        // A step is answered once it is over.
+        // A step is answered once it is complete.
         let is_step = |(.., command, _): &(u64, u64, Command, Option<Code>)| matches!(command, Command::Step(_));
         assert!(sent.len() <= 1 && sent.iter().all(is_step), "no answer to {sent:?}");
     }
     true
 }
 
-/// The same bytes as a request over ROS 2, in both mappings: no request of the one is ever read in the other.
+/// Checks the same bytes as a request over ROS 2, in both mappings: no request of one mapping is read in the other.
 fn check_mappings(bytes: &[u8]) {
     for length in 0..=bytes.len() {
         for lengths in [&[1][..], &[8], &[1, 8]] {

@@ -1,4 +1,5 @@
-//! Environment variables, a line each (`ROS_DOMAIN_ID=7`), and names: honoured, or refused with a sentence that names them.
+//! Environment variables, a line each (`ROS_DOMAIN_ID=7`), and names: applied, or refused with a sentence that names
+//! them.
 
 use std::time::Duration;
 
@@ -57,7 +58,7 @@ fn run(data: &[u8]) -> bool {
             let domain = set("ROS_DOMAIN_ID").map_or(Ok(0), |text| text.trim().parse::<i128>());
             assert_eq!(domain, Ok(i128::from(network.domain)));
             assert!(network.domain <= 232 && set("ROS_STATIC_PEERS").is_none(), "{network:?}");
-            // Whoever asks for this machine alone gets no more.
+            // A setting for this machine alone allows no other range.
             let alone = set("ROS_LOCALHOST_ONLY").is_some_and(|value| value.trim() == "1");
             assert!(!alone || network.range == Range::Localhost, "{network:?}");
             assert!(network.sentence().contains(&network.domain.to_string()));
@@ -70,7 +71,7 @@ fn run(data: &[u8]) -> bool {
     let (_, warning) = Mapping::of(variable);
     assert!(warning.is_none_or(|text| text.contains("RMW_IMPLEMENTATION")));
     assert!(other_distribution(variable).is_none_or(|text| text.contains("ROS_DISTRO")));
-    // The rest of each line as a name.
+    // The rest of each line is used as a name.
     for (_, name) in lines {
         if check_name(name).is_ok() {
             assert!(name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"_/".contains(&byte)), "{name}");

@@ -1,7 +1,7 @@
-//! The small log as `verify` reads it: a verdict that is true, or the line that is wrong.
+//! The small log as `verify` reads it: a true verdict, or the line with the error.
 //!
-//! What `verify` calls the same is written again from its show and its commands, by this file's own hand: lines, checks and
-//! hashes by docs/recordings.md.
+//! If `verify` reports the same bits, this file writes the log again from its show and its commands with code of its
+//! own: lines, checks and hashes by docs/recordings.md.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, OnceLock};
@@ -24,11 +24,11 @@ use super::scene::is_quick;
 
 pub const TARGET: Target = Target { name: "log", run, seeds, mutate, cases: 5000, hung: Duration::from_secs(30) };
 
-/// What stands before a line's check.
+/// Text before a line's check.
 const CHECK: &str = ",\"check\":\"";
-/// Lines of a log that is played: each can be a second of the show.
+/// Most lines of a log that is played: each can be a second of the show.
 const MOST_LINES: usize = 40;
-/// Frames that a second may have here.
+/// Most frames per second here.
 const MOST_FRAMES: f64 = 1000.0;
 
 fn run(data: &[u8]) -> bool {
@@ -59,7 +59,7 @@ fn run(data: &[u8]) -> bool {
     }
 }
 
-/// The lines that are whole, as far as their checks are right.
+/// Returns the complete lines, up to the first wrong check.
 fn sealed_lines(data: &[u8]) -> Vec<Line> {
     let mut hasher = blake3::Hasher::new();
     let mut lines = Vec::new();
@@ -78,14 +78,14 @@ fn sealed_lines(data: &[u8]) -> Vec<Line> {
     lines
 }
 
-/// Whether the show of a log is played within a moment; what is to be refused always is.
+/// Returns true if the show of a log is played within a moment; logs to be refused always are.
 fn is_short(lines: &[Line]) -> bool {
     let Some(Line::Show(show)) = lines.first() else { return true };
     !(show.rate > MOST_FRAMES && show.rate <= 20_000.0)
         && show.scene_text("fuzz").parse().map_or(true, |scene| is_quick(&scene))
 }
 
-/// That a log which was not refused is one that a run can have written, and if it is the same, the one of this run.
+/// Asserts that a log which was not refused can come from a run, and if its bits are the same, from this run.
 fn check_accepted(lines: &[Line], verdict: &Verdict) {
     let Some((Line::Show(show), rest)) = lines.split_first() else { panic!("no show, and {verdict:?}") };
     let Playback { rate, time_scale, end_hold, .. } = show.playback().expect("on_contact and at_end");
@@ -96,11 +96,11 @@ fn check_accepted(lines: &[Line], verdict: &Verdict) {
         return;
     }
     let end = rest.iter().position(|line| matches!(line, Line::End { .. } | Line::Stopped { .. }));
-    assert!(end.is_none_or(|at| at + 1 == rest.len()), "something stands behind the end: {rest:?}");
+    assert!(end.is_none_or(|at| at + 1 == rest.len()), "lines follow the end: {rest:?}");
     assert_eq!(verdict.complete, matches!(rest.last(), Some(Line::End { .. })), "{rest:?}");
-    // Each tick once, in order.
+    // Each tick comes once, in order.
     let (mut next, mut frames, mut skipped, mut lost, mut seconds) = (0, 0, 0, 0, 0);
-    // Ticks of commands; and what counts: frames and commands before the end of a second that has its hash.
+    // Ticks of commands; and the compared parts: frames and commands before the end of a second that has its hash.
     let (mut commands, mut compared) = (Vec::new(), (0, 0));
     for line in rest {
         match line {
@@ -138,14 +138,14 @@ fn check_accepted(lines: &[Line], verdict: &Verdict) {
     }
 }
 
-/// That the seconds of a log are those of its show.
+/// Asserts that the seconds of a log are those of its show.
 fn check_same(show: &ShowLine, lines: &[Line]) {
     let playback = show.playback().expect("it was played");
     let mut again = Writer::new(show, playback);
     for line in lines {
         match line {
             Line::Command { tick, command, value, .. } => {
-                let number = Command::NAMES.iter().position(|name| name == command).expect("a command") as u32;
+                let number = Command::named(command).expect("a command").number;
                 let command = Command::of_number(number, value.unwrap_or(f64::NAN)).expect("a command");
                 again.command(*tick, command);
             }
@@ -157,7 +157,7 @@ fn check_same(show: &ShowLine, lines: &[Line]) {
             Line::Second(SecondLine { to, .. }) => {
                 again.play_to(to + 1, true);
                 let own = again.second();
-                assert_eq!(serde_json::to_value(&own).ok(), serde_json::to_value(line).ok(), "said to be the same");
+                assert_eq!(serde_json::to_value(&own).ok(), serde_json::to_value(line).ok(), "reported as the same");
             }
             _ => (),
         }
@@ -170,7 +170,7 @@ struct Writer {
     rate: f64,
     tick: u64,
     sequence: u64,
-    /// The ticks since the latest hash that are in the next.
+    /// The ticks since the latest hash that are part of the next one.
     hashed: Vec<u64>,
     hasher: blake3::Hasher,
     last: (f64, Vec<(u32, f64, f64)>),
@@ -234,7 +234,7 @@ impl Writer {
         }
     }
 
-    /// The line of the second that is over.
+    /// Returns the line of the second that has ended.
     fn second(&mut self) -> Line {
         let ticks = std::mem::take(&mut self.hashed);
         let (from, to) = (ticks.first().copied().unwrap_or(0), ticks.last().copied().unwrap_or(0));
@@ -245,7 +245,7 @@ impl Writer {
     }
 }
 
-/// The timeline of a scene, which is searched once.
+/// Returns the timeline of a scene, searched once.
 fn timeline(text: &str, scene: &Scene) -> Timeline {
     static KNOWN: OnceLock<Mutex<HashMap<String, Timeline>>> = OnceLock::new();
     let mut known = KNOWN.get_or_init(Mutex::default).lock().unwrap_or_else(|error| error.into_inner());
@@ -259,7 +259,7 @@ fn timeline(text: &str, scene: &Scene) -> Timeline {
     known.entry(text.to_owned()).or_insert_with(search).clone()
 }
 
-/// A log of these lines, each with a right check.
+/// Returns a log of these lines, each with a correct check.
 fn sealed(bodies: &[String]) -> Vec<u8> {
     let (mut hasher, mut log) = (blake3::Hasher::new(), Vec::new());
     for body in bodies {
@@ -277,7 +277,7 @@ fn body(line: &Line) -> String {
     text
 }
 
-/// Logs of this machine's arithmetic: of some seconds, with commands, skipped periods and lost frames.
+/// Returns logs of some seconds in this machine's arithmetic, with commands, skipped periods and lost frames.
 fn seeds() -> Vec<Vec<u8>> {
     let path = "[path]\nkind = \"pieces\"\n[[path.pieces]]\nkind = \"line\"\nlength = 3.0\n";
     let alerts = "[alerts]\napproach_time = 2.0\n";
@@ -317,7 +317,7 @@ fn seeds() -> Vec<Vec<u8>> {
     logs
 }
 
-/// The log of four seconds; of one with gaps, ticks 6 and 7 are skipped and ticks 12 and 13 lost.
+/// Returns the log of four seconds; with `gap`, ticks 6 and 7 are skipped and ticks 12 and 13 lost.
 fn log_of(show: &ShowLine, playback: Playback, commands: &[(u64, Command)], gap: bool) -> Vec<u8> {
     let mut writer = Writer::new(show, playback);
     let mut bodies = vec![body(&Line::Show(Box::new(show.clone())))];
@@ -379,7 +379,7 @@ fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
                     1 => Line::Lost { from, to },
                     2 => Line::Stopped { tick },
                     _ => {
-                        let command = (*one(&Command::NAMES, random)).to_owned();
+                        let command = one(&Command::TABLE, random).name.to_owned();
                         Line::Command { tick, command, value: Some(3.0), code: Some("done".to_owned()) }
                     }
                 };
@@ -393,14 +393,14 @@ fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
     sealed(&bodies)
 }
 
-/// Puts a number at a border, or none, or a text, in the place of a field's value.
+/// Replaces the value of a field by a limit, null, or a text.
 fn revalued(body: &str, random: &mut Rng) -> String {
     let Ok(Value::Object(mut fields)) = serde_json::from_str(&format!("{body}}}")) else {
         return body.to_owned();
     };
     let Some(name) = fields.keys().nth(random.usize(..fields.len().max(1))).cloned() else { return body.to_owned() };
     if let Some(Value::Array(list)) = fields.get_mut(&name).filter(|_| random.bool()) {
-        // A list that is shorter, longer, in another order, empty.
+        // A list that is shorter, longer, reordered, or empty.
         let (at, other) = (random.usize(..list.len().max(1)), random.usize(..list.len().max(1)));
         match random.u8(..4) {
             0 => list.truncate(at),
@@ -443,7 +443,7 @@ fn revalued(body: &str, random: &mut Rng) -> String {
     unclosed(fields)
 }
 
-/// A line without its end, before which its check comes.
+/// Returns a line without its end, to which its check is added.
 fn unclosed(fields: Map<String, Value>) -> String {
     let mut text = Value::Object(fields).to_string();
     text.pop();

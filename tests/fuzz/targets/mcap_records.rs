@@ -1,11 +1,11 @@
-//! The records of an MCAP file, taken apart by its specification and put together again with what the format counts made
-//! right: lengths, checks, indexes. Written without the library that the program reads with.
+//! The records of an MCAP file, parsed by its specification and written again with correct lengths, checks and indexes.
+//! Written without the library that the program reads with.
 
 use std::collections::BTreeMap;
 
 pub const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
-/// Numbers of records.
+/// Opcodes of records.
 pub const FOOTER: u8 = 2;
 pub const SCHEMA: u8 = 3;
 pub const CHANNEL: u8 = 4;
@@ -27,11 +27,11 @@ const MESSAGE_HEAD: usize = 22;
 pub struct Record {
     pub opcode: u8,
     pub body: Vec<u8>,
-    /// The records of a chunk that is not compressed.
+    /// The records of an uncompressed chunk.
     pub inner: Option<Vec<Record>>,
 }
 
-/// What a message is known by.
+/// The identity of a message.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Known {
     pub sequence: u32,
@@ -39,17 +39,17 @@ pub struct Known {
     pub data: Vec<u8>,
 }
 
-/// What is put wrong in a file that is right in all else.
+/// The one error in an otherwise correct file.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Wrong {
     Nothing,
     /// A chunk's check.
     Check,
-    /// Where the index has a chunk.
+    /// The offset of a chunk in the index.
     Offset(u64),
-    /// How long the index says that a chunk is.
+    /// The length of a chunk in the index.
     Length(u64),
-    /// How many messages there are said to be.
+    /// The number of messages in the statistics.
     Counts(u64),
     /// There is no index.
     NoIndex,
@@ -63,7 +63,7 @@ fn number<const BYTES: usize>(bytes: &[u8], at: usize) -> Option<u64> {
     Some(u64::from_le_bytes(number))
 }
 
-/// The records in some bytes, and whether these end with the last.
+/// Returns the records in some bytes, and true if the bytes end with the last record.
 fn records(mut bytes: &[u8]) -> (Vec<Record>, bool) {
     let mut records = Vec::new();
     while let Some((head, rest)) = bytes.split_at_checked(9) {
@@ -76,7 +76,7 @@ fn records(mut bytes: &[u8]) -> (Vec<Record>, bool) {
     (records, bytes.is_empty())
 }
 
-/// The records of a chunk without compression.
+/// Returns the records of an uncompressed chunk.
 fn inner(body: &[u8]) -> Option<Vec<Record>> {
     let compression = number::<4>(body, 28)?;
     let length = number::<8>(body, 32)?;
@@ -84,10 +84,10 @@ fn inner(body: &[u8]) -> Option<Vec<Record>> {
     (compression == 0 && length == body.len() as u64 - 40 && whole).then_some(inner)
 }
 
-/// The records of a file before its index; `None` where it does not begin as one.
+/// Returns the records of a file before its index; `None` if it does not begin as an MCAP file.
 pub fn parsed(data: &[u8]) -> Option<Vec<Record>> {
     let (mut records, _) = records(data.strip_prefix(MAGIC)?);
-    // One of another length is damaged, and ends nothing.
+    // A record of another length is damaged, and does not end the data.
     if let Some(end) =
         records.iter().position(|record| record.opcode == DATA_END && record.body.len() == DATA_END_BYTES)
     {
@@ -96,8 +96,8 @@ pub fn parsed(data: &[u8]) -> Option<Vec<Record>> {
     Some(records)
 }
 
-/// The messages of a file of which every chunk is whole, can be read and comes with its messages: those in chunks, and
-/// those before the first chunk. `None` for any other file.
+/// Returns the messages in chunks and those before the first chunk of a file whose every chunk is whole, readable and
+/// complete. Returns `None` for any other file.
 pub fn messages(data: &[u8]) -> Option<Vec<Known>> {
     let records = parsed(data)?;
     // No record has this opcode.
@@ -132,7 +132,7 @@ fn known(body: &[u8]) -> Option<Known> {
     Some(Known { sequence, times: [number::<8>(body, 6)?, number::<8>(body, 14)?], data })
 }
 
-/// The check of MCAP, byte by byte.
+/// Returns the check of MCAP, computed byte by byte.
 fn crc32(bytes: &[u8]) -> u32 {
     const BYTES: [u32; 256] = {
         let mut table = [0; 256];
@@ -157,7 +157,7 @@ fn put(out: &mut Vec<u8>, opcode: u8, body: &[u8]) {
     out.extend(body);
 }
 
-/// A chunk of these records, and where in it the messages of each channel are.
+/// Returns a chunk of these records, and the places of each channel's messages in it.
 #[expect(clippy::type_complexity, reason = "channel, then time and place, as the format has them")]
 fn chunk(inner: &[Record], wrong: Wrong) -> (Vec<u8>, [u64; 2], BTreeMap<u16, Vec<(u64, u64)>>) {
     let (mut bytes, mut index) = (Vec::new(), BTreeMap::<u16, Vec<(u64, u64)>>::new());
@@ -182,7 +182,7 @@ fn chunk(inner: &[Record], wrong: Wrong) -> (Vec<u8>, [u64; 2], BTreeMap<u16, Ve
     (body, span, index)
 }
 
-/// The file of these records, with an index of what is in it.
+/// Returns the file of these records, with an index of its content.
 pub fn written(records: &[Record], wrong: Wrong) -> Vec<u8> {
     let mut file = MAGIC.to_vec();
     let (mut kinds, mut indexes) = (BTreeMap::new(), Vec::new());

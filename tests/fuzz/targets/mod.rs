@@ -1,8 +1,9 @@
-//! The fuzz targets: one function each, from bytes that anyone can write or send to a panic where something is wrong.
+//! The fuzz targets: one function each, from bytes that any user or client can write or send to a panic if there is an
+//! error.
 //!
-//! `tests/fuzz/main.rs` calls them with a fixed number of seeded cases, `fuzz/fuzz_targets/` from libFuzzer. Besides its
-//! function a target has the inputs to begin with, and a way to change one that keeps what random bytes would never get
-//! right: TOML, checks, lengths, masks.
+//! `tests/fuzz/main.rs` calls them with a fixed number of seeded cases, `fuzz/fuzz_targets/` from libFuzzer. Besides
+//! its function a target has initial inputs, and a way to change an input that keeps parts which random bytes would
+//! never get right: TOML, checks, lengths, masks.
 
 pub mod bytes;
 pub mod certificate;
@@ -26,17 +27,17 @@ use fastrand::Rng;
 
 /// A target.
 pub struct Target {
-    /// Its name, which is that of its folder in the corpus and of its file in `fuzz/fuzz_targets`.
+    /// Its name, which is also the name of its folder in the corpus and of its file in `fuzz/fuzz_targets`.
     pub name: &'static str,
-    /// Panics where something is wrong. Whether the input got in: it was not refused at once.
+    /// Panics if there is an error. Returns true if the input was accepted, that is, not refused at once.
     pub run: fn(&[u8]) -> bool,
-    /// What to begin with, besides the corpus.
+    /// Returns the initial inputs, besides the corpus.
     pub seeds: fn() -> Vec<Vec<u8>>,
-    /// Another input from one that there is.
+    /// Returns a changed input.
     pub mutate: fn(&[u8], &mut Rng) -> Vec<u8>,
-    /// Cases that a second has room for, roughly: how many are run.
+    /// Number of cases, about as many as run in a second.
     pub cases: u64,
-    /// After so long a case has hung: some hundred times the slowest, for a machine that is busy.
+    /// Time after which a case counts as hung: some hundred times the slowest case, for a busy machine.
     pub hung: Duration,
 }
 

@@ -1,7 +1,8 @@
-//! What a browser, or anybody, sends to `view` over a connection: HTTP, the WebSocket's frames, the messages in them.
+//! Requests of browsers and other clients to `view` over a connection: HTTP, the WebSocket's frames, the messages in
+//! them.
 //!
-//! A real server answers, with commands behind a token that nobody has, and a folder of pages beside which lies a file that
-//! is not to be served.
+//! A real server answers. Its commands are behind a token that no client has, and beside its folder of pages is a file
+//! that must not be served.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpStream};
@@ -23,11 +24,11 @@ const SECRET: &str = "this file is not to be served";
 /// Seconds after which a server that neither answers nor hangs up has hung.
 const HUNG: Duration = Duration::from_secs(30);
 
-/// The server, for as long as the process lives.
+/// Starts the server, which runs until the process ends, and returns its address.
 fn address() -> SocketAddr {
     static ADDRESS: OnceLock<SocketAddr> = OnceLock::new();
     *ADDRESS.get_or_init(|| {
-        // One for all runs: nobody is left who could remove one of this run.
+        // One for all runs: no process remains that could remove a folder of this run.
         let folder =
             option_env!("CARGO_TARGET_TMPDIR").map_or_else(std::env::temp_dir, PathBuf::from).join("fuzz_page");
         let pages = folder.join("pages");
@@ -60,7 +61,7 @@ fn address() -> SocketAddr {
 fn run(data: &[u8]) -> bool {
     let mut connection = TcpStream::connect(address()).expect("the server listens");
     connection.set_read_timeout(Some(HUNG)).expect("a timeout");
-    // A server that hangs up early takes no more.
+    // A server that hangs up early reads no more.
     let _ = connection.write_all(data);
     let _ = connection.shutdown(Shutdown::Write);
     let mut answer = Vec::new();
@@ -74,18 +75,18 @@ fn run(data: &[u8]) -> bool {
     if text.starts_with("HTTP/1.1 101") {
         check_upgraded(data, &answer);
     }
-    // Without the token nobody commands.
+    // Without the token no client can send commands.
     assert!(!text.contains("\"allowed\":true") && !text.contains("\"code\":\"done\""), "{text}");
     true
 }
 
-/// What is promised of a connection that became a WebSocket.
+/// Checks the promises about a connection that became a WebSocket.
 fn check_upgraded(data: &[u8], answer: &[u8]) {
     let (head, sent) = data.split_at(head_end(data));
     let head = String::from_utf8_lossy(head).into_owned();
     let origin = head.lines().find(|line| line.starts_with("Origin: "));
     assert!(!origin.is_some_and(|line| FOREIGN.contains(&line)), "let in: {head}");
-    // What the request itself has for a body is no message; of lines that end otherwise nothing more is asked.
+    // The body of the request itself is no message; requests with other line ends are not checked further.
     let has_own_end = head.lines().count() != head.split("\r\n").count() - 1 || head.replace("\r\n", "").contains('\r');
     let head = head.to_ascii_lowercase();
     if has_own_end || head.contains("transfer-encoding") || head.contains("content-length") {
@@ -96,7 +97,7 @@ fn check_upgraded(data: &[u8], answer: &[u8]) {
         .map(|(_, text)| serde_json::from_slice(&text).unwrap_or_else(|error| panic!("{error} in {text:?}")))
         .filter(|json: &Value| ["control", "answer", "clock"].contains(&json["type"].as_str().unwrap_or_default()))
         .collect();
-    // Of what breaks the rules of WebSockets somewhere nothing more is asked.
+    // Input that breaks the rules of WebSockets anywhere is not checked further.
     let (frames, rest) = frames(sent, true);
     let is_regular = |(first, text): &(u8, Vec<u8>)| match first {
         0x81 => text.len() <= 1024 && std::str::from_utf8(text).is_ok(),
@@ -107,13 +108,13 @@ fn check_upgraded(data: &[u8], answer: &[u8]) {
         return;
     }
     let asked: Vec<Vec<u8>> = frames.into_iter().filter(|frame| frame.0 == 0x81).map(|frame| frame.1).collect();
-    // Whether this one may command comes first, unasked.
+    // The first message tells if this client may send commands.
     assert_eq!(answers.len(), asked.len() + 1, "{answers:?} to {}", String::from_utf8_lossy(sent));
     for (asked, answer) in asked.iter().zip(&answers[1..]) {
         assert_eq!(asked == b"clock", answer["type"] == "clock", "{answer}");
         let text = String::from_utf8_lossy(asked);
         let Ok(Value::Object(asked)) = serde_json::from_str(&text) else { continue };
-        // Of what has a name twice no more is asked.
+        // Messages that repeat a name are not checked further.
         let is_once = |name: &&str| text.matches(&format!("\"{name}\"")).count() <= 1;
         let is_command = ["command", "value", "id"].iter().all(is_once)
             && asked.get("command").is_some_and(Value::is_string)
@@ -127,15 +128,16 @@ fn check_upgraded(data: &[u8], answer: &[u8]) {
     }
 }
 
-/// Where the head of a request or an answer ends: behind the first empty line, of which the carriage return may be missing.
+/// Returns the end of the head of a request or an answer: after the first empty line, whose carriage return may be
+/// missing.
 fn head_end(bytes: &[u8]) -> usize {
     let after =
         |line_end: &[u8]| bytes.windows(line_end.len()).position(|some| some == line_end).map(|at| at + line_end.len());
     [after(b"\n\n"), after(b"\n\r\n")].into_iter().flatten().min().unwrap_or(bytes.len())
 }
 
-/// The WebSocket's frames that some bytes begin with, masked as a client's or not as a server's: the first byte and the content
-/// of each; and the bytes behind them.
+/// Returns the WebSocket frames at the start of some bytes, masked as a client's or not masked as a server's: the first
+/// byte and the content of each, and the remaining bytes.
 fn frames(mut bytes: &[u8], masked: bool) -> (Vec<(u8, Vec<u8>)>, &[u8]) {
     let mut frames = Vec::new();
     while let Some(([first, length], rest)) = bytes.split_first_chunk() {
@@ -159,7 +161,7 @@ fn frames(mut bytes: &[u8], masked: bool) -> (Vec<(u8, Vec<u8>)>, &[u8]) {
     (frames, bytes)
 }
 
-/// Of whom nobody is let in.
+/// Origins that the server refuses.
 const FOREIGN: [&str; 2] = ["Origin: null", "Origin: http://evil.example"];
 
 const PATHS: [&str; 16] = [
@@ -224,17 +226,17 @@ fn request(path: &str, headers: &[&str]) -> Vec<u8> {
     format!("GET {path} HTTP/1.1\r\n{}\r\n\r\n", headers.join("\r\n")).into_bytes()
 }
 
-/// A handshake that is accepted.
+/// Returns a handshake that is accepted.
 fn handshake() -> Vec<u8> {
     handshake_with("/frames?rate=30", "X: y")
 }
 
-/// One with another path, and one header that may change that.
+/// Returns a handshake with another path, and one header that may change the result.
 fn handshake_with(path: &str, header: &str) -> Vec<u8> {
     request(path, &[header, "Host: localhost", HEADERS[9], HEADERS[10], HEADERS[11], HEADERS[12]])
 }
 
-/// A WebSocket frame of a client, masked with zeros.
+/// Returns a WebSocket frame of a client, masked with zeros.
 fn frame(opcode: u8, payload: &[u8]) -> Vec<u8> {
     let mut frame = vec![0x80 | opcode];
     match payload.len() {

@@ -1,4 +1,4 @@
-//! MCAP files: what `record --recover` mends can be read, and what `replay` takes is played to its end.
+//! MCAP files: output of `record --recover` can be read, and files that `replay` accepts are played to their end.
 
 use std::fs::File;
 use std::io::{Cursor, Write};
@@ -7,10 +7,11 @@ use std::os::fd::AsRawFd;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use bench_dragon::publisher::live::{Frames, Period};
+use bench_dragon::publisher::live::{FrameSource, Outgoing, Period};
 use bench_dragon::recording::mcap::reader::{Item, Recording, frame_of};
 use bench_dragon::recording::mcap::recover::{RecoverError, Recovered, check_magic, recover};
 use bench_dragon::recording::replay::{Pace, Prepared, ReplayOptions};
+use bench_dragon::show::convert::Stamps;
 use bench_dragon::show::scene::Accepted;
 use fastrand::Rng;
 use mcap::records::MessageHeader;
@@ -25,11 +26,11 @@ use super::mcap_records::{
 
 pub const TARGET: Target = Target { name: "recording", run, seeds, mutate, cases: 3000, hung: Duration::from_secs(30) };
 
-/// The recording of which the smaller ones are made.
+/// The recording from which the smaller ones are made.
 const RECORDED: &[u8] = include_bytes!("../corpus/recording/small.mcap");
-/// Periods of a replay that are waited for: in each the thread that reads has a while.
+/// Most periods of a replay that the test waits for: each gives the reading thread some time.
 const MOST_PERIODS: u64 = 5000;
-/// Frames per second of the replay: two seconds of them are read ahead.
+/// Frames per second of the replay: two seconds of frames are read ahead.
 const RATE: f64 = 10.0;
 
 fn run(data: &[u8]) -> bool {
@@ -63,12 +64,12 @@ fn run(data: &[u8]) -> bool {
     }
 }
 
-/// Mending is done once, and keeps every message of every whole chunk and none besides.
+/// Asserts that mending a mended file changes nothing, and that mending keeps exactly the messages of whole chunks.
 fn check_mended(recovered: &Recovered, mended: &[u8], whole: Option<&[Known]>) {
-    let (again, _) = mend(mended).expect("what was mended is a recording");
+    let (again, _) = mend(mended).expect("a mended file is a recording");
     assert!(again.whole && again.damaged == 0 && again.lost_bytes == 0, "{again:?} after {recovered:?}");
     assert_eq!((again.messages, again.attachments), (recovered.messages, recovered.attachments), "{recovered:?}");
-    let read = MessageStream::new(mended).expect("what was mended has an end");
+    let read = MessageStream::new(mended).expect("a mended file has an end");
     let kept: Vec<Known> = (read.filter_map(Result::ok))
         .map(|Message { sequence, log_time, publish_time, data, .. }| {
             let data = data.into_owned();
@@ -78,7 +79,7 @@ fn check_mended(recovered: &Recovered, mended: &[u8], whole: Option<&[Known]>) {
     assert_eq!(kept.len() as u64, recovered.messages);
     let Some(whole) = whole else { return };
     let mut left = whole.iter();
-    assert!(kept.iter().all(|kept| left.any(|message| message == kept)), "kept what is in no chunk: {recovered:?}");
+    assert!(kept.iter().all(|kept| left.any(|message| message == kept)), "kept a message of no chunk: {recovered:?}");
     let of_known_channels = whole.len() as u64 - recovered.unknown.min(whole.len() as u64);
     assert!(recovered.damaged > 0 || recovered.messages == of_known_channels, "{recovered:?} of {}", whole.len());
 }
@@ -91,7 +92,7 @@ fn mend(data: &[u8]) -> Result<(Recovered, Vec<u8>), RecoverError> {
     Ok((recovered, mended))
 }
 
-/// A file of these bytes that is on no disk, for as long as it is open, and its path.
+/// Returns a file of these bytes in memory, which exists while it is open, and its path.
 fn in_memory(data: &[u8]) -> (File, PathBuf) {
     let mut file = File::from(memfd_create("fuzz.mcap", MFdFlags::MFD_CLOEXEC).expect("a file"));
     file.write_all(data).expect("memory");
@@ -99,10 +100,10 @@ fn in_memory(data: &[u8]) -> (File, PathBuf) {
     (file, path)
 }
 
-/// What a recording has to send, as its chunks have it.
+/// The messages of a recording that a replay must send, from its chunks.
 #[derive(Default)]
 struct Sent {
-    /// Simulated time and tick of the frames that can be read.
+    /// Simulated time and tick of the readable frames.
     frames: Vec<(u64, u64)>,
     unreadable: bool,
     alerts: Vec<u64>,
@@ -122,15 +123,18 @@ impl Sent {
         }
     }
 
-    /// How many of these messages a replay sends: of those before the first frame, if they are there by then, only the
-    /// latest.
+    /// Returns the number of these messages that a replay sends: of the messages before the first frame, only the
+    /// latest if they have been read by then.
     fn outgoing(&self, ticks: &[u64]) -> RangeInclusive<usize> {
         let first = self.frames.first().map_or(0, |(_, tick)| *tick);
         ticks.len() - ticks.iter().filter(|tick| **tick < first).count().saturating_sub(1)..=ticks.len()
     }
 }
 
-/// Plays a file as the command does, as fast as it is read.
+/// The stamps of every frame.
+const STAMPS: Stamps = Stamps { run_id: 0, sequence: 0, stamp_ns: 0, deadline_ns: 0 };
+
+/// Plays a file as the command does, at the speed of reading.
 fn play(file: &Path, sent: Option<&Sent>) {
     let options = ReplayOptions { pace: Pace::Even(RATE), start: None, looping: false };
     let recorded = ReplayOptions { pace: Pace::Recorded(1.0), start: Some(1e-3), looping: false };
@@ -146,13 +150,13 @@ fn play(file: &Path, sent: Option<&Sent>) {
     let mut last = None;
     let (mut frames, mut alerts, mut cues, mut over) = (Vec::new(), 0, 0, false);
     for tick in 0..MOST_PERIODS {
-        match replay.frame(tick) {
-            Period::Frame(frame, messages) => {
-                assert_eq!((frame.tick, frame.chain.handles()), (tick, handles));
+        match replay.frame(tick, STAMPS) {
+            Period::Frame(Outgoing { header, chain, alerts: some_alerts, cues: some_cues, .. }) => {
+                assert_eq!((header.tick, chain.handles()), (tick, handles));
                 assert!(last.replace(tick).is_none_or(|last| last < tick));
-                frames.push(frame.sim_time.to_bits());
-                alerts += messages.alerts.len();
-                cues += messages.cues.len();
+                frames.push(header.sim_time.to_bits());
+                alerts += some_alerts.len();
+                cues += some_cues.len();
             }
             Period::Empty => std::thread::sleep(Duration::from_micros(20)),
             Period::Over => {
@@ -170,7 +174,7 @@ fn play(file: &Path, sent: Option<&Sent>) {
     let Some(sent) = sent.filter(|sent| over && failure.is_none() && !sent.unreadable) else { return };
     assert!(frames.iter().eq(sent.frames.iter().map(|(time, _)| time)), "{} frames", frames.len());
     assert!(sent.frames.is_sorted_by(|one, next| one.1 < next.1), "periods out of order are played");
-    // Out of order they may count as older than the first frame.
+    // Messages out of order may count as older than the first frame.
     if sent.alerts.is_sorted() && sent.cues.is_sorted() {
         let (of_alerts, of_cues) = (sent.outgoing(&sent.alerts), sent.outgoing(&sent.cues));
         assert!(of_alerts.contains(&alerts), "{alerts} alerts, expected {of_alerts:?}");
@@ -178,7 +182,7 @@ fn play(file: &Path, sent: Option<&Sent>) {
     }
 }
 
-/// Recordings of few messages: of all topics, of frames and the stage alone, in many chunks and in one.
+/// Returns recordings of few messages: of all topics, of frames and the stage alone, in many chunks and in one.
 fn seeds() -> Vec<Vec<u8>> {
     let all: Vec<Message> =
         MessageStream::new(RECORDED).expect("a recording").map(|read| read.expect("whole")).collect();
@@ -200,7 +204,7 @@ fn seeds() -> Vec<Vec<u8>> {
     chosen.map(|(topics, most, chunk)| packed(of(topics, most), Some(chunk), false).expect("a recording")).to_vec()
 }
 
-/// A recording of these messages, the definitions of their types without what says nothing of fields.
+/// Returns a recording of these messages; the definitions of their types contain only fields.
 fn packed(messages: Vec<Message>, chunk: Option<u64>, compressed: bool) -> Option<Vec<u8>> {
     let options = WriteOptions::new().profile("ros2").chunk_size(chunk).use_chunks(chunk.is_some());
     let options = options.compression(compressed.then_some(mcap::Compression::Zstd)).compression_threads(0);
@@ -228,9 +232,9 @@ fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
     }
 }
 
-/// The messages in other chunks, compressed or not.
+/// Returns the messages in other chunks, compressed or not.
 fn repacked(data: &[u8], random: &mut Rng) -> Option<Vec<u8>> {
-    // The stream panics where lengths are damaged ("capacity overflow"); what is mended has right ones.
+    // The stream panics on damaged lengths ("capacity overflow"); a mended file has correct lengths.
     let (_, mended) = mend(data).ok()?;
     let messages: Option<Vec<Message>> = MessageStream::new(&mended).ok()?.map(Result::ok).collect();
     packed(
@@ -240,8 +244,8 @@ fn repacked(data: &[u8], random: &mut Rng) -> Option<Vec<u8>> {
     )
 }
 
-/// The records in another order, doubled, left out, in other chunks, in none, with other content; all else is right, or one
-/// thing is not.
+/// Returns the records reordered, doubled, removed, in other chunks, in none, or with other content; the rest is
+/// correct, except for at most one error.
 fn rearranged(data: &[u8], random: &mut Rng) -> Option<Vec<u8>> {
     let mut records = parsed(data)?;
     records.retain(|record| record.opcode != MESSAGE_INDEX);
@@ -251,7 +255,7 @@ fn rearranged(data: &[u8], random: &mut Rng) -> Option<Vec<u8>> {
         match random.u8(..5) {
             0 if !records.is_empty() => edit(&mut records, at, random),
             1 if !chunks.is_empty() => {
-                // Out of a chunk, to anywhere between the others.
+                // A record moves from a chunk to any place between the others.
                 let inner = records[*one(&chunks, random)].inner.as_mut()?;
                 if !inner.is_empty() {
                     let record = inner.remove(random.usize(..inner.len()));
@@ -290,7 +294,7 @@ fn edit(records: &mut Vec<Record>, at: usize, random: &mut Rng) {
         3 => records[at].body.clear(),
         4 => records[at].opcode = *one(&[MESSAGE, CHANNEL, SCHEMA, CHUNK, MESSAGE_INDEX, ATTACHMENT, 13, 0x80], random),
         5 | 6 => {
-            // A number of eight or four bytes; of a message one of its own or of a frame's header.
+            // A number of eight or four bytes: a field of a message or of a frame's header.
             const NUMBERS: [(usize, usize); 18] = [
                 (2, 4),
                 (6, 8),
@@ -328,7 +332,7 @@ fn edit(records: &mut Vec<Record>, at: usize, random: &mut Rng) {
             }
         }
         7 if records[at].opcode == MESSAGE && records[other].opcode == MESSAGE => {
-            // On another's channel.
+            // The message moves to another channel.
             let channel: Vec<u8> = records[other].body.iter().take(2).copied().collect();
             let body = &mut records[at].body;
             body.splice(..channel.len().min(body.len()), channel);

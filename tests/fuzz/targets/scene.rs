@@ -1,4 +1,4 @@
-//! A scene as text: it is refused with a sentence, or it is played and every frame is what is promised.
+//! A scene as text: it is refused with a sentence, or it is played and every frame is as promised.
 
 use std::time::Duration;
 
@@ -16,10 +16,10 @@ use super::bytes::{changed, one, renumbered};
 
 pub const TARGET: Target = Target { name: "scene", run, seeds, mutate, cases: 5000, hung: Duration::from_secs(45) };
 
-/// Benches of the largest team that is played, and links along the longest path: what is larger takes its time.
+/// Most benches of a played team, and most links along a path: larger scenes take long.
 const MOST_BENCHES: usize = 30;
 const MOST_LINKS: f64 = 400.0;
-/// Steps of the paper's rules.
+/// Most steps of the paper's rules.
 const MOST_PAPER_STEPS: f64 = 1e5;
 /// Frames of a show.
 const FRAMES: u64 = 40;
@@ -48,7 +48,7 @@ fn run(data: &[u8]) -> bool {
     }
 }
 
-/// That a sentence about a field's number names a line on which both stand.
+/// Asserts that a sentence about a field's number names a line with both.
 fn check_named_line(text: &str, sentence: &str, line: Option<usize>) {
     let named = sentence.split_once(": ").and_then(|(_, rest)| rest.split_once(" is "));
     let Some((field, rest)) = named.filter(|_| sentence.contains(", expected a number from")) else { return };
@@ -59,7 +59,7 @@ fn check_named_line(text: &str, sentence: &str, line: Option<usize>) {
     assert!(number.is_some() && on_it.contains(field), "{sentence} of {on_it:?}");
 }
 
-/// Numbers of a scene and what is accepted, by docs/design.md and the README: a table, a field, from, to.
+/// Numbers of a scene and their accepted values, by docs/design.md and the README: a table, a field, from, to.
 const RANGES: [(&str, &str, f64, f64); 17] = [
     ("team", "benches", 1.0, 1e6),
     ("team", "head_length", 1e-3, 1e4),
@@ -80,9 +80,9 @@ const RANGES: [(&str, &str, f64, f64); 17] = [
     ("publish", "queue", 1.0, 1e6),
 ];
 
-/// That a scene which was not refused is within the ranges.
+/// Asserts that a scene which was not refused is within the ranges.
 fn check_ranges(text: &str) {
-    // A whole number that no i64 holds is no number here, and was read as one that no range holds.
+    // A whole number beyond i64 is no number here; it was read as a number that no range holds.
     let Ok(scene) = text.parse::<toml::Table>() else { return };
     let number = |value: &toml::Value| value.as_float().or_else(|| value.as_integer().map(|number| number as f64));
     for (table, field, least, greatest) in RANGES {
@@ -98,12 +98,12 @@ fn check_ranges(text: &str) {
     }
 }
 
-/// Whether a scene is played within a moment.
+/// Returns true if a scene is played within a moment.
 pub fn is_small(scene: &Scene) -> bool {
     is_within(scene, MOST_BENCHES, MOST_LINKS)
 }
 
-/// Whether that takes no more than a few milliseconds.
+/// Returns true if the search and the tables take no more than a few milliseconds.
 pub fn is_quick(scene: &Scene) -> bool {
     is_within(scene, 8, 40.0)
 }
@@ -150,7 +150,7 @@ fn play(scene: &Scene) {
     }
 }
 
-/// What is promised of a frame.
+/// Checks the promises about a frame.
 fn check(scene: &Scene, frame: &Frame, is_searched: bool) {
     let (chain, team, tick) = (&frame.chain, scene.team(), frame.tick);
     let finite = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
@@ -179,8 +179,8 @@ fn check(scene: &Scene, frame: &Frame, is_searched: bool) {
     }
 }
 
-/// Scenes of each kind of path, most of them very small: what a case costs is the search for events, and the table of a
-/// solver or of the clearance where there is one.
+/// Returns scenes of each kind of path, most of them very small: the cost of a case is the search for events, and a
+/// table of a solver or of the clearance.
 pub fn seeds() -> Vec<Vec<u8>> {
     let team = |benches: u32| {
         format!(
@@ -224,7 +224,7 @@ pub fn seeds() -> Vec<Vec<u8>> {
     .to_vec()
 }
 
-/// Lines that a scene may have.
+/// Possible lines of a scene.
 const LINES: [&str; 24] = [
     "on_contact = \"stop\"",
     "on_contact = \"continue\"",
@@ -276,7 +276,7 @@ pub fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// One more segment of a route.
+/// Returns one more segment of a route.
 fn segment(random: &mut Rng) -> String {
     let size = 10f64.powf(3.0 * random.f64() - 1.5);
     if random.bool() {

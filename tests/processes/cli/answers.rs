@@ -15,7 +15,7 @@ const LIMIT: f64 = 2.0;
 const PLAN_PITCH: [&str; 4] = ["plan", "pitch", "--reach-radius", "2"];
 const PLAN_SPEED: [&str; 4] = ["plan", "speed", "--max-handle-speed", "2"];
 
-/// The scenes without those that have the same tables as one before them.
+/// Returns the scenes, without those that have the same tables as an earlier one.
 fn different(tables: &[&str]) -> Vec<SceneFile> {
     let mut seen = Vec::new();
     let is_new = |scene: &SceneFile| {
@@ -107,7 +107,8 @@ fn plan_speed_has_its_keys_or_names_what_forbids_it() {
     assert!(planned >= 4, "only {planned} scenes have a greatest speed");
 }
 
-/// What another program finds in SVG files: for each, the number of elements of each name, and all its texts.
+/// Returns the content of SVG files as another program reads it: for each file, the number of elements of each name,
+/// and all texts.
 fn read_svg(files: &[&Path]) -> Vec<Value> {
     let code = "import collections, json, sys, xml.etree.ElementTree as tree\n\
                 svg = '{http://www.w3.org/2000/svg}'\n\
@@ -140,8 +141,8 @@ const MEASUREMENT: [&str; 15] = [
     "solver",
 ];
 
-/// `trade` measures for seconds, and for minutes on long teams. Its figures are of this machine: nothing here compares
-/// them with another's.
+/// `trade` measures for seconds, and for minutes on long teams. Its figures are of this machine, so nothing here
+/// compares them with another machine's.
 #[test]
 fn trade_has_its_keys_for_every_solver() {
     let folder = tempfile::tempdir().unwrap();
@@ -155,7 +156,7 @@ fn trade_has_its_keys_for_every_solver() {
         measured += 1;
         let arguments = ["--json", "trade", "--plot", plot.to_str().unwrap()];
         let output = Process::start(&mut scene.command(&arguments)).output_within(10 * DEADLINE);
-        // Half a minute without a word is too long where no bar can be drawn.
+        // If no progress bar can be drawn, a sentence comes first: half a minute without output is too long.
         let began =
             format!("measuring every solver on scene {} ({} benches), which takes ", scene.name, scene.benches());
         let said = text(&output.stderr);
@@ -187,7 +188,7 @@ fn trade_has_its_keys_for_every_solver() {
             assert_keys(way, &["method", "frame_ns", "search_s", "contact_time_error"]);
             assert!(way["frame_ns"].is_null() != way["search_s"].is_null(), "{way}");
         }
-        // On the front is who has nobody both faster and more exact; errors below the noise are equal.
+        // A solver is on the front if no other solver is both faster and more exact; errors below the noise are equal.
         let [cost, error, noise] = ["frame_ns", "max_position_error", "noise"]
             .map(|key| lines.iter().map(|line| line[key].as_f64().unwrap()).collect::<Vec<_>>());
         let error: Vec<f64> = error.iter().zip(&noise).map(|(error, noise)| error.max(*noise)).collect();
@@ -200,7 +201,7 @@ fn trade_has_its_keys_for_every_solver() {
         if can_run(python_modules(&["xml.etree"])) {
             let svg = &read_svg(&[&plot])[0];
             let texts = svg["texts"].as_array().unwrap();
-            // The notes above the plot say what a table is.
+            // The notes above the plot explain what a table is.
             let label =
                 |solver: &Value| solver.as_str().unwrap().replace("follower_table", "table").replace(" precision", "");
             assert!(lines.iter().all(|line| texts.contains(&label(&line["solver"]).into())), "{svg}");

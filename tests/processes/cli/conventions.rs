@@ -1,4 +1,4 @@
-//! What all commands have in common: options before and after the subcommand, exit codes, closed pipes.
+//! Conventions of all commands: options before and after the subcommand, exit codes, closed pipes.
 
 use std::fs::OpenOptions;
 use std::process::{Command, Output, Stdio};
@@ -6,7 +6,7 @@ use std::process::{Command, Output, Stdio};
 use crate::cli::scenes::{DEADLINE, program, scene, scenes};
 use crate::harness::{Place, Process, text};
 
-/// Every command that ends by itself, with what makes it short.
+/// Every command that ends by itself, with the options that make it short.
 const COMMANDS: [&[&str]; 9] = [
     &["events"],
     &["events", "--json"],
@@ -27,14 +27,14 @@ fn options_stand_before_or_after_the_subcommand() {
         let answer = |arguments: &[&str]| {
             let output = Process::start(program().args(arguments)).output_within(DEADLINE);
             assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
-            // How long a table took to make is measured anew each time.
+            // The time for making a table is measured again in each run.
             let made = |line: &str| line.split(", made in ").next().unwrap_or_default().to_owned();
             text(&output.stdout).lines().map(made).collect::<Vec<_>>()
         };
         let before = answer(&[&["--scene", path, "--name", "n", "--json"], *command].concat());
         let after = answer(&[*command, &["--json", "--name", "n", "--scene", path]].concat());
         assert!(!before.is_empty() && before == after, "{command:?}");
-        // --json changes what is printed, where there is JSON to print.
+        // --json changes the output of a command that has JSON to print.
         if command[0] != "check" {
             assert_ne!(before.join("\n"), scene.answer(command).trim_end(), "{command:?}");
         }
@@ -78,7 +78,7 @@ fn what_is_neither_done_nor_bad_input_is_exit_code_1_and_a_sentence() {
     assert_eq!(printed.status.code(), Some(1), "{}", text(&printed.stderr));
 }
 
-/// How a command ends whose readers go away before it prints anything.
+/// Runs a command whose readers go away before it prints anything.
 fn end_unread(command: &mut Command, stdout: bool, stderr: bool) -> Output {
     let mut process = Process::start(command);
     if stdout {
@@ -90,13 +90,13 @@ fn end_unread(command: &mut Command, stdout: bool, stderr: bool) -> Output {
     process.output_within(DEADLINE)
 }
 
-/// `| head` and `2>&1 | head`: nobody reads any more.
+/// `| head` and `2>&1 | head`: the reader has closed the pipe.
 #[test]
 fn a_closed_pipe_ends_quietly() {
     let scene = scene("school");
     let short = ["run", "--duration", "0.5"];
     let rows = ["solve", "--every", "0.01", "--until", "1"];
-    // This one reports on standard error.
+    // This command reports on standard error.
     let past_the_end = ["solve", "--every", "10", "--until", "1000"];
     for command in COMMANDS.iter().chain(&[&short[..], &rows, &past_the_end]) {
         let place = Place::new("unread");
@@ -130,7 +130,7 @@ fn help_and_version_are_on_standard_output() {
     }
 }
 
-/// `-v` and `--quiet` change what is logged on standard error, and nothing on standard output.
+/// `-v` and `--quiet` change the log on standard error, and nothing on standard output.
 #[test]
 fn the_amount_of_logging_does_not_change_the_result() {
     for scene in scenes().into_iter().filter(|scene| scene.benches() <= 60) {

@@ -82,7 +82,7 @@ fn events_of_the_paper_scene_are_the_known_ones() {
     assert_eq!(built_in, scene("paper").answer(&["events", "--json"]));
 }
 
-/// The times of these scenes differ by what their heads travel further, since their last turns are the same.
+/// The times of these scenes differ by the further distance of their heads, since their last turns are the same.
 #[test]
 fn events_of_scenes_with_the_same_last_turns_differ_by_the_way_there() {
     let metres_per_radian = 0.55 / std::f64::consts::TAU;
@@ -102,18 +102,18 @@ fn events_of_scenes_with_the_same_last_turns_differ_by_the_way_there() {
     }
 }
 
-/// No number in a sentence for people has sixteen digits, nor an exponent that is only rounding.
+/// Asserts that no number in a sentence for people has sixteen digits, or an exponent that is only rounding.
 fn assert_short_numbers(line: &str) {
     let longest = line.split(|c: char| !c.is_ascii_digit()).map(str::len).max().unwrap();
     assert!(longest <= 9 && !line.contains("e-16") && !line.contains("e-17"), "{line}");
 }
 
-/// Benches count from 1 in sentences, and the sentence states it.
+/// Asserts that a sentence has the event's values, counts benches from 1, and states that.
 fn assert_sentence(scene: &SceneFile, event: &Value, line: &str) {
     let kind = event["event"].as_str().unwrap();
     assert!(line.trim_start().starts_with(kind), "{}: {line}", scene.name);
     let time: f64 = line.split_once("t = ").and_then(|(_, rest)| rest.split_once(" s:")).unwrap().0.parse().unwrap();
-    // For people, to a billionth; --json has all digits.
+    // For people, times are printed to a billionth; --json has all digits.
     assert!((time - event["time"].as_f64().unwrap()).abs() <= 0.51e-9, "{line}: {event}");
     assert_short_numbers(line);
     for bench in ["bench_a", "bench_b"].into_iter().filter_map(|key| event[key].as_u64()) {
@@ -188,7 +188,7 @@ fn check_states_what_each_scene_models() {
         let on_contact = scene.content["motion"].get("on_contact").and_then(|value| value.as_str());
         let stops = scene.content.contains_key("alerts") && on_contact != Some("continue");
         match contact.filter(|_| stops) {
-            // The show freezes where boards touch: nothing of it is nearer.
+            // The show ends when boards touch, so no frame has less clearance.
             Some(contact) => {
                 let at = contact["time"].as_f64().unwrap();
                 assert!(metres.abs() < 1e-9 && (time - at).abs() < 1e-9, "{}: {least}", scene.name);
@@ -203,7 +203,7 @@ fn check_states_what_each_scene_models() {
     assert!(text.contains("At a contact the show continues, unnoticed;"), "{text}");
 }
 
-/// The event of that kind, as the library has it.
+/// Returns the time of the event of that kind in the library's timeline.
 pub fn time_of(scene: &SceneFile, kind: EventKind) -> Option<f64> {
     scene.load().motion.timeline(&mut |_| ()).find(kind).map(|timed| timed.time)
 }

@@ -1,4 +1,4 @@
-//! `run` and `watch`: two seconds of every scene, live, and the JSON of both ends.
+//! `run` and `watch`: two seconds of every scene, live, and the JSON of both commands.
 
 use std::process::Command;
 
@@ -35,7 +35,7 @@ fn number(object: &Value, key: &str) -> u64 {
     object[key].as_u64().unwrap_or_else(|| panic!("no {key} in {object}"))
 }
 
-/// The publisher of a scene; what it sends over DDS stays on this machine.
+/// Returns the publisher of a scene; its DDS messages stay on this machine.
 fn publisher(place: &Place, scene: &SceneFile) -> Command {
     let mut command = place.program();
     command.env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST").arg("--scene").arg(&scene.path).args(["run", "--json"]);
@@ -57,7 +57,7 @@ fn assert_summary(summary: &Value, periods: u64, end: &str, ros2: bool) {
         let shares = ["p50", "p99", "p999", "max"].map(|key| number(spread, key));
         assert!(shares.is_sorted() && shares[3] > 0, "{summary}");
     }
-    // In nanoseconds, since nothing solves, copies and sends a frame in a tenth of a microsecond.
+    // The value is in nanoseconds, since no machine solves, copies and sends a frame in a tenth of a microsecond.
     assert!(number(&summary["step_ns"], "p50") > 100, "{summary}");
     if ros2 {
         assert_keys(&summary["ros2"], &["frames", "skipped", "discarded"]);
@@ -104,7 +104,7 @@ fn assert_watched(scene: &SceneFile, lines: &[Value]) {
         }
         assert!(alert["clearance"].is_number() && alert["bench_b"].is_number(), "{alert}");
     }
-    // The level at the start is an alert, which a subscriber that comes later gets within a second.
+    // The level at the start is an alert, which a late subscriber gets within a second.
     assert_eq!(alerts.is_empty(), !scene.content.contains_key("alerts"), "{}: {lines:?}", scene.name);
 }
 
@@ -113,7 +113,7 @@ fn two_seconds_of_every_scene_are_published_and_watched() {
     let speaks_ros2 = |scene: &SceneFile| scene.content["publish"].get("ros2").is_some();
     let with_ros2 = || if cfg!(feature = "ros2") { Ok(()) } else { Err("this build has no ROS 2".to_owned()) };
     let playable: Vec<_> = scenes().into_iter().filter(|scene| !speaks_ros2(scene) || can_run(with_ros2())).collect();
-    // A few at once: each of them mostly waits.
+    // A few run at once, since each mostly waits.
     for some in playable.chunks(3) {
         let started = some.iter().map(|scene| {
             let place = Place::new(&format!("cli_{}", scene.name));
@@ -126,7 +126,7 @@ fn two_seconds_of_every_scene_are_published_and_watched() {
             let summary = summary(&publisher.output_within(300));
             let periods = (2.01 * scene.number("publish", "rate")).ceil() as u64;
             assert_summary(&summary, periods, "duration", speaks_ros2(scene));
-            // The second in which the publisher ended is over when the next one is without it.
+            // The second in which the publisher ended is complete when the next line does not list it.
             let mut watched: Vec<String> = Vec::new();
             let ended = |watched: &[String]| {
                 watched.iter().any(|line| line.contains("moving")) && watched.last().unwrap().contains("waiting")
@@ -224,7 +224,7 @@ fn a_name_before_or_after_the_subcommand_is_the_services_name() {
     assert!(number(heard.last().unwrap(), "received") > 0, "{heard:?}");
     let heard = watch(&["--duration", "1"]);
     assert!(heard.iter().all(|line| line["state"] == "waiting"), "another name: {heard:?}");
-    // A second publisher of that name, named after the subcommand, is turned away.
+    // A second publisher of that name, named after the subcommand, is refused.
     let mut after = place.program();
     after.args(["run", "--json", "--duration", "1", "--name", "lion", "--scene"]).arg(&scene.path);
     let output = Process::start(&mut after).output_within(300);

@@ -1,5 +1,5 @@
-//! The path that a scene's numbers describe, in closed form: how far a point is from it, and where its junctions are.
-//! Shares no code with the program.
+//! The path that a scene's numbers describe, in closed form: the distance of a point from it, and the places of its
+//! junctions. Shares no code with the program.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -8,18 +8,18 @@ use crate::cli::scenes::{SceneFile, float};
 type Point = [f64; 2];
 
 enum Segment {
-    /// From a point in a direction; the first of a route has no beginning.
+    /// From a point in a direction; the first line of a route has no beginning.
     Line { start: Point, heading: f64, from: f64, to: f64 },
-    /// Turns left where `turn` is 1 and right where it is -1.
+    /// Turns left if `turn` is 1 and right if it is -1.
     Arc { centre: Point, radius: f64, phase: f64, turn: f64, angle: f64 },
-    /// r = a theta from a radius on, turned by half a turn where `sign` is -1.
+    /// r = a theta from a radius on, turned by half a turn if `sign` is -1.
     Spiral { radius_per_radian: f64, sign: f64, least_radius: f64 },
 }
 
 /// A path.
 pub struct Outline {
     segments: Vec<Segment>,
-    /// Metres that the head has travelled and where it is then, at places that are known in closed form.
+    /// Metres that the head has travelled and its place then, at places that are known in closed form.
     pub known: Vec<(f64, Point)>,
 }
 
@@ -31,7 +31,7 @@ fn distance(a: Point, b: Point) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// Metres along r = a theta from the centre.
+/// Returns the metres along r = a theta from the centre.
 pub fn spiral_length(radius_per_radian: f64, theta: f64) -> f64 {
     0.5 * radius_per_radian * (theta * 1f64.hypot(theta) + theta.asinh())
 }
@@ -60,7 +60,8 @@ impl Outline {
         }
     }
 
-    /// In along a spiral to A at the turn's radius, right along one arc, left along another, and from B = -A outward.
+    /// Returns the path inward along a spiral to A at the turn's radius, right along one arc, left along another, and
+    /// from B = -A outward.
     fn turnaround(scene: &SceneFile) -> Self {
         let [pitch, turn_radius, ratio, lead_in] =
             ["pitch", "turn_radius", "arc_ratio", "lead_in"].map(|key| scene.number("path", key));
@@ -68,7 +69,8 @@ impl Outline {
         let theta = turn_radius / radius_per_radian;
         let a = ahead([0.0, 0.0], theta, turn_radius);
         let b = [-a[0], -a[1]];
-        // Towards the centre the polar angle falls: the tangent lies atan(theta) clockwise of the way to the centre.
+        // Towards the centre the polar angle falls: the tangent lies atan(theta) clockwise of the direction to the
+        // centre.
         let heading = theta + PI + theta.atan();
         let whole = turn_radius.hypot(radius_per_radian);
         let [first, second] = [whole * ratio / (1.0 + ratio), whole / (1.0 + ratio)];
@@ -117,7 +119,7 @@ impl Outline {
         Self { segments, known }
     }
 
-    /// Metres from a point to the path.
+    /// Returns the metres from a point to the path.
     pub fn distance(&self, point: Point) -> f64 {
         self.segments.iter().map(|segment| segment.distance(point)).fold(f64::INFINITY, f64::min)
     }

@@ -1,4 +1,4 @@
-//! The scenes of `config/`, read from their TOML without the program's own reader, and what the binary prints of them.
+//! The scenes of `config/`, read from their TOML without the program's own reader, and the binary's output for them.
 
 use std::path::PathBuf;
 use std::process::{Command, Output};
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::harness::{Process, text};
 
-/// A deadline for hanging, not for slowness, seconds.
+/// A deadline for hanging processes, not for slow ones, seconds.
 pub const DEADLINE: u64 = 600;
 
 /// A scene file and its content.
@@ -18,7 +18,7 @@ pub struct SceneFile {
     pub content: toml::Table,
 }
 
-/// Every scene of the folder.
+/// Returns every scene of the folder.
 pub fn scenes() -> Vec<SceneFile> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/config");
     let mut paths: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
@@ -28,7 +28,7 @@ pub fn scenes() -> Vec<SceneFile> {
     scenes
 }
 
-/// The scene of that name.
+/// Returns the scene of that name.
 pub fn scene(name: &str) -> SceneFile {
     scenes().into_iter().find(|scene| scene.name == name).unwrap()
 }
@@ -39,12 +39,12 @@ impl SceneFile {
         Self { name: content["name"].as_str().unwrap().to_owned(), path, content }
     }
 
-    /// The scene as the library reads it.
+    /// Returns the scene as the library reads it.
     pub fn load(&self) -> Scene {
         Scene::load(&self.path).unwrap()
     }
 
-    /// A number of the file.
+    /// Returns a number of the file.
     pub fn number(&self, table: &str, key: &str) -> f64 {
         float(&self.content[table][key])
     }
@@ -57,13 +57,13 @@ impl SceneFile {
         self.benches() + 1
     }
 
-    /// The link of a bench, the head being 0.
+    /// Returns the link of a bench, metres; the head is bench 0.
     pub fn link(&self, bench: usize) -> f64 {
         let board = if bench == 0 { "head_length" } else { "body_length" };
         self.number("team", board) - 2.0 * self.number("team", "hole_inset")
     }
 
-    /// The scene with one entry of a table changed, as a file in `folder`.
+    /// Returns the scene with one entry of a table changed, as a file in `folder`.
     pub fn with(&self, folder: &tempfile::TempDir, table: &str, key: &str, value: impl Into<toml::Value>) -> Self {
         let mut content = self.content.clone();
         match table {
@@ -75,19 +75,19 @@ impl SceneFile {
         Self::read(path)
     }
 
-    /// The program on this scene.
+    /// Returns the program's command on this scene.
     pub fn command(&self, arguments: &[&str]) -> Command {
         let mut command = program();
         command.arg("--scene").arg(&self.path).args(arguments);
         command
     }
 
-    /// What the program answers on this scene.
+    /// Runs the program on this scene.
     pub fn run(&self, arguments: &[&str]) -> Output {
         Process::start(&mut self.command(arguments)).output_within(DEADLINE)
     }
 
-    /// What it prints, once it has ended with exit code 0 and nothing on standard error.
+    /// Returns the output of the program, which must end with exit code 0 and nothing on standard error.
     pub fn answer(&self, arguments: &[&str]) -> String {
         let output = self.run(arguments);
         let printed = text(&output.stderr);
@@ -95,13 +95,13 @@ impl SceneFile {
         text(&output.stdout)
     }
 
-    /// The JSON lines that it prints.
+    /// Returns the JSON lines that the program prints.
     pub fn json(&self, arguments: &[&str]) -> Vec<Value> {
         let lines = self.answer(&[&["--json"], arguments].concat());
         lines.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|error| panic!("{line}: {error}"))).collect()
     }
 
-    /// The sentence on standard error with which it refuses, nothing being on standard output.
+    /// Returns the sentence on standard error with which the program refuses; standard output must be empty.
     pub fn refusal(&self, arguments: &[&str]) -> String {
         let output = self.run(arguments);
         let printed = text(&output.stderr);
@@ -112,7 +112,7 @@ impl SceneFile {
     }
 }
 
-/// A number of a TOML file, written with or without a point.
+/// Returns a number of a TOML file, written with or without a point.
 pub fn float(value: &toml::Value) -> f64 {
     value.as_float().or(value.as_integer().map(|whole| whole as f64)).unwrap()
 }
@@ -129,14 +129,14 @@ pub fn assert_keys(object: &Value, keys: &[&str]) {
     assert_eq!(found, expected, "{object}");
 }
 
-/// The numbers of a JSON line in their order, null as NaN. Read by Rust itself, since `serde_json` may round the last
-/// bit of what it reads.
+/// Returns the numbers of a JSON line in their order, null as NaN. Read by Rust itself, since `serde_json` may round
+/// the last bit.
 pub fn numbers(line: &str) -> Vec<f64> {
     let tokens = line.split(['[', ']', '{', '}', ',', ':']);
     tokens.filter_map(|token| if token == "null" { Some(f64::NAN) } else { token.parse().ok() }).collect()
 }
 
-/// Whether two numbers have the same bits, one NaN being like another.
+/// Returns true if two numbers have the same bits; all NaN are equal.
 pub fn same_bits(a: f64, b: f64) -> bool {
     a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
 }

@@ -55,7 +55,7 @@ fn read_json(scene: &SceneFile, lines: &str) -> Vec<Moment> {
     lines.lines().map(moment).collect()
 }
 
-/// What the library's own solver gives at these times.
+/// Returns the results of the library's own solver at these times.
 fn solved(scene: &SceneFile, times: &[f64]) -> Vec<Moment> {
     let loaded = scene.load();
     let mut solver = loaded.motion.solver(loaded.velocities).solver;
@@ -80,7 +80,7 @@ fn assert_same(scene: &SceneFile, printed: &[Moment], expected: &[Moment]) {
     }
 }
 
-/// Times not in order, one of them twice, and every event that this scene has by its name.
+/// Returns times not in order, one of them twice, and every event of this scene by its name.
 fn times(scene: &SceneFile) -> (String, Vec<f64>) {
     let timeline = scene.load().motion.timeline(&mut |_| ());
     let mut times = vec![("1.25".to_owned(), 1.25), ("0".to_owned(), 0.0), ("1.25".to_owned(), 1.25)];
@@ -121,13 +121,14 @@ fn without_velocities_their_fields_are_empty_and_null() {
     }
 }
 
-/// What the design promises of a position, metres.
+/// Returns the promised accuracy of a position, metres.
 fn promise(scene: &SceneFile, [x, y, ..]: &[f64; 6], time: f64) -> f64 {
     let travelled = scene.number("motion", "head_speed") * time;
     1e-12 + 8.0 * f64::EPSILON * (x.hypot(*y) + travelled)
 }
 
-/// Links, headings and velocities by the numbers of the file, and every handle on the path that these describe.
+/// Links, headings and velocities agree with the numbers of the file, and every handle is on the path that these
+/// describe.
 #[test]
 fn handles_stand_on_the_path_a_link_apart() {
     for scene in scenes() {
@@ -141,7 +142,7 @@ fn handles_stand_on_the_path_a_link_apart() {
                 assert!(off <= promise(&scene, handle, time), "{who} is {off:e} m off the path");
                 assert!(heading > -std::f64::consts::PI && heading <= std::f64::consts::PI, "{who} heads {heading}");
                 assert!((vx.hypot(vy) - speed.abs()).abs() <= 1e-12 * speed.abs(), "{who}: {handle:?}");
-                // A handle leads the bench behind it; the last one takes the last bench's direction.
+                // A handle leads the bench behind it; the last handle has the direction of the last bench.
                 let bench = i.min(scene.benches() - 1);
                 let (front, rear) = (handles[bench], handles[bench + 1]);
                 let (dx, dy) = (front[0] - rear[0], front[1] - rear[1]);
@@ -186,7 +187,7 @@ fn followers_on_a_spiral_are_the_first_points_at_their_distance() {
     assert!(compared > 10_000, "{compared} links");
 }
 
-/// The head at places whose distance along the path has a closed form: junctions, and angles of a spiral.
+/// The head at places whose arc length has a closed form: junctions, and angles of a spiral.
 #[test]
 fn the_head_is_where_its_way_along_the_path_ends() {
     for scene in scenes() {
@@ -208,7 +209,7 @@ fn the_head_is_where_its_way_along_the_path_ends() {
     }
 }
 
-/// A time as sentences for people have it.
+/// Returns a time as sentences for people print it.
 fn figure(time: f64) -> String {
     format!("{time:.9}").trim_end_matches('0').trim_end_matches('.').to_owned()
 }
@@ -222,7 +223,7 @@ fn a_time_past_the_end_is_refused_with_the_event_and_its_time() {
         let file = folder.path().join(format!("{}.csv", scene.name));
         for past in [format!("{}", time * 1.001), format!("0,{}", time + 1e6)] {
             for format in [&["solve"][..], &["solve", "--json"], &["draw"]] {
-                // A picture is of one time.
+                // A picture shows one time.
                 let past = if format[0] == "draw" { past.trim_start_matches("0,") } else { &past };
                 let output = ["-o", file.to_str().unwrap()];
                 for arguments in [[format, &["--at", past]].concat(), [format, &["--at", past], &output].concat()] {

@@ -1,4 +1,4 @@
-//! `record --recover` as the library has it: files that are cut at any byte, and files of which a byte is wrong.
+//! `record --recover` in the library: files that are cut at any byte, and files with a wrong byte.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::harness::{can_run, json_lines, python, python_modules, text};
 use super::{Entry, entries, small_recording};
 
-/// The chunks of a file by the reference implementation: the byte after each, and its messages.
+/// Returns the chunks of a file by the reference implementation: the byte after each, and its messages.
 fn chunks(file: &Path) -> Vec<(usize, Vec<Entry>)> {
     let output = python().args(["tests/python/record_chunks.py", file.to_str().unwrap()]).output().unwrap();
     assert!(output.status.success(), "{}", text(&output.stderr));
@@ -23,7 +23,7 @@ fn chunks(file: &Path) -> Vec<(usize, Vec<Entry>)> {
     json_lines(&output).iter().map(chunk).collect()
 }
 
-/// The bytes at which the records of a file begin.
+/// Returns the bytes at which the records of a file begin.
 fn record_starts(bytes: &[u8]) -> Vec<usize> {
     let next = |at: &usize| {
         let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap());
@@ -52,7 +52,7 @@ fn a_file_that_is_cut_anywhere_keeps_every_finished_chunk() {
     assert_eq!(whole.attachments, 1);
     let mut random = fastrand::Rng::with_seed(17);
     let random_cuts: Vec<_> = (0..1000).map(|_| random.usize(8..bytes.len())).collect();
-    // And at the very bytes where a chunk ends.
+    // And at the exact bytes at which a chunk ends.
     let edges = chunks.iter().flat_map(|(end, _)| [end - 1, *end, end + 1]);
     for cut in random_cuts.into_iter().chain(edges) {
         let finished = chunks.iter().take_while(|(end, _)| *end <= cut);
@@ -82,10 +82,10 @@ fn a_byte_that_is_wrong_costs_messages_and_invents_none() {
     let mut random = fastrand::Rng::with_seed(18);
     let mut damaged = 0;
     for round in 0..400 {
-        // Every other file was cut before its end, and every fourth byte is in the first chunk.
+        // Every second file was cut before its end, and every fourth byte is in the first chunk.
         let length = if round % 2 == 0 { bytes.len() } else { last_end };
         let first = record_of(first_end - 1);
-        // First each byte before the messages of the first chunk, with its lengths and its check.
+        // First each byte before the messages of the first chunk, which contain its lengths and its check.
         let at = match round {
             0..40 => first + 9 + round,
             _ if round % 4 < 2 => random.usize(first..first_end),
@@ -103,7 +103,7 @@ fn a_byte_that_is_wrong_costs_messages_and_invents_none() {
         let others = |chunk: &&(usize, Vec<Entry>)| record_of(chunk.0 - 1) != record;
         let others: Vec<_> = chunks.iter().filter(others).flat_map(|(_, messages)| messages.clone()).collect();
         if (1..9).contains(&(at - record)) {
-            // Where a length is wrong nothing says where the next record begins.
+            // If a length is wrong, the beginning of the next record is unknown.
             let before: usize = chunks.iter().take_while(|(end, _)| *end <= record).map(|chunk| chunk.1.len()).sum();
             assert!(kept.len() >= before, "a length at {at}: {counts:?}");
         } else {
@@ -113,7 +113,7 @@ fn a_byte_that_is_wrong_costs_messages_and_invents_none() {
         damaged += u64::from(counts.damaged > 0);
     }
     assert!(damaged > 200, "{damaged} of 400 were noticed in a chunk");
-    // No record of MCAP, in place of the second chunk; a message, in place of the first.
+    // An invalid opcode in place of the second chunk; a message in place of the first.
     for (chunk, opcode) in [(1, 0x16), (0, 0x05)] {
         let mut wrong = bytes.clone();
         wrong[record_of(chunks[chunk].0 - 1)] = opcode;

@@ -1,4 +1,4 @@
-//! The recorder itself, given frames that no publisher can be made to send.
+//! The recorder itself, given frames that a publisher does not send.
 
 use std::path::Path;
 
@@ -8,13 +8,13 @@ use bench_dragon::ros2_messages::settings::Topic;
 
 use super::{entries, frame_times};
 
-/// A recorder of the publisher `p`.
+/// Returns a recorder of the publisher `p`.
 fn library_recorder(file: &Path, topics: &[Topic], replace: bool) -> Recorder {
     let (name, file, topics) = ("p".to_owned(), file.to_owned(), topics.to_vec());
     Recorder::new(RecorderConfig { name, file, replace, topics, split: None }).unwrap()
 }
 
-/// A frame of a run, one of 100 a second.
+/// Returns a frame of a run of 100 frames a second.
 fn frame(run_id: u64, tick: u64, stamp_ns: u64) -> FrameHeader {
     FrameHeader {
         run_id,
@@ -35,7 +35,7 @@ fn a_clock_that_is_set_back_is_recorded_as_it_was() {
     let handles = [HandlePose::default(); 2];
     let alert = |tick, stamp_ns| CollisionAlert { run_id: 1, tick, stamp_ns, ..Default::default() };
     let stamp = |tick: u64| 1_000_000_000_000 + tick * 10_000_000 - if tick >= 60 { 100_000_000_000 } else { 0 };
-    // One that was sent before anybody subscribed comes after the first frame.
+    // A message sent before the recorder subscribed comes after the first frame.
     recorder.frame(&frame(1, 50, stamp(50)), &handles, 0).unwrap();
     recorder.alert(&alert(10, stamp(10))).unwrap();
     (51..70).for_each(|tick| recorder.frame(&frame(1, tick, stamp(tick)), &handles, 0).unwrap());
@@ -56,7 +56,7 @@ fn every_file_that_is_replaced_is_emptied() {
     let handles = [HandlePose::default(); 2];
     for (run_id, path) in (1..).zip(&paths) {
         (0..5).for_each(|tick| recorder.frame(&frame(run_id, tick, tick), &handles, 0).unwrap());
-        // Before its end: a recorder that is killed here leaves nothing of the old file.
+        // Before the end: a recorder that is killed here leaves nothing of the old file.
         let bytes = std::fs::metadata(path).unwrap().len();
         assert!(bytes < 500_000, "{}: {bytes} bytes", path.display());
     }

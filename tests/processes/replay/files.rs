@@ -1,4 +1,5 @@
-//! Recordings as the tests see them: the bytes of each message, by the offsets of its CDR, read with the crate `mcap` alone.
+//! Recordings as the tests read them: the bytes of each message, by the offsets of its CDR, with the crate `mcap`
+//! alone.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -29,12 +30,12 @@ impl Bytes {
         f64::from_bits(self.u64(at))
     }
 
-    /// Of every message.
+    /// Returns the run id, a field of every message.
     pub fn run_id(&self) -> u64 {
         self.u64(0)
     }
 
-    /// All from a field of the layout on.
+    /// Returns all bytes from a field of the layout on.
     pub fn from(&self, at: usize) -> &[u8] {
         &self.0[LAYOUT + at..]
     }
@@ -66,7 +67,7 @@ impl Bytes {
         self.u32(88)
     }
 
-    /// State, playback and cue, and the handles.
+    /// Returns state, playback and cue, and the handles.
     pub fn standing(&self) -> (&[u8], &[u8]) {
         (&self.from(64)[..24], self.from(92))
     }
@@ -99,7 +100,7 @@ pub fn read(file: &Path) -> Kept {
     kept
 }
 
-/// Writes a recording again, message by message as `change` makes it: none, another, or several.
+/// Writes a recording again with each message as `change` returns it: removed, changed, or several messages.
 pub fn rewrite<'a>(file: &'a [u8], to: &Path, change: impl Fn(Message<'a>) -> Vec<Message<'a>>) {
     let options = WriteOptions::new().profile("ros2").chunk_size(Some(50_000));
     let mut writer: Writer<_> = options.create(BufWriter::new(File::create(to).unwrap())).unwrap();
@@ -117,21 +118,21 @@ pub fn rewrite<'a>(file: &'a [u8], to: &Path, change: impl Fn(Message<'a>) -> Ve
     writer.finish().unwrap();
 }
 
-/// The message on a channel that is not quite its own.
+/// Returns the message on a changed channel.
 pub fn on_channel<'a>(message: &Message<'a>, change: impl Fn(&mut Channel<'a>)) -> Message<'a> {
     let mut channel = (*message.channel).clone();
     change(&mut channel);
     Message { channel: Arc::new(channel), ..message.clone() }
 }
 
-/// The message with some bytes of its layout changed.
+/// Returns the message with some bytes of its layout changed.
 pub fn with_bytes<'a>(message: &Message<'a>, at: usize, bytes: &[u8]) -> Message<'a> {
     let mut data = message.data.clone().into_owned();
     data[LAYOUT + at..LAYOUT + at + bytes.len()].copy_from_slice(bytes);
     Message { data: Cow::Owned(data), ..message.clone() }
 }
 
-/// Whether a message is a frame.
+/// Returns true if a message is a frame.
 pub fn is_frame(message: &Message<'_>) -> bool {
     message.channel.topic.ends_with("/handles")
 }

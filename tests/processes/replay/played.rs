@@ -1,4 +1,4 @@
-//! How a recording is played: gaps, where it begins, how fast, and again.
+//! The playback of a recording: gaps, start, speed and loops.
 
 use std::path::{Path, PathBuf};
 
@@ -11,12 +11,12 @@ use crate::replay::{assert_same, recorded_replay, recorder, scene, stopped, wait
 /// Frames per second of the recording.
 const RATE: f64 = 40.0;
 
-/// A recording of some seconds of a small team.
+/// Returns a recording of some seconds of a small team.
 pub fn small_recording(name: &str, folder: &Path) -> PathBuf {
     recording(name, folder, 3000, |_| wait(2.5))
 }
 
-/// A recording of a small team, during which `meanwhile` is done with the recorder.
+/// Returns a recording of a small team, during which `meanwhile` is called with the recorder.
 fn recording(name: &str, folder: &Path, queue: u32, meanwhile: impl Fn(&Process)) -> PathBuf {
     let (scene, file) = (scene(folder, "school", queue, ""), folder.join("small.mcap"));
     let recorder = recorder(name, &file);
@@ -30,7 +30,7 @@ fn recording(name: &str, folder: &Path, queue: u32, meanwhile: impl Fn(&Process)
     file
 }
 
-/// Each frame's period began when its tick says, at so many periods a second.
+/// Asserts that each frame's period began at the time of its tick, at `rate` periods a second.
 fn assert_deadlines(kept: &Kept, rate: f64) {
     let first = &kept.frames[0];
     for frame in &kept.frames {
@@ -40,7 +40,7 @@ fn assert_deadlines(kept: &Kept, rate: f64) {
     }
 }
 
-/// The frames are those of the recording from `from` on, with another time scale.
+/// Asserts that the frames are those of the recording from `from` on, with another time scale.
 fn assert_frames(kept: &[Bytes], recorded: &[Bytes], speed: f64) {
     assert_eq!(kept.len(), recorded.len());
     for (frame, original) in kept.iter().zip(recorded) {
@@ -53,7 +53,7 @@ fn assert_frames(kept: &[Bytes], recorded: &[Bytes], speed: f64) {
 #[test]
 fn options_change_when_frames_go_out_and_never_what_they_hold() {
     let folder = tempfile::tempdir().unwrap();
-    // What overflows a queue of eight while the recorder stands still is not in the file.
+    // Frames that overflow a queue of eight while the recorder is stopped are not in the file.
     let file = recording("replay_gap", folder.path(), 8, |recorder| {
         recorder.stop();
         wait(1.5);
@@ -67,7 +67,7 @@ fn options_change_when_frames_go_out_and_never_what_they_hold() {
     let play = |name: &str, arguments: &[&str]| recorded_replay(name, &file, &publish, arguments);
 
     let (summary, kept) = play("replay_plain", &[]);
-    // A gap stays one in time, and is none in the count of frames.
+    // A gap remains in time, but not in the count of frames.
     assert_same(&kept, &recorded, summary["skipped"].as_u64().unwrap());
     assert!(kept.frames[gap + 1].tick() - kept.frames[gap].tick() > 20);
     assert_deadlines(&kept, RATE);
@@ -82,20 +82,20 @@ fn options_change_when_frames_go_out_and_never_what_they_hold() {
     let periods = kept.frames.last().unwrap().tick() + 1;
     assert_eq!(periods, frames.len() as u64 + summary["skipped"].as_u64().unwrap(), "gaps are closed: {summary}");
 
-    // From a frame in the middle: between two of them the later one.
+    // From a frame in the middle: a start between two frames selects the later one.
     let middle = frames.len() / 2;
     let start = 0.5 * (frames[middle - 1].sim_time() + frames[middle].sim_time());
     let start = start.to_string();
     let (_, kept) = play("replay_start", &["--start", &start]);
     assert_frames(&kept.frames, &frames[middle..], 1.0);
     assert_eq!((kept.frames[0].tick(), kept.frames[0].sequence()), (0, 0));
-    // The alert that held then, and those after it.
+    // The alert in effect at that frame, and the later alerts.
     let ahead = recorded.alerts.iter().filter(|alert| alert.u64(8) > frames[middle].tick()).count();
     let held = recorded.alerts.len() - ahead - 1;
     let content = |alerts: &[Bytes]| alerts.iter().map(|alert| alert.from(24).to_vec()).collect::<Vec<_>>();
     assert_eq!(content(&kept.alerts), content(&recorded.alerts[held..]));
 
-    // Again and again: the count of frames and periods goes on, and each showing is another epoch.
+    // In a loop the count of frames and periods continues, and each round is another epoch.
     let arguments = ["--start", &start, "--time-scale", "8", "--loop", "--duration", "2"];
     let (summary, kept) = play("replay_loop", &arguments);
     assert_eq!(summary["end"], "duration");

@@ -5,9 +5,10 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
-use bench_dragon::publisher::live::{Frames, Period};
+use bench_dragon::publisher::live::{FrameSource, Period};
 use bench_dragon::recording::mcap::reader::ReadError;
 use bench_dragon::recording::replay::{Pace, Prepared, ReplayOptions};
+use bench_dragon::show::convert::Stamps;
 use mcap::{Message, Schema};
 
 use crate::harness::{Process, can_run, json_lines, python, python_modules, text};
@@ -15,7 +16,7 @@ use crate::replay::files::{is_frame, on_channel, rewrite, with_bytes};
 use crate::replay::played::small_recording;
 use crate::replay::{replay, scene};
 
-/// The message with another schema.
+/// Returns the message with another schema.
 fn typed<'a>(message: &Message<'a>, change: impl Fn(&mut Schema<'a>)) -> Message<'a> {
     on_channel(message, |channel| {
         let mut schema = (**channel.schema.as_ref().unwrap()).clone();
@@ -24,7 +25,7 @@ fn typed<'a>(message: &Message<'a>, change: impl Fn(&mut Schema<'a>)) -> Message
     })
 }
 
-/// Bytes of a frame's layout: its run, its tick, the number of its handles, its state.
+/// Offsets of a frame's layout: its run, its tick, the number of its handles, its state.
 const RUN_ID: usize = 0;
 const TICK: usize = 16;
 const STATE: usize = 76;
@@ -51,7 +52,7 @@ fn what_cannot_be_played_is_refused_with_a_sentence() {
         (sentence, frames)
     };
 
-    // Files that are no recordings, and options.
+    // Files that are not recordings, and options.
     let written: [(&str, &[u8], &str); 4] = [
         ("empty", b"", "this is no MCAP file"),
         ("text", b"a text of some length, which is no recording at all", "this is no MCAP file"),
@@ -83,7 +84,7 @@ fn what_cannot_be_played_is_refused_with_a_sentence() {
     let sentence = text(&output.stderr);
     assert!(output.status.code() == Some(2) && sentence.contains("the name is"), "{sentence}");
 
-    // Recordings of something else: changed messages, the sentence, and whether frames go out before it.
+    // Recordings with changed messages: the change, the sentence, and true if frames are sent before the sentence.
     let changed: [(&str, Change, &str, bool); 15] = [
         ("no_handles", |it| Vec::from_iter((!is_frame(&it)).then_some(it)), "it has no topic handles", false),
         ("no_frames", |it| vec![with_other_topic(it, "/handles", "/x/y")], "it has no topic handles", false),
@@ -134,7 +135,7 @@ fn what_cannot_be_played_is_refused_with_a_sentence() {
         assert_eq!(frames > 0, plays, "{name}: {frames} frames");
     }
 
-    // Comments of a definition may be others, and log times go back where a clock was set back.
+    // Comments of a definition may differ, and log times go back if a clock was set back.
     let otherwise = |it: Message<'static>| {
         let it = typed(&it, |schema| {
             let text = String::from_utf8(schema.data.to_vec()).unwrap();
@@ -157,27 +158,28 @@ fn with_other_field(schema: &mut Schema<'_>) {
     schema.data = Cow::Owned(text.replace("float64 vx", "float32 vx").into_bytes());
 }
 
-/// Changes the frames that are not among the first.
+/// Changes the frames, except the first ones.
 fn later<'a>(message: Message<'a>, change: impl Fn(Message<'a>) -> Message<'a>) -> Message<'a> {
     if message.sequence > 40 { change(message) } else { message }
 }
 
 fn with_a_handle_less(message: Message<'_>) -> Message<'_> {
-    // The number of the frame's handles, that of the list, and the list.
+    // The number of the frame's handles, the length of the list, and the list.
     let mut message = with_bytes(&with_bytes(&message, 72, &[20, 0, 0, 0]), 96, &[20, 0, 0, 0]);
     let shorter = message.data.len() - 40;
     message.data.to_mut().truncate(shorter);
     message
 }
 
-/// Simulated time and the first handle of each frame that the library plays; and why it ends early.
+/// Returns simulated time and the first handle of each frame that the library plays, and the reason of an early end.
 fn contents(file: &Path, expected_failure: Option<&mut bool>) -> Result<Vec<(u64, u64)>, ReadError> {
     let options = ReplayOptions { pace: Pace::Even(100.0), start: None, looping: false };
     let (mut replay, thread) = Prepared::open(file, options)?.begin()?;
+    const STAMPS: Stamps = Stamps { run_id: 0, sequence: 0, stamp_ns: 0, deadline_ns: 0 };
     let mut frames = Vec::new();
     for tick in 0.. {
-        match replay.frame(tick) {
-            Period::Frame(frame, _) => frames.push((frame.sim_time.to_bits(), frame.chain.x[0].to_bits())),
+        match replay.frame(tick, STAMPS) {
+            Period::Frame(frame) => frames.push((frame.header.sim_time.to_bits(), frame.chain.x[0].to_bits())),
             Period::Empty => std::thread::yield_now(),
             Period::Over => break,
         }
@@ -215,7 +217,7 @@ fn a_wrong_byte_costs_frames_and_invents_none() {
     let bytes = std::fs::read(&file).unwrap();
     let all = contents(&file, None).unwrap();
     let damaged = folder.path().join("damaged.mcap");
-    // An index without one of its chunks: a record of its kind (8) becomes one that readers pass over.
+    // An index without one of its chunks: a record of its kind (8) becomes a kind that readers skip.
     let mut chunk_indexes =
         (0..bytes.len() - 9).filter(|at| bytes[*at] == 8 && (60..300).contains(&length_at(&bytes, at + 1)));
     let mut wrong = bytes.clone();
@@ -228,7 +230,7 @@ fn a_wrong_byte_costs_frames_and_invents_none() {
     let (mut refused, mut ended) = (0, 0);
     for _ in 0..300 {
         let mut wrong = bytes.clone();
-        // The index at the end is a tenth of the file, and the most there is to go wrong with.
+        // The index at the end is a tenth of the file, and the most sensitive part.
         let at = if random.bool() { random.usize(0..bytes.len()) } else { bytes.len() - 1 - random.usize(0..6000) };
         wrong[at] ^= 1 << random.u32(0..8);
         std::fs::write(&damaged, &wrong).unwrap();

@@ -1,5 +1,5 @@
-//! Where the fields of a Rust value really lie in memory, without a list of them: serde hands over every field's name
-//! and a reference to it.
+//! The offsets of a Rust value's fields in memory, without a list of fields: serde passes every field's name and a
+//! reference to it.
 
 use serde::de::value::Error;
 use serde::ser::{Error as _, Impossible, Serialize, SerializeStruct, Serializer};
@@ -7,7 +7,7 @@ use serde::ser::{Error as _, Impossible, Serialize, SerializeStruct, Serializer}
 /// A field: its name, its offset, its size.
 pub type Member = (&'static str, usize, usize);
 
-/// The fields of a struct in order.
+/// Returns the fields of a struct in order.
 pub fn members<T: Serialize>(value: &T) -> Vec<Member> {
     value.serialize(Members { base: address(value), found: Vec::new() }).unwrap()
 }
@@ -35,7 +35,7 @@ impl SerializeStruct for Members {
     }
 }
 
-/// Methods for everything that is not a struct with named fields.
+/// Methods for all types except structs with named fields.
 macro_rules! refused {
     ($($method:ident($($argument:ty),*) -> $of:ty;)*) => {
         $(fn $method(self $(, _: $argument)*) -> Result<$of, Error> {

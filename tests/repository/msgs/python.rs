@@ -3,7 +3,7 @@
 use crate::msgs::render::{ENUMS, NOTICE, Target, comment, targets, wrapped};
 use crate::msgs::source::{Docs, Enumeration, Kind, Layout, Source, links, without_links};
 
-/// Where the part that is written by hand begins.
+/// First line of the part that is written by hand.
 pub const BY_HAND: &str = "# From here on written by hand.\n";
 
 const HEAD: &str = r#""""The memory layouts of bench-dragon's messages, once, for every Python subscriber.
@@ -29,7 +29,7 @@ class _Message(ctypes.Structure):
         return f"bench_dragon/{cls.__name__}/{cls.LAYOUT}"
 "#;
 
-/// The generated part, with [`BY_HAND`] as its last line.
+/// Returns the generated part, with [`BY_HAND`] as its last line.
 pub fn module(source: &Source) -> String {
     let mut text = format!("{NOTICE}# What stands below MESSAGES is written by hand.\n{HEAD}");
     let names: Vec<_> = source.layouts.iter().map(|layout| layout.name.as_str()).collect();
@@ -68,7 +68,7 @@ pub fn module(source: &Source) -> String {
     text + &format!("\n\nMESSAGES = ({})\n\n{BY_HAND}", sent.join(", "))
 }
 
-/// The fields whose comments have this link.
+/// Returns the fields whose comments have this link.
 fn held_by(source: &Source, link: &str) -> String {
     let fields = source.layouts.iter().flat_map(|layout| layout.fields.iter().map(move |field| (layout, field)));
     let fields = fields.filter(|(_, field)| field.docs.iter().any(|text| links(text).any(|found| found == link)));
@@ -76,7 +76,7 @@ fn held_by(source: &Source, link: &str) -> String {
 }
 
 impl Kind {
-    /// Whether this layout is part of it.
+    /// Returns true if this layout is part of the module.
     fn holds(&self, layout: &str) -> bool {
         match self {
             Kind::Layout(name) => name == layout,
@@ -109,7 +109,7 @@ fn class(source: &Source, layout: &Layout) -> String {
     let mut text = format!("\n\nclass {}(_Message):\n", layout.name);
     let docs: Vec<_> = plain(source, Some(layout), &layout.docs).iter().map(|text| wrapped(text, "    ")).collect();
     let docs = docs.join("\n");
-    // The quotes stand on a line of their own behind more than one line.
+    // The quotes are on a separate line after a text of more than one line.
     let one_line = docs.trim();
     if docs.lines().count() == 1 && one_line.len() + 10 <= 120 {
         text += &format!("    \"\"\"{one_line}\"\"\"\n");
@@ -124,7 +124,7 @@ fn class(source: &Source, layout: &Layout) -> String {
     text + "    ]\n"
 }
 
-/// Comments in the words of Python.
+/// Returns comments in the words of Python.
 fn plain(source: &Source, own: Option<&Layout>, docs: &Docs) -> Docs {
     let words = |link: &str| match Target::of(source, link) {
         Target::Enum(names) => format!("`{}`", names.python),

@@ -1,4 +1,4 @@
-//! What all generated files have in common: their first line, their comments, the names of enums.
+//! The common parts of all generated files: their first line, their comments, the names of enums.
 
 use crate::msgs::source::{Constant, Source, links};
 
@@ -11,12 +11,12 @@ pub const NOTICE: &str = "\
 # BENCH_DRAGON_WRITE=1 cargo test --test repository msgs::
 ";
 
-/// What an enum is called in other languages.
+/// The names of an enum in other languages.
 pub struct EnumNames {
     pub rust: &'static str,
-    /// What its constants begin with in ROS 2.
+    /// Prefix of its constants in ROS 2.
     pub ros: &'static str,
-    /// What turns a number into a name in Python.
+    /// The name that converts a number to a name in Python.
     pub python: &'static str,
 }
 
@@ -27,14 +27,14 @@ pub const ENUMS: [EnumNames; 4] = [
     EnumNames { rust: "PlaybackState", ros: "PLAYBACK_", python: "PLAYBACK" },
 ];
 
-/// What a doc comment links to.
+/// The target of a link in a doc comment.
 pub enum Target<'a> {
     Enum(&'static EnumNames),
     /// A layout's field: the layout, the field.
     Field(&'a str, &'a str),
     Layout(&'a str),
     Constant(&'a Constant),
-    /// The constants whose names have this beginning.
+    /// The constants whose names have this prefix.
     Group(&'a str),
 }
 
@@ -58,7 +58,7 @@ impl<'a> Target<'a> {
     }
 }
 
-/// What the fields of some layouts link to, each once, in order.
+/// Returns the link targets of the fields of some layouts, each once, in order.
 pub fn targets<'a>(source: &'a Source, layouts: &[&'a str]) -> Vec<Target<'a>> {
     let layouts = layouts.iter().map(|name| source.layout(name).unwrap());
     let mut found: Vec<&str> = Vec::new();
@@ -72,7 +72,7 @@ pub fn targets<'a>(source: &'a Source, layouts: &[&'a str]) -> Vec<Target<'a>> {
     found.into_iter().map(|link| Target::of(source, link)).collect()
 }
 
-/// A text in lines that begin with `prefix`.
+/// Returns a text in lines that begin with `prefix`.
 pub fn wrapped(text: &str, prefix: &str) -> String {
     let (mut lines, mut line) = (String::new(), prefix.to_owned());
     for word in text.split_whitespace() {
@@ -88,7 +88,7 @@ pub fn wrapped(text: &str, prefix: &str) -> String {
     lines + &format!("{}\n", line.trim_end())
 }
 
-/// Paragraphs as a comment.
+/// Returns paragraphs as a comment.
 pub fn comment(paragraphs: &[String], indent: &str) -> String {
     let paragraphs: Vec<_> = paragraphs.iter().map(|text| wrapped(text, &format!("{indent}# "))).collect();
     paragraphs.join(&format!("{indent}#\n"))

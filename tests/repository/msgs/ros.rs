@@ -7,7 +7,7 @@ use crate::msgs::source::{Docs, Kind, Layout, Source, without_links};
 pub struct Message {
     pub name: &'static str,
     pub layout: &'static str,
-    /// Whether a `std_msgs/Header` comes first.
+    /// True if a `std_msgs/Header` comes first.
     has_header: bool,
 }
 
@@ -23,12 +23,12 @@ pub const MESSAGES: [Message; 9] = [
     Message { name: "StageCue", layout: "StageCue", has_header: false },
 ];
 
-/// What a frame is over ROS 2, where the handles and what is true of all of them are one message.
+/// The comment of a frame over ROS 2: the handles and their common values are one message.
 const HANDLE_POSES: &str = "One frame: every handle of the dragon, the head first, and what is true of all of them.";
 const HEADER: &str =
     "The stamp is stamp_ns; frame_id is \"stage\": metres, x to the right, y up, origin at the centre.";
 
-/// The text of a message's file.
+/// Returns the text of a message's file.
 pub fn interface_file(source: &Source, message: &Message) -> String {
     let layout = source.layout(message.layout).unwrap();
     let about: Docs = match message.name {
@@ -63,7 +63,7 @@ struct Constant {
     docs: Docs,
 }
 
-/// The constants that the fields of a layout may hold: those to which their comments link.
+/// Returns the constants that the fields of a layout may hold: their comments link to these.
 fn constants(source: &Source, layout: &Layout) -> Vec<Constant> {
     let mut constants = Vec::new();
     let mut targets = targets(source, &[&layout.name]);
@@ -76,7 +76,7 @@ fn constants(source: &Source, layout: &Layout) -> Vec<Constant> {
                     let name = format!("{}NONE", names.ros);
                     constants.push(Constant { name, value: 0, docs: vec!["No event.".to_owned()] });
                 }
-                // An alert is about no event that raises no level.
+                // An alert is only about events that raise a level.
                 let levels = &source.enumeration("Level").unwrap().variants;
                 let is_reported = |name: &str| !is_event || levels.iter().any(|level| level.name == name);
                 let variants = &source.enumeration(names.rust).unwrap().variants;
@@ -104,13 +104,13 @@ fn constants(source: &Source, layout: &Layout) -> Vec<Constant> {
     constants
 }
 
-/// How many words of the constants' names the message's own name already has: `StageSegment` has no `SEGMENT_`.
+/// Returns the number of words of the constants' names that the message's name has: `StageSegment` has no `SEGMENT_`.
 fn repeated(prefix: &str, layout: &Layout) -> usize {
     let word = prefix.trim_end_matches('_').to_lowercase();
     if layout.name.to_lowercase().ends_with(&word) { prefix.len() } else { 0 }
 }
 
-/// Comments as plain text: links in words of ROS 2, no backticks.
+/// Returns comments as plain text: links in words of ROS 2, no backticks.
 fn plain(source: &Source, own: &Layout, docs: &Docs) -> Docs {
     let message = |layout: &str| MESSAGES.iter().find(|message| message.layout == layout).unwrap().name;
     let words = |link: &str| match Target::of(source, link) {

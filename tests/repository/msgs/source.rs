@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use syn::{Attribute, Expr, Fields, Item, ItemEnum, ItemStruct, Lit, Meta, Type};
 
-/// A number that a layout may hold, as each language calls it.
+/// A number type of a layout, with its name in each language.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Primitive {
     pub rust: &'static str,
@@ -27,7 +27,7 @@ const PRIMITIVES: [Primitive; 7] = [
 #[derive(Debug, Clone, PartialEq)]
 pub enum Kind {
     Number(Primitive),
-    /// UTF-8 in so many bytes, padded with zeros.
+    /// UTF-8 in an array of this many bytes, padded with zeros.
     Text(u64),
     /// Another layout.
     Layout(String),
@@ -54,7 +54,7 @@ pub struct Constant {
     pub name: String,
     pub docs: Docs,
     pub value: u64,
-    /// Whether a field may hold it, as against the length of an array.
+    /// True if a field may hold the constant, false for the length of an array.
     pub is_on_the_wire: bool,
 }
 
@@ -72,11 +72,11 @@ pub struct Enumeration {
     pub variants: Vec<Variant>,
 }
 
-/// All of it, in the order of the files.
+/// All items, in the order of the files.
 pub struct Source {
     pub layouts: Vec<Layout>,
     pub constants: Vec<Constant>,
-    /// Those of `show::state`, and `EventKind`, each kind with the number of the state that it leads to.
+    /// The enums of `show::state`, and `EventKind`, each kind with the number of the state that it leads to.
     pub enums: Vec<Enumeration>,
 }
 
@@ -119,7 +119,7 @@ impl Source {
         self.constants.iter().find(|constant| constant.name == name)
     }
 
-    /// The constants that a field may hold and whose names begin so.
+    /// Returns the constants that a field may hold and whose names begin with `prefix`.
     pub fn group(&self, prefix: &str) -> Vec<&Constant> {
         let is_in_it = |constant: &&Constant| constant.is_on_the_wire && constant.name.starts_with(prefix);
         let group: Vec<_> = self.constants.iter().filter(is_in_it).collect();
@@ -128,18 +128,18 @@ impl Source {
     }
 }
 
-/// What stands in the links of a text, such as `NO_BENCH` or `FrameHeader::state`.
+/// Returns the texts of the links in a text, such as `NO_BENCH` or `FrameHeader::state`.
 pub fn links(text: &str) -> impl Iterator<Item = &str> {
     text.split("[`").skip(1).map(|rest| rest.split_once('`').expect("a link ends").0)
 }
 
-/// A text with each link replaced by `words` of what stands in it.
+/// Returns a text with each link replaced by `words` of the link's text.
 pub fn without_links(text: &str, words: impl Fn(&str) -> String) -> String {
     let mut pieces = text.split("[`");
     let mut plain = pieces.next().unwrap_or_default().to_owned();
     for piece in pieces {
         let (link, rest) = piece.split_once("`]").expect("a link ends");
-        // With a target of its own: [`link`](target).
+        // A link with a separate target: [`link`](target).
         let rest = match rest.strip_prefix('(') {
             Some(target) => target.split_once(')').expect("a target ends").1,
             None => rest,
@@ -202,7 +202,7 @@ fn constant(item: &Item) -> Option<Constant> {
     Some(Constant { name, docs: docs(&item.attrs), value, is_on_the_wire })
 }
 
-/// A struct around an array of bytes, which holds a text.
+/// Returns the name and length of a struct around an array of bytes that holds a text.
 fn text_bytes(item: &Item, lengths: &BTreeMap<String, u64>) -> Option<(String, u64)> {
     let Item::Struct(ItemStruct { ident, fields: Fields::Unnamed(fields), .. }) = item else { return None };
     match kind(&fields.unnamed.first()?.ty, &BTreeMap::new(), lengths) {

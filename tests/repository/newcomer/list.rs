@@ -1,10 +1,10 @@
-//! What of the pages' commands is not run just as it is printed, and why: a line each, all of which the test prints.
-//! A command that is on no list is run. A line that no page has any more is a failure.
+//! The commands of the pages that are not run as printed, and the reasons: a line each, all of which the test prints. A
+//! command that is on no list is run. A line without a command on a page is a failure.
 
-/// Commands that begin with the first, and why.
+/// Commands that begin with the first text, and the reason.
 pub type Line = (&'static str, &'static str);
 
-/// Not run here at all.
+/// Commands that are not run.
 pub const NOT_HERE: &[Line] = &[
     (".venv/bin/python benches/", "measures for minutes"),
     ("apt install ros-", "needs ROS 2"),
@@ -18,7 +18,7 @@ pub const NOT_HERE: &[Line] = &[
     ("cd / && /tmp/installed/bin/bench-dragon", "needs the cargo install before it: tests/newcomer/debian.sh has both"),
     ("chromium --kiosk", "needs a screen: tests/browser/view.rs opens the pages without one"),
     ("colcon build", "needs ROS 2"),
-    ("du -c /dev/shm/iox2_*", "a look at files of a tunnel"),
+    ("du -c /dev/shm/iox2_*", "shows files of a tunnel"),
     ("iox2", "needs the tunnel, which builds for minutes: tests/processes/tunnel.rs has two hosts and both ends"),
     (
         "java -cp HdrHistogram.jar",
@@ -38,15 +38,15 @@ pub const NOT_HERE: &[Line] = &[
     ("tests/run", "runs this test itself"),
 ];
 
-/// Not run, but their files and the names of tests in them are looked up.
+/// Commands that are not run; their files and the names of tests in them are looked up.
 pub const LOOKED_UP: &[Line] =
     &[("cargo test", "a test, which tests/run runs"), ("cargo bench", "measures for minutes")];
 
-/// Run where these programs are there.
+/// Commands that are run if these programs are installed.
 pub const NEEDS: &[Line] =
     &[("curl", "curl promtool"), ("ffmpeg", "ffmpeg rsvg-convert"), ("for svg in", "rsvg-convert")];
 
-/// Run with `BENCH_DRAGON_LONG=1`.
+/// Commands that are run with `BENCH_DRAGON_LONG=1`.
 pub const LONG: &[Line] = &[
     ("bench-dragon --scene config/long.toml trade", "takes minutes"),
     ("bench-dragon --scene config/turnaround.toml trade", "takes a minute"),
@@ -54,7 +54,7 @@ pub const LONG: &[Line] = &[
     ("cargo run --release -- trade", "takes a minute"),
 ];
 
-/// A part of a command, what is run in its place, and why.
+/// A part of a command, its replacement, and the reason.
 pub const INSTEAD: &[(&str, &str, &str)] = &[
     ("--duration 8h", "--duration 2", "shorter"),
     ("--duration 1h", "--duration 2", "shorter"),
@@ -63,21 +63,17 @@ pub const INSTEAD: &[(&str, &str, &str)] = &[
     ("--duration 60 ", "--duration 2 ", "shorter"),
     ("--duration 40s", "--duration 2", "shorter"),
     ("--seconds 60", "--seconds 2", "shorter"),
-    ("--rate RATE", "--rate 60", "a number of the reader's"),
-    ("--name NAME", "--name mine", "a name of the reader's"),
-    ("--scene FILE", "--scene config/school.toml", "a scene of the reader's"),
-    (
-        "events --certify FILE",
-        "--scene tests/scenes/tiny_1.toml events --certify proof.jsonl",
-        "a file of the reader's",
-    ),
-    ("verify FILE", "verify proof.jsonl", "a file of the reader's"),
-    ("--plot FILE.svg", "--plot trade.svg", "a file of the reader's"),
+    ("--rate RATE", "--rate 60", "the reader's own number"),
+    ("--name NAME", "--name mine", "the reader's own name"),
+    ("--scene FILE", "--scene config/school.toml", "the reader's own scene"),
+    ("events --certify FILE", "--scene tests/scenes/tiny_1.toml events --certify proof.jsonl", "the reader's own file"),
+    ("verify FILE", "verify proof.jsonl", "the reader's own file"),
+    ("--plot FILE.svg", "--plot trade.svg", "the reader's own file"),
 ];
 
 const LIGHT_SCENE: &str = "sed '/^\\[publish\\]/a precision = \"f32\"' config/paper.toml > light.toml";
 
-/// What the page's text has its reader start before.
+/// The commands that a page's text has its reader start before.
 pub const BEFORE: &[(&str, &[&str])] = &[
     ("bench-dragon --name gold control hold", &["bench-dragon --name gold run"]),
     ("curl", &["bench-dragon run", "bench-dragon metrics"]),
@@ -88,12 +84,12 @@ pub const BEFORE: &[(&str, &[&str])] = &[
     ("python3 examples/python/cyclone_listener.py", &["bench-dragon run --ros2"]),
 ];
 
-/// A file that has to have a text before the command makes sense: the reader is slower than this test.
+/// A file that must contain a text before the command makes sense: a person is slower than this test.
 pub const AFTER: &[(&str, &str, &str)] = &[("bench-dragon verify show.jsonl", "show.jsonl", "\"type\":\"second\"")];
 
-/// Exit codes other than 0, and a text that has to be printed with them.
+/// Exit codes other than 0, and a text that must be printed with them.
 pub const CODES: &[(&str, &[i32], &str)] = &[
-    // The verdict is on the machine as well; but each process ended when it was told to, and every count agrees.
+    // The verdict depends on the machine as well; but each process ended on request, and every count is correct.
     ("bench-dragon soak --duration", &[0, 1], SOAK_ENDED),
     ("bench-dragon soak --name mine", &[0, 1], SOAK_ENDED),
     ("cargo run --release -- soak", &[0, 1], SOAK_ENDED),

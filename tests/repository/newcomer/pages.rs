@@ -1,4 +1,4 @@
-//! What stands on a page to be copied into a shell: lines of blocks marked `sh`, and commands within the text.
+//! The texts of a page that readers copy into a shell: lines of blocks marked `sh`, and commands within the text.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ pub struct Printed {
     pub place: String,
     /// The line without its comment, spaces made single, continued lines joined.
     pub text: String,
-    /// Within the text, and no line of a block.
+    /// True for a command within the text, false for a line of a block.
     pub inline: bool,
 }
 
@@ -19,7 +19,7 @@ pub struct Section {
     pub commands: Vec<Printed>,
 }
 
-/// Words that make a command of what stands in backticks within the text, with at least one more word.
+/// Words that begin a command among the backticked texts, with at least one more word.
 const PROGRAMS: [&str; 29] = [
     ".venv/bin/python",
     "apt",
@@ -52,10 +52,10 @@ const PROGRAMS: [&str; 29] = [
     "time",
 ];
 
-/// What a block that is no command may be marked.
+/// Marks of blocks that are not commands.
 const OTHER_LANGUAGES: [&str; 6] = ["js", "json", "python", "text", "toml", "yaml"];
 
-/// A command without its leading `NAME=VALUE` words.
+/// Returns a command without its leading `NAME=VALUE` words.
 pub fn without_variables(command: &str) -> &str {
     match command.split_once(' ') {
         Some((first, rest)) if first.contains('=') && first.starts_with(|c: char| c.is_ascii_uppercase()) => {
@@ -65,10 +65,10 @@ pub fn without_variables(command: &str) -> &str {
     }
 }
 
-/// The sections of a page that have commands.
+/// Returns the sections of a page that have commands.
 ///
 /// # Panics
-/// Where a block does not state what it holds: nobody could tell whether it is to be run.
+/// If a block does not name its language: it is then unknown if the block is to be run.
 pub fn sections(root: &Path, page: &str) -> Vec<Section> {
     let text = std::fs::read_to_string(root.join(page)).unwrap();
     let mut reader = Reader { page, sections: vec![Section::default()], paragraph: String::new(), paragraph_line: 0 };
@@ -98,7 +98,7 @@ struct Block {
 
 fn is_shell(language: &str, page: &str, line: u32) -> bool {
     let known = language == "sh" || OTHER_LANGUAGES.contains(&language);
-    assert!(known, "{page}:{line}: a block is marked sh, or else what it holds: \"{language}\"");
+    assert!(known, "{page}:{line}: a block is marked sh, or with its language: \"{language}\"");
     language == "sh"
 }
 
@@ -130,7 +130,7 @@ impl Reader<'_> {
 
     fn end_paragraph(&mut self) {
         let paragraph = std::mem::take(&mut self.paragraph);
-        // Every second part stands in backticks.
+        // Every second part is in backticks.
         for span in paragraph.split('`').skip(1).step_by(2).filter(|span| is_command(span)) {
             self.push(span, self.paragraph_line, true);
         }
@@ -164,7 +164,7 @@ fn is_command(span: &str) -> bool {
     command == "tests/run" || command.contains(' ') && (PROGRAMS.contains(&first) || first.ends_with(".py"))
 }
 
-/// A comment begins with `# `, so that `'http://127.0.0.1:8080/#show'` is none.
+/// Returns a line without its comment, which begins with `# `: `'http://127.0.0.1:8080/#show'` has none.
 fn without_comment(line: &str) -> &str {
     if line.starts_with("# ") { "" } else { line.split(" # ").next().unwrap_or_default().trim_end() }
 }

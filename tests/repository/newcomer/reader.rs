@@ -1,4 +1,4 @@
-//! One who reads a page and types what stands there.
+//! A reader of a page who types its commands.
 
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
@@ -11,19 +11,19 @@ use super::list::{AFTER, BEFORE, CODES};
 use super::pages::without_variables;
 use super::terminal::{Terminal, wait_until};
 
-/// The tables of the list that only this file uses, by how their commands begin.
+/// Returns the beginnings of the commands in the lists that only this file uses.
 pub fn beginnings() -> impl Iterator<Item = &'static str> {
     BEFORE.iter().map(|line| line.0).chain(AFTER.iter().map(|line| line.0)).chain(CODES.iter().map(|line| line.0))
 }
 
 /// A program that runs until it is stopped.
 struct Resident {
-    /// Two of one kind cannot run at once: two publishers of one name, two servers at one port.
+    /// Two programs of one kind cannot run at once: two publishers of one name, two servers at one port.
     kind: String,
     terminal: Terminal,
 }
 
-/// A checkout, a network and an iceoryx2 of one page.
+/// A separate checkout, network and iceoryx2 for one page.
 pub struct Reader {
     place: Place,
     residents: Vec<Resident>,
@@ -31,10 +31,10 @@ pub struct Reader {
 }
 
 impl Reader {
-    /// Moves the calling thread into a network of its own.
+    /// Moves the calling thread into a separate network.
     pub fn new(root: &Path, page: &str) -> Self {
         unshare(CloneFlags::CLONE_NEWNET).unwrap();
-        // Addresses of the pages are this machine's here, and nothing leaves it.
+        // Addresses on the pages belong to this machine here, and no packet leaves the machine.
         for settings in ["link set lo up multicast on", "address add 10.0.0.7/32 dev lo", "route add default dev lo"] {
             let output = Command::new("ip").args(settings.split(' ')).output().unwrap();
             assert!(output.status.success(), "ip {settings}: {}", text(&output.stderr));
@@ -78,7 +78,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Ends what still runs, publishers last. A subscriber has to have got something by then.
+    /// Ends the programs that still run, publishers last. A subscriber must have received a message by then.
     pub fn end_section(&mut self) -> Result<(), String> {
         let mut outcome = Ok(());
         let publishes = self.residents.iter().any(|resident| is_publisher(&resident.kind));
@@ -93,12 +93,12 @@ impl Reader {
     fn await_frames(&mut self, resident: usize) -> Result<(), String> {
         let (publishers, watching) = self.residents.split_at_mut(resident);
         let Resident { kind, terminal: watching } = &mut watching[0];
-        // A recording that is played again comes to its end.
+        // A recording that is played again ends by itself.
         let mut has_ended = || publishers.iter_mut().all(|publisher| publisher.terminal.ended().is_some());
         let file = self.place.folder().join("show.mcap");
         match kind.as_str() {
             "watch" => watching.until("frames", |watching| watching.text().contains("received ") || has_ended()),
-            // A second, roughly.
+            // About a second of recording.
             "record" => watching.until("file", |_| std::fs::metadata(&file).is_ok_and(|file| file.len() > 700_000)),
             _ => Ok(()),
         }
@@ -120,7 +120,7 @@ impl Reader {
     }
 }
 
-/// Where installed programs are: `tests/run` unpacks promtool beside Python.
+/// Returns the folders of installed programs: `tests/run` unpacks promtool beside Python.
 pub fn programs_path() -> String {
     let path = std::env::var("PATH").unwrap();
     let python = std::env::var("BENCH_DRAGON_PYTHON").unwrap_or_default();
@@ -132,7 +132,7 @@ fn is_publisher(kind: &str) -> bool {
     kind.starts_with("publisher")
 }
 
-/// Which kind of program that runs until it is stopped a command starts, if any.
+/// Returns the kind of the program that a command starts and that runs until it is stopped, if any.
 fn resident_kind(command: &str) -> Option<String> {
     if command.starts_with("python3 examples/python/stage_socket.py") {
         return Some("socket".to_owned());
@@ -151,7 +151,8 @@ fn resident_kind(command: &str) -> Option<String> {
     }
 }
 
-/// The files of the repository as they are, without what is ignored; all but what is built, where there is no repository.
+/// Returns the files of the repository as they are, without ignored files; if there is no repository, all but built
+/// files.
 fn files(root: &Path) -> Vec<String> {
     // The checkout may belong to another user, as in a container.
     let list = ["-c", "safe.directory=*", "ls-files", "-z", "--cached", "--others", "--exclude-standard"];
@@ -186,7 +187,7 @@ fn check_out(root: &Path, checkout: &Path) {
     }
 }
 
-/// What a newcomer has built or installed, under the names of the pages.
+/// Writes the programs that a newcomer has built or installed, under the names of the pages.
 fn write_programs(root: &Path, folder: &Path) {
     std::fs::create_dir(folder).unwrap();
     let program = PathBuf::from(env!("CARGO_BIN_EXE_bench-dragon"));
@@ -207,7 +208,7 @@ fn write_programs(root: &Path, folder: &Path) {
     for (name, script) in [
         ("cargo", cargo),
         ("python3", format!("exec {python} \"$@\"\n")),
-        // Without a network: what is installed already has to be what the page asks for.
+        // Without a network: the installed packages must already satisfy the page.
         ("pip", format!("exec {python} -m pip \"$@\"\n")),
     ] {
         std::fs::write(folder.join(name), format!("#!/bin/sh\n{script}")).unwrap();

@@ -1,8 +1,8 @@
-//! Tests and benchmarks that a page names: that their files are there, and in them the names that are asked for.
+//! Tests and benchmarks that a page names: their files exist and contain the requested names.
 
 use std::path::{Path, PathBuf};
 
-/// Looks up what a `cargo test` or `cargo bench` of a page names.
+/// Looks up the names in a `cargo test` or `cargo bench` of a page.
 pub fn look_up(root: &Path, command: &str) -> Result<(), String> {
     let mut words = command.split(' ').skip_while(|word| *word != "cargo").skip(2);
     let (mut text, mut names) = (String::new(), Vec::new());
@@ -19,12 +19,13 @@ pub fn look_up(root: &Path, command: &str) -> Result<(), String> {
     }
     let is_there = |name: &&str| name.split("::").all(|part| text.contains(part));
     match names.into_iter().find(|name| !is_there(name)) {
-        Some(name) => Err(format!("{command}: nothing there is called {name}")),
+        Some(name) => Err(format!("{command}: no test or benchmark has the name {name}")),
         None => Ok(()),
     }
 }
 
-/// The text of a target, with its files' names: of what `Cargo.toml` states, `name.rs`, or all below the folder `name`.
+/// Returns the text of a target with the names of its files: the file that `Cargo.toml` states, `name.rs`, or all files
+/// below the folder `name`.
 fn source(root: &Path, folder: &str, name: &str) -> Option<String> {
     let manifest = std::fs::read_to_string(root.join("Cargo.toml")).ok()?;
     let stated =

@@ -1,4 +1,4 @@
-//! Shells of a newcomer: one for each command, in a checkout and a network of their own.
+//! Shells of a newcomer: one for each command, in a separate checkout and network.
 
 use std::fs::File;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::{Signal, killpg};
 use nix::unistd::Pid;
 
-/// What hangs fails after so long, on a machine however busy.
+/// Time after which a hanging command fails, on a machine however busy.
 const DEADLINE: Duration = Duration::from_secs(300);
 
 /// A command in a shell, whose output goes to a file.
@@ -23,20 +23,20 @@ pub struct Terminal {
 impl Terminal {
     pub fn open(command: &str, folder: &Path, output: PathBuf, path: &str) -> Self {
         let file = File::create(&output).unwrap();
-        // Whoever has started this may have Ctrl-C ignored.
+        // The process that started this test may ignore Ctrl-C.
         let mut bash = Command::new("env");
         bash.args(["--default-signal=INT", "bash", "-o", "pipefail", "-c", command])
             .current_dir(folder)
             .env("PATH", path)
             .env("PYTHONUNBUFFERED", "1");
         bash.env("PIP_NO_INDEX", "1").env("PIP_DISABLE_PIP_VERSION_CHECK", "1").env("PIP_ROOT_USER_ACTION", "ignore");
-        // The answers to these are the tests' own.
+        // The tests set these variables themselves.
         bash.env_remove("BENCH_DRAGON_LONG").env_remove("RUST_LOG").process_group(0);
         bash.stdin(Stdio::null()).stdout(file.try_clone().unwrap()).stderr(file);
         Self { command: command.to_owned(), shell: bash.spawn().unwrap(), output, status: None }
     }
 
-    /// What has been printed so far, on both streams.
+    /// Returns the text printed so far, on both streams.
     pub fn text(&self) -> String {
         String::from_utf8_lossy(&std::fs::read(&self.output).unwrap()).into_owned()
     }
@@ -48,14 +48,14 @@ impl Terminal {
         self.status
     }
 
-    /// Waits for the end; the exit code.
+    /// Waits for the end and returns the exit code.
     pub fn code(&mut self) -> Result<i32, String> {
         self.until("end", |terminal| terminal.ended().is_some())?;
         let status = self.status.expect("it has just ended");
         status.code().ok_or_else(|| self.report(&format!("ended by signal {:?}", status.signal())))
     }
 
-    /// Ctrl-C, which reaches every process of the terminal.
+    /// Sends Ctrl-C to every process of the terminal and returns the exit code.
     pub fn interrupt(&mut self) -> Result<i32, String> {
         if self.ended().is_none() {
             self.signal(Signal::SIGINT);
@@ -63,18 +63,18 @@ impl Terminal {
         self.code()
     }
 
-    /// Waits until something is so.
+    /// Waits until a condition holds.
     pub fn until(&mut self, what: &str, mut is_so: impl FnMut(&mut Self) -> bool) -> Result<(), String> {
         wait_until(what, || is_so(self)).map_err(|late| self.report(&late))
     }
 
-    /// What went wrong, with what was printed.
+    /// Returns the error with the printed text.
     pub fn report(&self, what: &str) -> String {
         format!("{}\n{what}; it printed:\n{}", self.command, self.text())
     }
 
     fn signal(&self, signal: Signal) {
-        // It may have ended meanwhile.
+        // The command may have ended meanwhile.
         let _ = killpg(Pid::from_raw(self.shell.id() as i32), signal);
     }
 }
@@ -88,7 +88,7 @@ impl Drop for Terminal {
     }
 }
 
-/// Waits until something is so.
+/// Waits until a condition holds.
 pub fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) -> Result<(), String> {
     let began = Instant::now();
     while !is_so() {

@@ -1,4 +1,4 @@
-//! Clients that have just come, and those that speak the other mapping.
+//! Clients that have just started, and clients that use the other mapping.
 
 use super::*;
 
@@ -10,7 +10,7 @@ fn a_hundred_new_clients_each_get_the_answer_to_their_first_call() {
     let (cyclone, fast) = ("fresh_cyclone", "fresh_fast");
     let publishers = [(cyclone, CYCLONE), (fast, FAST)]
         .map(|(name, rmw)| publisher(name, rmw, &["--ros2-control", "--duration", "300"]));
-    // A process for each client of Cyclone DDS, as users have them, in which starting takes the longest.
+    // One process for each client of Cyclone DDS, as users have them; most of the time is starting them.
     let calls = if long() { 100 } else { 12 };
     std::thread::scope(|threads| {
         for _ in 0..4 {
@@ -61,7 +61,7 @@ fn a_call_in_the_other_mapping_is_refused_and_nothing_happens() {
         let (_, here) = control(name, &["state"]);
         assert_eq!((&here["sim_time"], &here["playback"]), (&50.0.into(), &"paused".into()));
     }
-    // Not because nobody was there: those of the same mapping are answered.
+    // The publisher is there: clients of the same mapping get answers.
     assert_eq!(call(cyclone, &["get_rate"]), [json!({"rate": 1.0})]);
     assert_eq!(enhanced::<_, f64>(fast, "get_rate", ("rosbag2_interfaces", "GetRate"), Empty(0)), 1.0);
     for (publisher, of_client) in publishers.into_iter().zip([FAST, CYCLONE]) {

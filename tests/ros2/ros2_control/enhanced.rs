@@ -48,12 +48,12 @@ pub struct Trigger {
     pub message: String,
 }
 
-/// What a request or a response holds.
+/// The content of a request or a response.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Fields<T>(T);
 impl<T: Serialize + DeserializeOwned> Message for Fields<T> {}
 
-/// Calls a service as a client that has never called before, a participant of its own. `None` where no answer comes.
+/// Calls a service as a new client with its own participant. Returns `None` if no answer comes.
 fn first_call<Request, Response>(
     mapping: ServiceMapping,
     name: &str,
@@ -89,7 +89,7 @@ where
     answer
 }
 
-/// As [`first_call`], in the mapping of `rmw_fastrtps_cpp`; there has to be an answer.
+/// Calls as [`first_call`] does, in the mapping of `rmw_fastrtps_cpp`; an answer must come.
 pub fn enhanced<Request, Response>(name: &str, service: &str, kind: (&str, &str), request: Request) -> Response
 where
     Request: Serialize + DeserializeOwned + Clone + 'static,

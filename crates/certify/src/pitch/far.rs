@@ -1,5 +1,4 @@
-//! Lemma 8 of `docs/proofs.md`: teams of any length far out on an inward spiral, where no two boards can touch. Only
-//! [`super`] uses it.
+//! Lemma 8 of `docs/proofs.md`: teams of any length far out on an inward spiral, where no two boards can touch.
 
 use crate::boards::Shape;
 use crate::elementary::pi;
@@ -7,13 +6,14 @@ use crate::interval::Interval;
 use crate::step::links_of;
 use bench_dragon_motion::model::team::Team;
 
-/// How many times the longest link or the radius, whichever is more, is doubled to find where the lemma holds.
+/// Limit of doublings of the longest link or the radius, the greater of the two, to find a radius for which
+/// the lemma holds.
 const MOST_DOUBLINGS: u32 = 30;
 
-/// How much further out than need be a radius may be, as a share of it.
+/// Excess of the radius found over the least one, as a share of the radius.
 const SLACK: f64 = 1e-3;
 
-/// A radius for which the lemma holds, not below `radius`, and little more than the least.
+/// Returns a radius for which the lemma holds, at least `radius` and little more than the least.
 pub(super) fn least_radius(team: &Team, pitch: f64, radius: f64) -> Option<f64> {
     let holds = |radius: f64| holds(team, pitch, radius);
     if holds(radius) {
@@ -36,7 +36,7 @@ pub(super) fn least_radius(team: &Team, pitch: f64, radius: f64) -> Option<f64> 
     Some(outside)
 }
 
-/// Whether the lemma holds for all handles at least `radius` metres from the centre.
+/// Returns true if the lemma holds for all handles at least `radius` metres from the centre.
 fn holds(team: &Team, pitch: f64, radius: f64) -> bool {
     let a = Interval::point(pitch).over(pi() * 2.0);
     let r = Interval::point(radius);
@@ -62,7 +62,7 @@ fn holds(team: &Team, pitch: f64, radius: f64) -> bool {
         return false;
     }
     // 2. No boards a turn apart: the team is too short.
-    // A number of benches below 2^53 is a double.
+    // A number of benches below 2^53 is exact in a double.
     let length = head + body * (team.benches - 1) as f64;
     if (pi() * length + body * 3.0).is_below(pi() * r * 6.0) {
         return true;

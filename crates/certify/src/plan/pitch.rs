@@ -1,7 +1,8 @@
-//! The least pitch between two numbers, proved: with every pitch up to the one boards overlap, with the other none touch.
+//! The least pitch, enclosed: with every pitch up to the lower number boards overlap, with the upper number no boards
+//! touch.
 //!
-//! In: a team, a radius. Out: the two numbers. "The least pitch" in `docs/proofs.md` says why it holds; the ordinary search
-//! ([`super::trial`]) only tells where to look.
+//! In: a team, a radius. Out: the two numbers. "The least pitch" in `docs/proofs.md` has the proof. The ordinary search
+//! ([`super::trial`]) only suggests where to search.
 
 use std::f64::consts::TAU;
 
@@ -11,72 +12,74 @@ use crate::pitch::{Pitches, head_locks, reaches};
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_show::scene::Accepted;
 
-/// The least pitch of an inward spiral with which the front handle of a team's head comes to a radius: from however far
-/// outside it comes in, before it is there no two boards touch that share no handle, and no link locks. Of pitches above
-/// `value_hi` nothing is said: with some of them boards may overlap.
+/// The least pitch of an inward spiral with which a team reaches a radius. The head comes in from any distance, and
+/// until its front handle is at the radius no two boards touch that share no handle, and no link locks. Pitches above
+/// `value_hi` are not covered: with some of them boards may overlap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeastPitch {
-    /// Metres per turn: with every pitch from `from` up to this, two boards overlap or a link locks before the radius is
-    /// reached. `from` itself where that is shown of none.
+    /// Lower bound, metres per turn: with every pitch from `from` up to this, two boards overlap or a link locks before
+    /// the radius is reached. Equal to `from` if this is shown for no pitch.
     pub value_lo: f64,
-    /// Metres per turn: with this pitch the radius is reached. `None` where that is shown of none.
+    /// Upper bound, metres per turn: with this pitch the radius is reached. `None` if this is shown for no pitch.
     pub value_hi: Option<f64>,
-    /// Metres per turn: the least pitch that is looked at, half of the boards' width or, where that is more, a millimetre.
+    /// The least pitch that is tested, metres per turn: half of the boards' width, or a millimetre if that is more.
     pub from: f64,
-    /// Two boards that overlap with pitches up to `value_lo`; `None` where a link locks, or nothing is shown.
+    /// Two boards that overlap with pitches up to `value_lo`; `None` if a link locks, or if nothing is shown.
     pub overlap: Option<Overlap>,
-    /// Whether `value_lo` and `value_hi` are within a nanometre; otherwise the search was given up.
+    /// True if `value_lo` and `value_hi` are within a nanometre. Otherwise the search was given up.
     pub proved: bool,
-    /// Intervals of pitches into which those from `from` to `value_lo` are divided.
+    /// Number of intervals into which the pitches from `from` to `value_lo` are divided.
     pub intervals: u64,
 }
 
 /// Two boards that overlap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Overlap {
-    /// The one nearer the head, counted from 0.
+    /// The bench nearer the head, counted from 0.
     pub bench_a: u32,
-    /// The other.
+    /// The other bench.
     pub bench_b: u32,
-    /// Metres from the centre to the head's front handle when they do.
+    /// Distance of the head's front handle from the centre at that moment, metres.
     pub head_radius: f64,
 }
 
-/// Metres between the two numbers, with room for rounding, and on both sides of a pitch that the search has found.
+/// Distance of the two numbers in metres, with room for rounding; and the distance kept on both sides of a pitch that
+/// the search has found.
 const WIDTH: f64 = 0.95e-9;
 const BESIDE: f64 = 0.45e-9;
 
-/// Intervals of pitches after which the proof is given up.
+/// Limit of intervals of pitches.
 const MOST_INTERVALS: u64 = 200_000;
 
-/// Steps of the head after which the proof of a pitch that will do is given up.
+/// Limit of steps of the head for the proof of one pitch.
 const MOST_STEPS: u64 = 100_000;
 
-/// Pitches that the search may propose.
+/// Limit of pitches that the search may propose.
 const MOST_PROPOSALS: u32 = 8;
 
-/// The least share of a pitch that an interval is, the share at first, and what an interval that is shown does to the next.
+/// Length of an interval as a share of its pitch, at least and at first; and its growth after an interval that is
+/// shown.
 const LEAST_SHARE: f64 = 1e-14;
 const FIRST_SHARE: f64 = 1e-4;
 const GROWTH: f64 = 1.1;
 
-/// How much shallower than when they were chosen two boards may overlap until others are looked for.
+/// Share of its first depth below which an overlap is replaced by another pair of boards.
 const SHALLOW: f64 = 0.5;
 
-/// The least pitch with which the head of a team comes in to `radius` metres from the centre, within a nanometre.
-/// `progress` is given the share of the work done, from 0 to 1.
+/// Encloses the least pitch with which the head of a team comes in to `radius` metres from the centre, within a
+/// nanometre. `progress` receives the share of the work that is done, from 0 to 1.
 ///
 /// # Errors
-/// A radius that every pitch from the first on reaches, or none.
+/// The radius is reached with every pitch from the least one on, or with none.
 pub fn least_pitch(team: &Team, radius: f64, progress: &mut dyn FnMut(f64)) -> Result<LeastPitch, PlanError> {
     let mut propose = |from: f64, to: f64, progress: &mut dyn FnMut(f64)| free_from(team, (from, to), radius, progress);
     decided(team, radius, &mut propose, progress)
 }
 
-/// What proposes the least pitch between two with which the radius might be reached.
+/// A function that proposes the least pitch between two with which the radius might be reached.
 type Propose<'p> = &'p mut dyn FnMut(f64, f64, &mut dyn FnMut(f64)) -> Option<f64>;
 
-/// The least pitch, with anything that proposes pitches: nothing rests on them but how soon it is found.
+/// Encloses the least pitch with any proposals. Wrong proposals only cost time.
 fn decided(
     team: &Team,
     radius: f64,
@@ -97,11 +100,11 @@ fn decided(
     let mut value_hi = None;
     let mut next = from;
     for _ in 0..MOST_PROPOSALS {
-        // The more turns fit into the radius, the further there is to go.
+        // The more turns fit into the radius, the longer the way.
         let proposed = propose(next, greatest, &mut |pitch| progress(0.3 * (1.0 - (-0.3 * pitch / from).exp())));
         if proposed == Some(from) && reaches(from, progress) {
             return Err(PlanError(format!(
-                "the team reaches {radius} m with a pitch of {from} m already, the least that is looked at: it is too \
+                "the team reaches {radius} m with a pitch of {from} m already, the least that is tested: it is too \
                  short to meet itself before"
             )));
         }
@@ -110,18 +113,18 @@ fn decided(
         let done = blocked.pitch >= target;
         if done && proposed.is_none() {
             return Err(PlanError(format!(
-                "the team reaches {radius} m with no pitch from {from:.9} m to {greatest:.3} m: with every one two boards \
-                 overlap, or a link locks, before"
+                "the team reaches {radius} m with no pitch from {from:.9} m to {greatest:.3} m: with every one two \
+                 boards overlap, or a link locks, before"
             )));
         }
-        // Where boards come free before the proposed pitch is reached, that may be the answer.
+        // Boards that come free before the proposed pitch may be the answer.
         let upper = proposed.filter(|_| done).map_or(blocked.pitch + WIDTH, |pitch| pitch + BESIDE);
         if reaches(upper, &mut |share| progress(0.8 + 0.2 * share)) {
             value_hi = Some(upper);
             break;
         }
         if !done {
-            // A pitch that will do, further from the other than is asked for.
+            // A pitch that reaches the radius, further from the lower number than requested.
             value_hi = proposed.map(|pitch| pitch + BESIDE).filter(|pitch| reaches(*pitch, progress));
             break;
         }
@@ -132,7 +135,7 @@ fn decided(
     Ok(LeastPitch { value_lo, value_hi, from, overlap, proved, intervals })
 }
 
-/// Two boards that overlap at a pitch, how deeply, and metres from the centre to the head's front handle then.
+/// Two boards that overlap at a pitch, their depth, and the head's distance from the centre in metres.
 #[derive(Debug, Clone, Copy)]
 struct Deepest {
     pair: (u32, u32),
@@ -140,23 +143,23 @@ struct Deepest {
     head_radius: f64,
 }
 
-/// Pitches with which boards are proved to overlap.
+/// An interval of pitches with which boards are proved to overlap.
 struct Blocked<'a> {
     team: &'a Team,
     radius: f64,
-    /// All from the first up to this one.
+    /// The greatest pitch that is proved.
     pitch: f64,
-    /// Whether the head's link locks with the last of them.
+    /// True if the head's link locks with that pitch.
     locks: bool,
-    /// The boards last found.
+    /// The boards that were found last.
     deepest: Option<Deepest>,
-    /// Those that were shown to overlap with the last pitch, where it was not a lock.
+    /// The boards that were shown to overlap with that pitch; `None` for a lock.
     shown: Option<Overlap>,
     intervals: u64,
 }
 
 impl Blocked<'_> {
-    /// Goes on up to a pitch, or as far as can be shown. `progress` gets the share of that.
+    /// Extends the interval up to a pitch, or as far as can be shown. `progress` receives the share that is done.
     fn extend_to(&mut self, to: f64, progress: &mut dyn FnMut(f64)) {
         let from = self.pitch;
         let mut width = FIRST_SHARE * from;
@@ -175,7 +178,7 @@ impl Blocked<'_> {
             }
             let next = (self.pitch + width).min(to);
             self.shown = self.deepest.filter(|_| !self.locks).map(|Deepest { pair, head_radius, .. }| {
-                // The polar angle is that for all pitches of the interval.
+                // The polar angle holds for all pitches of the interval.
                 Overlap { bench_a: pair.0, bench_b: pair.1, head_radius: head_radius * next / self.pitch }
             });
             self.pitch = next;
@@ -185,7 +188,8 @@ impl Blocked<'_> {
         }
     }
 
-    /// Whether the two boards are proved to overlap, or the head's link to lock, with all pitches so much further on.
+    /// Returns true if, for all pitches up to `width` further on, the two boards are proved to overlap, or the head's
+    /// link to lock.
     fn holds(&self, width: f64) -> bool {
         let (from, to) = (self.pitch, self.pitch + width);
         if self.locks {
@@ -198,8 +202,8 @@ impl Blocked<'_> {
         pitches.are_outside(self.radius) && pitches.all_overlap()
     }
 
-    /// Looks for the same two boards where they overlap most deeply at this pitch, or for others, or a lock, where they have
-    /// come too nearly free. Whether there is anything.
+    /// Finds the deepest overlap of the same two boards at this pitch. If they have come too nearly free, it finds
+    /// other boards or a lock. Returns true if it finds any.
     fn follow(&mut self) -> bool {
         if let Some(Deepest { pair, depth, head_radius }) = self.deepest
             && !self.locks

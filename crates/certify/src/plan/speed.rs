@@ -1,6 +1,7 @@
 //! The greatest speed of the head at which no handle is too fast.
 //!
-//! In: a scene, its events, a limit. Out: two speeds between which it is, proved. See "Lemma 7" in `docs/proofs.md`.
+//! In: a scene, its events, a limit. Out: two speeds that enclose the greatest one, proved. See "Lemma 7" in
+//! `docs/proofs.md`.
 
 use super::PlanError;
 use crate::speed::{GreatestRatio, greatest_ratio};
@@ -11,38 +12,38 @@ use bench_dragon_show::scene::Scene;
 /// The greatest speed of the head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GreatestSpeed {
-    /// Metres per second: with the head no faster than this, no handle exceeds the limit; 0 where nothing is proved.
+    /// Lower bound, metres per second: with the head no faster than this, no handle exceeds the limit. 0 if nothing is
+    /// proved.
     pub value_lo: f64,
-    /// Metres per second: with the head any faster, the handle exceeds the limit.
+    /// Upper bound, metres per second: with the head any faster, the handle exceeds the limit.
     pub value_hi: f64,
-    /// Simulated seconds of the scene as it is written at which the handle is as fast as `ratio`.
+    /// Simulated seconds of the scene, at its own speed, at which the handle has the speed `ratio`.
     pub time: f64,
-    /// The handle, counted from 0: none is faster by more than the two speeds of the head leave open.
+    /// The handle, counted from 0. A faster handle could only be faster by the distance of the two speeds.
     pub handle: u32,
-    /// Its speed over the head's then.
+    /// Ratio of its speed to the head's at that time.
     pub ratio: f64,
-    /// Whether the two speeds are as near to each other as was to be; otherwise the search was given up.
+    /// True if the two speeds are within the tolerance. Otherwise the search was given up.
     pub proved: bool,
-    /// Steps of the head that were enclosed.
+    /// Number of steps of the head that were enclosed.
     pub steps: u64,
 }
 
-/// How far the two speeds may be apart, metres per second; for limits above [`LARGE`] as a share of the limit over
-/// that.
+/// Greatest distance of the two speeds, metres per second. For limits above [`LARGE`] it grows as the limit over
+/// [`LARGE`].
 const TOLERANCE: f64 = 1e-9;
 
-/// Metres per second from which on the tolerance grows with the limit.
+/// The limit from which on the tolerance grows, metres per second.
 const LARGE: f64 = 4.0;
 
-/// The greatest constant speed of the head at which no handle ever goes faster than `limit` metres per second, from
-/// the scene's start until its show freezes. `progress` is called now and then with the share of the work that is
-/// done, from 0 to 1.
+/// Encloses the greatest constant speed of the head at which no handle exceeds `limit` metres per second, from the
+/// scene's start until its show ends. `progress` receives the share of the work that is done, from 0 to 1.
 ///
-/// A handle's speed over the head's depends on the head's place alone. Its greatest value is enclosed by branch and
-/// bound with intervals ([`greatest_ratio`]); the event at which the show freezes is taken as `timeline` has it.
+/// The ratio of a handle's speed to the head's depends only on the head's place. Branch and bound with intervals
+/// encloses its greatest value ([`greatest_ratio`]). The show ends at the event that `timeline` gives.
 ///
 /// # Errors
-/// A show that runs into a lock, near which speeds have no bound.
+/// The show runs into a lock: near a lock speeds have no bound.
 pub fn greatest_speed(
     scene: &Scene,
     timeline: &Timeline,
@@ -56,7 +57,7 @@ pub fn greatest_speed(
             freeze.time
         )));
     }
-    // A little less: the two speeds are rounded away from each other.
+    // A little less, since the two speeds are rounded away from each other.
     let tolerance = 0.999 * TOLERANCE / limit.clamp(1.0, LARGE);
     let found = greatest_ratio(&scene.motion, freeze.event.travelled, tolerance, progress);
     let GreatestRatio { handle, travelled, ratio, proved, steps, .. } = found;

@@ -1,5 +1,5 @@
-//! What keeps a team from a radius on a spiral of one pitch, by the ordinary search, which samples: it tells the proofs of
-//! [`super::pitch`] where to look.
+//! Obstacles of a team on a spiral of one pitch, found by the ordinary search, which samples. They suggest to the
+//! proofs of [`super::pitch`] where to search.
 
 use crate::pitch::clear_beyond;
 use bench_dragon_messages::state::EventKind;
@@ -10,46 +10,46 @@ use bench_dragon_motion::model::root::bisect_predicate;
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::singularities::Singularities;
 
-/// Turns outside the radius, or the longest link, within which most teams touch if they ever do.
+/// Turns outside the radius, or outside the longest link, within which most teams touch if they ever do.
 const TURNS_BEFORE: f64 = 3.0;
 
-/// Turns that a trial begins outside a touch that it follows.
+/// Turns outside a touch at which a trial starts that follows it.
 const TURNS_ABOUT: f64 = 1.0;
 
-/// How much the pitch grows at a time while the same two boards are in the way.
+/// Factor of the pitch from one trial to the next while the same two boards touch.
 const GROWTH: f64 = 1.005;
 
-/// How far about a touch, in links, the same two boards are followed as the pitch grows.
+/// Distance from a touch, in links, within which the same two boards are followed.
 const WINDOW: f64 = 0.3;
 
-/// Units of work for one trial of a pitch: some seconds.
+/// Work for one trial of a pitch, in units of [`Budget`]: some seconds.
 const TRIAL_BUDGET: u64 = 20_000_000;
 
-/// What keeps a head from its radius.
+/// The reason why a head does not reach its radius.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Obstacle {
     /// A link locks before.
     Lock,
-    /// Two boards overlap, most deeply with the head so many metres from the centre.
+    /// Two boards overlap, most deeply with the head `head_radius` metres from the centre.
     Touch { pair: (u32, u32), head_radius: f64 },
 }
 
-/// What keeps a head from its radius with a pitch, if the search finds anything.
+/// Returns the obstacle for a head with this pitch and radius, if the search finds one.
 pub(super) fn obstacle(team: &Team, pitch: f64, radius: f64) -> Option<Obstacle> {
     let near = Trial::near(team, pitch, radius);
     near.obstacle().or_else(|| {
-        // Boards with next to no room between them and the next but one touch in a bend that may be anywhere.
+        // Boards with almost no room between them and the next but one touch in a bend that may be anywhere.
         let outer = clear_beyond(team, pitch, radius)?;
         let far = Trial::new(team, pitch, radius, outer);
         (far.limit > near.limit).then(|| far.obstacle())?
     })
 }
 
-/// The least pitch from one on, up to another, with which the search finds nothing in the way; `None` if there is none.
+/// Returns the least pitch between two with which the search finds no obstacle; `None` if there is none.
 ///
-/// Each time something is, the two boards that overlap most deeply are followed near that place, in steps of half a percent
-/// of the pitch, until they come free: so pitches that will do are passed over where the two come free and meet again
-/// within one step. `progress` is called now and then.
+/// At an obstacle, the two boards that overlap most deeply are followed near that place until they come free. The pitch
+/// grows in steps of half a percent. So a pitch is missed if the two boards come free and meet again within one step.
+/// `progress` receives each pitch.
 pub(super) fn free_from(
     team: &Team,
     (from, to): (f64, f64),
@@ -73,7 +73,7 @@ pub(super) fn free_from(
 }
 
 impl Obstacle {
-    /// Whether an obstacle of another pitch is one of this pitch too.
+    /// Returns true if an obstacle of another pitch is an obstacle of this pitch too.
     fn blocks(&self, team: &Team, pitch: f64, radius: f64) -> bool {
         match *self {
             Self::Lock => Trial::near(team, pitch, radius).locks(),
@@ -82,7 +82,7 @@ impl Obstacle {
     }
 }
 
-/// The least clearance of two boards while the head is near a radius, and the head's radius then.
+/// Returns the least clearance of two boards while the head is near a radius, and the head's radius at that moment.
 pub(super) fn deepest(team: &Team, pitch: f64, radius: f64, pair: (u32, u32), head_radius: f64) -> (f64, f64) {
     let trial = Trial::new(team, pitch, radius, head_radius.max(radius) + TURNS_ABOUT * pitch);
     let around = WINDOW * trial.team.shortest_link();
@@ -91,16 +91,16 @@ pub(super) fn deepest(team: &Team, pitch: f64, radius: f64, pair: (u32, u32), he
     let parts = [((at - around).max(0.0), at), (at, (at + around).min(trial.limit))];
     let nearest = parts.map(|(from, to)| advancement.minimum_of(pair, from, to));
     let (clearance, travelled) = if nearest[0].0 <= nearest[1].0 { nearest[0] } else { nearest[1] };
-    // Never by rounding inside the radius.
+    // Rounding must not move the head inside the radius.
     (clearance, trial.head_radius(travelled).max(radius * (1.0 + 1e-12)))
 }
 
-/// The foremost part of a team that comes in on a spiral of one pitch to a radius.
+/// The foremost part of a team that comes in to a radius on a spiral of one pitch.
 struct Trial {
     team: Team,
     path: Path,
     singularities: Singularities,
-    /// Metres of travel at which the radius is reached.
+    /// Travel at which the radius is reached, metres.
     limit: f64,
 }
 
@@ -109,13 +109,13 @@ impl Trial {
         Self::new(team, pitch, radius, radius.max(team.longest_link()) + TURNS_BEFORE * pitch)
     }
 
-    /// A head that comes in from `outer` metres to `radius` metres.
+    /// Creates the trial of a head that comes in from `outer` metres to `radius` metres.
     fn new(team: &Team, pitch: f64, radius: f64, outer: f64) -> Self {
         let start = outer / pitch;
         let path = Path::spiral(pitch, start);
         let length = |turns: f64| Path::spiral(pitch, turns).length();
         let limit = path.length() - length(radius / pitch);
-        // No board can touch one of the first two from more than two turns away without touching one before it.
+        // A board that touches one of the first two from more than two turns away also touches a board before it.
         let benches = ((length(start + 2.0) - path.length()) / team.link(1)).ceil() as usize + 3;
         let team = Team { benches: benches.min(team.benches), ..*team };
         let singularities = Singularities::search(&path, &team, &mut Budget::new(TRIAL_BUDGET, &mut |_| ()));
@@ -136,7 +136,7 @@ impl Trial {
         self.path.point(self.path.param_at(travelled)).coords.norm()
     }
 
-    /// What keeps the head from the radius, if the search finds anything.
+    /// Returns the obstacle that the search finds, if any.
     fn obstacle(&self) -> Option<Obstacle> {
         if self.locks() {
             return Some(Obstacle::Lock);

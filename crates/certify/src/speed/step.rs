@@ -1,48 +1,48 @@
-//! Speeds over one step of the head: the ratio of every handle's speed to the head's, enclosed. See "Lemma 7" in
-//! `docs/proofs.md`. In: two places of the head. Out: bounds. Only [`super`] uses it.
+//! Speeds over one step of the head: enclosures of the ratio of every handle's speed to the head's. See "Lemma 7" in
+//! `docs/proofs.md`. In: two places of the head. Out: bounds.
 
 use super::super::capsule::{Capsule, Span, Spanned};
+use super::super::grid::{GridPoint, param, span};
 use super::super::interval::{Interval, cross, dot, minus, norm, scaled};
-use super::super::knot::{Knot, param, span};
 use super::super::link::follower_within;
 use super::super::path::{Curve, Place};
 use super::super::step::Chain;
 use bench_dragon_motion::linkage::follower;
 
-/// How much longer than a unit in the last place the span of the follower of one place is made, in turn.
+/// Pads of the span of the follower of one place, in units in the last place, tried in this order.
 const PADS: [f64; 4] = [4.0, 64.0, 1024.0, 16384.0];
 
-/// How often the bounds of a link's ratio are made narrower by those of its rate.
+/// Number of times that the bounds of a link's ratio are narrowed by the bounds of its rate.
 const ROUNDS: usize = 2;
 
-/// The speed of a handle over the head's.
+/// The ratio of a handle's speed to the head's.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Speed {
-    /// With the head anywhere in the step.
+    /// The ratio with the head anywhere in the step.
     pub ratio: Interval,
-    /// How fast that changes, per metre of the head.
+    /// The rate of the ratio, per metre of the head.
     rate: Interval,
 }
 
 /// A handle's speed with the head at one place.
 #[derive(Debug, Clone, Copy)]
-struct Sample {
+struct SpeedSample {
     speed: Interval,
-    /// The speed of the handle behind over this one's.
+    /// The ratio of the next handle's speed to this handle's.
     link: Interval,
-    /// How fast that changes, per metre of this handle.
+    /// The rate of that ratio, per metre of this handle.
     link_rate: Interval,
 }
 
-/// What is proved of a step.
+/// The bounds that are proved for a step.
 #[derive(Debug, Clone)]
 pub(super) struct Bounds {
-    /// No handle is faster anywhere in the step, times the head.
+    /// Upper bound of the ratio of every handle anywhere in the step.
     pub upper: f64,
-    /// The fastest handle with the head at the middle, and its speed there.
+    /// The fastest handle with the head at the middle, and its ratio there.
     pub fastest: usize,
     pub speed: Interval,
-    /// Handles that were enclosed.
+    /// Number of handles that were enclosed.
     pub handles: u64,
 }
 
@@ -52,8 +52,8 @@ pub(super) struct Speeds<'a> {
 }
 
 impl Speeds<'_> {
-    /// The bounds over the step from one place of the head to another, if they can be enclosed.
-    pub fn over(&self, from: &mut Knot, middle: &mut Knot, to: &mut Knot) -> Option<Bounds> {
+    /// Returns the bounds over a step between two grid points, or `None` if they cannot be enclosed.
+    pub fn over(&self, from: &mut GridPoint, middle: &mut GridPoint, to: &mut GridPoint) -> Option<Bounds> {
         let exact = &self.chain.exact;
         if !(exact.in_order(from.head, middle.head) && exact.in_order(middle.head, to.head)) {
             return None;
@@ -72,7 +72,7 @@ impl Speeds<'_> {
         Some(Bounds { upper, fastest, speed, handles })
     }
 
-    /// Whether no handle behind the last of these can be faster than it.
+    /// Returns true if no handle behind the last one can be faster than it.
     fn is_enough(&self, handles: &[Spanned]) -> bool {
         let (last, benches) = (handles.len() - 1, self.chain.team.benches);
         let Place(segment, at) = handles[last].span.1;
@@ -94,14 +94,14 @@ impl Speeds<'_> {
         }
     }
 
-    /// Handles' speeds with the head at one place, from the spans of the handles that rounding leaves.
-    fn samples(&self, thin: &[Spanned]) -> Option<Vec<Sample>> {
+    /// Returns the handles' speeds with the head at one place, from spans as narrow as rounding allows.
+    fn samples(&self, thin: &[Spanned]) -> Option<Vec<SpeedSample>> {
         let mut speed = Interval::ONE;
         let mut samples = Vec::with_capacity(thin.len());
         for (link, pair) in thin.windows(2).enumerate() {
             let [front, rear] = pair else { return None };
             if self.is_rigid(front, rear) {
-                samples.push(Sample { speed, link: Interval::ONE, link_rate: Interval::ZERO });
+                samples.push(SpeedSample { speed, link: Interval::ONE, link_rate: Interval::ZERO });
                 continue;
             }
             let rear_cosine = front.capsule.product(&rear.capsule, true).lo / self.chain.link(link).hi;
@@ -109,14 +109,15 @@ impl Speeds<'_> {
             let crude = product_ratio(&front.capsule, &rear.capsule);
             let rate = self.rate(front, rear, crude);
             let ratio = ratio + Interval::within(front.capsule.half) * rate;
-            samples.push(Sample { speed, link: ratio, link_rate: rate });
+            samples.push(SpeedSample { speed, link: ratio, link_rate: rate });
             speed = speed * ratio;
         }
-        samples.push(Sample { speed, link: Interval::ONE, link_rate: Interval::ZERO });
+        samples.push(SpeedSample { speed, link: Interval::ONE, link_rate: Interval::ZERO });
         Some(samples)
     }
 
-    /// The rear handle's speed over the front's, with the front at one place; the rear cosine is needed roughly.
+    /// Returns the ratio of the rear handle's speed to the front's, with the front at one place. An approximate rear
+    /// cosine suffices.
     fn ratio_at(&self, front: Place, link: usize, rear_cosine: f64) -> Option<Interval> {
         let Chain { path, exact, team, .. } = &self.chain;
         let rear = follower(path, param(front), team.link(link)).ok()?;
@@ -134,14 +135,14 @@ impl Speeds<'_> {
         })
     }
 
-    /// Whether two handles are on one line or one circle all the while.
+    /// Returns true if two handles are on one line or one circle throughout the step.
     fn is_rigid(&self, front: &Spanned, rear: &Spanned) -> bool {
         let segment = rear.span.0.0;
         segment == front.span.1.0
             && matches!(self.chain.exact.segments[segment].curve, Curve::Line { .. } | Curve::Arc { .. })
     }
 
-    /// How fast the rear handle's speed over the front's changes, per metre of the front.
+    /// Returns the rate of the ratio of the rear handle's speed to the front's, per metre of the front.
     fn rate(&self, front: &Spanned, rear: &Spanned, ratio: Interval) -> Interval {
         let (u, x) = (&front.capsule, &rear.capsule);
         let bend = |span: Span| self.chain.exact.bend(span.0, span.1);
@@ -153,7 +154,7 @@ impl Speeds<'_> {
         (apart.square() + bends).over(u.product(x, true))
     }
 
-    /// How fast that changes in turn, per metre of the front; `None` where a handle passes from one segment to another.
+    /// Returns the rate of that rate, per metre of the front; `None` if a handle passes from one segment to another.
     fn rate_of_rate(&self, front: &Spanned, rear: &Spanned, ratio: Interval, rate: Interval) -> Option<Interval> {
         let (u, x) = (&front.capsule, &rear.capsule);
         let exact = &self.chain.exact;
@@ -171,8 +172,8 @@ impl Speeds<'_> {
         Some(change.over(u.product(x, true)))
     }
 
-    /// At least the greatest speed of any handle over the step.
-    fn greatest(&self, wide: &[Spanned], samples: &[Sample], half: f64) -> Option<f64> {
+    /// Returns an upper bound of the greatest ratio of any handle over the step.
+    fn greatest(&self, wide: &[Spanned], samples: &[SpeedSample], half: f64) -> Option<f64> {
         let mut front = Speed { ratio: Interval::ONE, rate: Interval::ZERO };
         let mut greatest = 1.0f64;
         for (link, pair) in wide.windows(2).enumerate() {
@@ -194,7 +195,7 @@ impl Speeds<'_> {
             let rate = front.rate * ratio + front.ratio.square() * rate;
             let ratio = intersection(front.ratio * ratio, rear.speed + Interval::within(half) * rate)?;
             front = Speed { ratio, rate };
-            // Also where it is not a number.
+            // Also true for NaN.
             if !ratio.magnitude().is_finite() {
                 return None;
             }
@@ -204,12 +205,12 @@ impl Speeds<'_> {
     }
 }
 
-/// The front product over the rear product, over two spans.
+/// Returns the front product divided by the rear product, over two spans.
 fn product_ratio(front: &Capsule, rear: &Capsule) -> Interval {
     front.product(rear, false).over(front.product(rear, true))
 }
 
-/// What two enclosures of one number have in common; `None` for what cannot be.
+/// Returns the intersection of two enclosures of one number; `None` if it is empty.
 fn intersection(one: Interval, other: Interval) -> Option<Interval> {
     let (lo, hi) = (one.lo.max(other.lo), one.hi.min(other.hi));
     (lo <= hi).then_some(Interval { lo, hi })

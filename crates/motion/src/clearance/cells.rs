@@ -4,6 +4,7 @@
 use super::bounds::CELLS;
 use super::moving::Quadratic;
 use crate::model::Vector;
+use crate::model::elementary::hypot;
 use crate::model::path::Path;
 use crate::solve::table::FollowerTable;
 use crate::solve::table::rows::{Band, Rows};
@@ -83,7 +84,7 @@ fn handle(band: &Band, pieces: std::ops::RangeInclusive<usize>, row: usize, (beg
             let coefficients = band.coordinates(piece, row)[axis];
             largest_difference(coefficients, betas, quadratic.terms.map(|term| term[axis]), times)
         });
-        quadratic.error = quadratic.error.max(miss[0].hypot(miss[1]));
+        quadratic.error = quadratic.error.max(hypot(miss[0], miss[1]));
     }
     quadratic
 }

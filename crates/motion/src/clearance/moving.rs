@@ -18,6 +18,7 @@
 
 use super::corner_reach;
 use crate::model::board::Board;
+use crate::model::elementary::hypot;
 use crate::model::separation::closest_points_board_board;
 use crate::model::team::Team;
 use crate::model::{Point, Vector};
@@ -139,7 +140,7 @@ impl MovingBoard {
 
     /// How far a point of `other` goes from where it is at 0, as a point of this board sees it, at most, metres.
     pub(super) fn relative_travel(&self, other: &Self) -> f64 {
-        let turn = |board: &Self| board.half_length.hypot(board.half_width) * board.axis.travel();
+        let turn = |board: &Self| hypot(board.half_length, board.half_width) * board.axis.travel();
         self.centre.to(&other.centre).travel() + turn(self) + turn(other)
     }
 
@@ -164,7 +165,7 @@ impl MovingBoard {
         let offset = point - at.centre;
         let along = offset.dot(&at.axis).clamp(-self.half_length, self.half_length);
         let across = offset.dot(&at.across()).clamp(-self.half_width, self.half_width);
-        let error = self.centre.error + along.hypot(across) * self.axis.error;
+        let error = self.centre.error + hypot(along, across) * self.axis.error;
         self.centre.combine(&self.axis, |centre, axis| centre + along * axis + across * normal(axis), error)
     }
 }

@@ -1,14 +1,11 @@
 //! How far two boards can move relative to each other while the head goes from one place to another: the bound on which
 //! the search rests. The proof is in the header of [`super`].
 
-use std::f64::consts::TAU;
-
 use crate::event::Budget;
 use crate::linkage::follower;
 use crate::model::board::Board;
-use crate::model::curve::{Coordinate, Segment};
+use crate::model::curve::Curve;
 use crate::model::path::{Param, Path};
-use crate::model::spiral::{Direction, Spiral};
 use crate::model::team::Team;
 use crate::model::{Point, Vector};
 
@@ -145,14 +142,15 @@ impl Displacements {
         let segments =
             [before.places[a], before.places[b + 1], after.places[a], after.places[b + 1]].map(|place| place.segment);
         let curve = chain.curves[segments[0]];
-        match chain.path.segment(before.places[a]) {
-            Segment::Line(_) | Segment::Arc(_) if segments.iter().all(|segment| chain.curves[*segment] == curve) => 0.0,
-            Segment::Spiral(spiral) if segments.iter().all(|segment| *segment == segments[0]) => {
-                let seen = |bench| seen_from_spiral(chain, ends, bench, (spiral, a), weights);
-                stage.min(seen(a) + seen(b))
-            }
-            _ => stage,
+        let keeps_shape = chain.path.segment(before.places[a]).constant_curvature().is_some();
+        if keeps_shape && segments.iter().all(|segment| chain.curves[*segment] == curve) {
+            return 0.0;
         }
+        if segments.iter().any(|segment| *segment != segments[0]) {
+            return stage;
+        }
+        let seen = |bench| seen_from_frame(chain, ends, bench, a, weights);
+        seen(a).zip(seen(b)).map_or(stage, |(one, other)| stage.min(one + other))
     }
 
     /// At least the relative motion of any two of the foremost boards, metres.
@@ -173,14 +171,11 @@ impl Displacements {
         let (mut radius, mut outermost) = (0.0, 0.0);
         for (bench, (first, last)) in before.iter().zip(after).enumerate() {
             let stage = self.on_stage(chain, bench, Weights::OnePoint);
-            let outward = match chain.path.segment(ends.0.places[bench]) {
-                Segment::Spiral(spiral) if self.stays_on_segment(ends, bench) => {
-                    let outward = |handle| spiral.radius_per_radian() * turned(ends, handle).abs();
-                    let around = seen_from_spiral(chain, ends, bench, (spiral, bench), Weights::OnePoint);
-                    stage.min(around + outward(bench))
-                }
-                _ => stage,
-            };
+            let seen = self.stays_on_segment(ends, bench).then(|| {
+                let frame_travel = chain.path.segment(ends.0.places[bench]).frame_travel(turned(ends, bench));
+                seen_from_frame(chain, ends, bench, bench, Weights::OnePoint).map(|seen| seen + frame_travel)
+            });
+            let outward = seen.flatten().map_or(stage, |seen| stage.min(seen));
             let far = |board: &Board| (board.centre - centre).norm() + board.circle_radius();
             let out =
                 |board: &Board| board.corners().map(|corner| corner.coords.norm()).into_iter().fold(0.0, f64::max);
@@ -203,26 +198,20 @@ impl Displacements {
     }
 }
 
-/// How far any point of a board, whose handles are on a spiral, moved as seen from a frame that turns about the centre
-/// with handle `reference` and goes outward with it, along the direction in which the next handle was, metres.
-fn seen_from_spiral(
+/// Returns how far any point of a board moved, metres, seen from the frame of handle `reference` on the same segment.
+/// `None` if the segment has no such bound.
+fn seen_from_frame(
     chain: &ConservativeAdvancement,
     ends: (&Configuration, &Configuration),
     bench: usize,
-    (spiral, reference): (&Spiral, usize),
+    reference: usize,
     weights: Weights,
-) -> f64 {
-    let (a, frame) = (spiral.radius_per_radian(), turned(ends, reference));
-    let moved = |handle: usize| {
-        let (first, last) = (ends.0.places[handle].at, ends.1.places[handle].at);
-        let radius = spiral.radius(if first.high > last.high { first } else { last });
-        let around = (last.minus(first) - frame).abs();
-        let apart = first.minus(ends.0.places[reference + 1].at);
-        // No less than twice the sine of half the angle.
-        let aside = (apart - TAU * (apart / TAU).round()).abs() + around;
-        (radius + a) * around + a * frame.abs() * aside
-    };
-    weights.board(chain.team, bench, moved(bench), moved(bench + 1))
+) -> Option<f64> {
+    let (segment, frame) = (chain.path.segment(ends.0.places[reference]), turned(ends, reference));
+    let behind = ends.0.places[reference + 1].at;
+    let moved =
+        |handle: usize| segment.seen_from_frame((ends.0.places[handle].at, ends.1.places[handle].at), frame, behind);
+    Some(weights.board(chain.team, bench, moved(bench)?, moved(bench + 1)?))
 }
 
 /// The change of a handle's coordinate in a step within one segment.
@@ -261,10 +250,7 @@ pub(super) fn progress(path: &Path, from: Param, to: Param) -> f64 {
     match from.segment.cmp(&to.segment) {
         std::cmp::Ordering::Less => f64::INFINITY,
         std::cmp::Ordering::Greater => f64::NEG_INFINITY,
-        std::cmp::Ordering::Equal => match path.segment(from) {
-            Segment::Spiral(spiral) if spiral.direction() == Direction::Inward => from.at.minus(to.at),
-            _ => to.at.minus(from.at),
-        },
+        std::cmp::Ordering::Equal => path.segment(from).progress(from.at, to.at),
     }
 }
 
@@ -273,15 +259,5 @@ fn length_bound(path: &Path, from: Param, to: Param) -> f64 {
     if from.segment != to.segment {
         return path.arc_length(from, to).abs();
     }
-    let coordinates = to.at.minus(from.at).abs();
-    match path.segment(from) {
-        Segment::Line(_) => coordinates,
-        Segment::Arc(arc) => arc.radius * coordinates,
-        // The arc length of a radian grows outward.
-        Segment::Spiral(spiral) => {
-            let outer: Coordinate = if from.at.high > to.at.high { from.at } else { to.at };
-            let (radius, a) = (spiral.radius(outer), spiral.radius_per_radian());
-            coordinates * (radius * radius + a * a).sqrt()
-        }
-    }
+    path.segment(from).length_bound(from.at, to.at)
 }

@@ -1,65 +1,21 @@
-//! The curves that a path is made of: what every curve can do, the line and the arc. The spiral has a file of its own.
+//! [`Curve`]: the contract of every curve that a path is made of. Units and formulas of a curve are in its own file.
 //!
 //! A curve has a coordinate of its own (metres on a line, radians on an arc, the polar angle on a spiral), kept as two
-//! doubles, so that a place far along has lost no digits. Only [`super::path`] and the linkage call it.
+//! doubles, so that a place far along has lost no digits. Its coordinate may grow or fall in the direction of travel.
+//!
+//! **A new kind of curve** needs a file beside `line` and `arc` with its `impl Curve`, a variant of
+//! [`Segment`](super::segment::Segment), a constructor and an outline in `path`, and a variant of `description`. No other
+//! code of this crate distinguishes kinds of curves: `model` has a test of that. The methods with a default have one
+//! that is valid for every curve; the default of a bound costs time only.
 
 use super::double_double::DoubleDouble;
-use super::spiral::Spiral;
+use super::team::Team;
 use super::{Point, Vector};
 
 /// A place on a curve, in the curve's own coordinate.
 pub type Coordinate = DoubleDouble;
 
-/// A smooth curve on the stage, travelled in one direction.
-pub trait Curve {
-    /// The point of a place.
-    fn point(&self, at: Coordinate) -> Point;
-
-    /// The unit tangent at a place, in the direction of travel.
-    fn tangent(&self, at: Coordinate) -> Vector;
-
-    /// The curvature at a place, 1/m, not negative.
-    fn curvature(&self, at: Coordinate) -> f64;
-
-    /// Metres of arc length from one place to another; negative against the direction of travel.
-    fn arc_length(&self, from: Coordinate, to: Coordinate) -> f64;
-
-    /// The place `metres` of arc length after another, before it where negative.
-    fn advance(&self, from: Coordinate, metres: f64) -> Coordinate;
-}
-
-/// A straight line. Its coordinate is metres.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Line {
-    /// The point at 0.
-    pub origin: Point,
-    /// Unit direction of travel.
-    pub direction: Vector,
-}
-
-impl Curve for Line {
-    fn point(&self, at: Coordinate) -> Point {
-        self.origin + at.high * self.direction + at.low * self.direction
-    }
-
-    fn tangent(&self, _: Coordinate) -> Vector {
-        self.direction
-    }
-
-    fn curvature(&self, _: Coordinate) -> f64 {
-        0.0
-    }
-
-    fn arc_length(&self, from: Coordinate, to: Coordinate) -> f64 {
-        to.minus(from)
-    }
-
-    fn advance(&self, from: Coordinate, metres: f64) -> Coordinate {
-        from.plus(metres)
-    }
-}
-
-/// Which way an arc turns, seen in the direction of travel.
+/// The side to which a curve turns, seen in the direction of travel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
     /// Counter-clockwise.
@@ -68,107 +24,211 @@ pub enum Side {
     Right,
 }
 
-/// An arc of a circle. Its coordinate is radians turned since its first point.
+/// No point behind is as far away as the link is long: any further motion would make the handle jump.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("no point behind on the path is one link away")]
+pub struct NoFollower;
+
+/// How a link lies across the path at its two handles.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Arc {
-    /// The point at 0.
-    pub origin: Point,
-    /// Unit direction of travel at 0.
+pub struct LinkPose {
+    /// The link's unit direction b, from its rear handle to its front one.
     pub direction: Vector,
-    /// Unit vector from the point at 0 towards the centre.
-    pub inward: Vector,
-    /// Metres.
-    pub radius: f64,
+    /// t . b at the front handle, t the path's unit tangent: 0 is a stall.
+    pub front_cosine: f64,
+    /// t . b at the rear handle: 0 is a lock.
+    pub rear_cosine: f64,
 }
 
-impl Arc {
-    /// The arc from a point in a unit direction, its centre on one side.
-    pub fn new(origin: Point, direction: Vector, side: Side, radius: f64) -> Self {
-        let left = Vector::new(-direction.y, direction.x);
-        let inward = match side {
-            Side::Left => left,
-            Side::Right => -left,
-        };
-        Self { origin, direction, inward, radius }
-    }
-
-    /// 1/m, positive where the arc turns left.
-    pub fn signed_curvature(&self) -> f64 {
-        self.direction.perp(&self.inward).signum() / self.radius
+impl LinkPose {
+    /// Returns the pose of the link between two handles, each given by its point and the path's unit tangent there.
+    pub fn between((front, front_tangent): (Point, Vector), (rear, rear_tangent): (Point, Vector)) -> Self {
+        let direction = (front - rear).normalize();
+        Self { direction, front_cosine: direction.dot(&front_tangent), rear_cosine: direction.dot(&rear_tangent) }
     }
 }
 
-impl Curve for Arc {
-    fn point(&self, at: Coordinate) -> Point {
-        // With half angles, short ways keep all their digits.
-        let (sine, cosine) = half(at).sin_cos();
-        let (along, across) = (2.0 * sine * cosine, 2.0 * sine * sine);
-        self.origin + self.radius * (along * self.direction + across * self.inward)
-    }
-
-    fn tangent(&self, at: Coordinate) -> Vector {
-        let (sine, cosine) = half(at).sin_cos();
-        let (sine, versine) = (2.0 * sine * cosine, 2.0 * sine * sine);
-        self.direction + (sine * self.inward - versine * self.direction)
-    }
-
-    fn curvature(&self, _: Coordinate) -> f64 {
-        self.radius.recip()
-    }
-
-    fn arc_length(&self, from: Coordinate, to: Coordinate) -> f64 {
-        self.radius * to.minus(from)
-    }
-
-    fn advance(&self, from: Coordinate, metres: f64) -> Coordinate {
-        let DoubleDouble { high, low } = DoubleDouble::quotient(metres, self.radius);
-        from.plus(high).plus(low)
-    }
-}
-
-fn half(at: Coordinate) -> Coordinate {
-    Coordinate { high: 0.5 * at.high, low: 0.5 * at.low }
-}
-
-/// One of the curves of a path.
+/// Result of the search for a follower on the front handle's own curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Segment {
-    /// Straight on.
-    Line(Line),
-    /// Along a circle.
-    Arc(Arc),
-    /// Along an Archimedean spiral, inward or outward.
-    Spiral(Spiral),
+pub enum Follower {
+    /// The follower is this many units of the coordinate behind the front handle.
+    Behind(f64),
+    /// Every place of the curve behind the front handle is nearer than the link.
+    AllNearer,
+    /// The curve has no closed form for this front handle: the path has to be searched.
+    Unknown,
 }
 
-impl Segment {
-    fn curve(&self) -> &dyn Curve {
-        match self {
-            Self::Line(line) => line,
-            Self::Arc(arc) => arc,
-            Self::Spiral(spiral) => spiral,
-        }
+impl Follower {
+    /// Returns the follower `by` units behind, on a curve that reaches `behind` units back and along which the distance
+    /// grows up to there.
+    #[inline]
+    pub fn within(by: f64, behind: f64) -> Self {
+        if by <= behind { Self::Behind(by) } else { Self::AllNearer }
     }
 }
 
-impl Curve for Segment {
-    fn point(&self, at: Coordinate) -> Point {
-        self.curve().point(at)
+/// What boards can reach: no point of a board with a handle outside the disc is within the limit of the boards searched.
+#[derive(Debug, Clone, Copy)]
+pub struct ReachedDisc {
+    /// Centre of the disc.
+    pub centre: Point,
+    /// Radius of the disc, metres.
+    pub radius: f64,
+    /// Radius, metres, of the circle about the origin with the same property for boards on an inward spiral.
+    pub about_origin: f64,
+}
+
+/// A smooth curve on the stage, travelled in one direction.
+///
+/// Places are in the curve's coordinate; "units" are units of that coordinate.
+pub trait Curve {
+    /// Returns the point of a place.
+    fn point(&self, at: Coordinate) -> Point;
+
+    /// Returns the unit tangent at a place, in the direction of travel.
+    fn tangent(&self, at: Coordinate) -> Vector;
+
+    /// Returns the curvature at a place, 1/m, not negative.
+    fn curvature(&self, at: Coordinate) -> f64;
+
+    /// Returns the metres of arc length from one place to another, negative against the direction of travel.
+    fn arc_length(&self, from: Coordinate, to: Coordinate) -> f64;
+
+    /// Returns the place `metres` of arc length after another, before it where negative.
+    fn advance(&self, from: Coordinate, metres: f64) -> Coordinate;
+
+    /// Returns 1 if the coordinate grows in the direction of travel, -1 if it falls.
+    fn sign(&self) -> f64 {
+        1.0
     }
 
-    fn tangent(&self, at: Coordinate) -> Vector {
-        self.curve().tangent(at)
+    /// Returns the metres of travel per unit at a place, with the sign of [`sign`](Self::sign).
+    fn rate(&self, at: Coordinate) -> f64;
+
+    /// Returns the units from one place to another, positive in the direction of travel.
+    fn progress(&self, from: Coordinate, to: Coordinate) -> f64 {
+        self.sign() * to.minus(from)
     }
 
-    fn curvature(&self, at: Coordinate) -> f64 {
-        self.curve().curvature(at)
+    /// Returns the place `by` units further back.
+    fn back(&self, at: Coordinate, by: f64) -> Coordinate {
+        at.plus(-self.sign() * by)
     }
 
-    fn arc_length(&self, from: Coordinate, to: Coordinate) -> f64 {
-        self.curve().arc_length(from, to)
+    /// Returns true if the curve exists at this coordinate.
+    fn contains(&self, _at: Coordinate) -> bool {
+        true
     }
 
-    fn advance(&self, from: Coordinate, metres: f64) -> Coordinate {
-        self.curve().advance(from, metres)
+    /// Returns 1 if the curve turns left, -1 if it turns right, 0 on a line.
+    fn turning(&self) -> f64;
+
+    /// Returns the signed curvature, 1/m, positive to the left, of a curve whose curvature is the same everywhere.
+    ///
+    /// On such a curve a chain keeps its shape, and two joined curves of equal curvature are one line or circle.
+    fn constant_curvature(&self) -> Option<f64> {
+        None
+    }
+
+    /// Returns true if the curvature of every stretch is greatest where the stretch ends, false if where it begins.
+    fn tightens(&self) -> bool {
+        false
+    }
+
+    /// Returns the metres of travel after which every point of the curve has been passed.
+    fn circumference(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Returns the metres of arc length over a chord of `chord` metres, if these are the same everywhere.
+    fn arc_over(&self, _chord: f64) -> Option<f64> {
+        None
+    }
+
+    /// Returns an upper bound of the metres of arc length between two places.
+    fn length_bound(&self, one: Coordinate, other: Coordinate) -> f64 {
+        self.arc_length(one, other).abs()
+    }
+
+    /// Returns the vector from one place to another, metres, with a relative error of a few units in the last place.
+    fn displacement(&self, from: Coordinate, to: Coordinate) -> Vector;
+
+    /// Returns the pose of the link of `link` metres between two places.
+    fn link_pose(&self, front: Coordinate, rear: Coordinate, _link: f64) -> LinkPose {
+        LinkPose::between((self.point(front), self.tangent(front)), (self.point(rear), self.tangent(rear)))
+    }
+
+    /// Finds the first place behind `front` at the distance `link` metres, on a curve that extends `behind` units back.
+    ///
+    /// # Errors
+    /// [`NoFollower`] if no place of the curve, continued backward, is as far away before the distance shrinks again.
+    fn follower(&self, _front: Coordinate, _behind: f64, _link: f64) -> Result<Follower, NoFollower> {
+        Ok(Follower::Unknown)
+    }
+
+    /// Returns the change of the coordinate to the place `link` metres of distance ahead of `rear`; `gap` is a guess of
+    /// the metres of travel. `None` if there is no such place, or none is found.
+    fn ahead(&self, rear: Coordinate, gap: f64, link: f64) -> Option<f64>;
+
+    /// Returns half the greatest second derivative, by the coordinate, of the squared distance to a point F.
+    ///
+    /// It holds where that distance is at most `distance` metres and the place at most [`longest_step`](Self::longest_step)
+    /// behind `at`: |p'|^2 + (p - F) . p'' <= |p'|^2 + distance |p''|.
+    fn second_derivative_bound(&self, at: Coordinate, distance: f64) -> f64;
+
+    /// Returns the greatest step, in units, for which [`second_derivative_bound`](Self::second_derivative_bound) holds.
+    fn longest_step(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Returns true if the distance from `front` is known to grow all the way back to `rear`.
+    fn distance_grows(&self, _front: Coordinate, _rear: Coordinate) -> bool {
+        false
+    }
+
+    /// Returns true if a link with these handles is known not to stall or lock while both stay on the curve.
+    fn is_steady(&self, _front: Coordinate, _rear: Coordinate) -> bool {
+        false
+    }
+
+    /// Returns the place up to which no link of `link` metres stalls or locks, on the first curve of a path; `None` if
+    /// no link does anywhere on it.
+    fn stall_free_until(&self, _link: f64) -> Option<Coordinate> {
+        None
+    }
+
+    /// Returns the coordinate of the front handle at which a link of `link` metres locks with both handles on the curve.
+    fn fold(&self, _link: f64) -> Option<f64> {
+        None
+    }
+
+    /// Returns the first place of the curve from which a board can reach into the disc, or an earlier one; `None` if no
+    /// place up to `last` can. `begin` is where the curve begins, `None` for the first curve of a path.
+    fn first_within(&self, disc: &ReachedDisc, begin: Option<Coordinate>, last: Coordinate) -> Option<Coordinate>;
+
+    /// Returns the place of a path's first curve, ending at `last`, behind which no two boards without a common handle
+    /// ever come within `limit` metres.
+    fn quiet_place(&self, _team: &Team, _limit: f64, _last: Coordinate) -> Option<Coordinate> {
+        None
+    }
+
+    /// Returns an upper bound of the metres that a handle moves from `first` to `last`, seen from a frame that moves
+    /// rigidly with a reference handle.
+    ///
+    /// The coordinate of the reference handle changes by `turned`; `behind` is where its follower was. `None` if no
+    /// bound below the handle's own path length is known.
+    fn seen_from_frame(
+        &self,
+        (_first, _last): (Coordinate, Coordinate),
+        _turned: f64,
+        _behind: Coordinate,
+    ) -> Option<f64> {
+        None
+    }
+
+    /// Returns the metres that the frame of [`seen_from_frame`](Self::seen_from_frame) moves.
+    fn frame_travel(&self, _turned: f64) -> f64 {
+        0.0
     }
 }

@@ -5,6 +5,8 @@
 
 use std::f64::consts::TAU;
 
+use super::elementary;
+
 /// 2 pi minus its nearest double: with it, whole turns come off an angle without losing digits.
 const TAU_LOW: f64 = 2.449_293_598_294_706_4e-16;
 
@@ -66,13 +68,13 @@ impl DoubleDouble {
     }
 
     /// Sine and cosine of this angle in radians, exact to a few units of 1e-16 up to 1e8 radians.
-    pub fn sin_cos(self) -> (f64, f64) {
+    pub fn sine_and_cosine(self) -> (f64, f64) {
         let turns = (self.high / TAU).round();
         let product = turns * TAU;
         // Exact: the angle and the nearest multiple of TAU agree in their leading bits.
         let remainder = self.high - product;
         let low = self.low - TAU.mul_add(turns, -product) - TAU_LOW * turns;
-        let (sine, cosine) = remainder.sin_cos();
+        let (sine, cosine) = elementary::sin_cos(remainder);
         (low.mul_add(cosine, sine), (-low).mul_add(sine, cosine))
     }
 }
@@ -86,7 +88,7 @@ mod tests {
         for turns in [1e3, 123_456.0, 1e7] {
             for part in [0.0, 0.125, 0.25, -0.375] {
                 // The part is a dyadic fraction, so that turns + part is exact.
-                let (sine, cosine) = DoubleDouble::from_turns(turns + part).sin_cos();
+                let (sine, cosine) = DoubleDouble::from_turns(turns + part).sine_and_cosine();
                 let (true_sine, true_cosine) = (TAU * part).sin_cos();
                 assert!((sine - true_sine).abs() < 3e-16 && (cosine - true_cosine).abs() < 3e-16, "{turns} {part}");
             }

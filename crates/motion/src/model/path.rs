@@ -6,8 +6,12 @@
 
 use std::f64::consts::TAU;
 
-use super::curve::{Arc, Coordinate, Curve, Line, Segment, Side};
+use super::arc::Arc;
+use super::curve::{Coordinate, Curve, Side};
 use super::double_double::DoubleDouble;
+use super::elementary::{atan, atan2, hypot};
+use super::line::Line;
+use super::segment::Segment;
 use super::spiral::{Direction, Spiral};
 use super::{Point, Vector};
 
@@ -148,10 +152,10 @@ impl Path {
     ) -> Result<Self, Disjoint> {
         let inward = Spiral::new(pitch, Direction::Inward);
         let a = inward.radius_per_radian();
-        let both = turn_radius.hypot(a);
+        let both = hypot(turn_radius, a);
         let second_radius = both / (1.0 + arc_ratio);
         let first_radius = arc_ratio * second_radius;
-        let angle = 2.0 * (turn_radius / a).atan();
+        let angle = 2.0 * atan(turn_radius / a);
         // Far out a rounded number of turns would be a place well beside the turn's own.
         let DoubleDouble { high, low } = DoubleDouble::quotient(turn_radius, pitch);
         let anchor = DoubleDouble::from_turns(high).plus(TAU * low);
@@ -179,7 +183,7 @@ impl Path {
     /// A route that begins at `start` in the direction `heading_turns` turns counter-clockwise from x, with a straight
     /// line without end behind it. Lines and arcs are added to it one by one.
     pub fn route(start: Point, heading_turns: f64) -> Route {
-        let (sine, cosine) = DoubleDouble::from_turns(heading_turns).sin_cos();
+        let (sine, cosine) = DoubleDouble::from_turns(heading_turns).sine_and_cosine();
         let segment = Segment::Line(Line { origin: start, direction: Vector::new(cosine, sine) });
         let zero = Coordinate::ZERO;
         let behind =
@@ -200,7 +204,7 @@ impl Path {
             let (end, start) = (before.point(last), after.point(first));
             let (old, new) = (before.tangent(last), after.tangent(first));
             let gap = (end - start).norm();
-            let corner = old.perp(&new).atan2(old.dot(&new)).abs();
+            let corner = atan2(old.perp(&new), old.dot(&new)).abs();
             let sharpest = before.curvature(last).max(after.curvature(first));
             let size = end.coords.norm() + 1.0 / sharpest.max(1.0);
             // Not a number is no join either.
@@ -282,12 +286,8 @@ impl Path {
     pub fn max_curvature_between(&self, from: f64, to: f64) -> f64 {
         let met = self.segments.iter().filter(|placed| placed.begin <= to && placed.end >= from);
         met.map(|placed| {
-            // A spiral bends most where it is nearest to the centre.
-            let innermost = match placed.segment {
-                Segment::Spiral(spiral) if spiral.direction() == Direction::Inward => to.min(placed.end),
-                _ => from.max(placed.begin).min(placed.end),
-            };
-            placed.segment.curvature(placed.at(innermost))
+            let tightest = if placed.segment.tightens() { to } else { from.max(placed.begin) }.min(placed.end);
+            placed.segment.curvature(placed.at(tightest))
         })
         .fold(0.0, f64::max)
     }
@@ -319,13 +319,17 @@ impl Path {
                     },
                 };
                 let start = placed.segment.point(first);
-                SegmentOutline { kind, start, heading: tangent.y.atan2(tangent.x), length: placed.end - begin }
+                SegmentOutline { kind, start, heading: atan2(tangent.y, tangent.x), length: placed.end - begin }
             })
             .collect()
     }
 
     pub(crate) fn segment(&self, param: Param) -> &Segment {
         &self.segments[param.segment].segment
+    }
+
+    pub(crate) fn segment_at(&self, index: usize) -> &Segment {
+        &self.segments[index].segment
     }
 
     /// The coordinate with which a segment begins; of the first segment, of the place from which it is measured.
@@ -367,7 +371,7 @@ impl Route {
     }
 
     fn direction(&self) -> Vector {
-        let (sine, cosine) = DoubleDouble::from_turns(self.heading_turns).sin_cos();
+        let (sine, cosine) = DoubleDouble::from_turns(self.heading_turns).sine_and_cosine();
         Vector::new(cosine, sine)
     }
 

@@ -3,12 +3,17 @@
 //! The path and the linkage call it. All formulas are derived in the polar frame of a handle, so that none subtracts two
 //! positions that are nearly the same.
 
-use std::f64::consts::{PI, TAU};
+mod bounds;
+mod links;
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::LazyLock;
 
-use super::curve::{Coordinate, Curve};
+use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower, ReachedDisc};
 use super::double_double::DoubleDouble;
+use super::elementary::{asinh, cos, hypot, pow, sin, sin_cos, tan};
 use super::root::{bisect_predicate, increasing_root};
+use super::team::Team;
 use super::{Point, Vector};
 
 /// Which way a spiral is travelled.
@@ -29,10 +34,8 @@ pub struct Spiral {
     direction: Direction,
 }
 
-/// No point behind is as far away as the link is long: any further motion would make the handle jump.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("no point behind on the path is one link away")]
-pub struct NoFollower;
+/// The longest step, in radians, of the search for a follower along a spiral.
+const LONGEST_STEP: f64 = 0.5;
 
 impl Spiral {
     /// A spiral of `pitch` metres per turn, which must be positive and finite; the scene, which knows the user's file and
@@ -77,9 +80,9 @@ impl Spiral {
             return 0.0;
         }
         let inner = theta - span;
-        let (w, w_inner) = (1f64.hypot(theta), 1f64.hypot(inner));
+        let (w, w_inner) = (hypot(1.0, theta), hypot(1.0, inner));
         let algebraic = span * (w + inner * (theta + inner) / (w + w_inner));
-        let logarithmic = (span * (theta + inner) / (theta * w_inner + inner * w)).asinh();
+        let logarithmic = asinh(span * (theta + inner) / (theta * w_inner + inner * w));
         0.5 * self.radius_per_radian.high * (algebraic + logarithmic)
     }
 
@@ -96,7 +99,7 @@ impl Spiral {
         let twice = 2.0 * metres / a;
         let guess = twice / (theta + (theta * theta - twice).max(0.0).sqrt());
         let span = increasing_root(
-            |span| (self.inward_length(theta, span) - metres, a * 1f64.hypot(theta - span)),
+            |span| (self.inward_length(theta, span) - metres, a * hypot(1.0, theta - span)),
             if metres < 0.0 { 2.0 * guess } else { 0.0 },
             theta,
             guess,
@@ -109,7 +112,7 @@ impl Spiral {
     pub(crate) fn chord_residual(&self, r: f64, link: f64) -> impl Fn(f64) -> (f64, f64) + use<> {
         let a = self.radius_per_radian.high;
         move |d| {
-            let (sine, cosine) = (0.5 * d).sin_cos();
+            let (sine, cosine) = sin_cos(0.5 * d);
             let rise = a * d;
             let outer = r + rise;
             let value = rise.mul_add(rise, (2.0 * r * sine) * (2.0 * outer * sine)) - link * link;
@@ -141,8 +144,8 @@ impl Spiral {
                 }
             }
         };
-        let first = link / r.hypot(a);
-        let second = link / (r + 0.5 * a * first.min(PI)).hypot(a);
+        let first = link / hypot(r, a);
+        let second = link / hypot(r + 0.5 * a * first.min(PI), a);
         Ok(increasing_root(residual, 0.0, high, second))
     }
 
@@ -157,7 +160,7 @@ impl Spiral {
         // theta alone.
         let excess = |theta: f64| match first_chord_maximum(theta) {
             Some(d) => {
-                let square = (0.5 * d).sin().powi(2);
+                let square = sin(0.5 * d).powi(2);
                 let chord_square = d * d + 4.0 * theta * (theta + d) * square;
                 (chord_square - ratio * ratio, 4.0 * (2.0 * theta + d) * square)
             }
@@ -185,10 +188,10 @@ static LEAST_WITH_MAXIMUM: LazyLock<f64> =
 /// H = (1 - theta)(d + theta), and the part of the dip below that shrinks with d.
 fn first_chord_maximum(theta: f64) -> Option<f64> {
     let half_slope = |d: f64| {
-        let sine = (0.5 * d).sin();
-        d + 2.0 * theta * sine * sine + theta * (theta + d) * d.sin()
+        let sine = sin(0.5 * d);
+        d + 2.0 * theta * sine * sine + theta * (theta + d) * sin(d)
     };
-    let curvature = |d: f64| 1.0 + 2.0 * theta * d.sin() + theta * (theta + d) * d.cos();
+    let curvature = |d: f64| 1.0 + 2.0 * theta * sin(d) + theta * (theta + d) * cos(d);
     if curvature(PI) >= 0.0 {
         return None;
     }
@@ -205,22 +208,22 @@ impl Curve for Spiral {
             Direction::Inward => self.radius(at),
             Direction::Outward => -self.radius(at),
         };
-        let (sine, cosine) = at.sin_cos();
+        let (sine, cosine) = at.sine_and_cosine();
         Point::new(r * cosine, r * sine)
     }
 
     fn tangent(&self, at: Coordinate) -> Vector {
         let (r, a) = (self.radius(at), self.radius_per_radian.high);
-        let (sine, cosine) = at.sin_cos();
+        let (sine, cosine) = at.sine_and_cosine();
         // dp/dtheta = a e_r + r e_phi, and theta decreases. Turned by half a turn and travelled the other way, the outward
         // spiral has the same tangent.
-        Vector::new(r * sine - a * cosine, -a * sine - r * cosine) / r.hypot(a)
+        Vector::new(r * sine - a * cosine, -a * sine - r * cosine) / hypot(r, a)
     }
 
     /// (2 + theta^2) / (a (1 + theta^2)^(3/2)), which falls outward.
     fn curvature(&self, at: Coordinate) -> f64 {
         let square = at.high * at.high;
-        (2.0 + square) / (self.radius_per_radian.high * (1.0 + square).powf(1.5))
+        (2.0 + square) / (self.radius_per_radian.high * pow(1.0 + square, 1.5))
     }
 
     fn arc_length(&self, from: Coordinate, to: Coordinate) -> f64 {
@@ -235,6 +238,107 @@ impl Curve for Spiral {
             Direction::Inward => self.inward(from, metres),
             Direction::Outward => self.inward(from, -metres),
         }
+    }
+
+    #[inline]
+    fn sign(&self) -> f64 {
+        match self.direction {
+            Direction::Inward => -1.0,
+            Direction::Outward => 1.0,
+        }
+    }
+
+    fn rate(&self, at: Coordinate) -> f64 {
+        self.sign() * (self.radius_per_radian.high * hypot(1.0, at.high))
+    }
+
+    fn contains(&self, at: Coordinate) -> bool {
+        at.high > 0.0
+    }
+
+    fn turning(&self) -> f64 {
+        // Inward is clockwise.
+        self.sign()
+    }
+
+    fn tightens(&self) -> bool {
+        self.direction == Direction::Inward
+    }
+
+    fn length_bound(&self, one: Coordinate, other: Coordinate) -> f64 {
+        self.outer_length(one, other)
+    }
+
+    fn displacement(&self, from: Coordinate, to: Coordinate) -> Vector {
+        // A "link" of one metre has the displacement as its direction.
+        self.pose(to, from, 1.0).direction
+    }
+
+    fn link_pose(&self, front: Coordinate, rear: Coordinate, link: f64) -> LinkPose {
+        self.pose(front, rear, link)
+    }
+
+    fn follower(&self, front: Coordinate, behind: f64, link: f64) -> Result<Follower, NoFollower> {
+        Ok(match self.direction {
+            Direction::Inward => Follower::Behind(self.follower_angle(self.radius(front), link)?),
+            Direction::Outward => self.inner_follower(front, behind, link),
+        })
+    }
+
+    fn ahead(&self, rear: Coordinate, gap: f64, link: f64) -> Option<f64> {
+        self.angle_ahead(rear, gap, link)
+    }
+
+    fn second_derivative_bound(&self, at: Coordinate, distance: f64) -> f64 {
+        let a = self.radius_per_radian.high;
+        let theta = match self.direction {
+            Direction::Inward => at.high + LONGEST_STEP,
+            Direction::Outward => at.high,
+        };
+        a * a * (1.0 + theta * theta) + distance * a * hypot(2.0, theta)
+    }
+
+    fn longest_step(&self) -> f64 {
+        LONGEST_STEP
+    }
+
+    fn distance_grows(&self, front: Coordinate, rear: Coordinate) -> bool {
+        rear.minus(front).abs() <= FRAC_PI_2 && (self.direction == Direction::Inward || front.high >= 1.0 + FRAC_PI_2)
+    }
+
+    /// On the outward spiral, from a front handle at theta to a rear one at theta - d,
+    /// chord^2 = (a d)^2 + 4 a^2 theta (theta - d) sin^2(d/2) grows with d while tan(d/2) <= theta - d, and with theta
+    /// for fixed d. So where that inequality holds at the follower it holds at all smaller d; d falls as theta grows,
+    /// and it continues to hold. The rear cosine is positive there, and the front one (see `pose`) is larger.
+    fn is_steady(&self, front: Coordinate, rear: Coordinate) -> bool {
+        let d = front.minus(rear);
+        self.direction == Direction::Outward && d < PI && tan(0.5 * d) < rear.high
+    }
+
+    /// From theta = max(1, link / a) outward sin(d/2) <= link / (2 r) <= 1/2.
+    fn stall_free_until(&self, link: f64) -> Option<Coordinate> {
+        let theta = (link / self.radius_per_radian.high).max(1.0);
+        Some(Coordinate { high: theta, low: 0.0 })
+    }
+
+    fn fold(&self, link: f64) -> Option<f64> {
+        Self::fold(self, link)
+    }
+
+    fn first_within(&self, disc: &ReachedDisc, begin: Option<Coordinate>, last: Coordinate) -> Option<Coordinate> {
+        self.first_in_disc(disc, begin, last)
+    }
+
+    fn quiet_place(&self, team: &Team, limit: f64, last: Coordinate) -> Option<Coordinate> {
+        self.quiet_from(team, limit, last)
+    }
+
+    fn seen_from_frame(&self, moved: (Coordinate, Coordinate), turned: f64, behind: Coordinate) -> Option<f64> {
+        Some(self.seen_from_polar_frame(moved, turned, behind))
+    }
+
+    fn frame_travel(&self, turned: f64) -> f64 {
+        self.radius_per_radian.high * turned.abs()
     }
 }
 

@@ -31,12 +31,9 @@
 //! lacks) falls in proportion to the distance from a singular configuration, even where all of them vanish at once: the
 //! steps shrink in geometric progression towards it.
 
-use std::f64::consts::{PI, TAU};
-
 use crate::linkage::{NoFollower, follower, link_pose};
-use crate::model::curve::{Curve, Segment};
+use crate::model::curve::Curve;
 use crate::model::path::{Param, Path};
-use crate::model::spiral::Direction;
 use crate::model::{Point, Vector};
 
 /// A link of one length, anywhere on the path.
@@ -136,25 +133,12 @@ impl Link<'_> {
         self.path.end_of(at.front_param.segment)
     }
 
-    /// Metres of travel of the front handle up to which nothing can happen, because both handles are on one segment.
-    ///
-    /// On a line or an arc nothing changes. On the outward spiral, from a front handle at theta to a rear one at theta - d,
-    /// chord^2 = (a d)^2 + 4 a^2 theta (theta - d) sin^2(d/2) grows with d while tan(d/2) <= theta - d, and with theta
-    /// for fixed d. So where that inequality holds at the follower it holds at all smaller d; d falls as theta grows, and
-    /// it holds for ever. The rear cosine is positive there, and the front one (see `link_pose`) is larger.
+    /// Returns the metres of travel of the front handle up to which no link with both handles on its segment stalls or
+    /// locks, if this is known to be the segment's end.
     pub fn steady_until(&self, at: &Configuration) -> Option<f64> {
         let (front, rear) = (at.front_param, at.rear_param);
-        if front.segment != rear.segment {
-            return None;
-        }
-        let steady = match self.path.segment(front) {
-            Segment::Line(_) | Segment::Arc(_) => true,
-            Segment::Spiral(spiral) => {
-                let d = front.at.minus(rear.at);
-                spiral.direction() == Direction::Outward && d < PI && (0.5 * d).tan() < rear.at.high
-            }
-        };
-        Some(self.segment_end(at)).filter(|end| steady && *end > at.front)
+        let is_steady = front.segment == rear.segment && self.path.segment(front).is_steady(front.at, rear.at);
+        Some(self.segment_end(at)).filter(|end| is_steady && *end > at.front)
     }
 
     /// Whether a step, during which the front handle is on one segment, is proven to be continuous and to hold no turn of
@@ -170,8 +154,7 @@ impl Link<'_> {
         let last = if after.front_param.segment == segment { after.front_param.at } else { self.path.last(segment) };
         let segment = self.path.segment(before.front_param);
         let (first, last) = (segment.curvature(at), segment.curvature(last));
-        let side = side(segment);
-        FrontCurvature { least: first.min(last), most: first.max(last), side }
+        FrontCurvature { least: first.min(last), most: first.max(last), side: segment.turning() }
     }
 
     /// The least rear cosine over a step that is proven to be continuous; `curvature` is that at the front handle.
@@ -205,8 +188,9 @@ impl Link<'_> {
         let param = self.path.param_at(travelled);
         let (point, tangent) = (self.path.point(param), self.path.tangent(param));
         let offsets = [before.front_point - point, after.front_point - point];
-        let curvature = self.path.segment(param).curvature(param.at);
-        let turning = side(self.path.segment(param)) * curvature;
+        let segment = self.path.segment(param);
+        let curvature = segment.curvature(param.at);
+        let turning = segment.turning() * curvature;
         Distances {
             param,
             curvature,
@@ -245,11 +229,8 @@ impl Link<'_> {
         let mut segment = self.path.param_at(place).segment;
         while place > to {
             let begin = if segment == 0 { f64::NEG_INFINITY } else { self.path.end_of(segment - 1) };
-            let stop = match self.path.segment(Param { segment, at: self.path.first(segment) }) {
-                // One turn has been everywhere on the circle.
-                Segment::Arc(arc) => to.max(begin).max(place - TAU * arc.radius),
-                _ => to.max(begin),
-            };
+            let circumference = self.path.segment_at(segment).circumference();
+            let stop = to.max(begin).max(place - circumference);
             while place > stop {
                 let at_end = segment < after.front_param.segment && place >= self.path.end_of(segment);
                 let param =
@@ -279,11 +260,8 @@ impl Link<'_> {
 
     /// The greatest curvature of a segment from a place back to the segment's beginning.
     fn max_curvature_back(&self, segment: usize, from: Param) -> f64 {
-        let first = Param { segment, at: self.path.first(segment) };
-        match self.path.segment(first) {
-            Segment::Spiral(spiral) if spiral.direction() == Direction::Inward => spiral.curvature(from.at),
-            other => other.curvature(first.at),
-        }
+        let curve = self.path.segment_at(segment);
+        curve.curvature(if curve.tightens() { from.at } else { self.path.first(segment) })
     }
 
     /// Whether the number of turns in a step is certain: 0 where the front cosines have one sign, else 1.
@@ -327,17 +305,6 @@ impl Link<'_> {
             let point = self.path.point(self.path.param_at(*place));
             [before, after].iter().all(|end| (end.front_point - point).norm_squared() < limit)
         })
-    }
-}
-
-/// 1 where a segment turns left, -1 where it turns right.
-fn side(segment: &Segment) -> f64 {
-    match segment {
-        Segment::Line(_) => 0.0,
-        Segment::Arc(arc) => arc.signed_curvature().signum(),
-        // The inward spiral is travelled clockwise; outward it is travelled the other way.
-        Segment::Spiral(spiral) if spiral.direction() == Direction::Inward => -1.0,
-        Segment::Spiral(_) => 1.0,
     }
 }
 

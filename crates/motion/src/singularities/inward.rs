@@ -21,8 +21,7 @@
 
 use std::f64::consts::PI;
 
-use crate::model::curve::Segment;
-use crate::model::double_double::DoubleDouble;
+use crate::model::curve::Curve;
 use crate::model::path::Param;
 use crate::model::root::bisect_predicate;
 
@@ -39,26 +38,18 @@ pub(super) struct InwardSingularities {
 
 /// Metres of travel of the front handle up to which no link of this length has a singular configuration.
 pub(super) fn stall_free_until(link: &Link) -> f64 {
-    match link.path.segment(Param { segment: 0, at: link.path.first(0) }) {
-        Segment::Spiral(spiral) => {
-            let theta = (link.length / spiral.radius_per_radian()).max(1.0);
-            let at = DoubleDouble { high: theta, low: 0.0 };
-            link.path.travelled(Param { segment: 0, at }).min(link.path.end_of(0))
-        }
-        Segment::Line(_) | Segment::Arc(_) => link.path.end_of(0),
-    }
+    let end = link.path.end_of(0);
+    let free = link.path.segment_at(0).stall_free_until(link.length);
+    free.map_or(end, |at| link.path.travelled(Param { segment: 0, at }).min(end))
 }
 
 /// The lock and the turns on the first segment of a link's path.
 pub(super) fn singularities(link: &Link) -> InwardSingularities {
-    let Segment::Spiral(spiral) = link.path.segment(Param { segment: 0, at: link.path.first(0) }) else {
-        return InwardSingularities::default();
-    };
     let (from, end) = (stall_free_until(link), link.path.end_of(0));
     if from >= end {
         return InwardSingularities::default();
     }
-    let inward = Inward { link, end, fold: spiral.fold(link.length) };
+    let inward = Inward { link, end, fold: link.path.segment_at(0).fold(link.length) };
     let lock = inward.last_solvable(from);
     let to = lock.unwrap_or(end);
     // Past the curve on which it stalls; past the one on which the stall ends.

@@ -5,6 +5,7 @@
 use super::{Chain, Solver, Velocities};
 use crate::linkage::{NoFollower, follower, link_pose};
 use crate::model::Vector;
+use crate::model::elementary;
 use crate::model::path::{Param, Path};
 use crate::model::team::Team;
 
@@ -64,7 +65,7 @@ impl Newton {
 
 /// The angle of a direction in (-pi, pi]: minus pi, which atan2 gives for a negative zero, is turned to pi.
 pub(super) fn heading(direction: Vector) -> f64 {
-    let angle = direction.y.atan2(direction.x);
+    let angle = elementary::atan2(direction.y, direction.x);
     if angle == -std::f64::consts::PI { std::f64::consts::PI } else { angle }
 }
 

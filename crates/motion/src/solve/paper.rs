@@ -11,6 +11,7 @@ use std::f64::consts::PI;
 
 use super::{Chain, Solver, Velocities};
 use crate::linkage::NoFollower;
+use crate::model::elementary::{atan2, cos, hypot, sin};
 use crate::model::spiral::Spiral;
 use crate::model::team::Team;
 
@@ -129,15 +130,15 @@ fn place_chain(spiral: &Spiral, team: &Team, tolerance: f64, theta: f64, chain: 
     let a = spiral.radius_per_radian();
     let mut angle = theta;
     for handle in 0..team.handles() {
-        chain.x[handle] = a * angle * angle.cos();
-        chain.y[handle] = a * angle * angle.sin();
+        chain.x[handle] = a * angle * cos(angle);
+        chain.y[handle] = a * angle * sin(angle);
         if handle < team.benches {
             angle += bisected_follower_angle(spiral, angle, team.link(handle), tolerance)?;
         }
     }
     for handle in 0..team.benches {
         let (dx, dy) = (chain.x[handle] - chain.x[handle + 1], chain.y[handle] - chain.y[handle + 1]);
-        chain.heading[handle] = dy.atan2(dx);
+        chain.heading[handle] = atan2(dy, dx);
     }
     chain.heading[team.benches] = chain.heading[team.benches - 1];
     Ok(())
@@ -163,7 +164,7 @@ impl Solver for Paper {
             chain.vy[handle] = vy;
             // The paper knows no direction; travel is clockwise, so the sign is that of r x v, turned round.
             let turning = chain.y[handle] * vx - chain.x[handle] * vy;
-            chain.speed[handle] = if turning < 0.0 { -vx.hypot(vy) } else { vx.hypot(vy) };
+            chain.speed[handle] = if turning < 0.0 { -hypot(vx, vy) } else { hypot(vx, vy) };
         }
         Ok(())
     }

@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 use super::newton::Newton;
 use super::table::{Allowed, EXACT_ACCURACY, FollowerTable, Instructions, Tolerance};
 use super::{Chain, Solver, Velocities};
+use crate::model::elementary::hypot;
 use crate::model::path::Path;
 use crate::model::team::Team;
 
@@ -191,8 +192,8 @@ impl ErrorMeasurement {
                 return (f64::INFINITY, worst.1);
             }
             for (handle, (x, y)) in x.iter().zip(y).enumerate() {
-                let error = (chain.x[handle] - x).hypot(chain.y[handle] - y);
-                let floor = 8.0 * f64::EPSILON * (x.hypot(*y) + self.head_speed * time);
+                let error = hypot(chain.x[handle] - x, chain.y[handle] - y);
+                let floor = 8.0 * f64::EPSILON * (hypot(*x, *y) + self.head_speed * time);
                 let allowed = (SHARE_MEASURED * accuracy).max(floor);
                 if error.is_nan() || error * worst.1 > worst.0 * allowed {
                     worst = (error, allowed);

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
 
 use bench_dragon_messages::SCENE_HASH_BYTES;
-use bench_dragon_proof::{Outcome, Proved, Refused, scene_hash};
+use bench_dragon_proof::{Proved, ProvedEvent, Refused, scene_hash};
 
 /// Bytes of the longest first line, which holds the scene's text.
 const LONGEST_FIRST_LINE: u64 = 1 << 26;
@@ -58,7 +58,7 @@ impl Certificate {
 #[derive(Debug, Default)]
 pub struct Proofs {
     /// Of the scenes that there is a certificate of, what it proves; `None` until it has been checked.
-    of: RwLock<HashMap<SceneHash, Option<Arc<[Outcome]>>>>,
+    of: RwLock<HashMap<SceneHash, Option<Arc<[ProvedEvent]>>>>,
 }
 
 impl Proofs {
@@ -75,7 +75,7 @@ impl Proofs {
     }
 
     /// What is proved of the scene with this hash; `None` where nothing is, or not yet.
-    pub(super) fn of(&self, scene: &SceneHash) -> Option<Arc<[Outcome]>> {
+    pub(super) fn of(&self, scene: &SceneHash) -> Option<Arc<[ProvedEvent]>> {
         let of = self.of.read().unwrap_or_else(PoisonError::into_inner);
         of.get(scene).cloned().flatten()
     }

@@ -162,13 +162,13 @@ fn action(name: &str, value: Option<f64>) -> Result<Action, &'static str> {
     if name == "toggle" {
         return Ok(Action::Toggle);
     }
-    let number = Command::NAMES.iter().position(|known| *known == name).ok_or(EXPECTED)?;
+    let number = Command::named(name).ok_or(EXPECTED)?.number;
     let value = match (name, value) {
         ("step", None) => 1.0,
         ("rate" | "seek", None) => return Err(EXPECTED),
         (_, value) => value.unwrap_or_default(),
     };
-    match Command::of_number(number as u32, value) {
+    match Command::of_number(number, value) {
         Ok(command) => Ok(Action::Send(command)),
         Err(_) => Err("step is refused: expected a whole number of periods from 1"),
     }
@@ -185,7 +185,7 @@ fn answer(id: &Value, conducted: Conducted) -> String {
         Ok(conducted) => conducted,
         Err(error) => return refused(id, &error.to_string()),
     };
-    json!({"type": "answer", "id": id, "command": Command::NAMES[command.number_and_value().0 as usize],
+    json!({"type": "answer", "id": id, "command": command.name(),
         "code": response.result().map_or("unknown", Code::name), "tick": response.tick, "sim_time": response.sim_time,
         "time_scale": response.time_scale, "playback": response.playback_state().map_or("unknown", PlaybackState::name),
         "cue": response.cue, "sentence": refusal(&response, command)})

@@ -10,7 +10,7 @@ use tokio::sync::watch;
 use super::{Picture, Proofs, SceneHash, wire};
 use bench_dragon_client::feed::{Feed, FeedEvent};
 use bench_dragon_messages::{LoopStatus, Stage};
-use bench_dragon_proof::Outcome;
+use bench_dragon_proof::ProvedEvent;
 
 /// How often frames are polled: some browsers draw 240 times a second, none needs more. To be woken by each frame
 /// instead would cost the publisher more than the frame itself.
@@ -62,7 +62,7 @@ struct Reader<'a> {
     proofs: &'a Proofs,
     stage: Option<Stage>,
     /// What is proved of the scene of that stage.
-    proved: Option<Arc<[Outcome]>>,
+    proved: Option<Arc<[ProvedEvent]>>,
     /// The scene of which it has been said that no certificate is its own.
     unproved: Option<SceneHash>,
     /// Of the run whose status came last: it alone holds the scene's name.

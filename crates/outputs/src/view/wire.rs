@@ -28,7 +28,7 @@ use bench_dragon_messages::json::{AlertObject, CueObject, Exact, StageObject};
 use bench_dragon_messages::sentence::{Figures, alert_sentence, state_sentence};
 use bench_dragon_messages::state::{FrameState, Level, Severity};
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage};
-use bench_dragon_proof::Outcome;
+use bench_dragon_proof::ProvedEvent;
 
 const VERSION: u8 = 3;
 const HEADER_BYTES: usize = 72;
@@ -56,7 +56,7 @@ pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
 }
 
 /// The stage, the name of its publisher and, once they are known, that of its scene and what is proved of its events.
-pub(super) fn stage(stage: &Stage, publisher: &str, scene: Option<&str>, proved: Option<&[Outcome]>) -> String {
+pub(super) fn stage(stage: &Stage, publisher: &str, scene: Option<&str>, proved: Option<&[ProvedEvent]>) -> String {
     #[derive(Serialize)]
     struct StageMessage<'a> {
         r#type: &'static str,
@@ -64,7 +64,7 @@ pub(super) fn stage(stage: &Stage, publisher: &str, scene: Option<&str>, proved:
         scene: Option<&'a str>,
         #[serde(flatten)]
         stage: StageObject,
-        proved: Option<&'a [Outcome]>,
+        proved: Option<&'a [ProvedEvent]>,
         states: [Value; FrameState::ALL.len()],
     }
     let (stage, states) = (StageObject::from(stage), FrameState::ALL.map(state));

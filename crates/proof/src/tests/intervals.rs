@@ -5,13 +5,14 @@ use astro_float::{BigFloat, Consts, RoundingMode, Sign};
 use fastrand::Rng;
 use num_bigint::BigInt;
 
+use super::cases;
 use crate::elementary;
 use crate::interval::{BITS, Interval, Vector};
 
-/// Random operations of each kind on intervals.
-const OPERATIONS: usize = if cfg!(debug_assertions) { 2_000 } else { 100_000 };
-/// Random arguments of each elementary function.
-const ARGUMENTS: usize = if cfg!(debug_assertions) { 50 } else { 2_000 };
+/// Returns the number of random operations of each kind.
+fn operations() -> usize {
+    cases(100_000, 2_000)
+}
 
 /// An exact binary number: `integer` times 2^`exponent`.
 #[derive(Clone, Debug)]
@@ -48,7 +49,7 @@ impl Exact {
     }
 }
 
-/// A number of 128 bits of any sign, mostly near 1 in size, sometimes far from it, round, or 0.
+/// Returns a number of 128 bits of either sign, mostly near 1 in size, sometimes far from it, round, or 0.
 fn number(random: &mut Rng) -> BigFloat {
     let round = |random: &mut Rng| random.f64() * 2.0 - 1.0;
     let scale = match random.u8(..10) {
@@ -63,7 +64,7 @@ fn number(random: &mut Rng) -> BigFloat {
     sum.mul(&BigFloat::from_f64(scale, BITS), BITS, RoundingMode::ToEven)
 }
 
-/// An interval, and two numbers in it; narrow or wide.
+/// Returns a narrow or wide interval, and two numbers in it.
 fn interval(random: &mut Rng) -> (Interval, Vec<BigFloat>) {
     let a = number(random);
     let b = match random.u8(..3) {
@@ -83,7 +84,7 @@ fn assert_holds(interval: &Interval, exact: &Exact, what: &str) {
 #[test]
 fn sums_and_products_hold_the_exact_result() {
     let mut random = Rng::with_seed(1);
-    for _ in 0..OPERATIONS {
+    for _ in 0..operations() {
         let ((a, of_a), (b, of_b)) = (interval(&mut random), interval(&mut random));
         let (sum, difference, product) = (&a + &b, &a - &b, &a * &b);
         let (square, size, most, least) = (a.square(), a.abs(), a.max(&b), a.min(&b));
@@ -107,7 +108,7 @@ fn sums_and_products_hold_the_exact_result() {
 fn quotients_and_roots_hold_the_exact_result() {
     let mut random = Rng::with_seed(2);
     let mut quotients = 0;
-    for _ in 0..OPERATIONS {
+    for _ in 0..operations() {
         let ((a, of_a), (b, of_b)) = (interval(&mut random), interval(&mut random));
         let quotient = &a / &b;
         if !(b.is_positive() || b.is_negative()) {
@@ -127,23 +128,23 @@ fn quotients_and_roots_hold_the_exact_result() {
         let (lo, hi) = (Exact::new(root.ends().0), Exact::new(root.ends().1));
         let (least, greatest) = (Exact::new(a.abs().ends().0), Exact::new(a.abs().ends().1));
         assert!(lo.times(&lo).is_at_most(&least) && greatest.is_at_most(&hi.times(&hi)), "root of {a:?}");
-        // And it is no wider than it need be.
+        // The interval is no wider than needed.
         if a.ends().0 == a.ends().1 && !a.ends().0.is_zero() {
             let width = hi.minus(&lo);
             let allowed = Exact { integer: hi.integer.clone(), exponent: hi.exponent - 90 };
             assert!(width.is_at_most(&allowed), "root of {a:?}");
         }
     }
-    assert!(quotients > OPERATIONS / 4, "{quotients}");
+    assert!(quotients > operations() / 4, "{quotients}");
 }
 
-/// Doubles are taken over exactly, or held where they are subnormal.
+/// Doubles are converted exactly; subnormal ones are enclosed.
 #[test]
 fn doubles_are_exact() {
     let mut random = Rng::with_seed(3);
     let some = [0.0, -0.0, 1.0, 5e-324, f64::MIN_POSITIVE, f64::MAX, f64::MIN, 2f64.powi(-1060) * 3.0];
     let any = std::iter::repeat_with(|| f64::from_bits(random.u64(..))).filter(|number| number.is_finite());
-    for number in some.into_iter().chain(any.take(OPERATIONS)) {
+    for number in some.into_iter().chain(any.take(operations())) {
         let interval = Interval::new(number);
         let bits = number.to_bits();
         let exponent = ((bits >> 52) & 0x7ff) as i64;
@@ -157,7 +158,7 @@ fn doubles_are_exact() {
     }
 }
 
-/// Comparisons with what is not a number are never true.
+/// Comparisons with NaN are never true.
 #[test]
 fn what_is_not_a_number_proves_nothing() {
     let one = Interval::new(1.0);
@@ -196,7 +197,7 @@ fn compare(
     mut reference: impl FnMut(&BigFloat) -> BigFloat,
 ) {
     let mut random = Rng::with_seed(4);
-    for _ in 0..ARGUMENTS {
+    for _ in 0..cases(2_000, 50) {
         let x = argument(&mut random);
         let value = Exact::new(&reference(&BigFloat::from_f64(x, 512)));
         let enclosure = computed(&Interval::new(x));
@@ -204,7 +205,7 @@ fn compare(
         let wide =
             computed(&Interval::between(BigFloat::from_f64(x, BITS), BigFloat::from_f64(x + x.abs() * 1e-12, BITS)));
         assert_holds(&wide, &value, &format!("{name} from {x:e}"));
-        // 1e-28 of the value or of 1, whatever is more.
+        // 1e-28 of the value or of 1, the greater of the two.
         let width = Exact::new(enclosure.ends().1).minus(&Exact::new(enclosure.ends().0));
         let size = Exact::new(&BigFloat::from_f64(1e-28 * x.abs().max(1.0), BITS));
         assert!(width.is_at_most(&size), "{name} of {x:e}: {enclosure:?}");
@@ -226,7 +227,7 @@ fn elementary_functions_hold_their_values() {
     let positive = |random: &mut Rng| 2f64.powf(random.f64() * 60.0 - 10.0);
     compare("atan", positive, elementary::atan, |x| x.atan(512, NEAREST, &mut constants));
     compare("ln", positive, elementary::ln, |x| x.ln(512, NEAREST, &mut constants));
-    // Where nothing is known of an angle, everything is possible.
+    // An unknown angle gives the whole range.
     for angle in [1e300, f64::MAX, -1e17] {
         let (sine, cosine) = elementary::sin_cos(&Interval::new(angle));
         let one = Interval::new(1.0);

@@ -1,7 +1,8 @@
-//! Each lemma on cases made by hand: true ones hold, and those that are false by little do not.
+//! Each lemma on cases made by hand: true cases hold, and cases that are false by little do not.
 
 use fastrand::Rng;
 
+use super::cases;
 use crate::boards::{Board, covers, is_inside_ring};
 use crate::capsule::{Capsule, Pair};
 use crate::interval::{Interval, Vector};
@@ -18,7 +19,7 @@ fn turnaround() -> Scene {
     scene("kind = \"turnaround\"\npitch = 1.7\nturn_radius = 4.5\narc_ratio = 2.0\nlead_in = 100.0")
 }
 
-/// An arc around the origin, entered from a line: coordinates are angles.
+/// Returns an arc around the origin, entered from a line: coordinates are angles.
 fn circle(radius: f64) -> Scene {
     scene(&format!(
         "kind = \"pieces\"\nstart = [0.0, {}]\npieces = [{{ kind = \"arc\", radius = {radius}, side = \"left\", turns = 0.9 }}]",
@@ -60,7 +61,7 @@ fn paths_are_without_gap_or_corner() {
     assert!((path.length.rough() - both - 100.0 - 2.86 - 8.0 * 1.65).abs() < 1e-12);
 }
 
-/// What a capsule says of its span holds at random places of it, also across junctions.
+/// The bounds of a capsule hold at random places of its span, also across junctions.
 #[test]
 fn capsules_hold_their_places() {
     let scene = turnaround();
@@ -120,14 +121,14 @@ fn a_link_on_a_circle() {
     assert!(check([2.0, 2.1], around(-1e-12, 0.1 - 1e-12)).is_err());
     assert!(check([2.0, 2.1], around(1e-12, 0.1)).is_err());
     assert!(check([2.0, 2.1], around(-1e-12, behind + 0.01)).is_err());
-    // Half a circle further on the front product is negative, and a place nearer by is at the distance first: the place
-    // where the circle has come round again is no follower.
+    // Half a circle further on the front product is negative. A nearer place is at the distance before: the place where
+    // the circle closes is no follower.
     let round = std::f64::consts::TAU - behind;
     let far = 5.62 - round;
     assert!(far > 0.0 && check([5.62, 5.62], [far - 1e-9, far + 1e-9]).is_err());
 }
 
-/// Boards of one link each that are held by capsules of single places.
+/// Returns the capsule of a single place.
 fn single(point: [f64; 2]) -> Capsule {
     let zero = || Interval::new(0.0);
     let place = Place(0, 0.0);
@@ -142,14 +143,14 @@ fn single(point: [f64; 2]) -> Capsule {
     }
 }
 
-/// The rear handle, the direction, the length of a board; its four corners.
+/// Returns the four corners of a board with this rear handle, direction and length.
 fn corners(rear: [f64; 2], angle: f64, length: f64) -> [[f64; 2]; 4] {
     let (sine, cosine) = angle.sin_cos();
     [(-0.275, -0.15), (-0.275, 0.15), (length + 0.275, 0.15), (length + 0.275, -0.15)]
         .map(|(x, y)| [rear[0] + x * cosine - y * sine, rear[1] + x * sine + y * cosine])
 }
 
-/// The distance of a point from an edge.
+/// Returns the distance of a point from an edge.
 fn distance(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     let (edge, to) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
     let along = ((edge[0] * to[0] + edge[1] * to[1]) / (edge[0] * edge[0] + edge[1] * edge[1])).clamp(0.0, 1.0);
@@ -170,7 +171,7 @@ fn boards_are_apart_or_not() {
     let scene = turnaround();
     let mut random = Rng::with_seed(2);
     let (mut apart, mut overlapping) = (0, 0);
-    for _ in 0..if cfg!(debug_assertions) { 500 } else { 5_000 } {
+    for _ in 0..cases(5_000, 500) {
         let length = scene.team.link(1).rough();
         let place = |random: &mut Rng| ([random.f64() * 3.0, random.f64() * 3.0], random.f64() * 7.0);
         let placed = [place(&mut random), place(&mut random)];
@@ -186,7 +187,7 @@ fn boards_are_apart_or_not() {
             p.into_iter().flat_map(move |p| edges(q).map(move |(a, b)| distance(p, a, b))).fold(f64::INFINITY, f64::min)
         };
         let least = from(shapes[0], shapes[1]).min(from(shapes[1], shapes[0]));
-        // Points of a grid over the one that are in the other as well.
+        // Grid points of one board that are in the other as well.
         let grid = (0..=40).flat_map(|i| (0..=10).map(move |j| (f64::from(i) / 40.0, f64::from(j) / 10.0)));
         let [o, across, _, along] = shapes[0];
         let common = grid
@@ -245,7 +246,7 @@ fn boards_inside_a_ring() {
     assert!(!is_inside_ring(team, &Interval::new(-10.0), &Interval::new(0.8)));
 }
 
-/// *Nearer* ends where it is true by so little that the stretches would have to be shorter than anybody can wait for.
+/// *Nearer* is given up where it is true by too little: the stretches would have to be too short.
 #[test]
 fn what_is_nearer_by_almost_nothing_is_given_up() {
     // Half a circle about the origin, then half of one that leads to the origin.

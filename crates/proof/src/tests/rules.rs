@@ -1,4 +1,4 @@
-//! The rules of the file, on a certificate that is short enough to be written by hand: three benches go straight on.
+//! The rules of the file, on a certificate short enough to be written by hand: three benches go straight on.
 
 use serde_json::{Value, json};
 
@@ -22,7 +22,7 @@ pieces = [{ kind = "line", length = 4.0 }, { kind = "line", length = 6.0 }]
 head_speed = 2.0
 "#;
 
-/// The place so many metres from the start.
+/// Returns the place `metres` from the start.
 fn place(metres: f64) -> Value {
     match metres {
         _ if metres < 0.0 => json!([0, metres]),
@@ -31,10 +31,10 @@ fn place(metres: f64) -> Value {
     }
 }
 
-/// Metres from the head back to handles 1, 2, 3, and how much more or less each span reaches to.
+/// Metres from the head back to handles 1, 2, 3, and the half width of each span.
 const BACK: [(f64, f64); 3] = [(2.5, 0.01), (4.5, 0.02), (6.5, 0.03)];
 
-/// The step from `from` to `to`.
+/// Returns the step from `from` to `to`.
 fn step(from: f64, to: f64) -> Value {
     let spans: Vec<_> =
         BACK.iter().map(|(back, more)| json!([place(from - back - more), place(to - back + more)])).collect();
@@ -69,7 +69,7 @@ fn assert_refused(lines: &[Value], line: u64, says: &str) {
     }
 }
 
-/// The certificate with one change.
+/// Returns the certificate with one change.
 fn changed(change: impl FnOnce(&mut Vec<Value>)) -> Vec<Value> {
     let mut lines = certificate();
     change(&mut lines);
@@ -80,14 +80,14 @@ fn changed(change: impl FnOnce(&mut Vec<Value>)) -> Vec<Value> {
 fn what_follows_is_accepted() {
     let proved = check(&certificate()).unwrap();
     assert_eq!((proved.steps, proved.links, proved.pairs, proved.results.len()), (11, 33, 11, 4));
-    // Less may be claimed than is known.
+    // A certificate may claim less than it shows.
     check(&changed(|lines| {
         lines[16]["time_lo"] = json!(4.9);
         lines[13] =
             json!({"type": "result", "event": "contact", "status": "undecided", "time_lo": 5.0, "because": "-"});
     }))
     .unwrap();
-    // The handles that stand on the line behind the start need not be listed.
+    // Handles on the line behind the start need not be listed.
     check(&changed(|lines| {
         for line in &mut lines[1..3] {
             line["spans"].as_array_mut().unwrap().truncate(1);
@@ -139,11 +139,11 @@ fn what_does_not_follow_is_refused() {
         refused(5, "is not inside a segment", &|lines| lines[5]["spans"][0][1] = place.clone());
     }
     // Flags.
-    refused(4, "moving after one that was not", &|lines| lines[3]["moving"] = json!(false));
-    refused(4, "clear after one that was not", &|lines| lines[3]["clear"] = json!(false));
+    refused(4, "moving after a step that does not", &|lines| lines[3]["moving"] = json!(false));
+    refused(4, "clear after a step that does not", &|lines| lines[3]["clear"] = json!(false));
     refused(13, "none does not follow", &|lines| lines[11]["clear"] = json!(false));
     refused(14, "none does not follow", &|lines| lines[11]["moving"] = json!(false));
-    // Front steps: handle 2 has come to where handle 1 was only later.
+    // Front steps: handle 2 comes only later to the start of handle 1.
     refused(3, "handle 2 has not come", &|lines| lines[3]["links"] = json!("front"));
     refused(4, "links 0 and 1", &|lines| {
         lines[4]["links"] = json!("front");
@@ -158,7 +158,7 @@ fn what_does_not_follow_is_refused() {
         lines[13] = json!({"type": "result", "event": "contact", "status": "undecided", "time_lo": 5.000000000000001});
     });
     for line in 13..15 {
-        refused(line, "happens does not follow", &|lines| {
+        refused(line, "status proved does not follow", &|lines| {
             for (field, value) in [("status", json!("proved")), ("time_lo", json!(0.0)), ("time_hi", json!(9.0))] {
                 lines[line][field] = value;
             }
@@ -180,7 +180,7 @@ fn what_does_not_follow_is_refused() {
     refused(5, "", &|lines| lines[5]["to"] = json!([1, 2.0, 3.0]));
 }
 
-/// A change of the scene: what was proved of one is not of another.
+/// A proof of one scene is no proof of a changed scene.
 #[test]
 fn another_scene_is_refused() {
     for (from, to) in [
@@ -209,7 +209,7 @@ fn another_scene_is_refused() {
     }
 }
 
-/// An overlap or a stall before the start or beyond the end is not the scene's.
+/// An overlap or a stall before the start or beyond the end is not an event of the scene.
 #[test]
 fn events_outside_the_motion_are_refused() {
     let contact = |from: f64, to: f64| {

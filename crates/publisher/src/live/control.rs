@@ -5,7 +5,7 @@
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::Frames;
+use super::FrameSource;
 use bench_dragon_messages::control::{Code, Command};
 use bench_dragon_show::Outcome;
 
@@ -97,17 +97,17 @@ impl Doors {
     }
 
     /// Has the next command obeyed, if one waits, at the beginning of the period `tick`.
-    pub fn take_one(&mut self, frames: &mut dyn Frames, tick: u64) {
+    pub fn take_one(&mut self, source: &mut dyn FrameSource, tick: u64) {
         for turn in 0..self.ports.len() {
             let door = (self.next + turn) % self.ports.len();
             let Ok(Request { ticket, command }) = self.ports[door].requests.pop() else { continue };
             self.next = door + 1;
             // Where the command is a step too, the one before it is over by now, and has its answer first.
-            self.finish_step(frames, tick);
-            match frames.command(tick, command) {
+            self.finish_step(source, tick);
+            match source.command(tick, command) {
                 Some(outcome) => {
                     // What a command breaks off is answered before it.
-                    self.finish_step(frames, tick);
+                    self.finish_step(source, tick);
                     self.answer(door, ticket, outcome);
                 }
                 None => self.step = Some((door, ticket)),
@@ -117,9 +117,9 @@ impl Doors {
     }
 
     /// Answers the step that was over with the frame of `tick`.
-    pub fn finish_step(&mut self, frames: &mut dyn Frames, tick: u64) {
+    pub fn finish_step(&mut self, source: &mut dyn FrameSource, tick: u64) {
         if let Some((door, ticket)) = self.step
-            && let Some(outcome) = frames.finished_step(tick)
+            && let Some(outcome) = source.finished_step(tick)
         {
             self.step = None;
             self.answer(door, ticket, outcome);

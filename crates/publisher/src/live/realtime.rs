@@ -4,7 +4,9 @@
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 
+use nix::sched::{CpuSet, sched_getaffinity, sched_setaffinity};
 use nix::sys::mman::{MlockAllFlags, mlockall};
+use nix::unistd::Pid;
 use thread_priority::unix::{
     RealtimeThreadSchedulePolicy, ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
 };
@@ -80,10 +82,11 @@ pub struct CpuError {
 /// # Errors
 /// [`CpuError`] where there is no such CPU, or the thread may not run on it.
 pub fn pin_to_cpu(cpu: usize) -> Result<(), CpuError> {
-    let cores = core_affinity::get_core_ids().unwrap_or_default();
-    let core = cores.iter().find(|core| core.id == cpu);
-    match core {
-        Some(core) if core_affinity::set_for_current(*core) => Ok(()),
-        _ => Err(CpuError { cpu, available: cores.iter().map(|core| core.id).collect() }),
-    }
+    // The calling thread.
+    let this = Pid::from_raw(0);
+    let set = sched_getaffinity(this).unwrap_or_default();
+    let available: Vec<usize> = (0..CpuSet::count()).filter(|cpu| set.is_set(*cpu).unwrap_or(false)).collect();
+    let mut one = CpuSet::new();
+    let pinned = available.contains(&cpu) && one.set(cpu).and_then(|()| sched_setaffinity(this, &one)).is_ok();
+    if pinned { Ok(()) } else { Err(CpuError { cpu, available }) }
 }

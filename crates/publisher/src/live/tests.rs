@@ -8,6 +8,7 @@ use std::rc::Rc;
 
 use proptest::prelude::*;
 
+use super::show_source::{FrameMessages, ShowSource};
 use super::*;
 use bench_dragon_testing::simulated::{REALTIME_OFFSET_NS, SimulatedClock, Wake};
 
@@ -46,14 +47,15 @@ struct FakeFrames {
     log: Rc<RefCell<Log>>,
     cost_ns: VecDeque<u64>,
     frame: Frame,
+    messages: FrameMessages,
 }
 
-impl Frames for FakeFrames {
-    fn frame(&mut self, tick: u64) -> Period<'_> {
+impl FrameSource for FakeFrames {
+    fn frame(&mut self, tick: u64, stamps: Stamps) -> Period<'_> {
         self.log.borrow_mut().computed.push((tick, self.clock.monotonic_ns()));
         self.clock.advance(self.cost_ns.pop_front().unwrap_or(0));
         self.frame.tick = tick;
-        (&self.frame).into()
+        Period::Frame(self.messages.of(&self.frame, stamps))
     }
 
     fn command(&mut self, _: u64, _: Command) -> Option<Outcome> {
@@ -75,8 +77,7 @@ struct FakePublisher {
 }
 
 impl Publisher for FakePublisher {
-    fn publish(&mut self, Outgoing { header, frame, .. }: Outgoing<'_>) -> Result<(), PublishError> {
-        assert_eq!(header.tick, frame.tick);
+    fn publish(&mut self, Outgoing { header, .. }: Outgoing<'_>) -> Result<(), PublishError> {
         if self.log.borrow().published.len() >= self.lasts {
             return Err(PublishError("the transport is gone".into()));
         }
@@ -171,7 +172,8 @@ impl Setup {
         let clock = Rc::new(SimulatedClock::new(START_NS, wakes).stopping_at(self.stop_at_ns));
         let log = Rc::new(RefCell::new(Log::default()));
         let frame = Frame { sim_time: 1.5, ..Frame::new(1) };
-        let mut frames = FakeFrames { clock: clock.clone(), log: log.clone(), cost_ns: frame_ns.into(), frame };
+        let (messages, cost_ns) = (FrameMessages::default(), frame_ns.into());
+        let mut frames = FakeFrames { clock: clock.clone(), log: log.clone(), cost_ns, frame, messages };
         let publisher = FakePublisher {
             clock: clock.clone(),
             log: log.clone(),

@@ -1,17 +1,14 @@
-//! What the bits of a frame depend on besides the program: the processor's instructions and the system's elementary
+//! What the bits of a frame depend on besides the scene: the processor's instructions, and the crate of the elementary
 //! functions. The log names both, and `verify` compares them with its own.
-
-use std::sync::OnceLock;
 
 use serde::{Deserialize, Serialize};
 
 use bench_dragon_motion::solve::table::Instructions;
 use bench_dragon_show::scene::Scene;
 
-/// Arguments at which the elementary functions are evaluated.
-const ARGUMENTS: u32 = 4096;
-/// Hexadecimal digits of the fingerprint.
-const FINGERPRINT_DIGITS: usize = 16;
+/// The crate that computes sines and their like, compiled in (`bench_dragon_motion::model::elementary`). Earlier programs
+/// called the C library, and logged a hash of its results.
+const ELEMENTARY_FUNCTIONS: &str = "libm 0.2.16";
 
 /// The arithmetic of a machine, as far as it can show in a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -21,8 +18,7 @@ pub struct Arithmetic {
     pub architecture: String,
     /// The instructions that tables are read with, by [`Instructions::name`].
     pub instructions: String,
-    /// The first 16 digits of a hash over what the system's elementary functions return: their last digits differ from
-    /// one library to another.
+    /// The crate of the elementary functions and its version.
     pub elementary_functions: String,
 }
 
@@ -32,7 +28,7 @@ impl Arithmetic {
         Self {
             architecture: std::env::consts::ARCH.to_owned(),
             instructions: scene.motion.instructions().name().to_owned(),
-            elementary_functions: elementary_functions().to_owned(),
+            elementary_functions: ELEMENTARY_FUNCTIONS.to_owned(),
         }
     }
 
@@ -41,39 +37,18 @@ impl Arithmetic {
         let instructions = Instructions::of_name(&self.instructions);
         self.architecture == std::env::consts::ARCH
             && instructions.is_some_and(Instructions::is_available)
-            && self.elementary_functions == elementary_functions()
+            && self.elementary_functions == ELEMENTARY_FUNCTIONS
     }
 }
 
-/// A fingerprint of the elementary functions that solvers and searches call. They are the same as long as a process lives.
-fn elementary_functions() -> &'static str {
-    static FINGERPRINT: OnceLock<String> = OnceLock::new();
-    FINGERPRINT.get_or_init(fingerprint)
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-fn fingerprint() -> String {
-    let mut hasher = blake3::Hasher::new();
-    for k in 1..=ARGUMENTS {
-        // Spread over nine magnitudes, with digits in all places.
-        let x = 1e-4 * 1.005f64.powi(k as i32);
-        let unit = f64::from(k) / f64::from(ARGUMENTS + 1);
-        let (sin, cos) = x.sin_cos();
-        let results = [
-            sin,
-            cos,
-            x.tan(),
-            x.atan(),
-            unit.asin(),
-            unit.acos(),
-            x.asinh(),
-            x.ln(),
-            x.powf(unit),
-            unit.atan2(x),
-            x.hypot(unit),
-        ];
-        for result in results {
-            hasher.update(&result.to_le_bytes());
-        }
+    #[test]
+    fn the_crate_named_is_the_one_compiled_in() {
+        let (name, version) = ELEMENTARY_FUNCTIONS.split_once(' ').unwrap();
+        let lock = include_str!("../../../../Cargo.lock");
+        assert!(lock.contains(&format!("name = \"{name}\"\nversion = \"{version}\"\n")));
     }
-    hasher.finalize().to_hex()[..FINGERPRINT_DIGITS].to_owned()
 }

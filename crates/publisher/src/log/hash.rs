@@ -14,8 +14,23 @@ pub(super) const HANDLE_WORDS: usize = 5;
 
 /// What a header contributes, in the order of its bytes.
 pub(super) fn header_words(header: &FrameHeader) -> [u64; HEADER_WORDS] {
-    let FrameHeader { sequence, tick, sim_time, time_scale, min_clearance, .. } = *header;
-    let FrameHeader { handles, state, playback, cue, epoch, reserved, .. } = *header;
+    let FrameHeader {
+        run_id: _,
+        sequence,
+        tick,
+        stamp_ns: _,
+        sent_ns: _,
+        deadline_ns: _,
+        sim_time,
+        time_scale,
+        min_clearance,
+        handles,
+        state,
+        playback,
+        cue,
+        epoch,
+        reserved,
+    } = *header;
     let pair = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
     [
         sequence,
@@ -31,7 +46,8 @@ pub(super) fn header_words(header: &FrameHeader) -> [u64; HEADER_WORDS] {
 
 /// The arrays of a chain that its poses are made of, in the order of a pose's fields.
 pub(super) fn columns(chain: &Chain) -> [&[f64]; HANDLE_WORDS] {
-    [&chain.x, &chain.y, &chain.heading, &chain.vx, &chain.vy]
+    let Chain { x, y, heading, speed: _, vx, vy } = chain;
+    [x, y, heading, vx, vy]
 }
 
 /// The hash of some frames.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::arithmetic::Arithmetic;
 use crate::live::End;
-use bench_dragon_messages::control::{Code, Command, CommandRecord};
+use bench_dragon_messages::control::{Command, CommandRecord, CommandValue};
 use bench_dragon_show::Playback;
 use bench_dragon_show::scene::{AtEnd, OnContact, SceneText};
 
@@ -173,7 +173,24 @@ impl ShowLine {
             "loop" => AtEnd::Loop,
             _ => return None,
         };
-        let Self { start, time_scale, rate, end_hold, paused, .. } = *self;
+        let Self {
+            format: _,
+            version: _,
+            arithmetic: _,
+            solver: _,
+            run_id: _,
+            stamp_ns: _,
+            rate,
+            start,
+            time_scale,
+            on_contact: _,
+            at_end: _,
+            end_hold,
+            paused,
+            scene_file: _,
+            scene_stem: _,
+            scene: _,
+        } = *self;
         Some(Playback { start, time_scale, rate, on_contact, at_end, end_hold, paused })
     }
 
@@ -189,9 +206,9 @@ impl Line {
     pub fn of(tick: u64, record: CommandRecord) -> Self {
         match record {
             CommandRecord::Given { command, code } => {
-                let (number, value) = command.number_and_value();
-                let has_value = matches!(command, Command::Rate(_) | Command::Seek(_) | Command::Step(_));
-                let command = Command::NAMES[number as usize].to_owned();
+                let (_, value) = command.number_and_value();
+                let has_value = command.entry().value != CommandValue::None;
+                let command = command.name().to_owned();
                 let value = (has_value && value.is_finite()).then_some(value);
                 Self::Command { tick, command, value, code: code.map(|code| code.name().to_owned()) }
             }
@@ -202,14 +219,8 @@ impl Line {
 
 /// The command of a name and a value; `None` for one that no log has.
 pub(super) fn command_of(name: &str, value: Option<f64>) -> Option<Command> {
-    let number = Command::NAMES.iter().position(|known| *known == name)? as u32;
     // A value that is not a number stands as null.
-    Command::of_number(number, value.unwrap_or(f64::NAN)).ok()
-}
-
-/// The code of a name.
-pub(super) fn code_of(name: &str) -> Option<Code> {
-    Code::ALL.into_iter().find(|code| code.name() == name)
+    Command::of_number(Command::named(name)?.number, value.unwrap_or(f64::NAN)).ok()
 }
 
 /// The checks of a file, line by line.

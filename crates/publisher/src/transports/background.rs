@@ -14,15 +14,13 @@ use rtrb::{Consumer, Producer, RingBuffer};
 
 use crate::live::{Deliveries, Outgoing, PublishError, Publisher, StatusPublisher};
 use bench_dragon_client::clock::{Clock, SystemClock, monotonic_ns};
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, QUEUE_BYTES};
 use bench_dragon_show::convert::handle_poses;
 
 /// Seconds of frames that the thread may fall behind before it continues with the newest.
 const QUEUED_SECONDS: f64 = 0.25;
 /// The least and the most frames in that queue.
 const QUEUED_FRAMES: (usize, usize) = (4, 256);
-/// The memory that queue may take.
-const QUEUED_BYTES: usize = 64_000_000;
 /// Alerts in their queue; one a second is usual.
 const QUEUED_ALERTS: usize = 256;
 /// Times that all cues of the scene fit into their queue: one frame can reach every one of them twice.
@@ -200,7 +198,7 @@ pub fn queues(config: BackgroundConfig) -> (BackgroundPublisher, BackgroundStatu
 
 fn queue_depth(handles: usize, rate: f64) -> usize {
     let (least, most) = QUEUED_FRAMES;
-    let affordable = QUEUED_BYTES / (handles * size_of::<HandlePose>());
+    let affordable = QUEUE_BYTES / (handles * size_of::<HandlePose>());
     ((rate * QUEUED_SECONDS) as usize).clamp(least, most).min(affordable.max(least))
 }
 
@@ -304,14 +302,14 @@ impl BackgroundPublisher {
 
 impl Publisher for BackgroundPublisher {
     fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
-        for alert in outgoing.alerts() {
-            // A thread that is 256 alerts behind has other troubles than this one.
-            let _ = self.alerts.push(alert);
+        let Outgoing { header, chain, alerts, cues, .. } = outgoing;
+        for alert in alerts {
+            // Dropped if the thread is 256 alerts behind.
+            let _ = self.alerts.push(*alert);
         }
-        for cue in outgoing.cues() {
-            let _ = self.cues.push(cue);
+        for cue in cues {
+            let _ = self.cues.push(*cue);
         }
-        let Outgoing { header, frame, .. } = outgoing;
         if !self.due(header.tick) {
             return Ok(());
         }
@@ -322,7 +320,7 @@ impl Publisher for BackgroundPublisher {
             return Ok(());
         };
         snapshot.header = FrameHeader { sent_ns: monotonic_ns(), ..*header };
-        for (slot, pose) in snapshot.handles.iter_mut().zip(handle_poses(&frame.chain)) {
+        for (slot, pose) in snapshot.handles.iter_mut().zip(handle_poses(chain)) {
             *slot = pose;
         }
         let _ = self.filled.push(snapshot);

@@ -31,8 +31,7 @@ use bench_dragon_client::shared_memory::{
 use super::{Transport, TransportConfig, TransportError};
 use crate::live::control::Door;
 use crate::live::{Deliveries, Outgoing, PublishError, Publisher, StatusPublisher};
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, HandlePose32, LoopStatus, Stage};
-use bench_dragon_show::Frame;
+use bench_dragon_messages::{CollisionAlert, Cue, HandlePose, HandlePose32, LoopStatus, Stage};
 use bench_dragon_show::convert::{Decimation, handle_pose, handle_pose_32, handle_poses};
 use bench_dragon_show::scene::SinglePrecision;
 
@@ -90,7 +89,18 @@ struct Iceoryx2 {
 /// # Errors
 /// [`TransportError::BadInput`] for a name that iceoryx2 cannot take.
 pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError> {
-    let TransportConfig { name, handles, alerts, cues, single_precision, queue, subscribers, stage, .. } = *config;
+    let TransportConfig {
+        name,
+        handles,
+        alerts,
+        cues,
+        single_precision,
+        queue,
+        subscribers,
+        ros2: _,
+        loop_rate: _,
+        stage,
+    } = *config;
     service_name(name, "poses")?;
     stale_files::spawn_reaper();
     let mut config = PublisherConfig {
@@ -205,35 +215,33 @@ impl SharedMemoryPublisher {
         Ok(Self { poses, poses_32, alerts, cues, stage, tick, tick_service, _node: node })
     }
 
-    fn send_frame(&self, header: &FrameHeader, frame: &Frame) -> Result<(), String> {
-        self.poses.send(header, handle_poses(&frame.chain))?;
+    fn send_frame(&self, Outgoing { header, chain, .. }: Outgoing<'_>) -> Result<(), String> {
+        self.poses.send(header, handle_poses(chain))?;
         match &self.poses_32 {
             None => Ok(()),
-            Some((port, Decimation { every: 1, .. })) => {
-                port.send(header, handle_poses(&frame.chain).map(handle_pose_32))
-            }
+            Some((port, Decimation { every: 1, .. })) => port.send(header, handle_poses(chain).map(handle_pose_32)),
             Some((port, decimation)) => {
-                let pose = |index| handle_pose_32(handle_pose(&frame.chain, decimation.handle(index)));
+                let pose = |index| handle_pose_32(handle_pose(chain, decimation.handle(index)));
                 port.send(header, (0..decimation.poses()).map(pose))
             }
         }
     }
+}
 
-    fn send_cues(&mut self, outgoing: Outgoing<'_>) -> Result<(), String> {
-        let Some(cues) = &mut self.cues else { return Ok(()) };
-        outgoing.cues().try_for_each(|cue| cues.send(cue)).map_err(|error| error.to_string())
-    }
-
-    fn send_alerts(&mut self, outgoing: Outgoing<'_>) -> Result<(), String> {
-        let Some(alerts) = &mut self.alerts else { return Ok(()) };
-        outgoing.alerts().try_for_each(|alert| alerts.send(alert)).map_err(|error| error.to_string())
-    }
+/// Sends messages if there is a service for them.
+fn send_all<Message: ZeroCopySend + std::fmt::Debug + Copy + 'static>(
+    service: &mut Option<Repeated<Message>>,
+    messages: &[Message],
+) -> Result<(), String> {
+    let Some(service) = service else { return Ok(()) };
+    messages.iter().try_for_each(|message| service.send(*message)).map_err(|error| error.to_string())
 }
 
 impl Publisher for SharedMemoryPublisher {
     fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
-        let sent = self.send_frame(outgoing.header, outgoing.frame).and_then(|()| self.send_alerts(outgoing));
-        let sent = sent.and_then(|()| self.send_cues(outgoing));
+        let sent = self.send_frame(outgoing);
+        let sent = sent.and_then(|()| send_all(&mut self.alerts, outgoing.alerts));
+        let sent = sent.and_then(|()| send_all(&mut self.cues, outgoing.cues));
         sent.map_err(|reason| PublishError(format!("the shared memory failed: {reason}")))?;
         // Waking costs a socket write per listener, several times what sending does: it is left out for nobody.
         if self.tick_service.dynamic_config().number_of_listeners() > 0 {

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use super::*;
 use bench_dragon_publisher::live::control::Doors;
-use bench_dragon_publisher::live::{Counts, End, LoopOptions, Outgoing, PublishError, Publisher, Reports, run_loop};
+use bench_dragon_publisher::live::{Counts, End, LoopOptions, PublishError, Publisher, Reports, run_loop};
 use bench_dragon_testing::simulated::{SimulatedClock, Wake};
 
 const START_NS: u64 = 5_000_000_000;
@@ -34,8 +34,8 @@ fn play(due: &[u64], wakes: Vec<Wake>) -> (Counts, Vec<FrameHeader>) {
     let (mut filled, loop_filled) = RingBuffer::new(due.len());
     let (free, _reader) = RingBuffer::new(due.len());
     for (number, due) in due.iter().enumerate() {
-        let frame = Frame { sim_time: number as f64, ..Frame::new(1) };
-        filled.push(Box::new(Moment { due: *due, frame, messages: Messages::default() })).ok().unwrap();
+        let header = FrameHeader { sim_time: number as f64, ..FrameHeader::default() };
+        filled.push(Box::new(QueuedFrame { due: *due, header, ..QueuedFrame::new(1) })).ok().unwrap();
     }
     drop(filled);
     let shared = Arc::default();

@@ -20,7 +20,7 @@ fn timed(kind: EventKind, time: f64) -> TimedEvent {
     TimedEvent { event: Event { kind, travelled: time, bench_a: Some(0), bench_b: None, place: None }, time }
 }
 
-/// These events, and the path's end a good while after them where there is no lock.
+/// Returns the timeline of these events. Without a lock the path's end follows much later.
 fn timeline(events: &[(EventKind, f64)]) -> Timeline {
     let mut all: Vec<_> = events.iter().map(|(kind, time)| timed(*kind, *time)).collect();
     if all.iter().all(|timed| timed.event.kind != EventKind::Lock) {
@@ -29,7 +29,7 @@ fn timeline(events: &[(EventKind, f64)]) -> Timeline {
     Timeline::new(all, None)
 }
 
-/// A tracker, and what it has announced, frame by frame.
+/// A tracker, and its alerts frame by frame.
 struct Run {
     tracker: LevelTracker,
     timeline: Timeline,
@@ -54,13 +54,13 @@ impl Run {
     }
 }
 
-/// Contact, stall and lock, each perhaps, in any order, on eighths of a second, so that sums are exact.
+/// Contact, stall and lock, each optional, in any order, on eighths of a second: so sums are exact.
 fn events() -> impl Strategy<Value = Vec<(EventKind, f64)>> {
     let time = || prop::option::of((0u32..800).prop_map(|eighths| f64::from(eighths) / 8.0));
     (time(), time(), time()).prop_map(|(contact, stall, lock)| {
         let kinds = [(EventKind::Contact, contact), (EventKind::Stall, stall), (EventKind::Lock, lock)];
         let mut events: Vec<_> = kinds.into_iter().filter_map(|(kind, time)| Some((kind, time?))).collect();
-        // A lock ends the motion: nothing comes after it.
+        // A lock ends the motion.
         let end = lock.unwrap_or(f64::INFINITY);
         events.retain(|(_, time)| *time <= end);
         events.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
@@ -68,7 +68,7 @@ fn events() -> impl Strategy<Value = Vec<(EventKind, f64)>> {
     })
 }
 
-/// Times that grow by steps of nothing, of an eighth of a second, of some, or of very many.
+/// Times with steps of zero, of one, of some, or of very many eighths of a second.
 fn times() -> impl Strategy<Value = Vec<f64>> {
     let step = prop_oneof![1 => Just(0u32), 8 => 1u32..4, 2 => 1u32..40, 1 => 1u32..800];
     (0u32..100, prop::collection::vec(step, 0..60)).prop_map(|(first, steps)| {
@@ -81,7 +81,7 @@ fn times() -> impl Strategy<Value = Vec<f64>> {
     })
 }
 
-/// Below the threshold, between it and the release, above the release, and on each border.
+/// Clearances below the threshold, between threshold and release, above the release, and on each border.
 fn clearances() -> impl Strategy<Value = f64> {
     prop_oneof![Just(0.04), Just(0.05), Just(0.06), Just(0.074), Just(1.5 * 0.05), Just(0.076), Just(WIDE)]
 }
@@ -89,7 +89,7 @@ fn clearances() -> impl Strategy<Value = f64> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(400) })]
 
-    /// However large the steps: what has passed before the first frame is one alert, and all else is one each.
+    /// For steps of any size: the events before the first frame are one alert, every other event is one each.
     #[test]
     fn every_event_passed_is_announced_once_in_order_and_at_once(events in events(), times in times()) {
         let mut run = Run::new(8.0, &events);
@@ -107,7 +107,7 @@ proptest! {
         }
     }
 
-    /// A change is one alert, no change is none but the countdown, and the first frame is one whatever the level.
+    /// A change is one alert, no change is none but the countdown, and the first frame is one at any level.
     #[test]
     fn an_alert_is_a_change_of_level_or_the_countdown(
         events in events(),
@@ -144,8 +144,8 @@ proptest! {
             run.frame(frames.len() as u64, time, clearance);
             frames.push((time, clearance));
             let event_is_near = contact - time <= 10.0;
-            // "Above 1.5 approach_clearance for a tenth of approach_time": the first of the frames that were, without a
-            // break up to this one, is at least so old.
+            // "Above 1.5 approach_clearance for a tenth of approach_time": of the unbroken frames up to this one, the
+            // first is at least that old.
             let break_at = frames.iter().rposition(|(_, clearance)| *clearance <= 1.5 * 0.05);
             let opened = frames.get(break_at.map_or(0, |at| at + 1));
             let open_for_a_tenth = opened.is_some_and(|(opened, _)| time - opened >= 1.0);
@@ -156,7 +156,7 @@ proptest! {
         }
     }
 
-    /// One alert for every second of wall time, in its first frame, whatever the rate, the time scale and the tick.
+    /// One alert for every second of wall time, in its first frame, for any rate, time scale and tick.
     #[test]
     fn the_countdown_is_of_wall_time(
         rate in prop_oneof![1u64..20, 1u64..20_000],
@@ -228,7 +228,7 @@ fn a_contact_recorded_while_the_show_plays_is_announced_in_that_frame() {
 fn a_show_that_ends_and_begins_approaching_counts_down_through_the_loop() {
     let mut run = Run::new(10.0, &[]);
     assert_eq!(run.levels(0, 0.0, WIDE), [Level::Clear]);
-    // Announced late in a showing of 1.5 s, and again and again of showings of half a second.
+    // Announced late in a showing of 1.5 s, and repeatedly in showings of half a second.
     let mut announced = Vec::new();
     for tick in 14..50 {
         if tick % 5 == 0 {
@@ -240,7 +240,7 @@ fn a_show_that_ends_and_begins_approaching_counts_down_through_the_loop() {
 }
 
 #[test]
-fn a_restart_decides_the_level_anew() {
+fn a_restart_decides_the_level_again() {
     let contact = [(EventKind::Contact, 20.0), (EventKind::Stall, 30.0)];
     let mut run = Run::new(10.0, &contact);
     assert_eq!(run.levels(0, 25.0, WIDE), [Level::Contact]);
@@ -252,6 +252,6 @@ fn a_restart_decides_the_level_anew() {
     run.tracker.restart();
     assert_eq!(run.levels(4, 12.0, WIDE), [Level::Approaching]);
     run.tracker.restart();
-    // Open by less than the release needs, and not for long: a level of the showing before is not held.
+    // Open by less than the release needs, and briefly: the level of the showing before is not held.
     assert_eq!(run.levels(5, 0.0, 0.06), [Level::Clear]);
 }

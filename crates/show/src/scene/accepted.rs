@@ -16,15 +16,15 @@ impl Accepted {
     pub const LENGTH: Self = Self { least: 1e-3, greatest: 1e4, unit: "metres" };
     /// The turn on which the head starts.
     pub const START_TURN: Self = Self { least: 1e-9, greatest: 1e7, unit: "turns" };
-    /// The first radius of a turnaround over the second.
+    /// The first radius of a turnaround divided by the second.
     pub const ARC_RATIO: Self = Self { least: 1e-3, greatest: 1e3, unit: "metres per metre" };
     /// Metres of path before or after a turnaround.
     pub const ROUTE: Self = Self { least: 0.0, greatest: 1e9, unit: "metres" };
     /// A line or arc of a route.
     pub const LEG: Self = Self { least: 1e-3, greatest: 1e9, unit: "metres" };
-    /// How far an arc of a route turns.
+    /// The turns of an arc of a route.
     pub const ARC_TURNS: Self = Self { least: 1e-6, greatest: 1e3, unit: "turns" };
-    /// The direction in which a route begins.
+    /// The direction at the start of a route.
     pub const HEADING: Self = Self { least: -1.0, greatest: 1.0, unit: "turns" };
     /// A coordinate on the stage.
     pub const PLACE: Self = Self { least: -1e9, greatest: 1e9, unit: "metres" };
@@ -36,21 +36,21 @@ impl Accepted {
     pub const TIME_SCALE: Self = Self { least: 1e-6, greatest: 1e6, unit: "simulated seconds per second" };
     /// Requested position error.
     pub const ACCURACY: Self = Self { least: 1e-18, greatest: 1e3, unit: "metres" };
-    /// Times and clearances at which a warning is given.
+    /// Times and clearances of a warning.
     pub const WARNING: Self = Self { least: 0.0, greatest: 1e9, unit: "seconds or metres" };
     /// Simulated seconds of a cue.
     pub const CUE: Self = Self { least: 0.0, greatest: 1e20, unit: "seconds" };
-    /// Wall time at the end of a show before it begins again.
+    /// Wall time at the end of a show before it starts again.
     pub const END_HOLD: Self = Self { least: 0.0, greatest: 1e6, unit: "seconds" };
     /// Seconds of the paper's time step and difference interval, radians of its tolerance.
     pub const PAPER_RULE: Self = Self { least: 1e-15, greatest: 1e3, unit: "seconds or radians" };
     /// The number of benches.
     pub const BENCHES: Self = Self { least: 1.0, greatest: 1e6, unit: "benches" };
-    /// Frames a subscriber may fall behind.
+    /// Frames that a subscriber may fall behind.
     pub const QUEUE: Self = Self { least: 1.0, greatest: 1e6, unit: "frames" };
-    /// One handle in how many is published.
+    /// The stride of the handles that are published.
     pub const EVERY: Self = Self { least: 1.0, greatest: 1e6, unit: "handles" };
-    /// Subscribers at once.
+    /// Subscribers of a service.
     pub const SUBSCRIBERS: Self = Self { least: 1.0, greatest: 256.0, unit: "subscribers" };
     /// Periods skipped in a second.
     pub const SKIPPED: Self = Self { least: 1.0, greatest: 1e6, unit: "periods" };
@@ -59,12 +59,12 @@ impl Accepted {
     /// Messages that a ROS 2 topic keeps.
     pub const DEPTH: Self = Self { least: 1.0, greatest: 1e3, unit: "messages" };
 
-    /// The number itself where it is within the range.
+    /// Returns the number if it is in the range.
     ///
     /// # Errors
     /// One sentence that names the field, the number and the range.
     pub fn check(self, field: &str, number: f64) -> Result<f64, String> {
-        // A comparison with NaN is false, so that NaN is refused here too.
+        // A comparison with NaN is false, so NaN is refused too.
         if number >= self.least && number <= self.greatest {
             Ok(number)
         } else {
@@ -75,7 +75,7 @@ impl Accepted {
     }
 }
 
-/// A number as people write it: 256, 20000, 1e6.
+/// Returns a number in short form: 256, 20000, 1e6.
 fn short(number: f64) -> String {
     let plain = number.to_string();
     if plain.len() <= 6 { plain } else { format!("{number:e}") }

@@ -1,6 +1,6 @@
-//! Cues: moments of a show that are announced, and at which it may wait: `[[cues]]`.
+//! Cues: named times of a show that are announced, with an optional pause: `[[cues]]`.
 //!
-//! In: the tables as written. Out: [`Cue`]s, checked. Called by the scene; the show works out their times.
+//! In: the tables of the file. Out: checked [`Cue`]s. The scene calls it; the show computes their times.
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -10,34 +10,34 @@ use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::timeline::Timeline;
 
-/// A moment of the show that has a name.
+/// A named time of the show.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cue {
     /// Its name.
     pub name: String,
-    /// When it is.
+    /// The cue's time, as the scene states it.
     pub moment: CueMoment,
-    /// What the show does then.
+    /// The show's action at the cue.
     pub then: CueAction,
 }
 
-/// How a scene states when a cue is.
+/// The ways to state the time of a cue.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CueMoment {
-    /// At simulated seconds since the start of the scene.
+    /// A time, simulated seconds since the start of the scene.
     At(f64),
-    /// So many simulated seconds before an event.
+    /// A time before an event.
     Before {
         /// The event.
         event: EventKind,
-        /// Simulated seconds.
+        /// Simulated seconds before it.
         seconds: f64,
     },
-    /// Once the head has travelled so many metres along the path.
+    /// Travel of the head along the path, metres.
     Travelled(f64),
 }
 
-/// What the show does at a cue.
+/// The show's action at a cue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CueAction {
@@ -48,8 +48,8 @@ pub enum CueAction {
 }
 
 impl Cue {
-    /// Simulated seconds of the cue; `None` before an event that does not happen, or that happens sooner after the
-    /// start than the cue would be before it.
+    /// Returns the simulated time of the cue. Returns `None` for a cue before an event that does not happen, or that
+    /// would be before the start.
     pub fn time(&self, motion: &Motion, timeline: &Timeline) -> Option<f64> {
         let time = match self.moment {
             CueMoment::At(time) => time,
@@ -60,7 +60,7 @@ impl Cue {
     }
 }
 
-/// An event as a cue names it.
+/// The name of an event in a cue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum CueEvent {
@@ -70,7 +70,7 @@ enum CueEvent {
     PathEnd,
 }
 
-/// A table as written.
+/// A table of the file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawCue {

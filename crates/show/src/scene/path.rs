@@ -1,7 +1,7 @@
 //! The `[path]` table: a spiral, a turnaround, or a route of lines and arcs.
 //!
-//! In: what serde has read. Out: a [`PathDescription`], or one sentence about the field that is wrong. Only [`super`]
-//! calls it.
+//! In: the table from serde. Out: a [`PathDescription`], or one sentence about the wrong field. Only [`super`] calls
+//! it.
 
 use std::f64::consts::TAU;
 
@@ -19,7 +19,7 @@ use bench_dragon_motion::model::root::bisect_predicate;
 use bench_dragon_motion::model::spiral::{Direction, Spiral};
 use bench_dragon_motion::model::team::Team;
 
-/// The most segments of a route.
+/// The greatest number of segments of a route.
 pub(crate) const MOST_STEPS: usize = 31;
 
 #[derive(Deserialize)]
@@ -62,7 +62,7 @@ enum RawSide {
 }
 
 impl RawPath {
-    /// The path that is meant.
+    /// Checks the table and returns its path.
     pub(super) fn validated(&self, source: &Source, team: &Team) -> Result<PathDescription, SceneError> {
         match self.kind.get_ref().as_str() {
             "spiral" => self.spiral(source, team),
@@ -75,7 +75,7 @@ impl RawPath {
         }
     }
 
-    /// An error of the path as a whole.
+    /// Returns an error of the path as a whole.
     pub(super) fn error(&self, source: &Source, sentence: &str) -> SceneError {
         source.field_error(&self.kind, sentence)
     }
@@ -172,7 +172,7 @@ impl RawPath {
         Ok(PathDescription::Turnaround { pitch, turn_radius, arc_ratio, lead_in, lead_out })
     }
 
-    /// Metres of path before the turn.
+    /// Returns the metres of path before the turn.
     fn lead_in(&self, source: &Source, spiral: &Spiral, turn: f64) -> Result<f64, SceneError> {
         match (&self.lead_in, &self.start_turn) {
             (Some(lead_in), Some(_)) => {
@@ -246,7 +246,7 @@ impl RawStep {
                             .check("path.pieces.length in turns", turns)
                             .map_err(|sentence| source.field_error(length, &sentence))?
                     }
-                    // The guard has seen one of the two.
+                    // The guard excludes the case of both.
                     (None, None) => return Err(source.field_error(at, "an arc needs turns or a length")),
                 };
                 let side = match side {
@@ -264,17 +264,17 @@ impl RawStep {
     }
 }
 
-/// Whether one Euler step of the paper's rules, of so many metres, ends where a bench is folded back on itself, or at the
-/// centre.
+/// Returns true if one Euler step of the paper's rules, `metres` long, ends where a bench is folded back on itself, or
+/// at the centre.
 pub(super) fn is_folded_after(pitch: f64, start_turn: f64, metres: f64, team: &Team) -> bool {
     let start = TAU * start_turn;
     let theta = start - metres * TAU / (pitch * start);
     theta.is_nan() || theta <= 0.0 || least_legal_start(pitch, theta / TAU, team).is_some()
 }
 
-/// Where a start is illegal, the least number of turns that is not, rounded up to nine decimals.
+/// Returns the least legal number of turns, rounded up to nine decimals, for an illegal start.
 ///
-/// Only the first link of each length can be at or inside its fold: all others of that length are further out.
+/// Only the first link of each length can be at or inside its fold: all other links of that length are further out.
 fn least_legal_start(pitch: f64, start_turn: f64, team: &Team) -> Option<f64> {
     let spiral = Spiral::new(pitch, Direction::Inward);
     let folds = [0, 1].map(|bench| spiral.fold(team.link(bench)));

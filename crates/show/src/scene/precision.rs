@@ -1,4 +1,4 @@
-//! `publish.precision` and `publish.every`: whether poses go out in single precision too, and which.
+//! `publish.precision` and `publish.every`: the service of poses in single precision.
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -16,10 +16,10 @@ pub(super) enum Precision {
     F32,
 }
 
-/// What the service of poses in single precision has.
+/// The settings of the service of poses in single precision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SinglePrecision {
-    /// One handle in how many, from the head on, at least 1; the tail is always there.
+    /// The stride of the handles from the head on, at least 1. The tail is always included.
     pub every: usize,
 }
 
@@ -33,7 +33,7 @@ impl std::fmt::Display for SinglePrecision {
 }
 
 impl Precision {
-    /// What single precision holds, where it is asked for.
+    /// Returns the settings of single precision, if requested.
     pub(super) fn single(
         self,
         every: Option<&Spanned<i64>>,

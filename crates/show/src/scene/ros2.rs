@@ -1,6 +1,6 @@
-//! What a scene may state about its ROS 2 topics and services: `[publish.ros2]`.
+//! The ROS 2 topics and services of a scene: `[publish.ros2]`.
 //!
-//! In: the table as written. Out: [`Ros2Settings`], checked. Called by the scene; read by the ROS 2 transport.
+//! In: the table of the file. Out: checked [`Ros2Settings`]. The scene calls it; the ROS 2 transport reads the result.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use toml::Spanned;
 
 use super::{Accepted, SceneError, Source};
 
-/// The table as written.
+/// The table of the file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawRos2 {

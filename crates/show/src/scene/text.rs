@@ -1,22 +1,22 @@
-//! The text of a scene, before it is understood: what a recording keeps, so that the same scene can be read again.
+//! The text of a scene before parsing. A recording keeps it, so that the same scene can be read again.
 
 use std::path::Path as FilePath;
 
 use super::{PAPER, Scene, SceneError};
 
-/// A scene as it was written.
+/// The text of a scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SceneText {
-    /// TOML.
+    /// The text, TOML.
     pub text: String,
-    /// How errors call the file.
+    /// The file's name in errors.
     pub file: String,
-    /// The scene's name where the text gives none.
+    /// The scene's name if the text gives none.
     pub stem: String,
 }
 
 impl SceneText {
-    /// The text of the scene that is built in.
+    /// Returns the text of the built-in scene.
     pub fn paper() -> Self {
         Self { text: PAPER.to_owned(), file: "paper.toml (built in)".to_owned(), stem: "paper".to_owned() }
     }
@@ -40,7 +40,7 @@ impl SceneText {
         Ok(Self { text, file: shown, stem })
     }
 
-    /// The scene of this text.
+    /// Parses the text.
     ///
     /// # Errors
     /// As [`Scene::parse`].
@@ -49,7 +49,7 @@ impl SceneText {
     }
 }
 
-/// What a file holds, as it can stand in a sentence: line ends, and what would command a terminal, as escapes.
+/// Returns text in printable form: line ends and terminal control characters are escaped.
 pub fn printable(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for letter in text.chars() {

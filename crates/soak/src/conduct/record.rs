@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use hdrhistogram::Histogram;
 
 use super::Conducted;
+use super::answers::ShowFacts;
 use bench_dragon_messages::control::{Code, Command};
 use bench_dragon_messages::state::PlaybackState;
 use bench_dragon_messages::{ControlResponse, FrameHeader};
@@ -17,7 +18,8 @@ const MOST_FAULTS: usize = 10;
 /// Seconds for which frames are kept for comparison.
 const KEPT_SECONDS: f64 = 2.0;
 
-/// A command and what came of it.
+/// A command and its answer.
+#[derive(Clone)]
 pub(super) struct Answered {
     pub command: Command,
     /// CLOCK_MONOTONIC at which it was sent, ns.
@@ -30,9 +32,11 @@ pub(super) struct Answered {
     pub is_step_that_ran: bool,
 }
 
-/// Counts so far, and what is to be compared yet.
+/// The counts so far, and the answers that wait for their frames.
+#[derive(Clone)]
 pub(super) struct Record {
     conducted: Conducted,
+    facts: Option<ShowFacts>,
     frames: VecDeque<FrameHeader>,
     most_frames: usize,
     /// Answers whose frame has not come yet.
@@ -47,6 +51,7 @@ impl Record {
         let histogram = || Histogram::new_with_bounds(1, LONGEST_NS, 3).expect("valid bounds");
         Self {
             conducted: Conducted { seed, period_ns: 1e9 / rate, ..Conducted::default() },
+            facts: None,
             frames: VecDeque::new(),
             most_frames: 100 + (rate * KEPT_SECONDS) as usize,
             waiting: Vec::new(),
@@ -55,15 +60,70 @@ impl Record {
         }
     }
 
-    /// Takes in the header of a frame.
+    /// Sets the facts of the show.
+    pub fn show_is(&mut self, facts: &ShowFacts) {
+        self.facts = Some(facts.clone());
+    }
+
+    /// Checks the header of a frame against the one before, and keeps it.
     pub fn frame(&mut self, header: &FrameHeader) {
+        if let Some(fault) = self.frames.back().and_then(|before| self.fault_of_frame(before, header)) {
+            self.conducted.contradicted += 1;
+            self.fault(format!("{fault}: {header:?}"));
+        }
         if self.frames.len() == self.most_frames {
             self.frames.pop_front();
         }
         self.frames.push_back(*header);
     }
 
-    /// Takes in what came of a command.
+    /// Returns the fault of a frame that passes a cue which pauses, or begins the show again at another time than 0.
+    fn fault_of_frame(&self, before: &FrameHeader, frame: &FrameHeader) -> Option<&'static str> {
+        let cues = &self.facts.as_ref()?.cues;
+        let passed = cues.get(before.cue as usize..cues.len().min(frame.cue as usize)).unwrap_or_default();
+        let waits = passed.iter().find(|cue| cue.1);
+        let is_next = before.run_id == frame.run_id && before.tick + 1 == frame.tick;
+        let begins_again = before.playback_state() == Some(PlaybackState::Ended) && before.epoch + 1 == frame.epoch;
+        if before.epoch == frame.epoch && waits.is_some_and(|cue| cue.0 != frame.sim_time) {
+            Some("the show does not wait at its cue")
+        } else if is_next && begins_again && frame.sim_time != 0.0 {
+            Some("the show does not begin again at its start")
+        } else {
+            None
+        }
+    }
+
+    /// Returns the periods of the step that ended with the frame at `place`. Returns `None` if a frame of
+    /// the step is missing, or if it may have begun in the period of a cue that pauses, without a frame that stands still.
+    fn length_of_step(&self, place: usize) -> Option<u64> {
+        let mut place = place;
+        let mut periods = 0;
+        loop {
+            let (before, frame) = (self.frames.get(place.checked_sub(1)?)?, self.frames.get(place)?);
+            let waits = self.facts.as_ref().is_none_or(|facts| facts.waits_at(frame.sim_time));
+            if before.tick + 1 != frame.tick || periods > 0 && waits {
+                return None;
+            }
+            if before.time_scale == 0.0 {
+                return Some(periods);
+            }
+            (periods, place) = (periods + 1, place - 1);
+        }
+    }
+
+    /// Returns true if the frames before the end of a step do not have its length, and no cue has ended it.
+    fn has_wrong_length(&self, answered: &Answered, answer: &ControlResponse, place: usize) -> bool {
+        let Command::Step(periods) = answered.command else { return false };
+        if !answered.is_step_that_ran || answer.result() != Some(Code::Done) {
+            return false;
+        }
+        let waits = self.facts.as_ref().is_none_or(|facts| facts.waits_at(self.frames[place].sim_time));
+        let jumped = place.checked_sub(1).is_none_or(|before| self.frames[before].epoch != self.frames[place].epoch);
+        let is_wrong = |length: u64| length > periods || length < periods && !waits && !jumped;
+        self.length_of_step(place).is_some_and(is_wrong)
+    }
+
+    /// Counts the result of a command.
     pub fn answered(&mut self, answered: Answered) {
         let conducted = &mut self.conducted;
         conducted.sent += 1;
@@ -75,7 +135,7 @@ impl Record {
                 return self.fault(fault);
             }
         };
-        let name = Command::NAMES[answered.command.number_and_value().0 as usize];
+        let name = answered.command.name();
         let code = answer.result().map_or("unknown", Code::name);
         *conducted.answers.entry(name.to_owned()).or_default().entry(code.to_owned()).or_default() += 1;
         if let Err(expected) = allowed {
@@ -118,7 +178,8 @@ impl Record {
             let agrees = frame.sim_time.to_bits() == answer.sim_time.to_bits()
                 && frame.time_scale == answer.time_scale
                 && (frame.playback, frame.cue) == (answer.playback, answer.cue)
-                && jumps.is_none_or(|(jumps, due)| jumps == due);
+                && jumps.is_none_or(|(jumps, due)| jumps == due)
+                && !self.has_wrong_length(&answered, answer, place);
             if !agrees {
                 self.conducted.contradicted += 1;
                 let (described, words) = (description(answered.command), answer_in_words(answer));
@@ -157,8 +218,7 @@ fn jumps_due(answered: &Answered, before: &FrameHeader) -> u32 {
 }
 
 fn description(command: Command) -> String {
-    let (number, value) = command.number_and_value();
-    format!("{} {value}", Command::NAMES[number as usize])
+    format!("{} {}", command.name(), command.number_and_value().1)
 }
 
 fn answer_in_words(answer: &ControlResponse) -> String {

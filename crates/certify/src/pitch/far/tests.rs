@@ -1,4 +1,4 @@
-//! Lemma 8 against teams that the ordinary solver has placed.
+//! Lemma 8 against teams placed by the ordinary solver.
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
@@ -12,11 +12,11 @@ use bench_dragon_motion::model::team::Team;
 
 const PAPER: Team = Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
 
-/// Handles of one team after which no more are placed.
+/// Limit of handles of one team.
 const MOST_HANDLES: usize = 300;
 
-/// The least clearance of boards 0 and 1 to any other with the head so far from the centre; `None` where a link has no
-/// follower.
+/// Returns the least clearance of boards 0 and 1 to any other board, with the head `head_radius` metres from the
+/// centre; `None` if a link has no follower.
 fn least_clearance(team: &Team, pitch: f64, head_radius: f64) -> Option<f64> {
     let path = Path::spiral(pitch, head_radius / pitch);
     // Two turns behind the first two boards.
@@ -57,7 +57,7 @@ fn boards_are_apart_wherever_the_lemma_says_so() {
     let mut runner = TestRunner::new(Config { cases: 300, failure_persistence: None, ..Config::default() });
     let counted = std::cell::RefCell::new((&mut tried, &mut sharp));
     let result = runner.run(&teams(), |(team, pitch)| {
-        // Where the pitch exceeds the width there is such a radius, and the lemma holds further out too.
+        // If the pitch exceeds the width there is such a radius, and the lemma holds further out too.
         let radius = least_radius(&team, pitch, 1e-3).ok_or_else(|| TestCaseError::fail("no radius"))?;
         for factor in [1.0, 1.0001, 1.03, 1.3, 4.0] {
             prop_assert!(holds(&team, pitch, factor * radius), "not {factor} times as far out as {radius}");
@@ -81,7 +81,7 @@ fn the_lemma_holds_for_the_team_of_the_paper_little_further_out_than_boards_touc
     let radius = least_radius(&PAPER, 0.4503373934, 4.5).unwrap();
     println!("{radius}");
     assert!(radius > 4.6 && radius < 5.6, "{radius}");
-    // It begins no further in than it is asked for.
+    // The result is never below the radius that is requested.
     assert_eq!(least_radius(&PAPER, 0.4503373934, 9.0), Some(9.0));
 }
 

@@ -15,9 +15,9 @@ use super::rows::{Band, LANES, Lanes, Lengths, Piece, Rows, Tolerance};
 use super::track::{Node, Track};
 use crate::linkage;
 use crate::model::Vector;
-use crate::model::curve::Segment;
+use crate::model::curve::Curve;
+use crate::model::elementary::hypot;
 use crate::model::path::Param;
-use crate::model::spiral::Direction;
 use crate::model::team::Team;
 
 /// Halvings of what lies between two kinks, at most.
@@ -227,7 +227,7 @@ impl BandBuilder<'_> {
     fn error(&self, half: f64, nodes: [&Node; 5], index: usize, chain: &NodeChain) -> f64 {
         let mut polynomials = polynomials(half, nodes);
         // The size of the slope's next power, had it fallen off as the last one did.
-        let power = |power: usize| power as f64 * polynomials[0][power].hypot(polynomials[1][power]);
+        let power = |power: usize| power as f64 * hypot(polynomials[0][power], polynomials[1][power]);
         let neglected = LARGEST_NODAL * power(5) * (power(5) / power(4)).min(1.0);
         let dropped: [f64; 3] = std::array::from_fn(|quantity| {
             let Lengths { coordinate, heading } = self.lengths;
@@ -246,7 +246,7 @@ impl BandBuilder<'_> {
             miss = miss.max((self.track.displacement(middle.at, node.at) - found).norm());
             turn = turn.max((within_half_turn(node.heading - middle.heading) - horner(&heading, beta).0).abs());
         }
-        let dropped_place = dropped[0].hypot(dropped[1]);
+        let dropped_place = hypot(dropped[0], dropped[1]);
         let truncated = neglected + 25.0 * dropped_place;
         let worst = ((miss + dropped_place) / allowed)
             .max((turn + dropped[2]) / allowed_heading)
@@ -263,16 +263,7 @@ impl BandBuilder<'_> {
 
 /// Whether a place at a link's distance is where the linkage has the follower of `front`.
 fn is_follower(track: &Track, place: Param, front: Param, link: f64) -> bool {
-    let apart = place.at.minus(front.at).abs();
-    // As long as the distance has grown all the way.
-    let nearest = match track.path.segment(front) {
-        Segment::Line(_) => true,
-        Segment::Arc(_) => apart <= FRAC_PI_2,
-        Segment::Spiral(spiral) => {
-            apart <= FRAC_PI_2 && (spiral.direction() == Direction::Inward || front.at.high >= 1.0 + FRAC_PI_2)
-        }
-    };
-    if nearest && place.segment == front.segment {
+    if place.segment == front.segment && track.path.segment(front).distance_grows(front.at, place.at) {
         return true;
     }
     let Ok(found) = linkage::follower(track.path, front, link) else { return false };

@@ -5,12 +5,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::track::{Node, Track, signed_rate};
+use super::track::{Node, Track};
 use crate::linkage;
-use crate::model::curve::{Coordinate, Segment};
+use crate::model::curve::{Coordinate, Curve, Follower};
 use crate::model::path::Param;
 use crate::model::root::increasing_root;
-use crate::model::spiral::Direction;
 use crate::model::team::Team;
 
 /// Links beyond the tail at which a table on a spiral begins to be made: so far out that it is smooth.
@@ -41,13 +40,13 @@ impl Beginning {
     pub(super) fn new(track: &Track, team: &Team) -> Option<Self> {
         let (start, link) = (track.path.param_at(0.0), team.link(1));
         let head = if start.segment == 0 { start } else { Param { segment: 0, at: track.path.last(0) } };
-        let spiral = match track.path.segment(head) {
-            Segment::Line(_) => {
-                return Some(Self { base: track.advanced(head, -team.length() - 2.0 * link), link, fit: None });
-            }
-            Segment::Spiral(spiral) if spiral.direction() == Direction::Inward => spiral,
-            _ => return None,
-        };
+        let curve = track.path.segment(head);
+        if curve.constant_curvature() == Some(0.0) {
+            return Some(Self { base: track.advanced(head, -team.length() - 2.0 * link), link, fit: None });
+        }
+        if !curve.tightens() {
+            return None;
+        }
         // The arc under a link is longest where the path bends most, which is under the first links.
         let stretch = [team.link(0), link].into_iter().try_fold(1f64, |stretch, link| {
             let rear = linkage::follower(track.path, head, link).ok()?;
@@ -59,8 +58,10 @@ impl Beginning {
             place = linkage::follower(track.path, place, link).ok()?;
         }
         let span = place.at.minus(base.at);
-        let radius = |ahead: f64| spiral.radius(base.at.plus(ahead));
-        let rear_of = |ahead: f64| Some(ahead + spiral.follower_angle(radius(ahead), link).ok()?);
+        let rear_of = |ahead: f64| match curve.follower(base.at.plus(ahead), f64::INFINITY, link) {
+            Ok(Follower::Behind(by)) => Some(ahead + by),
+            _ => None,
+        };
         let fit = Fit { span, coefficients: fitted(span, rear_of)? };
         Some(Self { base, link, fit: Some(fit) })
     }
@@ -77,7 +78,7 @@ impl Beginning {
                 let y = increasing_root(excess, -1.0, 1.0, 2.0 * alpha / FITTED_LINKS as f64 - 1.0);
                 let at = self.base.at.plus(0.5 * (y + 1.0) * fit.span);
                 let per_link = 0.5 * fit.span / fit.links_and_slope(y).1;
-                (at, -signed_rate(track.path.segment(self.base), at) * per_link)
+                (at, -track.path.segment(self.base).rate(at) * per_link)
             }
         };
         let at = Param { segment: 0, at };
@@ -129,7 +130,10 @@ fn fitted(span: f64, rear_of: impl Fn(f64) -> Option<f64>) -> Option<Vec<f64>> {
             equations[(row, column)] = rear.powi(column as i32 + 1) - front.powi(column as i32 + 1);
         }
     }
-    let ones = DVector::from_element(FITTED_PLACES, 1.0);
-    let solution = equations.svd(true, true).solve(&ones, 1e-15).ok()?;
+    // By QR, since the singular values of nalgebra take hypotenuses from the C library.
+    let factors = equations.qr();
+    let mut ones = DVector::from_element(FITTED_PLACES, 1.0);
+    factors.q_tr_mul(&mut ones);
+    let solution = factors.r().solve_upper_triangular(&ones.rows(0, FITTED_DEGREE).clone_owned())?;
     Some(solution.iter().copied().collect())
 }

@@ -7,6 +7,7 @@ use super::polynomial::SlopeFit;
 use super::rows::{Alpha, Rows};
 use super::track::Track;
 use crate::model::Vector;
+use crate::model::elementary::{hypot, pow};
 use crate::model::path::Param;
 use crate::model::root::increasing_root;
 use crate::model::team::Team;
@@ -193,8 +194,7 @@ impl<'a> HeadBuilder<'a> {
                     table.pieces.push(piece);
                     table.begins.push(end);
                     // The error goes with the eighth power of the length.
-                    length =
-                        ((end - travelled) * (0.5 / error.max(1e-6)).powf(0.125)).clamp(0.5 * length, 2.0 * length);
+                    length = ((end - travelled) * pow(0.5 / error.max(1e-6), 0.125)).clamp(0.5 * length, 2.0 * length);
                     length = length.min(LONGEST * link);
                     (travelled, reached) = (end, self.past_junction(exact, end));
                 }
@@ -368,7 +368,7 @@ impl<'a> HeadBuilder<'a> {
         // Where T goes from one piece to the next, alpha jumps by what rounding has added up to along the rows.
         let walk = 2.0 * (self.rows.rows() as f64).sqrt() * f64::EPSILON * link;
         let allowed = tolerance.metres(self.team.shortest_link()) + walk;
-        let place = (found.x - values[0]).hypot(found.y - values[1]).max(link * (alpha - values[3]).abs());
+        let place = hypot(found.x - values[0], found.y - values[1]).max(link * (alpha - values[3]).abs());
         // The size of a slope's next power, had it fallen off as the last one did.
         let neglected = |quantities: &[usize]| {
             let power = |power: usize| {

@@ -7,7 +7,7 @@ use super::beginning::Beginning;
 use super::rows::Piece;
 use super::track::Track;
 use crate::linkage;
-use crate::model::curve::Segment;
+use crate::model::curve::Curve;
 use crate::model::path::Param;
 use crate::model::team::Team;
 
@@ -76,8 +76,8 @@ pub(super) fn kinks(track: &Track, beginning: &Beginning, link: f64, end: usize)
     let mut kinks: Vec<f64> = (1..path.segments())
         .filter_map(|segment| {
             let junction = Param { segment, at: path.first(segment) };
-            let before = Param { segment: segment - 1, at: path.last(segment - 1) };
-            if let (Segment::Line(_), Segment::Line(_)) = (path.segment(before), path.segment(junction)) {
+            let is_straight = |segment| path.segment_at(segment).constant_curvature() == Some(0.0);
+            if is_straight(segment - 1) && is_straight(segment) {
                 return None;
             }
             let (mut place, mut links) = (junction, 0.0);

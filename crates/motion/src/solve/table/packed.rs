@@ -10,6 +10,7 @@
 
 use super::polynomial::{economise, on_part};
 use super::rows::{Band, LANES, Lanes, Lengths, Piece, Rows, piece_at, piece_of_share};
+use crate::model::elementary::hypot;
 
 /// One coefficient of neighbouring rows in single precision.
 #[derive(Debug, Clone, Copy)]
@@ -222,13 +223,13 @@ impl Builder<'_> {
                 (coefficients[0].abs(), coefficients[1..].iter().map(|c| c.abs()).sum::<f64>());
             ROUNDING * (if constant { 2.0 * constant_part } else { 0.0 } + 2.0 * (length + 1) as f64 * others)
         };
-        let place = (dropped_x.value + rounding(x, !mixed, coordinate))
-            .hypot(dropped_y.value + rounding(y, !mixed, coordinate));
+        let place =
+            hypot(dropped_x.value + rounding(x, !mixed, coordinate), dropped_y.value + rounding(y, !mixed, coordinate));
         let turn = dropped_heading.value + rounding(angle, true, heading);
         let slopes = |axis: &[f64; 6]| (1..6).map(|power| power as f64 * axis[power].abs()).sum::<f64>();
-        let least_slope = 2.0 * x[1].hypot(y[1]) - slopes(x).hypot(slopes(y));
+        let least_slope = 2.0 * hypot(x[1], y[1]) - hypot(slopes(x), slopes(y));
         let speed =
-            dropped_x.slope.hypot(dropped_y.slope) / least_slope.max(0.0) + (2 * coordinate + 6) as f64 * ROUNDING;
+            hypot(dropped_x.slope, dropped_y.slope) / least_slope.max(0.0) + (2 * coordinate + 6) as f64 * ROUNDING;
         let speed = if self.allowed.speed == f64::INFINITY { 0.0 } else { speed / self.allowed.speed };
         (place / self.allowed.place).max(turn / self.allowed.heading).max(speed)
     }

@@ -4,13 +4,11 @@
 //! In: a path and places on it. Out: displacements, places at a link's distance, [`Node`]s. Called by the making of the
 //! table only; no frame comes here.
 
-use std::f64::consts::PI;
-
-use crate::linkage::{self, link_pose};
+use crate::linkage;
 use crate::model::Vector;
-use crate::model::curve::{Coordinate, Curve, Line, Segment};
+use crate::model::curve::{Coordinate, Curve};
+use crate::model::elementary;
 use crate::model::path::{Param, Path};
-use crate::model::spiral::{Direction, Spiral};
 
 /// A path with the coordinates at which its segments join.
 #[derive(Debug)]
@@ -63,16 +61,7 @@ impl<'a> Track<'a> {
             let next = Param { segment: from.segment + 1, at: self.first[from.segment + 1] };
             return self.displacement(from, end) + self.displacement(next, to);
         }
-        match self.path.segment(from) {
-            Segment::Line(Line { direction, .. }) => to.at.minus(from.at) * direction,
-            Segment::Arc(arc) => {
-                // The chord is parallel to the tangent half way.
-                let half = 0.5 * to.at.minus(from.at);
-                2.0 * arc.radius * half.sin() * arc.tangent(from.at.plus(half))
-            }
-            // A "link" of one metre has the displacement as its direction.
-            Segment::Spiral(_) => link_pose(self.path, to, from, 1.0).direction,
-        }
+        self.path.segment(from).displacement(from.at, to.at)
     }
 
     /// The place about `metres` further along, exact to first order: for a guess, or the last step of an iteration.
@@ -82,7 +71,8 @@ impl<'a> Track<'a> {
         let mut place = from;
         let mut left = metres;
         loop {
-            let rate = signed_rate(self.path.segment(place), place.at);
+            let segment = self.path.segment(place);
+            let rate = segment.rate(place.at);
             let by = left / rate;
             let ahead = metres > 0.0;
             let next = if ahead { place.segment + 1 } else { place.segment.wrapping_sub(1) };
@@ -95,8 +85,7 @@ impl<'a> Track<'a> {
                 continue;
             }
             place.at = place.at.plus(by);
-            let sound = place.at.high > 0.0 || !matches!(self.path.segment(place), Segment::Spiral(_));
-            return sound.then_some(place);
+            return segment.contains(place.at).then_some(place);
         }
     }
 
@@ -120,17 +109,11 @@ impl<'a> Track<'a> {
     /// The place `link` metres ahead of another, about `gap` metres of travel ahead, where both are on one segment.
     fn ahead_on_segment(&self, rear: Param, gap: f64, link: f64) -> Option<Param> {
         let segment = self.path.segment(rear);
-        let by = match segment {
-            Segment::Line(_) => link,
-            Segment::Arc(arc) => 2.0 * (0.5 * link / arc.radius).asin(),
-            Segment::Spiral(spiral) => spiral_angle(spiral, rear.at, gap, link)?,
-        };
+        let by = segment.ahead(rear.at, gap, link)?;
         let at = Param { at: rear.at.plus(by), ..rear };
-        let over = at.at.minus(self.last[rear.segment]);
-        let inward = matches!(segment, Segment::Spiral(spiral) if spiral.direction() == Direction::Inward);
-        let beyond = if inward { over < 0.0 } else { over > 0.0 };
-        let sound = at.at.high > 0.0 || !matches!(segment, Segment::Spiral(_));
-        (by.is_finite() && sound && (!beyond || rear.segment + 1 == self.last.len())).then_some(at)
+        let is_last = rear.segment + 1 == self.last.len();
+        let is_on_segment = is_last || segment.progress(self.last[rear.segment], at.at) <= 0.0;
+        (by.is_finite() && segment.contains(at.at) && is_on_segment).then_some(at)
     }
 
     /// The first place behind `front` at a link's distance.
@@ -147,7 +130,7 @@ impl<'a> Track<'a> {
             None => self.settled(self.moved(rear.at, *gap)?, rear.at, link)?,
         };
         if at.segment == rear.at.segment {
-            *gap = at.at.minus(rear.at.at) * signed_rate(self.path.segment(at), rear.at.at);
+            *gap = at.at.minus(rear.at.at) * self.path.segment(at).rate(rear.at.at);
         }
         let tangent = self.path.tangent(at);
         let pose = self.pose((at, tangent), (rear.at, rear.tangent), link)?;
@@ -164,7 +147,7 @@ impl<'a> Track<'a> {
         let (front_cosine, rear_cosine) = (direction.dot(&front.1), direction.dot(&rear.1));
         let speed_ratio = front_cosine / rear_cosine;
         let turning = direction.perp(&(front.1 - speed_ratio * rear.1));
-        let heading = direction.y.atan2(direction.x);
+        let heading = elementary::atan2(direction.y, direction.x);
         (rear_cosine > 0.0).then_some(Pose { heading, speed_ratio, heading_per_metre: turning / link })
     }
 
@@ -172,42 +155,4 @@ impl<'a> Track<'a> {
     pub(super) fn advanced(&self, from: Param, metres: f64) -> Param {
         Param { segment: from.segment, at: self.path.segment(from).advance(from.at, metres) }
     }
-}
-
-/// Metres of travel per unit of a segment's coordinate.
-pub(super) fn signed_rate(segment: &Segment, at: Coordinate) -> f64 {
-    match segment {
-        Segment::Line(_) => 1.0,
-        Segment::Arc(arc) => arc.radius,
-        Segment::Spiral(spiral) => {
-            let rate = spiral.radius_per_radian() * 1f64.hypot(at.high);
-            if spiral.direction() == Direction::Inward { -rate } else { rate }
-        }
-    }
-}
-
-/// The angle from a place on a spiral to the one `link` metres away, about `gap` metres of travel ahead, by Newton's
-/// method for (g d)^2 + 4 r (r + g d) sin^2(d/2) = link^2 (law of cosines), r the radius and g its change per radian.
-fn spiral_angle(spiral: &Spiral, from: Coordinate, gap: f64, link: f64) -> Option<f64> {
-    let (r, a) = (spiral.radius(from), spiral.radius_per_radian());
-    let (radius_per_radian, sign) = if spiral.direction() == Direction::Inward { (-a, -1.0) } else { (a, 1.0) };
-    // What rounds off here would add up along the rows.
-    let (square, low) = (link * link, link.mul_add(link, -(link * link)));
-    let mut d = gap / r.hypot(a);
-    for _ in 0..20 {
-        let (sine, cosine) = (0.5 * d).sin_cos();
-        let rise = radius_per_radian * d;
-        let other = r + rise;
-        let value = (2.0 * r * sine).mul_add(2.0 * other * sine, -square) + rise.mul_add(rise, -low);
-        let slope = 2.0 * radius_per_radian * rise + 4.0 * r * sine * (radius_per_radian * sine + other * cosine);
-        let step = value / slope;
-        d -= step;
-        if !(d > 0.0 && d < PI && r + radius_per_radian * d > 0.0) {
-            return None;
-        }
-        if step.abs() < LAST_STEP * d {
-            return Some(sign * d);
-        }
-    }
-    None
 }

@@ -5,8 +5,8 @@ use super::*;
 use crate::live::control::{Answer, Door, door};
 use bench_dragon_messages::control::Code;
 use bench_dragon_messages::state::PlaybackState;
-use bench_dragon_show::Playback;
 use bench_dragon_show::scene::Scene;
+use bench_dragon_show::{Playback, Show};
 
 /// A command that waits: its door, and the frame during which it arrived.
 #[derive(Debug, Clone, Copy)]
@@ -37,10 +37,11 @@ struct Arrivals {
     waiting: Vec<Waiting>,
     obeyed: Vec<Obeyed>,
     frame: Frame,
+    messages: FrameMessages,
 }
 
-impl Frames for Arrivals {
-    fn frame(&mut self, tick: u64) -> Period<'_> {
+impl FrameSource for Arrivals {
+    fn frame(&mut self, tick: u64, stamps: Stamps) -> Period<'_> {
         for door in self.arrivals.pop_front().unwrap_or_default() {
             // Its number names the door: this show plays no steps.
             self.doors[door].send(Command::Step(door as u64)).unwrap();
@@ -49,7 +50,7 @@ impl Frames for Arrivals {
         self.clock.advance(self.cost_ns.pop_front().unwrap_or(0));
         self.computed += 1;
         self.frame.tick = tick;
-        (&self.frame).into()
+        Period::Frame(self.messages.of(&self.frame, stamps))
     }
 
     fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
@@ -91,6 +92,7 @@ proptest! {
             waiting: Vec::new(),
             obeyed: Vec::new(),
             frame: Frame::new(1),
+            messages: FrameMessages::default(),
         };
         let options = LoopOptions { run_id: 1, rate: rate.hertz(), periods: Some(400) };
         let (samples, _received) = rtrb::RingBuffer::new(1024);
@@ -131,7 +133,8 @@ fn steps_on_each_others_heels_are_all_answered() {
     let text = format!("{team}{path}[motion]\nhead_speed = 1.0\nsolver = \"newton\"\n");
     let scene = Scene::parse(&text, "small.toml", "small").unwrap();
     let playback = Playback { paused: true, ..Playback::of(&scene) };
-    let mut show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), playback).unwrap();
+    let show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), playback).unwrap();
+    let mut show = ShowSource::new(show);
     let (port, mut door) = door();
     let mut doors = Doors::new(vec![port]);
     for periods in [1, 1, 2, 1] {
@@ -139,7 +142,7 @@ fn steps_on_each_others_heels_are_all_answered() {
     }
     for tick in 0..9 {
         doors.take_one(&mut show, tick);
-        Frames::frame(&mut show, tick);
+        show.show.frame(tick);
         doors.finish_step(&mut show, tick);
     }
     let answers: Vec<_> = std::iter::from_fn(|| door.answer()).map(|answer| answer.outcome).collect();

@@ -9,9 +9,11 @@ use super::super::verify::{Verdict, VerifyError, verify};
 use super::super::writer::LogWriter;
 use super::super::{LogPublisher, LogReader, queue_of};
 use crate::live::control::{Door, Doors, door};
-use crate::live::{Counts, Frames, LoopOptions, Outgoing, Period, PublishError, Publisher, Reports, run_loop};
+use crate::live::show_source::ShowSource;
+use crate::live::{Counts, FrameSource, LoopOptions, Outgoing, Period, PublishError, Publisher, Reports, run_loop};
 use bench_dragon_messages::control::Command;
 use bench_dragon_motion::solve::table::Instructions;
+use bench_dragon_show::convert::Stamps;
 use bench_dragon_show::scene::SceneText;
 use bench_dragon_show::{Outcome, Playback, Show};
 use bench_dragon_testing::simulated::{SimulatedClock, Wake};
@@ -36,7 +38,7 @@ pub const NEWTON: &str = "solver = \"newton\"";
 
 /// Conducts a show from the inside: each frame sends what is next, and takes the answers.
 pub struct Conducted {
-    show: Show,
+    show: ShowSource,
     door: Door,
     commands: std::vec::IntoIter<Command>,
     answers: Rc<RefCell<Vec<Outcome>>>,
@@ -55,10 +57,10 @@ impl Conducted {
     }
 }
 
-impl Frames for Conducted {
-    fn frame(&mut self, tick: u64) -> Period<'_> {
+impl FrameSource for Conducted {
+    fn frame(&mut self, tick: u64, stamps: Stamps) -> Period<'_> {
         self.exchange();
-        self.show.frame(tick).into()
+        self.show.frame(tick, stamps)
     }
 
     fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
@@ -185,6 +187,7 @@ impl Setup {
         let publisher = Inline { publisher, reader, writer, held_up: self.held_up, ended: ended.clone() };
         let (port, door) = door();
         let answers = Rc::new(RefCell::new(Vec::new()));
+        let show = ShowSource::new(show);
         let mut frames = Conducted { show, door, commands: self.commands.into_iter(), answers: answers.clone() };
         let clock = SimulatedClock::new(5, self.wakes);
         let (samples, _inbox) = rtrb::RingBuffer::new(1);

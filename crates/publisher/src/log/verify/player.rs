@@ -1,9 +1,10 @@
 //! Plays a show from the lines of its log, in the order of ticks, and compares as it goes.
 
 use super::super::hash::{FrameHasher, columns, header_words};
-use super::super::lines::{Line, SecondLine, ShowLine, code_of, command_of};
+use super::super::lines::{Line, SecondLine, ShowLine, command_of};
 use super::super::writer::{sampled, second_of};
 use super::{Difference, Verdict, accuracy_of};
+use bench_dragon_messages::control::Code;
 use bench_dragon_motion::solve::{Chain, Solver, Velocities};
 use bench_dragon_motion::{Method, Motion};
 use bench_dragon_show::convert::{Stamps, frame_header};
@@ -114,7 +115,7 @@ impl Player {
         match line {
             Line::Command { tick, command, value, code } => {
                 self.play_until(number, *tick)?;
-                let known = code.as_deref().is_none_or(|code| code_of(code).is_some());
+                let known = code.as_deref().is_none_or(|code| Code::named(code).is_some());
                 let Some(command) = command_of(command, *value).filter(|_| known) else {
                     return Err("the command is not understood, expected one of those of docs/conducting.md".to_owned());
                 };

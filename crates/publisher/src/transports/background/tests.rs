@@ -8,8 +8,10 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use proptest::prelude::*;
 
 use super::*;
+use crate::live::show_source::FrameMessages;
 use bench_dragon_messages::state::Level;
 use bench_dragon_show::alerts::Alert;
+use bench_dragon_show::convert::Stamps;
 use bench_dragon_show::{Frame, ReachedCue};
 
 const HANDLES: usize = 3;
@@ -80,7 +82,12 @@ fn frame(tick: u64, alerts: usize) -> Frame {
 }
 
 fn publish(publisher: &mut BackgroundPublisher, tick: u64, alerts: usize) {
-    publisher.publish(Outgoing::new(&FrameHeader { tick, ..FrameHeader::default() }, &frame(tick, alerts))).unwrap();
+    publish_frame(publisher, &frame(tick, alerts));
+}
+
+fn publish_frame(publisher: &mut BackgroundPublisher, frame: &Frame) {
+    let stamps = Stamps { run_id: 0, sequence: 0, stamp_ns: 0, deadline_ns: 0 };
+    publisher.publish(FrameMessages::default().of(frame, stamps)).unwrap();
 }
 
 #[test]
@@ -206,7 +213,7 @@ fn cues_of_frames_that_are_not_sent_are_sent() {
             name: "".into(),
         });
         let frame = Frame { cues: cues.to_vec(), ..frame(tick, 0) };
-        publisher.publish(Outgoing::new(&FrameHeader { tick, ..FrameHeader::default() }, &frame)).unwrap();
+        publish_frame(&mut publisher, &frame);
     }
     drop(publisher);
     assert_eq!(thread.finish().frames, 1, "the rate is a frame a second");

@@ -1,12 +1,9 @@
 //! The memory that the queues of frames need, and a check that it is there. Called by the publisher before it opens a service.
 
 use bench_dragon_client::shared_memory::{OpenError, free_bytes};
-use bench_dragon_messages::{FrameHeader, HandlePose, HandlePose32};
+use bench_dragon_messages::{FrameHeader, HandlePose, HandlePose32, QUEUE_BYTES};
 
 use super::PublisherConfig;
-
-/// The shared memory that the queues of frames may take by default.
-const QUEUE_BYTES: usize = 64_000_000;
 
 /// Frames a subscriber may fall behind, where the scene does not state it: at most 64 MB for all subscribers together.
 pub(super) fn default_queue(config: &PublisherConfig) -> usize {

@@ -1,155 +1,13 @@
-//! The clock under random commands, against a second one that counts tick by tick in whole numbers.
+//! The clock under random commands, against the model that counts tick by tick in whole numbers.
 
 use proptest::prelude::*;
 
 use super::super::*;
 use crate::scene::OnContact;
+use bench_dragon_testing::model::{Model, ModelCue, ModelShow, Sum};
 
-/// Units in a simulated second: every time, rate and scale below is a whole number of them, and exact as a double.
-const UNITS: i64 = 1 << 14;
-/// Frames per second.
+/// Frames per second. Every time, rate and scale below is a whole number of [`Sum::UNITS`], and exact as a double.
 const RATE: i64 = 64;
-
-/// A show in whole numbers, moved on by one tick at a time.
-#[derive(Debug, Clone)]
-struct Counted {
-    start: i64,
-    freeze: i64,
-    end_hold: Option<i64>,
-    cues: Vec<(i64, bool)>,
-    time: i64,
-    /// Units per tick.
-    scale: i64,
-    mode: Mode,
-    /// Ticks left of a step.
-    step: Option<u64>,
-    waits: bool,
-    /// Ticks for which the end has been shown.
-    at_end: i64,
-    epoch: u32,
-    passed: usize,
-    reached: Vec<usize>,
-    finished: Option<Code>,
-}
-
-impl Counted {
-    fn advances(&self) -> bool {
-        self.mode == Mode::Playing || self.step.is_some()
-    }
-
-    fn before(&self, time: i64) -> usize {
-        self.cues.iter().filter(|cue| cue.0 < time).count()
-    }
-
-    fn break_step(&mut self, code: Code) {
-        if self.step.take().is_some() {
-            self.finished = Some(code);
-        }
-    }
-
-    /// The next period begins.
-    fn tick(&mut self) {
-        if !self.advances() {
-            return;
-        }
-        if self.time >= self.freeze {
-            self.at_end += 1;
-            if self.end_hold.is_some_and(|ticks| self.at_end > ticks) {
-                (self.time, self.at_end, self.passed) = (self.start, 0, self.before(self.start));
-                self.epoch += 1;
-            }
-        } else {
-            self.time = (self.time + self.scale).min(self.freeze);
-        }
-        self.step.iter_mut().for_each(|left| *left -= 1);
-        self.pass();
-        if self.step == Some(0) {
-            self.mode = Mode::Paused;
-            self.break_step(Code::Done);
-        }
-    }
-
-    /// Passes cues; waits at the first that pauses.
-    fn pass(&mut self) {
-        while self.advances() && self.cues.get(self.passed).is_some_and(|cue| cue.0 <= self.time) {
-            self.reached.push(self.passed);
-            let (time, pauses) = self.cues[self.passed];
-            self.passed += 1;
-            if pauses {
-                (self.time, self.mode, self.waits) = (time, Mode::Paused, true);
-                self.break_step(Code::Done);
-            }
-        }
-    }
-
-    fn jump(&mut self, time: i64) -> Code {
-        self.break_step(Code::Refused);
-        (self.time, self.at_end, self.passed) = (time, 0, self.before(time));
-        self.epoch += 1;
-        self.pass();
-        Code::Done
-    }
-
-    fn command(&mut self, command: Command) -> Option<Code> {
-        use Command::*;
-        let held = self.mode == Mode::Held;
-        Some(match command {
-            State => Code::Done,
-            Hold if held => Code::Already,
-            Release if held => {
-                self.mode = Mode::Paused;
-                Code::Done
-            }
-            Hold => {
-                self.break_step(Code::Refused);
-                self.mode = Mode::Held;
-                Code::Done
-            }
-            _ if held => Code::Refused,
-            Release => Code::Refused,
-            Pause if self.advances() => {
-                self.break_step(Code::Refused);
-                self.mode = Mode::Paused;
-                Code::Done
-            }
-            Pause => Code::Already,
-            Resume if self.mode == Mode::Playing => Code::Already,
-            Go if !self.waits => Code::Refused,
-            Resume | Go => {
-                self.break_step(Code::Refused);
-                (self.mode, self.waits, self.at_end) = (Mode::Playing, false, 0);
-                self.pass();
-                Code::Done
-            }
-            Rate(rate) if rate <= 0.0 => Code::OutOfRange,
-            Rate(rate) if rate * UNITS as f64 == (self.scale * RATE) as f64 => Code::Already,
-            Rate(rate) => {
-                (self.scale, self.at_end) = ((rate * UNITS as f64) as i64 / RATE, 0);
-                Code::Done
-            }
-            Seek(time) => {
-                let time = (time * UNITS as f64) as i64;
-                if time < 0 || time > self.freeze { Code::OutOfRange } else { self.jump(time) }
-            }
-            Restart => self.jump(self.start),
-            Step(_) if self.advances() => Code::Refused,
-            Step(periods) => {
-                (self.step, self.at_end) = (Some(periods), 0);
-                self.pass();
-                return None;
-            }
-        })
-    }
-
-    fn playback(&self) -> PlaybackState {
-        match self.mode {
-            Mode::Held => PlaybackState::Held,
-            Mode::Paused if self.step.is_none() => PlaybackState::Paused,
-            _ if self.time >= self.freeze => PlaybackState::Ended,
-            _ => PlaybackState::Playing,
-        }
-    }
-}
 
 fn commands() -> impl Strategy<Value = Command> {
     prop_oneof![
@@ -194,9 +52,12 @@ proptest! {
         cues in prop::collection::vec((0i64..40 * 8, any::<bool>()), 0..4),
         list in prop::collection::vec((0u64..150, commands()), 0..30),
     ) {
-        let mut cues: Vec<(i64, bool)> = cues.into_iter().map(|(eighths, pauses)| (eighths * UNITS / 8, pauses)).collect();
-        cues.sort_unstable();
-        let times = cues.iter().map(|cue| CueTime { time: cue.0 as f64 / UNITS as f64, pauses: cue.1 }).collect();
+        let mut cues: Vec<_> = cues
+            .into_iter()
+            .map(|(eighths, pauses)| ModelCue { time: eighths as f64 / 8.0, pauses })
+            .collect();
+        cues.sort_unstable_by(|a, b| a.time.total_cmp(&b.time));
+        let times = cues.iter().map(|cue| CueTime { time: cue.time, pauses: cue.pauses }).collect();
         let at_end = if end_hold.is_some() { AtEnd::Loop } else { AtEnd::Hold };
         let playback = Playback {
             start: start as f64,
@@ -208,54 +69,40 @@ proptest! {
             paused,
         };
         let clock = ShowClock::new(&playback, freeze as f64, times);
-        let mut counted = Counted {
-            start: start * UNITS,
-            freeze: freeze * UNITS,
-            end_hold,
-            time: start * UNITS,
-            scale: UNITS / RATE,
-            mode: if paused { Mode::Paused } else { Mode::Playing },
-            step: None,
-            waits: paused,
-            at_end: 0,
-            epoch: 0,
-            passed: 0,
-            reached: Vec::new(),
-            finished: None,
+        let show = ModelShow {
+            start: start as f64,
+            end: freeze as f64,
+            end_hold: end_hold.map(|periods| periods as u64),
             cues,
         };
-        counted.passed = counted.before(counted.start);
-        counted.pass();
+        let mut counted = Model::new(show, Sum::new(RATE), 1.0, paused);
         // One that is read at every tick, and one at the commands alone.
-        let (mut every, mut seldom) = (clock.clone(), clock);
+        let (mut every, mut rarely) = (clock.clone(), clock);
         let mut tick = 0;
         for (gap, command) in list {
             for next in tick..tick + gap {
-                if next > tick {
-                    counted.tick();
-                }
+                counted.count_to(next);
                 let time = every.advance(next);
-                prop_assert_eq!(time.sim_time, counted.time as f64 / UNITS as f64, "at {}", next);
+                prop_assert_eq!(time.sim_time, counted.sim_time(), "at {}", next);
                 prop_assert_eq!((time.playback, time.epoch, time.cues_passed), (counted.playback(), counted.epoch, counted.passed));
-                prop_assert_eq!(time.time_scale > 0.0, counted.advances());
-                prop_assert_eq!(every.reached(), &counted.reached[..]);
-                prop_assert_eq!(every.take_step_outcome(), counted.finished.take());
+                prop_assert_eq!(time.time_scale, counted.time_scale());
+                prop_assert_eq!(time.shows_played, counted.shows_played);
+                let reached: Vec<_> = counted.reached.drain(..).map(|(_, cue)| cue).collect();
+                prop_assert_eq!(every.reached(), &reached[..]);
+                prop_assert_eq!(every.take_step_outcome(), counted.step_outcome.take());
                 every.clear_reached();
-                counted.reached.clear();
             }
             tick += gap;
-            if gap > 0 {
-                counted.tick();
-            }
-            prop_assert_eq!(seldom.advance(tick), every.advance(tick));
-            seldom.take_step_outcome();
-            prop_assert_eq!(every.take_step_outcome(), counted.finished.take());
+            counted.count_to(tick);
+            prop_assert_eq!(rarely.advance(tick), every.advance(tick));
+            rarely.take_step_outcome();
+            prop_assert_eq!(every.take_step_outcome(), counted.step_outcome.take());
             let code = every.apply(tick, command);
-            prop_assert_eq!(code, counted.command(command), "{:?} at {}", command, tick);
-            prop_assert_eq!(seldom.apply(tick, command), code);
-            prop_assert_eq!(seldom.advance(tick), every.advance(tick));
-            prop_assert_eq!(every.take_step_outcome(), counted.finished.take());
-            seldom.take_step_outcome();
+            prop_assert_eq!(code, counted.execute(command), "{:?} at {}", command, tick);
+            prop_assert_eq!(rarely.apply(tick, command), code);
+            prop_assert_eq!(rarely.advance(tick), every.advance(tick));
+            prop_assert_eq!(every.take_step_outcome(), counted.step_outcome.take());
+            rarely.take_step_outcome();
         }
     }
 

@@ -13,7 +13,7 @@ fn clock(start: f64, time_scale: f64, rate: f64, freeze_time: f64, at_end: AtEnd
     ShowClock::new(&playback, freeze_time, Vec::new())
 }
 
-/// What holds at a tick, of a clock to which nothing has happened yet.
+/// The state at a tick of a clock without commands.
 #[derive(Debug, PartialEq)]
 struct At {
     sim_time: f64,
@@ -26,12 +26,12 @@ fn at(clock: &ShowClock, tick: u64) -> At {
     At { sim_time, shows_played, ended: playback == PlaybackState::Ended }
 }
 
-/// Ten to a power, every magnitude alike.
+/// Numbers of every magnitude, with equal shares.
 fn magnitude(least: f64, greatest: f64) -> impl Strategy<Value = f64> {
     (least..greatest).prop_map(|exponent| 10f64.powf(exponent))
 }
 
-/// Time scale, rate, start and freeze: a show of a billionth of a second to one of a billion billion years.
+/// Time scale, rate, start and end: a show of a billionth of a second to one of a billion billion years.
 fn shows() -> impl Strategy<Value = (f64, f64, f64, f64)> {
     let start = prop_oneof![Just(0.0), magnitude(-6.0, 20.0)];
     (magnitude(-6.0, 6.0), magnitude(-1.0, 4.3), start, magnitude(-9.0, 27.0))
@@ -41,7 +41,7 @@ fn shows() -> impl Strategy<Value = (f64, f64, f64, f64)> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(500) })]
 
-    /// Against integers: a start and a scale of whole 1/1024, over a whole rate.
+    /// Compares with integers: a start and a scale of whole 1/1024, over a whole rate.
     #[test]
     fn time_is_that_of_the_integer_tick(
         start in 0u64..1 << 30,
@@ -51,7 +51,7 @@ proptest! {
     ) {
         let clock = clock(start as f64 / 1024.0, scale as f64 / 1024.0, rate as f64, f64::MAX, AtEnd::Hold);
         for tick in [tick, 1_000_000_000] {
-            // Over 1024 * rate.
+            // Times are in units of 1 / (1024 * rate).
             let exact = u128::from(start) * u128::from(rate) + u128::from(scale) * u128::from(tick);
             let exact = exact as f64 / (1024.0 * rate as f64);
             prop_assert!((at(&clock, tick).sim_time - exact).abs() <= 2.0 * f64::EPSILON * exact);
@@ -75,20 +75,20 @@ proptest! {
         }
     }
 
-    /// The last tick of a showing is the first that has ended; then time begins again and ticks continue.
+    /// The last tick of a showing is the first at its end. Then time starts again and ticks continue.
     #[test]
     fn a_loop_ends_each_showing_at_its_first_tick_past_the_freeze((time_scale, rate, start, freeze) in shows()) {
         let looping = clock(start, time_scale, rate, freeze, AtEnd::Loop);
         let holding = clock(start, time_scale, rate, freeze, AtEnd::Hold);
         let seconds_per_tick = time_scale / rate;
-        // The first tick that has ended, doubling and halving the step.
+        // Finds the first tick at the end by doubling and halving the step.
         let mut tick: u64 = 0;
         for step in (0..62).rev().map(|power| 1u64 << power) {
             tick += if at(&holding, tick + step - 1).ended { 0 } else { step };
         }
         prop_assume!(tick < 1 << 60);
         prop_assert!(at(&holding, tick).ended && (tick == 0 || !at(&holding, tick - 1).ended));
-        // As many as fit: to a tick, and to what a double distinguishes there.
+        // The expected number, to a tick, and to the resolution of doubles there.
         let fit = (freeze - start) / seconds_per_tick;
         prop_assert!((tick as f64 - fit).abs() <= 1.0 + 4.0 * f64::EPSILON * (freeze / seconds_per_tick));
         for shows_played in [0, 1, 7] {
@@ -114,7 +114,7 @@ fn a_start_past_the_freeze_has_ended_at_once() {
 
 #[test]
 fn where_a_double_is_coarser_than_a_tick_the_first_of_equal_times_ends_the_show() {
-    // Doubles are 2 s apart here: every tick from 9 s on rounds to the freeze, and a tick is 50 ps.
+    // Doubles are 2 s apart here: every tick from 9 s on rounds to the end, and a tick is 50 ps.
     let looping = clock(1e16 - 10.0, 1e-6, 20_000.0, 1e16, AtEnd::Loop);
     let ends = 9 * 20_000_000_000;
     assert!(at(&looping, ends).ended && !at(&looping, ends - 1).ended);

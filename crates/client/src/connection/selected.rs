@@ -1,5 +1,5 @@
-//! Where a message comes from, and whose messages are followed. A service admits two publishers, of which one can be the end of
-//! a tunnel to other machines: it is told from the show by where its samples come from.
+//! The origin of a message, and the selected publisher. A service admits two publishers, of which one can be the end of a
+//! tunnel to other machines: the origin of its samples distinguishes it from the show.
 
 use iceoryx2::identifiers::{UniqueNodeId, UniquePublisherId};
 use iceoryx2::prelude::*;
@@ -22,20 +22,20 @@ pub(super) struct Origin {
 }
 
 impl Origin {
-    /// Where a sample comes from.
+    /// Returns the origin of a sample.
     pub(super) fn of(header: &Header) -> Self {
         Self { publisher: header.publisher_id(), node: header.node_id() }
     }
 }
 
-/// The publisher whose frames are handed over, and the run that the latest of them belongs to.
+/// The publisher whose frames are handed over, and the run of its latest frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Followed {
+pub(super) struct Selected {
     pub(super) origin: Origin,
     pub(super) run_id: u64,
 }
 
-/// The publishers of a service.
+/// Returns the publishers of a service.
 pub(super) fn publishers(service: &impl PortFactory<DynamicConfig = Ports>) -> Vec<Origin> {
     let mut all = Vec::new();
     service.dynamic_config().list_publishers(|of| {

@@ -1,4 +1,5 @@
-//! Where handles are with the head at one place, in doubles: what the search guesses its spans from. Nothing rests on it.
+//! Grid points of the search: the handles for one place of the head, in doubles. They are the starting guess of the
+//! spans; correctness does not depend on them.
 
 use super::capsule::Span;
 use super::path::{ExactPath, Place};
@@ -6,25 +7,25 @@ use bench_dragon_motion::linkage::{NoFollower, follower, link_pose};
 use bench_dragon_motion::model::path::{Param, Path};
 use bench_dragon_motion::model::team::Team;
 
-/// A handle at a knot.
+/// A handle at a grid point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Handle {
     pub param: Param,
-    /// Cosines at the front and the rear of the link whose rear handle this is.
+    /// Cosines at the front and at the rear of the link that ends at this handle.
     pub front_cosine: f64,
     pub rear_cosine: f64,
 }
 
-/// The head at one place, and as many handles as were needed.
+/// A place of the head, and as many handles as were needed.
 #[derive(Debug, Clone)]
-pub(super) struct Knot {
-    /// Metres of travel, nearly.
+pub(super) struct GridPoint {
+    /// Travel in metres, approximate.
     pub travelled: f64,
     pub head: Place,
     pub handles: Vec<Handle>,
 }
 
-impl Knot {
+impl GridPoint {
     pub fn new(path: &Path, exact: &ExactPath, travelled: f64) -> Self {
         let param = path.param_at(travelled);
         let place = place(param);
@@ -51,17 +52,17 @@ impl Knot {
     }
 }
 
-/// The parameter of a place.
+/// Returns the parameter of a place.
 pub(super) fn param(place: Place) -> Param {
     Param::new(place.0, bench_dragon_motion::model::curve::Coordinate { high: place.1, low: 0.0 })
 }
 
-/// The place nearest to a parameter.
+/// Returns the place nearest to a parameter.
 pub(super) fn place(param: Param) -> Place {
     Place(param.segment(), param.coordinate().high)
 }
 
-/// The span of a handle between two knots, `pad` metres longer at both ends.
+/// Returns the span of a handle between two grid points, `pad` metres longer at both ends.
 pub(super) fn span(exact: &ExactPath, one: Param, other: Param, pad: f64) -> Span {
     let (one, other) = (place(one), place(other));
     let (first, last) = if exact.in_order(one, other) { (one, other) } else { (other, one) };

@@ -1,5 +1,5 @@
-//! Lemma 6 of `docs/proofs.md`: handles that move together with the head, to the first order, and the clearance of two boards
-//! that they carry, over a step and at its middle. Only [`super`] uses it.
+//! First-order enclosures (Taylor models) of handles and boards over a step of the head, and of the clearance of two
+//! boards. Lemma 6 of `docs/proofs.md`.
 
 use super::boards::Shape;
 use super::capsule::Spanned;
@@ -9,62 +9,63 @@ use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::separation::{closest_points_board_board, separation_board_board};
 
-/// A handle while the head is `tau` metres from the middle of a step: at `point + tau velocity`, but for an error.
+/// A handle as `point + tau velocity` plus an error. `tau` is the head's distance in metres from the middle of the
+/// step.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Moving {
-    /// The point of a place m.
+pub(super) struct FirstOrderHandle {
+    /// The point of a place m of the path.
     point: Vector,
-    /// The tangent there.
+    /// The tangent at m.
     tangent: Vector,
-    /// Metres per metre of the head, along that tangent.
+    /// Velocity along that tangent, metres per metre of the head.
     velocity: Vector,
-    /// The handle's metres per metre of the head, over the step.
+    /// Speed of the handle over the step, metres per metre of the head.
     rate: Interval,
-    /// At least the metres of path from m to the handle at the middle of the step.
+    /// Upper bound of the metres of path from m to the handle at the middle of the step.
     offset: f64,
-    /// At least the length of the error at the middle of the step.
+    /// Upper bound of the error at the middle of the step, metres.
     still: f64,
-    /// At least its length anywhere in the step.
+    /// Upper bound of the error anywhere in the step, metres.
     error: f64,
-    /// At least the curvature where the handle goes, 1/m.
+    /// Upper bound of the curvature in the handle's span, 1/m.
     curvature: f64,
 }
 
-/// How many times the products of a link are enclosed anew, each time from where they put its rear handle.
+/// Number of times that the products of a link are enclosed again from the last enclosure of its rear handle.
 const REFINEMENTS: u32 = 3;
 
-/// When in a step.
+/// Moments of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum When {
-    /// With the head in the middle.
+    /// The head is at the middle of the step.
     Middle,
-    /// At any moment.
+    /// The head is anywhere in the step.
     Always,
 }
 
-/// A direction that keeps to a board: parts along its axis and a quarter turn to the left of it, not both 0.
+/// A direction fixed to a board: components along the board's axis and a quarter turn to the left of it, not both 0.
 pub(super) type Direction = [f64; 2];
 
-/// A board carried by two handles.
+/// A first-order enclosure of a board, from its two handles.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Carried {
-    front: Moving,
-    rear: Moving,
+pub(super) struct FirstOrderBoard {
+    front: FirstOrderHandle,
+    rear: FirstOrderHandle,
     link: Interval,
     half_length: Interval,
     half_width: Interval,
     half_step: f64,
 }
 
-/// A vector that is `at + tau by`, but for an error.
+/// A vector `at + tau by` plus an error.
 struct Linear {
     at: Vector,
     by: Vector,
     error: Interval,
 }
 
-impl Moving {
-    /// The head, which is at `middle` in the middle of a step of `half_step` metres to either side.
+impl FirstOrderHandle {
+    /// Creates the enclosure of the head, at `middle` in the middle of a step of `half_step` metres to either side.
     pub fn head(path: &ExactPath, span: &Spanned, middle: Place, half_step: f64) -> Self {
         Self::new(path, span, middle, Interval::ONE, 0.0, half_step)
     }
@@ -88,8 +89,8 @@ impl Moving {
         Self { velocity: scaled(self.tangent, Interval::point(middle)), rate, still, error, ..self }
     }
 
-    /// The handle behind this one, near `place` in the middle of the step. `None` where the bounds come out infinite, or
-    /// the place is not in the handle's span.
+    /// Creates the enclosure of the next handle, near `place` in the middle of the step. Returns `None` if a bound is
+    /// infinite, or if the place is not in the handle's span.
     pub fn follower(
         &self,
         path: &ExactPath,
@@ -122,12 +123,12 @@ impl Moving {
         follower.error.is_finite().then_some(follower)
     }
 
-    /// A handle so many metres behind this one on a straight line.
+    /// Returns the handle moved back `metres` on its straight line.
     pub fn moved_back(&self, metres: Interval) -> Self {
         Self { point: minus(self.point, scaled(self.tangent, metres)), ..*self }
     }
 
-    /// The tangent here times the link from `rear` to `front`, one of which this handle is.
+    /// Returns the tangent of this handle times the link from `rear` to `front`. This handle is one of the two.
     fn product(&self, front: &Self, rear: &Self, link: Interval, half_step: f64) -> Interval {
         let (at, by) = (minus(front.point, rear.point), minus(front.velocity, rear.velocity));
         let error = Interval::point(front.error) + Interval::point(rear.error);
@@ -137,7 +138,7 @@ impl Moving {
         dot(self.tangent, at) + dot(self.tangent, by) * step + Interval::within((error + bend).hi)
     }
 
-    /// The angle by which the tangent may differ from that at the place.
+    /// Returns a bound of the angle between the handle's tangent and the tangent at m.
     fn turn(&self, half_step: f64) -> Interval {
         (Interval::point(self.rate.magnitude()) * half_step + Interval::point(self.offset)) * self.curvature
     }
@@ -147,19 +148,19 @@ impl Moving {
     }
 }
 
-/// What two intervals that hold the same number have in common.
+/// Returns the intersection of two intervals that hold the same number.
 fn meet(one: Interval, other: Interval) -> Option<Interval> {
     let (lo, hi) = (one.lo.max(other.lo), one.hi.min(other.hi));
     (lo <= hi).then_some(Interval { lo, hi })
 }
 
-impl Carried {
-    pub fn new(shape: &Shape, front: Moving, rear: Moving, link: Interval, half_step: f64) -> Self {
+impl FirstOrderBoard {
+    pub fn new(shape: &Shape, front: FirstOrderHandle, rear: FirstOrderHandle, link: Interval, half_step: f64) -> Self {
         let half_length = link * 0.5 + shape.inset;
         Self { front, rear, link, half_length, half_width: shape.half_width, half_step }
     }
 
-    /// The board in doubles, in the middle of the step.
+    /// Returns the board in doubles, in the middle of the step.
     pub fn in_doubles(&self) -> Board {
         let [front, rear] = [self.front.point, self.rear.point].map(|point| {
             let [x, y] = point.map(Interval::middle);
@@ -170,15 +171,14 @@ impl Carried {
         Board { half_length: length, ..board }
     }
 
-    /// From front to rear handle.
+    /// Returns the vector from the rear handle to the front handle.
     fn along(&self, when: When) -> Linear {
         let Self { front, rear, .. } = self;
         let error = front.error(when) + rear.error(when);
         Linear { at: minus(front.point, rear.point), by: minus(front.velocity, rear.velocity), error }
     }
 
-    /// The gap between this board and another along a direction that keeps to this one: within the interval at each
-    /// of those moments.
+    /// Returns an enclosure of the gap between this board and another along a direction fixed to this board.
     pub fn gap(&self, other: &Self, direction: Direction, when: When) -> Interval {
         let along = self.along(when);
         let normal = Linear { at: turned(along.at, direction), by: turned(along.by, direction), error: along.error };
@@ -191,11 +191,11 @@ impl Carried {
         (first.min(second).min(third.min(last)).over(self.link) - support).over(size)
     }
 
-    /// A corner of this board, seen from the middle of the handles of another.
+    /// Returns a corner of this board, relative to the middle of the handles of another.
     fn corner(&self, seen_from: &Self, (ahead, left): (bool, bool), when: When) -> Linear {
         let Self { front, rear, link, half_length, half_width, .. } = self;
         let along = self.along(when);
-        // Shares of the link.
+        // Multiplied by the link vector, these shares are metres.
         let share = half_length.over(*link);
         let share = if ahead { share } else { -share };
         let aside = half_width.over(*link);
@@ -207,7 +207,7 @@ impl Carried {
         let middle = |one: Vector, other: Vector| plus(one, other).map(|sum| sum * 0.5);
         let (own_front, own_rear) = (&seen_from.front, &seen_from.rear);
         let own_error = (own_front.error(when) + own_rear.error(when)) * 0.5;
-        // (1/2 + share) times the front handle and (1/2 - share) times the rear one, and the width.
+        // The corner is (1/2 + share) front + (1/2 - share) rear + aside: errors have the same factors.
         let half = Interval::point(0.5);
         let error = (half + share).abs() * front.error(when).hi
             + (half - share).abs() * rear.error(when).hi
@@ -220,7 +220,7 @@ impl Carried {
         }
     }
 
-    /// The product of a normal as long as `size` links with a corner.
+    /// Returns the product of a corner with a normal of length `size` links.
     fn reach(&self, normal: &Linear, size: Interval, corner: &Linear, when: When) -> Interval {
         let half = if when == When::Middle { 0.0 } else { self.half_step };
         let (step, square) = (Interval::within(half), Interval { lo: 0.0, hi: Interval::point(half).square().hi });
@@ -232,8 +232,8 @@ impl Carried {
             + Interval::within(error.hi)
     }
 
-    /// A point of the board, `along` and `aside` of its middle: where it is in the middle of the step, and how far it may be
-    /// from there.
+    /// Returns a point of the board, `along` and `aside` of its middle: its position in the middle of the step, and a
+    /// bound of its distance from there.
     fn point(&self, (along, aside): (f64, f64), when: When) -> (Vector, Interval) {
         let Linear { at, .. } = self.along(when);
         let Self { front, rear, link, half_length, half_width, .. } = self;
@@ -242,11 +242,11 @@ impl Carried {
         let middle = plus(front.point, rear.point).map(|sum| sum * 0.5);
         let point = plus(middle, plus(scaled(at, along), scaled([-at[1], at[0]], aside)));
         let half = if when == When::Middle { 0.0 } else { self.half_step };
-        let off = |handle: &Moving| handle.error(when) + norm(handle.velocity) * half;
+        let off = |handle: &FirstOrderHandle| handle.error(when) + norm(handle.velocity) * half;
         (point, (off(front) + off(rear)) * (Interval::point(0.5) + along.abs() + aside.abs()))
     }
 
-    /// At least the clearance of two boards at those moments.
+    /// Returns an upper bound of the clearance of two boards.
     pub fn at_most(&self, other: &Self, when: When) -> f64 {
         let most = |one: &Self, other: &Self| {
             let gap = |direction| one.gap(other, direction, when).hi;
@@ -267,8 +267,8 @@ impl Carried {
         (norm(minus(own, its)) + own_error + its_error).hi
     }
 
-    /// Whether two boards are proved to stay further apart than `metres` at those moments: along the direction in which they
-    /// are furthest apart in the middle of the step, or another of those that doubles find.
+    /// Returns true if two boards are proved to stay further apart than `metres`. It tries the direction of greatest
+    /// distance in the middle of the step, then the directions of the faces.
     pub fn is_further_than(&self, metres: f64, other: &Self, when: When) -> bool {
         let boards = [self.in_doubles(), other.in_doubles()];
         let separated = separation_board_board(&boards[0], &boards[1]);
@@ -276,7 +276,7 @@ impl Carried {
             let (from, to) = closest_points_board_board(&boards[0], &boards[1]);
             let between = to - from;
             let seen = |board: &Board, way: f64| [way * board.axis.dot(&between), way * board.across().dot(&between)];
-            // Along a face it is that board's own direction which loses nothing to its turning.
+            // Along a face, the direction fixed to that board loses nothing when the board turns.
             let (own, its) = (seen(&boards[0], 1.0), seen(&boards[1], -1.0));
             let slant = |direction: Direction| direction[0].abs().min(direction[1].abs());
             let along_own = |metres| self.gap(other, own, when).lo > metres;
@@ -295,7 +295,7 @@ impl Carried {
     }
 }
 
-/// A vector turned and stretched like a direction from a board's axis.
+/// Returns a vector, turned and stretched by a direction relative to `axis`.
 fn turned(axis: Vector, [ahead, left]: Direction) -> Vector {
     plus(scaled(axis, Interval::point(ahead)), scaled([-axis[1], axis[0]], Interval::point(left)))
 }

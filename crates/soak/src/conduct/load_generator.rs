@@ -1,14 +1,14 @@
-//! The conductor: a thread that sends the commands and checks their answers, and one that reads the frames beside it.
+//! The load generator: a thread that sends the commands and checks their answers, and a thread that reads the frames.
 //!
-//! Steps are sent by a client of their own, since they are answered when they are over and other commands come between.
+//! A second client sends the steps: a step is answered when it is over, and other commands come between.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
 
 use super::Conducted;
+use super::answers::{AnswerCheck, ShowFacts};
 use super::commands::RandomCommands;
-use super::model::{Model, ShowFacts};
 use super::record::{Answered, Record};
 use bench_dragon_client::clock::monotonic_ns;
 use bench_dragon_client::connection::Wake;
@@ -22,32 +22,33 @@ use bench_dragon_messages::control::{Code, Command};
 const TIMEOUT: Duration = Duration::from_secs(10);
 /// How long the control service may take to appear.
 const START_TIMEOUT: Duration = Duration::from_secs(30);
-/// Between two readings of the frames.
+/// The interval at which frames are read.
 const READ_INTERVAL: Duration = Duration::from_millis(1);
-/// Between two questions whether a step has begun.
+/// The interval at which the state is requested until a step has begun.
 const STEP_INTERVAL: Duration = Duration::from_millis(1);
-/// How long the last frames may take to come.
+/// How long to wait for the last frames.
 const END_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Conducts the publisher of `name` until `stop` is set; hands over what has been counted at the beginning, once a second,
-/// and at the end.
+/// Conducts the publisher of `name`, of `rate` frames per second, until `stop` is set. Reports its counts at the
+/// beginning, once a second, and at the end.
 ///
 /// # Errors
-/// [`OpenError`] where its frames cannot be read, and what `report` returns.
+/// [`OpenError`] if its frames cannot be read, and the errors of `report`.
 pub fn conduct<Failed: From<OpenError>>(
     name: &str,
-    facts: &ShowFacts,
+    rate: f64,
     seed: u64,
     stop: &AtomicBool,
     report: &mut dyn FnMut(Conducted) -> Result<(), Failed>,
 ) -> Result<(), Failed> {
     let mut feed = Feed::new(name, FeedOptions { wake: Wake::Never, frames: Frames::All })?;
-    let mut record = Record::new(seed, facts.rate);
+    let mut record = Record::new(seed, rate);
     report(record.conducted())?;
+    let Some(facts) = wait_for_stage(&mut feed, &mut record, stop)? else { return report(record.conducted()) };
     let (events, answers) = channel();
     std::thread::scope(|scope| {
-        let commands = RandomCommands::new(seed, facts.rate, facts.end);
-        let ended = scope.spawn(move || Conductor::run(name, Model::new(facts.clone()), commands, stop, &events));
+        let commands = RandomCommands::new(seed, rate, facts.end);
+        let ended = scope.spawn(move || LoadGenerator::run(name, AnswerCheck::new(facts), commands, stop, &events));
         let mut next = Instant::now() + Duration::from_secs(1);
         let mut end = None;
         loop {
@@ -73,7 +74,22 @@ pub fn conduct<Failed: From<OpenError>>(
     })
 }
 
-/// A command, when it was sent and answered, and the answer.
+/// Reads until the stage has come. Returns `None` if it does not come in time.
+fn wait_for_stage(feed: &mut Feed, record: &mut Record, stop: &AtomicBool) -> Result<Option<ShowFacts>, OpenError> {
+    let began = Instant::now();
+    let mut facts = None;
+    while facts.is_none() && began.elapsed() < START_TIMEOUT && !stop.load(Ordering::Relaxed) {
+        feed.poll(READ_INTERVAL, &mut |event| match event {
+            FeedEvent::Stage(stage) => facts = Some(ShowFacts::of(stage)),
+            FeedEvent::Frame { header, .. } => record.frame(header),
+            _ => (),
+        })?;
+    }
+    facts.iter().for_each(|facts| record.show_is(facts));
+    Ok(facts)
+}
+
+/// A command and its answer, with the moments of both.
 struct Reply {
     command: Command,
     sent_ns: u64,
@@ -87,7 +103,7 @@ fn send(controller: &mut Controller, command: Command) -> Reply {
     Reply { command, sent_ns, answered_ns: monotonic_ns(), answer }
 }
 
-/// Connects as soon as there is a publisher; `None` where none comes in time.
+/// Connects as soon as a publisher runs. Returns `None` if none starts in time.
 pub fn connect(name: &str, stop: &AtomicBool) -> Option<Controller> {
     let began = Instant::now();
     while began.elapsed() < START_TIMEOUT && !stop.load(Ordering::Relaxed) {
@@ -100,10 +116,10 @@ pub fn connect(name: &str, stop: &AtomicBool) -> Option<Controller> {
 }
 
 /// The thread that sends.
-struct Conductor<'a> {
+struct LoadGenerator<'a> {
     controller: Controller,
-    model: Model,
-    /// Whether the model knows nothing of the show, because an answer was lost.
+    check: AnswerCheck,
+    /// True if the state of the show is unknown, because an answer was lost.
     lost: bool,
     steps: Sender<u64>,
     step_replies: Receiver<Reply>,
@@ -112,8 +128,8 @@ struct Conductor<'a> {
     events: &'a Sender<Answered>,
 }
 
-impl Conductor<'_> {
-    fn run(name: &str, model: Model, commands: RandomCommands, stop: &AtomicBool, events: &Sender<Answered>) {
+impl LoadGenerator<'_> {
+    fn run(name: &str, check: AnswerCheck, commands: RandomCommands, stop: &AtomicBool, events: &Sender<Answered>) {
         let Some(controller) = connect(name, stop) else { return };
         let (steps, requests) = channel();
         let (replies, step_replies) = channel();
@@ -121,22 +137,22 @@ impl Conductor<'_> {
             scope.spawn(move || {
                 let Some(mut controller) = connect(name, stop) else { return };
                 for periods in requests {
-                    // Nobody receives any more where the test has ended.
+                    // The receiver is gone if the test has ended.
                     let _ = replies.send(send(&mut controller, Command::Step(periods)));
                 }
             });
-            let mut conductor =
-                Conductor { controller, model, lost: false, steps, step_replies, stepping: false, events };
+            let mut generator =
+                LoadGenerator { controller, check, lost: false, steps, step_replies, stepping: false, events };
             let mut due = Instant::now();
             for (gap, command) in commands {
                 due += gap;
-                conductor.wait_until(due, stop);
+                generator.wait_until(due, stop);
                 if stop.load(Ordering::Relaxed) {
                     break;
                 }
-                conductor.command(command);
+                generator.command(command);
             }
-            conductor.wait_for_step();
+            generator.wait_for_step();
         });
     }
 
@@ -154,36 +170,36 @@ impl Conductor<'_> {
         match command {
             Command::Step(periods) if !self.stepping => self.begin_step(periods),
             Command::Step(periods) => self.second_step(periods),
-            command => self.obey(command),
+            command => self.send(command),
         }
         if self.stepping {
             self.take_step_reply(Duration::ZERO);
         }
     }
 
-    fn obey(&mut self, command: Command) {
+    fn send(&mut self, command: Command) {
         let reply = send(&mut self.controller, command);
         self.answered(reply);
     }
 
-    /// Hands a step to the other client, and waits until it has certainly begun, or is over.
+    /// Hands a step to the other client, and waits until the step has certainly begun, or is over.
     fn begin_step(&mut self, periods: u64) {
-        self.model.step_sent(periods);
+        self.check.step_sent();
         self.stepping = self.steps.send(periods).is_ok();
-        while self.stepping && !self.model.step_has_begun() {
-            self.obey(Command::State);
+        while self.stepping && !self.check.step_has_begun() {
+            self.send(Command::State);
             self.take_step_reply(STEP_INTERVAL);
         }
     }
 
-    /// A step while another runs. It is refused, unless that one is over meanwhile.
+    /// Sends a step while another runs. The publisher refuses it, unless the other one is over meanwhile.
     fn second_step(&mut self, periods: u64) {
         let reply = send(&mut self.controller, Command::Step(periods));
         if reply.answer.as_ref().is_ok_and(|answer| answer.result() == Some(Code::Refused)) {
             return self.answered(reply);
         }
         self.wait_for_step();
-        self.model.step_sent(periods);
+        self.check.step_sent();
         self.step_answered(reply);
     }
 
@@ -207,33 +223,33 @@ impl Conductor<'_> {
 
     fn answered(&mut self, reply: Reply) {
         let command = reply.command;
-        self.check(reply, |model, answer| model.answered(command, answer), false);
+        self.check_reply(reply, |check, answer| check.answered(command, answer), false);
     }
 
     fn step_answered(&mut self, reply: Reply) {
-        self.check(reply, Model::step_answered, true);
+        self.check_reply(reply, AnswerCheck::step_answered, true);
     }
 
-    fn check(
+    fn check_reply(
         &mut self,
         reply: Reply,
-        check: impl FnOnce(&mut Model, &ControlResponse) -> Result<(), String>,
+        check: impl FnOnce(&mut AnswerCheck, &ControlResponse) -> Result<(), String>,
         is_step_that_ran: bool,
     ) {
         let Reply { command, sent_ns, answered_ns, answer } = reply;
         let answer = match answer {
             Ok(answer) if self.lost => {
-                self.model.adopt(&answer);
+                self.check.adopt(&answer);
                 self.lost = false;
                 Ok((answer, Ok(())))
             }
-            Ok(answer) => Ok((answer, check(&mut self.model, &answer))),
+            Ok(answer) => Ok((answer, check(&mut self.check, &answer))),
             Err(error) => {
                 self.lost = true;
                 Err(error.to_string())
             }
         };
-        // Nobody receives any more where the test has ended.
+        // The receiver is gone if the test has ended.
         let _ = self.events.send(Answered { command, sent_ns, answered_ns, answer, is_step_that_ran });
     }
 }

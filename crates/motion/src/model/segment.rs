@@ -1,0 +1,68 @@
+//! [`Segment`]: one of the curves of a path. This is the only list of the kinds of curves that is matched on.
+
+use super::arc::Arc;
+use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower, ReachedDisc};
+use super::line::Line;
+use super::spiral::Spiral;
+use super::team::Team;
+use super::{Point, Vector};
+
+/// One of the curves of a path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Segment {
+    /// Straight on.
+    Line(Line),
+    /// Along a circle.
+    Arc(Arc),
+    /// Along an Archimedean spiral, inward or outward.
+    Spiral(Spiral),
+}
+
+/// Forwards every method of [`Curve`] to the curve of the segment, by a match: frames call these methods per handle.
+macro_rules! forward {
+    ($(fn $name:ident(&self $(, $argument:ident: $type:ty)*) -> $result:ty;)*) => {
+        impl Curve for Segment {
+            $(
+                #[inline]
+                fn $name(&self $(, $argument: $type)*) -> $result {
+                    match self {
+                        Self::Line(line) => Curve::$name(line $(, $argument)*),
+                        Self::Arc(arc) => Curve::$name(arc $(, $argument)*),
+                        Self::Spiral(spiral) => Curve::$name(spiral $(, $argument)*),
+                    }
+                }
+            )*
+        }
+    };
+}
+
+forward! {
+    fn point(&self, at: Coordinate) -> Point;
+    fn tangent(&self, at: Coordinate) -> Vector;
+    fn curvature(&self, at: Coordinate) -> f64;
+    fn arc_length(&self, from: Coordinate, to: Coordinate) -> f64;
+    fn advance(&self, from: Coordinate, metres: f64) -> Coordinate;
+    fn sign(&self) -> f64;
+    fn rate(&self, at: Coordinate) -> f64;
+    fn contains(&self, at: Coordinate) -> bool;
+    fn turning(&self) -> f64;
+    fn constant_curvature(&self) -> Option<f64>;
+    fn tightens(&self) -> bool;
+    fn circumference(&self) -> f64;
+    fn arc_over(&self, chord: f64) -> Option<f64>;
+    fn length_bound(&self, one: Coordinate, other: Coordinate) -> f64;
+    fn displacement(&self, from: Coordinate, to: Coordinate) -> Vector;
+    fn link_pose(&self, front: Coordinate, rear: Coordinate, link: f64) -> LinkPose;
+    fn follower(&self, front: Coordinate, behind: f64, link: f64) -> Result<Follower, NoFollower>;
+    fn ahead(&self, rear: Coordinate, gap: f64, link: f64) -> Option<f64>;
+    fn second_derivative_bound(&self, at: Coordinate, distance: f64) -> f64;
+    fn longest_step(&self) -> f64;
+    fn distance_grows(&self, front: Coordinate, rear: Coordinate) -> bool;
+    fn is_steady(&self, front: Coordinate, rear: Coordinate) -> bool;
+    fn stall_free_until(&self, link: f64) -> Option<Coordinate>;
+    fn fold(&self, link: f64) -> Option<f64>;
+    fn first_within(&self, disc: &ReachedDisc, begin: Option<Coordinate>, last: Coordinate) -> Option<Coordinate>;
+    fn quiet_place(&self, team: &Team, limit: f64, last: Coordinate) -> Option<Coordinate>;
+    fn seen_from_frame(&self, moved: (Coordinate, Coordinate), turned: f64, behind: Coordinate) -> Option<f64>;
+    fn frame_travel(&self, turned: f64) -> f64;
+}

@@ -1,0 +1,279 @@
+//! The check of a response against the table of commands: which codes and states the responses so far allow.
+//!
+//! It knows no times, except those that the stage lists: the [`record`](super::record) compares times with frames. Where
+//! a step or a cue may have changed the state since the last response, every possible state is kept, and each response
+//! removes those that would have answered otherwise.
+
+use bench_dragon_messages::control::{Code, Command, RATES, Refusal};
+use bench_dragon_messages::state::PlaybackState;
+use bench_dragon_messages::{ControlResponse, Stage};
+
+/// The facts of a show that its stage lists.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ShowFacts {
+    /// Simulated seconds at which it ends.
+    pub end: f64,
+    /// The times of its cues in their order, and whether the show waits there.
+    pub cues: Vec<(f64, bool)>,
+    /// Cues that the stage has no room for.
+    pub cues_not_listed: usize,
+}
+
+impl ShowFacts {
+    pub fn of(stage: &Stage) -> Self {
+        let cues: Vec<_> = stage.cues_in_use().iter().map(|cue| (cue.time, cue.pauses == 1)).collect();
+        Self { end: stage.freeze_time, cues_not_listed: stage.cues as usize - cues.len(), cues }
+    }
+
+    /// Returns true if the show waits at a cue at this time.
+    pub fn waits_at(&self, time: f64) -> bool {
+        self.cues_not_listed > 0 || self.cues.iter().any(|cue| cue.1 && cue.0 == time)
+    }
+
+    fn has_pausing_cue(&self) -> bool {
+        self.cues_not_listed > 0 || self.cues.iter().any(|cue| cue.1)
+    }
+
+    /// Returns true if this number of cues can be passed at this time: a cue at the time itself may be or not.
+    fn can_have_passed(&self, cue: u32, time: f64) -> bool {
+        let before = self.cues.iter().filter(|cue| cue.0 < time).count();
+        let until = self.cues.iter().filter(|cue| cue.0 <= time).count();
+        (before..=until + self.cues_not_listed).contains(&(cue as usize))
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Mode {
+    Playing,
+    Paused,
+    Held,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Step {
+    None,
+    Sent,
+    Running,
+    Over(Code),
+}
+
+/// A state that the responses so far allow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Possible {
+    mode: Mode,
+    waits: bool,
+    step: Step,
+}
+
+impl Possible {
+    fn advances(self) -> bool {
+        self.mode == Mode::Playing || self.step == Step::Running
+    }
+
+    fn over(self, code: Code) -> Step {
+        if self.step == Step::Running { Step::Over(code) } else { self.step }
+    }
+
+    fn at_cue(self) -> Self {
+        Self { mode: Mode::Paused, waits: true, step: self.over(Code::Done) }
+    }
+
+    /// Returns the code of the table for a command in this state.
+    fn code(self, command: Command, rate: f64, end: f64) -> Code {
+        let (entry, held) = (command.entry(), self.mode == Mode::Held);
+        if held && !entry.allowed_while_held {
+            return Code::Refused;
+        }
+        match (entry.refusal, command) {
+            (Refusal::RateOutOfRange, Command::Rate(rate)) if !RATES.contains(&rate) => Code::OutOfRange,
+            (Refusal::TimeOutOfRange, Command::Seek(time)) if !(0.0..=end).contains(&time) => Code::OutOfRange,
+            (Refusal::NotPaused, _) if self.advances() => Code::Refused,
+            (Refusal::NotHeld, _) if !held => Code::Refused,
+            (Refusal::NotWaiting, _) if !self.waits => Code::Refused,
+            (_, Command::Rate(wanted)) if wanted == rate => Code::Already,
+            (_, Command::Hold) if held => Code::Already,
+            (_, Command::Pause) if !self.advances() => Code::Already,
+            (_, Command::Resume) if self.mode == Mode::Playing => Code::Already,
+            _ => Code::Done,
+        }
+    }
+
+    /// Returns the state after a command that was done.
+    fn after(self, command: Command) -> Self {
+        let step = self.over(Code::Refused);
+        match command {
+            Command::Pause => Self { mode: Mode::Paused, step, ..self },
+            Command::Hold => Self { mode: Mode::Held, step, ..self },
+            Command::Resume | Command::Go => Self { mode: Mode::Playing, waits: false, step },
+            Command::Seek(_) | Command::Restart => Self { step, ..self },
+            Command::Release => Self { mode: Mode::Paused, ..self },
+            Command::Step(_) => Self { step: Step::Running, ..self },
+            Command::State | Command::Rate(_) => self,
+        }
+    }
+}
+
+/// Every state that the responses so far allow.
+#[derive(Debug, Clone)]
+pub(super) struct AnswerCheck {
+    facts: ShowFacts,
+    possible: Vec<Possible>,
+    /// Simulated seconds per second while the show plays.
+    rate: f64,
+    tick: u64,
+}
+
+impl AnswerCheck {
+    /// Creates the check of a show that waits at its start.
+    pub fn new(facts: ShowFacts) -> Self {
+        let waiting = Possible { mode: Mode::Paused, waits: true, step: Step::None };
+        Self { facts, possible: vec![waiting], rate: 1.0, tick: 0 }
+    }
+
+    /// Notes that a step was sent, whose response comes later: [`step_answered`](Self::step_answered).
+    pub fn step_sent(&mut self) {
+        self.possible.iter_mut().for_each(|state| state.step = Step::Sent);
+    }
+
+    /// Returns true if a step that was sent has certainly begun, or is over.
+    pub fn step_has_begun(&self) -> bool {
+        self.possible.iter().all(|state| state.step != Step::Sent)
+    }
+
+    /// Adds the states that the show may have reached without a response. `at_cue`: it may have paused at a cue.
+    fn advance(&mut self, at_cue: bool) {
+        let mut place = 0;
+        while let Some(&state) = self.possible.get(place) {
+            place += 1;
+            let mut add = |next: Possible| {
+                if !self.possible.contains(&next) {
+                    self.possible.push(next);
+                }
+            };
+            if at_cue && state.advances() {
+                add(state.at_cue());
+            }
+            match state.step {
+                Step::Running => add(Possible { mode: Mode::Paused, step: Step::Over(Code::Done), ..state }),
+                Step::Sent if state.advances() || state.mode == Mode::Held => {
+                    add(Possible { step: Step::Over(Code::Refused), ..state });
+                }
+                Step::Sent => add(Possible { step: Step::Running, ..state }),
+                Step::None | Step::Over(_) => (),
+            }
+        }
+    }
+
+    /// Checks the response to a command that is no step that ran.
+    ///
+    /// # Errors
+    /// The expected response, if this one is wrong. The check continues from the response.
+    pub fn answered(&mut self, command: Command, answer: &ControlResponse) -> Result<(), String> {
+        let result = self.allows(command, answer);
+        if result.is_err() {
+            self.adopt(answer);
+        }
+        self.tick = self.tick.max(answer.tick);
+        result
+    }
+
+    fn allows(&mut self, command: Command, answer: &ControlResponse) -> Result<(), String> {
+        if answer.tick <= self.tick && self.tick > 0 {
+            return Err(format!("expected a tick after {}", self.tick));
+        }
+        let time = answer.sim_time;
+        let has_jumped = |code| code == Some(Code::Done) && matches!(command, Command::Seek(_) | Command::Restart);
+        let is_at_cue = self.facts.waits_at(time);
+        // A jump leaves the time of the cue, and so does a step that begins there.
+        let has_left = has_jumped(answer.result()) || self.possible.iter().any(|state| state.step == Step::Sent);
+        self.advance(is_at_cue || has_left && self.facts.has_pausing_cue());
+        let mut allowed: Vec<Possible> = Vec::new();
+        let mut expected = Vec::new();
+        for state in std::mem::take(&mut self.possible) {
+            // A step that begins has no response at this tick.
+            let code = state.code(command, self.rate, self.facts.end);
+            let done = code == Code::Done;
+            if done && matches!(command, Command::Step(_)) {
+                continue;
+            }
+            let after = if done { state.after(command) } else { state };
+            let rate = if let (true, Command::Rate(rate)) = (done, command) { rate } else { self.rate };
+            let cue_follows = is_at_cue && after.advances();
+            for after in [Some(after), cue_follows.then(|| after.at_cue())].into_iter().flatten() {
+                let playback = match after.mode {
+                    _ if after.advances() && time >= self.facts.end => PlaybackState::Ended,
+                    _ if after.advances() => PlaybackState::Playing,
+                    Mode::Held => PlaybackState::Held,
+                    Mode::Playing | Mode::Paused => PlaybackState::Paused,
+                };
+                let scale = if after.advances() { rate } else { 0.0 };
+                let wanted = (Some(code), Some(playback), scale);
+                if (answer.result(), answer.playback_state(), answer.time_scale) != wanted {
+                    let sentence = format!("{}, {} at {scale} x", code.name(), playback.name());
+                    if !expected.contains(&sentence) {
+                        expected.push(sentence);
+                    }
+                } else if !allowed.contains(&after) {
+                    allowed.push(after);
+                }
+            }
+        }
+        self.possible = allowed;
+        if self.possible.is_empty() {
+            return Err(format!("expected {}", expected.join(", or ")));
+        }
+        let target = match command {
+            Command::Seek(time) if has_jumped(answer.result()) => Some(time),
+            Command::Restart if has_jumped(answer.result()) => Some(0.0),
+            _ => None,
+        };
+        if let Some(target) = target.filter(|target| *target != time) {
+            return Err(format!("expected t = {target} s"));
+        }
+        if let (Some(Code::Done), Command::Rate(rate)) = (answer.result(), command) {
+            self.rate = rate;
+        }
+        self.check_cue(answer)
+    }
+
+    fn check_cue(&self, answer: &ControlResponse) -> Result<(), String> {
+        let passed = self.facts.can_have_passed(answer.cue, answer.sim_time);
+        if passed { Ok(()) } else { Err("expected the number of cues until then".to_owned()) }
+    }
+
+    /// Checks the response to the step that was sent. It may be older than responses to other commands.
+    ///
+    /// # Errors
+    /// As [`answered`](Self::answered).
+    pub fn step_answered(&mut self, answer: &ControlResponse) -> Result<(), String> {
+        self.advance(self.facts.has_pausing_cue());
+        let steps: Vec<_> = self.possible.iter().map(|state| state.step).collect();
+        self.possible.retain(|state| answer.result().is_some_and(|code| state.step == Step::Over(code)));
+        let result =
+            if self.possible.is_empty() { Err(format!("expected one of {steps:?}")) } else { self.check_cue(answer) };
+        if self.possible.is_empty() {
+            self.adopt(answer);
+        }
+        self.possible.iter_mut().for_each(|state| state.step = Step::None);
+        self.possible.dedup();
+        self.tick = self.tick.max(answer.tick);
+        result
+    }
+
+    /// Continues from a response, after a wrong or a lost one.
+    pub fn adopt(&mut self, answer: &ControlResponse) {
+        let mode = match answer.playback_state() {
+            Some(PlaybackState::Paused) => Mode::Paused,
+            Some(PlaybackState::Held) => Mode::Held,
+            _ => Mode::Playing,
+        };
+        if answer.time_scale > 0.0 {
+            self.rate = answer.time_scale;
+        }
+        self.possible = [true, false].map(|waits| Possible { mode, waits, step: Step::None }).to_vec();
+        self.tick = self.tick.max(answer.tick);
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,59 @@
+//! The table of commands, compared with every file that repeats its numbers and names.
+
+use bench_dragon::messages::control::{Code, Command, CommandEntry, CommandValue};
+
+const LAYOUTS: &str = include_str!("../../crates/messages/src/layouts/control.rs");
+const PYTHON: &str = include_str!("../../examples/python/conduct.py");
+const CONDUCTING: &str = include_str!("../../docs/conducting.md");
+
+/// Returns the text of `file` between `begin` and the next `end`.
+fn between<'a>(file: &'a str, begin: &str, end: &str) -> &'a str {
+    let (_, rest) = file.split_once(begin).unwrap_or_else(|| panic!("no {begin}"));
+    rest.split_once(end).unwrap_or_else(|| panic!("no {end} after {begin}")).0
+}
+
+fn numbered<'a>(words: impl Iterator<Item = &'a str>) -> String {
+    let words: Vec<_> = words.enumerate().map(|(number, word)| format!("{number} {word}")).collect();
+    format!("    /// {}.\n", words.join(", "))
+}
+
+#[test]
+fn the_layouts_list_every_command_and_code() {
+    let commands = numbered(Command::TABLE.iter().map(|entry| entry.name));
+    assert!(LAYOUTS.contains(&format!("{commands}    pub command: u32,\n")), "expected {commands}");
+    let codes = numbered(Code::TABLE.iter().map(|entry| entry.words));
+    assert!(LAYOUTS.contains(&format!("{codes}    pub code: u32,\n")), "expected {codes}");
+}
+
+#[test]
+fn the_python_example_has_every_command_and_code() {
+    let tuple = |words: Vec<&str>| words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ");
+    let commands = tuple(Command::TABLE.iter().map(|entry| entry.name).collect());
+    assert_eq!(between(PYTHON, "\nCOMMANDS = (", ")\n"), commands);
+    let codes = tuple(Code::TABLE.iter().map(|entry| entry.words).collect());
+    assert_eq!(between(PYTHON, "\nCODES = (", ")\n"), codes);
+}
+
+/// Returns the cell of the page's first column that a command stands in.
+fn cell(entry: &CommandEntry) -> String {
+    let letter = match entry.value {
+        CommandValue::None => return format!("`{}`", entry.name),
+        CommandValue::Rate => "X",
+        CommandValue::Seconds => "T",
+        CommandValue::Periods => "N",
+    };
+    format!("`{} {letter}`", entry.name)
+}
+
+#[test]
+fn the_page_lists_every_command_and_those_that_a_hold_refuses() {
+    let rows = between(CONDUCTING, "| command | does | refused |\n|---|---|---|\n", "\n\n");
+    let rows: Vec<Vec<&str>> =
+        rows.lines().map(|row| row.trim_matches('|').split('|').map(str::trim).collect()).collect();
+    let listed: Vec<&str> = rows.iter().flat_map(|row| row[0].split(", ")).filter(|name| *name != "`toggle`").collect();
+    assert_eq!(listed, Command::TABLE.iter().map(cell).collect::<Vec<_>>());
+    for entry in &Command::TABLE {
+        let row = rows.iter().find(|row| row[0].split(", ").any(|name| name == cell(entry))).unwrap();
+        assert_eq!(row[2].contains("while held"), !entry.allowed_while_held, "{row:?}");
+    }
+}
