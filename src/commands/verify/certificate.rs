@@ -81,7 +81,7 @@ pub fn reason(shown: &str, refused: &Refused) -> String {
     }
 }
 
-/// What is proved of an event, in a sentence.
+/// Returns a sentence on what is proved of an event.
 fn sentence(outcome: &ProvedEvent) -> String {
     let event = match outcome.event {
         EventKind::Contact => "contact",
