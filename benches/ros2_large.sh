@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# How large a team arrives whole over ROS 2: every message compared with the shared memory, for growing teams.
+# The largest team that arrives complete over ROS 2: every message is compared with the shared memory, for growing teams.
 #   cargo build --release && tests/run (for .venv), then benches/ros2_large.sh
 set -euo pipefail
 cd "$(dirname "$0")/.."

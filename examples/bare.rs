@@ -18,7 +18,7 @@ type Header = [u64; 10];
 /// Handles in a sample, as in the paper's frames.
 const HANDLES: usize = 224;
 const PERIOD_NS: u64 = 1_000_000;
-/// The longest latency that is distinguished: an hour.
+/// The greatest latency distinguished: an hour.
 const LONGEST_NS: u64 = 3_600_000_000_000;
 /// Samples by which the subscriber may fall behind, as in the live publisher.
 const QUEUE: usize = 64;

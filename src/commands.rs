@@ -1,7 +1,6 @@
-//! The subcommands, one file each: what a person types becomes calls of the library. Called by `main` only.
+//! The subcommands, one file each: arguments to calls of the library. Called by `main` only.
 
-/// In place of the standard library's, which panics where nobody reads standard error any more: a closed pipe ends
-/// quietly.
+/// Replaces the standard library's, which panics if standard error is closed.
 macro_rules! eprintln {
     ($($text:tt)*) => {{
         use std::io::Write as _;
@@ -46,10 +45,10 @@ use bench_dragon::show::scene::{Scene, SceneError, SceneText};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-/// What stands before or after every subcommand.
+/// Options before or after every subcommand.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Common {
-    /// The scene to play (TOML); without it, the paper's, which is built in
+    /// The scene to play (TOML); by default the paper's, which is built in
     #[arg(long, value_name = "FILE", global = true)]
     pub scene: Option<std::path::PathBuf>,
     /// The name under which services and topics appear; view, send and metrics take several
@@ -69,12 +68,11 @@ pub struct Common {
 impl Common {
     /// The first name; the only one for a command of one publisher.
     pub fn name(&self) -> &str {
-        // The default stands where none is given.
         self.names.first().map_or("", String::as_str)
     }
 
-    /// Tests the names: each once, one alone where the command is of one publisher, and all of them in one place, since those
-    /// after the command would replace those before it.
+    /// Tests the names: each once, one alone for a command of one publisher, all in one place, since clap replaces
+    /// those before the command by those after it.
     ///
     /// # Errors
     /// Bad input: the sentence says what was expected.
@@ -100,12 +98,12 @@ impl Common {
         }
     }
 
-    /// The names for a sentence, each in quotation marks.
+    /// Returns the names for a sentence, each in quotation marks.
     pub fn quoted_names(&self) -> String {
         self.names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
     }
 
-    /// The scene that the command line names.
+    /// Reads the scene that the command line names.
     ///
     /// # Errors
     /// Bad input: the sentence names the file, the line and the field.
@@ -113,7 +111,7 @@ impl Common {
         Ok(self.scene_text()?.parse()?)
     }
 
-    /// The text of that scene.
+    /// Returns the text of that scene.
     ///
     /// # Errors
     /// Bad input: the file cannot be read.
@@ -125,14 +123,14 @@ impl Common {
     }
 }
 
-/// Why a command failed.
+/// The failure of a command.
 #[derive(Debug)]
 pub enum CommandError {
-    /// The user's input cannot be used; one sentence that names the place and what was expected. Exit code 2.
+    /// Invalid input of the user; one sentence with the place and what was expected. Exit code 2.
     BadInput(String),
     /// Anything else, in one sentence. Exit code 1.
     Failed(String),
-    /// Whoever read the output has gone: the command ends quietly. Exit code 0.
+    /// The reader of the output has closed it: the command ends without a message. Exit code 0.
     ClosedPipe,
 }
 
@@ -153,18 +151,18 @@ pub fn not_writable(file: impl std::fmt::Display, error: &io::Error) -> CommandE
     CommandError::BadInput(format!("{file}: {error}, expected a file to write"))
 }
 
-/// Where a command's result goes: standard output, or a file that the user named.
+/// The destination of a command's result: standard output, or a file that the user named.
 pub struct Output {
     writer: BufWriter<Box<dyn Write>>,
 }
 
 impl Output {
-    /// Standard output.
+    /// Creates an output to standard output.
     pub fn standard() -> Self {
         Self { writer: BufWriter::new(Box::new(io::stdout().lock())) }
     }
 
-    /// A file, made anew.
+    /// Creates an output to a new file.
     ///
     /// # Errors
     /// Bad input: the file cannot be written.
@@ -178,19 +176,19 @@ impl Output {
         Ok(writeln!(self.writer, "{text}")?)
     }
 
-    /// Writes a JSON line. Numbers that are not numbers become null.
+    /// Writes a JSON line. NaN becomes null.
     pub fn json(&mut self, value: &impl Serialize) -> Result<(), CommandError> {
         serde_json::to_writer(&mut self.writer, value).map_err(io::Error::from)?;
         Ok(writeln!(self.writer)?)
     }
 
-    /// Writes what is left.
+    /// Writes the buffered rest.
     pub fn finish(mut self) -> Result<(), CommandError> {
         Ok(self.writer.flush()?)
     }
 }
 
-/// The colour of a state or level on the terminal.
+/// Returns the colour of a state or level on the terminal.
 pub fn severity_colour(severity: Severity) -> AnsiColor {
     match severity {
         Severity::Ok => AnsiColor::Green,
@@ -199,15 +197,15 @@ pub fn severity_colour(severity: Severity) -> AnsiColor {
     }
 }
 
-/// A number with the fewest digits that read back to the same bits.
+/// Formats a number with the fewest digits that read back to the same bits.
 pub fn number(value: f64) -> String {
     let plain = format!("{value}");
-    // Beyond this Rust writes out every zero.
+    // Rust writes every zero of a longer one.
     if plain.len() > 24 { format!("{value:e}") } else { plain }
 }
 
-/// A number in a sentence for people: to a billionth, zero where it is rounding, with an exponent where it is very large or
-/// very small.
+/// Formats a number for people: to a billionth, rounding errors as zero, very large and very small numbers with an
+/// exponent.
 pub fn figure(value: f64) -> String {
     match value.abs() {
         size if size < 1e-12 => "0".to_owned(),
@@ -216,17 +214,17 @@ pub fn figure(value: f64) -> String {
     }
 }
 
-/// A progress bar on standard error, hidden where that is no terminal.
+/// Creates a progress bar on standard error, hidden if that is no terminal.
 pub fn progress_bar(length: u64, common: &Common) -> ProgressBar {
     if common.quiet {
         return ProgressBar::hidden();
     }
-    // The template is a constant that a test has parsed; the default bar would do as well.
+    // The template is a constant that a test has parsed.
     let style = ProgressStyle::with_template("{msg} {wide_bar} {percent} % {eta}");
     ProgressBar::new(length).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
-/// All events of a scene, with a progress bar for the long searches.
+/// Returns all events of a scene, with a progress bar for the long searches.
 pub fn search_timeline(scene: &Scene, common: &Common) -> Timeline {
     let bar = progress_bar(1000, common).with_message("searching for contact");
     let timeline = scene.motion.timeline(&mut |share| bar.set_position((1000.0 * share) as u64));
@@ -235,7 +233,7 @@ pub fn search_timeline(scene: &Scene, common: &Common) -> Timeline {
     timeline
 }
 
-/// Reports how far the searches came, where one of them gave up.
+/// Warns of the time up to which a search that gave up came.
 pub fn warn_of_gap(timeline: &Timeline) {
     if let Some(until) = timeline.searched_until() {
         log::warn!(
@@ -245,12 +243,12 @@ pub fn warn_of_gap(timeline: &Timeline) {
     }
 }
 
-/// Whether a stream is a terminal whose user has not switched colour off (`NO_COLOR`, see no-color.org).
+/// Returns true if a stream is a terminal and colour is not switched off (`NO_COLOR`, see no-color.org).
 pub fn shows_colour(stream: &impl io::IsTerminal) -> bool {
     stream.is_terminal() && !anstyle_query::no_color()
 }
 
-/// Refuses a scene whose solver is the paper's, of whose motion nothing can be proved.
+/// Refuses a scene with the paper's solver, since its motion has no proof.
 pub fn expect_exact_motion(scene: &Scene) -> Result<(), CommandError> {
     if !matches!(scene.motion.method(), Method::Paper(_)) {
         return Ok(());
@@ -260,10 +258,10 @@ pub fn expect_exact_motion(scene: &Scene) -> Result<(), CommandError> {
     Err(CommandError::BadInput(sentence.to_owned()))
 }
 
-/// A flag that SIGINT, SIGTERM and SIGHUP set: the last where a terminal was closed, unless `nohup` has it ignored.
+/// Returns a flag that SIGINT, SIGTERM and SIGHUP set; SIGHUP unless it is ignored, as by `nohup`.
 ///
-/// To be called before other threads are started: from then on these signals come to a thread that does nothing else.
-/// iceoryx2 takes a system call that a signal has interrupted for a failure.
+/// Call it before other threads start: from then on one thread receives these signals. iceoryx2 treats an interrupted
+/// system call as a failure.
 pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CommandError> {
     use nix::sys::signal::{SigSet, Signal};
     let stop = Arc::new(AtomicBool::new(false));
@@ -273,8 +271,8 @@ pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CommandError> {
         signal_hook::flag::register(signal as i32, Arc::clone(&stop))?;
     }
     std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
-        // The process that started this one may have them blocked, as `soak` has, and a mask is inherited.
-        // No panic: this fails for an unknown way to change the mask only.
+        // A parent such as `soak` may have them blocked, and a mask is inherited.
+        // No panic: this fails only for an unknown way to change the mask.
         signals.thread_unblock().unwrap();
         loop {
             nix::unistd::pause();
@@ -284,7 +282,7 @@ pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CommandError> {
     Ok(stop)
 }
 
-/// Whether whoever started this process has it ignore a signal, as `nohup` does.
+/// Returns true if the parent process made this one ignore a signal, as `nohup` does.
 fn is_ignored(signal: i32) -> bool {
     // proc(5): SigIgn is a mask in hexadecimal, the first signal its lowest bit.
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -292,13 +290,13 @@ fn is_ignored(signal: i32) -> bool {
     mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
-/// Ends this program with a sentence where a page of shared memory cannot be had, which Linux signals by SIGBUS: others
-/// have filled /dev/shm since it was last looked at.
+/// Ends this program with a sentence if no page of shared memory is available, which Linux signals by SIGBUS: other
+/// processes have filled /dev/shm since the last test.
 pub fn end_when_shared_memory_is_full() -> Result<(), CommandError> {
     const SENTENCE: &[u8] = b"error: /dev/shm is full: remove what fills it, or make it larger\n";
     let end = || {
         watch::terminal::restore();
-        // Nothing is left to do for a standard error that takes no more.
+        // A failing standard error cannot be reported.
         let _ = nix::unistd::write(io::stderr(), SENTENCE);
         // SAFETY: async-signal-safe, and ends the process without unwinding.
         unsafe { nix::libc::_exit(1) };
@@ -309,10 +307,10 @@ pub fn end_when_shared_memory_is_full() -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Wall time as a person writes it: `60`, `90s`, `5m`, `8h`. Seconds.
+/// Parses a wall time, `60`, `90s`, `5m` or `8h`, to seconds.
 ///
 /// # Errors
-/// One sentence for anything else, for clap to print.
+/// One sentence for other texts, for clap to print.
 pub fn wall_seconds(text: &str) -> Result<f64, String> {
     let text = text.trim();
     let (digits, unit) = match text.char_indices().last() {

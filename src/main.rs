@@ -1,4 +1,4 @@
-//! The command line: reads arguments, sets up logging, runs one subcommand, turns its error into an exit code.
+//! The command line: reads arguments, sets up logging, runs one subcommand, converts its error to an exit code.
 
 #[macro_use]
 mod commands;
@@ -25,9 +25,9 @@ pub enum Command {
     Run(commands::run::RunArguments),
     /// Conduct a running publisher: pause, rate, seek, step, hold
     Control(commands::control::ControlArguments),
-    /// Record a running publisher as MCAP, or mend a recording that was cut
+    /// Record a running publisher as MCAP, or repair a recording that was cut
     Record(commands::record::RecordArguments),
-    /// Publish a recording again, as the show that it was
+    /// Publish a recording again, as the show was
     Replay(commands::replay::ReplayArguments),
     /// Play the show of a log again and compare every bit
     Verify(commands::verify::VerifyArguments),
@@ -47,20 +47,20 @@ pub enum Command {
     Draw(commands::draw::DrawArguments),
     /// Measure accuracy against cost for every solver on this scene and machine
     Trade(commands::trade::TradeArguments),
-    /// Answer a choreographer: the least pitch, the greatest speed
+    /// Plan a choreography: the least pitch, the greatest speed
     Plan(commands::plan::PlanArguments),
     /// Soak-test: publish for hours to real subscriber processes and give a verdict
     Soak(commands::soak::SoakArguments),
-    /// What soak starts
+    /// A subscriber process of soak
     #[command(hide = true)]
     SoakSubscriber(commands::soak::SoakSubscriberArguments),
-    /// What soak --conduct starts
+    /// The commanding process of soak --conduct
     #[command(hide = true)]
     SoakConductor(commands::soak_conductor::SoakConductorArguments),
-    /// What soak --conduct starts to kill it
+    /// A client that soak --conduct kills
     #[command(hide = true)]
     SoakClient(commands::soak_conductor::SoakClientArguments),
-    /// Validate a scene and print what it would model
+    /// Validate a scene and print what it models
     Check(commands::check::CheckArguments),
 }
 
@@ -117,10 +117,10 @@ fn set_up_logging(common: &Common) {
     iceoryx2::prelude::set_log_level(match level {
         log::LevelFilter::Debug => iceoryx2::prelude::LogLevel::Debug,
         log::LevelFilter::Info => iceoryx2::prelude::LogLevel::Warn,
-        // What iceoryx2 refuses is reported in this program's own words.
+        // This program reports iceoryx2's refusals in its own words.
         _ => iceoryx2::prelude::LogLevel::Fatal,
     });
-    // What RustDDS and ros2-client complain of (every large message, every end) is of no use to a user.
+    // RustDDS and ros2-client log every large message and every end, which is of no use to a user.
     let of_dds = if common.verbose > 1 { log::LevelFilter::Warn } else { log::LevelFilter::Off };
     env_logger::Builder::new()
         .filter_level(level)

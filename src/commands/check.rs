@@ -1,4 +1,4 @@
-//! `check`: what a scene would model, what it leaves out, and which solver it would use and why.
+//! `check`: what a scene models and leaves out, and its solver with the reason.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -21,11 +21,11 @@ use super::{CommandError, Common, Output, expect_exact_motion, figure, number, p
 /// Arguments of `check`.
 #[derive(Debug, clap::Args)]
 pub struct CheckArguments {
-    /// A certificate of `events --certify` for this very scene: it is checked, and what it proves is printed
+    /// A certificate of `events --certify` for this scene: check it and print what it proves
     #[arg(long, value_name = "FILE")]
     certificate: Option<PathBuf>,
-    /// Prove the least clearance of the show: enclose it within a nanometre, rounding included. Seconds to minutes; with
-    /// --json, print that alone
+    /// Prove the least clearance of the show: enclose it within a nanometre, rounding included. Seconds to minutes;
+    /// with --json, print that alone
     #[arg(long)]
     prove: bool,
 }
@@ -37,14 +37,14 @@ struct ClearanceLine {
     least_clearance_lo: Option<f64>,
     least_clearance_hi: Option<f64>,
     least_clearance_status: &'static str,
-    /// Simulated seconds up to which that is proved, where it is not to the end of the show.
+    /// Simulated seconds up to which that is proved, unless to the end of the show.
     proved_until: Option<f64>,
     time: Option<f64>,
     bench_a: Option<usize>,
     bench_b: Option<usize>,
 }
 
-/// Validates the scene and prints what it would do.
+/// Validates the scene and prints what it does.
 pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandError> {
     let text = common.scene_text()?;
     let scene = text.parse()?;
@@ -137,7 +137,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     output.finish()
 }
 
-/// The least clearance between two numbers, if it can be proved.
+/// Encloses the least clearance between two numbers, if it can be proved.
 fn enclosed(
     scene: &Scene,
     found: Option<TimedClearance>,
@@ -154,7 +154,7 @@ fn enclosed(
     Ok(enclosure)
 }
 
-/// What was proved of the least clearance, for people.
+/// Returns a sentence for people on the proof of the least clearance.
 fn proof_sentence(scene: &Scene, enclosure: Option<ClearanceEnclosure>) -> String {
     let Some(ClearanceEnclosure { lo, hi, until, travelled, .. }) = enclosure else {
         return "Nothing of it could be proved.".to_owned();
@@ -196,7 +196,7 @@ fn clearance_line(
     }
 }
 
-/// What a certificate proves of the scene with this text.
+/// Returns what a certificate proves of the scene with this text.
 fn proved(scene: &str, file: &Path, common: &Common) -> Result<Vec<String>, CommandError> {
     let shown = file.display().to_string();
     let opened = File::open(file)
@@ -207,7 +207,7 @@ fn proved(scene: &str, file: &Path, common: &Common) -> Result<Vec<String>, Comm
     proved
 }
 
-/// The path in words.
+/// Describes the path in words.
 fn path(motion: &Motion) -> String {
     let outline = motion.outline();
     if let [SegmentOutline { kind: OutlineKind::Spiral { pitch, first, .. }, .. }] = outline.as_slice() {

@@ -16,7 +16,7 @@ use super::{CommandError, Common, Output};
 pub struct ControlArguments {
     #[command(subcommand)]
     action: Action,
-    /// Wait at most so long for the answer, seconds; by default 30, and for a step as long as it makes progress
+    /// Longest wait for the answer, seconds; by default 30, and for a step as long as it makes progress
     #[arg(long, value_name = "SECONDS", global = true, allow_negative_numbers = true)]
     timeout: Option<f64>,
 }
@@ -29,7 +29,7 @@ enum Action {
     Pause,
     #[command(about = help(2))]
     Resume,
-    /// Pause a show that plays, resume one that is paused
+    /// Pause a playing show, resume a paused one
     Toggle,
     #[command(about = help(3), allow_negative_numbers = true)]
     Rate {
@@ -73,7 +73,7 @@ struct ResponseLine {
     cue: u32,
 }
 
-/// Sends one command and prints what became of it.
+/// Sends one command and prints its result.
 pub fn control(common: &Common, arguments: &ControlArguments) -> Result<(), CommandError> {
     let timeout = arguments.timeout.map(|seconds| {
         let sentence = || CommandError::BadInput(format!("--timeout is {seconds}, expected a number of seconds"));

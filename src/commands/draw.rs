@@ -1,4 +1,4 @@
-//! `draw`: the stage as SVG, of one time, of many as numbered files, or as one picture that moves.
+//! `draw`: the stage as SVG: of one time, of many times as numbered files, or as one animation.
 
 use std::path::{Path, PathBuf};
 
@@ -41,28 +41,28 @@ struct Many {
     /// The last time, inclusive: seconds, or an event
     #[arg(long, value_name = "TIME", requires = "every", allow_negative_numbers = true)]
     until: Option<String>,
-    /// One SVG that moves, in place of many: in real time, about --every seconds from one moment to the next
+    /// One SVG that moves, in place of many: in real time, about --every seconds between two moments
     #[arg(long, requires = "every")]
     animated: bool,
 }
 
-/// How the picture looks.
+/// The look of the picture.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "The picture")]
 struct LookArguments {
-    /// Metres from the centre of the stage to the edge of the picture; by default all that is there is shown
+    /// Metres from the centre of the stage to the edge of the picture; by default all boards are shown
     #[arg(long, value_name = "METRES", conflicts_with = "view", allow_negative_numbers = true)]
     radius: Option<f64>,
     /// The point in the middle of the picture and its width, metres, as in 1.5,2,4
     #[arg(long, value_name = "X,Y,METRES", value_parser = view, allow_hyphen_values = true)]
     view: Option<Framing>,
-    /// light, dark, or auto: light, and dark where a browser prefers that
+    /// light, dark, or auto: light, and dark if a browser prefers that
     #[arg(long, value_name = "THEME", default_value = "light", value_parser = theme)]
     theme: Theme,
-    /// The width in print or on a screen, as in 210mm or 1920px; all that is drawn grows with it
+    /// The width in print or on a screen, as in 210mm or 1920px; the whole drawing scales with it
     #[arg(long, value_name = "LENGTH", default_value = "960px", value_parser = length)]
     width: Length,
-    /// The height; by default that of what is shown
+    /// The height; by default that of the content
     #[arg(long, value_name = "LENGTH", value_parser = length)]
     height: Option<Length>,
     /// The stage alone: no axes, title or legend
@@ -73,18 +73,18 @@ struct LookArguments {
 /// A line of `draw --json`.
 #[derive(Serialize)]
 struct PictureLine<'a> {
-    /// Simulated seconds; of a picture that moves, its last moment.
+    /// Simulated seconds; of an animation, its last moment.
     time: f64,
-    /// The file that was written.
+    /// The file written.
     file: Option<&'a Path>,
-    /// The picture, where no file was named.
+    /// The picture, if no file was named.
     svg: Option<&'a str>,
 }
 
-/// The most pictures of one command.
+/// The greatest number of pictures of one command.
 const MOST: f64 = 1e6;
 
-/// The most moments of a picture that moves: more make a file that no browser shows well.
+/// The greatest number of moments of an animation: browsers show larger files badly.
 const MOST_MOMENTS: f64 = 2000.0;
 
 /// Seconds between two moments of an animation, at least: the last one stands as many steps as there are in seconds.
@@ -118,7 +118,7 @@ pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandErr
     }
 }
 
-/// How many steps of --every lie between two times.
+/// Returns the number of steps of --every between two times.
 fn steps(every: f64, from: f64, until: f64) -> Result<u64, CommandError> {
     if !(every.is_finite() && every > 0.0) {
         return Err(CommandError::BadInput(format!("--every is {every}, expected a number of seconds above 0")));
@@ -126,7 +126,7 @@ fn steps(every: f64, from: f64, until: f64) -> Result<u64, CommandError> {
     if until < from {
         return Err(CommandError::BadInput(format!("--until is before --from, expected a time from {from} s on")));
     }
-    // A last picture that rounding has pushed past --until by less than a part in 10^9 of a step still counts.
+    // A last picture that rounding puts past --until by less than a part in 10^9 of a step still counts.
     let steps = ((until - from) / every + 1e-9).floor();
     let pictures = steps + 1.0;
     if pictures > MOST {
@@ -137,7 +137,7 @@ fn steps(every: f64, from: f64, until: f64) -> Result<u64, CommandError> {
     Ok(steps as u64)
 }
 
-/// A scene being drawn, and where its pictures go.
+/// A scene being drawn, and the destination of its pictures.
 struct Session<'a> {
     scene: &'a Scene,
     timeline: &'a Timeline,
@@ -149,7 +149,7 @@ struct Session<'a> {
 
 impl<'a> Session<'a> {
     fn new(scene: &'a Scene, timeline: &'a Timeline, file: Option<&'a Path>, json: bool) -> Self {
-        // Boards are coloured by speed, whether the scene publishes speeds or not.
+        // Boards are coloured by speed, even if the scene publishes no speeds.
         let solver = scene.motion.solver(Velocities::Computed).solver;
         Self { scene, timeline, solver, chain: Chain::new(scene.team().handles()), file, json }
     }
@@ -231,7 +231,7 @@ impl<'a> Session<'a> {
         self.write(until, &svg, self.file)
     }
 
-    /// Writes a picture where it is to go, and with --json a line about it.
+    /// Writes a picture to its destination, and with --json a line about it.
     fn write(&self, time: f64, svg: &str, file: Option<&Path>) -> Result<(), CommandError> {
         if let Some(file) = file {
             let mut output = Output::file(file)?;

@@ -1,4 +1,4 @@
-//! `events`: everything that ends the show, in order; with a proof where one is requested.
+//! `events`: the events that end the show, in order; with a proof on request.
 
 use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ pub struct EventsArguments {
     certify: Option<PathBuf>,
 }
 
-/// The times between which an event is proved to be; both null where that was not decided.
+/// The times between which an event is proved; both null if undecided.
 #[derive(Serialize)]
 struct Enclosure {
     time_lo: Option<f64>,
@@ -121,7 +121,7 @@ fn enclosure(status: &Status) -> Enclosure {
     }
 }
 
-/// What was proved of an event, for people.
+/// Returns a sentence for people on the proof of an event.
 fn proof_sentence(kind: EventKind, status: &Status) -> String {
     let name = kind.name().replace('_', " ");
     match status {
@@ -138,7 +138,7 @@ fn proof_sentence(kind: EventKind, status: &Status) -> String {
     }
 }
 
-/// An event for people; benches are counted from 1, and the sentence states it.
+/// Returns a sentence for people on an event; benches count from 1, as the sentence states.
 pub fn sentence(scene: &Scene, timed: &TimedEvent) -> String {
     let TimedEvent { event, time } = *timed;
     let bench = |bench: Option<u32>| bench.map_or("no bench".to_owned(), |bench| bench_name(scene, bench));
@@ -155,7 +155,7 @@ pub fn sentence(scene: &Scene, timed: &TimedEvent) -> String {
         .replace("path (counting from 1)", "path")
 }
 
-/// The least clearance of the whole show, and the event at which the show freezes.
+/// Returns the least clearance of the whole show, and the event that ends it.
 pub fn find_least_clearance<'t>(
     scene: &Scene,
     timeline: &'t Timeline,
@@ -169,7 +169,7 @@ pub fn find_least_clearance<'t>(
     (found, freeze)
 }
 
-/// The least clearance of the whole show, for people.
+/// Returns a sentence for people on the least clearance of the whole show.
 pub fn least_clearance(scene: &Scene, found: Option<TimedClearance>) -> String {
     let Some(TimedClearance { least, time, searched_until }) = found else {
         return "The least clearance of the show is not computed: there are no two benches that could meet, or the search gave up.".to_owned();
@@ -181,7 +181,7 @@ pub fn least_clearance(scene: &Scene, found: Option<TimedClearance>) -> String {
     format!("The least clearance {of} is {value} m, at t = {time} s, between {first} and {second} (counting from 1).")
 }
 
-/// A bench as people call it, counted from 1.
+/// Returns a bench's name for people, counted from 1.
 pub fn bench_name(scene: &Scene, bench: u32) -> String {
     bench_dragon::messages::sentence::bench_name(bench, scene.team().benches as u32)
 }

@@ -1,16 +1,16 @@
-//! Lines on standard error that hold nobody up. A terminal that is stopped with Ctrl-S, or a pipe that nobody reads, takes none
-//! for as long as it likes. Used by `publishing`, whose statistics have other things to do.
+//! Non-blocking writer for standard error: a terminal stopped with Ctrl-S, or an unread pipe, can block without limit.
+//! Used by `publishing`, whose statistics must not block.
 
 use std::io::{self, Write};
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::time::Duration;
 
-/// Lines that may wait; further ones are lost.
+/// The greatest number of waiting lines; further ones are dropped.
 const QUEUED: usize = 256;
-/// How long those that wait are given in the end.
+/// Longest wait for the waiting lines at the end.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// The thread that writes them.
+/// The thread that writes the lines.
 pub struct Lines {
     sender: SyncSender<String>,
     written: Receiver<()>,
@@ -22,7 +22,7 @@ impl Lines {
         let (sender, lines) = sync_channel::<String>(QUEUED);
         let (end, written) = channel();
         let write = move || {
-            // Where there is nobody to read it, nobody misses it.
+            // A closed standard error loses the line.
             lines.into_iter().for_each(|line| drop(writeln!(io::stderr(), "{line}")));
             drop(end);
         };
@@ -30,12 +30,12 @@ impl Lines {
         Ok(Self { sender, written })
     }
 
-    /// Has a line written.
+    /// Queues a line.
     pub fn print(&self, line: String) {
         let _ = self.sender.try_send(line);
     }
 
-    /// Waits until all is written, or will not be.
+    /// Waits until all lines are written, or the limit passes.
     pub fn finish(self) {
         drop(self.sender);
         // The thread sends nothing, and ends.

@@ -16,7 +16,7 @@ pub struct MetricsArguments {
     listen: SocketAddr,
 }
 
-/// What `metrics --json` prints once requests are answered.
+/// The line of `metrics --json` once requests are answered.
 #[derive(Serialize)]
 struct ReadyLine {
     r#type: &'static str,

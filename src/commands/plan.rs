@@ -1,4 +1,4 @@
-//! `plan`: answers for a choreographer, with where they are decided.
+//! `plan`: answers for a choreographer, with the place that decides them.
 
 use bench_dragon::certify::plan::{GreatestSpeed, LeastPitch, Overlap, PlanError, greatest_speed, least_pitch};
 use bench_dragon::show::scene::Accepted;
@@ -16,13 +16,13 @@ pub struct PlanArguments {
 
 #[derive(Debug, clap::Subcommand)]
 enum Question {
-    /// The least pitch at which the scene's team comes in to a radius on a spiral without touching itself
+    /// The least pitch at which the scene's team reaches a radius on a spiral without touching itself
     Pitch {
-        /// Metres from the centre that the front handle of the head is to reach
+        /// Metres from the centre that the front handle of the head must reach
         #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
         reach_radius: f64,
     },
-    /// The greatest constant speed of the head at which no handle of the show is ever faster than a limit
+    /// The greatest constant speed of the head at which no handle of the show exceeds a limit
     Speed {
         /// Metres per second that no handle may exceed
         #[arg(long, value_name = "M/S", allow_negative_numbers = true)]
@@ -36,7 +36,7 @@ struct PitchLine {
     plan: &'static str,
     status: &'static str,
     value: Option<f64>,
-    /// The least pitch that was looked at.
+    /// The least pitch examined.
     from: f64,
     value_lo: Option<f64>,
     value_hi: Option<f64>,
@@ -58,7 +58,7 @@ struct SpeedLine {
     ratio: f64,
 }
 
-/// Answers the question.
+/// Plans the pitch or the speed.
 pub fn plan(common: &Common, arguments: &PlanArguments) -> Result<(), CommandError> {
     match arguments.question {
         Question::Pitch { reach_radius } => plan_pitch(common, reach_radius),

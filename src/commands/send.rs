@@ -1,4 +1,4 @@
-//! `send`: what takes a running publisher's dragon out of this machine. Each kind is a process of its own.
+//! `send`: sends a running publisher's dragon to other machines. Each kind is a separate process.
 
 use std::net::{Ipv4Addr, SocketAddrV4};
 use std::sync::atomic::Ordering;
@@ -32,7 +32,7 @@ enum Kind {
 /// Arguments of `send psn`.
 #[derive(Debug, Clone, clap::Args)]
 struct PsnArguments {
-    /// The multicast group, or one desk; port 56565 where none is given
+    /// The multicast group, or one desk; the default port is 56565
     #[arg(long, value_name = "ADDR[:PORT]", default_value = USUAL_ADDRESS, value_parser = psn_destination)]
     to: SocketAddrV4,
     /// The address of this machine's interface to send by; without it, the machine's routes decide
@@ -41,19 +41,20 @@ struct PsnArguments {
     /// Which handles of each publisher, counted from 1: all, head, tail, 1,2,9 or head,20-40
     #[arg(long, value_name = "WHICH", default_value = "all")]
     trackers: Selection,
-    /// What the desk's x, y and z are: the stage's x, y (into the depth) and up, in any order, with a minus to reverse one
+    /// The stage's axes for the desk's x, y and z: x, y (into the depth) and up, in any order, with a minus to reverse
+    /// one
     #[arg(long, value_name = "X,Y,Z", default_value_t = Axes::default(), allow_hyphen_values = true)]
     axes: Axes,
-    /// How many networks multicast may pass, this one included
+    /// Number of networks that multicast may pass, this one included
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=255))]
     ttl: u32,
     /// Frames per second at most, up to 250; a slower publisher sets its own
     #[arg(long, value_name = "HZ", default_value_t = USUAL_RATE, value_parser = rate::<250>)]
     rate: f64,
-    /// The tracker number of the head, of the first publisher where there are several
+    /// The tracker number of the head, of the first publisher if there are several
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     first_id: u16,
-    /// How far the tracker numbers of several publishers' heads are apart
+    /// Distance between the tracker numbers of several publishers' heads
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u16).range(1..))]
     id_step: u16,
     /// The name under which desks list this sender; without it, the publisher's, or bench-dragon for several
@@ -64,7 +65,7 @@ struct PsnArguments {
 /// Arguments of `send osc`.
 #[derive(Debug, Clone, clap::Args)]
 struct OscArguments {
-    /// Where to: any number of hosts
+    /// The destinations: any number of hosts
     #[arg(long, value_name = "HOST:PORT", required = true, num_args = 1.., value_parser = osc_destination)]
     to: Vec<SocketAddrV4>,
     /// The address of this machine's interface to send by; without it, the machine's routes decide
@@ -83,7 +84,7 @@ fn psn_destination(text: &str) -> Result<SocketAddrV4, String> {
     destination(text, Some(USUAL_PORT))
 }
 
-/// A rate of at most so many frames per second.
+/// Parses a rate of 0.01 to `MOST` frames per second.
 fn rate<const MOST: u32>(text: &str) -> Result<f64, String> {
     let rate = text.trim().parse::<f64>().ok().filter(|rate| *rate >= 0.01 && *rate <= f64::from(MOST));
     rate.ok_or_else(|| format!("expected frames per second from 0.01 to {MOST}"))
@@ -132,7 +133,7 @@ fn psn(common: &Common, arguments: &PsnArguments) -> Result<(), CommandError> {
             log::warn!("{sentence}");
         } else if printed.is_ok() {
             printed = print(common, || notice_line(names.get(publisher).map_or("", String::as_str), &notice));
-            // Whoever read this has gone, as `| head` does.
+            // The reader has closed the pipe, as `| head` does.
             stop.fetch_or(printed.is_err(), Ordering::Relaxed);
         }
     };
@@ -152,7 +153,7 @@ fn psn(common: &Common, arguments: &PsnArguments) -> Result<(), CommandError> {
     output.finish()
 }
 
-/// The numbers of each publisher's trackers.
+/// Returns the numbers of each publisher's trackers.
 fn numbers(names: &[String], arguments: &PsnArguments) -> Result<Vec<Numbers>, CommandError> {
     let PsnArguments { first_id, id_step, .. } = *arguments;
     if names.len() == 1 {
@@ -174,7 +175,8 @@ fn osc(common: &Common, arguments: &OscArguments) -> Result<(), CommandError> {
     let addresses: Vec<_> = common.names.iter().map(|name| Addresses::new(name)).collect();
     let prefixes: Vec<_> = addresses.iter().map(|addresses| addresses.prefix().to_owned()).collect();
     if let Some(twice) = prefixes.iter().enumerate().find(|(at, prefix)| prefixes[..*at].contains(prefix)) {
-        let sentence = format!("two of the names have the OSC address {}, expected names that differ there", twice.1);
+        let sentence =
+            format!("two of the names have the OSC address {}, expected names with different addresses", twice.1);
         return Err(CommandError::BadInput(sentence));
     }
     let sender = |addresses| {
@@ -230,7 +232,7 @@ fn notice_line(name: &str, notice: &Notice) -> String {
     }
 }
 
-/// Prints a line for people at once; machines get the summary only.
+/// Prints a line for people at once; `--json` has the summary only.
 fn print(common: &Common, line: impl FnOnce() -> String) -> Result<(), CommandError> {
     if common.json {
         return Ok(());

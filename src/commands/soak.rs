@@ -1,4 +1,4 @@
-//! `soak`: a publisher and subscribers as processes for hours, and a verdict. `soak-subscriber` is what it starts.
+//! `soak`: a publisher and subscribers as processes for hours, and a verdict. It starts `soak-subscriber`.
 
 use std::ffi::OsString;
 use std::fs::File;
@@ -27,10 +27,10 @@ use nix::sys::signal::{SigSet, Signal};
 use super::realtime_scheduling::RealtimeScheduling;
 use super::{CommandError, Common, Output, not_writable, progress_bar, stop_on_signals, wall_seconds};
 
-/// How long a slow subscriber sleeps: longer than a queue of 64 frames lasts at 60 Hz.
+/// Sleep of a slow subscriber: longer than a queue of 64 frames lasts at 60 Hz.
 const SLOW_PAUSE: Duration = Duration::from_millis(1500);
 
-/// Clients of the control service that find room beside the conductor's.
+/// Clients of the control service for which there is room beside the conductor's.
 const MOST_FLAKY_CLIENTS: usize = 8;
 
 /// Arguments of `soak`.
@@ -45,17 +45,18 @@ pub struct SoakArguments {
     /// Subscribers that keep up and must miss nothing
     #[arg(long, value_name = "N", default_value_t = 3, help_heading = "The test")]
     subscribers: usize,
-    /// Subscribers that sleep longer than their queue lasts; what they miss is reported and has no limit
+    /// Subscribers that sleep longer than their queue lasts; their missed frames are reported, without limit
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "The test")]
     slow: usize,
-    /// Subscribers that are killed with SIGKILL every 5 s and started again; what they miss is reported and has no limit
+    /// Subscribers that are killed with SIGKILL every 5 s and restarted; their missed frames are reported, without
+    /// limit
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "The test")]
     flaky: usize,
     /// Conduct the show: ten random commands a second from this seed, each answer and every frame checked
     #[arg(long, value_name = "SEED", value_parser = seed, help_heading = "The test", allow_negative_numbers = true)]
     conduct: Option<u64>,
-    /// With --conduct: further clients of the control service, killed with SIGKILL amid a request every 5 s and
-    /// started again
+    /// With --conduct: further clients of the control service, killed with SIGKILL during a request every 5 s and
+    /// restarted
     #[arg(long, value_name = "N", default_value_t = 0, requires = "conduct", help_heading = "The test")]
     flaky_clients: usize,
     /// Publish ROS 2 topics too
@@ -90,7 +91,7 @@ pub struct SoakSubscriberArguments {
     parent: Parent,
 }
 
-/// Whose end is that of a process of a soak test too.
+/// Option of a process that exits when its parent process exits.
 #[derive(Debug, clap::Args)]
 pub struct Parent {
     /// End when the process that started this one ends, which has this number
@@ -152,7 +153,7 @@ fn show_progress(bar: &ProgressBar, fleet: &mut Fleet, seconds: f64) {
 }
 
 fn conclude(report: &Report, common: &Common, files: Option<ReportFiles>) -> Result<(), CommandError> {
-    // Who read the output may have gone with the Ctrl-C that ended the test, or with the terminal.
+    // The Ctrl-C that ended the test, or a closed terminal, may have ended the reader of the output.
     if let Some(files) = files {
         files.write(report)?;
     }
@@ -187,7 +188,7 @@ impl SoakArguments {
                 self.flaky_clients
             )));
         }
-        // Who conducts reads the frames too.
+        // The conductor reads the frames too.
         let conductor = usize::from(self.conduct.is_some());
         let all = self.subscribers.saturating_add(self.slow).saturating_add(self.flaky).saturating_add(conductor);
         if self.subscribers == 0 || all > admitted {
@@ -245,18 +246,18 @@ impl From<FleetError> for CommandError {
     }
 }
 
-/// What the names of the files end with that the publisher writes beside a report.
+/// Ends of the names of files that the publisher writes beside a report.
 const HISTOGRAMS: &str = ".hgrm";
 const LOG: &str = ".log.jsonl";
 
-/// A report's file name with its end.
+/// Returns a report's file name with its end.
 fn with_end(stem: &Path, end: &str) -> OsString {
     let mut name = stem.as_os_str().to_owned();
     name.push(end);
     name
 }
 
-/// Both files of a report, opened before the test: after eight hours is too late to learn that they cannot be.
+/// Both files of a report, opened before the test: after eight hours a failure would be too late.
 struct ReportFiles {
     json: File,
     html: File,
@@ -269,7 +270,7 @@ impl ReportFiles {
             let shown = format!("--report: {}", Path::new(&name).display());
             File::create(&name).map_err(|error| not_writable(shown, &error))
         };
-        // The publisher makes these again.
+        // The publisher creates these again.
         [HISTOGRAMS, LOG].into_iter().try_for_each(|end| create(end).map(drop))?;
         Ok(Self { json: create(".json")?, html: create(".html")? })
     }
@@ -281,7 +282,7 @@ impl ReportFiles {
     }
 }
 
-/// Observes until a signal comes, an observation a second on standard output.
+/// Observes until a signal comes, and prints an observation each second.
 pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result<(), CommandError> {
     arguments.parent.watch()?;
     let stop = stop_on_signals()?;
@@ -311,15 +312,16 @@ pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result
 }
 
 impl Parent {
-    /// Has this process killed when the one that started it ends, so that nothing is left behind.
+    /// Kills this process when its parent ends, so that no process remains.
     pub fn watch(&self) -> Result<(), CommandError> {
         let Some(parent) = self.end_with_parent else { return Ok(()) };
-        // The soak test has these blocked, and a mask is inherited: until `stop_on_signals` they end this process at once.
+        // The soak test blocks these signals, and a mask is inherited: until `stop_on_signals` they end this process
+        // at once.
         let signals = SigSet::from_iter([Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP]);
         signals.thread_unblock().map_err(std::io::Error::from)?;
         let set = nix::sys::prctl::set_pdeathsig(Signal::SIGTERM);
         set.map_err(|error| CommandError::Failed(format!("the end of the parent cannot be watched: {error}")))?;
-        // A parent that ended before that sends no signal any more.
+        // A parent that ended earlier sends no signal.
         if nix::unistd::getppid().as_raw() != parent {
             return Err(CommandError::Failed("the program that started this one has ended".to_owned()));
         }

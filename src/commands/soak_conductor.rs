@@ -1,4 +1,4 @@
-//! `soak-conductor` and `soak-client`: what `soak --conduct` starts to conduct its publisher.
+//! `soak-conductor` and `soak-client`: processes of `soak --conduct` that command its publisher.
 
 use std::io::Write;
 use std::sync::atomic::Ordering;
@@ -10,7 +10,7 @@ use bench_dragon::soak::conduct::load_generator;
 use super::soak::Parent;
 use super::{CommandError, Common, stop_on_signals};
 
-/// How long the publisher may take to answer.
+/// Longest wait for an answer of the publisher.
 const TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Arguments of `soak-conductor`.
@@ -19,7 +19,7 @@ pub struct SoakConductorArguments {
     /// The seed of its commands
     #[arg(long)]
     seed: u64,
-    /// Frames per second of the publisher, where they are not the scene's
+    /// Frames per second of the publisher, if not the scene's
     #[arg(long)]
     rate: Option<f64>,
     #[command(flatten)]
@@ -33,7 +33,7 @@ pub struct SoakClientArguments {
     parent: Parent,
 }
 
-/// Conducts until a signal comes, what it has counted once a second on standard output.
+/// Conducts until a signal comes, and prints its counts once a second.
 pub fn conduct(common: &Common, arguments: &SoakConductorArguments) -> Result<(), CommandError> {
     arguments.parent.watch()?;
     let stop = stop_on_signals()?;
@@ -47,7 +47,7 @@ pub fn conduct(common: &Common, arguments: &SoakConductorArguments) -> Result<()
     })
 }
 
-/// Requests the state of the show again and again, so that it always awaits an answer, until it is killed.
+/// Requests the state of the show in a loop, so that it always awaits an answer, until it is killed.
 pub fn client(common: &Common, arguments: &SoakClientArguments) -> Result<(), CommandError> {
     arguments.parent.watch()?;
     let stop = stop_on_signals()?;

@@ -14,7 +14,7 @@ use super::{CommandError, Common, Output, figure, number, progress_bar, search_t
 #[derive(Debug, clap::Args)]
 #[command(group = clap::ArgGroup::new("times").required(true))]
 pub struct SolveArguments {
-    /// Simulated seconds, or contact, stall, lock, path_end; several divided by commas
+    /// Simulated seconds, or contact, stall, lock, path_end; several separated by commas
     #[arg(long, value_name = "TIMES", value_delimiter = ',', group = "times", allow_negative_numbers = true)]
     at: Vec<String>,
     /// Simulated seconds between two rows; with --until
@@ -81,7 +81,7 @@ fn numbers(chain: &Chain, handle: usize) -> [f64; 6] {
 }
 
 impl SolveArguments {
-    /// How many times are requested, and one after the other, all of them within the motion.
+    /// Returns the number of requested times, and the times in order, all within the motion.
     fn times(&self, timeline: &Timeline) -> Result<Times, CommandError> {
         match (self.every, self.until) {
             (Some(every), Some(until)) => self.regular_times(every, until, timeline),
@@ -106,7 +106,7 @@ impl SolveArguments {
                 "--until is {until}, expected a number of seconds from {from} on"
             )));
         }
-        // A last row that rounding has pushed past --until by less than a part in 10^9 of a step still counts.
+        // A last row that rounding puts past --until by less than a part in 10^9 of a step still counts.
         let steps = ((until - from) / every + 1e-9).floor();
         if steps >= 1e9 {
             return Err(CommandError::BadInput(format!(
@@ -124,7 +124,7 @@ impl SolveArguments {
                 figure(end.time),
                 end.event.kind.name()
             );
-            // The first row past the end: found by halving, since the rows may be a billion.
+            // The first row past the end, by bisection, since there may be a billion rows.
             let (mut within, mut past) = (0, steps);
             while within < past {
                 let middle = within.midpoint(past);
@@ -136,10 +136,10 @@ impl SolveArguments {
     }
 }
 
-/// How many times, and one after the other.
+/// The number of times, and the times in order.
 type Times = (u64, Box<dyn Iterator<Item = f64>>);
 
-/// A time as an option such as `--at` takes it: seconds, or the name of an event.
+/// Parses a time of an option such as `--at`: seconds, or the name of an event.
 ///
 /// # Errors
 /// Bad input: not a number, an event that does not happen, or a time after the motion's end.
@@ -150,7 +150,7 @@ pub fn time_of(option: &str, text: &str, timeline: &Timeline) -> Result<f64, Com
         .find(|kind| kind.name() == text);
     if let Some(kind) = named {
         return timeline.find(kind).map(|timed| timed.time).ok_or_else(|| {
-            CommandError::BadInput(format!("{option} {text}: this scene has no {text}; `events` lists what it has"))
+            CommandError::BadInput(format!("{option} {text}: this scene has no {text}; `events` lists its events"))
         });
     }
     let time: f64 = text.parse().map_err(|_| {
@@ -162,7 +162,7 @@ pub fn time_of(option: &str, text: &str, timeline: &Timeline) -> Result<f64, Com
     }
     // Minus zero is zero.
     let time = time + 0.0;
-    // The end's own time, printed for people and read again, is the end.
+    // The time of the end, rounded for people and read back, is the end.
     if time > end.time && time <= (end.time + 1e-9).max(end.time * (1.0 + 4.0 * f64::EPSILON)) {
         return Ok(end.time);
     }

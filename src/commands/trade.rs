@@ -1,4 +1,4 @@
-//! `trade`: what accuracy costs on this scene and machine, for every solver.
+//! `trade`: the cost of accuracy on this scene and machine, for every solver.
 
 use std::io::{IsTerminal, stderr};
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ use plotters::prelude::*;
 
 use super::{CommandError, Common, Output, progress_bar, search_timeline};
 
-/// What `trade` takes.
+/// Arguments of `trade`.
 #[derive(Debug, Clone, clap::Args)]
 pub struct TradeArguments {
     /// Draw error against cost as an SVG
@@ -27,13 +27,13 @@ pub struct TradeArguments {
     /// Pictures per second of the display [default: 60]
     #[arg(long, value_name = "HZ", value_parser = display_rate, help_heading = "The display")]
     pub display_rate: Option<f64>,
-    /// How far the display runs behind the stream [default: 0 for `hold`, else one publishing period]
+    /// Delay of the display behind the stream [default: 0 for `hold`, else one publishing period]
     #[arg(long, value_name = "SECONDS", value_parser = delay, help_heading = "The display")]
     pub delay: Option<f64>,
 }
 
 impl TradeArguments {
-    /// Whether JSON lines of the display are wanted: by default the lines are those of the solvers alone.
+    /// Returns true if JSON lines of the display are requested: by default only the solvers have lines.
     fn wants_display(&self) -> bool {
         self.display || self.display_plot.is_some() || self.display_rate.is_some() || self.delay.is_some()
     }
@@ -51,10 +51,10 @@ fn delay(text: &str) -> Result<f64, String> {
 
 /// Measures every solver, and readers at every rate, and prints tables or JSON lines.
 pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandError> {
-    /// Of a progress bar of 1000, what measuring the solvers takes.
+    /// Share of the solvers in a progress bar of 1000.
     const SOLVERS: f64 = 850.0;
     let scene = common.load_scene()?;
-    // A file that cannot be written is better known before minutes of measuring.
+    // A file that cannot be written is reported before minutes of measuring.
     let [plot_file, display_file] =
         [&arguments.plot, &arguments.display_plot].map(|file| file.as_deref().map(Output::file).transpose());
     let (plot_file, display_file) = (plot_file?, display_file?);
@@ -93,7 +93,7 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
     output.finish()
 }
 
-/// Where no bar shows that something goes on, a line does.
+/// Prints a line if no bar shows progress.
 fn announce(scene: &Scene, common: &Common) {
     if common.quiet || stderr().is_terminal() {
         return;
@@ -153,7 +153,7 @@ fn print(output: &mut Output, measurements: &[Measurement]) -> Result<(), Comman
     ))
 }
 
-/// One row for both precisions, which stand one after the other.
+/// One row for both precisions, which are neighbours.
 fn print_display(output: &mut Output, scene: &Scene, displayed: &[DisplayMeasurement]) -> Result<(), CommandError> {
     output.line("")?;
     output.line(&format!(
@@ -190,13 +190,13 @@ fn print_display(output: &mut Output, scene: &Scene, displayed: &[DisplayMeasure
     ))
 }
 
-/// Pixels across and down: on a phone, half as large, words can still be read.
+/// Pixels across and down: words stay legible on a phone, half as large.
 const SIZE: (u32, u32) = (760, 720);
 
-/// The least error that is drawn: below it all is rounding.
+/// The least error drawn: smaller ones are rounding.
 const LEAST_ERROR: f64 = 1e-15;
 
-/// What can go wrong in a drawing.
+/// The error of a drawing.
 type DrawingError = Box<dyn std::error::Error>;
 
 fn draw(mut file: Output, plot: impl FnOnce(&mut String) -> Result<(), DrawingError>) -> Result<(), CommandError> {
@@ -206,13 +206,13 @@ fn draw(mut file: Output, plot: impl FnOnce(&mut String) -> Result<(), DrawingEr
     file.finish()
 }
 
-/// A colour of the palette.
+/// Returns a colour of the palette.
 fn colour(hex: &str) -> RGBColor {
     let [red, green, blue] = channels(hex);
     RGBColor(red, green, blue)
 }
 
-/// Words in the face of the page.
+/// Returns a text style in the page's font.
 fn words(size: u32, colour: RGBColor) -> TextStyle<'static> {
     let style = TextStyle::from(("system-ui, sans-serif", size).into_font());
     TextStyle { color: colour.to_backend_color(), ..style }
@@ -221,7 +221,7 @@ fn words(size: u32, colour: RGBColor) -> TextStyle<'static> {
 fn plot(svg: &mut String, scene: &str, measurements: &[Measurement]) -> Result<(), DrawingError> {
     let point = |m: &Measurement| Point {
         at: (m.frame_ns / 1e3, m.max_position_error.max(LEAST_ERROR)),
-        // What all tables have in common would only make the words smaller.
+        // The common beginning of all tables would only make the words smaller.
         text: m.solver.replace("follower_table", "table").replace(" precision", ""),
         colour: colour(if m.solver.starts_with("paper") { LIGHT.danger } else { LIGHT.slow }),
         on_front: m.on_front,
@@ -237,7 +237,7 @@ fn plot(svg: &mut String, scene: &str, measurements: &[Measurement]) -> Result<(
 }
 
 fn display_plot(svg: &mut String, scene: &str, displayed: &[DisplayMeasurement]) -> Result<(), DrawingError> {
-    // Single precision is no different for readers whose error is far above its rounding.
+    // Single precision makes no difference to readers whose error is far above its rounding.
     let series = [
         (Reader::Hold, Precision::Double, SERIES[2].0, "hold"),
         (Reader::Linear, Precision::Double, SERIES[1].0, "linear"),
@@ -278,14 +278,14 @@ struct Point {
     on_front: bool,
 }
 
-/// The points of the front, by cost.
+/// Returns the points of the front, by cost.
 fn front(points: &[Point]) -> Vec<(f64, f64)> {
     let mut front: Vec<(f64, f64)> = points.iter().filter(|point| point.on_front).map(|point| point.at).collect();
     front.sort_by(|a, b| a.0.total_cmp(&b.0));
     front
 }
 
-/// Lines below labelled points, both axes logarithmic.
+/// Draws lines below labelled points, both axes logarithmic.
 fn scatter(
     svg: &mut String,
     caption: &str,
@@ -346,7 +346,7 @@ fn draw_points(chart: &mut LogChart, points: Vec<Point>) -> Result<(), DrawingEr
         let label = Label::near(&taken, (x, y), &text);
         let middle = label.top + Label::HEIGHT / 2;
         if (middle - y).abs() >= Label::HEIGHT {
-            // A line from a label that had to go elsewhere to its point.
+            // A line from a displaced label to its point.
             let end = if label.left > x { label.left - 2 } else { label.right + 2 };
             let line = PathElement::new(vec![(0, 0), (end - x, middle - y)], colour.mix(0.4));
             chart.draw_series([EmptyElement::at(at) + line])?;
@@ -360,7 +360,7 @@ fn draw_points(chart: &mut LogChart, points: Vec<Point>) -> Result<(), DrawingEr
     Ok(())
 }
 
-/// Where a label stands on the plot, pixels.
+/// The place of a label on the plot, pixels.
 struct Label {
     left: i32,
     right: i32,
@@ -369,17 +369,17 @@ struct Label {
 
 impl Label {
     const HEIGHT: i32 = 19;
-    /// What a letter takes.
+    /// The width of a letter.
     const LETTER: i32 = 8;
-    /// Where labels may stand.
+    /// The area for labels.
     const LEFTMOST: i32 = 110;
     const RIGHTMOST: i32 = 748;
     const TOPMOST: i32 = 108;
     const LOWEST: i32 = 624;
 
-    /// A label beside a point, or as near to that as it lies on none of `others` and on the plot.
+    /// Places a label beside a point, or as near as possible on the plot without covering one of `others`.
     fn near(others: &[Self], (x, y): (i32, i32), text: &str) -> Self {
-        // One more, since capitals and digits are wider than most.
+        // One letter more, since capitals and digits are wider than most.
         let width = Self::LETTER * (text.len() as i32 + 1);
         let overlaps = |label: &Self, other: &Self| {
             label.left < other.right && other.left < label.right && (label.top - other.top).abs() < Self::HEIGHT

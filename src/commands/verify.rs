@@ -19,11 +19,11 @@ pub struct VerifyArguments {
     file: PathBuf,
 }
 
-/// Bytes of the longest first line that is read to see what the file is.
+/// Bytes of the longest first line that is read to determine the kind of file.
 const LONGEST_FIRST_LINE: u64 = 1 << 26;
 
-/// Verifies a log or a certificate. Exit code 0: a log has the same show, or close to it; a certificate proves what it
-/// says. 1: a difference, nothing to compare; a line that does not follow. 2: a file that is neither.
+/// Verifies a log or a certificate. Exit code 0: a log has the same show, or close to it; a certificate is valid. 1: a
+/// difference, nothing to compare; a line that does not follow. 2: a file that is neither.
 pub fn verify(common: &Common, arguments: &VerifyArguments) -> Result<(), CommandError> {
     let shown = arguments.file.display().to_string();
     let unread =
@@ -70,7 +70,7 @@ pub fn verify(common: &Common, arguments: &VerifyArguments) -> Result<(), Comman
     }
 }
 
-/// Whether the first line of a file is that of a certificate.
+/// Returns true if the first line of a file is that of a certificate.
 fn is_certificate(line: &[u8]) -> bool {
     let value: Option<serde_json::Value> = serde_json::from_slice(line).ok();
     value.is_some_and(|value| value["type"] == "certificate")
@@ -85,7 +85,7 @@ fn print(common: &Common, verdict: &Verdict) -> Result<(), CommandError> {
     let Verdict { seconds, same_seconds, frames, commands, skipped, lost, .. } = *verdict;
     if verdict.version != env!("CARGO_PKG_VERSION") {
         let (theirs, ours) = (&verdict.version, env!("CARGO_PKG_VERSION"));
-        output.line(&format!("The log is of version {theirs}, this is {ours}: played again all the same."))?;
+        output.line(&format!("The log is of version {theirs}, this is {ours}: played again anyway."))?;
     }
     if !verdict.same_arithmetic {
         output.line(&format!(

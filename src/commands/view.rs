@@ -20,32 +20,32 @@ pub struct ViewArguments {
     /// The port of the page; 0 takes any free one
     #[arg(long, default_value_t = 8080)]
     port: u16,
-    /// The address to listen on; any but a loopback one lets others watch
+    /// The address to listen on; any but loopback lets other machines watch
     #[arg(long, value_name = "ADDR", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     listen: IpAddr,
     /// Let browsers conduct the show: pause, seek, rate, hold
     #[arg(long)]
     control: bool,
-    /// Let a page of another place in, such as https://show.example or http://localhost:5173; may be repeated
+    /// Admit pages of another origin, such as https://show.example or http://localhost:5173; may be repeated
     #[arg(long, value_name = "ORIGIN")]
     allow_origin: Vec<AllowedOrigin>,
-    /// Serve the files of this folder below /pages/, for a page of one's own
+    /// Serve the files of this folder below /pages/, for your own page
     #[arg(long, value_name = "DIR")]
     pages: Option<PathBuf>,
-    /// A certificate of `events --certify`: it is checked while the page is served, and where a publisher shows that very
-    /// scene, the page says what is proved of its events; may be repeated
+    /// A certificate of `events --certify`: checked while the page is served. If a publisher shows that scene, the
+    /// page says what is proved of its events; may be repeated
     #[arg(long, value_name = "FILE")]
     certificate: Vec<PathBuf>,
 }
 
-/// What `view --json` prints once browsers can connect.
+/// The line of `view --json` once browsers can connect.
 #[derive(Serialize)]
 struct ReadyLine {
     r#type: &'static str,
     url: String,
-    /// The addresses that others type, where the server listens on all of this machine's.
+    /// The addresses for other machines, if the server listens on all of this machine's.
     others: Vec<String>,
-    /// What whoever conducts has to give; null where nothing is needed.
+    /// The token for commands; null if none is needed.
     token: Option<String>,
 }
 
@@ -73,7 +73,7 @@ fn opened(file: &Path) -> Result<Certificate, CommandError> {
     })
 }
 
-/// Checks certificates one after another on a thread of its own, which ends with the process.
+/// Checks certificates in order on a separate thread, which ends with the process.
 fn check_in_background(certificates: Vec<Certificate>, proofs: Arc<Proofs>, json: bool) -> Result<(), CommandError> {
     if certificates.is_empty() {
         return Ok(());
@@ -83,14 +83,14 @@ fn check_in_background(certificates: Vec<Certificate>, proofs: Arc<Proofs>, json
             let shown = certificate.file().display().to_string();
             let checked = certificate.check();
             checked.iter().for_each(|proved| proofs.add(proved));
-            // Whoever read the output has gone; the page is still there.
+            // The reader of the output has closed it; the page continues.
             let _ = report(&shown, checked, json);
         }
     })?;
     Ok(())
 }
 
-/// Says what became of a certificate.
+/// Reports the result of checking a certificate.
 fn report(shown: &str, checked: Result<Proved, Refused>, json: bool) -> Result<(), CommandError> {
     let mut output = Output::standard();
     match checked {
@@ -100,8 +100,7 @@ fn report(shown: &str, checked: Result<Proved, Refused>, json: bool) -> Result<(
                 output
                     .json(&json!({"type": "certificate", "file": shown, "verdict": "proved", "scene_hash": scene}))?;
             } else {
-                output
-                    .line(&format!("{shown} proves what it says, of the scene whose text has the BLAKE3 {scene}."))?;
+                output.line(&format!("{shown} is valid, for the scene whose text has the BLAKE3 {scene}."))?;
             }
         }
         Err(refused) => {
@@ -151,7 +150,7 @@ fn announce(common: &Common, arguments: &ViewArguments, ready: &Ready) -> Result
     output.finish()
 }
 
-/// The addresses of this machine that others can type, of the kinds that are listened on.
+/// Returns the addresses of this machine for other machines, of the kinds that are listened on.
 fn own_addresses(listen: IpAddr) -> Vec<IpAddr> {
     let interfaces = nix::ifaddrs::getifaddrs().into_iter().flatten();
     let mut addresses: Vec<_> = interfaces
@@ -161,7 +160,7 @@ fn own_addresses(listen: IpAddr) -> Vec<IpAddr> {
             v4.or_else(|| address.as_sockaddr_in6().map(|address| IpAddr::V6(address.ip())))
         })
         .filter(|ip| !ip.is_loopback() && (ip.is_ipv4() || listen.is_ipv6()))
-        // One that is valid on its own link only cannot be typed without naming the link.
+        // A link-local address would need the name of the link.
         .filter(|ip| !matches!(ip, IpAddr::V6(ip) if ip.is_unicast_link_local()))
         .collect();
     addresses.sort();

@@ -1,4 +1,4 @@
-//! `watch`: the terminal monitor. In `keys`, what its keys command; in `terminal`, how they are read.
+//! `watch`: the terminal monitor. `keys` has the commands of its keys, `terminal` reads them.
 
 mod keys;
 pub mod terminal;
@@ -50,10 +50,10 @@ const DISABLE_LINE_WRAP: &str = "\x1b[?7l";
 const ENABLE_LINE_WRAP: &str = "\x1b[?7h";
 const CLEAR_BELOW_CURSOR: &str = "\x1b[J";
 
-/// Where an alert's words begin on the terminal: behind its time.
+/// Column of an alert's words on the terminal: behind its time.
 const INDENT: &str = "              ";
 
-/// How reports and events are printed.
+/// The form of reports and events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Display {
     /// Redrawn in place.
@@ -113,7 +113,8 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
                 printed = screen.print_event(&event);
             }
         });
-        // Once something has come, what is in the way of a later publisher's services is waited for, as a publisher is.
+        // After the first event, `watch` waits while an obstacle hides a later publisher's services, as it waits for a
+        // publisher.
         if !has_come {
             polled?;
         } else if obstacle.is_met(polled) {
@@ -130,9 +131,9 @@ struct Screen<'a> {
     name: &'a str,
     time_scale: f64,
     benches: u32,
-    /// The lines of the last report that stand on the terminal, which the next one replaces.
+    /// The lines of the last report on the terminal, which the next report replaces.
     drawn: Vec<String>,
-    /// How the show stood after the last key, which is the last line of the report.
+    /// The playback state after the last key: the last line of the report.
     answer: Option<String>,
 }
 
@@ -181,7 +182,7 @@ impl Screen<'_> {
         write!(output, "\x1b[{}F{CLEAR_BELOW_CURSOR}", self.drawn.len())
     }
 
-    /// Prints what a person wants to know at once; a machine gets the alerts and the cues.
+    /// Prints an event at once for people; with `--json` only alerts and cues.
     fn print_event(&mut self, event: &FeedEvent<'_>) -> Result<(), CommandError> {
         if let FeedEvent::Frame { header, .. } = event {
             (self.time_scale, self.benches) = (header.time_scale, header.handles.saturating_sub(1));
@@ -199,13 +200,13 @@ impl Screen<'_> {
         let line = match event {
             FeedEvent::Started { run_id } => format!("A publisher of \"{name}\" is running (run {run_id:016x})."),
             FeedEvent::Gone => format!("The publisher of \"{name}\" has ended; waiting for the next."),
-            FeedEvent::Silent => format!("The publisher of \"{name}\" is there but sends nothing."),
+            FeedEvent::Silent => format!("The publisher of \"{name}\" is running but sends nothing."),
             FeedEvent::Alert(alert) => self.alert_line(alert),
             FeedEvent::Cue(cue) => format!("{:>10.3} s  {}", cue.sim_time, cue_sentence(cue)),
             FeedEvent::Frame { .. } | FeedEvent::Stage(_) | FeedEvent::Status(_) => return Ok(()),
         };
         if self.display == Display::Terminal && matches!(event, FeedEvent::Started { .. } | FeedEvent::Gone) {
-            // The last report is of another publisher, or of none.
+            // The last report belongs to another publisher, or to none.
             self.clear_previous(&mut stdout().lock())?;
             self.drawn.clear();
             self.answer = None;
@@ -221,14 +222,14 @@ impl Screen<'_> {
             return Ok(output.flush()?);
         }
         self.clear_previous(&mut output)?;
-        // Some terminals do not know their size.
+        // Some terminals have no known size.
         let columns = terminal_size().map_or(80, |(Width(columns), _)| columns.into());
         writeln!(output, "{}", textwrap::fill(line, textwrap::Options::new(columns).subsequent_indent(INDENT)))?;
         self.draw(&mut output)?;
         Ok(output.flush()?)
     }
 
-    /// Shows how the show stands after a key at once, below the last report.
+    /// Shows the playback state after a key at once, below the last report.
     fn show_answer(&mut self, words: String) -> Result<(), CommandError> {
         let mut output = stdout().lock();
         self.clear_previous(&mut output)?;
@@ -261,7 +262,7 @@ impl Screen<'_> {
         let clearance = if header.min_clearance.is_nan() {
             "not computed".to_owned()
         } else {
-            // Zero has no sign for people: a touch is solved to the last bits, on either side.
+            // No sign for zero: rounding puts a touch on either side.
             format!("{:.4} m", (header.min_clearance * 1e4).round() / 1e4 + 0.0)
         };
         let mut lines = vec![
@@ -283,7 +284,7 @@ impl Screen<'_> {
         lines
     }
 
-    /// Wall time to the event that the latest alert announced.
+    /// Returns the wall time to the event that the latest alert announced.
     fn countdown(&self, report: &IntervalReport, sim_time: f64) -> String {
         let warns = |level: Level| level.severity() > Severity::Ok && !level.has_happened();
         let ahead = report.alert.filter(|alert| alert.alert_level().is_some_and(warns) && alert.event_time > sim_time);
@@ -310,7 +311,7 @@ impl Screen<'_> {
     }
 }
 
-/// The publisher's own figures, in lines that fit a terminal of 80 columns.
+/// Returns the publisher's figures, in lines that fit a terminal of 80 columns.
 fn status_lines(status: &LoopStatus) -> [String; 2] {
     let us = |ns: u64| ns as f64 / 1000.0;
     [

@@ -1,4 +1,4 @@
-//! What `verify` says of a certificate of events.
+//! The report of `verify` on a certificate of events.
 
 use std::io::BufRead;
 
@@ -10,7 +10,7 @@ use serde_json::json;
 
 use super::super::{CommandError, Common, Output};
 
-/// What `--json` prints of a certificate that proves what it says.
+/// The line of `--json` for a valid certificate.
 #[derive(Serialize)]
 struct Verdict<'a> {
     verdict: &'static str,
@@ -19,7 +19,7 @@ struct Verdict<'a> {
     proved: &'a Proved,
 }
 
-/// Prints what a certificate proves, or why it proves nothing; `shown` is how sentences call the file.
+/// Prints what a certificate proves, or why it proves nothing; `shown` is the file's name in sentences.
 pub(super) fn print(common: &Common, shown: &str, checked: Result<Proved, Refused>) -> Result<(), CommandError> {
     let proved = match checked {
         Err(Refused::DoesNotFollow { line, problem }) if common.json => {
@@ -45,8 +45,8 @@ pub(super) fn print(common: &Common, shown: &str, checked: Result<Proved, Refuse
     output.finish()
 }
 
-/// Checks that a certificate proves something of the scene with this very text; `shown` is how sentences call the file.
-/// Returns a sentence for each kind of event.
+/// Checks that a certificate is of the scene with this text; `shown` is the file's name in sentences. Returns a
+/// sentence for each kind of event.
 pub fn proved_of(
     scene: &str,
     shown: &str,
@@ -61,7 +61,7 @@ pub fn proved_of(
     Ok(proved.results.iter().map(sentence).collect())
 }
 
-/// Why a certificate proves nothing.
+/// Returns the error for a refused certificate.
 fn refusal(shown: &str, refused: Refused) -> CommandError {
     let sentence = reason(shown, &refused);
     match refused {
@@ -70,7 +70,7 @@ fn refusal(shown: &str, refused: Refused) -> CommandError {
     }
 }
 
-/// The same in a sentence.
+/// Returns the sentence for a refused certificate.
 pub fn reason(shown: &str, refused: &Refused) -> String {
     match refused {
         Refused::DoesNotFollow { line, problem } => {
@@ -81,7 +81,7 @@ pub fn reason(shown: &str, refused: &Refused) -> String {
     }
 }
 
-/// What is proved of an event, in a sentence.
+/// Returns a sentence on what is proved of an event.
 fn sentence(outcome: &ProvedEvent) -> String {
     let event = match outcome.event {
         EventKind::Contact => "contact",
@@ -97,7 +97,7 @@ fn sentence(outcome: &ProvedEvent) -> String {
             format!("{event}: proved between {lo} and {hi}, when benches {a} and {b} (counting from 1) overlap")
         }
         (Status::Proved, Some(a), None) => {
-            format!("{event}: proved between {lo} and {hi}, when it is there at bench {} (counting from 1)", a + 1)
+            format!("{event}: proved between {lo} and {hi}, when it occurs at bench {} (counting from 1)", a + 1)
         }
         (Status::Proved, ..) => format!("{event}: proved between {lo} and {hi}"),
         (Status::None, ..) if outcome.time_lo.is_some() => {

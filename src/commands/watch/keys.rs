@@ -1,7 +1,7 @@
-//! The keys of `watch`: what a media player's keys do, done to the show.
+//! The keys of `watch`, as of a media player, applied to the show.
 //!
-//! In: keys, and the answers of a [`CommandClient`]. Out: lines for the screen. Nothing is sent without a key, and nothing
-//! here waits for an answer.
+//! In: keys, and the answers of a [`CommandClient`]. Out: lines for the screen. Nothing is sent without a key, and no call
+//! waits for an answer.
 
 use std::collections::VecDeque;
 use std::io;
@@ -21,61 +21,61 @@ use signal_hook::consts::{SIGCONT, SIGQUIT, SIGTSTP};
 use super::super::CommandError;
 use super::terminal::KeyMode;
 
-/// What `?` prints.
+/// The text of `?`.
 const HELP: &str = "Keys: space pauses and resumes; left and right seek 5 s; [ and ] halve and double the rate; \
                     . steps one period; h holds; r releases; ? lists the keys; q ends.";
-/// How often keys are looked for.
+/// The interval at which keys are polled.
 pub const KEY_INTERVAL: Duration = Duration::from_millis(20);
 /// Simulated seconds of one seek.
 const SEEK: f64 = 5.0;
-/// Keys that may wait for the answers to those before them.
+/// The greatest number of keys waiting for answers to earlier keys.
 const MOST_WAITING: usize = 16;
 
-/// What became of a key.
+/// The result of a key.
 #[derive(Debug, Clone, PartialEq)]
 pub enum KeyOutcome {
-    /// Words to keep.
+    /// A line that stays.
     Line(String),
-    /// How the show stands after a command.
+    /// The playback state after a command.
     Done(String),
-    /// The monitor is to end.
+    /// The monitor ends.
     Quit,
 }
 
-/// A keyboard that conducts the publisher of one name.
+/// A keyboard that commands the publisher of one name.
 pub struct Keyboard {
     mode: Option<KeyMode>,
     terminal_is_gone: bool,
     client: CommandClient<()>,
     answers: Receiver<ActionResult>,
     waiting: VecDeque<Action>,
-    /// Commands sent, holds aside, whose answer has not come: at most one, so that each key acts on what the one before
+    /// Commands without an answer, except holds: at most one, so that each key acts on the state that the one before
     /// it left.
     unanswered: usize,
-    /// Simulated seconds per second while the show plays, once it is known.
+    /// Simulated seconds per second while the show plays, if known.
     rate: Option<f64>,
-    /// Simulated seconds at which the show freezes, once it is known.
+    /// End of the show, simulated seconds; infinite while unknown.
     end: f64,
     suspend: Arc<AtomicBool>,
     resumed: Arc<AtomicBool>,
 }
 
 impl Keyboard {
-    /// Keys from standard input; `stop` is also set by the signal that would leave the terminal without an echo.
+    /// Reads keys from standard input; SIGQUIT, which would leave the terminal without an echo, also sets `stop`.
     ///
     /// # Errors
-    /// The system's, where it has no thread or signal handler left.
+    /// The system's, if no thread or signal handler is left.
     pub fn new(name: &str, stop: &Arc<AtomicBool>) -> Result<Self, CommandError> {
         let [suspend, resumed] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
         for (signal, flag) in [(SIGQUIT, stop), (SIGTSTP, &suspend), (SIGCONT, &resumed)] {
             signal_hook::flag::register(signal, Arc::clone(flag))?;
         }
-        // They too come to the thread of `stop_on_signals`.
+        // The thread of `stop_on_signals` receives them too.
         SigSet::from_iter([Signal::SIGQUIT, Signal::SIGTSTP, Signal::SIGCONT])
             .thread_block()
             .map_err(io::Error::from)?;
         let (sender, answers) = channel();
-        // Nobody waits for an answer any more where the keyboard has gone.
+        // Sending fails once the keyboard is dropped: no one needs the answer.
         let client = CommandClient::start(name, move |(), conducted| drop(sender.send(conducted)))?;
         let (waiting, unanswered, end) = (VecDeque::new(), 0, f64::INFINITY);
         let mode = KeyMode::enter();
@@ -93,7 +93,7 @@ impl Keyboard {
         })
     }
 
-    /// Takes in what the keys' commands depend on.
+    /// Applies an event on which the keys' commands depend.
     pub fn handle(&mut self, event: &FeedEvent<'_>) {
         match event {
             FeedEvent::Frame { header, .. } if header.time_scale > 0.0 && self.unanswered == 0 => {
@@ -105,14 +105,14 @@ impl Keyboard {
         }
     }
 
-    /// What has become of keys since the last call. Reads those that have been pressed.
+    /// Reads the pressed keys. Returns the results since the last call.
     pub fn poll(&mut self) -> Vec<KeyOutcome> {
         let mut outcomes = Vec::new();
         self.follow_job_control();
         match self.mode.as_mut().map(KeyMode::keys) {
             Some(Ok(keys)) => keys.into_iter().for_each(|key| outcomes.extend(self.press(key))),
             Some(Err(_)) => (self.mode, self.terminal_is_gone) = (None, true),
-            // In the background of its terminal: no signal comes when a shell brings it to the front.
+            // In the background of its terminal: a shell sends no signal when it brings the program to the front.
             None if !self.terminal_is_gone => self.mode = KeyMode::enter(),
             None => (),
         }
@@ -122,15 +122,15 @@ impl Keyboard {
         outcomes
     }
 
-    /// Gives the terminal back while this program is stopped (Ctrl-Z) or in the background.
+    /// Restores the terminal while this program is stopped (Ctrl-Z) or in the background.
     fn follow_job_control(&mut self) {
         if self.suspend.swap(false, Ordering::Relaxed) {
             self.mode = None;
-            // Without it the key would do nothing.
+            // Otherwise the key would do nothing.
             let _ = signal_hook::low_level::emulate_default_handler(SIGTSTP);
         }
         if self.resumed.swap(false, Ordering::Relaxed) {
-            // Whoever stopped it may have changed the settings: they are made anew.
+            // The shell may have changed the settings: set them again.
             self.mode = None;
         }
     }
@@ -157,7 +157,7 @@ impl Keyboard {
         let Some(rate) = self.rate else {
             return Some(KeyOutcome::Line("The rate is not known until the show plays.".to_owned()));
         };
-        // Keys pressed one after the other add up, answered or not.
+        // Consecutive keys add up, answered or not.
         self.rate = Some(rate * factor);
         self.request(Action::Send(Command::Rate(rate * factor)))
     }
@@ -165,7 +165,7 @@ impl Keyboard {
     fn request(&mut self, action: Action) -> Option<KeyOutcome> {
         let is_hold = action == Action::Send(Command::Hold);
         if is_hold {
-            // What was asked before it is not to be done after it.
+            // No earlier key may be executed after the hold.
             let dropped = self.waiting.drain(..).count();
             let line = match dropped {
                 0 => None,
@@ -202,7 +202,7 @@ impl Keyboard {
                 None => KeyOutcome::Done(standing(&response)),
                 Some(sentence) => {
                     if matches!(command, Command::Rate(_)) {
-                        // The rate that was asked for is not in force; the next frame has the one that is.
+                        // The requested rate is not in force; the next frame has the current one.
                         self.rate = None;
                     }
                     KeyOutcome::Line(sentence)
@@ -213,7 +213,7 @@ impl Keyboard {
         if self.unanswered == 0
             && let Some(action) = self.waiting.pop_front()
         {
-            // A client that awaits no answer has room.
+            // A conductor without pending requests has room.
             let _ = self.send(action);
         }
         outcome

@@ -1,9 +1,9 @@
-//! The terminal while keys are read: each key at once and without an echo, and as it was before on every way out.
+//! The terminal while keys are read: each key at once and without an echo. Every exit restores the settings.
 //!
-//! The rest of an incomplete sequence is not waited for: the display must continue.
+//! Reading never waits for the rest of an incomplete sequence: the display must continue.
 //!
-//! Signals of the terminal (Ctrl-C) and the end of lines stay as they are. Called by `watch`, and by the handler that
-//! ends the program where shared memory is full.
+//! Signals of the terminal (Ctrl-C) and ends of lines are unchanged. Called by `watch`, and by the handler that ends
+//! the program if shared memory is full.
 
 use std::io::{IsTerminal, stdin};
 use std::os::fd::AsFd;
@@ -17,26 +17,26 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::{LocalFlags, SetArg, SpecialCharacterIndices, Termios, tcgetattr, tcsetattr};
 use nix::unistd::{getpgrp, read, tcgetpgrp};
 
-/// How long the rest of a sequence may take: a terminal sends it in one piece, a network in a few.
+/// Longest wait for the rest of a sequence: a terminal sends it in one piece, a network in a few.
 const SEQUENCE_TIMEOUT: Duration = Duration::from_millis(100);
 
-/// The terminal's settings as they were at the start.
+/// The terminal's settings at the start.
 static BEFORE: OnceLock<libc::termios> = OnceLock::new();
-/// Whether they have been changed.
+/// True if they have been changed.
 static CHANGED: AtomicBool = AtomicBool::new(false);
 
-/// A terminal that hands over each key at once, until this is dropped.
+/// A terminal that delivers each key at once, until this value is dropped.
 pub struct KeyMode {
-    /// What has come and is no whole key yet, and when the latest of it came.
+    /// The bytes of an incomplete key, and the time of the latest.
     bytes: Vec<u8>,
     came: Instant,
 }
 
 impl KeyMode {
-    /// Changes the settings of standard input; `None` where that is no terminal, or where this program is in the
-    /// terminal's background, whose settings are another's then.
+    /// Changes the settings of standard input. Returns `None` if that is no terminal, or if this program is in its
+    /// background, where the settings belong to another program.
     pub fn enter() -> Option<Self> {
-        // A terminal that is not this program's own has no foreground that could be another's.
+        // Only the controlling terminal has a foreground group.
         let is_foreground = tcgetpgrp(stdin()).map_or(true, |group| group == getpgrp());
         if !stdin().is_terminal() || !is_foreground {
             return None;
@@ -51,7 +51,7 @@ impl KeyMode {
         Some(Self { bytes: Vec::new(), came: Instant::now() })
     }
 
-    /// The keys that have been pressed since the last call. Waits for none.
+    /// Returns the keys pressed since the last call, without waiting.
     ///
     /// # Errors
     /// The terminal has gone.
@@ -60,7 +60,7 @@ impl KeyMode {
         let mut ready = [PollFd::new(input.as_fd(), PollFlags::POLLIN)];
         let mut keys = Vec::new();
         let now = Instant::now();
-        // Before more is read: what comes now belongs to no sequence that is over.
+        // Before reading: new bytes belong to no sequence that has timed out.
         if now.duration_since(self.came) >= SEQUENCE_TIMEOUT {
             keys = self.take_keys(true);
         }
@@ -89,7 +89,7 @@ impl Drop for KeyMode {
     }
 }
 
-/// Gives the terminal its settings back. Calls nothing that a signal handler may not.
+/// Restores the terminal's settings. Async-signal-safe.
 pub fn restore() {
     if CHANGED.swap(false, Ordering::AcqRel)
         && let Some(before) = BEFORE.get()
