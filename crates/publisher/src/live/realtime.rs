@@ -15,8 +15,33 @@ use thread_priority::{ThreadPriority, ThreadPriorityValue};
 /// The real-time priorities that Linux has.
 pub const PRIORITIES: std::ops::RangeInclusive<u8> = 1..=99;
 
+/// The scheduling that is requested for the loop's thread.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Scheduling {
+    /// The priority under SCHED_FIFO, one of [`PRIORITIES`].
+    pub realtime: Option<u8>,
+    /// The CPU to stay on.
+    pub cpu: Option<usize>,
+    /// The longest wake-up latency of all CPUs, microseconds.
+    pub cpu_latency: Option<u32>,
+}
+
+impl Scheduling {
+    /// Requests the scheduling for the calling thread. The limit of the latency lasts until the returned file is closed.
+    ///
+    /// # Errors
+    /// [`CpuError`]. A right that the user does not have is a warning.
+    pub fn prepare_thread(self) -> Result<Option<File>, CpuError> {
+        let Self { realtime, cpu, cpu_latency } = self;
+        cpu.map(pin_to_cpu).transpose()?;
+        set_timer_slack();
+        realtime.into_iter().for_each(become_realtime);
+        Ok(cpu_latency.and_then(limit_cpu_latency))
+    }
+}
+
 /// Wakes this thread as precisely as timers can: Linux otherwise lets a wake-up slip by 50 microseconds.
-pub fn set_timer_slack() {
+fn set_timer_slack() {
     if let Err(error) = nix::sys::prctl::set_timerslack(1) {
         log::warn!("the timer slack could not be set ({error}): wake-ups will be some 50 microseconds later");
     }
@@ -26,7 +51,7 @@ pub fn set_timer_slack() {
 ///
 /// Without the right to either, a warning states how to get it. What is mapped later, the queues in shared memory among
 /// it, is not locked here: that would fill all of it, used or not.
-pub fn become_realtime(priority: u8) {
+fn become_realtime(priority: u8) {
     // Every priority of PRIORITIES is a valid value.
     let value = ThreadPriorityValue::try_from(priority).unwrap_or(ThreadPriorityValue::MIN);
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
@@ -52,7 +77,7 @@ const CPU_LATENCY_DEVICE: &str = "/dev/cpu_dma_latency";
 /// returned file is open. With 0 idle CPUs do not sleep at all. cyclictest does the same by default.
 ///
 /// Without the right to it, a warning states how to get it.
-pub fn limit_cpu_latency(microseconds: u32) -> Option<File> {
+fn limit_cpu_latency(microseconds: u32) -> Option<File> {
     // The device reads a signed 32-bit number; no CPU takes longer than what that holds.
     let limit = i32::try_from(microseconds).unwrap_or(i32::MAX);
     let opened = OpenOptions::new().write(true).open(CPU_LATENCY_DEVICE);
@@ -81,7 +106,7 @@ pub struct CpuError {
 ///
 /// # Errors
 /// [`CpuError`] where there is no such CPU, or the thread may not run on it.
-pub fn pin_to_cpu(cpu: usize) -> Result<(), CpuError> {
+fn pin_to_cpu(cpu: usize) -> Result<(), CpuError> {
     // The calling thread.
     let this = Pid::from_raw(0);
     let set = sched_getaffinity(this).unwrap_or_default();
