@@ -8,9 +8,9 @@ use anstyle::Style;
 use bench_dragon::client::clock::{SystemClock, realtime_ns};
 use bench_dragon::client::shared_memory::OpenError;
 use bench_dragon::messages::sentence::{Figures, alert_sentence, cue_sentence};
-use bench_dragon::publisher::live::control::Doors;
+use bench_dragon::publisher::live::control::CommandQueues;
 use bench_dragon::publisher::live::statistics::{RunSummary, Summary};
-use bench_dragon::publisher::live::{Announcement, Counts, Deliveries, End, FrameSource};
+use bench_dragon::publisher::live::{Announcement, End, FrameSource, LoopCounts, TransportCounters};
 use bench_dragon::publisher::run::{self, Hooks, Published, Publishing, RunError};
 use bench_dragon::publisher::transports::{self, Transport, TransportConfig, TransportError};
 
@@ -41,7 +41,7 @@ fn ros2_if_built(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>,
 }
 
 /// Opens the transports that `config` requests. Returns them with the loop's ends of their command queues.
-pub fn open_transports(config: &TransportConfig) -> Result<(Vec<Box<dyn Transport>>, Doors), CommandError> {
+pub fn open_transports(config: &TransportConfig) -> Result<(Vec<Box<dyn Transport>>, CommandQueues), CommandError> {
     Ok(run::open_transports(config, &TRANSPORTS)?)
 }
 
@@ -54,7 +54,7 @@ pub fn publish(
     benches: u32,
     publishing: &Publishing,
     source: &mut (dyn FrameSource + Send),
-    (transports, doors): (Vec<Box<dyn Transport>>, Doors),
+    (transports, doors): (Vec<Box<dyn Transport>>, CommandQueues),
     stop: &AtomicBool,
     hooks: Hooks,
 ) -> Result<Published, CommandError> {
@@ -89,7 +89,7 @@ fn announced(announcement: &Announcement, benches: u32) -> Option<String> {
 /// # Errors
 /// Standard output takes no more.
 pub fn print_summary(published: &Published, common: &Common) -> Result<(), CommandError> {
-    let Counts { frames, overruns, skipped, end } = published.counts;
+    let LoopCounts { frames, overruns, skipped, end } = published.counts;
     let Summary { wakeup_ns, step_ns, samples } = published.summary;
     let deliveries = published.deliveries.clone();
     let lost_samples = frames - samples;
@@ -119,7 +119,7 @@ pub fn print_summary(published: &Published, common: &Common) -> Result<(), Comma
                 us(of.max)
             ))?;
         }
-        for (name, Deliveries { frames, skipped, discarded }) in deliveries {
+        for (name, TransportCounters { frames, skipped, discarded }) in deliveries {
             output
                 .line(&format!("  {name}: {frames} frames sent, {skipped} skipped, {discarded} messages discarded."))?;
         }

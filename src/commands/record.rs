@@ -12,7 +12,7 @@ use bench_dragon::client::feed::{Feed, FeedEvent, FeedOptions, Frames};
 use bench_dragon::client::polling::Obstacle;
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::recording::mcap::recorder::{
-    Counts, DEFAULT_TOPICS, Recorded, Recorder, RecorderConfig, Split, create,
+    DEFAULT_TOPICS, Recorded, RecordedCounts, Recorder, RecorderConfig, Split, create,
 };
 use bench_dragon::recording::mcap::recover::{RecoverError, Recovered, check_magic, recover};
 use bench_dragon::recording::record::{self, RecordQueue, RecordThread};
@@ -168,7 +168,7 @@ fn progress(common: &Common) -> ProgressBar {
 
 /// How much has been recorded.
 fn sentence(recorded: &Recorded) -> String {
-    let Counts { messages, frames, missed, bytes, .. } = recorded.counts;
+    let RecordedCounts { messages, frames, missed, bytes, .. } = recorded.counts;
     if recorded.files.is_empty() {
         return "waiting for a publisher".to_owned();
     }
@@ -189,7 +189,7 @@ fn size(bytes: u64) -> String {
 fn print(common: &Common, recorded: &Recorded) -> Result<(), CommandError> {
     let mut output = Output::standard();
     let files: Vec<String> = recorded.files.iter().map(|file| file.display().to_string()).collect();
-    let Counts { messages, frames, missed, bytes, nanoseconds } = recorded.counts;
+    let RecordedCounts { messages, frames, missed, bytes, nanoseconds } = recorded.counts;
     if common.json {
         output.json(&Summary { files, messages, frames, missed, bytes, seconds: nanoseconds as f64 / 1e9 })?;
     } else if !files.is_empty() {

@@ -20,7 +20,7 @@ use bench_dragon_show::convert::Stamps;
 use bench_dragon_show::{Frame, Outcome};
 
 use bench_dragon_client::clock::{Clock, Deadlines};
-use control::Doors;
+use control::CommandQueues;
 use statistics::Sample;
 
 /// Nanoseconds between two calls of [`Publisher::maintain`].
@@ -179,7 +179,7 @@ pub enum End {
 /// What the loop counted. `frames + skipped` is the number of periods elapsed, but for those that brought nothing; where a
 /// publisher failed, those before the period in which it did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Counts {
+pub struct LoopCounts {
     /// Frames published.
     pub frames: u64,
     /// Incidents in which at least one period was skipped.
@@ -192,7 +192,7 @@ pub struct Counts {
 
 /// What a transport with a queue of its own has done with the frames of the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-pub struct Deliveries {
+pub struct TransportCounters {
     /// Frames sent.
     pub frames: u64,
     /// Frames left out because the transport was behind.
@@ -233,13 +233,13 @@ pub struct Reports {
 pub fn run_loop<C: Clock>(
     clock: &C,
     source: &mut dyn FrameSource,
-    doors: &mut Doors,
+    doors: &mut CommandQueues,
     publishers: &mut [Box<dyn Publisher>],
     options: LoopOptions,
     mut reports: Reports,
     stop: &AtomicBool,
-) -> Result<Counts, (Counts, PublishError)> {
-    let mut counts = Counts { frames: 0, overruns: 0, skipped: 0, end: End::Signal };
+) -> Result<LoopCounts, (LoopCounts, PublishError)> {
+    let mut counts = LoopCounts { frames: 0, overruns: 0, skipped: 0, end: End::Signal };
     let periods = options.periods.unwrap_or(u64::MAX);
     let deadlines = Deadlines::starting_at(clock.monotonic_ns(), options.rate);
     let mut maintenance_due_ns = 0;

@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use crate::live::{Counts, Deliveries, Outgoing, PublishError, Publisher, StatusPublisher};
+use crate::live::{LoopCounts, Outgoing, PublishError, Publisher, StatusPublisher, TransportCounters};
 use crate::transports::{Transport, TransportError};
 use bench_dragon_messages::control::{Code, Command, CommandRecord};
 use bench_dragon_messages::{LoopStatus, QUEUE_BYTES};
@@ -66,7 +66,7 @@ struct Shared {
     frames: AtomicU64,
     lost: AtomicU64,
     /// What the loop has counted, once it is over.
-    ended: Mutex<Option<Counts>>,
+    ended: Mutex<Option<LoopCounts>>,
     failure: Mutex<Option<String>>,
 }
 
@@ -121,7 +121,7 @@ pub fn open(file: &Path, show: ShowLine, handles: usize) -> Result<(Box<dyn Tran
 
 impl LogOutcome {
     /// Takes in what the loop has counted: the log's last lines. To be called before the transports are finished.
-    pub fn ended(&self, counts: Counts) {
+    pub fn ended(&self, counts: LoopCounts) {
         *self.0.ended.lock().unwrap_or_else(PoisonError::into_inner) = Some(counts);
     }
 
@@ -242,7 +242,7 @@ impl Transport for Log {
         Ok(Box::new(NoStatus))
     }
 
-    fn finish(self: Box<Self>) -> Option<(&'static str, Deliveries)> {
+    fn finish(self: Box<Self>) -> Option<(&'static str, TransportCounters)> {
         self.shared.stop.store(true, Ordering::Release);
         let began = Instant::now();
         while !self.thread.is_finished() && began.elapsed() < LONGEST_END {
@@ -253,7 +253,7 @@ impl Transport for Log {
             fail(&self.shared, sentence);
         }
         let [frames, skipped] = [&self.shared.frames, &self.shared.lost].map(|count| count.load(Ordering::Acquire));
-        Some(("log", Deliveries { frames, skipped, discarded: 0 }))
+        Some(("log", TransportCounters { frames, skipped, discarded: 0 }))
     }
 }
 

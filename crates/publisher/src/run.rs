@@ -10,11 +10,12 @@ use std::sync::mpsc;
 
 use bench_dragon_client::clock::Clock;
 
-use crate::live::control::{Doors, door};
+use crate::live::control::{CommandQueues, command_queue};
 use crate::live::realtime::{CpuError, Scheduling};
 use crate::live::statistics::{self, Inbox, Sample, Summary};
 use crate::live::{
-    Announcement, Counts, Deliveries, FrameSource, LoopOptions, PublishError, Publisher, StatusPublisher, run_loop,
+    Announcement, FrameSource, LoopCounts, LoopOptions, PublishError, Publisher, StatusPublisher, TransportCounters,
+    run_loop,
 };
 use crate::transports::{self, Transport, TransportConfig, TransportError};
 
@@ -42,16 +43,16 @@ pub enum RunError {
 pub fn open_transports(
     config: &TransportConfig,
     known: &[transports::Open],
-) -> Result<(Vec<Box<dyn Transport>>, Doors), TransportError> {
+) -> Result<(Vec<Box<dyn Transport>>, CommandQueues), TransportError> {
     let mut transports = transports::open(config, known)?;
     let mut ports = Vec::new();
     for transport in &mut transports {
-        let (port, outer) = door();
+        let (port, outer) = command_queue();
         if transport.control(outer)?.is_none() {
             ports.push(port);
         }
     }
-    Ok((transports, Doors::new(ports)))
+    Ok((transports, CommandQueues::new(ports)))
 }
 
 /// The settings of a publisher's run.
@@ -82,17 +83,17 @@ pub struct Hooks<'a> {
     /// Called with each sample, on the statistics thread.
     pub sample: Box<dyn FnMut(&Sample) + Send + 'a>,
     /// Called once the loop has ended, before the transports shut down.
-    pub ended: Box<dyn FnOnce(Counts) + 'a>,
+    pub ended: Box<dyn FnOnce(LoopCounts) + 'a>,
 }
 
 /// The result of a run.
 pub struct Published {
     /// The counts of the loop.
-    pub counts: Counts,
+    pub counts: LoopCounts,
     /// Lateness and step cost.
     pub summary: Summary,
     /// The counters of each transport with a queue, by the transport's name.
-    pub deliveries: BTreeMap<String, Deliveries>,
+    pub deliveries: BTreeMap<String, TransportCounters>,
     /// The transport's failure that ended the loop.
     pub error: Option<PublishError>,
 }
@@ -110,7 +111,7 @@ impl Publishing<'_> {
         clock: &C,
         source: &mut (dyn FrameSource + Send),
         transports: Vec<Box<dyn Transport>>,
-        mut doors: Doors,
+        mut doors: CommandQueues,
         stop: &AtomicBool,
         hooks: Hooks,
     ) -> Result<Published, RunError> {
@@ -277,9 +278,9 @@ mod tests {
             Ok(Box::new(Ends(self.log.clone())))
         }
 
-        fn finish(self: Box<Self>) -> Option<(&'static str, Deliveries)> {
+        fn finish(self: Box<Self>) -> Option<(&'static str, TransportCounters)> {
             self.log.lock().unwrap().push("finish");
-            Some(("fake", Deliveries { frames: 3, skipped: 0, discarded: 0 }))
+            Some(("fake", TransportCounters { frames: 3, skipped: 0, discarded: 0 }))
         }
     }
 
@@ -303,8 +304,14 @@ mod tests {
         let mut source = OneFrame(Frame::new(1), FrameMessages::default());
         let transport = FakeTransport { log: log.clone(), has_status };
         let stop = AtomicBool::new(false);
-        let published =
-            publishing.run(&SystemClock, &mut source, vec![Box::new(transport)], Doors::default(), &stop, hooks);
+        let published = publishing.run(
+            &SystemClock,
+            &mut source,
+            vec![Box::new(transport)],
+            CommandQueues::default(),
+            &stop,
+            hooks,
+        );
         (published, Arc::into_inner(log).unwrap().into_inner().unwrap())
     }
 

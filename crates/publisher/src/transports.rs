@@ -7,8 +7,8 @@
 pub mod background;
 pub mod iceoryx2;
 
-use crate::live::control::Door;
-use crate::live::{Deliveries, Publisher, StatusPublisher};
+use crate::live::control::CommandSender;
+use crate::live::{Publisher, StatusPublisher, TransportCounters};
 use bench_dragon_client::shared_memory::OpenError;
 use bench_dragon_messages::Stage;
 use bench_dragon_ros2_messages::settings::Ros2Settings;
@@ -116,12 +116,12 @@ pub trait Transport: Send {
     ///
     /// # Errors
     /// [`TransportError`]
-    fn control(&mut self, door: Door) -> Result<Option<Door>, TransportError> {
+    fn control(&mut self, door: CommandSender) -> Result<Option<CommandSender>, TransportError> {
         Ok(Some(door))
     }
 
     /// Takes leave once both ends are dropped: its name in the summary, and what it delivered, where it has a queue.
-    fn finish(self: Box<Self>) -> Option<(&'static str, Deliveries)>;
+    fn finish(self: Box<Self>) -> Option<(&'static str, TransportCounters)>;
 }
 
 /// Makes a transport; `None` where the scene does not request it.

@@ -23,8 +23,8 @@ use rustdds::{GUID, SampleIdentity, SequenceNumber};
 use super::Ros2Error;
 use super::matching::Matches;
 use bench_dragon_messages::control::{Code, Command};
-use bench_dragon_publisher::live::control::{Answer, Door, MOST_WAITING};
-use calls::{Conductor, Next, refusal, sentence};
+use bench_dragon_publisher::live::control::{Answer, CommandSender, MOST_WAITING};
+use calls::{Next, ServiceAdapter, refusal, sentence};
 use endpoints::{Client, Endpoints};
 pub use mapping::Mapping;
 use mapping::Request;
@@ -59,7 +59,7 @@ impl ControlThread {
         context: Context,
         matches: Matches,
         mapping: Mapping,
-        door: Door,
+        door: CommandSender,
     ) -> Result<Self, Ros2Error> {
         let stop = Arc::new(AtomicBool::new(false));
         let (opened, opening) = mpsc::channel();
@@ -114,19 +114,19 @@ struct Server {
     endpoints: Endpoints,
     matches: Matches,
     mapping: Mapping,
-    door: Door,
-    conductor: Conductor,
+    door: CommandSender,
+    adapter: ServiceAdapter,
     pending: Vec<Pending>,
 }
 
 impl Server {
-    fn new(endpoints: Endpoints, matches: Matches, mapping: Mapping, door: Door) -> Self {
+    fn new(endpoints: Endpoints, matches: Matches, mapping: Mapping, door: CommandSender) -> Self {
         Self {
             endpoints,
             matches,
             mapping,
             door,
-            conductor: Conductor::default(),
+            adapter: ServiceAdapter::default(),
             pending: Vec::with_capacity(MOST_PENDING),
         }
     }
@@ -171,8 +171,8 @@ impl Server {
             let of_process =
                 self.pending.iter().filter(|pending| pending.client.writer.prefix == writer.prefix).count();
             let progress = if of_process < MOST_CALLS {
-                match self.conductor.begin(call) {
-                    Next::Obey(command) => Progress::Waiting(command),
+                match self.adapter.begin(call) {
+                    Next::Execute(command) => Progress::Waiting(command),
                     Next::Answer(response) => Progress::Answered(response, Instant::now()),
                 }
             } else {
@@ -204,8 +204,8 @@ impl Server {
             if !matches!(outcome.code, Code::Done | Code::Already) {
                 self.endpoints.ports[pending.port].report_refusal(&sentence(command, &outcome));
             }
-            pending.progress = match self.conductor.proceed(pending.call, command, &outcome) {
-                Next::Obey(command) => Progress::Waiting(command),
+            pending.progress = match self.adapter.proceed(pending.call, command, &outcome) {
+                Next::Execute(command) => Progress::Waiting(command),
                 Next::Answer(response) => Progress::Answered(response, Instant::now()),
             };
         }

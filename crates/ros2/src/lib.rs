@@ -7,7 +7,7 @@ mod control;
 pub mod environment;
 mod matching;
 mod node;
-mod port;
+mod topic_writer;
 
 use std::net::{IpAddr, Ipv4Addr};
 
@@ -15,8 +15,8 @@ use ros2_client::Context;
 use rustdds::DomainParticipantBuilder;
 
 use bench_dragon_messages::Stage;
-use bench_dragon_publisher::live::control::Door;
-use bench_dragon_publisher::live::{Deliveries, Publisher, StatusPublisher};
+use bench_dragon_publisher::live::control::CommandSender;
+use bench_dragon_publisher::live::{Publisher, StatusPublisher, TransportCounters};
 use bench_dragon_ros2_messages::settings::Ros2Settings;
 
 use bench_dragon_publisher::transports::background::{
@@ -183,13 +183,13 @@ impl Transport for Ros2 {
         }
     }
 
-    fn control(&mut self, door: Door) -> Result<Option<Door>, TransportError> {
+    fn control(&mut self, door: CommandSender) -> Result<Option<CommandSender>, TransportError> {
         let Some((context, matches, mapping)) = self.services.take() else { return Ok(Some(door)) };
         self.control = Some(ControlThread::start(&self.name, context, matches, mapping, door)?);
         Ok(None)
     }
 
-    fn finish(mut self: Box<Self>) -> Option<(&'static str, Deliveries)> {
+    fn finish(mut self: Box<Self>) -> Option<(&'static str, TransportCounters)> {
         // Whoever holds the participant last takes leave of the network.
         drop((self.control.take(), self.services.take()));
         Some(("ros2", self.thread.finish()))

@@ -14,7 +14,7 @@ use super::observation::{Latencies, Observation};
 use super::plots::{Line, Scale, escaped, plot};
 use super::verdict::LimitCheck;
 use bench_dragon_drawing::palette::dark_rules;
-use bench_dragon_publisher::live::Deliveries;
+use bench_dragon_publisher::live::TransportCounters;
 use bench_dragon_publisher::live::statistics::RunSummary;
 
 /// The name of the report's JSON, whose schema is docs/soak-report.schema.json. A change that a reader of the former one
@@ -146,7 +146,7 @@ impl Report {
     /// A sentence for each transport of the publisher that counts what it delivers.
     fn deliveries(&self) -> impl Iterator<Item = String> {
         self.publisher.iter().flat_map(|summary| &summary.deliveries).map(
-            |(name, Deliveries { frames, skipped, discarded })| {
+            |(name, TransportCounters { frames, skipped, discarded })| {
                 format!("{name}: {frames} frames sent, {skipped} skipped, {discarded} messages discarded")
             },
         )

@@ -1,6 +1,6 @@
 //! The queues by which commands reach the loop and answers come back: one pair for each door, never blocking.
 //!
-//! [`ControlPort`] is the loop's end, [`Door`] that of a thread which takes commands from outside. The loop takes at most
+//! [`CommandReceiver`] is the loop's end, [`CommandSender`] that of a thread which takes commands from outside. The loop takes at most
 //! one command at the beginning of a period, so that each has an exact tick; the doors take turns.
 
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -22,20 +22,20 @@ struct Request {
 /// The answer to a command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Answer {
-    /// As [`Door::send`] returned it.
+    /// As [`CommandSender::send`] returned it.
     pub ticket: u64,
     /// What became of the command.
     pub outcome: Outcome,
 }
 
 /// The loop's end of a door's queues.
-pub struct ControlPort {
+pub struct CommandReceiver {
     requests: Consumer<Request>,
     answers: Producer<Answer>,
 }
 
 /// The outer end of a door's queues.
-pub struct Door {
+pub struct CommandSender {
     requests: Producer<Request>,
     answers: Consumer<Answer>,
     ticket: u64,
@@ -43,15 +43,15 @@ pub struct Door {
 }
 
 /// The queues of a door.
-pub fn door() -> (ControlPort, Door) {
+pub fn command_queue() -> (CommandReceiver, CommandSender) {
     let (requests, request_inbox) = RingBuffer::new(MOST_WAITING);
     // A door that takes no answers sends no more commands than there is room for their answers.
     let (answers, answer_inbox) = RingBuffer::new(MOST_WAITING);
-    let door = Door { requests, answers: answer_inbox, ticket: 0, waiting: 0 };
-    (ControlPort { requests: request_inbox, answers }, door)
+    let door = CommandSender { requests, answers: answer_inbox, ticket: 0, waiting: 0 };
+    (CommandReceiver { requests: request_inbox, answers }, door)
 }
 
-impl Door {
+impl CommandSender {
     /// Sends a command to the loop; the number of its answer.
     ///
     /// # Errors
@@ -82,17 +82,17 @@ impl Door {
 
 /// All doors of a loop.
 #[derive(Default)]
-pub struct Doors {
-    ports: Vec<ControlPort>,
+pub struct CommandQueues {
+    ports: Vec<CommandReceiver>,
     /// The door whose turn it is.
     next: usize,
     /// The door and the ticket of a step that is not over.
     step: Option<(usize, u64)>,
 }
 
-impl Doors {
+impl CommandQueues {
     /// The loop's ends of these doors.
-    pub fn new(ports: Vec<ControlPort>) -> Self {
+    pub fn new(ports: Vec<CommandReceiver>) -> Self {
         Self { ports, next: 0, step: None }
     }
 

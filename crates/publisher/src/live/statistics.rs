@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Announcement, Deliveries, End, StatusPublisher};
+use super::{Announcement, End, StatusPublisher, TransportCounters};
 use bench_dragon_client::clock::Clock;
 use bench_dragon_messages::LoopStatus;
 
@@ -66,7 +66,7 @@ pub struct RunSummary {
     pub end: End,
     /// What each transport with a queue of its own has delivered, by its name.
     #[serde(flatten)]
-    pub deliveries: BTreeMap<String, Deliveries>,
+    pub deliveries: BTreeMap<String, TransportCounters>,
 }
 
 /// The run that statistics are made of, and where they go.

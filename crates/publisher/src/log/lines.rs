@@ -1,6 +1,6 @@
 //! The lines of a log: JSON objects, each with a check over all bytes before it.
 //!
-//! [`Seal`] makes and tests the checks. A line whose check does not fit was not written so: it is damage or forgery and is
+//! [`HashChain`] makes and tests the checks. A line whose check does not fit was not written so: it is damage or forgery and is
 //! reported by its number, before anything is computed.
 
 use serde::{Deserialize, Serialize};
@@ -231,11 +231,11 @@ pub(super) fn code_of(name: &str) -> Option<Code> {
 
 /// The checks of a file, line by line.
 #[derive(Default)]
-pub struct Seal {
+pub struct HashChain {
     hasher: blake3::Hasher,
 }
 
-impl Seal {
+impl HashChain {
     /// The text of a line, its check and its end included.
     pub fn line(&mut self, line: &Line) -> String {
         // Structs of numbers and text: serde_json has no reason to refuse one.

@@ -11,7 +11,7 @@ use std::io::{BufRead, Read};
 
 use serde::Serialize;
 
-use super::lines::{FORMAT, Line, Seal, ShowLine};
+use super::lines::{FORMAT, HashChain, Line, ShowLine};
 use bench_dragon_motion::Method;
 use bench_dragon_motion::solve::table::Instructions;
 use bench_dragon_show::scene::{Accepted, Scene, printable};
@@ -99,7 +99,7 @@ const LONGEST_LINE: u64 = 1 << 26;
 /// # Errors
 /// [`VerifyError`]
 pub fn verify(log: impl BufRead, file: &str, progress: &mut dyn FnMut(u64)) -> Result<Verdict, VerifyError> {
-    let mut lines = Lines { log, seal: Seal::default(), number: 0, bytes: 0, cut: false };
+    let mut lines = Lines { log, chain: HashChain::default(), number: 0, bytes: 0, cut: false };
     let show = match lines.next()? {
         Some(Line::Show(show)) => *show,
         Some(_) => return Err(lines.error("expected the line of the show, {\"type\":\"show\",...}")),
@@ -172,7 +172,7 @@ fn accuracy_of(scene: &Scene) -> f64 {
 /// The lines of a file.
 struct Lines<R> {
     log: R,
-    seal: Seal,
+    chain: HashChain,
     /// The latest line, from 1.
     number: u64,
     bytes: u64,
@@ -204,7 +204,7 @@ impl<R: BufRead> Lines<R> {
         }
         let text =
             std::str::from_utf8(&bytes).map_err(|_| self.error("it is not UTF-8 text, expected a line of a log"))?;
-        let line = self.seal.read(text).map_err(|problem| self.error(&problem))?;
+        let line = self.chain.read(text).map_err(|problem| self.error(&problem))?;
         Ok(Some(line))
     }
 }

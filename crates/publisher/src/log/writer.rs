@@ -5,8 +5,8 @@
 use std::io::{self, Write};
 
 use super::hash::{FrameHasher, HANDLE_WORDS, HEADER_WORDS};
-use super::lines::{Line, Seal, SecondLine, ShowLine};
-use crate::live::Counts;
+use super::lines::{HashChain, Line, SecondLine, ShowLine};
+use crate::live::LoopCounts;
 use bench_dragon_messages::control::CommandRecord;
 
 /// Handles whose places stand in the line of a second: evenly spread, head and tail among them.
@@ -15,7 +15,7 @@ const SAMPLED_HANDLES: usize = 5;
 /// Writes a log. After a write has failed it writes nothing more.
 pub(super) struct LogWriter<W> {
     file: W,
-    seal: Seal,
+    chain: HashChain,
     failure: Option<io::Error>,
     /// Whether a write has failed.
     failed: bool,
@@ -62,7 +62,7 @@ impl<W: Write> LogWriter<W> {
     pub fn new(file: W, show: ShowLine) -> Self {
         let mut writer = Self {
             file,
-            seal: Seal::default(),
+            chain: HashChain::default(),
             failure: None,
             failed: false,
             rate: show.rate,
@@ -130,7 +130,7 @@ impl<W: Write> LogWriter<W> {
     }
 
     /// The end of a run of which the loop has counted this.
-    pub fn end(&mut self, run: &Counts) {
+    pub fn end(&mut self, run: &LoopCounts) {
         // Periods may have passed between the last frame and the end.
         self.arrive(run.frames + run.skipped);
         self.close_second();
@@ -175,7 +175,7 @@ impl<W: Write> LogWriter<W> {
         if self.failed {
             return;
         }
-        let text = self.seal.line(line);
+        let text = self.chain.line(line);
         if let Err(error) = self.file.write_all(text.as_bytes()) {
             (self.failed, self.failure) = (true, Some(error));
         }

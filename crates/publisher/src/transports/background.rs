@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use crate::live::{Deliveries, Outgoing, PublishError, Publisher, StatusPublisher};
+use crate::live::{Outgoing, PublishError, Publisher, StatusPublisher, TransportCounters};
 use bench_dragon_client::clock::{Clock, SystemClock, monotonic_ns};
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, QUEUE_BYTES};
 use bench_dragon_show::convert::handle_poses;
@@ -34,7 +34,7 @@ const LONGEST_SLEEP_NS: u64 = 50_000_000;
 /// What a transport does with what comes, on the thread. It is made there and dropped there.
 pub trait Sink {
     /// Does what is due besides sending: before each frame, and every 50 ms at least.
-    fn attend(&mut self) {}
+    fn service(&mut self) {}
 
     /// Sends a frame.
     fn frame(&mut self, header: &FrameHeader, handles: &[HandlePose]);
@@ -228,7 +228,7 @@ impl<S: Sink> Worker<S> {
     pub fn send(&mut self, clock: &impl Clock) -> u64 {
         let mut deadline_ns = None;
         loop {
-            self.send_seldom();
+            self.send_events();
             let Some(sent_ns) = self.send_frame() else { break };
             deadline_ns = Some(sent_ns);
         }
@@ -242,9 +242,9 @@ impl<S: Sink> Worker<S> {
     }
 
     /// Does what is due besides frames, and sends what comes seldom.
-    fn send_seldom(&mut self) {
+    fn send_events(&mut self) {
         let Self { sink, inbox, .. } = self;
-        sink.attend();
+        sink.service();
         while let Ok(alert) = inbox.alerts.pop() {
             sink.alert(alert);
         }
@@ -278,16 +278,16 @@ impl<S: Sink> Worker<S> {
     }
 
     /// What has been done with the frames of the loop so far.
-    pub fn deliveries(&self) -> Deliveries {
-        self.inbox.shared.deliveries()
+    pub fn counters(&self) -> TransportCounters {
+        self.inbox.shared.counters()
     }
 }
 
 impl Shared {
-    fn deliveries(&self) -> Deliveries {
+    fn counters(&self) -> TransportCounters {
         let [rejected, frames, skipped, discarded] =
             [&self.rejected, &self.frames, &self.skipped, &self.discarded].map(|count| count.load(Ordering::Relaxed));
-        Deliveries { frames, skipped: skipped + rejected, discarded }
+        TransportCounters { frames, skipped: skipped + rejected, discarded }
     }
 }
 
@@ -343,9 +343,9 @@ impl StatusPublisher for BackgroundStatus {
 
 impl BackgroundThread {
     /// Ends the thread once it has sent what is queued; what it has done.
-    pub fn finish(mut self) -> Deliveries {
+    pub fn finish(mut self) -> TransportCounters {
         self.join();
-        self.shared.deliveries()
+        self.shared.counters()
     }
 
     fn join(&mut self) {

@@ -29,8 +29,8 @@ use bench_dragon_client::shared_memory::{
 };
 
 use super::{Transport, TransportConfig, TransportError};
-use crate::live::control::Door;
-use crate::live::{Deliveries, Outgoing, PublishError, Publisher, StatusPublisher};
+use crate::live::control::CommandSender;
+use crate::live::{Outgoing, PublishError, Publisher, StatusPublisher, TransportCounters};
 use bench_dragon_messages::{CollisionAlert, Cue, HandlePose, HandlePose32, LoopStatus, Stage};
 use bench_dragon_show::convert::{Decimation, handle_pose, handle_pose_32, handle_poses};
 use bench_dragon_show::scene::SinglePrecision;
@@ -137,12 +137,12 @@ impl Transport for Iceoryx2 {
         Ok(Box::new(StatusSender::open(&self.config.name, self.config.subscribers)?))
     }
 
-    fn control(&mut self, door: Door) -> Result<Option<Door>, TransportError> {
+    fn control(&mut self, door: CommandSender) -> Result<Option<CommandSender>, TransportError> {
         self.control = Some(control::ControlThread::start(&self.config.name, door)?);
         Ok(None)
     }
 
-    fn finish(self: Box<Self>) -> Option<(&'static str, Deliveries)> {
+    fn finish(self: Box<Self>) -> Option<(&'static str, TransportCounters)> {
         None
     }
 }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use super::file::McapFile;
 use super::messages::Messages;
-use super::run::{Run, Seldom};
+use super::run::{Event, Run};
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
 use bench_dragon_ros2_messages::settings::Topic;
 
@@ -57,12 +57,12 @@ pub struct Recorded {
     /// The files, in the order of time.
     pub files: Vec<PathBuf>,
     /// How much is in them.
-    pub counts: Counts,
+    pub counts: RecordedCounts,
 }
 
 /// How much has been recorded.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Counts {
+pub struct RecordedCounts {
     /// Messages of all topics.
     pub messages: u64,
     /// Frames of which there is a message.
@@ -90,7 +90,7 @@ pub struct Recorder {
     /// The first file until the first frame; whether it is to be removed if there is none.
     first: Option<(File, bool)>,
     run: Option<Run>,
-    early: Vec<Seldom>,
+    early: Vec<Event>,
     recorded: Recorded,
     /// Bytes of the files that are finished.
     finished_bytes: u64,
@@ -158,7 +158,7 @@ impl Recorder {
     /// # Errors
     /// As [`Recorder::frame`].
     pub fn stage(&mut self, stage: &Stage) -> Result<(), RecordError> {
-        self.seldom(Seldom::Stage(Box::new(*stage)))
+        self.event(Event::Stage(Box::new(*stage)))
     }
 
     /// An alert.
@@ -166,7 +166,7 @@ impl Recorder {
     /// # Errors
     /// As [`Recorder::frame`].
     pub fn alert(&mut self, alert: &CollisionAlert) -> Result<(), RecordError> {
-        self.seldom(Seldom::Alert(*alert))
+        self.event(Event::Alert(*alert))
     }
 
     /// A cue.
@@ -174,7 +174,7 @@ impl Recorder {
     /// # Errors
     /// As [`Recorder::frame`].
     pub fn cue(&mut self, cue: &Cue) -> Result<(), RecordError> {
-        self.seldom(Seldom::Cue(*cue))
+        self.event(Event::Cue(*cue))
     }
 
     /// A status.
@@ -182,7 +182,7 @@ impl Recorder {
     /// # Errors
     /// As [`Recorder::frame`].
     pub fn status(&mut self, status: &LoopStatus) -> Result<(), RecordError> {
-        self.seldom(Seldom::Status(*status))
+        self.event(Event::Status(*status))
     }
 
     /// Does what is due. To be called several times a second.
@@ -236,7 +236,7 @@ impl Recorder {
         self.run = Some(Run::new(file, frame));
         for early in std::mem::take(&mut self.early) {
             if early.run_id() == frame.run_id {
-                self.seldom(early)?;
+                self.event(early)?;
             }
         }
         Ok(())
@@ -245,13 +245,13 @@ impl Recorder {
     /// Goes on in another file, which begins with what a subscriber that joins now would get.
     fn next_file(&mut self, frame: &FrameHeader) -> Result<(), RecordError> {
         let Some(run) = &self.run else { return Ok(()) };
-        let Run { status, diagnosed, seldom, latest_deadline_ns, .. } = *run;
-        let stage = run.stage.clone().map(Seldom::Stage);
-        let held = [stage, run.alert.map(Seldom::Alert), run.cue.map(Seldom::Cue)];
+        let Run { status, diagnosed, events, latest_deadline_ns, .. } = *run;
+        let stage = run.stage.clone().map(Event::Stage);
+        let held = [stage, run.alert.map(Event::Alert), run.cue.map(Event::Cue)];
         self.finish_run()?;
         let file = self.make_file()?;
-        self.run = Some(Run { latest_deadline_ns, status, diagnosed, seldom, ..Run::new(file, frame) });
-        held.into_iter().flatten().try_for_each(|held| self.seldom(held))
+        self.run = Some(Run { latest_deadline_ns, status, diagnosed, events, ..Run::new(file, frame) });
+        held.into_iter().flatten().try_for_each(|held| self.event(held))
     }
 
     /// The next file, emptied where it was there.
@@ -280,7 +280,7 @@ impl Recorder {
     }
 
     /// A message that is not sent with every frame.
-    fn seldom(&mut self, message: Seldom) -> Result<(), RecordError> {
+    fn event(&mut self, message: Event) -> Result<(), RecordError> {
         let Some(run) = self.run.as_mut().filter(|run| run.run_id == message.run_id()) else {
             // Without frames there is nothing to keep it with.
             if self.early.len() < MOST_EARLY {
@@ -289,22 +289,22 @@ impl Recorder {
             return Ok(());
         };
         let log_time = run.log_time(&message);
-        let sequence = run.seldom;
-        run.seldom = sequence.wrapping_add(1);
+        let sequence = run.events;
+        run.events = sequence.wrapping_add(1);
         match message {
-            Seldom::Stage(stage) => {
+            Event::Stage(stage) => {
                 self.messages.stage(sequence, &stage);
                 run.stage = Some(stage);
             }
-            Seldom::Alert(alert) => {
+            Event::Alert(alert) => {
                 run.alert = Some(alert);
                 self.messages.alert(sequence, alert);
             }
-            Seldom::Cue(cue) => {
+            Event::Cue(cue) => {
                 run.cue = Some(cue);
                 self.messages.cue(sequence, cue);
             }
-            Seldom::Status(status) => {
+            Event::Status(status) => {
                 run.status = Some(status);
                 let before = run.diagnosed.replace(status).unwrap_or(status);
                 self.messages.status(sequence, &status, run.alert.as_ref(), &before);

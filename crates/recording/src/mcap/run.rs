@@ -14,14 +14,14 @@ const ATTACHMENT: &str = "bench_dragon.json";
 
 /// A message that is not sent with every frame.
 #[derive(Debug, Clone)]
-pub(super) enum Seldom {
+pub(super) enum Event {
     Stage(Box<Stage>),
     Alert(CollisionAlert),
     Cue(Cue),
     Status(LoopStatus),
 }
 
-impl Seldom {
+impl Event {
     /// The run that it belongs to.
     pub fn run_id(&self) -> u64 {
         match self {
@@ -63,7 +63,7 @@ pub(super) struct Run {
     /// known what was before.
     pub diagnosed: Option<LoopStatus>,
     /// Messages so far of what is not sent with every frame.
-    pub seldom: u32,
+    pub events: u32,
 }
 
 impl Run {
@@ -82,14 +82,14 @@ impl Run {
             cue: None,
             status: None,
             diagnosed: (frame.sequence == 0).then(LoopStatus::default),
-            seldom: 0,
+            events: 0,
         }
     }
 
     /// When a message is logged: at its own time, but not before the file's first frame where it goes with that or an
     /// earlier one. What a late subscriber got was true before, and would leave a gap. Ticks tell, since a clock can be set
     /// back.
-    pub fn log_time(&self, message: &Seldom) -> u64 {
+    pub fn log_time(&self, message: &Event) -> u64 {
         let ((stamp_ns, tick), began) = (message.stamp(), self.file_began_stamp_ns);
         match tick.cmp(&self.file_began_tick) {
             Ordering::Less => began,

@@ -1,6 +1,6 @@
 //! From a service call to commands of the show, and from how those were answered to the response.
 //!
-//! Pure: [`Conductor`] gives the next thing to do for a call. Called by the control thread.
+//! Pure: [`ServiceAdapter`] gives the next thing to do for a call. Called by the control thread.
 
 use super::services::{Call, CallResult, Features, Response, result, scope, state};
 use bench_dragon_messages::control::{Code, Command, RATES};
@@ -11,7 +11,7 @@ use bench_dragon_show::Outcome;
 #[derive(Debug, Clone, PartialEq)]
 pub enum Next {
     /// Have the loop obey this, and come back with its answer.
-    Obey(Command),
+    Execute(Command),
     /// Send this.
     Answer(Response),
 }
@@ -22,12 +22,12 @@ const HELD: &str = "the show is held: only hold, release and state queries are o
 /// Turns calls into commands. It remembers what the standard distinguishes and the show does not: whether a pause is one
 /// in which the simulation counts as stopped.
 #[derive(Debug, Default)]
-pub struct Conductor {
+pub struct ServiceAdapter {
     /// Where a paused show was left by the last reset, in simulated seconds.
     stopped_at: Option<f64>,
 }
 
-impl Conductor {
+impl ServiceAdapter {
     /// What a call begins with.
     pub fn begin(&self, call: Call) -> Next {
         let command = match call {
@@ -68,7 +68,7 @@ impl Conductor {
             Call::Release => Command::Release,
             Call::Go => Command::Go,
         };
-        Next::Obey(command)
+        Next::Execute(command)
     }
 
     /// What follows once a command of this call has been answered.
@@ -82,7 +82,7 @@ impl Conductor {
         Next::Answer(match (call, command) {
             (Call::GetState, _) => Response::State(simulation_state(outcome.playback, stopped), done()),
             (Call::SetState(state::STOPPED), Command::Pause) if succeeded && !stopped => {
-                return Next::Obey(Command::Restart);
+                return Next::Execute(Command::Restart);
             }
             (Call::SetState(state::STOPPED), Command::Restart) if succeeded && !paused => {
                 failure(result::STATE_TRANSITION_ERROR, "another client resumed the show meanwhile")
@@ -105,7 +105,7 @@ impl Conductor {
             },
             (Call::SetState(_) | Call::Reset(_) | Call::Step(_), _) => Response::Result(done()),
             (Call::TogglePaused, Command::State) => {
-                return Next::Obey(if stands_still(outcome.playback) { Command::Resume } else { Command::Pause });
+                return Next::Execute(if stands_still(outcome.playback) { Command::Resume } else { Command::Pause });
             }
             (Call::IsPaused, _) => Response::Flag(stands_still(outcome.playback)),
             (Call::GetRate, _) => Response::Rate(outcome.playing_rate),

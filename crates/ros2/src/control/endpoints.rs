@@ -79,7 +79,7 @@ impl SerializerAdapter<Vec<u8>> for AsTheyAre {
 }
 
 /// The ends of one service.
-pub(super) struct Port {
+pub(super) struct ServiceEndpoint {
     pub(super) service: &'static Service,
     pub(super) requests: Subscription<Raw>,
     pub(super) requests_guid: GUID,
@@ -99,7 +99,7 @@ struct Reported {
 
 /// All services, and the node that they belong to.
 pub(super) struct Endpoints {
-    pub(super) ports: Vec<Port>,
+    pub(super) ports: Vec<ServiceEndpoint>,
     // Dropped after the ports: they belong to it.
     _node: Node,
 }
@@ -124,7 +124,14 @@ impl Endpoints {
             let responses: DataWriter<_, _> =
                 publisher.create_datawriter_no_key(&responses, None).map_err(|error| failed(&error))?;
             let (requests_guid, responses_guid) = (requests.guid(), responses.guid());
-            Ok(Port { service, requests, requests_guid, responses_guid, responses, reported: Reported::default() })
+            Ok(ServiceEndpoint {
+                service,
+                requests,
+                requests_guid,
+                responses_guid,
+                responses,
+                reported: Reported::default(),
+            })
         };
         let ports = SERVICES.iter().map(&mut open).collect::<Result<_, Ros2Error>>()?;
         Ok(Self { ports, _node: node })
@@ -153,7 +160,7 @@ pub(super) struct Client {
     pub(super) reader: Option<GUID>,
 }
 
-impl Port {
+impl ServiceEndpoint {
     /// Sends a response.
     pub(super) fn answer(&mut self, client: &Client, response: &Response) {
         let mut bytes = client.header.clone();

@@ -5,7 +5,7 @@
 use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
 
-use crate::live::{Counts, End};
+use crate::live::{End, LoopCounts};
 use bench_dragon_messages::{LoopStatus, SceneName};
 
 /// The longest lateness and step cost that a histogram distinguishes: an hour.
@@ -28,7 +28,7 @@ pub struct Sample {
     /// Unsolved frames so far.
     pub unsolved_frames: u64,
     /// What was counted so far, this frame included.
-    pub counts: Counts,
+    pub counts: LoopCounts,
     /// How late the thread woke after the intended deadline.
     pub lateness_ns: u64,
     /// From waking to the frame's being published everywhere.
@@ -45,7 +45,7 @@ impl Sample {
         shows_played: 0,
         unforeseen_contacts: 0,
         unsolved_frames: 0,
-        counts: Counts { frames: 0, overruns: 0, skipped: 0, end: End::Signal },
+        counts: LoopCounts { frames: 0, overruns: 0, skipped: 0, end: End::Signal },
         lateness_ns: 0,
         step_ns: 0,
         subscribers: 0,
@@ -106,7 +106,7 @@ impl Durations {
         Self { lateness: histogram(), step: histogram() }
     }
 
-    /// Counts a sample. A late wake-up delays every period it covers, and each counts with what was left of it:
+    /// Records a sample. A late wake-up delays every period it covers, and each counts with what was left of it:
     /// HdrHistogram's correction for coordinated omission. Where it covers very many, neighbours share an entry, so that
     /// an hour's stop does not hold the thread up.
     pub fn record(&mut self, sample: &Sample, period_ns: u64) {
@@ -159,7 +159,7 @@ impl Accumulator {
         }
     }
 
-    /// Counts a frame.
+    /// Records a sample.
     pub fn record(&mut self, sample: &Sample) {
         let period_ns = (1e9 / self.rate) as u64;
         self.total.record(sample, period_ns);

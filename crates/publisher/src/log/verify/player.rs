@@ -28,9 +28,9 @@ pub(super) struct Player {
     hashed: Option<(u64, u64)>,
     latest: Sample,
     difference: Option<Difference>,
-    counts: Counts,
+    counts: VerifiedCounts,
     /// Of the counts, what no hash has been compared with yet.
-    uncompared: Counts,
+    uncompared: VerifiedCounts,
 }
 
 /// The latest frame, as far as the line of a second has it.
@@ -42,7 +42,7 @@ struct Sample {
 }
 
 #[derive(Default)]
-struct Counts {
+struct VerifiedCounts {
     seconds: u64,
     same_seconds: u64,
     frames: u64,
@@ -96,8 +96,8 @@ impl Player {
             hashed: None,
             latest: Sample::default(),
             difference: None,
-            counts: Counts::default(),
-            uncompared: Counts::default(),
+            counts: VerifiedCounts::default(),
+            uncompared: VerifiedCounts::default(),
         })
     }
 
@@ -152,7 +152,7 @@ impl Player {
                 if let Some((from, _)) = self.hashed {
                     return Err(format!("the frames from tick {from} on have no hash"));
                 }
-                let Counts { frames: played, skipped: passed, lost: missing, .. } = self.counts;
+                let VerifiedCounts { frames: played, skipped: passed, lost: missing, .. } = self.counts;
                 if (*frames, *skipped, *lost) != (played, passed, missing) {
                     return Err(format!(
                         "{frames} frames, {skipped} periods skipped, {lost} frames lost, expected {played}, {passed}, \
@@ -167,7 +167,7 @@ impl Player {
 
     /// What was found.
     pub fn verdict(self, show: &ShowLine, complete: bool, cut: bool) -> Verdict {
-        let Counts { seconds, same_seconds, skipped, lost, last_tick, .. } = self.counts;
+        let VerifiedCounts { seconds, same_seconds, skipped, lost, last_tick, .. } = self.counts;
         let frames = self.counts.frames - self.uncompared.frames;
         let commands = self.counts.commands - self.uncompared.commands;
         let verdict = match &self.difference {
@@ -279,7 +279,7 @@ impl Player {
         self.counts.seconds += 1;
         // Commands of the tick that comes next have no frame yet.
         let commands = self.announced.iter().filter(|line| matches!(line, Line::Command { .. })).count() as u64;
-        self.uncompared = Counts { commands, ..Counts::default() };
+        self.uncompared = VerifiedCounts { commands, ..VerifiedCounts::default() };
         let (hash, sample) = (self.hasher.take(), &self.latest);
         let (same_hash, same_sample) = (hash == line.hash, sample.is(line));
         if same_hash && same_sample {

@@ -19,7 +19,7 @@ use ::iceoryx2::service::builder::request_response::{
 use ::iceoryx2::service::port_factory::server::ServerCreateError;
 
 use super::{SPARE_NODES, node, retry_while_incomplete, service_name};
-use crate::live::control::{Answer, Door, MOST_WAITING};
+use crate::live::control::{Answer, CommandSender, MOST_WAITING};
 use bench_dragon_client::shared_memory::{OpenError, failed, incomplete};
 use bench_dragon_messages::control::{Code, Command};
 use bench_dragon_messages::state::PlaybackState;
@@ -55,7 +55,7 @@ impl ControlThread {
     ///
     /// # Errors
     /// [`OpenError`]
-    pub(super) fn start(name: &str, door: Door) -> Result<Self, OpenError> {
+    pub(super) fn start(name: &str, door: CommandSender) -> Result<Self, OpenError> {
         let stop = Arc::new(AtomicBool::new(false));
         let (opened, opening) = mpsc::channel();
         let thread = {
@@ -119,7 +119,11 @@ fn open(name: &str) -> Result<Opened, OpenError> {
     Ok((node, server))
 }
 
-fn serve(server: &Server<ipc::Service, ControlRequest, (), ControlResponse, ()>, mut door: Door, stop: &AtomicBool) {
+fn serve(
+    server: &Server<ipc::Service, ControlRequest, (), ControlResponse, ()>,
+    mut door: CommandSender,
+    stop: &AtomicBool,
+) {
     let mut pending: Vec<Pending> = Vec::with_capacity(MOST_WAITING);
     while !stop.load(Ordering::Acquire) {
         // Bounded, so that a client which floods the door does not keep answers back.
@@ -149,7 +153,7 @@ fn serve(server: &Server<ipc::Service, ControlRequest, (), ControlResponse, ()>,
 }
 
 /// Passes a request on to the loop. One that cannot be understood is answered with how the show stands.
-fn pass_on(door: &mut Door, request: Request) -> Option<Pending> {
+fn pass_on(door: &mut CommandSender, request: Request) -> Option<Pending> {
     let ControlRequest { value, command, .. } = *request.payload();
     let (command, instead) = match Command::of_number(command, value) {
         Ok(command) => (command, None),

@@ -32,10 +32,10 @@ const REPETITION_TIME: Duration = Duration::from_millis(1500);
 /// More bytes than a message has besides its handles.
 pub(super) const HEADER_BYTES: usize = 200;
 /// More bytes than any message has that is not of every frame; the largest of them is the stage.
-pub(super) const SELDOM_BYTES: usize = HEADER_BYTES + size_of::<Stage>();
+pub(super) const EVENT_BYTES: usize = HEADER_BYTES + size_of::<Stage>();
 
 /// A publisher of one topic.
-pub(super) struct Port<Message: Serialize> {
+pub(super) struct TopicWriter<Message: Serialize> {
     publisher: Publisher<Arc<Message>>,
     dds: rustdds::Topic,
     topic: String,
@@ -70,7 +70,7 @@ impl<Message> Latched<Message> {
     };
 }
 
-impl<Message: Serialize> Port<Message> {
+impl<Message: Serialize> TopicWriter<Message> {
     /// A publisher of this message, which is changed before each time it is sent.
     pub(super) fn stream(self, message: Message) -> Stream<Message> {
         Stream { port: self, message: Arc::new(message) }
@@ -123,14 +123,14 @@ impl<Message: Serialize> Port<Message> {
 }
 
 /// A publisher that knows what late subscribers are to get.
-pub(super) trait Attend {
+pub(super) trait Serviced {
     /// Sends what is held where somebody asks for it, and forgets what was sent when the last subscriber has left. To be
     /// called often.
-    fn attend(&mut self, matches: &Matches, node: &mut Node);
+    fn service(&mut self, matches: &Matches, node: &mut Node);
 }
 
-impl<Message: Serialize> Attend for Port<Message> {
-    fn attend(&mut self, matches: &Matches, node: &mut Node) {
+impl<Message: Serialize> Serviced for TopicWriter<Message> {
+    fn service(&mut self, matches: &Matches, node: &mut Node) {
         let Some(latched) = &mut self.latched else { return };
         let readers = matches.readers(self.publisher.guid());
         if !readers.any() {
@@ -158,15 +158,15 @@ impl<Message: Serialize> Attend for Port<Message> {
     }
 }
 
-impl<Message: Serialize> Attend for Stream<Message> {
-    fn attend(&mut self, matches: &Matches, node: &mut Node) {
-        self.port.attend(matches, node);
+impl<Message: Serialize> Serviced for Stream<Message> {
+    fn service(&mut self, matches: &Matches, node: &mut Node) {
+        self.port.service(matches, node);
     }
 }
 
 /// A publisher whose message is changed from frame to frame, so that its memory is used again.
 pub(super) struct Stream<Message: Serialize> {
-    port: Port<Message>,
+    port: TopicWriter<Message>,
     message: Arc<Message>,
 }
 
@@ -178,14 +178,14 @@ impl<Message: Serialize + Clone> Stream<Message> {
 }
 
 /// Makes the publishers of one node.
-pub(super) struct Maker<'a> {
+pub(super) struct WriterFactory<'a> {
     pub(super) context: Context,
     pub(super) node: Node,
     pub(super) config: &'a Ros2Config,
 }
 
-impl Maker<'_> {
-    /// As [`Maker::port`], for what is sent with every frame: `each` bytes a handle, `message` being filled later.
+impl WriterFactory<'_> {
+    /// As [`WriterFactory::port`], for what is sent with every frame: `each` bytes a handle, `message` being filled later.
     pub(super) fn stream<Message: Serialize>(
         &mut self,
         topic: Topic,
@@ -203,7 +203,7 @@ impl Maker<'_> {
         topic: Topic,
         bytes: usize,
         rate: f64,
-    ) -> Result<Option<Port<Message>>, Ros2Error> {
+    ) -> Result<Option<TopicWriter<Message>>, Ros2Error> {
         let Some(qos) = self.config.settings.topics.get(&topic) else { return Ok(None) };
         let name = topic.path(&self.config.name);
         let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(format!("topic {name}: {error}"));
@@ -214,7 +214,7 @@ impl Maker<'_> {
             .map_err(|error| failed(&error))?;
         let publisher = self.node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
         let latched = (qos.durability == Durability::TransientLocal).then_some(Latched::NOTHING);
-        Ok(Some(Port { publisher, dds, topic: name, reported: false, latched }))
+        Ok(Some(TopicWriter { publisher, dds, topic: name, reported: false, latched }))
     }
 }
 
