@@ -1,5 +1,5 @@
-//! What the operating system can do for a thread with deadlines: timer slack, real-time priority, locked memory, a CPU
-//! of its own, CPUs that stay awake. Called by the commands, once, on the loop's thread, before the loop.
+//! Settings of the operating system for a thread with deadlines: timer slack, real-time priority, locked memory, a fixed CPU,
+//! CPUs that stay awake. Called once on the loop's thread, before the loop.
 
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -40,7 +40,7 @@ impl Scheduling {
     }
 }
 
-/// Wakes this thread as precisely as timers can: Linux otherwise lets a wake-up slip by 50 microseconds.
+/// Sets the least timer slack. Linux may otherwise delay a wake-up by 50 microseconds.
 fn set_timer_slack() {
     if let Err(error) = nix::sys::prctl::set_timerslack(1) {
         log::warn!("the timer slack could not be set ({error}): wake-ups will be some 50 microseconds later");
@@ -49,8 +49,8 @@ fn set_timer_slack() {
 
 /// Gives this thread the real-time priority `priority` under SCHED_FIFO and locks the memory the process has so far.
 ///
-/// Without the right to either, a warning states how to get it. What is mapped later, the queues in shared memory among
-/// it, is not locked here: that would fill all of it, used or not.
+/// Without the right to either, a warning states how to get it. Memory that is mapped later, such as the queues in shared
+/// memory, is not locked: locking would allocate all of it, used or not.
 fn become_realtime(priority: u8) {
     // Every priority of PRIORITIES is a valid value.
     let value = ThreadPriorityValue::try_from(priority).unwrap_or(ThreadPriorityValue::MIN);
@@ -70,15 +70,15 @@ fn become_realtime(priority: u8) {
     }
 }
 
-/// Where Linux takes limits of the CPUs' wake-up latency (Documentation/power/pm_qos_interface.rst).
+/// The device for limits of the CPUs' wake-up latency (Linux, Documentation/power/pm_qos_interface.rst).
 const CPU_LATENCY_DEVICE: &str = "/dev/cpu_dma_latency";
 
-/// Lets no CPU of this machine sleep so deeply that it takes more than `microseconds` to wake up, for as long as the
-/// returned file is open. With 0 idle CPUs do not sleep at all. cyclictest does the same by default.
+/// Limits the wake-up latency of all CPUs to `microseconds` while the returned file is open. With 0, idle CPUs do not sleep.
+/// cyclictest does the same by default.
 ///
 /// Without the right to it, a warning states how to get it.
 fn limit_cpu_latency(microseconds: u32) -> Option<File> {
-    // The device reads a signed 32-bit number; no CPU takes longer than what that holds.
+    // The device reads a signed 32-bit number.
     let limit = i32::try_from(microseconds).unwrap_or(i32::MAX);
     let opened = OpenOptions::new().write(true).open(CPU_LATENCY_DEVICE);
     opened
@@ -92,20 +92,20 @@ fn limit_cpu_latency(microseconds: u32) -> Option<File> {
         .ok()
 }
 
-/// A CPU that is not there, or on which this thread may not run.
+/// A CPU that does not exist, or on which this thread may not run.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("no CPU {cpu} for this thread, expected one of {available:?}")]
 pub struct CpuError {
     /// The CPU.
     pub cpu: usize,
-    /// Those on which the thread may run.
+    /// The CPUs on which the thread may run.
     pub available: Vec<usize>,
 }
 
 /// Keeps this thread on one CPU.
 ///
 /// # Errors
-/// [`CpuError`] where there is no such CPU, or the thread may not run on it.
+/// [`CpuError`] if there is no such CPU, or the thread may not run on it.
 fn pin_to_cpu(cpu: usize) -> Result<(), CpuError> {
     // The calling thread.
     let this = Pid::from_raw(0);
