@@ -1,5 +1,5 @@
-//! What the bits of a frame depend on besides the program: the processor's instructions and the system's elementary
-//! functions. The log names both, and `verify` compares them with its own.
+//! The arithmetic on which the bits of a frame depend: the processor's instructions and the system's elementary functions.
+//! The log names both, and `verify` compares them with those of its machine.
 
 use std::sync::OnceLock;
 
@@ -13,21 +13,21 @@ const ARGUMENTS: u32 = 4096;
 /// Hexadecimal digits of the fingerprint.
 const FINGERPRINT_DIGITS: usize = 16;
 
-/// The arithmetic of a machine, as far as it can show in a frame.
+/// The arithmetic of a machine, as far as it affects a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Arithmetic {
     /// The processor's architecture, for people: `x86_64`.
     pub architecture: String,
-    /// The instructions that tables are read with, by [`Instructions::name`].
+    /// The name of the instructions that read the tables ([`Instructions::name`]).
     pub instructions: String,
-    /// The first 16 digits of a hash over what the system's elementary functions return: their last digits differ from
-    /// one library to another.
+    /// The first 16 digits of a hash over results of the system's elementary functions. Their last digits differ between
+    /// libraries.
     pub elementary_functions: String,
 }
 
 impl Arithmetic {
-    /// What a show of this scene is computed with here.
+    /// Returns the arithmetic of a scene's show on this machine.
     pub fn of(scene: &Scene) -> Self {
         Self {
             architecture: std::env::consts::ARCH.to_owned(),
@@ -36,7 +36,7 @@ impl Arithmetic {
         }
     }
 
-    /// Whether this machine can compute the same bits.
+    /// Returns true if this machine computes the same bits.
     pub fn is_available(&self) -> bool {
         let instructions = Instructions::of_name(&self.instructions);
         self.architecture == std::env::consts::ARCH
@@ -45,7 +45,7 @@ impl Arithmetic {
     }
 }
 
-/// A fingerprint of the elementary functions that solvers and searches call. They are the same as long as a process lives.
+/// Returns the fingerprint of the elementary functions that solvers and searches call. Computed once a process.
 fn elementary_functions() -> &'static str {
     static FINGERPRINT: OnceLock<String> = OnceLock::new();
     FINGERPRINT.get_or_init(fingerprint)
