@@ -1,6 +1,6 @@
 //! The ROS 2 node and its topics: the sink of the background thread.
 //!
-//! Everything of ros2-client but the participant is created and dropped on that thread.
+//! All objects of ros2-client except the participant are created and dropped on that thread.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -19,14 +19,14 @@ use bench_dragon_ros2_messages::settings::{DiagnosticLimits, Topic};
 use bench_dragon_ros2_messages::transforms::TfMessage;
 use bench_dragon_ros2_messages::{Clock, HandlePoses, PoseArray, Stamped};
 
-/// More bytes than a point of the path has.
+/// An upper bound of the bytes of a point of the path.
 const PATH_POSE_BYTES: usize = 88;
-/// More bytes than the transforms of head and tail have, whatever the name.
+/// An upper bound of the bytes of the transforms of head and tail, for any name.
 const TRANSFORMS_BYTES: usize = 1000;
-/// How long a reliable subscriber is given for the last messages.
+/// The time for reliable subscribers to get the last messages.
 const LINGER: Duration = Duration::from_millis(100);
 
-/// The publishers that the scene requests, and the messages they send, whose memory is used again.
+/// The writers that the scene requests, and their messages, whose memory is reused.
 pub(super) struct Topics {
     name: String,
     stage: Stage,
@@ -42,13 +42,13 @@ pub(super) struct Topics {
     transforms: Option<Stream<TfMessage>>,
     path: Option<TopicWriter<Path>>,
     latest_alert: Option<CollisionAlert>,
-    /// The latest status, and the messages discarded by then.
+    /// The latest status, and the messages discarded up to it.
     diagnosed: (LoopStatus, u64),
     limits: DiagnosticLimits,
-    /// Messages that a full queue of RustDDS did not take, because a reliable subscriber was slow or dead.
+    /// Messages that did not fit into a queue of RustDDS because a reliable subscriber was slow or dead.
     discarded: u64,
     matches: Matches,
-    // Dropped after the publishers: they belong to it.
+    // Dropped after the writers: they belong to it.
     node: Node,
 }
 
@@ -57,7 +57,7 @@ impl Topics {
         let Ros2Config { stage, handles, .. } = config;
         let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(error.to_string());
         let node_name = NodeName::new(&format!("/{}", config.name), "publisher").map_err(|error| failed(&error))?;
-        // Fewer endpoints, fewer complaints of subscribers that look for what RustDDS cannot send.
+        // Without these endpoints, subscribers do not warn about messages that RustDDS cannot send.
         let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
         let node = context.new_node(node_name, options).map_err(|error| failed(&error))?;
         let mut maker = WriterFactory { context, node, config: &config };
@@ -86,7 +86,7 @@ impl Topics {
             matches,
             node: maker.node,
         };
-        // What does not change.
+        // The messages that do not change.
         if let Some(port) = &mut topics.stages {
             port.send(Arc::new(Stamped::stage(stage)), &mut topics.discarded);
         }
