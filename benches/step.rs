@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 use bench_dragon::client::connection::{Connection, Subscription, Wake};
 use bench_dragon::client::shared_memory::{node, service_name};
 use bench_dragon::messages::{FrameHeader, HandlePose};
-use bench_dragon::publisher::live::control::{Door, Doors, door};
+use bench_dragon::publisher::live::control::{CommandQueues, CommandSender, command_queue};
 use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::publisher::live::{Outgoing, Publisher};
 use bench_dragon::publisher::log;
@@ -182,10 +182,10 @@ fn measure_doors() {
         publisher_and_subscriber(&format!("bench_{}_doors", std::process::id()), &scene, &show);
     let mut show = ShowSource::new(show);
     // The outer ends stay: a queue without a sender behaves differently.
-    let (mut doors, outer): (Vec<Doors>, Vec<Vec<Door>>) = (0..3)
+    let (mut doors, outer): (Vec<CommandQueues>, Vec<Vec<CommandSender>>) = (0..3)
         .map(|count| {
-            let (ports, outer): (Vec<_>, Vec<_>) = (0..count).map(|_| door()).unzip();
-            (Doors::new(ports), outer)
+            let (ports, outer): (Vec<_>, Vec<_>) = (0..count).map(|_| command_queue()).unzip();
+            (CommandQueues::new(ports), outer)
         })
         .unzip();
     let mut times: [Vec<f64>; 3] = Default::default();

@@ -30,9 +30,10 @@ impl Lines {
         Ok(Self { sender, written })
     }
 
-    /// Queues a line.
-    pub fn print(&self, line: String) {
-        let _ = self.sender.try_send(line);
+    /// Returns a function that queues a line. [`finish`](Self::finish) waits for the function's end.
+    pub fn printer(&self) -> impl Fn(String) + Send + use<> {
+        let sender = self.sender.clone();
+        move |line| drop(sender.try_send(line))
     }
 
     /// Waits until all lines are written, or the limit passes.

@@ -1,13 +1,10 @@
 //! Real-time scheduling of the loop: the options that `run` takes and `soak` passes to the `run` it starts.
 
 use std::ffi::OsString;
-use std::fs::File;
 
-use bench_dragon::publisher::live::realtime;
+use bench_dragon::publisher::live::realtime::Scheduling;
 
-use super::CommandError;
-
-/// What is requested from the operating system.
+/// The scheduling that is requested from the operating system.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Real-time scheduling")]
 pub struct RealtimeScheduling {
@@ -24,22 +21,13 @@ pub struct RealtimeScheduling {
 }
 
 impl RealtimeScheduling {
-    /// Requests it, on the loop's thread. The CPUs stay awake for as long as what is returned is kept.
-    ///
-    /// # Errors
-    /// Bad input: there is no such CPU. What the user has no right to is a warning.
-    pub fn prepare_thread(&self) -> Result<Option<File>, CommandError> {
-        if let Some(cpu) = self.cpu {
-            realtime::pin_to_cpu(cpu).map_err(|error| CommandError::BadInput(format!("--cpu: {error}")))?;
-        }
-        realtime::set_timer_slack();
-        if let Some(priority) = self.realtime {
-            realtime::become_realtime(priority);
-        }
-        Ok(self.cpu_latency.and_then(realtime::limit_cpu_latency))
+    /// Returns the options as the library takes them.
+    pub fn scheduling(&self) -> Scheduling {
+        let Self { realtime, cpu, cpu_latency } = *self;
+        Scheduling { realtime, cpu, cpu_latency }
     }
 
-    /// The same options for another process.
+    /// Returns the same options for another process.
     pub fn arguments(&self) -> impl Iterator<Item = OsString> {
         let given = [
             ("--realtime", self.realtime.map(|priority| priority.to_string())),

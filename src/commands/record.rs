@@ -1,4 +1,4 @@
-//! `record`: keeps a running show as MCAP.
+//! `record`: records a running show as MCAP.
 
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, IsTerminal};
@@ -12,7 +12,7 @@ use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use bench_dragon::client::polling::Obstacle;
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::recording::mcap::recorder::{
-    Counts, DEFAULT_TOPICS, Recorded, Recorder, RecorderConfig, Split, create,
+    DEFAULT_TOPICS, Recorded, RecordedCounts, Recorder, RecorderConfig, Split, create,
 };
 use bench_dragon::recording::mcap::recover::{RecoverError, Recovered, check_magic, recover};
 use bench_dragon::recording::record::{self, RecordQueue, RecordThread};
@@ -22,15 +22,15 @@ use serde::Serialize;
 
 use super::{CommandError, Common, Output, not_writable, progress_bar, stop_on_signals, wall_seconds};
 
-/// Frames that may wait in the shared memory before they are looked for, where its queue is the shortest.
+/// Frames that may wait in the shared memory between two polls, for the shortest queue.
 const UNREAD_FRAMES: f64 = 2.0;
-/// The shortest and the longest time between two looks.
+/// The shortest and the longest time between two polls.
 const POLL_INTERVAL: (Duration, Duration) = (Duration::from_millis(1), Duration::from_millis(20));
-/// How often the terminal shows how far it is.
+/// The interval of the progress on the terminal.
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(200);
-/// How long a stage may come after its first frame: a publisher notices within a second who has joined.
+/// The longest wait for a stage after the first frame: a publisher detects a new subscriber within a second.
 const STAGE_TIMEOUT: Duration = Duration::from_secs(2);
-/// The smallest file that a recording is split into.
+/// The least size for `--split`.
 const LEAST_SPLIT: u64 = 1_000_000;
 
 /// Arguments of `record`.
@@ -68,7 +68,7 @@ struct Summary {
     seconds: f64,
 }
 
-/// Records until the duration is over, a signal comes or the disk takes no more; or mends a recording.
+/// Records until the duration is over, a signal comes or a write fails; or repairs a recording.
 pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), CommandError> {
     if let Some(damaged) = &arguments.recover {
         return mend(common, damaged, arguments);
@@ -81,7 +81,7 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
     topics.dedup();
     let stop = stop_on_signals()?;
     let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::Never, frames: Delivery::All })?;
-    // A file that may not grow is then a failed write, and no signal that ends the process.
+    // A file size limit is then a failed write, not a signal that ends the process.
     signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
     let config = RecorderConfig {
         name: common.name().to_owned(),
@@ -109,9 +109,9 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
     }
 }
 
-/// Passes on what comes until it is over or the thread has ended. Once something has come, what is in the way of a later
-/// publisher's services is waited for, as a publisher is. Without its stage a recording cannot be replayed: where
-/// that follows its first frames, as it does for one who joins, it is waited for.
+/// Passes the feed's events to the thread until the end. After the first frame, obstacles of a later publisher's services do
+/// not end the recording. Without its stage a recording cannot be replayed, so a stage that follows the first frames is
+/// awaited.
 fn follow(
     feed: &mut Feed,
     queue: &RecordQueue,
@@ -156,7 +156,7 @@ fn follow(
     Ok(())
 }
 
-/// A line on standard error that shows how far it is, hidden where that is no terminal.
+/// Creates the progress line on standard error, hidden without a terminal.
 fn progress(common: &Common) -> ProgressBar {
     if common.quiet || common.json || !io::stderr().is_terminal() {
         return ProgressBar::hidden();
@@ -166,16 +166,16 @@ fn progress(common: &Common) -> ProgressBar {
     ProgressBar::new_spinner().with_style(style).with_message("waiting for a publisher")
 }
 
-/// How much has been recorded.
+/// Returns the recording's progress in words.
 fn sentence(recorded: &Recorded) -> String {
-    let Counts { messages, frames, missed, bytes, .. } = recorded.counts;
+    let RecordedCounts { messages, frames, missed, bytes, .. } = recorded.counts;
     if recorded.files.is_empty() {
         return "waiting for a publisher".to_owned();
     }
     format!("{}, {}, {messages} messages, {frames} frames, {missed} missed", time(recorded), size(bytes))
 }
 
-/// The time that was recorded, as 1:02:03.4.
+/// Returns the recorded time, such as 1:02:03.4.
 fn time(recorded: &Recorded) -> String {
     let tenths = recorded.counts.nanoseconds / 100_000_000;
     let (seconds, minutes, hours) = (tenths / 10 % 60, tenths / 600 % 60, tenths / 36_000);
@@ -189,7 +189,7 @@ fn size(bytes: u64) -> String {
 fn print(common: &Common, recorded: &Recorded) -> Result<(), CommandError> {
     let mut output = Output::standard();
     let files: Vec<String> = recorded.files.iter().map(|file| file.display().to_string()).collect();
-    let Counts { messages, frames, missed, bytes, nanoseconds } = recorded.counts;
+    let RecordedCounts { messages, frames, missed, bytes, nanoseconds } = recorded.counts;
     if common.json {
         output.json(&Summary { files, messages, frames, missed, bytes, seconds: nanoseconds as f64 / 1e9 })?;
     } else if !files.is_empty() {
@@ -207,7 +207,7 @@ struct MendedLine {
     recovered: Recovered,
 }
 
-/// Mends a recording that was cut: writes what is whole of it into another file.
+/// Repairs a recording: writes its complete records into another file.
 fn mend(common: &Common, file: &Path, arguments: &RecordArguments) -> Result<(), CommandError> {
     let shown = file.display().to_string();
     let bad = |error: RecoverError| CommandError::BadInput(format!("{shown}: {error}"));
@@ -227,7 +227,7 @@ fn mend(common: &Common, file: &Path, arguments: &RecordArguments) -> Result<(),
     if path.canonicalize().is_ok_and(|output| file.canonicalize().is_ok_and(|input| input == output)) {
         return Err(CommandError::BadInput(format!("{shown} is to be mended, expected another --output")));
     }
-    // What is no recording leaves no file.
+    // Checked before the output is created.
     let mut input = BufReader::new(input);
     check_magic(&mut input).map_err(bad)?;
     let output = create(&path, arguments.force).and_then(|file| file.set_len(0).map(|()| file));
@@ -237,7 +237,7 @@ fn mend(common: &Common, file: &Path, arguments: &RecordArguments) -> Result<(),
     bar.finish_and_clear();
     let mended = mended.and_then(|recovered| output.sync_all().map(|()| recovered).map_err(RecoverError::Write));
     let recovered = mended.map_err(|error| {
-        // Half of a mended recording is of no use.
+        // An incomplete output is removed.
         let _ = std::fs::remove_file(&path);
         match error {
             RecoverError::Write(error) => CommandError::Failed(format!("{}: {error}", path.display())),
@@ -266,7 +266,7 @@ fn mend(common: &Common, file: &Path, arguments: &RecordArguments) -> Result<(),
     lines.finish()
 }
 
-/// The sentence for a file that cannot be made.
+/// Returns the error for a file that cannot be created.
 fn refused(file: &Path, error: &io::Error) -> CommandError {
     let shown = file.display();
     if error.kind() == io::ErrorKind::AlreadyExists {
@@ -276,14 +276,14 @@ fn refused(file: &Path, error: &io::Error) -> CommandError {
     }
 }
 
-/// A topic by its name, for clap.
+/// Parses a topic's name, for clap.
 fn topic(text: &str) -> Result<Topic, String> {
     let names = || Topic::ALL.map(Topic::name).join(", ");
     let found = Topic::ALL.into_iter().find(|topic| topic.name() == text.trim());
     found.ok_or_else(|| format!("expected topics of {}", names()))
 }
 
-/// A size or a time after which a recording goes on in another file, for clap.
+/// Parses the size or time of a file, for clap.
 fn split(text: &str) -> Result<Split, String> {
     let text = text.trim();
     let units = [("KB", 1e3), ("MB", 1e6), ("GB", 1e9), ("TB", 1e12)];

@@ -1,13 +1,13 @@
 //! `replay`: plays a recording again, as the live publisher that it was made of.
 
 use std::path::PathBuf;
-use std::time::Duration;
 
 use bench_dragon::client::clock::realtime_ns;
 use bench_dragon::client::shared_memory::service_name;
 use bench_dragon::messages::Stage;
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::publisher::live::End;
+use bench_dragon::publisher::run::{Hooks, Publishing};
 use bench_dragon::publisher::transports::{Transport, TransportConfig};
 use bench_dragon::recording::mcap::reader::ReadError;
 use bench_dragon::recording::replay::{Pace, Prepared, ReplayOptions};
@@ -15,12 +15,12 @@ use bench_dragon::ros2_messages::settings::Topic;
 use bench_dragon::show::scene::{Accepted, Scene};
 use jiff::{Timestamp, Unit};
 
-use super::publishing::{Hooks, Publishing, new_run_id, open_transports};
+use super::publishing::{new_run_id, open_transports, print_summary, publish};
 use super::realtime_scheduling::RealtimeScheduling;
 use super::{CommandError, Common, number, stop_on_signals};
 
-/// How long subscribers that wait have before the first frame, which is not sent again as a show's would be.
-const LEAD: Duration = Duration::from_millis(500);
+/// Nanoseconds that waiting subscribers have before the first frame: unlike a show's, it is not sent again.
+const LEAD_NS: u64 = 500_000_000;
 /// The most cues that room is kept for, whatever a damaged stage states.
 const MOST_CUES: usize = 1000;
 
@@ -83,14 +83,12 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
     let benches = prepared.contents().stage.benches;
     let (mut frames, reading) = prepared.begin()?;
     let publishing = Publishing {
-        common,
-        scheduling: &arguments.scheduling,
+        scheduling: arguments.scheduling.scheduling(),
         run_id,
         rate,
         duration: arguments.duration,
         scene: &format!("replay of {of}"),
-        benches,
-        lead: LEAD,
+        lead_ns: LEAD_NS,
     };
     let print_start = |transports: &[Box<dyn Transport>]| {
         if !common.quiet && !common.json {
@@ -98,8 +96,13 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
             transports.iter().for_each(|transport| eprintln!("{}", transport.describe()));
         }
     };
-    let hooks = Hooks { opened: Box::new(print_start), sample: Box::new(|_| ()), ended: Box::new(|_| ()) };
-    let mut published = publishing.run(&mut frames, transports, doors, &stop, hooks)?;
+    let hooks = Hooks {
+        opened: Box::new(print_start),
+        announce: Box::new(|_| ()),
+        sample: Box::new(|_| ()),
+        ended: Box::new(|_| ()),
+    };
+    let mut published = publish(common, benches, &publishing, &mut frames, (transports, doors), &stop, hooks)?;
     let (waited, failure) = reading.finish();
     if waited > 0 {
         log::warn!("in {waited} periods a frame was due that had not been read from the disk: it went out later");
@@ -107,7 +110,7 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
     if failure.is_some() && published.counts.end == End::Recording {
         published.counts.end = End::Error;
     }
-    published.print(common)?;
+    print_summary(&published, common)?;
     match (published.error, failure) {
         (Some(error), _) => Err(CommandError::Failed(error.to_string())),
         (None, Some(error)) => Err(refused(error)),

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
-use std::time::Duration;
 
 use bench_dragon::client::clock::realtime_ns;
 use bench_dragon::client::shared_memory::service_name;
@@ -12,6 +11,7 @@ use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::publisher::log::arithmetic::Arithmetic;
 use bench_dragon::publisher::log::lines::ShowLine;
 use bench_dragon::publisher::log::{self as recording_log, LogOutcome};
+use bench_dragon::publisher::run::{Hooks, Publishing};
 use bench_dragon::publisher::transports::{Transport, TransportConfig};
 use bench_dragon::show::convert;
 use bench_dragon::show::scene::{Accepted, AtEnd, Scene, SceneText};
@@ -19,7 +19,7 @@ use bench_dragon::show::{Playback, ReachedCue, Show};
 use bench_dragon::soak::histograms::HistogramLog;
 
 use super::events::sentence;
-use super::publishing::{Hooks, Publishing, new_run_id, open_transports};
+use super::publishing::{new_run_id, open_transports, print_summary, publish};
 use super::realtime_scheduling::RealtimeScheduling;
 use super::soak::Parent;
 use super::{CommandError, Common, number, search_timeline, stop_on_signals, warn_of_gap};
@@ -142,23 +142,24 @@ impl RunSession<'_> {
         });
         let mut histograms = self.open_histograms()?;
         let publishing = Publishing {
-            common: self.common,
-            scheduling: &self.arguments.scheduling,
+            scheduling: self.arguments.scheduling.scheduling(),
             run_id: self.run_id,
             rate: self.playback.rate,
             duration: self.arguments.duration,
             scene: &self.scene.name,
-            benches: self.scene.team().benches as u32,
-            lead: Duration::ZERO,
+            lead_ns: 0,
         };
         let mut source = ShowSource::new(show);
         let hooks = Hooks {
             opened: Box::new(|transports| self.print_start(transports)),
+            announce: Box::new(|_| ()),
             sample: Box::new(|sample| histograms.iter_mut().for_each(|log| log.record(sample))),
             ended: Box::new(|counts| log.iter().for_each(|log| log.ended(counts))),
         };
-        let published = publishing.run(&mut source, transports, doors, stop, hooks)?;
-        published.print(self.common)?;
+        let benches = self.scene.team().benches as u32;
+        let ends = (transports, doors);
+        let published = publish(self.common, benches, &publishing, &mut source, ends, stop, hooks)?;
+        print_summary(&published, self.common)?;
         let log_failure = log.and_then(|outcome| outcome.failure());
         let failure = published.error.map(|error| error.to_string()).or(log_failure);
         let failure = failure.or(histograms.and_then(HistogramLog::finish));

@@ -14,7 +14,7 @@ use bench_dragon::motion::solve::{Chain, Solver, Velocities};
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::proof;
 use bench_dragon::publisher::live::Publisher;
-use bench_dragon::publisher::live::control::{Door, Doors, door};
+use bench_dragon::publisher::live::control::{CommandQueues, CommandSender, command_queue};
 use bench_dragon::publisher::live::show_source::{FrameMessages, ShowSource};
 use bench_dragon::publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
 use bench_dragon::show::alerts::LevelTracker;
@@ -116,8 +116,8 @@ struct Step {
     frame: Frame,
     publisher: SharedMemoryPublisher,
     connection: Connection,
-    doors: Doors,
-    door: Door,
+    doors: CommandQueues,
+    door: CommandSender,
 }
 
 impl Step {
@@ -139,7 +139,7 @@ impl Step {
         let connection = Subscription::new(&name, Wake::Never).unwrap().connect().unwrap().unwrap();
         let rules = LevelTracker::new(scene.alerts.unwrap(), playback.rate);
         let frame = show.frame(0).clone();
-        let (port, door) = door();
+        let (port, door) = command_queue();
         Self {
             show: ShowSource::new(show),
             messages: FrameMessages::new(0),
@@ -148,7 +148,7 @@ impl Step {
             frame,
             publisher,
             connection,
-            doors: Doors::new(vec![port]),
+            doors: CommandQueues::new(vec![port]),
             door,
         }
     }

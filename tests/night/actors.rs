@@ -10,7 +10,7 @@ use bench_dragon::client::feed::sequence::SequenceTracker;
 use bench_dragon::messages::LoopStatus;
 use bench_dragon::messages::control::Command;
 use bench_dragon::publisher::live::StatusPublisher;
-use bench_dragon::publisher::live::control::{Door, MOST_WAITING};
+use bench_dragon::publisher::live::control::{CommandSender, MOST_WAITING};
 use bench_dragon::publisher::live::statistics::Collector;
 use bench_dragon::publisher::transports::background::Worker;
 
@@ -65,7 +65,7 @@ impl Actor for Background {
     fn step(&mut self, world: &World) -> u64 {
         let mut worker = self.worker.borrow_mut();
         let poll_at = worker.send(&Frozen(world));
-        self.behind.borrow_mut().emptied(worker.deliveries());
+        self.behind.borrow_mut().emptied(worker.counters());
         let mut random = world.random.borrow_mut();
         // The network blocks. At a low rate the thread polls less often than every 50 ms, so that a night costs less.
         let blocked_ns = match random.below(40) {
@@ -97,7 +97,7 @@ impl bench_dragon::client::clock::Clock for Frozen<'_> {
 /// A client that sends commands through one queue: one at a time, several in one period, or a flood.
 pub struct Controller {
     pub number: usize,
-    pub door: Rc<RefCell<Door>>,
+    pub door: Rc<RefCell<CommandSender>>,
     pub oracle: Rc<RefCell<Oracle>>,
     /// Mean time between two commands.
     pub pause_ns: f64,

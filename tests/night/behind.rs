@@ -6,7 +6,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use bench_dragon::messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus};
-use bench_dragon::publisher::live::Deliveries;
+use bench_dragon::publisher::live::TransportCounters;
 use bench_dragon::publisher::transports::background::Sink;
 
 use crate::world::same;
@@ -26,7 +26,7 @@ pub struct Behind {
     cues: VecDeque<(u64, u32)>,
     /// True if a frame has found the queue full since it was emptied.
     was_full: bool,
-    delivered: Deliveries,
+    delivered: TransportCounters,
 }
 
 impl Behind {
@@ -40,7 +40,7 @@ impl Behind {
             alerts: VecDeque::new(),
             cues: VecDeque::new(),
             was_full: false,
-            delivered: Deliveries::default(),
+            delivered: TransportCounters::default(),
         }
     }
 
@@ -61,7 +61,7 @@ impl Behind {
     }
 
     /// Checks that the thread has emptied the queues.
-    pub fn emptied(&mut self, deliveries: Deliveries) {
+    pub fn emptied(&mut self, deliveries: TransportCounters) {
         same("messages left in the queues", (self.frames.len(), self.alerts.len(), self.cues.len()), (0, 0, 0));
         self.was_full = false;
         same("the delivered messages", deliveries, self.delivered);

@@ -4,10 +4,10 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Instant;
 
-use bench_dragon::publisher::live::control::{Door, Doors, door};
+use bench_dragon::publisher::live::control::{CommandQueues, CommandSender, command_queue};
 use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::publisher::live::statistics::{Collector, Run, queues_of};
-use bench_dragon::publisher::live::{Counts, End, LoopOptions, Publisher, StatusPublisher, run_loop};
+use bench_dragon::publisher::live::{End, LoopCounts, LoopOptions, Publisher, StatusPublisher, run_loop};
 use bench_dragon::publisher::transports::background::{self, BackgroundConfig, Worker};
 use bench_dragon::show::scene::AtEnd;
 use bench_dragon::show::{Playback, Show};
@@ -34,7 +34,7 @@ struct Cast {
     collected: Rc<RefCell<Collected>>,
     collector: Rc<RefCell<Collector<'static>>>,
     thread: Option<Thread>,
-    doors: Vec<Rc<RefCell<Door>>>,
+    doors: Vec<Rc<RefCell<CommandSender>>>,
     subscribers: Vec<Rc<RefCell<Subscriber>>>,
 }
 
@@ -73,7 +73,7 @@ pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
     };
     let subscribers: Vec<_> = plan.readers.iter().map(reader).collect();
     let (ports, doors): (Vec<_>, Vec<_>) =
-        plan.doors.iter().map(|_| door()).map(|(port, door)| (port, Rc::new(RefCell::new(door)))).unzip();
+        plan.doors.iter().map(|_| command_queue()).map(|(port, door)| (port, Rc::new(RefCell::new(door)))).unzip();
     let shared_memory = SharedMemory {
         world: Rc::clone(&world),
         oracle: Rc::clone(&oracle),
@@ -91,7 +91,7 @@ pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
     let mut frames =
         Checked { show: ShowSource::new(show), world: Rc::clone(&cast.world), oracle: Rc::clone(&cast.oracle) };
     let options = LoopOptions { run_id, rate: plan.rate, periods: plan.periods };
-    let mut doors = Doors::new(ports);
+    let mut doors = CommandQueues::new(ports);
     let World { stop, .. } = &*cast.world;
     let result = run_loop(&*cast.world, &mut frames, &mut doors, &mut publishers, options, reports, stop);
     let counts = match result {
@@ -180,7 +180,7 @@ impl Cast {
     }
 
     /// Delivers the messages in flight after the end of the loop, and compares all counts.
-    fn settle(self, plan: &Plan, counts: &Counts) -> Tally {
+    fn settle(self, plan: &Plan, counts: &LoopCounts) -> Tally {
         let Self { world, oracle, collected, collector, thread, doors, subscribers } = self;
         oracle.borrow_mut().pace.ended(&world, counts, plan.periods);
         let mut last = collector.borrow_mut();
@@ -191,7 +191,7 @@ impl Cast {
         if let Some((behind, worker)) = thread {
             // No other actor runs now.
             worker.borrow_mut().send(&Frozen(&world));
-            behind.borrow_mut().emptied(worker.borrow().deliveries());
+            behind.borrow_mut().emptied(worker.borrow().counters());
         }
         for (number, door) in doors.iter().enumerate() {
             while let Some(answer) = door.borrow_mut().answer() {

@@ -1,7 +1,7 @@
 //! Each period is a frame or skipped; deadlines never shift.
 
 use bench_dragon::messages::FrameHeader;
-use bench_dragon::publisher::live::{Counts, End};
+use bench_dragon::publisher::live::{End, LoopCounts};
 
 use crate::world::{SECOND_NS, World, same};
 
@@ -91,7 +91,7 @@ impl Pace {
     }
 
     /// Checks the counts after the end of the loop.
-    pub fn ended(&mut self, world: &World, counts: &Counts, periods: Option<u64>) {
+    pub fn ended(&mut self, world: &World, counts: &LoopCounts, periods: Option<u64>) {
         // A loop that is stopped at once has sent no frame.
         self.begin(world);
         let elapsed = counts.frames + counts.skipped;

@@ -220,7 +220,7 @@ fn a_file_that_takes_no_more_ends_the_log_and_not_the_stream() {
     let sentence = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{sentence}");
     assert!(
-        sentence.contains("--log: /dev/full: No space left on device") && sentence.contains("the show goes on"),
+        sentence.contains("--log: /dev/full: No space left on device") && sentence.contains("the show continues"),
         "{sentence}"
     );
 

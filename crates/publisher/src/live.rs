@@ -1,8 +1,8 @@
-//! The live loop: wait for the deadline, compute the frame, hand it to the publishers, count.
+//! The live loop: wait for the deadline, get the frame, pass it to the publishers, count.
 //!
 //! In: a [`FrameSource`] and a [`Clock`]. Out: frames to every [`Publisher`], samples and alerts to a queue that never blocks.
-//! Knows no transport and no solver. The `run` command calls [`run_loop`] on a thread of its own, and [`statistics`] on
-//! another, which empties that queue.
+//! It knows no transport and no solver. [`run`](crate::run) calls [`run_loop`] on one thread and
+//! [`statistics`], which empties that queue, on another.
 
 pub mod control;
 pub mod realtime;
@@ -20,7 +20,7 @@ use bench_dragon_show::convert::Stamps;
 use bench_dragon_show::{Frame, Outcome};
 
 use bench_dragon_client::clock::{Clock, Deadlines};
-use control::Doors;
+use control::CommandQueues;
 use statistics::Sample;
 
 /// Nanoseconds between two calls of [`Publisher::maintain`].
@@ -85,27 +85,26 @@ impl<'a> Outgoing<'a> {
     }
 }
 
-/// Where frames go. Called on the real-time thread: an implementation must not allocate, lock, log or make a system
-/// call besides its transport's own.
+/// A destination of frames. Called on the real-time thread: an implementation must not allocate, lock, log or make a system
+/// call besides its transport's.
 pub trait Publisher {
     /// Sends one frame with its alerts and cues.
     ///
     /// # Errors
-    /// A sentence for people where the transport failed in a way that ends the run; a slow or dead subscriber is no
-    /// error.
+    /// A failure of the transport that ends the run. A slow or dead subscriber is no error.
     fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError>;
 
-    /// What makes the next frame cheaper. Called when a step is over and has been measured.
+    /// Does work that makes the next frame cheaper. Called after the measured step.
     fn prepare(&mut self) {}
 
-    /// Lets late subscribers in; called about ten times a second.
+    /// Delivers the history to newly connected subscribers. Called about ten times a second.
     fn maintain(&mut self);
 
-    /// The subscribers of the frames that are connected.
+    /// Returns the number of connected subscribers of frames.
     fn subscribers(&self) -> u32;
 }
 
-/// Where the loop's status goes, once a second, on the statistics thread.
+/// A destination of the loop's status, once a second, on the statistics thread.
 pub trait StatusPublisher {
     /// Sends a status.
     fn publish_status(&mut self, status: &LoopStatus);
@@ -141,81 +140,81 @@ pub trait FrameSource {
     fn finished_step(&mut self, tick: u64) -> Option<Outcome>;
 }
 
-/// How the loop runs.
+/// The settings of the loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoopOptions {
     /// The run's number, in every header.
     pub run_id: u64,
     /// Frames per second.
     pub rate: f64,
-    /// The number of periods after which the loop ends; `None` for a loop that only its stop flag ends.
+    /// The number of periods after which the loop ends; `None` for a loop without limit.
     pub periods: Option<u64>,
 }
 
 impl LoopOptions {
-    /// The periods of `seconds` of wall time at `rate`: ticks 0 .. ceil(seconds * rate) - 1.
+    /// Returns the number of periods in `seconds` of wall time at `rate`: ceil(seconds * rate).
     pub fn periods_of(seconds: f64, rate: f64) -> u64 {
         let periods = seconds * rate;
-        // A product that rounding has pushed past a whole number is that number.
+        // Rounding can push the product of a whole number of periods past that number.
         let whole = periods.round();
         if (periods - whole).abs() <= 4.0 * f64::EPSILON * whole { whole as u64 } else { periods.ceil() as u64 }
     }
 }
 
-/// Why the loop ended.
+/// The reason for the end of the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum End {
-    /// Its periods were over.
+    /// All its periods had passed.
     Duration,
     /// Its stop flag was set.
     Signal,
-    /// Its frames were over, as those of a recording are.
+    /// The recording was over.
     Recording,
     /// A publisher failed.
     Error,
 }
 
-/// What the loop counted. `frames + skipped` is the number of periods elapsed, but for those that brought nothing; where a
-/// publisher failed, those before the period in which it did.
+/// The counts of the loop. `frames + skipped` is the number of elapsed periods without the empty ones of a recording.
+/// After a failure of a publisher, the failed period is not counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Counts {
+pub struct LoopCounts {
     /// Frames published.
     pub frames: u64,
     /// Incidents in which at least one period was skipped.
     pub overruns: u64,
     /// Periods skipped.
     pub skipped: u64,
-    /// Why it ended.
+    /// The reason for its end.
     pub end: End,
 }
 
-/// What a transport with a queue of its own has done with the frames of the loop.
+/// The counters of a transport that has a queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-pub struct Deliveries {
+pub struct TransportCounters {
     /// Frames sent.
     pub frames: u64,
-    /// Frames left out because the transport was behind.
+    /// Frames skipped because the transport was behind.
     pub skipped: u64,
-    /// Messages that the transport's own queues did not take, because a receiver was slow or dead.
+    /// Messages that did not fit into the transport's queues because a receiver was slow or dead.
     pub discarded: u64,
 }
 
-/// What went out besides a frame, for the terminal.
+/// An alert or a cue that was published, for the terminal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Announcement {
     /// An alert.
     Alert {
-        /// As it was published.
+        /// The message.
         alert: CollisionAlert,
-        /// Simulated seconds per second of wall time, as in force then.
+        /// Simulated seconds per second of wall time at the alert.
         time_scale: f64,
     },
-    /// A cue that the show has reached.
+    /// A cue.
     Cue(Cue),
 }
 
-/// The queues from the loop to the statistics thread, allocated beforehand.
+/// The queues from the loop to the statistics thread. Their memory is reserved beforehand.
 pub struct Reports {
     /// One sample a frame.
     pub samples: rtrb::Producer<Sample>,
@@ -223,23 +222,23 @@ pub struct Reports {
     pub announcements: rtrb::Producer<Announcement>,
 }
 
-/// Publishes a frame a period until `stop` is set or the periods are over.
+/// Publishes one frame in each period until `stop` is set or the periods are over.
 ///
-/// A frame is computed in its own period, however late. Periods that have wholly passed meanwhile are skipped and
-/// counted, never caught up; later deadlines do not shift.
+/// A frame is computed in its period, however late. A period that has wholly passed is skipped and counted. Later deadlines
+/// do not shift.
 ///
 /// # Errors
-/// The first [`PublishError`], with what was counted until then.
+/// The first [`PublishError`], with the counts up to the failure.
 pub fn run_loop<C: Clock>(
     clock: &C,
     source: &mut dyn FrameSource,
-    doors: &mut Doors,
+    doors: &mut CommandQueues,
     publishers: &mut [Box<dyn Publisher>],
     options: LoopOptions,
     mut reports: Reports,
     stop: &AtomicBool,
-) -> Result<Counts, (Counts, PublishError)> {
-    let mut counts = Counts { frames: 0, overruns: 0, skipped: 0, end: End::Signal };
+) -> Result<LoopCounts, (LoopCounts, PublishError)> {
+    let mut counts = LoopCounts { frames: 0, overruns: 0, skipped: 0, end: End::Signal };
     let periods = options.periods.unwrap_or(u64::MAX);
     let deadlines = Deadlines::starting_at(clock.monotonic_ns(), options.rate);
     let mut maintenance_due_ns = 0;
@@ -248,7 +247,7 @@ pub fn run_loop<C: Clock>(
         let deadline_ns = deadlines.of(tick);
         let reached = wait(clock, deadline_ns, stop, publishers, &mut maintenance_due_ns);
         let woke_ns = clock.monotonic_ns();
-        // The first period that has not wholly passed. A stop counts those before it too.
+        // The first period that has not wholly passed. After a stop, too, the periods before it count as skipped.
         let current = deadlines.latest_at(woke_ns).max(tick).min(periods);
         if current > tick {
             counts.overruns += 1;
@@ -307,8 +306,7 @@ pub fn run_loop<C: Clock>(
     }
 }
 
-/// Waits for a deadline; false where `stop` was set first. Long waits are cut up, so that late subscribers are let in
-/// and a stop is heeded in time.
+/// Waits for a deadline. Returns false if `stop` was set first. Long waits are divided, for maintenance and for `stop`.
 fn wait<C: Clock>(
     clock: &C,
     deadline_ns: u64,
@@ -332,8 +330,8 @@ fn wait<C: Clock>(
     }
 }
 
-/// Hands the statistics thread what it counts, and the alerts. Where that thread is behind by the whole queue, the
-/// sample or the line on the terminal is lost, never the frame or the alert that was published.
+/// Passes the sample, the alerts and the cues to the statistics thread. If its queue is full, the percentiles miss the sample
+/// or the terminal misses the line. The published frame and alert are not affected.
 fn report(reports: &mut Reports, outgoing: Outgoing<'_>, sample: Sample) {
     for alert in outgoing.alerts {
         let announcement = Announcement::Alert { alert: *alert, time_scale: outgoing.header.time_scale };

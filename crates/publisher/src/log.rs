@@ -1,9 +1,9 @@
-//! `run --log`: a transport whose receiver is a file.
+//! `run --log`: a transport that writes a file.
 //!
-//! [`LogPublisher`] is the loop's end: it copies the arrays of a frame into a queue and returns, without a lock, an
-//! allocation or a system call. A thread puts them into the order of the message, hashes and writes. Unlike
-//! `transports::background` it leaves no frame out while there is room for it; where there is none, the frame's tick is still
-//! recorded, as that of a lost frame. A frame and its commands are queued together, or not at all.
+//! [`LogPublisher`] is the loop's end. It copies the arrays of a frame into a queue without a lock, an allocation or a
+//! system call. A thread orders them as in the message, hashes them and writes. Unlike `transports::background`, it skips no
+//! frame while there is room. Without room, it records the frame's tick as lost. A frame and its commands are queued
+//! together, or not at all.
 
 pub mod arithmetic;
 pub mod hash;
@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use crate::live::{Counts, Deliveries, Outgoing, PublishError, Publisher, StatusPublisher};
+use crate::live::{LoopCounts, Outgoing, PublishError, Publisher, StatusPublisher, TransportCounters};
 use crate::transports::{Transport, TransportError};
 use bench_dragon_messages::control::{Code, Command, CommandRecord};
 use bench_dragon_messages::{LoopStatus, QUEUE_BYTES};
@@ -35,43 +35,42 @@ use writer::LogWriter;
 const QUEUED_SECONDS: f64 = 5.0;
 /// Frames that the queue holds at least.
 const LEAST_FRAMES: usize = 4;
-/// Words that frames leave free: for commands, and for the ticks of lost frames.
+/// Words that frames leave free for commands and for the ticks of lost frames.
 const RESERVED_WORDS: usize = RECORD_WORDS << 16;
-/// Words that are touched beforehand for the next frame: what a processor's own cache holds.
+/// The most words that are touched beforehand for the next frame: the size of a processor's cache.
 const MOST_PREPARED: usize = 1 << 15;
-/// How often the thread empties the queue.
+/// The interval at which the thread empties the queue.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
-/// How long the file is given to take the last lines: one on a dead network drive never does.
+/// The longest wait for the last lines: a file on a dead network drive never accepts them.
 const LONGEST_END: Duration = Duration::from_secs(10);
 
-/// Words of a record, and of a frame's before its columns: what it is, the tick, the handles, the header.
+/// Words of a record, and words of a frame before its columns: kind, tick, handles, header.
 const RECORD_WORDS: usize = 5;
 const FRAME_WORDS: usize = 3 + HEADER_WORDS;
 
-/// What a record is: its first word.
+/// The kinds of a record: its first word.
 const FRAME: u64 = 0;
 const LOST: u64 = 1;
 const COMMAND: u64 = 2;
 const STEP_FINISHED: u64 = 3;
 /// In place of a code: the step has begun.
 const NO_CODE: u64 = u64::MAX;
-/// In place of a tick: nothing is missing.
+/// In place of a tick: no frame is missing.
 const NEVER: u64 = u64::MAX;
 
-/// What the ends share besides the queue.
+/// The state that the ends share besides the queue.
 struct Shared {
     stop: AtomicBool,
-    /// The first tick of which the queue took nothing, from which on it gets nothing.
+    /// The first tick for which the queue had no room at all. Nothing is queued from there on.
     missing_from: AtomicU64,
     frames: AtomicU64,
     lost: AtomicU64,
-    /// What the loop has counted, once it is over.
-    ended: Mutex<Option<Counts>>,
+    /// The loop's counts, after its end.
+    ended: Mutex<Option<LoopCounts>>,
     failure: Mutex<Option<String>>,
 }
 
-/// The loop's end. The queue holds numbers, as the arrays of a chain do, and bits of whole numbers as such: nothing
-/// computes with either.
+/// The loop's end. The queue holds the numbers of a chain, and the bits of integers in place of numbers.
 pub struct LogPublisher {
     queue: Producer<f64>,
     reserved: usize,
@@ -86,7 +85,7 @@ pub(super) struct LogReader {
     columns: Vec<f64>,
 }
 
-/// How a log fared, once its run is over.
+/// The result of a log.
 #[derive(Clone)]
 pub struct LogOutcome(Arc<Shared>);
 
@@ -98,13 +97,13 @@ struct Log {
     thread: JoinHandle<()>,
 }
 
-/// The status is no part of a log.
+/// A destination that ignores the status: a log has none.
 struct NoStatus;
 
-/// Makes the file and starts its thread.
+/// Creates the file and starts its thread.
 ///
 /// # Errors
-/// [`TransportError::BadInput`] where the file cannot be made, [`TransportError::Failed`] where there is no thread.
+/// [`TransportError::BadInput`] if the file cannot be created, [`TransportError::Failed`] if the thread cannot be started.
 pub fn open(file: &Path, show: ShowLine, handles: usize) -> Result<(Box<dyn Transport>, LogOutcome), TransportError> {
     let shown = file.display().to_string();
     let refused = |error| TransportError::BadInput(format!("--log: {shown}: {error}, expected a file to write"));
@@ -120,18 +119,18 @@ pub fn open(file: &Path, show: ShowLine, handles: usize) -> Result<(Box<dyn Tran
 }
 
 impl LogOutcome {
-    /// Takes in what the loop has counted: the log's last lines. To be called before the transports are finished.
-    pub fn ended(&self, counts: Counts) {
+    /// Sets the loop's counts, for the log's last line. Must be called before the transports are finished.
+    pub fn ended(&self, counts: LoopCounts) {
         *self.0.ended.lock().unwrap_or_else(PoisonError::into_inner) = Some(counts);
     }
 
-    /// Why the log is not whole, in one sentence; `None` where it is.
+    /// Returns the reason why the log is incomplete, in one sentence; `None` for a complete log.
     pub fn failure(&self) -> Option<String> {
         self.0.failure.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
-/// The queue for frames of so many handles, all of its memory in place.
+/// Creates the queue for frames of `handles` handles. All of its memory is touched.
 pub(super) fn queue(handles: usize, rate: f64) -> (LogPublisher, LogReader) {
     let frame = words_of(handles);
     let affordable = QUEUE_BYTES / (frame * size_of::<f64>());
@@ -139,10 +138,10 @@ pub(super) fn queue(handles: usize, rate: f64) -> (LogPublisher, LogReader) {
     queue_of(frames * frame, RESERVED_WORDS)
 }
 
-/// The queue with room for so many words of frames, and for so many besides.
+/// Creates a queue with room for `words` words of frames and `reserved` further words.
 pub(super) fn queue_of(words: usize, reserved: usize) -> (LogPublisher, LogReader) {
     let (mut queue, mut consumer) = RingBuffer::new(words + reserved);
-    // The loop's thread is not to be the first that touches a page.
+    // Touches each page, so that the loop's thread has no page fault.
     while queue.push(0.0).is_ok() {}
     while consumer.pop().is_ok() {}
     let shared = Arc::new(Shared {
@@ -157,13 +156,13 @@ pub(super) fn queue_of(words: usize, reserved: usize) -> (LogPublisher, LogReade
     (LogPublisher { queue, reserved, frame_words: 0, shared }, reader)
 }
 
-/// Words of a frame.
+/// Returns the words of a frame.
 fn words_of(handles: usize) -> usize {
     FRAME_WORDS + HANDLE_WORDS * handles
 }
 
 impl LogPublisher {
-    /// Pushes words for which there is room.
+    /// Pushes words. The caller has checked that there is room.
     pub(super) fn push(&mut self, words: &[f64]) {
         let pushed = self.queue.push_entire_slice(words);
         debug_assert!(pushed.is_ok(), "{pushed:?}");
@@ -209,8 +208,8 @@ impl Publisher for LogPublisher {
         Ok(())
     }
 
-    /// Writes zeros where the next frame will be: its memory, which the log's thread has read on another processor, is in
-    /// this one's cache when it comes.
+    /// Writes zeros to the memory of the next frame. The log's thread has read that memory on another processor; now it is in
+    /// this processor's cache.
     fn prepare(&mut self) {
         drop(self.queue.write_chunk(self.frame_words.min(MOST_PREPARED)));
     }
@@ -242,18 +241,18 @@ impl Transport for Log {
         Ok(Box::new(NoStatus))
     }
 
-    fn finish(self: Box<Self>) -> Option<(&'static str, Deliveries)> {
+    fn finish(self: Box<Self>) -> Option<(&'static str, TransportCounters)> {
         self.shared.stop.store(true, Ordering::Release);
         let began = Instant::now();
         while !self.thread.is_finished() && began.elapsed() < LONGEST_END {
             std::thread::sleep(Duration::from_millis(1));
         }
         if !self.thread.is_finished() {
-            let sentence = format!("--log: {}: it takes no more, the log is cut", self.file.display());
+            let sentence = format!("--log: {}: write failed, the log is incomplete", self.file.display());
             fail(&self.shared, sentence);
         }
         let [frames, skipped] = [&self.shared.frames, &self.shared.lost].map(|count| count.load(Ordering::Acquire));
-        Some(("log", Deliveries { frames, skipped, discarded: 0 }))
+        Some(("log", TransportCounters { frames, skipped, discarded: 0 }))
     }
 }
 
@@ -262,17 +261,17 @@ fn fail(shared: &Shared, sentence: String) {
     shared.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(sentence);
 }
 
-/// Writes what the queue brings until the run is over.
+/// Writes the contents of the queue until the run is over.
 fn serve(mut reader: LogReader, mut writer: LogWriter<impl io::Write>, shared: &Shared, file: &str) {
     loop {
-        // Read before the queue is emptied: what was put there before it was set is then still written.
+        // Read before the queue is emptied, so that everything queued before it was set is written.
         let ending = shared.stop.load(Ordering::Acquire);
         let missing_from = shared.missing_from.load(Ordering::Acquire);
         reader.empty(&mut writer);
         if missing_from != NEVER {
             writer.stopped(missing_from);
             let sentence = format!("--log: {file}: the log was too far behind at tick {missing_from} and ends there");
-            log::error!("{sentence}; the show goes on");
+            log::error!("{sentence}; the show continues");
             fail(shared, sentence);
         } else if ending {
             match *shared.ended.lock().unwrap_or_else(PoisonError::into_inner) {
@@ -282,8 +281,8 @@ fn serve(mut reader: LogReader, mut writer: LogWriter<impl io::Write>, shared: &
         }
         let counts = writer.counts();
         if let Some(error) = writer.take_failure() {
-            let sentence = format!("--log: {file}: {error}: the log is cut");
-            log::error!("{sentence}; the show goes on");
+            let sentence = format!("--log: {file}: {error}: the log is incomplete");
+            log::error!("{sentence}; the show continues");
             fail(shared, sentence);
         }
         shared.frames.store(counts.frames, Ordering::Release);
@@ -296,9 +295,9 @@ fn serve(mut reader: LogReader, mut writer: LogWriter<impl io::Write>, shared: &
 }
 
 impl LogReader {
-    /// Writes all that is in the queue.
+    /// Writes the contents of the queue.
     fn empty(&mut self, writer: &mut LogWriter<impl io::Write>) {
-        // A record that is longer has more behind it.
+        // A frame is longer than this first part.
         while let Ok(record) = self.queue.read_chunk(RECORD_WORDS) {
             let mut words = [0; RECORD_WORDS];
             let (first, second) = record.as_slices();
@@ -317,7 +316,7 @@ impl LogReader {
                 STEP_FINISHED => code(third).into_iter().for_each(|code| {
                     writer.command(tick, CommandRecord::StepFinished { code });
                 }),
-                // Numbers that this end has written are numbers of commands; only a value can be out of range.
+                // The loop's end wrote the number of a command; only its value can be out of range.
                 _ => Command::of_number(third as u32, f64::from_bits(fourth)).into_iter().for_each(|command| {
                     writer.command(tick, CommandRecord::Given { command, code: code(fifth) });
                 }),
@@ -325,14 +324,14 @@ impl LogReader {
         }
     }
 
-    /// Writes a frame of so many handles; false where the loop has not pushed all of it yet.
+    /// Writes a frame of `handles` handles. Returns false if the loop has not pushed all of it yet.
     fn frame(&mut self, handles: usize, writer: &mut LogWriter<impl io::Write>) -> bool {
         if self.queue.slots() < words_of(handles) {
             return false;
         }
         let mut words = [0.0; FRAME_WORDS];
         self.columns.resize(HANDLE_WORDS * handles, 0.0);
-        // All of them are there.
+        // The check above ensures that there are enough.
         let _ = self.queue.pop_entire_slice(&mut words);
         let _ = self.queue.pop_entire_slice(&mut self.columns);
         let header: [u64; HEADER_WORDS] = std::array::from_fn(|k| words[FRAME_WORDS - HEADER_WORDS + k].to_bits());

@@ -1,33 +1,33 @@
-//! The ways out of this process: one trait, a list, a folder each.
+//! The transports.
 //!
-//! In: what is to be offered, the loop's rate, the stage. Out: for each transport that is requested, a [`Publisher`] for the
-//! loop's thread and a [`StatusPublisher`] for the statistics thread. Transports know frames and messages, no solver, and
-//! not each other. [`background`] is for those that would keep the loop waiting. Called by the commands that publish.
+//! In: a [`TransportConfig`]. Out: for each requested transport, a [`Publisher`] for the loop's thread and a
+//! [`StatusPublisher`] for the statistics thread. Transports know messages, no solver, and not each other. [`background`]
+//! keeps a slow transport off the loop. Called by [`run`](crate::run).
 
 pub mod background;
 pub mod iceoryx2;
 
-use crate::live::control::Door;
-use crate::live::{Deliveries, Publisher, StatusPublisher};
+use crate::live::control::CommandSender;
+use crate::live::{Publisher, StatusPublisher, TransportCounters};
 use bench_dragon_client::shared_memory::OpenError;
 use bench_dragon_messages::Stage;
 use bench_dragon_ros2_messages::settings::Ros2Settings;
 use bench_dragon_show::scene::{Scene, SinglePrecision};
 
-/// What every transport is given about the run.
+/// The settings of a run for every transport.
 #[derive(Debug, Clone, Copy)]
 pub struct TransportConfig<'a> {
     /// The name under which services and topics appear.
     pub name: &'a str,
     /// Handles in a frame.
     pub handles: usize,
-    /// Whether there are alerts.
+    /// True if there are alerts.
     pub alerts: bool,
     /// Cues of the show.
     pub cues: usize,
-    /// The service of poses in single precision, where there is one.
+    /// The service of poses in single precision, if requested.
     pub single_precision: Option<SinglePrecision>,
-    /// Frames a subscriber may fall behind; `None` for as many as suit their size.
+    /// Frames a subscriber may fall behind; `None` to choose by their size.
     pub queue: Option<usize>,
     /// Subscribers that each iceoryx2 service admits at once.
     pub subscribers: usize,
@@ -40,7 +40,7 @@ pub struct TransportConfig<'a> {
 }
 
 impl<'a> TransportConfig<'a> {
-    /// What a scene asks for, published under a name.
+    /// Returns the settings of a scene, published under `name`.
     pub fn of(name: &'a str, scene: &'a Scene, loop_rate: f64, stage: Stage) -> Self {
         Self {
             name,
@@ -57,16 +57,16 @@ impl<'a> TransportConfig<'a> {
     }
 }
 
-/// Why a transport cannot be used: one sentence, which names what to change.
+/// The reason why a transport cannot be used: one sentence that names the change to make.
 #[derive(Debug, thiserror::Error)]
 pub enum TransportError {
-    /// What the user asked for cannot be had.
+    /// The user's request cannot be fulfilled.
     #[error("{0}")]
     BadInput(String),
-    /// The transport cannot take such a name.
+    /// The name is illegal for the transport.
     #[error("{0}")]
     IllegalName(String),
-    /// Others use this name.
+    /// Another publisher uses this name.
     #[error("{0}")]
     NameInUse(String),
     /// Anything else.
@@ -90,12 +90,12 @@ impl From<OpenError> for TransportError {
     }
 }
 
-/// A way out of this process.
+/// A transport.
 ///
-/// It is made before the loop's thread has its priority, so that threads of its own do not inherit that. Its ends are
-/// opened by the threads that use them: ports of iceoryx2, for one, stay on the thread that made them.
+/// It is created before the loop's thread gets its priority, so that the transport's threads do not inherit it. The threads
+/// that use its ends open them: ports of iceoryx2 stay on the thread that made them.
 pub trait Transport: Send {
-    /// What it offers, in one line for people.
+    /// Returns a description for people, in one line.
     fn describe(&self) -> String;
 
     /// Opens the end of the loop, on the loop's thread. Called once.
@@ -104,30 +104,29 @@ pub trait Transport: Send {
     /// [`TransportError`]
     fn publisher(&mut self) -> Result<Box<dyn Publisher>, TransportError>;
 
-    /// Opens the end of the statistics, on their thread, after [`publisher`](Self::publisher). Called once.
+    /// Opens the end of the statistics, on the statistics thread, after [`publisher`](Self::publisher). Called once.
     ///
     /// # Errors
     /// [`TransportError`]
     fn status(&mut self) -> Result<Box<dyn StatusPublisher>, TransportError>;
 
-    /// Opens a door for commands, on a thread of its own, where this transport has one; gives the door back where it has
-    /// none. Called once, before the
-    /// loop's thread is started.
+    /// Serves commands on a thread of this transport and returns `None`. Returns `commands` if the transport has no commands.
+    /// Called once, before the loop's thread starts.
     ///
     /// # Errors
     /// [`TransportError`]
-    fn control(&mut self, door: Door) -> Result<Option<Door>, TransportError> {
-        Ok(Some(door))
+    fn control(&mut self, commands: CommandSender) -> Result<Option<CommandSender>, TransportError> {
+        Ok(Some(commands))
     }
 
-    /// Takes leave once both ends are dropped: its name in the summary, and what it delivered, where it has a queue.
-    fn finish(self: Box<Self>) -> Option<(&'static str, Deliveries)>;
+    /// Shuts down after both ends are dropped. Returns its name and its counters, if it has a queue.
+    fn finish(self: Box<Self>) -> Option<(&'static str, TransportCounters)>;
 }
 
-/// Makes a transport; `None` where the scene does not request it.
+/// Creates a transport. Returns `None` if the scene does not request it.
 pub type Open = fn(&TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError>;
 
-/// The transports that the scene requests.
+/// Opens the transports that the scene requests.
 ///
 /// # Errors
 /// The first [`TransportError`]

@@ -1,9 +1,9 @@
 //! A subscriber that records: from the feed through a queue to a thread that compresses and writes.
 //!
-//! The feed's end copies each frame and returns, so that a slow disk does not keep it from the shared memory. Where the thread
-//! is 64 MB behind, the feed's end waits for it with the next frame, until the recording is over: frames then stay in the shared
-//! memory until the oldest of them are overwritten, which shows as a gap, and neither the publisher nor the memory of this
-//! process notices. What is not sent with every frame is little and never waits. Called by the command `record`.
+//! The feed's end copies each frame, so that a slow disk does not delay it. If the thread is 64 MB behind, the feed's end
+//! waits with the next frame. Frames then stay in the shared memory until the oldest are overwritten, which is a gap in the
+//! recording. The publisher and this process's memory are not affected. Event-driven messages are small and never wait.
+//! Called by the command `record`.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -15,16 +15,16 @@ use crate::mcap::recorder::{RecordError, Recorded, Recorder};
 use bench_dragon_client::feed::FeedEvent;
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, QUEUE_BYTES, Stage};
 
-/// How often the thread does what is due.
+/// The interval of the thread's periodic work.
 const MAINTAIN_INTERVAL: Duration = Duration::from_millis(50);
-/// How long the feed's end waits for room before it looks again.
+/// The interval at which the feed's end polls for room.
 const ROOM_INTERVAL: Duration = Duration::from_millis(1);
-/// How long the end of a recording waits for a disk that takes nothing: a slow one needs seconds for what it was given.
+/// Seconds after which a disk that accepts nothing is given up at the end. A slow disk needs seconds for its buffers.
 const STUCK_SECONDS: u64 = 30;
-/// How often the end of a recording looks whether the thread is done.
+/// The interval at which the end of a recording polls the thread.
 const FINISH_INTERVAL: Duration = Duration::from_millis(10);
 
-/// What the feed brings.
+/// An item of the queue.
 enum Item {
     Frame { header: FrameHeader, handles: Vec<HandlePose>, missed: u64 },
     Stage(Box<Stage>),
@@ -34,7 +34,7 @@ enum Item {
     Gone,
 }
 
-/// What both ends know.
+/// The state that both ends share.
 #[derive(Default)]
 struct Shared {
     queued_bytes: AtomicUsize,
@@ -45,7 +45,7 @@ struct Shared {
 /// The feed's end.
 pub struct RecordQueue {
     items: Sender<Item>,
-    /// Memory of frames that have been written.
+    /// The memory of written frames, for reuse.
     free: Receiver<Vec<HandlePose>>,
     shared: Arc<Shared>,
 }
@@ -56,13 +56,13 @@ pub struct RecordThread {
     handle: JoinHandle<(Recorded, Option<RecordError>)>,
 }
 
-/// Why a recording has not all that its queue was given, in one sentence.
+/// The reason for an incomplete recording, in one sentence.
 #[derive(Debug, thiserror::Error)]
 pub enum UnfinishedError {
-    /// The disk refused it.
+    /// A write failed.
     #[error(transparent)]
     Record(RecordError),
-    /// The disk neither takes nor refuses it.
+    /// The disk neither accepts nor refuses the data.
     #[error(
         "nothing could be written for {STUCK_SECONDS} s: the recording ends there, a file without an end is mended by \
          record --recover"
@@ -73,7 +73,7 @@ pub enum UnfinishedError {
 /// Starts the thread of a recorder.
 ///
 /// # Errors
-/// The system gives no thread.
+/// The system refuses a thread.
 pub fn start(recorder: Recorder) -> std::io::Result<(RecordQueue, RecordThread)> {
     let (items, inbox) = channel();
     let (used, free) = channel();
@@ -89,7 +89,7 @@ pub fn start(recorder: Recorder) -> std::io::Result<(RecordQueue, RecordThread)>
 }
 
 impl RecordQueue {
-    /// Passes an event on. A frame waits for room until `over`, after which there is none for it.
+    /// Queues an event. A frame waits for room until `over` returns true, and is then dropped.
     pub fn handle(&self, event: &FeedEvent<'_>, over: impl Fn() -> bool) {
         let item = match event {
             FeedEvent::Frame { header, handles, missed } => {
@@ -112,24 +112,24 @@ impl RecordQueue {
             FeedEvent::Started { .. } | FeedEvent::Silent => return,
         };
         self.shared.queued_bytes.fetch_add(bytes(&item), Ordering::AcqRel);
-        // A thread that has failed takes nothing more, and its error is reported when it is joined.
+        // After a failure nothing is queued; the error is reported when the thread is joined.
         let _ = self.items.send(item);
     }
 }
 
 impl RecordThread {
-    /// Whether the thread has ended, because the disk takes no more.
+    /// Returns true if the thread has ended because a write failed.
     pub fn has_ended(&self) -> bool {
         self.shared.ended.load(Ordering::Acquire) || self.handle.is_finished()
     }
 
-    /// What has been recorded so far.
+    /// Returns the recording so far.
     pub fn recorded(&self) -> Recorded {
         self.shared.recorded.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Ends the thread once it has written all that `queue` was given. What it has recorded, and why not everything. A thread
-    /// that gets on with nothing is left behind.
+    /// Ends the thread after it has written the contents of `queue`. Returns the recording, and the reason if it is incomplete.
+    /// A thread without progress is abandoned.
     pub fn finish(self, queue: RecordQueue) -> (Recorded, Option<UnfinishedError>) {
         drop(queue);
         let (mut left, mut since) = (usize::MAX, Instant::now());
@@ -143,13 +143,13 @@ impl RecordThread {
             std::thread::sleep(FINISH_INTERVAL);
         }
         let recorded = self.recorded();
-        // A panic has been printed by then.
+        // The thread has printed its panic.
         let (recorded, error) = self.handle.join().unwrap_or((recorded, None));
         (recorded, error.map(UnfinishedError::Record))
     }
 }
 
-/// The memory of an item, with a share of the queue's own.
+/// Returns the memory of an item, with its share of the queue.
 fn bytes(item: &Item) -> usize {
     match item {
         Item::Frame { handles, .. } => size_of::<Item>() + size_of_val(&handles[..]),
@@ -157,7 +157,7 @@ fn bytes(item: &Item) -> usize {
     }
 }
 
-/// Records what comes until the other end of the queue is dropped or the disk takes no more.
+/// Records the items until the other end of the queue is dropped or a write fails.
 fn serve(
     mut recorder: Recorder,
     inbox: &Receiver<Item>,
@@ -176,7 +176,7 @@ fn serve(
         let done = match item {
             Some(Item::Frame { header, handles, missed }) => {
                 let done = recorder.frame(&header, &handles, missed);
-                // Nobody takes it where the recording is about to end.
+                // At the end of the recording the other end is gone.
                 let _ = used.send(handles);
                 done
             }

@@ -1,9 +1,9 @@
-//! A recording as frames of the live loop.
+//! A recording as the loop's frame source.
 //!
-//! In: a [`Recording`] and how to play it. Out: a [`Replay`], which the loop asks for the frame of each period, and a thread
-//! that reads ahead of it into a queue of bounded size. A frame is due as many periods after the first as it was when it was
-//! recorded; where the loop has skipped periods, or the disk was late, all that follow are as much later, so that no frame is
-//! left out and none is sent in a burst. Called by the command `replay`.
+//! In: a [`Recording`] and [`ReplayOptions`]. Out: a [`Replay`], the loop's [`FrameSource`], and a thread that reads ahead into
+//! a queue of bounded size. A frame is due as many periods after the first as in the recording. If the loop skips periods, or
+//! the disk is late, all later frames shift, so that no frame is skipped and none is sent in a burst. Called by the command
+//! `replay`.
 
 mod pass;
 #[cfg(test)]
@@ -32,28 +32,28 @@ use pass::{Pass, Recorded, Start};
 const QUEUED_SECONDS: f64 = 2.0;
 /// The least number of frames in that queue.
 const QUEUED_FRAMES: usize = 4;
-/// How often the thread looks for room in the queue.
+/// The interval at which the thread polls for room in the queue.
 const ROOM_INTERVAL: Duration = Duration::from_millis(2);
-/// How often it is looked for the first frame: once a replay.
+/// The interval of the polls for the first frame, once a replay.
 const FIRST_INTERVAL: Duration = Duration::from_micros(100);
 
-/// When the frames go out.
+/// The timing of the frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Pace {
-    /// As recorded, so many times as fast: where frames are missing there is a gap.
+    /// As recorded, faster by this factor. Missing frames are a gap.
     Recorded(f64),
-    /// One in each period of so many a second: gaps are closed.
+    /// At this rate per second, without gaps.
     Even(f64),
 }
 
-/// How a recording is played.
+/// The settings of a replay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReplayOptions {
-    /// When the frames go out.
+    /// The timing of the frames.
     pub pace: Pace,
-    /// The replay begins with the first frame at or after these simulated seconds; `None` for the first of the file.
+    /// Simulated seconds at which the replay begins; `None` for the first frame.
     pub start: Option<f64>,
-    /// Whether it begins again once it is over.
+    /// True to begin again at the end.
     pub looping: bool,
 }
 
@@ -69,34 +69,34 @@ struct QueuedFrame {
     shows_played: u64,
 }
 
-/// What both ends of the queue know.
+/// The state that both ends share besides the queue.
 #[derive(Default)]
 struct Shared {
     stop: AtomicBool,
-    /// Periods in which a frame was due that had not been read.
+    /// Periods in which the due frame had not been read.
     waited: AtomicU64,
     failure: Mutex<Option<ReadError>>,
 }
 
-/// The loop's end: the frames.
+/// The loop's end: the frame source.
 pub struct Replay {
     filled: Consumer<Box<QueuedFrame>>,
     free: Producer<Box<QueuedFrame>>,
-    /// The one that was sent last, and the one that is next.
+    /// The latest frame sent, and the next one.
     sent: Option<Box<QueuedFrame>>,
     next: Option<Box<QueuedFrame>>,
-    /// Periods by which everything is later.
+    /// Periods by which all frames are later than recorded.
     behind: u64,
     shared: Arc<Shared>,
 }
 
-/// The thread that reads. Dropping it ends it.
+/// The thread that reads. Dropping this value ends the thread.
 pub struct ReplayThread {
     shared: Arc<Shared>,
     handle: Option<JoinHandle<()>>,
 }
 
-/// A recording that is about to be played.
+/// An opened recording, before its replay.
 pub struct Prepared {
     recording: Recording,
     options: ReplayOptions,
@@ -105,7 +105,7 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Opens a file and finds where to begin.
+    /// Opens a file and finds the first frame.
     ///
     /// # Errors
     /// [`ReadError`]
@@ -119,33 +119,33 @@ impl Prepared {
         Ok(Self { recording, options, start, rate })
     }
 
-    /// What the recording holds.
+    /// Returns the contents of the recording.
     pub fn contents(&self) -> &Contents {
         self.recording.contents()
     }
 
-    /// Periods per second of the loop that plays it.
+    /// Returns the periods per second of the loop.
     pub fn rate(&self) -> f64 {
         self.rate
     }
 
-    /// Simulated seconds of the first frame.
+    /// Returns the simulated seconds of the first frame.
     pub fn start(&self) -> f64 {
         self.start.sim_time
     }
 
-    /// Starts to read. At most once the frames are waited for: the first is there when this returns.
+    /// Starts the thread and waits for the first frame.
     ///
     /// # Errors
-    /// The system gives no thread.
+    /// The system refuses a thread.
     pub fn begin(self) -> std::io::Result<(Replay, ReplayThread)> {
         let handles = self.contents().ends[0].handles as usize;
         let frames = self.frames_ahead(handles);
         let (filled, loop_filled) = RingBuffer::new(frames);
-        // Besides those in the queue one is being filled, one is next and one was sent last.
+        // Besides the frames in the queue, one is being filled, one is next and one was sent last.
         let (mut loop_free, free) = RingBuffer::new(frames + 3);
         for _ in 0..frames + 3 {
-            // The ring has just as many places.
+            // The ring has room for all of them.
             let _ = loop_free.push(Box::new(QueuedFrame::new(handles)));
         }
         let shared = Arc::new(Shared::default());
@@ -177,7 +177,7 @@ impl Prepared {
         ((self.rate * QUEUED_SECONDS) as usize).min(affordable).max(QUEUED_FRAMES)
     }
 
-    /// Reads until the recording is over or nobody wants more of it.
+    /// Reads until the recording is over or the loop has ended.
     fn read(mut self, queue: &mut Queue<'_>) -> Result<(), ReadError> {
         let speed = self.rate / self.contents().rate;
         let handles = self.contents().ends[0].handles as usize;
@@ -200,7 +200,7 @@ impl Prepared {
                 frame.fill(recorded, due)?;
                 frame.shows_played = shows;
                 frame.header.epoch = frame.header.epoch.wrapping_add(epochs);
-                // A product with 1 would be the same bits; this is plain to see.
+                // Keeps the recorded bits at the recorded speed.
                 if speed != 1.0 {
                     frame.header.time_scale *= speed;
                 }
@@ -243,7 +243,7 @@ impl Queue<'_> {
     }
 }
 
-/// Fails unless a frame can follow those before it.
+/// Checks that a frame can follow the frames before it.
 fn check(recorded: &Recorded, handles: usize, span: Option<[FrameHeader; 2]>) -> Result<(), ReadError> {
     let HandlePoses { frame: header, poses, .. } = &recorded.frame;
     let reason = match span {
@@ -322,7 +322,7 @@ impl QueuedFrame {
 impl FrameSource for Replay {
     fn frame(&mut self, tick: u64, stamps: Stamps) -> Period<'_> {
         if self.next.is_none() {
-            // Read before the queue: what was put there before it was left is then still sent.
+            // Read before the queue, so that everything queued before its end is sent.
             let over = self.filled.is_abandoned();
             self.next = self.filled.pop().ok();
             if self.next.is_none() && over {
@@ -349,10 +349,10 @@ impl FrameSource for Replay {
         Period::Frame(Outgoing { header, chain, alerts, cues, commands: &[], counts })
     }
 
-    /// Tells how the recorded show stands, and refuses everything else.
+    /// Answers `State` with the state of the recorded show. Refuses every other command.
     fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
         let code = if command == Command::State { Code::Done } else { Code::Refused };
-        // A command that comes before the first frame is answered with it.
+        // Before the first frame, the next frame has the state.
         let QueuedFrame { header, playback, .. } = self.sent.as_deref().or(self.next.as_deref())?;
         let (FrameHeader { sim_time, time_scale, cue, .. }, playback) = (*header, *playback);
         Some(Outcome { code, tick, sim_time, time_scale, playing_rate: time_scale, playback, cue })
@@ -364,7 +364,7 @@ impl FrameSource for Replay {
 }
 
 impl ReplayThread {
-    /// Ends the thread: the periods in which the loop waited for it, and why it ended before the recording did.
+    /// Ends the thread. Returns the periods in which the loop waited for it, and the error that ended it early.
     pub fn finish(mut self) -> (u64, Option<ReadError>) {
         self.join();
         let failure = self.shared.failure.lock().unwrap_or_else(PoisonError::into_inner).take();
@@ -374,7 +374,7 @@ impl ReplayThread {
     fn join(&mut self) {
         self.shared.stop.store(true, Ordering::Release);
         if self.handle.take().is_some_and(|handle| handle.join().is_err()) {
-            // It has been printed by then.
+            // The thread has printed its panic.
             let error = std::io::Error::other("the thread that reads has panicked");
             *self.shared.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error.into());
         }

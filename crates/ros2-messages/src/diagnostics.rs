@@ -11,9 +11,9 @@ use bench_dragon_messages::{CollisionAlert, LoopStatus};
 /// diagnostic_msgs/KeyValue.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct KeyValue {
-    /// What.
+    /// The name of the figure.
     pub key: String,
-    /// How much.
+    /// The figure.
     pub value: String,
 }
 
@@ -22,9 +22,9 @@ pub struct KeyValue {
 pub struct DiagnosticStatus {
     /// 0 OK, 1 WARN, 2 ERROR.
     pub level: u8,
-    /// What is diagnosed.
+    /// The subject.
     pub name: String,
-    /// In a few words.
+    /// The finding in a few words.
     pub message: String,
     /// The publisher's name.
     pub hardware_id: String,
@@ -35,7 +35,7 @@ pub struct DiagnosticStatus {
 /// diagnostic_msgs/DiagnosticArray.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct DiagnosticArray {
-    /// When this was so.
+    /// The time of the status.
     pub header: Header,
     /// The loop and the dragon.
     pub status: Vec<DiagnosticStatus>,
@@ -46,21 +46,21 @@ const OK: u8 = 0;
 const WARN: u8 = 1;
 const ERROR: u8 = 2;
 
-/// What the diagnostics of a second of the loop need besides its status.
+/// The input of a second's diagnostics besides the status.
 #[derive(Debug, Clone, Copy)]
 pub struct LoopSecond<'a> {
-    /// The status one second before; one that is the same where that is not known.
+    /// The status one second before; the same status if that is unknown.
     pub before: &'a LoopStatus,
-    /// Messages that no ROS 2 queue would take, since the start.
+    /// Messages discarded by ROS 2 queues since the start.
     pub discarded: u64,
-    /// The same as of one second before.
+    /// The same, one second before.
     pub discarded_before: u64,
-    /// From when on a figure is worth a warning, or is an error.
+    /// The limits for warnings and errors.
     pub limits: DiagnosticLimits,
 }
 
 impl LoopSecond<'_> {
-    /// The level of the last second alone, and why.
+    /// Returns the level of the last second alone, and the reason.
     fn level(&self, status: &LoopStatus) -> (u8, String) {
         let Self { before, discarded, discarded_before, limits } = *self;
         let since = |now: u64, then: u64| now.saturating_sub(then);
@@ -96,7 +96,7 @@ impl LoopSecond<'_> {
 }
 
 impl DiagnosticArray {
-    /// The loop's health and the dragon's, of the last second.
+    /// Creates the diagnostics of the loop and of the dragon for the last second.
     pub fn of(name: &str, status: &LoopStatus, alert: Option<&CollisionAlert>, second: &LoopSecond) -> Self {
         let value = |key: &str, value: String| KeyValue { key: key.to_owned(), value };
         let level = level_of(alert);
@@ -143,7 +143,7 @@ impl DiagnosticArray {
     }
 }
 
-/// Benches in a row, or "none".
+/// Returns the benches in a list, or "none".
 fn listed(benches: impl Iterator<Item = u32>) -> String {
     let names: Vec<_> = benches.map(|bench| bench.to_string()).collect();
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }

@@ -1,8 +1,7 @@
-//! The ROS 2 messages as they go on the wire: field for field what `msgs/` and the standard packages define.
+//! The ROS 2 messages on the wire, field for field as `msgs/` and the standard packages define them.
 //!
-//! A message that is a header followed by one of the program's own layouts nests that layout: on the wire a nested
-//! struct is its fields in order. Called by the ROS 2 transport and by the recorder, so that a recording holds what a ROS 2
-//! subscriber would have received.
+//! A message of a header and one of the program's layouts nests the layout: on the wire a nested struct is its fields in
+//! order. Called by the ROS 2 transport and by the recorder, so that a recording has the same messages as a ROS 2 subscriber.
 
 pub mod diagnostics;
 pub mod markers;
@@ -30,16 +29,16 @@ pub struct Time {
 }
 
 impl Time {
-    /// The time of a stamp in nanoseconds.
+    /// Converts a stamp in nanoseconds.
     pub fn of(stamp_ns: u64) -> Self {
         let (seconds, nanoseconds) = (stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000);
         Self { sec: i32::try_from(seconds).unwrap_or(i32::MAX), nanosec: nanoseconds as u32 }
     }
 
-    /// A simulated time in seconds, which is not negative, to the nearest nanosecond.
+    /// Converts simulated seconds, not negative, to the nearest nanosecond.
     pub fn of_seconds(seconds: f64) -> Self {
         let whole = seconds.floor();
-        // The fraction of a double is exact; rounding may fill the second.
+        // The fraction is exact; rounding may complete the second.
         Self::of((whole as u64).saturating_mul(1_000_000_000).saturating_add(((seconds - whole) * 1e9).round() as u64))
     }
 }
@@ -47,14 +46,14 @@ impl Time {
 /// std_msgs/Header.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Header {
-    /// When what follows was true.
+    /// The time of the message.
     pub stamp: Time,
     /// The frame of its coordinates.
     pub frame_id: String,
 }
 
 impl Header {
-    /// The header of what was true at `stamp_ns`.
+    /// Creates the header of a message with the stamp `stamp_ns`.
     pub fn of(stamp_ns: u64) -> Self {
         Self { stamp: Time::of(stamp_ns), frame_id: FRAME_ID.to_owned() }
     }
@@ -70,28 +69,28 @@ pub struct Stamped<Layout> {
 }
 
 impl Stamped<CollisionAlert> {
-    /// The message of an alert.
+    /// Creates the message of an alert.
     pub fn alert(alert: CollisionAlert) -> Self {
         Self { header: Header::of(alert.stamp_ns), layout: alert }
     }
 }
 
 impl Stamped<LoopStatus> {
-    /// The message of a status.
+    /// Creates the message of a status.
     pub fn status(status: LoopStatus) -> Self {
         Self { header: Header::of(status.stamp_ns), layout: status }
     }
 }
 
 impl Stamped<Stage> {
-    /// The message of a stage.
+    /// Creates the message of a stage.
     pub fn stage(stage: Stage) -> Self {
         Self { header: Header::of(stage.stamp_ns), layout: stage }
     }
 }
 
 impl Stamped<Cue> {
-    /// The message of a cue.
+    /// Creates the message of a cue.
     pub fn cue(cue: Cue) -> Self {
         Self { header: Header::of(cue.stamp_ns), layout: cue }
     }
@@ -105,7 +104,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// The simulated time of a frame.
+    /// Returns the simulated time of a frame.
     pub fn of(frame: &FrameHeader) -> Self {
         Self { clock: Time::of_seconds(frame.sim_time) }
     }
@@ -116,19 +115,19 @@ impl Clock {
 pub struct HandlePoses {
     /// The frame's stamp.
     pub header: Header,
-    /// What is true of the whole frame.
+    /// The header of the frame.
     pub frame: FrameHeader,
     /// The handles, head first.
     pub poses: Vec<HandlePose>,
 }
 
 impl HandlePoses {
-    /// The message of so many handles, not yet of any frame.
+    /// Creates an empty message of `handles` handles.
     pub fn of(handles: usize) -> Self {
         Self { header: Header::of(0), frame: FrameHeader::default(), poses: vec![HandlePose::default(); handles] }
     }
 
-    /// Makes it the message of a frame.
+    /// Fills the message of a frame.
     pub fn update(&mut self, frame: &FrameHeader, handles: &[HandlePose]) {
         self.header.stamp = Time::of(frame.stamp_ns);
         self.frame = *frame;
@@ -162,7 +161,7 @@ pub struct Quaternion {
 }
 
 impl Quaternion {
-    /// A turn about the vertical by `heading` radians: (0, 0, sin(heading / 2), cos(heading / 2)).
+    /// Returns a rotation about the vertical by `heading` radians: (0, 0, sin(heading / 2), cos(heading / 2)).
     pub fn of_heading(heading: f64) -> Self {
         let (sine, cosine) = (0.5 * heading).sin_cos();
         Self { x: 0.0, y: 0.0, z: sine, w: cosine }
@@ -172,9 +171,9 @@ impl Quaternion {
 /// geometry_msgs/Pose.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Pose {
-    /// Where it is.
+    /// The position.
     pub position: Xyz,
-    /// Where it points.
+    /// The direction.
     pub orientation: Quaternion,
 }
 
@@ -183,7 +182,7 @@ impl Pose {
         Self { position: Xyz { x, y, z: 0.0 }, orientation: Quaternion::of_heading(heading) }
     }
 
-    /// A handle's pose.
+    /// Returns a handle's pose.
     pub fn of(handle: &HandlePose) -> Self {
         // A pose has no velocity.
         let HandlePose { x, y, heading, vx: _, vy: _ } = *handle;
@@ -201,12 +200,12 @@ pub struct PoseArray {
 }
 
 impl PoseArray {
-    /// The message of so many handles, not yet of any frame.
+    /// Creates an empty message of `handles` handles.
     pub fn of(handles: usize) -> Self {
         Self { header: Header::of(0), poses: vec![Pose::flat(0.0, 0.0, 0.0); handles] }
     }
 
-    /// Makes it the message of a frame.
+    /// Fills the message of a frame.
     pub fn update(&mut self, frame: &FrameHeader, handles: &[HandlePose]) {
         self.header.stamp = Time::of(frame.stamp_ns);
         self.poses.clear();
@@ -214,7 +213,7 @@ impl PoseArray {
     }
 }
 
-/// The level of the latest alert; clear before the first.
+/// Returns the level of the latest alert, `Clear` before the first.
 fn level_of(alert: Option<&CollisionAlert>) -> Level {
     alert.and_then(CollisionAlert::alert_level).unwrap_or(Level::Clear)
 }

@@ -1,5 +1,5 @@
-//! visualization_msgs: the benches as cubes for RViz and Foxglove, where it touches, what is coming and where, and the
-//! sentence about it.
+//! visualization_msgs for RViz and Foxglove: the benches as cubes, the place of a contact, the place of the coming event, and
+//! a sentence.
 
 use serde::Serialize;
 
@@ -68,23 +68,23 @@ pub struct Marker {
     pub header: Header,
     /// `benches`, `contact`, `coming`, `sentence` or `numbers`.
     pub ns: String,
-    /// The bench, from 0; of `numbers` the place among them.
+    /// The bench, from 0; for `numbers` the index among them.
     pub id: i32,
     /// The shape.
     pub r#type: i32,
     /// Add or delete.
     pub action: i32,
-    /// Where it is.
+    /// The pose.
     pub pose: Pose,
     /// Metres along, across and up.
     pub scale: Xyz,
-    /// Its colour.
+    /// The colour.
     pub color: Color,
-    /// Zero: until it is replaced.
+    /// Zero: until the next.
     pub lifetime: Duration,
     /// False.
     pub frame_locked: bool,
-    /// Of `coming` the ends of the dashes of its ring; empty for all others.
+    /// For `coming` the ends of the ring's dashes; otherwise empty.
     pub points: Vec<Xyz>,
     /// Empty.
     pub colors: Vec<Color>,
@@ -94,7 +94,7 @@ pub struct Marker {
     pub texture: CompressedImage,
     /// Empty.
     pub uv_coordinates: Vec<UvCoordinate>,
-    /// Of `sentence` and `numbers` the words; empty for all others.
+    /// For `sentence` and `numbers` the text; otherwise empty.
     pub text: String,
     /// Empty.
     pub mesh_resource: String,
@@ -112,12 +112,12 @@ const TEXT: i32 = 9;
 /// Marker.ADD and Marker.DELETE.
 const ADD: i32 = 0;
 const DELETE: i32 = 2;
-/// Metres up that a bench is drawn: the width of a hand above the board's own thickness.
+/// The height of a bench in metres.
 const BENCH_HEIGHT: f64 = 0.1;
-/// Dashes of the ring around the place of what is coming, and its radius in widths of a board.
+/// The dashes of the ring around the coming event, and its radius in widths of a board.
 const DASHES: usize = 16;
 const RING_RADIUS: f64 = 2.5;
-/// Benches that can be named at once: two that it happens to, and two that are nearest now.
+/// The most benches named at once: two of the event, and the two nearest.
 const MOST_NAMED: usize = 4;
 
 impl Marker {
@@ -150,9 +150,8 @@ impl Marker {
     }
 }
 
-/// visualization_msgs/MarkerArray: a cube for each bench, a sphere where two benches touched, a dashed ring where the
-/// coming event will be, the sentence that `run`, `watch` and the stage picture print, the names of the benches it is
-/// about.
+/// visualization_msgs/MarkerArray: a cube for each bench, a sphere at a contact, a dashed ring at the coming event, the
+/// sentence of `run`, `watch` and the stage picture, the names of the benches in it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MarkerArray {
     /// The benches from the head on, then `contact`, `coming`, `sentence` and the `numbers`.
@@ -160,7 +159,7 @@ pub struct MarkerArray {
 }
 
 impl MarkerArray {
-    /// The markers of a stage, not yet in any place.
+    /// Creates the markers of a stage, without positions.
     pub fn of(stage: &Stage) -> Self {
         let width = stage.width;
         let bench = |bench: u32| {
@@ -168,7 +167,7 @@ impl MarkerArray {
             Marker { scale: Xyz { x: length, y: width, z: BENCH_HEIGHT }, ..Marker::new("benches", bench as i32, CUBE) }
         };
         let sign = |ns, shape, scale| Marker { scale, color: colour(Severity::Error), ..Marker::new(ns, 0, shape) };
-        // Only the height of words counts.
+        // Text has only a height.
         let words = |ns, id| Marker { scale: Xyz { x: 0.0, y: 0.0, z: width }, ..Marker::new(ns, id, TEXT) };
         let contact = sign("contact", SPHERE, Xyz { x: width, y: width, z: width });
         let coming =
@@ -179,7 +178,7 @@ impl MarkerArray {
         Self { markers }
     }
 
-    /// Puts every marker where it is in a frame. `alert` is the latest alert.
+    /// Updates every marker for a frame. `alert` is the latest alert.
     pub fn update(
         &mut self,
         frame: &FrameHeader,
@@ -221,20 +220,20 @@ impl MarkerArray {
     }
 }
 
-/// Shows a marker at a place, or not at all.
+/// Shows a marker at a place, or deletes it.
 fn put(marker: &mut Marker, stamp: Time, place: Option<(f64, f64)>) {
     marker.header.stamp = stamp;
     marker.action = if place.is_some() { ADD } else { DELETE };
     if let Some((x, y)) = place {
         marker.pose = Pose::flat(x, y, 0.0);
         if marker.r#type == TEXT {
-            // Words lie above the boards.
+            // Text is above the boards.
             marker.pose.position.z = 2.0 * BENCH_HEIGHT;
         }
     }
 }
 
-/// The benches an alert is about, with their colours: those of the event, and before it those that are nearest now.
+/// Returns the benches of an alert with their severities: those of the event, and before the event the nearest two.
 fn named(alert: &CollisionAlert, happened: bool) -> Vec<(u32, Severity)> {
     let mut named: Vec<_> = alert.event_benches().map(|bench| (bench, Severity::Error)).collect();
     if !happened {
@@ -247,7 +246,7 @@ fn named(alert: &CollisionAlert, happened: bool) -> Vec<(u32, Severity)> {
     named
 }
 
-/// The sentence about an alert as of a frame, or about a state that no alert reports.
+/// Returns the sentence about an alert at the time of a frame, or about a state without an alert.
 fn words(frame: &FrameHeader, stage: &Stage, alert: Option<&CollisionAlert>) -> Option<String> {
     let state = FrameState::ALL.get(frame.state as usize).and_then(|state| state_sentence(*state));
     let of = |alert: &CollisionAlert| {
@@ -258,7 +257,7 @@ fn words(frame: &FrameHeader, stage: &Stage, alert: Option<&CollisionAlert>) -> 
     state.map(str::to_owned).or_else(|| alert.map(of))
 }
 
-/// The ends of the dashes of a ring, m from its middle.
+/// Returns the ends of a ring's dashes, metres from its centre.
 fn ring(width: f64) -> Vec<Xyz> {
     let at = |step: usize| {
         let (sin, cos) = (step as f64 * std::f64::consts::PI / DASHES as f64).sin_cos();
@@ -267,7 +266,7 @@ fn ring(width: f64) -> Vec<Xyz> {
     (0..2 * DASHES).map(at).collect()
 }
 
-/// The colour of a severity.
+/// Returns the colour of a severity.
 fn colour(severity: Severity) -> Color {
     match severity {
         Severity::Ok => Color { r: 0.2, g: 0.6, b: 0.3, a: 1.0 },

@@ -1,19 +1,19 @@
-//! nav_msgs/Path: the line that the head follows.
+//! nav_msgs/Path: the path of the head.
 
 use serde::Serialize;
 
 use super::{Header, Pose};
 use bench_dragon_messages::{SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_OUTWARD_SPIRAL, Stage, StageSegment};
 
-/// The turn between two points, radians: a chord of it misses a circle of 9 m by 9 mm.
+/// The turn between two points, radians: the chord of a circle of 9 m is 9 mm off.
 const TURN: f64 = std::f64::consts::PI / 36.0;
-/// Points of a path at most; one that turns more often gets fewer for each turn.
+/// The most points of a path. A path with more turns gets fewer points for each.
 const MOST_POINTS: f64 = 10_000.0;
 
 /// geometry_msgs/PoseStamped.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PoseStamped {
-    /// As that of the path.
+    /// The header of the path.
     pub header: Header,
     /// A point, and the direction of travel there.
     pub pose: Pose,
@@ -22,14 +22,14 @@ pub struct PoseStamped {
 /// nav_msgs/Path.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Path {
-    /// When it was published.
+    /// The stamp of the stage.
     pub header: Header,
-    /// From the start to the end.
+    /// The points from start to end.
     pub poses: Vec<PoseStamped>,
 }
 
 impl Path {
-    /// The path of a stage, published when that was.
+    /// Creates the path of a stage, with the stage's stamp.
     pub fn of(stage: &Stage) -> Self {
         let header = Header::of(stage.stamp_ns);
         let poses = poses(stage.path_in_use(), stage.pitch);
@@ -38,8 +38,8 @@ impl Path {
     }
 }
 
-/// Points along segments, with the direction of travel: the ends of every segment, and between them one for each turn by
-/// five degrees. `pitch` is that of the spirals, metres per turn.
+/// Returns points along segments with the direction of travel: the ends of every segment, and a point for each turn by five
+/// degrees. `pitch` is the pitch of the spirals, metres per turn.
 fn poses(segments: &[StageSegment], pitch: f64) -> Vec<Pose> {
     let turned: f64 = segments.iter().map(turn_of).sum();
     let turn = TURN.max(turned / MOST_POINTS);
@@ -51,7 +51,7 @@ fn poses(segments: &[StageSegment], pitch: f64) -> Vec<Pose> {
     segments.iter().flat_map(along).collect()
 }
 
-/// Radians by which a segment turns.
+/// Returns the radians by which a segment turns.
 fn turn_of(segment: &StageSegment) -> f64 {
     match segment.kind {
         SEGMENT_ARC => (segment.curvature * segment.length).abs(),
@@ -60,7 +60,7 @@ fn turn_of(segment: &StageSegment) -> f64 {
     }
 }
 
-/// The pose at a share, from 0 to 1, of a segment: of its length, or of a spiral's polar angle.
+/// Returns the pose at a share, from 0 to 1, of a segment's length or of a spiral's polar angle.
 fn pose_at(segment: &StageSegment, pitch: f64, share: f64) -> Pose {
     let StageSegment { x, y, heading, length, curvature, theta_first, theta_last, kind, reserved: _ } = *segment;
     match kind {
@@ -74,7 +74,7 @@ fn pose_at(segment: &StageSegment, pitch: f64, share: f64) -> Pose {
             let per_radian = pitch / std::f64::consts::TAU;
             let (sine, cosine) = theta.sin_cos();
             let radius = per_radian * theta;
-            // Against the derivative by theta: inward because theta decreases, outward because of the half turn.
+            // Opposite to the derivative by theta: inward because theta decreases, outward because of the half turn.
             let (along_x, along_y) = (radius * sine - per_radian * cosine, -radius * cosine - per_radian * sine);
             let side = if kind == SEGMENT_INWARD_SPIRAL { 1.0 } else { -1.0 };
             Pose::flat(side * radius * cosine, side * radius * sine, along_y.atan2(along_x))

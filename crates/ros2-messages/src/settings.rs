@@ -35,11 +35,11 @@ pub enum Topic {
 }
 
 impl Topic {
-    /// What is published by default.
+    /// The topics published by default.
     pub const DEFAULT: [Self; 7] =
         [Self::Handles, Self::Poses, Self::Alerts, Self::Stage, Self::Diagnostics, Self::Path, Self::Cues];
 
-    /// Every one.
+    /// All topics.
     pub const ALL: [Self; 11] = [
         Self::Handles,
         Self::Poses,
@@ -54,7 +54,7 @@ impl Topic {
         Self::Tf,
     ];
 
-    /// The name in the scene, and the last part of the topic's.
+    /// Returns the name in the scene, which is the last part of the topic's name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Handles => "handles",
@@ -71,19 +71,19 @@ impl Topic {
         }
     }
 
-    /// The topic's full name, where the publisher is called `publisher`.
+    /// Returns the topic's full name for the publisher `publisher`.
     pub fn path(self, publisher: &str) -> String {
         match self {
-            // Where every tool looks.
+            // The names that tools expect.
             Self::Diagnostics | Self::Clock | Self::Tf => format!("/{}", self.name()),
             _ => format!("/{publisher}/{}", self.name()),
         }
     }
 
-    /// The default quality of service.
+    /// Returns the default quality of service.
     ///
-    /// Reliable throughout, since a default subscription is reliable and gets nothing from a best-effort publisher; a
-    /// best-effort subscription gets what a reliable publisher sends. What is sent seldom is kept for late subscribers.
+    /// All topics are reliable: a default subscription is reliable and gets nothing from a best-effort publisher, while a
+    /// best-effort subscription gets the messages of a reliable publisher. Event-driven messages are kept for late subscribers.
     pub fn default_qos(self) -> Qos {
         match self {
             Self::Alerts | Self::Stage | Self::Path | Self::Cues => {
@@ -94,47 +94,47 @@ impl Topic {
     }
 }
 
-/// Whether lost messages are sent again.
+/// The retransmission of lost messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reliability {
-    /// They are.
+    /// Lost messages are retransmitted.
     Reliable,
-    /// They are not.
+    /// Lost messages are not retransmitted.
     BestEffort,
 }
 
-/// Whether late subscribers get what was sent before.
+/// The history for late subscribers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Durability {
-    /// They do not.
+    /// No history.
     Volatile,
-    /// They get the last message. (More, up to the depth, only while others subscribe at the same time.)
+    /// The last message; more, up to the depth, only while others subscribe.
     TransientLocal,
 }
 
 /// The quality of service of a topic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Qos {
-    /// Whether lost messages are sent again.
+    /// The retransmission of lost messages.
     pub reliability: Reliability,
-    /// Whether late subscribers get what was sent before.
+    /// The history for late subscribers.
     pub durability: Durability,
-    /// The last messages that are kept.
+    /// The number of last messages that are kept.
     pub depth: u32,
 }
 
-/// From when on the diagnostics of the loop's last second are a warning, and from when on an error.
+/// The limits of the loop's last second for a warning and for an error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DiagnosticLimits {
-    /// Periods skipped, at least 1.
+    /// Skipped periods for a warning, at least 1.
     pub skipped_warn: u64,
-    /// The same; by default a tenth of the loop's rate.
+    /// Skipped periods for an error; by default a tenth of the loop's rate.
     pub skipped_error: Option<u64>,
-    /// Wake-up lateness, 99th percentile, seconds; infinite by default: what is late but in time has no consequence.
+    /// Wake-up lateness for a warning, 99th percentile, seconds; infinite by default: lateness within a period is harmless.
     pub lateness_warn: f64,
-    /// The same.
+    /// The same for an error.
     pub lateness_error: f64,
 }
 
@@ -145,20 +145,20 @@ impl Default for DiagnosticLimits {
 }
 
 impl DiagnosticLimits {
-    /// Periods skipped in a second that are an error at a rate of the loop.
+    /// Returns the skipped periods of a second that are an error at a rate of the loop.
     pub fn skipped_error_at(&self, rate: f64) -> u64 {
         self.skipped_error.unwrap_or(((0.1 * rate).ceil() as u64).max(2)).max(self.skipped_warn)
     }
 }
 
-/// What a scene states about its ROS 2 topics.
+/// The ROS 2 settings of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ros2Settings {
     /// Frames per second on ROS 2; by default the smaller of 60 and the loop's rate.
     pub rate: Option<f64>,
-    /// The topics and how each is published.
+    /// The topics and the quality of service of each.
     pub topics: BTreeMap<Topic, Qos>,
-    /// Whether there are services that conduct the show.
+    /// True for services that control the show.
     pub control: bool,
     /// The limits of the diagnostics.
     pub diagnostics: DiagnosticLimits,
@@ -172,7 +172,7 @@ impl Default for Ros2Settings {
 }
 
 impl Ros2Settings {
-    /// The topics that a scene fills: one without `[alerts]` has no alerts, one without `[[cues]]` no cues.
+    /// Returns the topics that have messages: a scene without `[alerts]` has no alerts, one without `[[cues]]` no cues.
     pub fn offered(&self, alerts: bool, cues: bool) -> impl Iterator<Item = Topic> {
         let filled = move |topic: &Topic| match topic {
             Topic::Alerts => alerts,
@@ -182,7 +182,7 @@ impl Ros2Settings {
         self.topics.keys().copied().filter(filled)
     }
 
-    /// Frames per second on ROS 2 where the loop makes `loop_rate`.
+    /// Returns the frames per second on ROS 2 for a loop at `loop_rate`.
     pub fn rate_of(&self, loop_rate: f64) -> f64 {
         self.rate.unwrap_or(60.0).min(loop_rate)
     }

@@ -1,4 +1,4 @@
-//! tf2_msgs/TFMessage: where head and tail are, for whatever follows frames.
+//! tf2_msgs/TFMessage: the transforms of head and tail.
 
 use serde::Serialize;
 
@@ -26,7 +26,7 @@ pub struct TfMessage {
 }
 
 impl TfMessage {
-    /// The frames of the publisher `name`, not yet in any place.
+    /// Creates the transforms of the publisher `name`, without positions.
     pub fn of(name: &str) -> Self {
         let transform = |end: &str| TransformStamped {
             header: Header::of(0),
@@ -37,7 +37,7 @@ impl TfMessage {
         Self { transforms: vec![transform("head"), transform("tail")] }
     }
 
-    /// Puts head and tail where the first and the last handle of a frame are.
+    /// Sets head and tail to the first and the last handle of a frame.
     pub fn update(&mut self, frame: &FrameHeader, handles: &[HandlePose]) {
         let stamp = Time::of(frame.stamp_ns);
         let ends = [handles.first(), handles.last()];

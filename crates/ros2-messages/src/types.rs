@@ -1,13 +1,13 @@
-//! The type of every topic, in the spellings of ROS 2's network and of its tools, and its definition as text.
+//! The type of every topic, with its names in DDS and in ROS 2 tools, and its definition as text.
 //!
-//! One table for the ROS 2 transport, which needs the names, and for recordings, which carry the definitions with them. Those
-//! of the program's own messages are the files of `msgs/msg`; those of the standard packages are the fields alone.
+//! The ROS 2 transport needs the names; recordings contain the definitions. The definitions of the program's messages are the
+//! files of `msgs/msg`; those of the standard packages are the fields alone.
 
 use std::collections::BTreeMap;
 
 use crate::settings::Topic;
 
-/// A message type: the package and the name in it.
+/// A message type: its package and its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MessageType {
     package: &'static str,
@@ -15,7 +15,7 @@ pub struct MessageType {
 }
 
 impl MessageType {
-    /// The type of a topic.
+    /// Returns the type of a topic.
     pub const fn of(topic: Topic) -> Self {
         let (package, name) = match topic {
             Topic::Handles => (OWN, "HandlePoses"),
@@ -33,18 +33,18 @@ impl MessageType {
         Self { package, name }
     }
 
-    /// The name on the network: `geometry_msgs::msg::dds_::PoseArray_`.
+    /// Returns the name in DDS: `geometry_msgs::msg::dds_::PoseArray_`.
     pub fn dds_name(self) -> String {
         format!("{}::msg::dds_::{}_", self.package, self.name)
     }
 
-    /// The name in tools: `geometry_msgs/msg/PoseArray`.
+    /// Returns the name in tools: `geometry_msgs/msg/PoseArray`.
     pub fn ros_name(self) -> String {
         format!("{}/msg/{}", self.package, self.name)
     }
 
-    /// The definition, followed by that of every type it is made of, as the schema encoding `ros2msg` has it: before each of
-    /// those a line of 80 equals signs and one with its name.
+    /// Returns the definition and those of all its parts in the schema encoding `ros2msg`: before each part a line of 80 equals
+    /// signs and a line with its name.
     pub fn schema(self) -> String {
         let own_name = format!("{}/{}", self.package, self.name);
         let mut names = vec![own_name.clone()];
@@ -52,7 +52,7 @@ impl MessageType {
         let mut next = 0;
         while let Some(name) = names.get(next).cloned() {
             next += 1;
-            // Every type that one of the table's is made of is in the table: a test looks.
+            // A test checks that the table is complete.
             let definition = definition(&name).unwrap_or_default();
             if name != own_name {
                 schema += &format!("{}\nMSG: {name}\n", "=".repeat(80));
@@ -68,9 +68,8 @@ impl MessageType {
     }
 }
 
-/// What the bytes of a message of the type `name`, `package/Name`, depend on in its definition of the schema encoding `ros2msg`:
-/// the fields of every type that it is made of, each as type and name, in order. Comments and constants are left out, and
-/// every type has its package.
+/// Returns the part of a `ros2msg` schema on which the bytes of a message `name`, `package/Name`, depend: the fields of every
+/// type in it, each as type and name, in order. Comments and constants are left out, and every type has its package.
 pub fn fields(name: &str, schema: &str) -> BTreeMap<String, Vec<[String; 2]>> {
     let (mut of, mut fields) = (name.to_owned(), BTreeMap::from([(name.to_owned(), Vec::new())]));
     for line in schema.lines().map(|line| line.split('#').next().unwrap_or_default().trim()) {
@@ -85,7 +84,7 @@ pub fn fields(name: &str, schema: &str) -> BTreeMap<String, Vec<[String; 2]>> {
     fields
 }
 
-/// The type of a field, with the package of the message that has the field where it names none and is a message.
+/// Returns the type of a field. A message type without package gets the package of `of`.
 fn with_package(kind: &str, of: &str) -> String {
     let package = of.split('/').next().unwrap_or_default();
     if kind.contains('/') || !kind.starts_with(char::is_uppercase) {
@@ -98,12 +97,12 @@ fn with_package(kind: &str, of: &str) -> String {
 /// The package of the program's own messages.
 const OWN: &str = "bench_dragon_msgs";
 
-/// The definition of a type, `package/Name`.
+/// Returns the definition of a type, `package/Name`.
 fn definition(name: &str) -> Option<&'static str> {
     DEFINITIONS.iter().find(|(of, _)| *of == name).map(|(_, definition)| *definition)
 }
 
-/// The types, `package/Name`, that a definition has fields of.
+/// Returns the message types, `package/Name`, of a definition's fields.
 fn parts(name: &str, definition: &str) -> Vec<String> {
     let words = definition.lines().filter_map(|line| line.split('#').next()?.split_whitespace().next());
     let types = words.map(|word| word.split('[').next().unwrap_or_default());
@@ -111,7 +110,7 @@ fn parts(name: &str, definition: &str) -> Vec<String> {
     messages.map(|of| with_package(of, name)).collect()
 }
 
-/// Every type that a topic is made of. Of the standard ones the fields in their order, which is all that the bytes depend on.
+/// All types of the topics. The standard types have their fields in order, on which the bytes depend.
 const DEFINITIONS: [(&str, &str); 32] = [
     ("bench_dragon_msgs/CollisionAlert", include_str!("../../../msgs/msg/CollisionAlert.msg")),
     ("bench_dragon_msgs/Cue", include_str!("../../../msgs/msg/Cue.msg")),

@@ -1,10 +1,10 @@
-//! The door for commands over ROS 2: the services below `/<name>`, on a thread of their own.
+//! Commands over ROS 2: the services below `/<name>`, on their own thread.
 //!
-//! Made of ros2-client's subscriptions (for the requests, so that the node shows its services) and RustDDS's writers (for
-//! the responses), not of ros2-client's `Server`: that one hides the bytes of a request, which tell the mapping
-//! ([`mapping`]), and answers at once. A client whose reply reader RustDDS has not matched yet would never get that
-//! answer, so an answer waits here until it is ([`Matches`]). A client that is dead or floods the door costs the loop
-//! nothing: the thread takes requests, the loop takes one command a period from a queue of bounded length.
+//! The requests use ros2-client's subscriptions, so that the node shows its services; the responses use RustDDS's writers.
+//! ros2-client's `Server` does not fit: it hides the bytes of a request, which determine the mapping ([`mapping`]), and
+//! answers at once. A client whose reply reader is not matched yet would never get that answer, so an answer waits here
+//! ([`Matches`]). A dead client, or one that floods the services, costs the loop nothing: this thread takes the requests, and
+//! the loop executes one command in each period from a queue of bounded length.
 
 mod calls;
 mod endpoints;
@@ -23,27 +23,27 @@ use rustdds::{GUID, SampleIdentity, SequenceNumber};
 use super::Ros2Error;
 use super::matching::Matches;
 use bench_dragon_messages::control::{Code, Command};
-use bench_dragon_publisher::live::control::{Answer, Door, MOST_WAITING};
-use calls::{Conductor, Next, refusal, sentence};
+use bench_dragon_publisher::live::control::{Answer, CommandSender, MOST_WAITING};
+use calls::{Next, ServiceAdapter, refusal, sentence};
 use endpoints::{Client, Endpoints};
 pub use mapping::Mapping;
 use mapping::Request;
 use services::{Call, Response};
 
-/// Calls of one process that may have no answer yet, so that one which floods the door leaves room for the others.
+/// The most calls of one process without an answer, so that a flood of one process leaves room for the others.
 const MOST_CALLS: usize = 16;
-/// Calls that may have no answer yet in all; further ones wait in their readers.
+/// The most calls without an answer in all; further calls wait in their readers.
 const MOST_PENDING: usize = 512;
-/// How long an answer waits for its client's reply reader. RMW implementations give up after 0.1 s; a loaded machine
-/// takes longer, and nobody else waits.
+/// The longest wait of an answer for its client's reply reader. RMW implementations stop after 0.1 s; a loaded machine takes
+/// longer. Other answers do not wait.
 const MATCHING_PATIENCE: Duration = Duration::from_secs(2);
-/// How often requests are looked for, and answers while some are awaited.
+/// The intervals at which requests are polled, and answers while some are pending.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 const ANSWER_INTERVAL: Duration = Duration::from_micros(500);
-/// How long clients are given for the last answers.
+/// The time for clients to get the last answers.
 const LINGER: Duration = Duration::from_millis(20);
 
-/// The thread. Dropping it ends it.
+/// The thread. Dropping this value ends the thread.
 pub(super) struct ControlThread {
     stop: Arc<AtomicBool>,
     handle: Option<JoinHandle<()>>,
@@ -59,7 +59,7 @@ impl ControlThread {
         context: Context,
         matches: Matches,
         mapping: Mapping,
-        door: Door,
+        commands: CommandSender,
     ) -> Result<Self, Ros2Error> {
         let stop = Arc::new(AtomicBool::new(false));
         let (opened, opening) = mpsc::channel();
@@ -68,7 +68,7 @@ impl ControlThread {
             move || match Endpoints::open(&name, &context) {
                 Ok(endpoints) => {
                     let _ = opened.send(Ok(()));
-                    Server::new(endpoints, matches, mapping, door).serve(&stop);
+                    Server::new(endpoints, matches, mapping, commands).serve(&stop);
                 }
                 Err(error) => drop(opened.send(Err(error))),
             }
@@ -85,13 +85,13 @@ impl Drop for ControlThread {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Release);
         if let Some(handle) = self.handle.take() {
-            // A panic has been printed by then.
+            // The thread has printed its panic.
             let _ = handle.join();
         }
     }
 }
 
-/// A call that has no answer yet.
+/// A call without an answer.
 struct Pending {
     /// The index of its service.
     port: usize,
@@ -100,13 +100,13 @@ struct Pending {
     progress: Progress,
 }
 
-/// How far a call is.
+/// The progress of a call.
 enum Progress {
-    /// To be passed to the loop as soon as its queue has room.
+    /// Waits for room in the loop's queue.
     Waiting(Command),
-    /// With the loop.
+    /// Sent to the loop.
     Sent(u64, Command),
-    /// Answered, but for its client's reply reader.
+    /// Answered; waits for its client's reply reader.
     Answered(Response, Instant),
 }
 
@@ -114,19 +114,19 @@ struct Server {
     endpoints: Endpoints,
     matches: Matches,
     mapping: Mapping,
-    door: Door,
-    conductor: Conductor,
+    commands: CommandSender,
+    adapter: ServiceAdapter,
     pending: Vec<Pending>,
 }
 
 impl Server {
-    fn new(endpoints: Endpoints, matches: Matches, mapping: Mapping, door: Door) -> Self {
+    fn new(endpoints: Endpoints, matches: Matches, mapping: Mapping, commands: CommandSender) -> Self {
         Self {
             endpoints,
             matches,
             mapping,
-            door,
-            conductor: Conductor::default(),
+            commands,
+            adapter: ServiceAdapter::default(),
             pending: Vec::with_capacity(MOST_PENDING),
         }
     }
@@ -145,7 +145,7 @@ impl Server {
     }
 
     fn take_requests(&mut self, port: usize) {
-        // Bounded, so that a client which floods the door does not keep answers back.
+        // Bounded, so that a flood of requests does not delay answers.
         for _ in 0..MOST_WAITING {
             if self.pending.len() >= MOST_PENDING {
                 return;
@@ -171,8 +171,8 @@ impl Server {
             let of_process =
                 self.pending.iter().filter(|pending| pending.client.writer.prefix == writer.prefix).count();
             let progress = if of_process < MOST_CALLS {
-                match self.conductor.begin(call) {
-                    Next::Obey(command) => Progress::Waiting(command),
+                match self.adapter.begin(call) {
+                    Next::Execute(command) => Progress::Waiting(command),
                     Next::Answer(response) => Progress::Answered(response, Instant::now()),
                 }
             } else {
@@ -185,18 +185,18 @@ impl Server {
         }
     }
 
-    /// Passes commands to the loop, in the order in which they came, as far as its queue has room.
+    /// Passes commands to the loop, in the order of reception, as far as its queue has room.
     fn pass_on(&mut self) {
         for pending in &mut self.pending {
             if let Progress::Waiting(command) = pending.progress {
-                let Ok(ticket) = self.door.send(command) else { return };
+                let Ok(ticket) = self.commands.send(command) else { return };
                 pending.progress = Progress::Sent(ticket, command);
             }
         }
     }
 
     fn take_answers(&mut self) {
-        while let Some(Answer { ticket, outcome }) = self.door.answer() {
+        while let Some(Answer { ticket, outcome }) = self.commands.answer() {
             let of_ticket =
                 |pending: &&mut Pending| matches!(pending.progress, Progress::Sent(sent, _) if sent == ticket);
             let Some(pending) = self.pending.iter_mut().find(of_ticket) else { continue };
@@ -204,24 +204,25 @@ impl Server {
             if !matches!(outcome.code, Code::Done | Code::Already) {
                 self.endpoints.ports[pending.port].report_refusal(&sentence(command, &outcome));
             }
-            pending.progress = match self.conductor.proceed(pending.call, command, &outcome) {
-                Next::Obey(command) => Progress::Waiting(command),
+            pending.progress = match self.adapter.proceed(pending.call, command, &outcome) {
+                Next::Execute(command) => Progress::Waiting(command),
                 Next::Answer(response) => Progress::Answered(response, Instant::now()),
             };
         }
     }
 
-    /// Sends the answers whose clients can be reached.
+    /// Sends the answers whose clients are matched, or after [`MATCHING_PATIENCE`].
     fn send_answers(&mut self) {
         let (ports, matches) = (&mut self.endpoints.ports, &self.matches);
         self.pending.retain(|Pending { port, client, progress, .. }| {
             let Progress::Answered(response, since) = progress else { return true };
-            let port = &mut ports[*port];
-            let reached = matches.reaches(port.responses_guid, port.requests_guid, client.writer, client.reader);
+            let endpoint = &mut ports[*port];
+            let reached =
+                matches.reaches(endpoint.responses_guid, endpoint.requests_guid, client.writer, client.reader);
             if !reached && since.elapsed() < MATCHING_PATIENCE {
                 return true;
             }
-            port.answer(client, response);
+            endpoint.answer(client, response);
             false
         });
     }

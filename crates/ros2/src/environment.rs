@@ -1,6 +1,6 @@
-//! The environment variables by which ROS 2 people choose a network, and legal ROS names.
+//! The environment variables of ROS 2 that choose a network, and legal ROS names.
 //!
-//! In: the process's environment. Out: a [`Network`], or a sentence: what cannot be honoured is refused, never ignored.
+//! In: the process's environment. Out: a [`Network`], or an error: an unsupported value is refused, never ignored.
 //! Called when the ROS 2 transport opens.
 
 use super::Ros2Error;
@@ -8,26 +8,26 @@ use super::Ros2Error;
 /// The greatest domain whose ports exist (ROS 2 documentation, "The ROS_DOMAIN_ID").
 const GREATEST_DOMAIN: u16 = 232;
 
-/// Which other ROS 2 processes are to be found.
+/// The network in which ROS 2 processes find each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Network {
     /// ROS_DOMAIN_ID, by default 0.
     pub domain: u16,
-    /// How far.
+    /// The range of discovery.
     pub range: Range,
 }
 
-/// How far other processes are looked for.
+/// The range of discovery.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Range {
-    /// All that multicast reaches.
+    /// All machines that multicast reaches.
     Subnet,
     /// This machine.
     Localhost,
 }
 
 impl Network {
-    /// The network that the environment selects; `variable` gives the value of a variable that is set.
+    /// Returns the network that the environment selects. `variable` returns the value of a variable that is set.
     ///
     /// # Errors
     /// [`Ros2Error::Environment`] for a value that ROS 2 does not know or that RustDDS cannot honour.
@@ -56,7 +56,7 @@ impl Network {
             Some("LOCALHOST") => Range::Localhost,
             Some("OFF") => {
                 return refused(
-                    "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF, with which RustDDS would reach nobody: set it to LOCALHOST \
+                    "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF, with which RustDDS would reach no process: set it to LOCALHOST \
                      or SUBNET, or run without ROS 2"
                         .to_owned(),
                 );
@@ -67,7 +67,7 @@ impl Network {
                 ));
             }
         };
-        // Deprecated since Iron, and stronger than the range where it is set.
+        // Deprecated since Iron. If set, it overrides the range.
         let range = match set("ROS_LOCALHOST_ONLY").as_deref().map(str::trim) {
             Some("1") => Range::Localhost,
             None | Some("0") => range,
@@ -76,7 +76,7 @@ impl Network {
         Ok(Self { domain, range })
     }
 
-    /// For people.
+    /// Returns the network in words.
     pub fn sentence(self) -> String {
         let range = match self.range {
             Range::Subnet => "the subnet",
@@ -101,8 +101,8 @@ pub fn check_name(name: &str) -> Result<(), Ros2Error> {
     if name.split('/').all(legal) { Ok(()) } else { Err(Ros2Error::Name(name.to_owned())) }
 }
 
-/// A warning where `ROS_DISTRO` names another distribution than this program was built for. Humble and what came later
-/// write some of the graph's messages differently; the topics themselves do not differ.
+/// Returns a warning if `ROS_DISTRO` names another distribution than this program was built for. Humble and later
+/// distributions write some of the graph's messages differently; the topics do not differ.
 pub fn other_distribution(variable: impl Fn(&str) -> Option<String>) -> Option<String> {
     let built = ros2_client::COMPILED_ROS_DISTRO;
     let distribution = variable("ROS_DISTRO").filter(|name| !name.is_empty() && name != built.as_str())?;

@@ -1,5 +1,5 @@
-//! ROS 2 topics, by ros2-client on RustDDS: on a thread of their own, at a rate of their own. Where a scene asks for it
-//! also services that conduct the show, on another thread.
+//! ROS 2 topics, by ros2-client on RustDDS, on their own thread and at their own rate. If a scene requests it, also services
+//! that control the show, on another thread.
 //!
 //! In: a scene with `[publish.ros2]` and the process's environment. Out: a [`Transport`]. Called by the list of transports.
 
@@ -7,7 +7,7 @@ mod control;
 pub mod environment;
 mod matching;
 mod node;
-mod port;
+mod topic_writer;
 
 use std::net::{IpAddr, Ipv4Addr};
 
@@ -15,8 +15,8 @@ use ros2_client::Context;
 use rustdds::DomainParticipantBuilder;
 
 use bench_dragon_messages::Stage;
-use bench_dragon_publisher::live::control::Door;
-use bench_dragon_publisher::live::{Deliveries, Publisher, StatusPublisher};
+use bench_dragon_publisher::live::control::CommandSender;
+use bench_dragon_publisher::live::{Publisher, StatusPublisher, TransportCounters};
 use bench_dragon_ros2_messages::settings::Ros2Settings;
 
 use bench_dragon_publisher::transports::background::{
@@ -28,10 +28,10 @@ pub use control::Mapping;
 use environment::{Network, Range, check_name, other_distribution};
 use matching::Matches;
 
-/// Why there are no ROS 2 topics.
+/// The reason why there are no ROS 2 topics.
 #[derive(Debug, thiserror::Error)]
 pub enum Ros2Error {
-    /// ROS 2 takes no such name.
+    /// The name is illegal in ROS 2.
     #[error(
         "the name is \"{0}\", which ROS 2 cannot take: expected words of letters, digits and single underscores, not \
          beginning with a digit, joined by slashes"
@@ -40,7 +40,7 @@ pub enum Ros2Error {
     /// An environment variable cannot be honoured.
     #[error("{0}")]
     Environment(String),
-    /// RustDDS or ros2-client refused.
+    /// RustDDS or ros2-client failed.
     #[error("ROS 2 could not be started: {0}")]
     Failed(String),
 }
@@ -55,7 +55,7 @@ impl From<Ros2Error> for TransportError {
     }
 }
 
-/// What is offered on ROS 2.
+/// The settings of the topics.
 #[derive(Debug, Clone)]
 struct Ros2Config {
     /// The namespace of the topics.
@@ -66,7 +66,7 @@ struct Ros2Config {
     rate: f64,
     /// The scene's settings.
     settings: Ros2Settings,
-    /// Whether there are alerts.
+    /// True if there are alerts.
     alerts: bool,
     /// The cues of the scene.
     cues: usize,
@@ -78,7 +78,7 @@ struct Ros2Config {
 struct Ros2 {
     name: String,
     description: String,
-    /// What the services are made of, until they are; `None` where the scene asks for none.
+    /// The parts of the services until these start; `None` if the scene requests none.
     services: Option<(Context, Matches, Mapping)>,
     control: Option<ControlThread>,
     publisher: Option<BackgroundPublisher>,
@@ -153,7 +153,7 @@ pub fn open_on(
     Ok(Box::new(Ros2 { name, description, services, control: None, publisher, status, thread }))
 }
 
-/// A participant of the network.
+/// Creates a participant of the network.
 fn context(network: Network) -> Result<Context, Ros2Error> {
     let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(error.to_string());
     let mut builder = DomainParticipantBuilder::new(network.domain);
@@ -183,14 +183,14 @@ impl Transport for Ros2 {
         }
     }
 
-    fn control(&mut self, door: Door) -> Result<Option<Door>, TransportError> {
-        let Some((context, matches, mapping)) = self.services.take() else { return Ok(Some(door)) };
-        self.control = Some(ControlThread::start(&self.name, context, matches, mapping, door)?);
+    fn control(&mut self, commands: CommandSender) -> Result<Option<CommandSender>, TransportError> {
+        let Some((context, matches, mapping)) = self.services.take() else { return Ok(Some(commands)) };
+        self.control = Some(ControlThread::start(&self.name, context, matches, mapping, commands)?);
         Ok(None)
     }
 
-    fn finish(mut self: Box<Self>) -> Option<(&'static str, Deliveries)> {
-        // Whoever holds the participant last takes leave of the network.
+    fn finish(mut self: Box<Self>) -> Option<(&'static str, TransportCounters)> {
+        // The participant leaves the network with its last owner, the thread.
         drop((self.control.take(), self.services.take()));
         Some(("ros2", self.thread.finish()))
     }

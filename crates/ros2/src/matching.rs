@@ -1,8 +1,8 @@
-//! Which remote ends RustDDS has matched with the program's own: those that a message reaches.
+//! The remote endpoints that RustDDS has matched with the program's own: those that a message reaches.
 //!
-//! RustDDS reports each match once, in the events of its participant, which nobody else may read. Called by the topics, which
-//! keep a message back until somebody is there, and by the services: a response that is written before its client's reply
-//! reader has been matched is lost.
+//! RustDDS reports each match once, in the events of its participant, which only this file reads. Called by the topics, which
+//! hold a message until there is a subscriber, and by the services: a response is lost if it is written before the client's
+//! reply reader is matched.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -20,14 +20,14 @@ pub(super) struct Matches {
 /// The subscribers of a writer.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Readers {
-    /// Those that ask for what was sent before.
+    /// The number of those that request the history.
     pub transient_local: usize,
-    /// Those that do not.
+    /// The number of all others.
     pub volatile: usize,
 }
 
 impl Readers {
-    /// Whether there are any.
+    /// Returns true if there is a subscriber.
     pub(super) fn any(self) -> bool {
         self.transient_local + self.volatile > 0
     }
@@ -35,16 +35,16 @@ impl Readers {
 
 struct Ends {
     events: DomainParticipantStatusListener,
-    /// A writer here and a reader there.
+    /// Pairs of a local writer and a remote reader.
     readers: BTreeSet<(GUID, GUID)>,
-    /// A reader here and a writer there.
+    /// Pairs of a local reader and a remote writer.
     writers: BTreeSet<(GUID, GUID)>,
-    /// Readers there that ask for what was sent before.
+    /// Remote readers that request the history.
     transient_local: BTreeSet<GUID>,
 }
 
 impl Matches {
-    /// The matches of a context from now on.
+    /// Observes the matches of a context from now on.
     pub(super) fn new(context: &Context) -> Self {
         let events = context.domain_participant().status_listener();
         let [readers, writers] = [BTreeSet::new(), BTreeSet::new()];
@@ -52,19 +52,19 @@ impl Matches {
         Self { ends: Arc::new(Mutex::new(ends)) }
     }
 
-    /// The state as of now.
+    /// Reads the current state.
     fn with<T>(&self, read: impl FnOnce(&Ends) -> T) -> T {
         let mut ends = self.ends.lock().unwrap_or_else(PoisonError::into_inner);
         ends.update();
         read(&ends)
     }
 
-    /// Takes in what has happened. RustDDS holds 2048 events and drops what is more: to be called often.
+    /// Processes pending discovery events. RustDDS buffers 2,048 and drops the rest, so call it often.
     pub(super) fn update(&self) {
         self.with(|_| ());
     }
 
-    /// Who subscribes to what this writer sends.
+    /// Returns the subscribers of a local writer.
     pub(super) fn readers(&self, writer: GUID) -> Readers {
         self.with(|ends| {
             let mut readers = Readers { transient_local: 0, volatile: 0 };
@@ -78,10 +78,10 @@ impl Matches {
         })
     }
 
-    /// Whether what is written to `responses` reaches the client whose request came from `client` to `requests`.
+    /// Returns true if a response written to `responses` reaches the client that sent a request from `client` to `requests`.
     ///
-    /// Only Fast DDS names the `reader` of the response in the request. Otherwise every client of that process has to be
-    /// complete: as many of its readers matched here as writers.
+    /// Only Fast DDS names the `reader` of the response in the request. Otherwise every client of that process must be
+    /// complete: as many of its readers as of its writers are matched here.
     pub(super) fn reaches(&self, responses: GUID, requests: GUID, client: GUID, reader: Option<GUID>) -> bool {
         self.with(|ends| {
             if let Some(reader) = reader {
@@ -107,7 +107,7 @@ impl Ends {
                 Event::RemoteWriterMatched { local_reader, remote_writer } => {
                     self.writers.insert((local_reader, remote_writer));
                 }
-                // Sent before the matches of that reader.
+                // RustDDS sends this before the matches of that reader.
                 Event::ReaderDetected { reader } => {
                     if matches!(reader.qos.durability(), Some(durability) if durability != Durability::Volatile) {
                         self.transient_local.insert(reader.guid);

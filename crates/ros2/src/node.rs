@@ -1,6 +1,6 @@
 //! The ROS 2 node and its topics: the sink of the background thread.
 //!
-//! Everything of ros2-client but the participant is created and dropped on that thread.
+//! All objects of ros2-client except the participant are created and dropped on that thread.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -8,7 +8,7 @@ use std::time::Duration;
 use ros2_client::{Context, Node, NodeName, NodeOptions};
 
 use super::matching::Matches;
-use super::port::{Attend, Maker, Port, SELDOM_BYTES, Stream};
+use super::topic_writer::{EVENT_BYTES, Serviced, Stream, TopicWriter, WriterFactory};
 use super::{Ros2Config, Ros2Error};
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
 use bench_dragon_publisher::transports::background::Sink;
@@ -19,36 +19,36 @@ use bench_dragon_ros2_messages::settings::{DiagnosticLimits, Topic};
 use bench_dragon_ros2_messages::transforms::TfMessage;
 use bench_dragon_ros2_messages::{Clock, HandlePoses, PoseArray, Stamped};
 
-/// More bytes than a point of the path has.
+/// An upper bound of the bytes of a point of the path.
 const PATH_POSE_BYTES: usize = 88;
-/// More bytes than the transforms of head and tail have, whatever the name.
+/// An upper bound of the bytes of the transforms of head and tail, for any name.
 const TRANSFORMS_BYTES: usize = 1000;
-/// How long a reliable subscriber is given for the last messages.
+/// The time for reliable subscribers to get the last messages.
 const LINGER: Duration = Duration::from_millis(100);
 
-/// The publishers that the scene requests, and the messages they send, whose memory is used again.
+/// The writers that the scene requests, and their messages, whose memory is reused.
 pub(super) struct Topics {
     name: String,
     stage: Stage,
     handles: Option<Stream<HandlePoses>>,
     poses: Option<Stream<PoseArray>>,
     markers: Option<Stream<MarkerArray>>,
-    alerts: Option<Port<Stamped<CollisionAlert>>>,
-    stages: Option<Port<Stamped<Stage>>>,
-    status: Option<Port<Stamped<LoopStatus>>>,
-    diagnostics: Option<Port<DiagnosticArray>>,
-    cues: Option<Port<Stamped<Cue>>>,
-    clock: Option<Port<Clock>>,
+    alerts: Option<TopicWriter<Stamped<CollisionAlert>>>,
+    stages: Option<TopicWriter<Stamped<Stage>>>,
+    status: Option<TopicWriter<Stamped<LoopStatus>>>,
+    diagnostics: Option<TopicWriter<DiagnosticArray>>,
+    cues: Option<TopicWriter<Stamped<Cue>>>,
+    clock: Option<TopicWriter<Clock>>,
     transforms: Option<Stream<TfMessage>>,
-    path: Option<Port<Path>>,
+    path: Option<TopicWriter<Path>>,
     latest_alert: Option<CollisionAlert>,
-    /// The latest status, and the messages discarded by then.
+    /// The latest status, and the messages discarded up to it.
     diagnosed: (LoopStatus, u64),
     limits: DiagnosticLimits,
-    /// Messages that a full queue of RustDDS did not take, because a reliable subscriber was slow or dead.
+    /// Messages that did not fit into a queue of RustDDS because a reliable subscriber was slow or dead.
     discarded: u64,
     matches: Matches,
-    // Dropped after the publishers: they belong to it.
+    // Dropped after the writers: they belong to it.
     node: Node,
 }
 
@@ -57,24 +57,24 @@ impl Topics {
         let Ros2Config { stage, handles, .. } = config;
         let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(error.to_string());
         let node_name = NodeName::new(&format!("/{}", config.name), "publisher").map_err(|error| failed(&error))?;
-        // Fewer endpoints, fewer complaints of subscribers that look for what RustDDS cannot send.
+        // Without these endpoints, subscribers do not warn about messages that RustDDS cannot send.
         let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
         let node = context.new_node(node_name, options).map_err(|error| failed(&error))?;
-        let mut maker = Maker { context, node, config: &config };
+        let mut maker = WriterFactory { context, node, config: &config };
         let path = Arc::new(Path::of(&stage));
-        let path_bytes = SELDOM_BYTES + path.poses.len() * PATH_POSE_BYTES;
+        let path_bytes = EVENT_BYTES + path.poses.len() * PATH_POSE_BYTES;
         let mut topics = Self {
             name: config.name.clone(),
             stage,
             handles: maker.stream(Topic::Handles, 40, || HandlePoses::of(handles))?,
             poses: maker.stream(Topic::Poses, 56, || PoseArray::of(handles))?,
             markers: maker.stream(Topic::Markers, 300, || MarkerArray::of(&stage))?,
-            alerts: if config.alerts { maker.port(Topic::Alerts, SELDOM_BYTES, 1.0)? } else { None },
-            stages: maker.port(Topic::Stage, SELDOM_BYTES, 1.0)?,
-            status: maker.port(Topic::Status, SELDOM_BYTES, 1.0)?,
-            diagnostics: maker.port(Topic::Diagnostics, SELDOM_BYTES, 1.0)?,
-            cues: if config.cues > 0 { maker.port(Topic::Cues, SELDOM_BYTES, 1.0)? } else { None },
-            clock: maker.port(Topic::Clock, SELDOM_BYTES, config.rate)?,
+            alerts: if config.alerts { maker.port(Topic::Alerts, EVENT_BYTES, 1.0)? } else { None },
+            stages: maker.port(Topic::Stage, EVENT_BYTES, 1.0)?,
+            status: maker.port(Topic::Status, EVENT_BYTES, 1.0)?,
+            diagnostics: maker.port(Topic::Diagnostics, EVENT_BYTES, 1.0)?,
+            cues: if config.cues > 0 { maker.port(Topic::Cues, EVENT_BYTES, 1.0)? } else { None },
+            clock: maker.port(Topic::Clock, EVENT_BYTES, config.rate)?,
             transforms: maker
                 .port(Topic::Tf, TRANSFORMS_BYTES, config.rate)?
                 .map(|port| port.stream(TfMessage::of(&config.name))),
@@ -86,7 +86,7 @@ impl Topics {
             matches,
             node: maker.node,
         };
-        // What does not change.
+        // The messages that do not change.
         if let Some(port) = &mut topics.stages {
             port.send(Arc::new(Stamped::stage(stage)), &mut topics.discarded);
         }
@@ -98,16 +98,16 @@ impl Topics {
 }
 
 impl Sink for Topics {
-    fn attend(&mut self) {
+    fn service(&mut self) {
         self.matches.update();
-        fn end<T: Attend>(end: &mut Option<T>) -> Option<&mut dyn Attend> {
-            end.as_mut().map(|end| end as &mut dyn Attend)
+        fn end<T: Serviced>(end: &mut Option<T>) -> Option<&mut dyn Serviced> {
+            end.as_mut().map(|end| end as &mut dyn Serviced)
         }
         let streams = [end(&mut self.handles), end(&mut self.poses), end(&mut self.markers), end(&mut self.transforms)];
-        let seldom = [end(&mut self.alerts), end(&mut self.cues), end(&mut self.stages), end(&mut self.path)];
+        let events = [end(&mut self.alerts), end(&mut self.cues), end(&mut self.stages), end(&mut self.path)];
         let others = [end(&mut self.status), end(&mut self.diagnostics), end(&mut self.clock)];
-        for end in streams.into_iter().chain(seldom).chain(others).flatten() {
-            end.attend(&self.matches, &mut self.node);
+        for end in streams.into_iter().chain(events).chain(others).flatten() {
+            end.service(&self.matches, &mut self.node);
         }
     }
 
@@ -173,7 +173,7 @@ mod tests {
     use serde::Serialize;
 
     use super::*;
-    use crate::port::HEADER_BYTES;
+    use crate::topic_writer::HEADER_BYTES;
     use bench_dragon_messages::{SEGMENT_ARC, SceneName, StageSegment};
 
     fn bytes<Message: Serialize>(message: &Message) -> usize {
@@ -195,7 +195,7 @@ mod tests {
         let second = LoopSecond { before: &status, discarded: u64::MAX, discarded_before: 0, limits };
         // iceoryx2 takes no longer name.
         let diagnostics = DiagnosticArray::of(&"n".repeat(255), &worst, Some(&alert), &second);
-        let seldom = [
+        let events = [
             bytes(&Stamped::stage(Stage::default())),
             bytes(&Stamped::status(status)),
             bytes(&Stamped::alert(alert)),
@@ -203,11 +203,11 @@ mod tests {
             bytes(&Stamped::cue(Cue { name: SceneName::new(&"n".repeat(100)), ..Cue::default() })),
             bytes(&Clock::of(&FrameHeader::default())),
         ];
-        assert!(seldom.iter().all(|bytes| *bytes < SELDOM_BYTES), "{seldom:?} bytes of {SELDOM_BYTES}");
+        assert!(events.iter().all(|bytes| *bytes < EVENT_BYTES), "{events:?} bytes of {EVENT_BYTES}");
         let mut stage = Stage { segments: 1, ..Stage::default() };
         stage.path[0] = StageSegment { length: 10.0, curvature: 10.0, kind: SEGMENT_ARC, ..StageSegment::default() };
         let path = Path::of(&stage);
-        assert!(path.poses.len() > 1000 && bytes(&path) < SELDOM_BYTES + path.poses.len() * PATH_POSE_BYTES);
+        assert!(path.poses.len() > 1000 && bytes(&path) < EVENT_BYTES + path.poses.len() * PATH_POSE_BYTES);
         let transforms = bytes(&TfMessage::of(&"n".repeat(255)));
         assert!(transforms < TRANSFORMS_BYTES, "{transforms}");
         assert!(bytes(&HandlePoses::of(224)) < HEADER_BYTES + 224 * size_of::<HandlePose>());

@@ -14,7 +14,7 @@ use super::observation::{Latencies, Observation};
 use super::plots::{PlotLine, Scale, escaped, plot};
 use super::verdict::LimitCheck;
 use bench_dragon_drawing::palette::dark_rules;
-use bench_dragon_publisher::live::Deliveries;
+use bench_dragon_publisher::live::TransportCounters;
 use bench_dragon_publisher::live::statistics::RunSummary;
 
 /// The name of the report's JSON, whose schema is docs/soak-report.schema.json. An incompatible change raises the
@@ -146,7 +146,7 @@ impl Report {
     /// Returns a sentence for each transport of the publisher with counters.
     fn deliveries(&self) -> impl Iterator<Item = String> {
         self.publisher.iter().flat_map(|summary| &summary.deliveries).map(
-            |(name, Deliveries { frames, skipped, discarded })| {
+            |(name, TransportCounters { frames, skipped, discarded })| {
                 format!("{name}: {frames} frames sent, {skipped} skipped, {discarded} messages discarded")
             },
         )

@@ -10,7 +10,7 @@ use bench_dragon::messages::control::{Code, Command};
 use bench_dragon::messages::state::PlaybackState;
 use bench_dragon::messages::{ControlRequest, ControlResponse};
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::publisher::live::control::{Answer, Doors, door};
+use bench_dragon::publisher::live::control::{Answer, CommandQueues, command_queue};
 use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::ros2::Mapping;
 use bench_dragon::show::convert::control_response;
@@ -60,8 +60,8 @@ fn run(data: &[u8]) -> bool {
     };
     let show = Show::new(scene, timeline.clone(), playback).expect("a start before the end");
     let mut show = ShowSource::new(show);
-    let (port, mut door) = door();
-    let mut doors = Doors::new(vec![port]);
+    let (port, mut door) = command_queue();
+    let mut doors = CommandQueues::new(vec![port]);
     let (mut tick, mut epoch, mut held_at) = (0u64, 0u32, None);
     // Unanswered commands, by their tickets.
     let mut sent: Vec<(u64, u64, Command, Option<Code>)> = Vec::new();

@@ -1,7 +1,7 @@
-//! The queues by which commands reach the loop and answers come back: one pair for each door, never blocking.
+//! The command queues: commands to the loop, answers back. They never block.
 //!
-//! [`ControlPort`] is the loop's end, [`Door`] that of a thread which takes commands from outside. The loop takes at most
-//! one command at the beginning of a period, so that each has an exact tick; the doors take turns.
+//! [`CommandReceiver`] is the loop's end, [`CommandSender`] the end of a thread that gets commands from clients. The loop
+//! executes at most one command at the beginning of a period, so that each has an exact tick. The queues take turns.
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
@@ -9,10 +9,10 @@ use super::FrameSource;
 use bench_dragon_messages::control::{Code, Command};
 use bench_dragon_show::Outcome;
 
-/// Commands that a door may have waiting.
+/// The most commands of one queue without an answer.
 pub const MOST_WAITING: usize = 64;
 
-/// A command on its way, with the number by which the door recognises its answer.
+/// A command in its queue, with the ticket of its answer.
 #[derive(Debug, Clone, Copy)]
 struct Request {
     ticket: u64,
@@ -22,40 +22,40 @@ struct Request {
 /// The answer to a command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Answer {
-    /// As [`Door::send`] returned it.
+    /// As [`CommandSender::send`] returned it.
     pub ticket: u64,
-    /// What became of the command.
+    /// The result of the command.
     pub outcome: Outcome,
 }
 
-/// The loop's end of a door's queues.
-pub struct ControlPort {
+/// The loop's end of a command queue.
+pub struct CommandReceiver {
     requests: Consumer<Request>,
     answers: Producer<Answer>,
 }
 
-/// The outer end of a door's queues.
-pub struct Door {
+/// The sender's end of a command queue.
+pub struct CommandSender {
     requests: Producer<Request>,
     answers: Consumer<Answer>,
     ticket: u64,
     waiting: usize,
 }
 
-/// The queues of a door.
-pub fn door() -> (ControlPort, Door) {
+/// Creates the two ends of a command queue.
+pub fn command_queue() -> (CommandReceiver, CommandSender) {
     let (requests, request_inbox) = RingBuffer::new(MOST_WAITING);
-    // A door that takes no answers sends no more commands than there is room for their answers.
+    // Both queues have one length: a sender that reads no answers cannot send more commands than fit.
     let (answers, answer_inbox) = RingBuffer::new(MOST_WAITING);
-    let door = Door { requests, answers: answer_inbox, ticket: 0, waiting: 0 };
-    (ControlPort { requests: request_inbox, answers }, door)
+    let sender = CommandSender { requests, answers: answer_inbox, ticket: 0, waiting: 0 };
+    (CommandReceiver { requests: request_inbox, answers }, sender)
 }
 
-impl Door {
-    /// Sends a command to the loop; the number of its answer.
+impl CommandSender {
+    /// Sends a command to the loop. Returns the ticket of its answer.
     ///
     /// # Errors
-    /// [`Code::TooMany`] where [`MOST_WAITING`] commands of this door have no answer yet.
+    /// [`Code::TooMany`] if [`MOST_WAITING`] commands of this queue have no answer yet.
     pub fn send(&mut self, command: Command) -> Result<u64, Code> {
         if self.waiting >= MOST_WAITING {
             return Err(Code::TooMany);
@@ -67,67 +67,67 @@ impl Door {
         Ok(ticket)
     }
 
-    /// The next answer, if one has come.
+    /// Returns the next answer, if there is one.
     pub fn answer(&mut self) -> Option<Answer> {
         let answer = self.answers.pop().ok()?;
         self.waiting -= 1;
         Some(answer)
     }
 
-    /// Commands without an answer yet.
+    /// Returns the number of commands without an answer.
     pub fn waiting(&self) -> usize {
         self.waiting
     }
 }
 
-/// All doors of a loop.
+/// The loop's ends of all command queues.
 #[derive(Default)]
-pub struct Doors {
-    ports: Vec<ControlPort>,
-    /// The door whose turn it is.
+pub struct CommandQueues {
+    ports: Vec<CommandReceiver>,
+    /// The index of the queue that is polled first.
     next: usize,
-    /// The door and the ticket of a step that is not over.
+    /// The queue and the ticket of a step that has not ended.
     step: Option<(usize, u64)>,
 }
 
-impl Doors {
-    /// The loop's ends of these doors.
-    pub fn new(ports: Vec<ControlPort>) -> Self {
+impl CommandQueues {
+    /// Creates the set of these queues.
+    pub fn new(ports: Vec<CommandReceiver>) -> Self {
         Self { ports, next: 0, step: None }
     }
 
-    /// Has the next command obeyed, if one waits, at the beginning of the period `tick`.
+    /// Executes the next waiting command, if there is one, at the beginning of the period `tick`.
     pub fn take_one(&mut self, source: &mut dyn FrameSource, tick: u64) {
         for turn in 0..self.ports.len() {
-            let door = (self.next + turn) % self.ports.len();
-            let Ok(Request { ticket, command }) = self.ports[door].requests.pop() else { continue };
-            self.next = door + 1;
-            // Where the command is a step too, the one before it is over by now, and has its answer first.
+            let queue = (self.next + turn) % self.ports.len();
+            let Ok(Request { ticket, command }) = self.ports[queue].requests.pop() else { continue };
+            self.next = queue + 1;
+            // A step before this command has ended by now and is answered first.
             self.finish_step(source, tick);
             match source.command(tick, command) {
                 Some(outcome) => {
-                    // What a command breaks off is answered before it.
+                    // A step that the command breaks off is answered before the command.
                     self.finish_step(source, tick);
-                    self.answer(door, ticket, outcome);
+                    self.answer(queue, ticket, outcome);
                 }
-                None => self.step = Some((door, ticket)),
+                None => self.step = Some((queue, ticket)),
             }
             return;
         }
     }
 
-    /// Answers the step that was over with the frame of `tick`.
+    /// Answers a step that ended with the frame of `tick`.
     pub fn finish_step(&mut self, source: &mut dyn FrameSource, tick: u64) {
-        if let Some((door, ticket)) = self.step
+        if let Some((queue, ticket)) = self.step
             && let Some(outcome) = source.finished_step(tick)
         {
             self.step = None;
-            self.answer(door, ticket, outcome);
+            self.answer(queue, ticket, outcome);
         }
     }
 
-    fn answer(&mut self, door: usize, ticket: u64, outcome: Outcome) {
-        // There is room: a door waits for no more answers than the queue holds.
-        let _ = self.ports[door].answers.push(Answer { ticket, outcome });
+    fn answer(&mut self, queue: usize, ticket: u64, outcome: Outcome) {
+        // There is room: a sender has at most as many commands without an answer.
+        let _ = self.ports[queue].answers.push(Answer { ticket, outcome });
     }
 }

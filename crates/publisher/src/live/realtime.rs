@@ -1,5 +1,5 @@
-//! What the operating system can do for a thread with deadlines: timer slack, real-time priority, locked memory, a CPU
-//! of its own, CPUs that stay awake. Called by the commands, once, on the loop's thread, before the loop.
+//! Settings of the operating system for a thread with deadlines: timer slack, real-time priority, locked memory, a fixed CPU,
+//! CPUs that stay awake. Called once on the loop's thread, before the loop.
 
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -15,8 +15,33 @@ use thread_priority::{ThreadPriority, ThreadPriorityValue};
 /// The real-time priorities that Linux has.
 pub const PRIORITIES: std::ops::RangeInclusive<u8> = 1..=99;
 
-/// Wakes this thread as precisely as timers can: Linux otherwise lets a wake-up slip by 50 microseconds.
-pub fn set_timer_slack() {
+/// The scheduling that is requested for the loop's thread.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Scheduling {
+    /// The priority under SCHED_FIFO, one of [`PRIORITIES`].
+    pub realtime: Option<u8>,
+    /// The CPU to stay on.
+    pub cpu: Option<usize>,
+    /// The longest wake-up latency of all CPUs, microseconds.
+    pub cpu_latency: Option<u32>,
+}
+
+impl Scheduling {
+    /// Requests the scheduling for the calling thread. The limit of the latency lasts until the returned file is closed.
+    ///
+    /// # Errors
+    /// [`CpuError`]. A right that the user does not have is a warning.
+    pub fn prepare_thread(self) -> Result<Option<File>, CpuError> {
+        let Self { realtime, cpu, cpu_latency } = self;
+        cpu.map(pin_to_cpu).transpose()?;
+        set_timer_slack();
+        realtime.into_iter().for_each(become_realtime);
+        Ok(cpu_latency.and_then(limit_cpu_latency))
+    }
+}
+
+/// Sets the least timer slack. Linux may otherwise delay a wake-up by 50 microseconds.
+fn set_timer_slack() {
     if let Err(error) = nix::sys::prctl::set_timerslack(1) {
         log::warn!("the timer slack could not be set ({error}): wake-ups will be some 50 microseconds later");
     }
@@ -24,9 +49,9 @@ pub fn set_timer_slack() {
 
 /// Gives this thread the real-time priority `priority` under SCHED_FIFO and locks the memory the process has so far.
 ///
-/// Without the right to either, a warning states how to get it. What is mapped later, the queues in shared memory among
-/// it, is not locked here: that would fill all of it, used or not.
-pub fn become_realtime(priority: u8) {
+/// Without the right to either, a warning states how to get it. Memory that is mapped later, such as the queues in shared
+/// memory, is not locked: locking would allocate all of it, used or not.
+fn become_realtime(priority: u8) {
     // Every priority of PRIORITIES is a valid value.
     let value = ThreadPriorityValue::try_from(priority).unwrap_or(ThreadPriorityValue::MIN);
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
@@ -45,15 +70,15 @@ pub fn become_realtime(priority: u8) {
     }
 }
 
-/// Where Linux takes limits of the CPUs' wake-up latency (Documentation/power/pm_qos_interface.rst).
+/// The device for limits of the CPUs' wake-up latency (Linux, Documentation/power/pm_qos_interface.rst).
 const CPU_LATENCY_DEVICE: &str = "/dev/cpu_dma_latency";
 
-/// Lets no CPU of this machine sleep so deeply that it takes more than `microseconds` to wake up, for as long as the
-/// returned file is open. With 0 idle CPUs do not sleep at all. cyclictest does the same by default.
+/// Limits the wake-up latency of all CPUs to `microseconds` while the returned file is open. With 0, idle CPUs do not sleep.
+/// cyclictest does the same by default.
 ///
 /// Without the right to it, a warning states how to get it.
-pub fn limit_cpu_latency(microseconds: u32) -> Option<File> {
-    // The device reads a signed 32-bit number; no CPU takes longer than what that holds.
+fn limit_cpu_latency(microseconds: u32) -> Option<File> {
+    // The device reads a signed 32-bit number.
     let limit = i32::try_from(microseconds).unwrap_or(i32::MAX);
     let opened = OpenOptions::new().write(true).open(CPU_LATENCY_DEVICE);
     opened
@@ -67,21 +92,21 @@ pub fn limit_cpu_latency(microseconds: u32) -> Option<File> {
         .ok()
 }
 
-/// A CPU that is not there, or on which this thread may not run.
+/// A CPU that does not exist, or on which this thread may not run.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("no CPU {cpu} for this thread, expected one of {available:?}")]
 pub struct CpuError {
     /// The CPU.
     pub cpu: usize,
-    /// Those on which the thread may run.
+    /// The CPUs on which the thread may run.
     pub available: Vec<usize>,
 }
 
 /// Keeps this thread on one CPU.
 ///
 /// # Errors
-/// [`CpuError`] where there is no such CPU, or the thread may not run on it.
-pub fn pin_to_cpu(cpu: usize) -> Result<(), CpuError> {
+/// [`CpuError`] if there is no such CPU, or the thread may not run on it.
+fn pin_to_cpu(cpu: usize) -> Result<(), CpuError> {
     // The calling thread.
     let this = Pid::from_raw(0);
     let set = sched_getaffinity(this).unwrap_or_default();

@@ -1,8 +1,8 @@
-//! What the loop has done: lateness and step cost as percentiles, the status once a second, the summary at the end.
+//! Statistics of the loop: percentiles of lateness and step cost, the status once a second, the summary at the end.
 //!
 //! In: samples and alerts from queues. Out: [`LoopStatus`] to every [`StatusPublisher`], alerts to the terminal, a
-//! [`Summary`]. Runs on a thread of its own, so that no percentile is computed, no file read and no line printed on the
-//! loop's thread. The thread only moves things; [`accumulator`] does the arithmetic.
+//! [`Summary`]. Runs on its own thread, so that the loop's thread computes no percentile, reads no file and prints no line.
+//! [`accumulator`] does the arithmetic.
 
 pub mod accumulator;
 #[cfg(test)]
@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Announcement, Deliveries, End, StatusPublisher};
+use super::{Announcement, End, StatusPublisher, TransportCounters};
 use bench_dragon_client::clock::Clock;
 use bench_dragon_messages::LoopStatus;
 
@@ -23,19 +23,19 @@ pub use accumulator::{Accumulator, Durations, Percentiles, Sample, Summary};
 const QUEUED_SAMPLES: usize = 1 << 16;
 /// Alerts and cues that their queue holds.
 const QUEUED_ANNOUNCEMENTS: usize = 1 << 10;
-/// Nanoseconds between two emptyings of the queues.
+/// Nanoseconds between two polls of the queues.
 const POLL_INTERVAL_NS: u64 = 20_000_000;
 
-/// The queues between the loop and this thread.
+/// Creates the queues between the loop and this thread.
 pub fn queues() -> (super::Reports, Inbox) {
     queues_of(QUEUED_SAMPLES, QUEUED_ANNOUNCEMENTS)
 }
 
-/// Queues that hold so many samples, and so many alerts and cues.
+/// Creates queues for `samples` samples and `announcements` alerts and cues.
 pub fn queues_of(samples: usize, announcements: usize) -> (super::Reports, Inbox) {
     let (mut samples, mut sample_inbox) = rtrb::RingBuffer::new(samples);
-    // Each page of this memory is written here once: otherwise the loop's thread would be the first to touch it, and for
-    // minutes a soak test would take that for growth.
+    // Touches each page here. Otherwise the loop's thread would be the first to touch it, and a soak test would report
+    // growing memory for minutes.
     while samples.push(Sample::NOTHING).is_ok() {}
     while sample_inbox.pop().is_ok() {}
     let (announcements, announcement_inbox) = rtrb::RingBuffer::new(announcements);
@@ -49,7 +49,7 @@ pub struct Inbox {
     announcements: rtrb::Consumer<Announcement>,
 }
 
-/// The summary of a run: what `run --json` prints at its end, and a soak test reads.
+/// The summary of a run. `run --json` prints it, and a soak test reads it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunSummary {
     /// Frames published.
@@ -62,14 +62,14 @@ pub struct RunSummary {
     pub wakeup_ns: Percentiles,
     /// Cost of a step.
     pub step_ns: Percentiles,
-    /// Why the loop ended.
+    /// The reason for the end of the loop.
     pub end: End,
-    /// What each transport with a queue of its own has delivered, by its name.
+    /// The counters of each transport with a queue, by the transport's name.
     #[serde(flatten)]
-    pub deliveries: BTreeMap<String, Deliveries>,
+    pub deliveries: BTreeMap<String, TransportCounters>,
 }
 
-/// The run that statistics are made of, and where they go.
+/// The run, and the destinations of its statistics.
 pub struct Run<'a> {
     /// The run's number.
     pub run_id: u64,
@@ -77,16 +77,15 @@ pub struct Run<'a> {
     pub rate: f64,
     /// The scene's name.
     pub scene: &'a str,
-    /// Where the status goes.
+    /// The destinations of the status.
     pub sinks: Vec<Box<dyn StatusPublisher>>,
-    /// What is done with each alert and cue.
+    /// Called with each alert and cue.
     pub announce: Box<dyn FnMut(&Announcement) + 'a>,
-    /// What else is done with each sample.
+    /// Called with each sample.
     pub record: Box<dyn FnMut(&Sample) + 'a>,
 }
 
-/// What the statistics thread does, without its waiting and without what only the operating system knows: a simulated
-/// scheduler can call it in that thread's place.
+/// The statistics thread without its waiting and its system calls, for a simulated scheduler.
 pub struct Collector<'a> {
     inbox: Inbox,
     run: Run<'a>,
@@ -94,7 +93,7 @@ pub struct Collector<'a> {
 }
 
 impl<'a> Collector<'a> {
-    /// Nothing collected yet, at `now_ns` of CLOCK_MONOTONIC.
+    /// Starts at `now_ns` of CLOCK_MONOTONIC.
     pub fn new(inbox: Inbox, run: Run<'a>, now_ns: u64) -> Self {
         let accumulator = Accumulator::new(run.run_id, run.rate, run.scene, now_ns);
         Self { inbox, run, accumulator }
@@ -111,8 +110,7 @@ impl<'a> Collector<'a> {
         }
     }
 
-    /// Sends the status where one is due, or the run is `ending`. `complete` adds the stamp and what else is not of the
-    /// run.
+    /// Sends the status if one is due or the run is `ending`. `complete` adds the stamp and the figures of the process.
     pub fn report(&mut self, now_ns: u64, ending: bool, complete: impl FnOnce(LoopStatus) -> LoopStatus) {
         let Self { accumulator, run, .. } = self;
         let status = if ending { accumulator.status(now_ns) } else { accumulator.status_if_due(now_ns) };
@@ -121,7 +119,7 @@ impl<'a> Collector<'a> {
         }
     }
 
-    /// What is known of the run.
+    /// Returns the summary of the run so far.
     pub fn summary(&self) -> Summary {
         self.accumulator.summary()
     }
@@ -131,7 +129,7 @@ impl<'a> Collector<'a> {
 pub fn collect<C: Clock>(clock: &C, inbox: Inbox, run: Run, done: &AtomicBool) -> Summary {
     let mut collector = Collector::new(inbox, run, clock.monotonic_ns());
     loop {
-        // Read before the queues are emptied: what was pushed before it was set is then still seen.
+        // Read before the queues are emptied, so that everything pushed before it was set is collected.
         let ending = done.load(Ordering::Acquire);
         collector.take();
         let now_ns = clock.monotonic_ns();
@@ -148,7 +146,7 @@ pub fn collect<C: Clock>(clock: &C, inbox: Inbox, run: Run, done: &AtomicBool) -
     }
 }
 
-/// Resident memory of this process, bytes; 0 where /proc does not list it.
+/// Returns the resident memory of this process in bytes, or 0 without /proc.
 fn resident_bytes() -> u64 {
     let pages = std::fs::read_to_string("/proc/self/statm").ok();
     let resident = pages.and_then(|text| text.split_whitespace().nth(1)?.parse::<u64>().ok()).unwrap_or(0);
@@ -156,7 +154,7 @@ fn resident_bytes() -> u64 {
     resident * page.unwrap_or(4096) as u64
 }
 
-/// Open file descriptors of this process; 0 where /proc does not list them.
+/// Returns the number of open file descriptors of this process, or 0 without /proc.
 fn file_descriptors() -> u32 {
     std::fs::read_dir("/proc/self/fd").map_or(0, |entries| entries.count() as u32)
 }

@@ -1,6 +1,6 @@
 //! The loop on a simulated clock: whatever is late, the counts, the deadlines and the order hold.
 
-mod doors;
+mod commands;
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -148,7 +148,7 @@ fn runs() -> impl Strategy<Value = (Rate, Script, u64)> {
 
 /// A run of the loop, and all that can be observed of it.
 struct Observed {
-    result: Result<Counts, (Counts, PublishError)>,
+    result: Result<LoopCounts, (LoopCounts, PublishError)>,
     log: Log,
     samples: Vec<Sample>,
     ended_ns: u64,
@@ -186,8 +186,15 @@ impl Setup {
         let (samples, mut received) = rtrb::RingBuffer::new(1 << 17);
         let (announcements, _) = rtrb::RingBuffer::new(1);
         let reports = Reports { samples, announcements };
-        let result =
-            run_loop(&*clock, &mut frames, &mut Doors::default(), &mut publishers, options, reports, &clock.stop);
+        let result = run_loop(
+            &*clock,
+            &mut frames,
+            &mut CommandQueues::default(),
+            &mut publishers,
+            options,
+            reports,
+            &clock.stop,
+        );
         drop((frames, publishers));
         Observed {
             result,
@@ -199,7 +206,7 @@ impl Setup {
 }
 
 /// What holds of every run, `periods` of which elapsed.
-fn check(rate: Rate, observed: &Observed, counts: Counts, periods: u64) -> Result<(), TestCaseError> {
+fn check(rate: Rate, observed: &Observed, counts: LoopCounts, periods: u64) -> Result<(), TestCaseError> {
     let Log { computed, published, .. } = &observed.log;
     prop_assert_eq!(counts.frames + counts.skipped, periods);
     prop_assert_eq!(counts.frames, published.len() as u64);
@@ -248,7 +255,7 @@ proptest! {
     fn without_delays_nothing_is_skipped_and_the_end_is_exact(rate in rates(), periods in 0u64..120) {
         let observed = Setup { periods: Some(periods), ..Setup::new(rate, Script::default()) }.run();
         let counts = observed.result.unwrap();
-        prop_assert_eq!(counts, Counts { frames: periods, overruns: 0, skipped: 0, end: End::Duration });
+        prop_assert_eq!(counts, LoopCounts { frames: periods, overruns: 0, skipped: 0, end: End::Duration });
         prop_assert!(observed.ended_ns.abs_diff(rate.deadline(periods)) <= ROUNDING_NS);
     }
 
@@ -298,7 +305,7 @@ proptest! {
 fn a_stop_at_a_tenth_of_a_hertz_ends_the_run_in_the_middle_of_its_period() {
     let stop_at_ns = START_NS + 3 * SECOND_NS + 1;
     let observed = Setup { stop_at_ns, ..Setup::new(Rate(1), Script::default()) }.run();
-    assert_eq!(observed.result.unwrap(), Counts { frames: 1, overruns: 0, skipped: 0, end: End::Signal });
+    assert_eq!(observed.result.unwrap(), LoopCounts { frames: 1, overruns: 0, skipped: 0, end: End::Signal });
     assert!(observed.ended_ns - stop_at_ns <= 100_000_000);
 }
 
@@ -308,7 +315,7 @@ fn a_stop_during_a_long_frame_counts_the_periods_that_passed() {
     let stop_at_ns = START_NS + SECOND_NS / 2;
     let observed = Setup { stop_at_ns, ..Setup::new(Rate(1000), script) }.run();
     // Ticks 0 to 2 were published; the third ended at 1.02 s, so that ticks 3 to 101 had passed.
-    assert_eq!(observed.result.unwrap(), Counts { frames: 3, overruns: 1, skipped: 99, end: End::Signal });
+    assert_eq!(observed.result.unwrap(), LoopCounts { frames: 3, overruns: 1, skipped: 99, end: End::Signal });
 }
 
 #[test]
@@ -316,7 +323,7 @@ fn after_a_frame_of_a_billion_periods_the_deadlines_have_not_shifted() {
     let script = Script { frame_ns: vec![1_000_000_000 * 1_000_000 + 400_000], ..Script::default() };
     let observed = Setup { periods: Some(1_000_000_010), ..Setup::new(Rate(10_000), script) }.run();
     let counts = observed.result.unwrap();
-    assert_eq!(counts, Counts { frames: 11, overruns: 1, skipped: 999_999_999, end: End::Duration });
+    assert_eq!(counts, LoopCounts { frames: 11, overruns: 1, skipped: 999_999_999, end: End::Duration });
     for (k, header) in observed.log.published[1..].iter().enumerate() {
         assert_eq!(header.tick, 1_000_000_000 + k as u64);
         assert_eq!(header.deadline_ns, START_NS + header.tick * 1_000_000);

@@ -1,5 +1,5 @@
-//! What the bits of a frame depend on besides the scene: the processor's instructions, and the crate of the elementary
-//! functions. The log names both, and `verify` compares them with its own.
+//! The arithmetic on which the bits of a frame depend: the processor's instructions and the crate of the elementary functions.
+//! The log names both, and `verify` compares them with those of its machine.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,20 +10,20 @@ use bench_dragon_show::scene::Scene;
 /// called the C library, and logged a hash of its results.
 const ELEMENTARY_FUNCTIONS: &str = "libm 0.2.16";
 
-/// The arithmetic of a machine, as far as it can show in a frame.
+/// The arithmetic of a machine, as far as it affects a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Arithmetic {
     /// The processor's architecture, for people: `x86_64`.
     pub architecture: String,
-    /// The instructions that tables are read with, by [`Instructions::name`].
+    /// The name of the instructions that read the tables ([`Instructions::name`]).
     pub instructions: String,
     /// The crate of the elementary functions and its version.
     pub elementary_functions: String,
 }
 
 impl Arithmetic {
-    /// What a show of this scene is computed with here.
+    /// Returns the arithmetic of a scene's show on this machine.
     pub fn of(scene: &Scene) -> Self {
         Self {
             architecture: std::env::consts::ARCH.to_owned(),
@@ -32,7 +32,7 @@ impl Arithmetic {
         }
     }
 
-    /// Whether this machine can compute the same bits.
+    /// Returns true if this machine computes the same bits.
     pub fn is_available(&self) -> bool {
         let instructions = Instructions::of_name(&self.instructions);
         self.architecture == std::env::consts::ARCH

@@ -1,8 +1,8 @@
-//! The hash of frames: BLAKE3 over what is the same whenever the same show is played.
+//! The hash of frames: BLAKE3 over the bytes that are equal whenever the same show is played.
 //!
-//! A frame contributes the bytes of its message as subscribers get it: of [`FrameHeader`] `sequence` and `tick` (bytes 8
-//! to 23) and all from `sim_time` on (bytes 48 to 95), then every [`HandlePose`](bench_dragon_messages::HandlePose). What is left out is
-//! the run's: its number and its stamps.
+//! A frame contributes the bytes of its message: of [`FrameHeader`] the fields `sequence` and `tick` (bytes 8 to 23) and all
+//! from `sim_time` on (bytes 48 to 95), then every [`HandlePose`](bench_dragon_messages::HandlePose). The run's number and
+//! its stamps are left out.
 
 use bench_dragon_messages::FrameHeader;
 use bench_dragon_motion::solve::Chain;
@@ -12,7 +12,7 @@ pub(super) const HEADER_WORDS: usize = 8;
 /// Words of a handle.
 pub(super) const HANDLE_WORDS: usize = 5;
 
-/// What a header contributes, in the order of its bytes.
+/// Returns the contribution of a header, in the order of its bytes.
 pub(super) fn header_words(header: &FrameHeader) -> [u64; HEADER_WORDS] {
     let FrameHeader {
         run_id: _,
@@ -44,13 +44,13 @@ pub(super) fn header_words(header: &FrameHeader) -> [u64; HEADER_WORDS] {
     ]
 }
 
-/// The arrays of a chain that its poses are made of, in the order of a pose's fields.
+/// Returns the arrays of a chain's poses, in the order of a pose's fields.
 pub(super) fn columns(chain: &Chain) -> [&[f64]; HANDLE_WORDS] {
     let Chain { x, y, heading, speed: _, vx, vy } = chain;
     [x, y, heading, vx, vy]
 }
 
-/// The hash of some frames.
+/// Hashes frames.
 #[derive(Default)]
 pub(super) struct FrameHasher {
     hasher: blake3::Hasher,
@@ -58,7 +58,7 @@ pub(super) struct FrameHasher {
 }
 
 impl FrameHasher {
-    /// Adds a frame: what its header contributes, and its [`columns`].
+    /// Adds a frame: its [`header_words`] and its [`columns`].
     pub fn frame(&mut self, header: &[u64; HEADER_WORDS], columns: [&[f64]; HANDLE_WORDS]) {
         self.bytes.clear();
         self.bytes.extend(header.iter().flat_map(|word| word.to_le_bytes()));
@@ -70,7 +70,7 @@ impl FrameHasher {
         self.hasher.update(&self.bytes);
     }
 
-    /// The hash in hexadecimal digits, after which the next begins.
+    /// Returns the hash in hexadecimal digits and starts the next.
     pub fn take(&mut self) -> String {
         let hash = self.hasher.finalize().to_hex().to_string();
         self.hasher.reset();

@@ -1,7 +1,7 @@
 //! The lines of a log: JSON objects, each with a check over all bytes before it.
 //!
-//! [`Seal`] makes and tests the checks. A line whose check does not fit was not written so: it is damage or forgery and is
-//! reported by its number, before anything is computed.
+//! [`HashChain`] creates and tests the checks. A line with a wrong check is damaged or forged. It is reported by its number,
+//! before anything is computed.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,57 +14,57 @@ use bench_dragon_show::scene::{AtEnd, OnContact, SceneText};
 /// The version of this format.
 pub const FORMAT: u32 = 2;
 
-/// What stands before a line's check, and after it.
+/// The text before a line's check, and the text after it.
 const CHECK: &str = ",\"check\":\"";
 const CHECK_DIGITS: usize = 16;
 const CHECK_END: &str = "\"}";
 
-/// A line, but for its check. Lines stand in the order of ticks.
+/// A line without its check. Lines are in the order of ticks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum Line {
-    /// The first line: all that determines the frames but the commands and the skipped periods.
+    /// The first line. With the commands and the skipped periods, it determines the frames.
     Show(Box<ShowLine>),
-    /// A command, obeyed or refused at the beginning of a period.
+    /// A command, executed or refused at the beginning of a period.
     Command {
         /// The period.
         tick: u64,
         /// Its name.
         command: String,
-        /// Its value, where it has one that is a number.
+        /// Its value, if the value is a finite number.
         value: Option<f64>,
-        /// What became of it, by name; `None` for a step that has begun.
+        /// Its result, by name; `None` for a step that has begun.
         code: Option<String>,
     },
-    /// A step was over, or was broken off, in this period.
+    /// A step ended, or was broken off, in this period.
     StepFinished {
         /// The period.
         tick: u64,
         /// How it ended, by name.
         code: String,
     },
-    /// Periods that had passed before their frame could be begun: they have none.
+    /// Periods without a frame: they had passed before it could be computed.
     Skipped {
         /// The first.
         from: u64,
         /// The last.
         to: u64,
     },
-    /// Frames that were published and are in no hash, since the log was behind.
+    /// Published frames that are in no hash because the log was behind.
     Lost {
         /// The tick of the first.
         from: u64,
         /// The tick of the last.
         to: u64,
     },
-    /// A second of the loop: the ticks whose `floor(tick / rate)` is its number.
+    /// A second of the loop: the ticks with one `floor(tick / rate)`.
     Second(SecondLine),
-    /// The log was behind by so much that it gave up; the show went on.
+    /// The log was too far behind and ended; the show continued.
     Stopped {
-        /// The first tick that it has not seen.
+        /// The first tick that is missing.
         tick: u64,
     },
-    /// The last line of a run whose end the log has seen.
+    /// The last line of a complete log.
     End {
         /// Frames in the hashes.
         frames: u64,
@@ -72,7 +72,7 @@ pub enum Line {
         skipped: u64,
         /// Frames in no hash.
         lost: u64,
-        /// Why the run ended. After an error the frame of its period may have been published and is not here.
+        /// The reason for the end of the run. After an error, the frame of the last period may be published and not logged.
         reason: End,
     },
 }
@@ -85,13 +85,13 @@ pub struct ShowLine {
     pub format: u32,
     /// The program's version.
     pub version: String,
-    /// What the frames were computed with.
+    /// The arithmetic of the frames.
     pub arithmetic: Arithmetic,
-    /// The solver and why it was chosen, for people.
+    /// The solver and the reason for its choice, for people.
     pub solver: String,
     /// The run's number, as text.
     pub run_id: String,
-    /// CLOCK_REALTIME in nanoseconds when the log was begun, as text: for people.
+    /// CLOCK_REALTIME in nanoseconds at the start of the log, as text: for people.
     pub stamp_ns: String,
     /// Frames per second.
     pub rate: f64,
@@ -103,15 +103,15 @@ pub struct ShowLine {
     pub on_contact: String,
     /// `hold` or `loop`.
     pub at_end: String,
-    /// Seconds of wall time for which a looping show stands at its end.
+    /// Seconds of wall time for which a looping show waits at its end.
     pub end_hold: f64,
-    /// Whether the show waits at its start.
+    /// True if the show waits at its start.
     pub paused: bool,
-    /// How errors called the scene's file.
+    /// The scene's file, as errors name it.
     pub scene_file: String,
-    /// The scene's name where its text gives none.
+    /// The scene's name if its text gives none.
     pub scene_stem: String,
-    /// The scene as it was written, TOML.
+    /// The scene's text, TOML.
     pub scene: String,
 }
 
@@ -127,7 +127,7 @@ pub struct SecondLine {
     pub to: u64,
     /// Frames in the hash.
     pub frames: u64,
-    /// BLAKE3 over them.
+    /// BLAKE3 over the frames.
     pub hash: String,
     /// Simulated seconds of the last.
     pub sim_time: f64,
@@ -136,7 +136,7 @@ pub struct SecondLine {
 }
 
 impl ShowLine {
-    /// The show of a scene.
+    /// Creates the line of a scene's show.
     pub fn new(scene: &SceneText, playback: &Playback, arithmetic: Arithmetic, solver: &str, run: (u64, u64)) -> Self {
         let Playback { start, time_scale, rate, on_contact, at_end, end_hold, paused } = *playback;
         let on_contact = if on_contact == OnContact::Stop { "stop" } else { "continue" };
@@ -161,7 +161,7 @@ impl ShowLine {
         }
     }
 
-    /// How the scene was played; `None` for words that this program does not know.
+    /// Returns the settings of the show. Returns `None` for a word that this program does not know.
     pub fn playback(&self) -> Option<Playback> {
         let on_contact = match self.on_contact.as_str() {
             "stop" => OnContact::Stop,
@@ -194,7 +194,7 @@ impl ShowLine {
         Some(Playback { start, time_scale, rate, on_contact, at_end, end_hold, paused })
     }
 
-    /// The scene as it was written.
+    /// Returns the scene's text.
     pub fn scene_text(&self, file: &str) -> SceneText {
         let file = format!("{file}, line 1, the scene \"{}\"", self.scene_file);
         SceneText { text: self.scene.clone(), file, stem: self.scene_stem.clone() }
@@ -202,7 +202,7 @@ impl ShowLine {
 }
 
 impl Line {
-    /// The line of a command, or of the end of a step.
+    /// Creates the line of a command, or of the end of a step.
     pub fn of(tick: u64, record: CommandRecord) -> Self {
         match record {
             CommandRecord::Given { command, code } => {
@@ -217,22 +217,22 @@ impl Line {
     }
 }
 
-/// The command of a name and a value; `None` for one that no log has.
+/// Returns the command of a name and a value. Returns `None` for a command that no log has.
 pub(super) fn command_of(name: &str, value: Option<f64>) -> Option<Command> {
-    // A value that is not a number stands as null.
+    // A value that is not a number is null in the log.
     Command::of_number(Command::named(name)?.number, value.unwrap_or(f64::NAN)).ok()
 }
 
-/// The checks of a file, line by line.
+/// The checks of a file, line by line: each depends on all lines before it.
 #[derive(Default)]
-pub struct Seal {
+pub struct HashChain {
     hasher: blake3::Hasher,
 }
 
-impl Seal {
-    /// The text of a line, its check and its end included.
+impl HashChain {
+    /// Returns the text of a line with its check and newline.
     pub fn line(&mut self, line: &Line) -> String {
-        // Structs of numbers and text: serde_json has no reason to refuse one.
+        // serde_json serialises structs of numbers and text without error.
         let mut text = serde_json::to_string(line).unwrap_or_default();
         text.pop();
         let check = self.check(&text);
@@ -243,12 +243,12 @@ impl Seal {
     /// Reads a line that ends with a newline.
     ///
     /// # Errors
-    /// What is wrong with it, without its place.
+    /// The problem, without its place.
     pub fn read(&mut self, text: &str) -> Result<Line, String> {
         let length = CHECK.len() + CHECK_DIGITS + CHECK_END.len() + 1;
         let body = text.len().checked_sub(length).and_then(|at| text.split_at_checked(at));
-        let sealed = body.filter(|(_, check)| check.starts_with(CHECK) && check.ends_with("\"}\n"));
-        let Some((body, check)) = sealed else {
+        let checked = body.filter(|(_, check)| check.starts_with(CHECK) && check.ends_with("\"}\n"));
+        let Some((body, check)) = checked else {
             return Err("it does not end in a check, expected a line of a log".to_owned());
         };
         let expected = self.check(body);
@@ -263,7 +263,7 @@ impl Seal {
         serde_json::from_str(&format!("{body}}}")).map_err(|error| format!("{error}, expected a line of a log"))
     }
 
-    /// The end of a line that begins with `body`: BLAKE3 over all bytes of the file before the check.
+    /// Returns the end of a line that begins with `body`: BLAKE3 over all bytes of the file before the check.
     fn check(&mut self, body: &str) -> String {
         self.hasher.update(body.as_bytes());
         let hash = self.hasher.finalize().to_hex();

@@ -8,10 +8,10 @@ use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRng;
 
 use super::arithmetic::Arithmetic;
-use super::lines::{Line, Seal, ShowLine};
+use super::lines::{HashChain, Line, ShowLine};
 use super::queue_of;
 use super::writer::LogWriter;
-use crate::live::{Counts, End, Outgoing, Publisher};
+use crate::live::{End, LoopCounts, Outgoing, Publisher};
 use bench_dragon_messages::FrameHeader;
 use bench_dragon_messages::control::{Code, Command, CommandRecord};
 use bench_dragon_motion::solve::table::Instructions;
@@ -115,7 +115,7 @@ proptest! {
     fn numbers_in_a_line_read_back_bit_for_bit(bits: u64, tick: u64) {
         let value = f64::from_bits(bits);
         let line = Line::of(tick, CommandRecord::Given { command: Command::Seek(value), code: Some(Code::Done) });
-        let read = Seal::default().read(&Seal::default().line(&line)).unwrap();
+        let read = HashChain::default().read(&HashChain::default().line(&line)).unwrap();
         let Line::Command { value: found, .. } = &read else { panic!("{read:?}") };
         prop_assert_eq!(found.map(f64::to_bits), value.is_finite().then_some(bits));
     }
@@ -244,7 +244,7 @@ fn a_full_disk_is_reported_once_and_nothing_more_is_written() {
     let record = CommandRecord::Given { command: Command::State, code: Some(Code::Done) };
     (0..200).for_each(|tick| writer.command(tick, record));
     assert_eq!(writer.take_failure().unwrap().kind(), std::io::ErrorKind::StorageFull);
-    writer.end(&Counts { frames: 200, overruns: 0, skipped: 0, end: End::Duration });
+    writer.end(&LoopCounts { frames: 200, overruns: 0, skipped: 0, end: End::Duration });
     assert!(writer.take_failure().is_none());
 }
 

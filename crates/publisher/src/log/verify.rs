@@ -1,9 +1,9 @@
-//! `verify`: plays the show of a log again, tick by tick, and compares.
+//! `verify`: replays the show of a log, tick by tick, and compares.
 //!
-//! In: the lines of a log. Out: a [`Verdict`], or a [`VerifyError`] that names the line. The show is computed by the code
-//! that `run` uses, with the instructions that the log names. Where this machine lacks those, or its elementary functions
-//! round differently, other bits prove nothing: there the handles in the line of each second are compared with what a
-//! second solver, `newton`, has for that moment.
+//! In: the lines of a log. Out: a [`Verdict`], or a [`VerifyError`] that names the line. The code of `run` computes the show,
+//! with the instructions that the log names. If this machine lacks those, or its elementary functions round differently,
+//! different bits prove nothing. Then the handles in the line of each second are compared with those of a second solver,
+//! `newton`.
 
 mod player;
 
@@ -11,13 +11,13 @@ use std::io::{BufRead, Read};
 
 use serde::Serialize;
 
-use super::lines::{FORMAT, Line, Seal, ShowLine};
+use super::lines::{FORMAT, HashChain, Line, ShowLine};
 use bench_dragon_motion::Method;
 use bench_dragon_motion::solve::table::Instructions;
 use bench_dragon_show::scene::{Accepted, Scene, printable};
 use player::Player;
 
-/// Why there is no verdict.
+/// The reason why there is no verdict.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     /// The file is no log, or is damaged.
@@ -25,7 +25,7 @@ pub enum VerifyError {
     Line {
         /// The line, from 1.
         line: u64,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
     /// The scene in its first line cannot be read.
@@ -36,41 +36,41 @@ pub enum VerifyError {
     Read(#[from] std::io::Error),
 }
 
-/// What `verify` found.
+/// The result of `verify`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
-    /// `same`: every bit. `close`: on a machine with another arithmetic, every place within the tolerance. `differs`.
-    /// `nothing`: the log has no second that could be compared.
+    /// `same`: every bit. `close`: on a machine with another arithmetic, every position within the tolerance. `differs`.
+    /// `nothing`: the log has no second to compare.
     pub verdict: &'static str,
     /// The first difference.
     pub difference: Option<Difference>,
-    /// Seconds whose hash was compared.
+    /// The number of seconds compared.
     pub seconds: u64,
-    /// Of these, those with the same hash.
+    /// The number of these with the same hash.
     pub same_seconds: u64,
-    /// Frames in them.
+    /// The frames in the compared seconds.
     pub frames: u64,
-    /// Commands obeyed or refused in them.
+    /// The commands in the compared seconds, executed or refused.
     pub commands: u64,
     /// Periods skipped.
     pub skipped: u64,
-    /// Frames that the log has lost.
+    /// Frames lost by the log.
     pub lost: u64,
-    /// The last tick that is proved; `None` where none is.
+    /// The last verified tick; `None` if there is none.
     pub last_tick: Option<u64>,
-    /// Whether the log has its last line.
+    /// True if the log has its last line.
     pub complete: bool,
-    /// Whether the last line is cut.
+    /// True if the last line is cut.
     pub cut: bool,
-    /// The version of the program that wrote it.
+    /// The version of the program that wrote the log.
     pub version: String,
-    /// The instructions that its frames were computed with.
+    /// The instructions that computed the frames.
     pub instructions: String,
-    /// Whether this machine computes the same bits.
+    /// True if this machine computes the same bits.
     pub same_arithmetic: bool,
-    /// Metres: how far sampled handles are from the second solver's, at most; `None` where bits decided.
+    /// Metres: the greatest distance of a sampled handle from the second solver's; `None` if bits were compared.
     pub max_difference: Option<f64>,
-    /// Metres: what that may be.
+    /// Metres: the tolerance of that distance.
     pub tolerance: Option<f64>,
 }
 
@@ -85,21 +85,21 @@ pub struct Difference {
     pub from: u64,
     /// The last tick concerned.
     pub to: u64,
-    /// What differs, in words.
+    /// The difference, in words.
     pub what: String,
 }
 
-/// Bytes of the longest line that is read: the scene in the first one is text that a person or a program wrote.
+/// The most bytes of a line. The first line holds the text of the scene.
 const LONGEST_LINE: u64 = 1 << 26;
 
-/// Plays a log again.
+/// Verifies a log.
 ///
-/// `file` is how errors call it. `progress` is called with the bytes read so far.
+/// `file` is its name in errors. `progress` is called with the bytes read so far.
 ///
 /// # Errors
 /// [`VerifyError`]
 pub fn verify(log: impl BufRead, file: &str, progress: &mut dyn FnMut(u64)) -> Result<Verdict, VerifyError> {
-    let mut lines = Lines { log, seal: Seal::default(), number: 0, bytes: 0, cut: false };
+    let mut lines = Lines { log, chain: HashChain::default(), number: 0, bytes: 0, cut: false };
     let show = match lines.next()? {
         Some(Line::Show(show)) => *show,
         Some(_) => return Err(lines.error("expected the line of the show, {\"type\":\"show\",...}")),
@@ -129,7 +129,7 @@ pub fn verify(log: impl BufRead, file: &str, progress: &mut dyn FnMut(u64)) -> R
     Ok(player.verdict(&show, complete, lines.cut))
 }
 
-/// The player of a show.
+/// Creates the player of a show.
 fn player<R>(show: &ShowLine, file: &str, lines: &Lines<R>) -> Result<Player, VerifyError> {
     if show.format != FORMAT {
         return Err(lines.error(&format!("the format is {}, expected {FORMAT}", show.format)));
@@ -156,11 +156,11 @@ fn player<R>(show: &ShowLine, file: &str, lines: &Lines<R>) -> Result<Player, Ve
     player.map_err(|error| lines.error(&error.to_string()))
 }
 
-/// Metres that two exact solutions of a scene may be apart at a place, besides their rounding.
+/// Returns the distance in metres that two exact solutions may have besides their rounding.
 fn accuracy_of(scene: &Scene) -> f64 {
-    /// What `verify` takes for equal at best.
+    /// The least tolerance.
     const LEAST: f64 = 1e-12;
-    /// The paper's rules are compared with themselves: their bisection leaves so much to rounding.
+    /// The error that rounding causes in the bisection of the paper's rules.
     const PAPER: f64 = 1e-9;
     match scene.motion.method() {
         Method::Accuracy(accuracy) => accuracy.max(LEAST),
@@ -172,7 +172,7 @@ fn accuracy_of(scene: &Scene) -> f64 {
 /// The lines of a file.
 struct Lines<R> {
     log: R,
-    seal: Seal,
+    chain: HashChain,
     /// The latest line, from 1.
     number: u64,
     bytes: u64,
@@ -186,7 +186,7 @@ impl<R> Lines<R> {
 }
 
 impl<R: BufRead> Lines<R> {
-    /// The next line; `None` at the end, and where the last line is cut.
+    /// Returns the next line, or `None` at the end and at a cut line.
     fn next(&mut self) -> Result<Option<Line>, VerifyError> {
         let mut bytes = Vec::new();
         let read = (&mut self.log).take(LONGEST_LINE).read_until(b'\n', &mut bytes)?;
@@ -204,7 +204,7 @@ impl<R: BufRead> Lines<R> {
         }
         let text =
             std::str::from_utf8(&bytes).map_err(|_| self.error("it is not UTF-8 text, expected a line of a log"))?;
-        let line = self.seal.read(text).map_err(|problem| self.error(&problem))?;
+        let line = self.chain.read(text).map_err(|problem| self.error(&problem))?;
         Ok(Some(line))
     }
 }

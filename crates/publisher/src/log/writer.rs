@@ -1,26 +1,26 @@
-//! From what the queue brings, in the order of ticks, to the lines of a log.
+//! Converts the contents of the queue, in the order of ticks, to the lines of a log.
 //!
-//! [`super::log`] calls it on the log's thread. Each line is one write, so that a killed process leaves whole lines.
+//! Called on the log's thread. Each line is one write, so that a killed process leaves whole lines.
 
 use std::io::{self, Write};
 
 use super::hash::{FrameHasher, HANDLE_WORDS, HEADER_WORDS};
-use super::lines::{Line, Seal, SecondLine, ShowLine};
-use crate::live::Counts;
+use super::lines::{HashChain, Line, SecondLine, ShowLine};
+use crate::live::LoopCounts;
 use bench_dragon_messages::control::CommandRecord;
 
-/// Handles whose places stand in the line of a second: evenly spread, head and tail among them.
+/// The number of handles in the line of a second: evenly spread, with head and tail.
 const SAMPLED_HANDLES: usize = 5;
 
-/// Writes a log. After a write has failed it writes nothing more.
+/// Writes a log. After a failed write it writes nothing more.
 pub(super) struct LogWriter<W> {
     file: W,
-    seal: Seal,
+    chain: HashChain,
     failure: Option<io::Error>,
-    /// Whether a write has failed.
+    /// True after a failed write.
     failed: bool,
     rate: f64,
-    /// The first tick of which nothing is known yet.
+    /// The next tick.
     expected: u64,
     second: Option<OpenSecond>,
     hasher: FrameHasher,
@@ -29,7 +29,7 @@ pub(super) struct LogWriter<W> {
     counts: LogCounts,
 }
 
-/// What a log holds.
+/// The counts of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct LogCounts {
     pub frames: u64,
@@ -45,12 +45,12 @@ struct OpenSecond {
     handles: Vec<(u32, f64, f64)>,
 }
 
-/// The second that a tick lies in.
+/// Returns the second of a tick.
 pub(super) fn second_of(tick: u64, rate: f64) -> u64 {
     (tick as f64 / rate) as u64
 }
 
-/// The handles of a team that stand in the line of a second.
+/// Returns the handles of a team in the line of a second.
 pub(super) fn sampled(handles: usize) -> impl Iterator<Item = usize> {
     let last = handles - 1;
     let count = SAMPLED_HANDLES.min(handles);
@@ -58,11 +58,11 @@ pub(super) fn sampled(handles: usize) -> impl Iterator<Item = usize> {
 }
 
 impl<W: Write> LogWriter<W> {
-    /// A log with its first line.
+    /// Starts a log with its first line.
     pub fn new(file: W, show: ShowLine) -> Self {
         let mut writer = Self {
             file,
-            seal: Seal::default(),
+            chain: HashChain::default(),
             failure: None,
             failed: false,
             rate: show.rate,
@@ -76,24 +76,24 @@ impl<W: Write> LogWriter<W> {
         writer
     }
 
-    /// Why nothing is written any more, once.
+    /// Returns the error of the failed write, once.
     pub fn take_failure(&mut self) -> Option<io::Error> {
         self.failure.take()
     }
 
-    /// What the log holds so far.
+    /// Returns the counts so far.
     pub fn counts(&self) -> LogCounts {
         self.counts
     }
 
-    /// A command or the end of a step, before the frame of its tick.
+    /// Adds a command or the end of a step, before the frame of its tick.
     pub fn command(&mut self, tick: u64, record: CommandRecord) {
         self.arrive(tick);
         self.close_lost_range();
         self.write(&Line::of(tick, record));
     }
 
-    /// A frame: what its header contributes to the hash, and its columns.
+    /// Adds a frame: the words of its header and its columns.
     pub fn frame(&mut self, header: &[u64; HEADER_WORDS], columns: [&[f64]; HANDLE_WORDS]) {
         let (tick, sim_time) = (header[1], f64::from_bits(header[2]));
         self.arrive(tick);
@@ -115,7 +115,7 @@ impl<W: Write> LogWriter<W> {
         second.handles.extend(sampled(x.len()).map(|handle| (handle as u32, x[handle], y[handle])));
     }
 
-    /// A frame that was published and is not here.
+    /// Adds a published frame that the log has lost.
     pub fn lost(&mut self, tick: u64) {
         self.arrive(tick);
         self.counts.lost += 1;
@@ -123,14 +123,14 @@ impl<W: Write> LogWriter<W> {
         self.lost_range = Some(self.lost_range.map_or((tick, tick), |(from, _)| (from, tick)));
     }
 
-    /// The queue could not even take what is lost from this tick on.
+    /// Ends the log: from this tick on, the queue had no room.
     pub fn stopped(&mut self, tick: u64) {
         self.close_second();
         self.write(&Line::Stopped { tick });
     }
 
-    /// The end of a run of which the loop has counted this.
-    pub fn end(&mut self, run: &Counts) {
+    /// Ends the log of a run with these counts.
+    pub fn end(&mut self, run: &LoopCounts) {
         // Periods may have passed between the last frame and the end.
         self.arrive(run.frames + run.skipped);
         self.close_second();
@@ -138,12 +138,12 @@ impl<W: Write> LogWriter<W> {
         self.write(&Line::End { frames, skipped, lost, reason: run.end });
     }
 
-    /// The end of a run of which nothing is known: the log has no last line.
+    /// Ends the log of a run without counts: it has no last line.
     pub fn break_off(&mut self) {
         self.close_second();
     }
 
-    /// Something of this tick follows: what comes before it is complete.
+    /// Completes the lines before a tick.
     fn arrive(&mut self, tick: u64) {
         let earlier = self.expected.saturating_sub(1);
         if second_of(tick, self.rate) > second_of(earlier, self.rate) {
@@ -175,7 +175,7 @@ impl<W: Write> LogWriter<W> {
         if self.failed {
             return;
         }
-        let text = self.seal.line(line);
+        let text = self.chain.line(line);
         if let Err(error) = self.file.write_all(text.as_bytes()) {
             (self.failed, self.failure) = (true, Some(error));
         }

@@ -1,8 +1,8 @@
-//! What keeps a slow transport off the loop: a queue, a thread, and a rate of its own.
+//! Keeps a slow transport off the loop by a queue, a thread and a separate rate.
 //!
-//! [`BackgroundPublisher`] is the loop's end: it copies a frame into memory that was set aside and returns, without a
-//! lock, an allocation or a system call. The thread owns the transport's [`Sink`] and takes frames from the queue; where
-//! it falls behind it continues with the newest and counts what it left out. Called by the transports that need it.
+//! [`BackgroundPublisher`] is the loop's end. It copies a frame into reserved memory without a lock, an allocation or a
+//! system call. The thread owns the transport's [`Sink`] and takes frames from the queue. If the thread falls behind, it
+//! continues with the newest frame and counts the skipped ones. Called by the ROS 2 transport.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use crate::live::{Deliveries, Outgoing, PublishError, Publisher, StatusPublisher};
+use crate::live::{Outgoing, PublishError, Publisher, StatusPublisher, TransportCounters};
 use bench_dragon_client::clock::{Clock, SystemClock, monotonic_ns};
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, QUEUE_BYTES};
 use bench_dragon_show::convert::handle_poses;
@@ -21,20 +21,20 @@ use bench_dragon_show::convert::handle_poses;
 const QUEUED_SECONDS: f64 = 0.25;
 /// The least and the most frames in that queue.
 const QUEUED_FRAMES: (usize, usize) = (4, 256);
-/// Alerts in their queue; one a second is usual.
+/// The length of the queue of alerts. One alert a second is usual.
 const QUEUED_ALERTS: usize = 256;
-/// Times that all cues of the scene fit into their queue: one frame can reach every one of them twice.
+/// The length of the queue of cues, in cues of the scene: one frame can reach each cue twice.
 const QUEUED_SHOWS: usize = 8;
 /// Nanoseconds after a frame's deadline at which the queue is polled for it, and between two polls from then on.
 const FIRST_POLL_NS: u64 = 300_000;
 const POLL_INTERVAL_NS: u64 = 500_000;
-/// The longest sleep: messages that are sent seldom wait no longer.
+/// The longest sleep, and so the longest wait of an event-driven message.
 const LONGEST_SLEEP_NS: u64 = 50_000_000;
 
-/// What a transport does with what comes, on the thread. It is made there and dropped there.
+/// The transport's part on the thread. Created and dropped there.
 pub trait Sink {
-    /// Does what is due besides sending: before each frame, and every 50 ms at least.
-    fn attend(&mut self) {}
+    /// Does the transport's periodic work. Called before each frame, and at least every 50 ms.
+    fn service(&mut self) {}
 
     /// Sends a frame.
     fn frame(&mut self, header: &FrameHeader, handles: &[HandlePose]);
@@ -48,14 +48,14 @@ pub trait Sink {
     /// Sends the loop's status.
     fn status(&mut self, status: &LoopStatus);
 
-    /// Messages so far that a full queue of the transport's own did not take.
+    /// Returns the number of messages that did not fit into the transport's queues.
     fn discarded(&self) -> u64;
 
-    /// How long receivers are given for the last messages before the sink is dropped.
+    /// Returns the time for which the sink is kept after the last messages, for its receivers.
     fn linger(&self) -> Duration;
 }
 
-/// What the queue is made for.
+/// The settings of the queue and its thread.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BackgroundConfig {
     /// The thread's name.
@@ -70,17 +70,17 @@ pub struct BackgroundConfig {
     pub rate: f64,
 }
 
-/// One frame on its way to the thread.
+/// A frame in the queue.
 struct Snapshot {
     header: FrameHeader,
     handles: Vec<HandlePose>,
 }
 
-/// What the ends share besides the queues.
+/// The state that the ends share besides the queues.
 #[derive(Default)]
 struct Shared {
     stop: AtomicBool,
-    /// Frames that found the queue full.
+    /// Frames for which the queue was full.
     rejected: AtomicU64,
     frames: AtomicU64,
     skipped: AtomicU64,
@@ -108,12 +108,12 @@ pub struct BackgroundThread {
     handle: Option<JoinHandle<()>>,
 }
 
-/// What the thread does, without its waiting: a simulated scheduler can call it in the thread's place.
+/// The thread without its waiting, for a simulated scheduler.
 pub struct Worker<S> {
     sink: S,
     inbox: Inbox,
     period_ns: u64,
-    /// Frames that had found the queue full when the last frame was taken from it.
+    /// The value of `rejected` when the latest frame was taken.
     rejected_before: u64,
 }
 
@@ -127,18 +127,18 @@ pub struct Inbox {
     shared: Arc<Shared>,
 }
 
-/// Why there is no thread with a sink.
+/// The reason why there is no thread with a sink.
 #[derive(Debug, thiserror::Error)]
 pub enum BackgroundError<E> {
-    /// The sink could not be made.
+    /// The sink could not be created.
     #[error(transparent)]
     Open(#[from] E),
-    /// The system gave no thread, or it ended early.
+    /// The system refused a thread, or the thread ended early.
     #[error("its thread could not be started: {0}")]
     Thread(String),
 }
 
-/// Starts a thread, has it make its sink with `open`, and returns when that exists.
+/// Starts a thread that creates its sink by `open`. Returns when the sink exists.
 ///
 /// # Errors
 /// [`BackgroundError`]
@@ -161,21 +161,21 @@ pub fn start<S: Sink, E: Send + 'static>(
     let thread = BackgroundThread { shared, handle: Some(handle) };
     match opening.recv() {
         Ok(opened) => opened?,
-        // It panicked, which it has printed.
+        // The thread panicked and has printed that.
         Err(_) => return Err(BackgroundError::Thread("it ended early".to_owned())),
     }
     Ok((publisher, status, thread))
 }
 
-/// The loop's end, the statistics thread's, and the thread's ends of the queues between them.
+/// Creates the queues: the loop's end, the statistics thread's end, and the thread's ends.
 pub fn queues(config: BackgroundConfig) -> (BackgroundPublisher, BackgroundStatus, Inbox) {
     let depth = queue_depth(config.handles, config.rate);
-    // Besides those in the queue one is being filled and one is being sent.
+    // Besides the frames in the queue, one is being filled and one is being sent.
     let (mut free_producer, free) = RingBuffer::new(depth + 2);
     for _ in 0..depth + 2 {
         let snapshot =
             Snapshot { header: FrameHeader::default(), handles: vec![HandlePose::default(); config.handles] };
-        // The ring has just as many places.
+        // The ring has room for all of them.
         let _ = free_producer.push(Box::new(snapshot));
     }
     let (filled, filled_consumer) = RingBuffer::new(depth);
@@ -203,16 +203,16 @@ fn queue_depth(handles: usize, rate: f64) -> usize {
 }
 
 impl<S: Sink> Worker<S> {
-    /// What sends `rate` frames per second, at most, with this sink.
+    /// Creates a worker that sends at most `rate` frames per second.
     pub fn new(sink: S, inbox: Inbox, rate: f64) -> Self {
         Self { sink, inbox, period_ns: (1e9 / rate) as u64, rejected_before: 0 }
     }
 
-    /// Sends what the queues bring until the thread is to stop.
+    /// Sends the contents of the queues until the thread must stop.
     fn serve(mut self, clock: &impl Clock) {
         let mut poll_at = 0;
         loop {
-            // Read before the queues are emptied: what was put there before it was set is then still sent.
+            // Read before the queues are emptied, so that everything queued before it was set is sent.
             let ending = self.inbox.shared.stop.load(Ordering::Acquire);
             clock.sleep_until(poll_at);
             poll_at = self.send(clock);
@@ -223,12 +223,12 @@ impl<S: Sink> Worker<S> {
         }
     }
 
-    /// Sends what the queues have brought; when there will be something next, CLOCK_MONOTONIC in nanoseconds. A sink that
-    /// takes longer over a frame than the next one takes to come is here for ever: all else is looked after between two frames.
+    /// Sends the contents of the queues. Returns the time of the next poll, CLOCK_MONOTONIC in nanoseconds. If the sink is
+    /// slower than the frame rate, this loop never returns, so event-driven messages are sent before each frame.
     pub fn send(&mut self, clock: &impl Clock) -> u64 {
         let mut deadline_ns = None;
         loop {
-            self.send_seldom();
+            self.send_events();
             let Some(sent_ns) = self.send_frame() else { break };
             deadline_ns = Some(sent_ns);
         }
@@ -241,10 +241,10 @@ impl<S: Sink> Worker<S> {
         poll_at.min(now + LONGEST_SLEEP_NS)
     }
 
-    /// Does what is due besides frames, and sends what comes seldom.
-    fn send_seldom(&mut self) {
+    /// Does the periodic work and sends the event-driven messages.
+    fn send_events(&mut self) {
         let Self { sink, inbox, .. } = self;
-        sink.attend();
+        sink.service();
         while let Ok(alert) = inbox.alerts.pop() {
             sink.alert(alert);
         }
@@ -257,8 +257,8 @@ impl<S: Sink> Worker<S> {
         inbox.shared.discarded.store(sink.discarded(), Ordering::Relaxed);
     }
 
-    /// Sends the next frame in the queue, or the newest where one has found the queue full since the last; its deadline,
-    /// CLOCK_MONOTONIC in nanoseconds, or nothing where there is none.
+    /// Sends the next frame in the queue, or the newest if the queue was full since the last call. Returns the frame's
+    /// deadline, CLOCK_MONOTONIC in nanoseconds, or `None` without a frame.
     fn send_frame(&mut self) -> Option<u64> {
         let Self { sink, inbox, rejected_before, .. } = self;
         let Shared { rejected, frames, skipped, .. } = &*inbox.shared;
@@ -267,7 +267,7 @@ impl<S: Sink> Worker<S> {
         let mut snapshot = inbox.filled.pop().ok()?;
         while newest_only && let Ok(newer) = inbox.filled.pop() {
             skipped.fetch_add(1, Ordering::Relaxed);
-            // The ring has a place for every snapshot there is.
+            // The ring has room for every snapshot.
             let _ = inbox.free.push(std::mem::replace(&mut snapshot, newer));
         }
         sink.frame(&snapshot.header, &snapshot.handles);
@@ -277,24 +277,24 @@ impl<S: Sink> Worker<S> {
         Some(deadline_ns)
     }
 
-    /// What has been done with the frames of the loop so far.
-    pub fn deliveries(&self) -> Deliveries {
-        self.inbox.shared.deliveries()
+    /// Returns the counters so far.
+    pub fn counters(&self) -> TransportCounters {
+        self.inbox.shared.counters()
     }
 }
 
 impl Shared {
-    fn deliveries(&self) -> Deliveries {
+    fn counters(&self) -> TransportCounters {
         let [rejected, frames, skipped, discarded] =
             [&self.rejected, &self.frames, &self.skipped, &self.discarded].map(|count| count.load(Ordering::Relaxed));
-        Deliveries { frames, skipped: skipped + rejected, discarded }
+        TransportCounters { frames, skipped: skipped + rejected, discarded }
     }
 }
 
 impl BackgroundPublisher {
-    /// Whether a frame of this tick is to be sent: the rate's number per second, evenly spaced.
+    /// Returns true if the frame of this tick must be sent. Such frames are evenly spaced.
     fn due(&mut self, tick: u64) -> bool {
-        // At most 20,000 ticks a second: beyond 2^53 they would have run for 14,000 years.
+        // At 20,000 ticks a second, 2^53 ticks last 14,000 years.
         let slot = (tick as f64 * self.share) as u64;
         self.latest_slot.replace(slot) != Some(slot)
     }
@@ -313,7 +313,7 @@ impl Publisher for BackgroundPublisher {
         if !self.due(header.tick) {
             return Ok(());
         }
-        // Only this end fills the queue, so that it still has room below.
+        // Only this end fills the queue, so there is still room below.
         let free = if self.filled.is_full() { None } else { self.free.pop().ok() };
         let Some(mut snapshot) = free else {
             self.shared.rejected.fetch_add(1, Ordering::Relaxed);
@@ -342,16 +342,16 @@ impl StatusPublisher for BackgroundStatus {
 }
 
 impl BackgroundThread {
-    /// Ends the thread once it has sent what is queued; what it has done.
-    pub fn finish(mut self) -> Deliveries {
+    /// Sends the contents of the queues and ends the thread. Returns its counters.
+    pub fn finish(mut self) -> TransportCounters {
         self.join();
-        self.shared.deliveries()
+        self.shared.counters()
     }
 
     fn join(&mut self) {
         self.shared.stop.store(true, Ordering::Release);
         if let Some(handle) = self.handle.take() {
-            // A panic has been printed by then.
+            // The thread has printed its panic.
             let _ = handle.join();
         }
     }

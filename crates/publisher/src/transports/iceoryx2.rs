@@ -2,11 +2,11 @@
 //!
 //! [`SharedMemoryPublisher`] lives on the loop's thread, [`StatusSender`] on the statistics thread; both are made there,
 //! since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/alerts`, `/status`,
-//! `/stage`, the event service `<name>/tick` and, where a scene asks for it, `<name>/poses32`.
+//! `/stage`, the event service `<name>/tick` and, if a scene requests it, `<name>/poses32`.
 //!
-//! One show has a name: the service of commands, `<name>/control`, admits one server, and that is opened first. iceoryx2
-//! knows by a lock of the operating system whether its process lives, so that one that was killed is in nobody's way and one
-//! that is stopped still has the name. The other services admit a second publisher: what joins this machine to others.
+//! A name belongs to one show: the service of commands, `<name>/control`, admits one server and is opened first. iceoryx2
+//! detects by a lock of the operating system whether the server's process lives. So a killed process does not block the
+//! name, and a stopped process keeps it. The other services admit a second publisher: a tunnel to other machines.
 
 mod control;
 mod frames;
@@ -29,8 +29,8 @@ use bench_dragon_client::shared_memory::{
 };
 
 use super::{Transport, TransportConfig, TransportError};
-use crate::live::control::Door;
-use crate::live::{Deliveries, Outgoing, PublishError, Publisher, StatusPublisher};
+use crate::live::control::CommandSender;
+use crate::live::{Outgoing, PublishError, Publisher, StatusPublisher, TransportCounters};
 use bench_dragon_messages::{CollisionAlert, Cue, HandlePose, HandlePose32, LoopStatus, Stage};
 use bench_dragon_show::convert::{Decimation, handle_pose, handle_pose_32, handle_poses};
 use bench_dragon_show::scene::SinglePrecision;
@@ -38,31 +38,31 @@ use bench_dragon_show::scene::SinglePrecision;
 use frames::{FrameSender, FrameService};
 use queues::{check_room, default_queue};
 
-/// How often the stage, the latest alert and the latest cue are sent again while there is a tunnel: it hands on what is sent,
-/// to the machines that are there at that moment, and keeps nothing for those that come later.
+/// The interval at which the stage, the latest alert and the latest cue are retransmitted to a tunnel. A tunnel keeps no
+/// history for machines that join later.
 const REPEAT_INTERVAL: Duration = Duration::from_secs(1);
-/// Nodes that may have a service open at once beyond one a subscriber: the publisher's, and those that died and have
-/// not been cleaned up after yet.
+/// The nodes that may have a service open besides one for each subscriber: the publisher's, and dead nodes that are not
+/// removed yet.
 const SPARE_NODES: usize = 32;
 /// Alerts and statuses that a subscriber may fall behind.
 const SMALL_QUEUE: usize = 16;
-/// How long an incomplete service may stop a publisher; [`stale_files`] needs less to remove it.
+/// The time for which an incomplete service may block a publisher; [`stale_files`] removes it earlier.
 const PATIENCE: Duration = Duration::from_secs(6);
 
-/// What a publisher offers.
+/// The settings of a publisher.
 #[derive(Debug, Clone)]
 pub struct PublisherConfig {
     /// The name under which services appear.
     pub name: String,
     /// Handles in a frame.
     pub handles: usize,
-    /// The service of poses in single precision, where there is one.
+    /// The service of poses in single precision, if requested.
     pub single_precision: Option<SinglePrecision>,
     /// Frames a subscriber may fall behind.
     pub queue: usize,
     /// Subscribers that each service admits at once.
     pub subscribers: usize,
-    /// Whether there is an alerts service.
+    /// True if there is an alerts service.
     pub alerts: bool,
     /// The number of the scene's cues; with none there is no cues service.
     pub cues: usize,
@@ -71,7 +71,7 @@ pub struct PublisherConfig {
 }
 
 impl PublisherConfig {
-    /// Which handles the frames in single precision have, where there are any.
+    /// Returns the handles of the frames in single precision, if there are such frames.
     fn decimation(&self) -> Option<Decimation> {
         self.single_precision.map(|SinglePrecision { every }| Decimation { handles: self.handles, every })
     }
@@ -83,8 +83,7 @@ struct Iceoryx2 {
     control: Option<control::ControlThread>,
 }
 
-/// The services that the scene asks for, which every scene does; nothing is opened yet but a thread that removes
-/// [`stale_files`].
+/// Creates the transport, for every scene. It opens no service yet, and starts the thread that removes [`stale_files`].
 ///
 /// # Errors
 /// [`TransportError::BadInput`] for a name that iceoryx2 cannot take.
@@ -137,12 +136,12 @@ impl Transport for Iceoryx2 {
         Ok(Box::new(StatusSender::open(&self.config.name, self.config.subscribers)?))
     }
 
-    fn control(&mut self, door: Door) -> Result<Option<Door>, TransportError> {
-        self.control = Some(control::ControlThread::start(&self.config.name, door)?);
+    fn control(&mut self, commands: CommandSender) -> Result<Option<CommandSender>, TransportError> {
+        self.control = Some(control::ControlThread::start(&self.config.name, commands)?);
         Ok(None)
     }
 
-    fn finish(self: Box<Self>) -> Option<(&'static str, Deliveries)> {
+    fn finish(self: Box<Self>) -> Option<(&'static str, TransportCounters)> {
         None
     }
 }
@@ -166,11 +165,11 @@ pub struct SharedMemoryPublisher {
 }
 
 impl SharedMemoryPublisher {
-    /// Opens the services and sends the stage. To be called on the thread that will publish. Whoever calls it sees to it that
-    /// no other show has the name: within a run [`Transport::control`] does, which is called before.
+    /// Opens the services and sends the stage. Must be called on the thread that publishes. The caller ensures that no other
+    /// show has the name: a run calls [`Transport::control`] first.
     ///
     /// # Errors
-    /// [`OpenError`]: each names what is in the way and what to do.
+    /// [`OpenError`]: each names the cause and the remedy.
     pub fn open(config: &PublisherConfig) -> Result<Self, OpenError> {
         retry_while_incomplete(|| Self::open_now(config))
     }
@@ -190,7 +189,7 @@ impl SharedMemoryPublisher {
         let poses_32 = config.decimation().map(open_32).transpose()?;
         let open_alerts = || Repeated::open(&node, config, "alerts", SMALL_QUEUE);
         let alerts = config.alerts.then(open_alerts).transpose()?;
-        // A large step reaches all of them in one frame; at a power of two most changes of a scene keep the service as it is.
+        // A large step can reach all cues in one frame. With a power of two, most changes of a scene keep the service.
         let open_cues = || Repeated::open(&node, config, "cues", config.cues.next_power_of_two().max(SMALL_QUEUE));
         let cues = (config.cues > 0).then(open_cues).transpose()?;
         let mut stage = Repeated::open(&node, config, "stage", SMALL_QUEUE)?;
@@ -203,7 +202,7 @@ impl SharedMemoryPublisher {
             .open_or_create()
             .map_err(|error| match error {
                 EventOpenOrCreateError::EventOpenError(EventOpenError::HangsInCreation) => incomplete(name, "tick"),
-                // A tunnel that listens to it was started first.
+                // A tunnel opened the service first.
                 EventOpenOrCreateError::EventOpenError(
                     EventOpenError::DoesNotSupportRequestedAmountOfNodes
                     | EventOpenError::DoesNotSupportRequestedAmountOfListeners,
@@ -243,16 +242,16 @@ impl Publisher for SharedMemoryPublisher {
         let sent = sent.and_then(|()| send_all(&mut self.alerts, outgoing.alerts));
         let sent = sent.and_then(|()| send_all(&mut self.cues, outgoing.cues));
         sent.map_err(|reason| PublishError(format!("the shared memory failed: {reason}")))?;
-        // Waking costs a socket write per listener, several times what sending does: it is left out for nobody.
+        // A wake-up costs a socket write per listener, several times the cost of sending.
         if self.tick_service.dynamic_config().number_of_listeners() > 0 {
-            // A listener that died or does not drain is its own loss: the frame is in its queue.
+            // A dead or slow listener only loses the wake-up: the frame is in its queue.
             let _ = self.tick.notify();
         }
         Ok(())
     }
 
     fn maintain(&mut self) {
-        // A late subscriber gets the history of a service only when its publisher looks for new connections.
+        // A late subscriber gets the history only when the publisher updates its connections.
         if let Some(alerts) = &mut self.alerts {
             alerts.maintain();
         }
@@ -271,7 +270,7 @@ impl Publisher for SharedMemoryPublisher {
     }
 }
 
-/// Messages that hold until the next one: the latest is sent again and again while there is a tunnel.
+/// A service whose latest message holds until the next. The latest message is retransmitted while there is a tunnel.
 struct Repeated<Message: ZeroCopySend + std::fmt::Debug + Copy + 'static> {
     latest: Option<Message>,
     port: Sender<Message, ()>,
@@ -295,7 +294,7 @@ impl<Message: ZeroCopySend + std::fmt::Debug + Copy + 'static> Repeated<Message>
         self.port.send_copy(message).map(|_| ())
     }
 
-    /// Lets late subscribers in, on this machine and on others.
+    /// Delivers the latest message to late subscribers, on this machine and on others.
     fn maintain(&mut self) {
         let _ = self.port.update_connections();
         let has_tunnel = self.service.dynamic_config().number_of_publishers() > 1;
@@ -305,14 +304,14 @@ impl<Message: ZeroCopySend + std::fmt::Debug + Copy + 'static> Repeated<Message>
     }
 }
 
-/// Publishes the loop's status; to be made on the statistics thread.
+/// Publishes the loop's status. Must be created on the statistics thread.
 pub struct StatusSender {
     status: Sender<LoopStatus, ()>,
     _node: Node<ipc::Service>,
 }
 
 impl StatusSender {
-    /// Opens `<name>/status`, which admits so many `subscribers` at once.
+    /// Opens `<name>/status` for at most `subscribers` subscribers at once.
     ///
     /// # Errors
     /// As [`SharedMemoryPublisher::open`].
@@ -334,7 +333,7 @@ impl StatusPublisher for StatusSender {
     }
 }
 
-/// A port for messages that are sent seldom, and its service; the last one is kept for late subscribers.
+/// Opens a service of event-driven messages, and a port to it. The last message is kept for late subscribers.
 fn sender<Message: ZeroCopySend + std::fmt::Debug + Copy>(
     node: &Node<ipc::Service>,
     name: &str,
@@ -373,8 +372,8 @@ fn sender<Message: ZeroCopySend + std::fmt::Debug + Copy>(
     Ok((port, opened))
 }
 
-/// Tries again while a service is incomplete: its maker is about to finish it, or was killed, and then its file is removed
-/// after a while ([`stale_files`]).
+/// Retries while a service is incomplete. Its creator either completes it or was killed; then [`stale_files`] removes its
+/// file.
 fn retry_while_incomplete<Opened>(open: impl Fn() -> Result<Opened, OpenError>) -> Result<Opened, OpenError> {
     let began = Instant::now();
     loop {

@@ -1,5 +1,5 @@
-//! Where the bytes of a recording go. What is written between two flushes reaches the file as a whole or not at all, and
-//! room on the disk is taken before it is needed, so that a full disk still has room for the end of the file.
+//! The output file of a recording. The bytes between two flushes reach the file together or not at all. Disk space is
+//! reserved in advance, so that a full disk still has room for the end of the file.
 
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -10,7 +10,7 @@ use nix::errno::Errno;
 use nix::fcntl::{FallocateFlags, fallocate};
 use nix::sys::resource::{Resource, getrlimit};
 
-/// Room that is taken at a time.
+/// The bytes that are reserved at a time.
 const STEP: u64 = 8 << 20;
 
 /// A file that grows by flushes. Clones are the same file.
@@ -19,18 +19,18 @@ pub(super) struct Disk(Arc<Mutex<Inner>>);
 
 struct Inner {
     file: File,
-    /// What has been written since the last flush.
+    /// The bytes since the last flush.
     buffer: Vec<u8>,
     /// Bytes in the file.
     flushed: u64,
-    /// Bytes that the file may have with the room that was taken.
+    /// The size of the file with the reserved space.
     reserved: u64,
-    /// After a write has failed the file is left as it stands.
+    /// True after a failed write: the file is not changed any more.
     failed: bool,
 }
 
 impl Disk {
-    /// An empty file.
+    /// Starts with an empty file.
     pub fn new(file: File) -> Self {
         Self(Arc::new(Mutex::new(Inner { file, buffer: Vec::new(), flushed: 0, reserved: 0, failed: false })))
     }
@@ -39,16 +39,16 @@ impl Disk {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Bytes in the file, and those that the next flush brings.
+    /// Returns the bytes in the file and in the buffer.
     pub fn position(&self) -> u64 {
         let inner = self.inner();
         inner.flushed + inner.buffer.len() as u64
     }
 
-    /// Takes room for so many bytes in all.
+    /// Reserves space for a file of `bytes` bytes.
     ///
     /// # Errors
-    /// There is none: the disk is full, or the process may not write larger files.
+    /// The disk is full, or the process may not write larger files.
     pub fn reserve(&self, bytes: u64) -> io::Result<()> {
         let mut inner = self.inner();
         if bytes <= inner.reserved {
@@ -64,7 +64,7 @@ impl Disk {
         });
         match took {
             Err(error @ (Errno::ENOSPC | Errno::EDQUOT | Errno::EFBIG)) => Err(error.into()),
-            // A file system that takes no room ahead: a full disk then shows in a write.
+            // The file system cannot reserve space: a full disk is then an error of a write.
             Err(_) => {
                 inner.reserved = most;
                 Ok(())
@@ -73,23 +73,23 @@ impl Disk {
         }
     }
 
-    /// Waits until what was flushed would survive a loss of power.
+    /// Waits until the flushed bytes are on the disk.
     pub fn sync(&self) -> io::Result<()> {
-        // Not under the lock, which nobody else needs while this lasts: the file is one thread's.
+        // Without the lock, since this can last.
         let file = self.inner().file.try_clone()?;
         match file.sync_data() {
-            // Pipes and devices have no such thing.
+            // Pipes and devices cannot be synchronised.
             Err(error) if error.raw_os_error() == Some(nix::libc::EINVAL) => Ok(()),
             done => done,
         }
     }
 
-    /// Gives back the room that was not needed.
+    /// Releases the reserved space that is unused.
     pub fn release(&self) {
         let mut inner = self.inner();
         let length = inner.flushed;
         inner.reserved = length;
-        // Of a device there is nothing to give back.
+        // A device has no length to set.
         let _ = inner.file.set_len(length);
     }
 }
@@ -105,7 +105,7 @@ impl Inner {
 }
 
 impl Seek for Disk {
-    /// Tells the position, for which the writer asks.
+    /// Returns the position, the only seek of the writer.
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         match to {
             SeekFrom::Current(0) => Ok(self.position()),
@@ -127,7 +127,7 @@ impl Write for Disk {
             return Err(io::Error::other("an earlier write has failed"));
         }
         if let Err(error) = file.write_all(buffer) {
-            // What arrived of it is no whole chunk.
+            // The bytes written are no whole chunk.
             let _ = file.set_len(*flushed);
             let _ = file.seek(SeekFrom::Start(*flushed));
             buffer.clear();

@@ -1,7 +1,7 @@
 //! One MCAP file: its channels, its chunks, and its end.
 //!
-//! The channels stand before the first chunk and again in it: whichever is damaged, the others are of use. A chunk is half a
-//! second of messages, or 4 MB of them: what is in a finished chunk can be read whatever happens to the rest. Called by the
+//! The channels are before the first chunk and again in it, so that one damaged copy does no harm. A chunk is half a second
+//! of messages, or 4 MB of them. A finished chunk can be read whatever happens to the rest. Called by the
 //! [`recorder`](super::recorder).
 
 use std::collections::BTreeMap;
@@ -20,25 +20,25 @@ use super::disk::Disk;
 use bench_dragon_ros2_messages::MessageType;
 use bench_dragon_ros2_messages::settings::{Durability, Qos, Reliability, Topic};
 
-/// How long messages wait for the end of their chunk: less than the second that a kill may cost, by what a busy machine may keep
-/// the processor from this one.
+/// The longest wait of messages for the end of their chunk. A kill may cost at most a second; the rest is a margin for a busy
+/// machine.
 const CHUNK_INTERVAL: Duration = Duration::from_millis(500);
 /// The bytes of messages after which a chunk ends early: readers hold whole chunks in memory.
 const CHUNK_BYTES: u64 = 4 << 20;
-/// How often what was written is forced to the disk.
+/// The interval at which the file is synchronised to the disk.
 const SYNC_INTERVAL: Duration = Duration::from_secs(10);
-/// More bytes than a message has in a file besides its own: its header and its places in two indexes.
+/// An upper bound of a message's bytes besides its own: its header and its entries in two indexes.
 const MESSAGE_OVERHEAD: u64 = 80;
-/// More bytes than the index of a chunk has.
+/// An upper bound of the bytes of a chunk's index.
 const CHUNK_INDEX_BYTES: u64 = 512;
-/// More bytes than the end of a file has besides channels and indexes, and than an attachment has.
+/// An upper bound of the bytes of a file's end besides channels and indexes, and of an attachment.
 const END_BYTES: u64 = 64 << 10;
-/// zstd's own default: handles are nearly random to it, and higher levels take much longer and save nothing.
+/// zstd's default: handles are nearly random, so higher levels take much longer and save nothing.
 const COMPRESSION_LEVEL: u32 = 3;
 /// CDR, little-endian.
 const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
 
-/// Messages as bytes, which go into one file together.
+/// Encoded messages that go into one file together.
 #[derive(Debug, Default)]
 pub struct Batch {
     bytes: Vec<u8>,
@@ -55,7 +55,7 @@ struct Encoded {
 }
 
 impl Batch {
-    /// Empties it; its memory is used again.
+    /// Empties the batch and keeps its memory.
     pub fn clear(&mut self) {
         self.bytes.clear();
         self.messages.clear();
@@ -65,7 +65,7 @@ impl Batch {
     pub fn push(&mut self, topic: Topic, stamp_ns: u64, sequence: u32, message: &impl Serialize) {
         let start = self.bytes.len();
         self.bytes.extend(ENCAPSULATION);
-        // It fails where a list has more than 2^32 entries, which no message of the wire has.
+        // Fails for a list with more than 2^32 entries, which no message has.
         if cdr_encoding::to_writer::<_, LittleEndian, _>(&mut self.bytes, message).is_err() {
             self.bytes.truncate(start);
             return;
@@ -73,7 +73,7 @@ impl Batch {
         self.messages.push(Encoded { topic, sequence, stamp_ns, bytes: start..self.bytes.len() });
     }
 
-    /// More bytes than the messages take in a file, uncompressed.
+    /// Returns an upper bound of the messages' bytes in a file, uncompressed.
     fn bound(&self) -> u64 {
         self.bytes.len() as u64 + MESSAGE_OVERHEAD * self.messages.len() as u64
     }
@@ -86,7 +86,7 @@ pub struct McapFile {
     channels: BTreeMap<Topic, u16>,
     /// The size that the file must not exceed.
     limit: Option<u64>,
-    /// A bound of the bytes of the open chunk, and when it was begun.
+    /// An upper bound of the open chunk's bytes, and the time of its start.
     pending: u64,
     chunk_began: Instant,
     chunks: u64,
@@ -95,13 +95,13 @@ pub struct McapFile {
 }
 
 impl McapFile {
-    /// A file with a channel for each topic of the publisher `name`.
+    /// Starts a file with a channel for each topic of the publisher `name`.
     ///
     /// # Errors
-    /// What the disk says.
+    /// A failed write.
     pub fn new(file: File, name: &str, topics: &[Topic], limit: Option<u64>) -> Result<Self, io::Error> {
         let disk = Disk::new(file);
-        // What it has not written itself would not be in its check of all data. Chunks and attachments have their own.
+        // The check of all data would lack the bytes written below. Chunks and attachments have their own checks.
         let options = options().calculate_data_section_crc(false);
         let mut bare = options.clone().use_chunks(false).create(NoSeek::new(Vec::new())).map_err(io_error)?;
         add_channels(&mut bare, name, topics)?;
@@ -111,7 +111,7 @@ impl McapFile {
         let channel_bytes = bare.get(disk.position() as usize..).unwrap_or_default();
         disk.clone().write_all(channel_bytes)?;
         let channels = add_channels(&mut writer, name, topics)?;
-        // A recorder that is killed within its first second leaves an empty recording, and no empty file.
+        // A recorder that is killed within its first second leaves an empty recording in place of an empty file.
         disk.clone().flush()?;
         // The channels are in the first chunk and in the end.
         let end_bytes = END_BYTES + channel_bytes.len() as u64;
@@ -120,24 +120,24 @@ impl McapFile {
         Ok(Self { writer, disk, channels, limit, pending, chunk_began, chunks: 0, end_bytes, synced })
     }
 
-    /// Whether these messages fit into a file of the size that it may have. An empty file takes any.
+    /// Returns true if the messages fit into the file's limit. Everything fits into an empty file.
     ///
     /// # Errors
-    /// What the disk says.
+    /// A failed write.
     pub fn has_room(&mut self, batch: &Batch) -> io::Result<bool> {
         let Some(limit) = self.limit else { return Ok(true) };
         if self.bytes_with(batch.bound()) > limit {
-            // Compressed it is smaller.
+            // A finished chunk is smaller, since compressed.
             self.end_chunk()?;
         }
         Ok(self.bytes_with(batch.bound()) <= limit)
     }
 
-    /// Writes messages: all of them, or none; how many are of this file's topics. They are logged at their own times or at
-    /// `log_time`.
+    /// Writes messages, all of them or none, with their own log times or `log_time`. Returns the number of messages of this
+    /// file's topics.
     ///
     /// # Errors
-    /// What the disk says.
+    /// A failed write.
     pub fn append(&mut self, batch: &Batch, log_time: Option<u64>) -> io::Result<u64> {
         let more = batch.bound();
         self.disk.reserve(self.bytes_with(more))?;
@@ -163,10 +163,10 @@ impl McapFile {
         Ok(written)
     }
 
-    /// Writes what goes with the recording and is no message, between two chunks.
+    /// Writes an attachment between two chunks.
     ///
     /// # Errors
-    /// What the disk says.
+    /// A failed write.
     pub fn attach(&mut self, name: &str, media_type: &str, time_ns: u64, data: &[u8]) -> io::Result<()> {
         self.end_chunk()?;
         let attached = self.writer.attach(&Attachment {
@@ -179,10 +179,10 @@ impl McapFile {
         attached.and_then(|()| self.writer.flush()).map_err(io_error)
     }
 
-    /// Ends the chunk where that is due, and forces it to the disk where that is.
+    /// Ends the chunk and synchronises the file, each if it is due.
     ///
     /// # Errors
-    /// What the disk says.
+    /// A failed write.
     pub fn maintain(&mut self) -> io::Result<()> {
         if self.pending > 0 && self.chunk_began.elapsed() >= CHUNK_INTERVAL {
             self.end_chunk()?;
@@ -194,10 +194,10 @@ impl McapFile {
         Ok(())
     }
 
-    /// Ends the file with what readers need to find their way in it. Its size.
+    /// Writes the index and ends the file. Returns its size.
     ///
     /// # Errors
-    /// What the disk says. Then the file has every chunk that was finished, and no end.
+    /// A failed write. The file then has every finished chunk and no end.
     pub fn finish(mut self) -> Result<u64, (u64, io::Error)> {
         let mut end = || -> Result<(), McapError> {
             self.writer.flush()?;
@@ -212,12 +212,12 @@ impl McapFile {
         }
     }
 
-    /// Bytes so far.
+    /// Returns the bytes so far.
     pub fn bytes(&self) -> u64 {
         self.disk.position()
     }
 
-    /// A bound of the size that the finished file has with so many more bytes of messages.
+    /// Returns an upper bound of the finished file's size if `more` bytes of messages are added.
     fn bytes_with(&self, more: u64) -> u64 {
         self.disk.position() + self.pending + more + self.end_bytes + CHUNK_INDEX_BYTES * (self.chunks + 1)
     }
@@ -232,7 +232,7 @@ impl McapFile {
     }
 }
 
-/// Adds a channel for each topic of the publisher `name`; their numbers.
+/// Adds a channel for each topic of the publisher `name`. Returns the channels' numbers.
 fn add_channels<Output: Write + Seek>(
     writer: &mut Writer<Output>,
     name: &str,
@@ -247,7 +247,7 @@ fn add_channels<Output: Write + Seek>(
     topics.iter().map(add).collect::<Result<_, McapError>>().map_err(io_error)
 }
 
-/// What every file of this program is written with.
+/// Returns the options of every file of this program.
 pub(super) fn options() -> WriteOptions {
     WriteOptions::library(WriteOptions::new(), concat!("bench-dragon ", env!("CARGO_PKG_VERSION")))
         .profile("ros2")
@@ -258,7 +258,7 @@ pub(super) fn options() -> WriteOptions {
         .disable_seeking(true)
 }
 
-/// What the disk said, or what is wrong with the bytes.
+/// Converts an error of the library to an I/O error.
 pub(super) fn io_error(error: McapError) -> io::Error {
     match error {
         McapError::Io(error) => error,
@@ -266,7 +266,7 @@ pub(super) fn io_error(error: McapError) -> io::Error {
     }
 }
 
-/// A quality of service as rosbag2 keeps it, in the numbers of rmw, which every version of it reads.
+/// Returns a quality of service in the format of rosbag2, with the numbers of rmw, which every version reads.
 fn qos_profile(qos: Qos) -> String {
     let reliability = match qos.reliability {
         Reliability::Reliable => 1,

@@ -1,4 +1,4 @@
-//! The end of a recording: which channels and chunks it has. Called by the [`reader`](super::reader).
+//! The index at the end of a recording: its channels and chunks. Called by the [`reader`](super::reader).
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Display;
@@ -13,20 +13,20 @@ use mcap::{Channel, MAGIC, McapError, parse_record};
 
 use super::reader::ReadError;
 
-/// The footer with the end's magic, and the record before the index.
+/// Bytes of the footer with the final magic, and of the record before the index.
 const FOOTER_BYTES: usize = 37;
 const DATA_END_BYTES: u64 = 13;
 
-/// What stands at the end of a file.
+/// The contents of the index.
 #[derive(Default)]
 pub(super) struct Index {
     pub channels: HashMap<u16, Arc<Channel<'static>>>,
     pub chunks: Vec<ChunkIndex>,
-    /// Messages by channel, where the file counts them.
+    /// Messages by channel, if the file counts them.
     pub counts: Option<BTreeMap<u16, u64>>,
 }
 
-/// Reads the end of a file, whose bytes are checked.
+/// Reads the index of a file and checks its bytes.
 pub(super) fn index(file: &mut File, length: u64) -> Result<Index, ReadError> {
     let mut magic = [0; MAGIC.len()];
     file.seek(SeekFrom::Start(0))?;
@@ -53,7 +53,7 @@ pub(super) fn index(file: &mut File, length: u64) -> Result<Index, ReadError> {
     let mut bytes = Vec::new();
     file.seek(SeekFrom::Start(begins))?;
     file.read_to_end(&mut bytes)?;
-    // A chunk has no place here: it is not looked into.
+    // A chunk is not expected here and is not read.
     let options = LinearReaderOptions::default().with_skip_start_magic(true).with_emit_chunks(true);
     let options = options.with_validate_summary_section_crc(true).with_record_length_limit(bytes.len());
     let (mut reader, mut left) = (LinearReader::new_with_options(options), bytes.as_slice());
@@ -61,7 +61,7 @@ pub(super) fn index(file: &mut File, length: u64) -> Result<Index, ReadError> {
     while let Some(event) = reader.next_event() {
         let record = match event.map_err(|error| damaged(&told(&error)))? {
             LinearReadEvent::ReadRequest(need) => {
-                // No more is asked for than there can be.
+                // The request is limited to the remaining bytes.
                 let read = left.read(reader.insert(need.min(left.len())))?;
                 reader.notify_read(read);
                 continue;
@@ -92,7 +92,7 @@ pub(super) fn index(file: &mut File, length: u64) -> Result<Index, ReadError> {
     if index.chunks.is_empty() && has_messages { Err(ReadError::NoIndex) } else { Ok(index) }
 }
 
-/// What the reader has to say, without what it says of itself.
+/// Returns the sentence of a reader's error, without names of the library.
 pub(super) fn told(error: &McapError) -> String {
     match error {
         McapError::UnsupportedCompression(name) => format!("its chunks are compressed by {name}, expected zstd"),

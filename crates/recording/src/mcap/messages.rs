@@ -1,6 +1,6 @@
-//! The messages of each topic that is recorded, as the ROS 2 transport would send them.
+//! The messages of each recorded topic, as the ROS 2 transport would send them.
 //!
-//! In: what a subscriber received. Out: a [`Batch`], with the memory of the one before. Called by the
+//! In: a subscriber's messages. Out: a [`Batch`], whose memory is reused. Called by the
 //! [`recorder`](super::recorder).
 
 use super::file::Batch;
@@ -16,17 +16,17 @@ use bench_dragon_ros2_messages::{Clock, HandlePoses, PoseArray, Stamped};
 pub(super) struct Messages {
     name: String,
     topics: Vec<Topic>,
-    /// Those of the latest call.
+    /// The messages of the latest call.
     pub batch: Batch,
     handles: HandlePoses,
     poses: PoseArray,
-    /// Once there is a stage.
+    /// The markers, after the first stage.
     markers: Option<MarkerArray>,
     transforms: TfMessage,
 }
 
 impl Messages {
-    /// The messages of the publisher `name` on these topics.
+    /// Creates the messages of the publisher `name` on these topics.
     pub fn new(name: &str, topics: &[Topic]) -> Self {
         Self {
             name: name.to_owned(),
@@ -39,7 +39,7 @@ impl Messages {
         }
     }
 
-    /// Those of a frame, on the stage and at the alert that hold.
+    /// Fills the messages of a frame, with the current stage and alert.
     pub fn frame(
         &mut self,
         frame: &FrameHeader,
@@ -76,7 +76,7 @@ impl Messages {
         }
     }
 
-    /// Those of a stage: with it comes the path.
+    /// Fills the messages of a stage, the path among them.
     pub fn stage(&mut self, sequence: u32, stage: &Stage) {
         self.batch.clear();
         self.markers = self.topics.contains(&Topic::Markers).then(|| MarkerArray::of(stage));
@@ -86,20 +86,20 @@ impl Messages {
         }
     }
 
-    /// That of an alert.
+    /// Fills the message of an alert.
     pub fn alert(&mut self, sequence: u32, alert: CollisionAlert) {
         self.batch.clear();
         self.batch.push(Topic::Alerts, alert.stamp_ns, sequence, &Stamped::alert(alert));
     }
 
-    /// That of a cue.
+    /// Fills the message of a cue.
     pub fn cue(&mut self, sequence: u32, cue: Cue) {
         self.batch.clear();
         self.batch.push(Topic::Cues, cue.stamp_ns, sequence, &Stamped::cue(cue));
     }
 
-    /// Those of a status: with it come the diagnostics, at the alert that holds, of what has changed since the status
-    /// `before`, by the default limits: those of the scene are not on the wire.
+    /// Fills the messages of a status. The diagnostics compare it with the status `before`, by the default limits: the limits
+    /// of the scene are in no message.
     pub fn status(&mut self, sequence: u32, status: &LoopStatus, alert: Option<&CollisionAlert>, before: &LoopStatus) {
         self.batch.clear();
         self.batch.push(Topic::Status, status.stamp_ns, sequence, &Stamped::status(*status));

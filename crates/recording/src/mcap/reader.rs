@@ -1,9 +1,8 @@
-//! A recording as it is read: whether it can be played, what it holds, and its chunks one by one.
+//! Reads a recording: checks that it can be played, reads its contents, and its chunks one by one.
 //!
-//! In: an MCAP file with an end, written by `record` or by another recorder of the same ROS 2 topics. Out: a [`Recording`],
-//! whose existence proves that there are frames of a known type; then [`Item`]s, a chunk at a time, in the order in which the
-//! file has them. That is the order in which they were received: log times go back where the recording machine's clock was set
-//! back. Called by the [`replay`](crate::replay).
+//! In: an MCAP file with an end, of `record` or of another recorder of the same ROS 2 topics. Out: a [`Recording`], which has
+//! frames of a known type; then [`Item`]s, chunk by chunk, in the order of the file. That is the order of reception: log times
+//! decrease if the recording machine's clock was set back. Called by the [`replay`](crate::replay).
 
 use std::collections::HashMap;
 use std::fmt::Display;
@@ -24,27 +23,27 @@ use bench_dragon_ros2_messages::settings::Topic;
 use bench_dragon_ros2_messages::{HandlePoses, Header, MessageType, Stamped, fields};
 use bench_dragon_show::scene::printable;
 
-/// What a replay reads.
+/// The topics that a replay reads.
 const TOPICS: [Topic; 5] = [Topic::Handles, Topic::Alerts, Topic::Cues, Topic::Status, Topic::Stage];
-/// What stands before the bytes of a message: CDR, little-endian.
+/// The first bytes of a message: CDR, little-endian.
 const ENCAPSULATION: [u8; 2] = [0, 1];
 
-/// Why a file cannot be played: one sentence, but for the file's name.
+/// The reason why a file cannot be played: one sentence without the file's name.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// The system gives no bytes.
+    /// The file cannot be read.
     #[error("{0}, expected a recording (MCAP)")]
     File(#[from] io::Error),
-    /// It begins otherwise.
+    /// The file is no MCAP.
     #[error("this is no MCAP file, expected a recording of bench-dragon record")]
     NotMcap,
-    /// It was cut.
+    /// The file was cut.
     #[error("it has no end, as when its recorder was killed: mend it with bench-dragon record --recover")]
     NoEnd,
-    /// It was written without an index of its chunks.
+    /// The file has no index of its chunks.
     #[error("it has no index of its chunks: write one with bench-dragon record --recover")]
     NoIndex,
-    /// A topic that has to be there is not.
+    /// A required topic is missing.
     #[error("it has no topic {0}, expected a recording with the topics handles and stage")]
     NoTopic(&'static str),
     /// Frames of several publishers.
@@ -55,12 +54,12 @@ pub enum ReadError {
     Type {
         /// The topic.
         topic: String,
-        /// What it has.
+        /// Its type and encoding.
         found: String,
-        /// What it should have.
+        /// The expected type and encoding.
         expected: String,
     },
-    /// The type has the same name and other fields.
+    /// The type has other fields than in this version.
     #[error(
         "its topic {} has other fields than {of} of this version, expected a recording of the same version",
         printable(.topic)
@@ -71,26 +70,26 @@ pub enum ReadError {
         /// The type.
         of: String,
     },
-    /// There is nothing to play.
+    /// There are no frames.
     #[error("it has no frames")]
     NoFrames,
     /// A chunk or a message cannot be read.
     #[error("it is damaged at byte {at} ({}): mend it with bench-dragon record --recover", printable(.reason))]
     Damaged {
-        /// Where the chunk begins.
+        /// The start of the chunk, in bytes.
         at: u64,
-        /// What is wrong with it.
+        /// The problem.
         reason: String,
     },
-    /// A message can be read and not be played.
+    /// A frame can be read but not played.
     #[error("it has a frame {0}")]
     Frame(String),
-    /// The show is over before.
+    /// The recording ends before the start.
     #[error("--start is {start} and the recording reaches {end} s of the show, expected an earlier start")]
     Start {
-        /// Simulated seconds that were asked for.
+        /// The requested simulated seconds.
         start: f64,
-        /// The greatest in the recording.
+        /// The greatest simulated seconds in the recording.
         end: f64,
     },
 }
@@ -98,7 +97,7 @@ pub enum ReadError {
 /// A message of a chunk.
 #[derive(Debug)]
 pub enum Item {
-    /// A frame as its bytes, which [`frame_of`] and [`header_of`] read.
+    /// The bytes of a frame, for [`frame_of`] and [`header_of`].
     Frame(Vec<u8>),
     /// An alert.
     Alert(CollisionAlert),
@@ -114,24 +113,24 @@ pub enum Item {
 pub struct Recording {
     file: File,
     length: u64,
-    /// In the order of the file.
+    /// The chunks, in the order of the file.
     chunks: Vec<ChunkIndex>,
     channels: HashMap<u16, Topic>,
     contents: Contents,
 }
 
-/// What a recording holds.
+/// The contents of a recording.
 #[derive(Debug, Clone)]
 pub struct Contents {
     /// The publisher's name.
     pub name: String,
-    /// The scene's name, where a status holds it.
+    /// The scene's name, if there is a status.
     pub scene: Option<String>,
-    /// The topics that have messages and are played, in the order of their numbers.
+    /// The played topics with messages, in order.
     pub topics: Vec<Topic>,
     /// Frames per second of the publisher's loop.
     pub rate: f64,
-    /// Frames; `None` where the file does not count them.
+    /// The number of frames; `None` if the file does not count them.
     pub frames: Option<u64>,
     /// The first and the last frame.
     pub ends: [FrameHeader; 2],
@@ -140,7 +139,7 @@ pub struct Contents {
 }
 
 impl Contents {
-    /// Seconds of wall time from the beginning of the first frame's period to the end of the last one's.
+    /// Returns the seconds of wall time from the start of the first frame's period to the end of the last frame's.
     pub fn seconds(&self) -> f64 {
         let [first, last] = self.ends;
         (last.tick.saturating_sub(first.tick) as f64 + 1.0) / self.rate
@@ -148,7 +147,7 @@ impl Contents {
 }
 
 impl Recording {
-    /// Opens a file, reads its index and what its topics begin with.
+    /// Opens a file, and reads its index and the first message of each topic.
     ///
     /// # Errors
     /// [`ReadError`]
@@ -175,17 +174,17 @@ impl Recording {
         Ok(recording)
     }
 
-    /// What it holds.
+    /// Returns the contents.
     pub fn contents(&self) -> &Contents {
         &self.contents
     }
 
-    /// The number of chunks.
+    /// Returns the number of chunks.
     pub fn chunks(&self) -> usize {
         self.chunks.len()
     }
 
-    /// Hands over the messages of a chunk.
+    /// Calls `handle` with the messages of a chunk.
     ///
     /// # Errors
     /// [`ReadError::Damaged`], after the messages before it, or [`ReadError::File`].
@@ -218,12 +217,12 @@ impl Recording {
         Ok(())
     }
 
-    /// Finds the first message of each topic, and the last frame.
+    /// Reads the first message of each topic, and the last frame.
     fn read_contents(&mut self) -> Result<(), ReadError> {
         let frame = |item| if let Item::Frame(bytes) = item { Some(bytes) } else { None };
         let first = self.first(Topic::Handles, frame)?.ok_or(ReadError::NoFrames)?;
         let last = self.last_frame()?;
-        // All are to have as many handles as this one: it is read as a whole.
+        // Read as a whole, since its number of handles holds for all frames.
         let first = frame_of(&first)?.frame;
         let last = last.map_or(Ok(first), |bytes| header_of(&bytes))?;
         let stage = self.first(Topic::Stage, |item| if let Item::Stage(stage) = item { Some(*stage) } else { None })?;
@@ -242,7 +241,7 @@ impl Recording {
         Ok(())
     }
 
-    /// The first message of a topic that `pick` takes.
+    /// Returns the first message of a topic for which `pick` returns a value.
     fn first<T>(&mut self, topic: Topic, pick: impl Fn(Item) -> Option<T>) -> Result<Option<T>, ReadError> {
         for chunk in 0..self.chunks.len() {
             let mut found = None;
@@ -273,14 +272,14 @@ impl Recording {
         Ok(None)
     }
 
-    /// Whether a chunk can have messages of a topic. Where it has no index of its messages it can.
+    /// Returns true if a chunk can have messages of a topic, as one without an index of its messages can.
     fn may_hold(&self, chunk: usize, topic: Topic) -> bool {
         let offsets = &self.chunks[chunk].message_index_offsets;
         offsets.is_empty() || self.channels.iter().any(|(id, of)| *of == topic && offsets.contains_key(id))
     }
 }
 
-/// The header of a frame, of which the handles are not read.
+/// Reads the header of a frame without its handles.
 ///
 /// # Errors
 /// [`ReadError::Frame`]
@@ -289,7 +288,7 @@ pub fn header_of(bytes: &[u8]) -> Result<FrameHeader, ReadError> {
     read.map(|(_, header)| header).ok_or_else(unreadable)
 }
 
-/// A frame with its handles.
+/// Reads a frame with its handles.
 ///
 /// # Errors
 /// [`ReadError::Frame`]
@@ -303,15 +302,15 @@ fn unreadable() -> ReadError {
     ReadError::Frame("that cannot be read".to_owned())
 }
 
-/// Frames per second of a loop, from two of its frames.
+/// Returns the frames per second of a loop, from two of its frames.
 fn rate_between(first: &FrameHeader, last: &FrameHeader) -> f64 {
     let nanoseconds = last.deadline_ns.saturating_sub(first.deadline_ns) as f64;
     let ticks = last.tick.saturating_sub(first.tick) as f64;
-    // That of a scene which names none.
+    // The default rate of a scene.
     if ticks > 0.0 && nanoseconds > 0.0 { 1e9 * ticks / nanoseconds } else { 60.0 }
 }
 
-/// A message from its bytes.
+/// Reads a message from its bytes.
 fn decoded<Message: DeserializeOwned>(bytes: &[u8]) -> Option<Message> {
     let (encapsulation, body) = bytes.split_at_checked(4)?;
     if encapsulation[..2] != ENCAPSULATION {
@@ -320,7 +319,7 @@ fn decoded<Message: DeserializeOwned>(bytes: &[u8]) -> Option<Message> {
     cdr_encoding::from_bytes::<Message, LittleEndian>(body).ok().map(|(message, _)| message)
 }
 
-/// The channels that are played, and the name of the publisher whose they are.
+/// Returns the played channels and the name of their publisher.
 fn played(channels: &HashMap<u16, Arc<Channel<'_>>>) -> Result<(HashMap<u16, Topic>, String), ReadError> {
     let handles = format!("/{}", Topic::Handles.name());
     let own = MessageType::of(Topic::Handles).ros_name();
@@ -328,7 +327,7 @@ fn played(channels: &HashMap<u16, Arc<Channel<'_>>>) -> Result<(HashMap<u16, Top
     let all = channels.values();
     let mut names: Vec<&str> = all.clone().filter_map(|channel| channel.topic.strip_suffix(&handles)).collect();
     if names.len() > 1 {
-        // Another's topic may end so too.
+        // Another program's topic may have the same ending.
         names = all.filter(|channel| is_own(channel)).filter_map(|it| it.topic.strip_suffix(&handles)).collect();
     }
     names.sort_unstable();
@@ -349,7 +348,7 @@ fn played(channels: &HashMap<u16, Arc<Channel<'_>>>) -> Result<(HashMap<u16, Top
     Ok((played, name.trim_start_matches('/').to_owned()))
 }
 
-/// Fails unless the messages of a channel are those of the topic in this version.
+/// Checks that a channel has the topic's message type of this version.
 fn check_type(channel: &Channel<'_>, topic: Topic) -> Result<(), ReadError> {
     let of = MessageType::of(topic);
     let schema = channel.schema.as_ref();
@@ -363,7 +362,7 @@ fn check_type(channel: &Channel<'_>, topic: Topic) -> Result<(), ReadError> {
         });
     }
     let text = schema.map(|schema| String::from_utf8_lossy(&schema.data)).unwrap_or_default();
-    // As definitions name it.
+    // The name in definitions.
     let name = of.ros_name().replace("/msg/", "/");
     if fields(&name, &text) == fields(&name, &of.schema()) {
         Ok(())

@@ -1,6 +1,6 @@
-//! A show as files: which messages a topic gets, where a file ends and the next begins, and what is counted.
+//! Records a show into files: the messages of each topic, the splitting, the counts.
 //!
-//! In: what a subscriber receives, in the order in which it does. Out: files of one run each. Called by the subscriber that
+//! In: the messages of a subscriber, in the order of reception. Out: files of one run each. Called by the subscriber that
 //! records, on its thread.
 
 use std::fs::{File, OpenOptions};
@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 
 use super::file::McapFile;
 use super::messages::Messages;
-use super::run::{Run, Seldom};
+use super::run::{Event, Run};
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
 use bench_dragon_ros2_messages::settings::Topic;
 
-/// What is recorded by default: all that a replay needs, and what tools show without this program's messages.
+/// The topics recorded by default: those of a replay, and those that tools show without this program's message types.
 pub const DEFAULT_TOPICS: [Topic; 8] = [
     Topic::Handles,
     Topic::Poses,
@@ -27,55 +27,55 @@ pub const DEFAULT_TOPICS: [Topic; 8] = [
 /// Messages of a run that are kept until its first frame.
 const MOST_EARLY: usize = 256;
 
-/// When a recording goes on in another file.
+/// The condition for the next file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Split {
-    /// Before a file has more bytes than this, unless one frame has more.
+    /// The most bytes of a file, unless one frame has more.
     Bytes(u64),
-    /// After so many nanoseconds of the publisher's monotonic clock.
+    /// The nanoseconds of a file, by the publisher's monotonic clock.
     Nanoseconds(u64),
 }
 
-/// What is recorded, and where.
+/// The settings of a recording.
 #[derive(Debug, Clone)]
 pub struct RecorderConfig {
     /// The publisher's name, which is the namespace of the topics.
     pub name: String,
     /// The first file; the others are numbered after it.
     pub file: PathBuf,
-    /// Whether files that exist are replaced.
+    /// True to replace files that exist.
     pub replace: bool,
     /// The topics.
     pub topics: Vec<Topic>,
-    /// When a file ends, besides with its run.
+    /// The condition for the next file, besides the next run.
     pub split: Option<Split>,
 }
 
-/// What has been recorded so far.
+/// The recording so far.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Recorded {
     /// The files, in the order of time.
     pub files: Vec<PathBuf>,
-    /// How much is in them.
-    pub counts: Counts,
+    /// The counts of all files.
+    pub counts: RecordedCounts,
 }
 
-/// How much has been recorded.
+/// The counts of a recording.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Counts {
+pub struct RecordedCounts {
     /// Messages of all topics.
     pub messages: u64,
-    /// Frames of which there is a message.
+    /// Frames recorded.
     pub frames: u64,
-    /// Frames of the same runs that did not come, between those that did.
+    /// Frames dropped between the received frames of a run.
     pub missed: u64,
     /// Bytes of all files.
     pub bytes: u64,
-    /// Nanoseconds from the first to the last frame of each run, added up.
+    /// The sum over all runs of the nanoseconds from first to last frame.
     pub nanoseconds: u64,
 }
 
-/// Why a recording ended early, in one sentence.
+/// The reason for the early end of a recording, in one sentence.
 #[derive(Debug, thiserror::Error)]
 #[error("{file}: {error}: the recording ends there, {state}")]
 pub struct RecordError {
@@ -84,13 +84,13 @@ pub struct RecordError {
     state: &'static str,
 }
 
-/// Records.
+/// Records the messages of a publisher.
 pub struct Recorder {
     config: RecorderConfig,
-    /// The first file until the first frame; whether it is to be removed if there is none.
+    /// The first file until the first frame; true to remove the file without frames.
     first: Option<(File, bool)>,
     run: Option<Run>,
-    early: Vec<Seldom>,
+    early: Vec<Event>,
     recorded: Recorded,
     /// Bytes of the files that are finished.
     finished_bytes: u64,
@@ -99,10 +99,10 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// A recorder, whose first file is there and empty, unless it is to be replaced.
+    /// Creates a recorder and its first file. A file that exists keeps its content until the first frame.
     ///
     /// # Errors
-    /// The file cannot be made, or is there and is not to be replaced.
+    /// The file cannot be created, or exists and must not be replaced.
     pub fn new(config: RecorderConfig) -> io::Result<Self> {
         let is_new = !config.file.exists();
         let file = create(&config.file, config.replace)?;
@@ -119,15 +119,15 @@ impl Recorder {
         })
     }
 
-    /// What has been recorded so far.
+    /// Returns the recording so far.
     pub fn recorded(&self) -> &Recorded {
         &self.recorded
     }
 
-    /// A frame, before which `missed` of its run did not come.
+    /// Records a frame, before which `missed` frames of its run were dropped.
     ///
     /// # Errors
-    /// [`RecordError`]; the files are finished then.
+    /// [`RecordError`], after the files are finished.
     pub fn frame(&mut self, frame: &FrameHeader, handles: &[HandlePose], missed: u64) -> Result<(), RecordError> {
         self.recorded.counts.missed += missed;
         match &self.run {
@@ -153,39 +153,39 @@ impl Recorder {
         Ok(())
     }
 
-    /// A stage.
+    /// Records a stage.
     ///
     /// # Errors
     /// As [`Recorder::frame`].
     pub fn stage(&mut self, stage: &Stage) -> Result<(), RecordError> {
-        self.seldom(Seldom::Stage(Box::new(*stage)))
+        self.event(Event::Stage(Box::new(*stage)))
     }
 
-    /// An alert.
+    /// Records an alert.
     ///
     /// # Errors
     /// As [`Recorder::frame`].
     pub fn alert(&mut self, alert: &CollisionAlert) -> Result<(), RecordError> {
-        self.seldom(Seldom::Alert(*alert))
+        self.event(Event::Alert(*alert))
     }
 
-    /// A cue.
+    /// Records a cue.
     ///
     /// # Errors
     /// As [`Recorder::frame`].
     pub fn cue(&mut self, cue: &Cue) -> Result<(), RecordError> {
-        self.seldom(Seldom::Cue(*cue))
+        self.event(Event::Cue(*cue))
     }
 
-    /// A status.
+    /// Records a status.
     ///
     /// # Errors
     /// As [`Recorder::frame`].
     pub fn status(&mut self, status: &LoopStatus) -> Result<(), RecordError> {
-        self.seldom(Seldom::Status(*status))
+        self.event(Event::Status(*status))
     }
 
-    /// Does what is due. To be called several times a second.
+    /// Does the periodic work. Must be called several times a second.
     ///
     /// # Errors
     /// As [`Recorder::frame`].
@@ -196,7 +196,7 @@ impl Recorder {
         done.or_else(|error| self.fail(error))
     }
 
-    /// Finishes the file of the run, if there is one: its publisher has gone, or the recording ends.
+    /// Finishes the file of the run, if there is one.
     ///
     /// # Errors
     /// As [`Recorder::frame`].
@@ -215,7 +215,7 @@ impl Recorder {
         }
     }
 
-    /// Ends the recording. A file that has got no frame is removed.
+    /// Ends the recording. A new file without frames is removed.
     ///
     /// # Errors
     /// As [`Recorder::frame`].
@@ -223,38 +223,38 @@ impl Recorder {
         if let Some((_, is_new)) = self.first.take()
             && is_new
         {
-            // Whoever has removed it before has done the same.
+            // Another process may have removed it.
             let _ = std::fs::remove_file(&self.config.file);
         }
         self.finish_run()
     }
 
-    /// Begins the first file of a run with what came before its first frame.
+    /// Starts the first file of a run with the messages before its first frame.
     fn begin(&mut self, frame: &FrameHeader) -> Result<(), RecordError> {
         self.finish_run()?;
         let file = self.make_file()?;
         self.run = Some(Run::new(file, frame));
         for early in std::mem::take(&mut self.early) {
             if early.run_id() == frame.run_id {
-                self.seldom(early)?;
+                self.event(early)?;
             }
         }
         Ok(())
     }
 
-    /// Goes on in another file, which begins with what a subscriber that joins now would get.
+    /// Starts the next file of a run with the latest messages, as a subscriber that joins now gets them.
     fn next_file(&mut self, frame: &FrameHeader) -> Result<(), RecordError> {
         let Some(run) = &self.run else { return Ok(()) };
-        let Run { status, diagnosed, seldom, latest_deadline_ns, .. } = *run;
-        let stage = run.stage.clone().map(Seldom::Stage);
-        let held = [stage, run.alert.map(Seldom::Alert), run.cue.map(Seldom::Cue)];
+        let Run { status, diagnosed, events, latest_deadline_ns, .. } = *run;
+        let stage = run.stage.clone().map(Event::Stage);
+        let held = [stage, run.alert.map(Event::Alert), run.cue.map(Event::Cue)];
         self.finish_run()?;
         let file = self.make_file()?;
-        self.run = Some(Run { latest_deadline_ns, status, diagnosed, seldom, ..Run::new(file, frame) });
-        held.into_iter().flatten().try_for_each(|held| self.seldom(held))
+        self.run = Some(Run { latest_deadline_ns, status, diagnosed, events, ..Run::new(file, frame) });
+        held.into_iter().flatten().try_for_each(|held| self.event(held))
     }
 
-    /// The next file, emptied where it was there.
+    /// Creates the next file, or empties it.
     fn make_file(&mut self) -> Result<McapFile, RecordError> {
         let (path, file) = match self.first.take() {
             Some((file, _)) => (self.config.file.clone(), Ok(file)),
@@ -262,7 +262,7 @@ impl Recorder {
                 self.number += 1;
                 let path = numbered(&self.config.file, self.number);
                 let file = create(&path, self.config.replace);
-                // In the midst of a show no file is worth an end.
+                // During a show, an existing file does not end the recording: the next number is tried.
                 if !matches!(&file, Err(error) if error.kind() == io::ErrorKind::AlreadyExists) {
                     break (path, file);
                 }
@@ -279,32 +279,32 @@ impl Recorder {
         made.map_err(|error| self.error(error, "nothing is in it"))
     }
 
-    /// A message that is not sent with every frame.
-    fn seldom(&mut self, message: Seldom) -> Result<(), RecordError> {
+    /// Records an event-driven message.
+    fn event(&mut self, message: Event) -> Result<(), RecordError> {
         let Some(run) = self.run.as_mut().filter(|run| run.run_id == message.run_id()) else {
-            // Without frames there is nothing to keep it with.
+            // Kept until the first frame of its run.
             if self.early.len() < MOST_EARLY {
                 self.early.push(message);
             }
             return Ok(());
         };
         let log_time = run.log_time(&message);
-        let sequence = run.seldom;
-        run.seldom = sequence.wrapping_add(1);
+        let sequence = run.events;
+        run.events = sequence.wrapping_add(1);
         match message {
-            Seldom::Stage(stage) => {
+            Event::Stage(stage) => {
                 self.messages.stage(sequence, &stage);
                 run.stage = Some(stage);
             }
-            Seldom::Alert(alert) => {
+            Event::Alert(alert) => {
                 run.alert = Some(alert);
                 self.messages.alert(sequence, alert);
             }
-            Seldom::Cue(cue) => {
+            Event::Cue(cue) => {
                 run.cue = Some(cue);
                 self.messages.cue(sequence, cue);
             }
-            Seldom::Status(status) => {
+            Event::Status(status) => {
                 run.status = Some(status);
                 let before = run.diagnosed.replace(status).unwrap_or(status);
                 self.messages.status(sequence, &status, run.alert.as_ref(), &before);
@@ -316,7 +316,7 @@ impl Recorder {
             run.attach(&self.config.name)
         };
         attached.or_else(|error| self.fail(error))?;
-        // Files are split before frames only.
+        // Only frames start the next file.
         self.append_batch(Some(log_time)).map(drop)
     }
 
@@ -326,13 +326,13 @@ impl Recorder {
         self.messages.frame(frame, handles, stage, alert);
     }
 
-    /// Whether the batch fits into this file.
+    /// Returns true if the batch fits into this file.
     fn has_room(&mut self) -> Result<bool, RecordError> {
         let room = self.run.as_mut().map_or(Ok(true), |run| run.file.has_room(&self.messages.batch));
         room.or_else(|error| self.fail(error))
     }
 
-    /// Writes the batch, logged at its messages' own times or at another; how many messages that were.
+    /// Writes the batch, with its messages' times or `log_time`. Returns the number of messages.
     fn append_batch(&mut self, log_time: Option<u64>) -> Result<u64, RecordError> {
         let appended = self.run.as_mut().map_or(Ok(0), |run| run.file.append(&self.messages.batch, log_time));
         let written = appended.or_else(|error| self.fail(error))?;
@@ -340,7 +340,7 @@ impl Recorder {
         Ok(written)
     }
 
-    /// Finishes the file as far as the disk takes it, and returns the error.
+    /// Finishes the file as far as possible, and returns the error.
     fn fail<Done>(&mut self, error: io::Error) -> Result<Done, RecordError> {
         let state = match self.finish_run() {
             Ok(()) => "the file is whole up to there",
@@ -355,10 +355,10 @@ impl Recorder {
     }
 }
 
-/// A new file to write, or with `replace` perhaps one that is there, with its content.
+/// Creates a file, or with `replace` opens one that exists, without changing it.
 ///
 /// # Errors
-/// It cannot be made, or is there and is not to be replaced.
+/// The file cannot be created, or exists and must not be replaced.
 pub fn create(path: &Path, replace: bool) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.write(true);
@@ -370,12 +370,12 @@ pub fn create(path: &Path, replace: bool) -> io::Result<File> {
     options.open(path)
 }
 
-/// A device has no length to set.
+/// Accepts the error of a device, which has no length to set.
 fn no_regular_file(error: io::Error) -> io::Result<()> {
     if error.raw_os_error() == Some(nix::libc::EINVAL) { Ok(()) } else { Err(error) }
 }
 
-/// `show-2.mcap` for `show.mcap`.
+/// Returns the name of a further file: `show-2.mcap` for `show.mcap`.
 fn numbered(path: &Path, number: u64) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let extension = path.extension().map_or(String::new(), |extension| format!(".{}", extension.to_string_lossy()));

@@ -1,7 +1,7 @@
-//! Mends a recording that was cut: by a kill, a full disk or a loss of power.
+//! Repairs a recording that was cut by a kill, a full disk or a loss of power.
 //!
-//! In: the bytes that are there. Out: a whole file with every message of every finished chunk, in order, and none besides.
-//! Called by the command `record --recover`.
+//! In: the bytes of the file. Out: a complete file with exactly the messages of the finished chunks, in order. Called by the
+//! command `record --recover`.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
@@ -15,23 +15,23 @@ use serde::Serialize;
 
 use super::file::{io_error, options};
 
-/// A longer record is taken for damage: a chunk is to fit into memory.
+/// A longer record counts as damaged: a chunk must fit into memory.
 const MOST_RECORD_BYTES: u64 = 1 << 30;
-/// Bytes of the last record of a file, and of the one that ends its messages.
+/// Bytes of the footer, and of the record that ends the messages.
 const FOOTER_BYTES: usize = 20;
 const DATA_END_BYTES: usize = 4;
-/// Bytes of a record that says where a part of the index is.
+/// Bytes of a record with the place of a part of the index.
 const SUMMARY_OFFSET_BYTES: usize = 17;
 /// Bytes of each message in the record that lists those of a chunk and a channel.
 const MESSAGE_INDEX_ENTRY_BYTES: usize = 16;
-/// Records from here on are no part of MCAP; each program may have its own.
+/// Opcodes from here on are private to programs.
 const FIRST_PRIVATE: u8 = 0x80;
 /// Bytes of a chunk's record besides the name of its compression and its records.
 const CHUNK_BYTES: usize = 40;
 /// Bytes of an attachment's record besides its two names and its data.
 const ATTACHMENT_BYTES: usize = 36;
 
-/// What was kept of a recording, and what not.
+/// The counts of a repair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Recovered {
     /// Finished chunks.
@@ -40,31 +40,31 @@ pub struct Recovered {
     pub messages: u64,
     /// Attachments.
     pub attachments: u64,
-    /// Records that cannot be what they say, or whose content does not agree with its check.
+    /// Records that cannot be of their type, or that fail their check.
     pub damaged: u64,
-    /// Messages of damaged chunks, as far as the indexes after these count them.
+    /// Messages of damaged chunks, as far as their indexes count them.
     pub lost_messages: u64,
     /// Messages whose channel cannot be read.
     pub unknown: u64,
-    /// Bytes from the first record that cannot be read, to the end.
+    /// Bytes from the first unreadable record to the end.
     pub lost_bytes: u64,
-    /// Whether the file has its end: nothing had been cut off.
+    /// True if the file has its end.
     pub whole: bool,
 }
 
-/// Why a recording was not mended.
+/// The reason why a recording was not repaired.
 #[derive(Debug, thiserror::Error)]
 pub enum RecoverError {
-    /// It is no MCAP.
+    /// The file is no MCAP.
     #[error("it does not begin as MCAP does, expected a recording")]
     NotMcap,
-    /// Its chunks cannot be read.
+    /// The compression of its chunks is unknown.
     #[error("its chunks are compressed by {0}, expected zstd or none")]
     Compression(String),
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("{0}, expected a recording to read")]
     Read(io::Error),
-    /// The mended one cannot be written.
+    /// The repaired file cannot be written.
     #[error("{0}")]
     Write(io::Error),
 }
@@ -75,7 +75,7 @@ impl From<McapError> for RecoverError {
     }
 }
 
-/// Reads the first bytes of a recording.
+/// Checks the first bytes of a recording.
 ///
 /// # Errors
 /// [`RecoverError::NotMcap`], [`RecoverError::Read`]
@@ -85,7 +85,7 @@ pub fn check_magic(mut input: impl Read) -> Result<(), RecoverError> {
     if magic == MAGIC { Ok(()) } else { Err(RecoverError::NotMcap) }
 }
 
-/// Writes what is whole of a recording of `length` bytes, and an end. `input` is what follows [`check_magic`].
+/// Writes the complete records of a recording of `length` bytes, and an end. `input` starts after [`check_magic`].
 ///
 /// # Errors
 /// [`RecoverError`]
@@ -111,7 +111,7 @@ pub fn recover(input: impl Read, length: u64, output: impl Write) -> Result<Reco
                 mender.recovered.whole = input.fill(MAGIC.len() as u64)? && input.body == MAGIC;
                 break;
             }
-            // What follows is an index of what has been kept.
+            // The index follows, which is rebuilt.
             (op::DATA_END, DATA_END_BYTES) => in_index = true,
             _ if in_index => (),
             _ => mender.keep(found, &input.body)?,
@@ -122,17 +122,17 @@ pub fn recover(input: impl Read, length: u64, output: impl Write) -> Result<Reco
     mender.finish()
 }
 
-/// The records of a file, as far as they are whole.
+/// The complete records of a file.
 struct Records<Input> {
     input: Input,
-    /// Bytes that follow.
+    /// The remaining bytes.
     left: u64,
     /// The content of the record.
     body: Vec<u8>,
 }
 
 impl<Input: Read> Records<Input> {
-    /// Reads the next record; its opcode, or `None` where what follows is no whole record.
+    /// Reads the next record. Returns its opcode, or `None` without a complete record.
     fn next(&mut self) -> Result<Option<u8>, RecoverError> {
         const HEAD: u64 = 9;
         if self.left < HEAD {
@@ -145,7 +145,7 @@ impl<Input: Read> Records<Input> {
         head.copy_from_slice(&self.body);
         let [opcode, length @ ..] = head;
         let length = u64::from_le_bytes(length);
-        // Zeros are what a loss of power leaves of a file that was about to grow.
+        // A loss of power can leave zeros at the end of a growing file.
         if opcode == 0 || length > (self.left - HEAD).min(MOST_RECORD_BYTES) || !self.fill(length)? {
             return Ok(None);
         }
@@ -153,7 +153,7 @@ impl<Input: Read> Records<Input> {
         Ok(Some(opcode))
     }
 
-    /// Reads so many bytes, or fewer at the end of the file; whether they were there.
+    /// Fills the buffer with `length` bytes. Returns false at the end of the file.
     fn fill(&mut self, length: u64) -> Result<bool, RecoverError> {
         self.body.clear();
         let read = self.input.by_ref().take(length).read_to_end(&mut self.body).map_err(RecoverError::Read)?;
@@ -161,18 +161,17 @@ impl<Input: Read> Records<Input> {
     }
 }
 
-/// Writes what is kept.
+/// Writes the kept records.
 struct Mender<Output: Write> {
     writer: Writer<NoSeek<Output>>,
-    /// By the file's numbers, of which the latest meaning holds: what stands before the first chunk has no check, and is
-    /// repeated in it.
+    /// By the file's numbers; the latest definition holds. Those before the first chunk have no check and are repeated in it.
     schemas: BTreeMap<u16, Schema<'static>>,
     channels: BTreeMap<u16, Known>,
-    /// Whether there was a chunk, be it damaged: messages stand in chunks then.
+    /// True after the first chunk, even a damaged one: messages are then in chunks.
     has_chunks: bool,
-    /// The last message outside of chunks: not kept before it is known that no index follows.
+    /// The last message outside of chunks, kept only if no index follows.
     held: Option<Record<'static>>,
-    /// Whether the indexes that come now are of a chunk that was left out.
+    /// True if the next indexes are of a damaged chunk.
     lost_chunk: bool,
     recovered: Recovered,
 }
@@ -180,18 +179,18 @@ struct Mender<Output: Write> {
 /// A channel of the file.
 struct Known {
     channel: records::Channel,
-    /// Its number in the mended file, once it is there.
+    /// Its number in the repaired file.
     id: Option<u16>,
 }
 
 impl<Output: Write> Mender<Output> {
-    /// Keeps a whole record of the file.
+    /// Keeps a complete record of the file.
     fn keep(&mut self, opcode: u8, body: &[u8]) -> Result<(), RecoverError> {
-        // What it lists is in a chunk, whatever became of that.
+        // An index belongs to a chunk, even a damaged one.
         let is_index = opcode == op::MESSAGE_INDEX && message_index_entries(body).is_some();
         self.has_chunks |= is_index || opcode == op::CHUNK && is_chunk(body);
         match self.held.take() {
-            // It was the chunk, of which the opcode is damaged.
+            // The message was a chunk with a damaged opcode.
             Some(_) if is_index => {
                 self.recovered.damaged += 1;
                 self.lost_chunk = true;
@@ -200,7 +199,7 @@ impl<Output: Write> Mender<Output> {
             None => (),
         }
         let kept = match opcode {
-            // All of it is read before any of it is kept: its check comes last.
+            // The whole chunk is read before any record is kept: its check comes last.
             op::CHUNK => match records_of_chunk(body) {
                 Ok(records) => {
                     self.has_chunks = true;
@@ -242,11 +241,10 @@ impl<Output: Write> Mender<Output> {
         Ok(())
     }
 
-    /// Whether a record outside of chunks can be what it says: where the opcode is damaged the parser may make something of
-    /// the content all the same.
+    /// Returns true if a record outside of chunks can be of its type. The parser may accept a record with a damaged opcode.
     fn is_possible(&self, opcode: u8, body: &[u8]) -> bool {
         match opcode {
-            // A file has chunks or has none.
+            // A file has all its messages in chunks, or none.
             op::MESSAGE => !self.has_chunks,
             op::MESSAGE_INDEX => message_index_entries(body).is_some(),
             op::ATTACHMENT => is_attachment(body),
@@ -258,7 +256,7 @@ impl<Output: Write> Mender<Output> {
         }
     }
 
-    /// Keeps what is no chunk.
+    /// Keeps a record that is no chunk.
     fn keep_record(&mut self, record: Record<'_>) -> Result<(), RecoverError> {
         match record {
             Record::Schema { header, data } => {
@@ -290,20 +288,20 @@ impl<Output: Write> Mender<Output> {
                 self.recovered.attachments += 1;
             }
             Record::Metadata(metadata) => self.writer.write_metadata(&metadata)?,
-            // Indexes are made anew.
+            // Indexes are rebuilt.
             _ => (),
         }
         Ok(())
     }
 
-    /// The number in the mended file of the channel that the file calls `id`. It comes with its first message, when it is
-    /// known what it is.
+    /// Returns the number in the repaired file of the file's channel `id`. The channel is added with its first message, when
+    /// its definition is complete.
     fn channel(&mut self, id: u16) -> Result<Option<u16>, RecoverError> {
         let Some(Known { channel, id }) = self.channels.get_mut(&id) else { return Ok(None) };
         if id.is_some() {
             return Ok(*id);
         }
-        // Number 0 is that of no schema.
+        // Number 0 means no schema.
         let schema = match self.schemas.get(&channel.schema_id) {
             Some(schema) => self.writer.add_schema(&schema.name, &schema.encoding, &schema.data)?,
             None if channel.schema_id == 0 => 0,
@@ -313,7 +311,7 @@ impl<Output: Write> Mender<Output> {
         Ok(*id)
     }
 
-    /// Ends the mended file, with the channels that have no message.
+    /// Adds the channels without messages and ends the repaired file.
     fn finish(mut self) -> Result<Recovered, RecoverError> {
         if let Some(message) = self.held.take() {
             self.keep_record(message)?;
@@ -327,7 +325,7 @@ impl<Output: Write> Mender<Output> {
     }
 }
 
-/// The schemas, channels and messages of a chunk.
+/// Returns the schemas, channels and messages of a chunk.
 pub(super) fn records_of_chunk(body: &[u8]) -> Result<Vec<Record<'static>>, McapError> {
     if !is_filled(body)? {
         return Err(McapError::UnexpectedEoc);
@@ -343,7 +341,7 @@ pub(super) fn records_of_chunk(body: &[u8]) -> Result<Vec<Record<'static>>, Mcap
     while let Some(event) = reader.next_event() {
         match event? {
             LinearReadEvent::ReadRequest(need) => {
-                // Of a compressed chunk it asks for 128 kB at a time, and clears room for what it is promised.
+                // The reader requests 128 kB at a time and clears that much memory.
                 let read = chunk.read(reader.insert(need.min(left)))?;
                 left -= read;
                 reader.notify_read(read);
@@ -357,8 +355,8 @@ pub(super) fn records_of_chunk(body: &[u8]) -> Result<Vec<Record<'static>>, Mcap
     Ok(records)
 }
 
-/// Whether the last record of a chunk without compression ends where the chunk does: mcap 0.26.0 subtracts the records'
-/// lengths from the chunk's unchecked. What decompresses any other chunk finds its end.
+/// Returns true if the last record of an uncompressed chunk ends with the chunk: mcap 0.26.0 subtracts the records' lengths
+/// unchecked. A decompressor finds the end of any other chunk.
 fn is_filled(body: &[u8]) -> Result<bool, McapError> {
     let Record::Chunk { header, data } = parse_record(op::CHUNK, body)? else { return Ok(false) };
     let mut left = if header.compression.is_empty() { &*data } else { &[] };
@@ -370,7 +368,7 @@ fn is_filled(body: &[u8]) -> Result<bool, McapError> {
     Ok(left.is_empty())
 }
 
-/// Whether the lengths in a chunk's record can be true: where the opcode of another record is damaged they are not.
+/// Returns true if the lengths in a chunk's record agree, as they do not after damage of an opcode.
 fn is_chunk(body: &[u8]) -> bool {
     match parse_record(op::CHUNK, body) {
         Ok(Record::Chunk { header, data }) => CHUNK_BYTES + header.compression.len() + data.len() == body.len(),
@@ -378,7 +376,7 @@ fn is_chunk(body: &[u8]) -> bool {
     }
 }
 
-/// How many messages a record lists, if it is such a list.
+/// Returns the number of messages in a message index, or `None` for another record.
 fn message_index_entries(body: &[u8]) -> Option<usize> {
     let (_, list) = body.split_at_checked(2)?;
     let (length, entries) = list.split_first_chunk()?;
@@ -388,7 +386,7 @@ fn message_index_entries(body: &[u8]) -> Option<usize> {
     agrees.then_some(count)
 }
 
-/// Whether the lengths in an attachment's record can be true, on which the parser relies.
+/// Returns true if the lengths in an attachment's record agree: the parser relies on them.
 fn is_attachment(body: &[u8]) -> bool {
     let text_at = |at: usize| {
         let length = body.get(at..at + 4)?;

@@ -1,4 +1,4 @@
-//! A run while it is recorded: its open file, and what is known of it. Called by the [`recorder`](super::recorder).
+//! A run while it is recorded: its open file and its state. Called by the [`recorder`](super::recorder).
 
 use std::cmp::Ordering;
 use std::io;
@@ -12,17 +12,17 @@ use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, LoopStatus, Stage}
 /// The name of the attachment.
 const ATTACHMENT: &str = "bench_dragon.json";
 
-/// A message that is not sent with every frame.
+/// An event-driven message.
 #[derive(Debug, Clone)]
-pub(super) enum Seldom {
+pub(super) enum Event {
     Stage(Box<Stage>),
     Alert(CollisionAlert),
     Cue(Cue),
     Status(LoopStatus),
 }
 
-impl Seldom {
-    /// The run that it belongs to.
+impl Event {
+    /// Returns the run of the message.
     pub fn run_id(&self) -> u64 {
         match self {
             Self::Stage(stage) => stage.run_id,
@@ -32,7 +32,7 @@ impl Seldom {
         }
     }
 
-    /// Its time, and the tick of the frame that it goes with; a stage goes with the first of the run.
+    /// Returns the message's time and the tick of its frame. A stage belongs to the first frame of the run.
     fn stamp(&self) -> (u64, u64) {
         match self {
             Self::Stage(stage) => (stage.stamp_ns, 0),
@@ -43,31 +43,30 @@ impl Seldom {
     }
 }
 
-/// A run, and the file that its frames go to.
+/// A run and its open file.
 pub(super) struct Run {
     pub run_id: u64,
     pub file: McapFile,
-    /// The file's first frame: its tick, and the time at which it is logged.
+    /// The tick of the file's first frame, and its log time.
     pub file_began_tick: u64,
     pub file_began_stamp_ns: u64,
-    /// Of the file's first frame and of the run's latest.
+    /// The deadlines of the file's first frame and of the run's latest.
     pub file_began_ns: u64,
     pub latest_deadline_ns: u64,
     pub attached: bool,
-    /// What a subscriber that joins now would get besides frames.
+    /// The latest messages, as a subscriber that joins now gets them.
     pub stage: Option<Box<Stage>>,
     pub alert: Option<CollisionAlert>,
     pub cue: Option<Cue>,
     pub status: Option<LoopStatus>,
-    /// The latest status that the run's diagnostics are of, one without a skip before the first; `None` where it is not
-    /// known what was before.
+    /// The status before the next one, for the diagnostics: an empty status at the start of a run, `None` if unknown.
     pub diagnosed: Option<LoopStatus>,
-    /// Messages so far of what is not sent with every frame.
-    pub seldom: u32,
+    /// The number of event-driven messages so far.
+    pub events: u32,
 }
 
 impl Run {
-    /// A run of which nothing is known but a frame, the first of its file.
+    /// Starts a run with the first frame of its file.
     pub fn new(file: McapFile, frame: &FrameHeader) -> Self {
         Self {
             run_id: frame.run_id,
@@ -82,14 +81,14 @@ impl Run {
             cue: None,
             status: None,
             diagnosed: (frame.sequence == 0).then(LoopStatus::default),
-            seldom: 0,
+            events: 0,
         }
     }
 
-    /// When a message is logged: at its own time, but not before the file's first frame where it goes with that or an
-    /// earlier one. What a late subscriber got was true before, and would leave a gap. Ticks tell, since a clock can be set
-    /// back.
-    pub fn log_time(&self, message: &Seldom) -> u64 {
+    /// Returns the log time of a message: its own time, but not before the file's first frame if it belongs to that frame or
+    /// an earlier one. An older message, as a late subscriber gets it, would leave a gap. Ticks are compared, since a clock can
+    /// be set back.
+    pub fn log_time(&self, message: &Event) -> u64 {
         let ((stamp_ns, tick), began) = (message.stamp(), self.file_began_stamp_ns);
         match tick.cmp(&self.file_began_tick) {
             Ordering::Less => began,
@@ -98,10 +97,10 @@ impl Run {
         }
     }
 
-    /// Attaches to the file what is known of the run and is no message, unless that has been done.
+    /// Attaches the description of the run to the file, once.
     ///
     /// # Errors
-    /// What the disk says.
+    /// A failed write.
     pub fn attach(&mut self, name: &str) -> io::Result<()> {
         if std::mem::replace(&mut self.attached, true) {
             return Ok(());

@@ -1,7 +1,7 @@
-//! The frames of a recording from where a replay begins to its end, each with the alerts and cues that go with it.
+//! The frames of a recording from a start to its end, each with its alerts and cues.
 //!
-//! A recorder may receive an alert a little before or after the frame that it goes with. Frames of a chunk are therefore handed
-//! over once the chunk after it has been read. Called by the [`replay`](super).
+//! A recorder may receive an alert a little before or after its frame. Frames of a chunk are therefore returned after the
+//! next chunk has been read. Called by the [`replay`](super).
 
 use std::collections::VecDeque;
 
@@ -9,21 +9,21 @@ use crate::mcap::reader::{Item, ReadError, Recording, frame_of, header_of};
 use bench_dragon_messages::{CollisionAlert, Cue};
 use bench_dragon_ros2_messages::HandlePoses;
 
-/// Where a replay begins.
+/// The start of a replay.
 #[derive(Debug, Clone)]
 pub(super) struct Start {
-    /// The chunk to begin to read with: one before that of the first frame.
+    /// The first chunk to read: one before the chunk of the first frame.
     chunk: usize,
-    /// Frames of earlier periods are passed over.
+    /// Frames of earlier periods are skipped.
     tick: u64,
     /// Simulated seconds of the first frame.
     pub sim_time: f64,
-    /// What a subscriber that joins then gets: the latest.
+    /// The latest messages at that time, as a subscriber that joins gets them.
     alert: Option<CollisionAlert>,
     cue: Option<Cue>,
 }
 
-/// A frame, and what goes out beside it.
+/// A frame with its alerts and cues.
 #[derive(Debug)]
 pub(super) struct Recorded {
     pub frame: HandlePoses,
@@ -31,31 +31,31 @@ pub(super) struct Recorded {
     pub cues: Vec<Cue>,
 }
 
-/// One showing.
+/// One playback of the recording.
 pub(super) struct Pass {
     next_chunk: usize,
-    /// The frames that are handed over, and those of the chunk that was read after them.
+    /// The frames to return, and the frames of the chunk after them.
     frames: VecDeque<Vec<u8>>,
     ahead: VecDeque<Vec<u8>>,
-    /// The chunks that these are of.
+    /// The chunks of `frames` and of `ahead`.
     chunk: usize,
     ahead_chunk: usize,
-    /// Those that no frame has taken.
+    /// The messages that belong to no returned frame.
     alerts: VecDeque<CollisionAlert>,
     cues: VecDeque<Cue>,
     /// As in [`Start`].
     from_tick: u64,
-    /// Whether no frame has been handed over.
+    /// True before the first frame.
     first: bool,
-    /// What is wrong with the next chunk: what was read before is handed over first.
+    /// The error of the next chunk, returned after the frames before it.
     failure: Option<ReadError>,
 }
 
 impl Start {
-    /// The first frame at or after so many simulated seconds; that of the file for `None`.
+    /// Finds the first frame at or after `seconds` simulated seconds, or the first frame of the file for `None`.
     pub fn find(recording: &mut Recording, seconds: Option<f64>) -> Result<Self, ReadError> {
         let [first, _] = recording.contents().ends;
-        // Not the first one's tick: where the index is wrong about a chunk, there is a frame before it.
+        // Not the tick of the first frame: with a wrong index, there can be a frame before it.
         let mut start = Self { chunk: 0, tick: 0, sim_time: first.sim_time, alert: None, cue: None };
         let Some(seconds) = seconds else { return Ok(start) };
         let mut pass = Pass::new(&start);
@@ -92,7 +92,7 @@ impl Pass {
         }
     }
 
-    /// The next frame; `None` at the end of the recording.
+    /// Returns the next frame, or `None` at the end of the recording.
     pub fn next(&mut self, recording: &mut Recording) -> Result<Option<Recorded>, ReadError> {
         while let Some(bytes) = self.next_frame(recording)? {
             let tick = header_of(&bytes)?.tick;
@@ -100,7 +100,7 @@ impl Pass {
                 continue;
             }
             let frame = frame_of(&bytes)?;
-            // What belongs to frames that are missing at the end goes with the last one.
+            // Messages of frames that are missing at the end go with the last frame.
             let is_last = self.frames.is_empty() && self.ahead.is_empty();
             let (mut alerts, mut cues) = self.take_messages(if is_last { u64::MAX } else { tick });
             if std::mem::take(&mut self.first) {
@@ -112,7 +112,7 @@ impl Pass {
         Ok(None)
     }
 
-    /// The next frame's bytes.
+    /// Returns the bytes of the next frame.
     fn next_frame(&mut self, recording: &mut Recording) -> Result<Option<Vec<u8>>, ReadError> {
         while self.frames.is_empty() {
             self.frames = std::mem::take(&mut self.ahead);
@@ -127,7 +127,7 @@ impl Pass {
         Ok(self.frames.pop_front())
     }
 
-    /// Reads a chunk: all of it, or nothing where it is damaged.
+    /// Reads a chunk. Keeps nothing of a damaged chunk.
     fn read_chunk(&mut self, recording: &mut Recording) {
         let (mut frames, mut alerts, mut cues) = (VecDeque::new(), Vec::new(), Vec::new());
         let read = recording.read_chunk(self.next_chunk, &mut |item| match item {
@@ -148,7 +148,7 @@ impl Pass {
         }
     }
 
-    /// Those of periods up to `tick`.
+    /// Returns the messages of periods up to `tick`.
     fn take_messages(&mut self, tick: u64) -> (Vec<CollisionAlert>, Vec<Cue>) {
         let alerts = self.alerts.partition_point(|alert| alert.tick <= tick);
         let cues = self.cues.partition_point(|cue| cue.tick <= tick);
@@ -156,7 +156,7 @@ impl Pass {
     }
 }
 
-/// Leaves only the last of those that are older than the first frame.
+/// Keeps only the last of the messages that are older than the first frame.
 fn keep_latest_before<T>(messages: &mut Vec<T>, is_before: impl Fn(&T) -> bool) {
     let before = messages.iter().take_while(|message| is_before(message)).count();
     messages.drain(..before.saturating_sub(1));

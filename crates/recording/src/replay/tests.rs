@@ -6,8 +6,8 @@ use std::rc::Rc;
 use proptest::prelude::*;
 
 use super::*;
-use bench_dragon_publisher::live::control::Doors;
-use bench_dragon_publisher::live::{Counts, End, LoopOptions, PublishError, Publisher, Reports, run_loop};
+use bench_dragon_publisher::live::control::CommandQueues;
+use bench_dragon_publisher::live::{End, LoopCounts, LoopOptions, PublishError, Publisher, Reports, run_loop};
 use bench_dragon_testing::simulated::{SimulatedClock, Wake};
 
 const START_NS: u64 = 5_000_000_000;
@@ -30,7 +30,7 @@ impl Publisher for Collected {
 }
 
 /// Plays frames that are due in these periods; the simulated time of each is its number.
-fn play(due: &[u64], wakes: Vec<Wake>) -> (Counts, Vec<FrameHeader>) {
+fn play(due: &[u64], wakes: Vec<Wake>) -> (LoopCounts, Vec<FrameHeader>) {
     let (mut filled, loop_filled) = RingBuffer::new(due.len());
     let (free, _reader) = RingBuffer::new(due.len());
     for (number, due) in due.iter().enumerate() {
@@ -47,7 +47,7 @@ fn play(due: &[u64], wakes: Vec<Wake>) -> (Counts, Vec<FrameHeader>) {
     let counts = run_loop(
         &clock,
         &mut replay,
-        &mut Doors::default(),
+        &mut CommandQueues::default(),
         &mut [Box::new(collected.clone())],
         LoopOptions { run_id: 3, rate: 1e9 / PERIOD_NS as f64, periods: None },
         Reports { samples, announcements },

@@ -1,34 +1,34 @@
-//! From a service call to commands of the show, and from how those were answered to the response.
+//! Converts a service call to commands of the show, and their results to the response.
 //!
-//! Pure: [`Conductor`] gives the next thing to do for a call. Called by the control thread.
+//! Pure: [`ServiceAdapter`] returns the next action for a call. Called by the control thread.
 
 use super::services::{Call, CallResult, Features, Response, result, scope, state};
 use bench_dragon_messages::control::{Code, Command, RATES};
 use bench_dragon_messages::state::PlaybackState;
 use bench_dragon_show::Outcome;
 
-/// What is to be done next for a call.
+/// The next action for a call.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Next {
-    /// Have the loop obey this, and come back with its answer.
-    Obey(Command),
-    /// Send this.
+    /// Execute this command, and continue with its result.
+    Execute(Command),
+    /// Send this response.
     Answer(Response),
 }
 
-/// Why a held show obeys nothing else.
+/// The refusal of a held show.
 const HELD: &str = "the show is held: only hold, release and state queries are obeyed until it is released";
 
-/// Turns calls into commands. It remembers what the standard distinguishes and the show does not: whether a pause is one
-/// in which the simulation counts as stopped.
+/// Converts calls to commands. It stores a distinction that the standard makes and the show does not: whether a paused
+/// simulation counts as stopped.
 #[derive(Debug, Default)]
-pub struct Conductor {
-    /// Where a paused show was left by the last reset, in simulated seconds.
+pub struct ServiceAdapter {
+    /// The simulated seconds of a paused show after the last reset.
     stopped_at: Option<f64>,
 }
 
-impl Conductor {
-    /// What a call begins with.
+impl ServiceAdapter {
+    /// Returns the first action of a call.
     pub fn begin(&self, call: Call) -> Next {
         let command = match call {
             Call::GetFeatures => return Next::Answer(features()),
@@ -68,10 +68,10 @@ impl Conductor {
             Call::Release => Command::Release,
             Call::Go => Command::Go,
         };
-        Next::Obey(command)
+        Next::Execute(command)
     }
 
-    /// What follows once a command of this call has been answered.
+    /// Returns the next action of a call after the result of its command.
     pub fn proceed(&mut self, call: Call, command: Command, outcome: &Outcome) -> Next {
         let succeeded = matches!(outcome.code, Code::Done | Code::Already);
         let paused = outcome.playback == PlaybackState::Paused;
@@ -82,7 +82,7 @@ impl Conductor {
         Next::Answer(match (call, command) {
             (Call::GetState, _) => Response::State(simulation_state(outcome.playback, stopped), done()),
             (Call::SetState(state::STOPPED), Command::Pause) if succeeded && !stopped => {
-                return Next::Obey(Command::Restart);
+                return Next::Execute(Command::Restart);
             }
             (Call::SetState(state::STOPPED), Command::Restart) if succeeded && !paused => {
                 failure(result::STATE_TRANSITION_ERROR, "another client resumed the show meanwhile")
@@ -105,7 +105,7 @@ impl Conductor {
             },
             (Call::SetState(_) | Call::Reset(_) | Call::Step(_), _) => Response::Result(done()),
             (Call::TogglePaused, Command::State) => {
-                return Next::Obey(if stands_still(outcome.playback) { Command::Resume } else { Command::Pause });
+                return Next::Execute(if stands_still(outcome.playback) { Command::Resume } else { Command::Pause });
             }
             (Call::IsPaused, _) => Response::Flag(stands_still(outcome.playback)),
             (Call::GetRate, _) => Response::Rate(outcome.playing_rate),
@@ -116,7 +116,7 @@ impl Conductor {
     }
 }
 
-/// The response to a call that is not passed on; `None` for one whose response has no room for a refusal.
+/// Returns the response to a call that is not passed on. Returns `None` if the response type cannot express a refusal.
 pub fn refusal(call: Call, sentence: &str) -> Option<Response> {
     Some(match call {
         Call::GetFeatures => features(),
@@ -135,7 +135,7 @@ fn stands_still(playback: PlaybackState) -> bool {
     matches!(playback, PlaybackState::Paused | PlaybackState::Held)
 }
 
-/// A show that has ended counts as playing: it stands at its end until it is reset or begins again by itself.
+/// Returns the simulation state. A show that has ended counts as playing: it waits at its end for a reset or a loop.
 fn simulation_state(playback: PlaybackState, stopped: bool) -> u8 {
     match playback {
         PlaybackState::Playing | PlaybackState::Ended => state::PLAYING,
@@ -144,7 +144,7 @@ fn simulation_state(playback: PlaybackState, stopped: bool) -> u8 {
     }
 }
 
-/// What became of a command, for the message of std_srvs/Trigger.
+/// Returns the result of a command in words, for std_srvs/Trigger.
 pub fn sentence(command: Command, outcome: &Outcome) -> String {
     match (outcome.code, command) {
         (Code::Done, Command::Hold) => "the show is held".to_owned(),

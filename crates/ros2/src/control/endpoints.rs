@@ -1,6 +1,6 @@
-//! The ends of the services on DDS: subscriptions that give requests as bytes, writers that send responses as bytes.
+//! The DDS endpoints of the services: subscriptions that return requests as bytes, writers that send responses as bytes.
 //!
-//! Called by the control thread, which makes them and drops them.
+//! The control thread creates and drops them.
 
 use std::convert::Infallible;
 use std::fmt;
@@ -23,17 +23,17 @@ use crate::Ros2Error;
 const REQUEST_DEPTH: i32 = 256;
 /// Answers of one service kept for clients that are slow or dead.
 const MOST_ANSWERS: i32 = 4096;
-/// More bytes than any request here has.
+/// An upper bound of the bytes of a request.
 const MOST_REQUEST_BYTES: usize = 64;
 
-/// The bytes of a request as they came.
+/// The bytes of a request.
 pub(super) struct Raw {
     bytes: [u8; MOST_REQUEST_BYTES],
     length: usize,
 }
 
 impl Raw {
-    /// The request's bytes.
+    /// Returns the bytes.
     pub(super) fn bytes(&self) -> &[u8] {
         &self.bytes[..self.length]
     }
@@ -51,7 +51,7 @@ impl<'de> Deserialize<'de> for Raw {
 
             fn visit_seq<A: SeqAccess<'de>>(self, mut bytes: A) -> Result<Raw, A::Error> {
                 let mut raw = Raw { bytes: [0; MOST_REQUEST_BYTES], length: 0 };
-                // CDR tells no length of its own: the end of the message is an error here, and the length.
+                // CDR contains no length: the error at the end of the message determines it.
                 while let Ok(Some(byte)) = bytes.next_element() {
                     raw.bytes[raw.length] = byte;
                     raw.length += 1;
@@ -79,7 +79,7 @@ impl SerializerAdapter<Vec<u8>> for AsTheyAre {
 }
 
 /// The ends of one service.
-pub(super) struct Port {
+pub(super) struct ServiceEndpoint {
     pub(super) service: &'static Service,
     pub(super) requests: Subscription<Raw>,
     pub(super) requests_guid: GUID,
@@ -99,7 +99,7 @@ struct Reported {
 
 /// All services, and the node that they belong to.
 pub(super) struct Endpoints {
-    pub(super) ports: Vec<Port>,
+    pub(super) ports: Vec<ServiceEndpoint>,
     // Dropped after the ports: they belong to it.
     _node: Node,
 }
@@ -124,14 +124,21 @@ impl Endpoints {
             let responses: DataWriter<_, _> =
                 publisher.create_datawriter_no_key(&responses, None).map_err(|error| failed(&error))?;
             let (requests_guid, responses_guid) = (requests.guid(), responses.guid());
-            Ok(Port { service, requests, requests_guid, responses_guid, responses, reported: Reported::default() })
+            Ok(ServiceEndpoint {
+                service,
+                requests,
+                requests_guid,
+                responses_guid,
+                responses,
+                reported: Reported::default(),
+            })
         };
         let ports = SERVICES.iter().map(&mut open).collect::<Result<_, Ros2Error>>()?;
         Ok(Self { ports, _node: node })
     }
 }
 
-/// As ROS 2 has it for services: reliable, volatile. A full queue refuses at once instead of blocking.
+/// Returns the quality of service of ROS 2 services: reliable, volatile. A full queue refuses at once instead of blocking.
 fn policies(depth: i32) -> QosPolicies {
     QosPolicyBuilder::new()
         .reliability(policy::Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO })
@@ -141,23 +148,23 @@ fn policies(depth: i32) -> QosPolicies {
         .build()
 }
 
-/// Whom an answer goes to.
+/// The receiver of an answer.
 pub(super) struct Client {
-    /// What sent the request.
+    /// The writer of the request.
     pub(super) writer: GUID,
-    /// What Cyclone wants before the response.
+    /// The header of Cyclone before the response.
     pub(super) header: Vec<u8>,
-    /// What the response refers to.
+    /// The identity of the request.
     pub(super) identity: SampleIdentity,
-    /// What will read the response, where the request names it, as those of Fast DDS do.
+    /// The reader of the response, if the request names it, as with Fast DDS.
     pub(super) reader: Option<GUID>,
 }
 
-impl Port {
+impl ServiceEndpoint {
     /// Sends a response.
     pub(super) fn answer(&mut self, client: &Client, response: &Response) {
         let mut bytes = client.header.clone();
-        // The header's 16 bytes leave the alignment of what follows as it is.
+        // The header's 16 bytes do not change the alignment.
         let Ok(body) = CDRSerializerAdapter::<Response>::to_bytes(response) else { return };
         bytes.extend_from_slice(&body);
         let options = WriteOptionsBuilder::new().related_sample_identity(client.identity).build();

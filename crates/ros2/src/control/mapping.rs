@@ -1,9 +1,9 @@
-//! How a service call travels over DDS: two mappings that do not understand each other.
+//! The two incompatible mappings of service calls to DDS.
 //!
-//! In `rmw_cyclonedds_cpp` 16 bytes of the client's stand before each request and each response; in `rmw_fastrtps_cpp`
-//! ("enhanced" in RPC over DDS 1.0, section 7.2.4) what belongs together is named beside the message. A request of one
-//! mapping read in the other is random numbers. All requests here have fixed lengths, so the length tells the mapping, and
-//! one of the other mapping is never read. Called by the control thread.
+//! `rmw_cyclonedds_cpp` puts 16 bytes of the client before each request and each response. `rmw_fastrtps_cpp` ("enhanced" in
+//! RPC over DDS 1.0, section 7.2.4) identifies the request beside the message. A request of one mapping is random numbers in
+//! the other. All requests here have fixed lengths, so the length determines the mapping, and a request of the other mapping
+//! is never read. Called by the control thread.
 
 /// Bytes that Cyclone puts before a message: its client (8 bytes) and the number of the call (8 bytes).
 const CYCLONE_HEADER: usize = 16;
@@ -11,14 +11,14 @@ const CYCLONE_HEADER: usize = 16;
 /// A mapping of services to DDS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mapping {
-    /// That of `rmw_fastrtps_cpp`, the default of ROS 2.
+    /// The mapping of `rmw_fastrtps_cpp`, the default of ROS 2.
     Enhanced,
-    /// That of `rmw_cyclonedds_cpp`.
+    /// The mapping of `rmw_cyclonedds_cpp`.
     Cyclone,
 }
 
 impl Mapping {
-    /// The mapping that `RMW_IMPLEMENTATION` selects, and a warning where that had to be assumed; `variable` gives the
+    /// Returns the mapping that `RMW_IMPLEMENTATION` selects, and a warning if the mapping is assumed. `variable` returns the
     /// value of a variable that is set.
     pub fn of(variable: impl Fn(&str) -> Option<String>) -> (Self, Option<String>) {
         let value = variable("RMW_IMPLEMENTATION").unwrap_or_default();
@@ -35,7 +35,7 @@ impl Mapping {
         }
     }
 
-    /// The RMW implementation whose clients call so.
+    /// Returns the RMW implementation of this mapping.
     pub fn rmw(self) -> &'static str {
         match self {
             Self::Enhanced => "rmw_fastrtps_cpp",
@@ -43,10 +43,10 @@ impl Mapping {
         }
     }
 
-    /// Takes a request apart. `lengths` are those that a request of this service may have, without any header.
+    /// Splits a request into header and body. `lengths` are the legal lengths of the body.
     pub fn split<'a>(self, bytes: &'a [u8], lengths: &[usize]) -> Result<Request<'a>, Misfit> {
         let fits = |header: usize| {
-            // What follows a message up to a multiple of four bytes may have been taken for a part of it.
+            // The message may include its padding to a multiple of four bytes.
             lengths.iter().copied().find(|length| {
                 let whole = header + length;
                 bytes.len() == whole || bytes.len() == whole.next_multiple_of(4)
@@ -66,21 +66,21 @@ impl Mapping {
     }
 }
 
-/// A request, taken apart.
+/// A request, split.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Request<'a> {
-    /// What has to stand before the response.
+    /// The bytes before the response.
     pub header: &'a [u8],
-    /// The request itself.
+    /// The body of the request.
     pub body: &'a [u8],
 }
 
-/// Why a request is not obeyed.
+/// The reason why a request is ignored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Misfit {
-    /// Its client speaks the other mapping.
+    /// Its client uses the other mapping.
     OtherMapping(Mapping),
-    /// No request of this service has so many bytes.
+    /// No request of this service has this number of bytes.
     Length(usize),
 }
 

@@ -1,4 +1,4 @@
-//! The services, request by request and response by response as their packages define them.
+//! The services, with their requests and responses as their packages define them.
 //!
 //! `simulation_interfaces` (1.0.0 to 2.1.0 do not differ in what follows), `rosbag2_interfaces` (Humble to Kilted, and
 //! `Resume` of what came later) under the names that rosbag2's player gives them, `std_srvs/Trigger`. In: the bytes of a
@@ -6,7 +6,7 @@
 
 use serde::Serialize;
 
-/// A service: what it is called below the publisher's name, its type, and what a request is.
+/// A service: its name below the publisher's, its type, and the form of a request.
 pub struct Service {
     /// The last part of the name.
     pub name: &'static str,
@@ -14,9 +14,9 @@ pub struct Service {
     pub package: &'static str,
     /// The type in that package.
     pub kind: &'static str,
-    /// The lengths in bytes that a request may have.
+    /// The legal lengths of a request in bytes.
     pub lengths: &'static [usize],
-    /// Reads a request of such a length.
+    /// Reads a request with a legal length.
     pub read: fn(&[u8]) -> Call,
 }
 
@@ -25,7 +25,7 @@ const EMPTY: &[usize] = &[1];
 const BYTE: &[usize] = &[1];
 const EIGHT_BYTES: &[usize] = &[8];
 
-/// Every service there is.
+/// All services.
 pub const SERVICES: [Service; 16] = {
     const fn simulation(
         name: &'static str,
@@ -55,7 +55,7 @@ pub const SERVICES: [Service; 16] = {
         }),
         simulation("reset_simulation", "ResetSimulation", BYTE, |body| Call::Reset(body[0])),
         player("pause", "Pause", EMPTY, |_| Call::Pause),
-        // Since Lyrical a request has a time, which the player does not heed.
+        // Since Lyrical a request has a time, which the player ignores.
         player("resume", "Resume", &[1, 8], |_| Call::Resume),
         player("toggle_paused", "TogglePaused", EMPTY, |_| Call::TogglePaused),
         player("is_paused", "IsPaused", EMPTY, |_| Call::IsPaused),
@@ -69,18 +69,18 @@ pub const SERVICES: [Service; 16] = {
     ]
 };
 
-/// The eight bytes that a request of that length has.
+/// Returns the eight bytes of a request.
 fn eight(body: &[u8]) -> [u8; 8] {
     std::array::from_fn(|byte| body.get(byte).copied().unwrap_or(0))
 }
 
-/// A builtin_interfaces/Time in seconds: i32 seconds, u32 nanoseconds.
+/// Converts a builtin_interfaces/Time (i32 seconds, u32 nanoseconds) to seconds.
 fn seconds(bytes: [u8; 8]) -> f64 {
     let [a, b, c, d, e, f, g, h] = bytes;
     f64::from(i32::from_le_bytes([a, b, c, d])) + f64::from(u32::from_le_bytes([e, f, g, h])) * 1e-9
 }
 
-/// What a client calls.
+/// A call of a client.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Call {
     /// simulation_interfaces/GetSimulatorFeatures.
@@ -117,23 +117,23 @@ pub enum Call {
     Go,
 }
 
-/// What a call is answered with: the fields of the response in order.
+/// The response to a call: its fields in order.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Response {
-    /// Of a service whose response has no field: one byte, 0.
+    /// A response without fields: one byte, 0.
     Empty(u8),
-    /// Whether it succeeded, or whether the show is paused.
+    /// Success, or for IsPaused the pause.
     Flag(bool),
     /// Simulated seconds per second.
     Rate(f64),
-    /// What became of a call that changes the simulation.
+    /// The result of a call that changes the simulation.
     Result(CallResult),
     /// simulation_interfaces/GetSimulationState.
     State(u8, CallResult),
     /// simulation_interfaces/GetSimulatorFeatures.
     Features(Features),
-    /// std_srvs/Trigger: whether it succeeded, and a sentence.
+    /// std_srvs/Trigger: success, and a sentence.
     Trigger(bool, String),
 }
 
@@ -142,11 +142,11 @@ pub enum Response {
 pub struct CallResult {
     /// One of [`result`].
     pub result: u8,
-    /// A sentence where it is not [`result::OK`].
+    /// A sentence, unless the result is [`result::OK`].
     pub error_message: String,
 }
 
-/// What simulation_interfaces/Result can be.
+/// The values of simulation_interfaces/Result.
 pub mod result {
     /// The simulator has no such feature.
     pub const FEATURE_UNSUPPORTED: u8 = 0;
@@ -156,11 +156,11 @@ pub mod result {
     pub const INCORRECT_STATE: u8 = 3;
     /// Not done: the message has the reason.
     pub const OPERATION_FAILED: u8 = 4;
-    /// Of SetSimulationState: it was in that state.
+    /// SetSimulationState: it was in that state.
     pub const ALREADY_IN_TARGET_STATE: u8 = 101;
-    /// Of SetSimulationState: it did not get into that state.
+    /// SetSimulationState: it did not reach that state.
     pub const STATE_TRANSITION_ERROR: u8 = 102;
-    /// Of SetSimulationState: not from the state it is in.
+    /// SetSimulationState: not from the current state.
     pub const INCORRECT_TRANSITION: u8 = 103;
 }
 
@@ -200,6 +200,6 @@ pub struct Features {
     pub features: Vec<u16>,
     /// None.
     pub spawn_formats: Vec<String>,
-    /// What this program is.
+    /// A description of this program.
     pub custom_info: String,
 }

@@ -1,20 +1,20 @@
 //! The arithmetic of the statistics: samples and times in, a [`LoopStatus`] a second and a [`Summary`] out.
 //!
-//! Pure: the statistics thread calls it and adds what only the operating system knows.
+//! Pure: the statistics thread calls it and adds the figures of the process.
 
 use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
 
-use crate::live::{Counts, End};
+use crate::live::{End, LoopCounts};
 use bench_dragon_messages::{LoopStatus, SceneName};
 
-/// The longest lateness and step cost that a histogram distinguishes: an hour.
+/// The longest lateness and step cost that a histogram records: an hour.
 const LONGEST_NS: u64 = 3_600_000_000_000;
-/// Entries that one late wake-up makes in a histogram, at most: a second's periods at the highest rate.
+/// The most entries that one late wake-up makes in a histogram: the periods of a second at the highest rate.
 const MOST_ENTRIES: u64 = 20_000;
 const SECOND_NS: u64 = 1_000_000_000;
 
-/// One frame, as the loop saw it.
+/// The measurements of one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// The frame's tick.
@@ -27,13 +27,13 @@ pub struct Sample {
     pub unforeseen_contacts: u64,
     /// Unsolved frames so far.
     pub unsolved_frames: u64,
-    /// What was counted so far, this frame included.
-    pub counts: Counts,
-    /// How late the thread woke after the intended deadline.
+    /// The loop's counts, this frame included.
+    pub counts: LoopCounts,
+    /// Nanoseconds from the intended deadline to the wake-up.
     pub lateness_ns: u64,
-    /// From waking to the frame's being published everywhere.
+    /// Nanoseconds from the wake-up until all publishers had the frame.
     pub step_ns: u64,
-    /// Subscribers connected.
+    /// Connected subscribers.
     pub subscribers: u32,
 }
 
@@ -45,7 +45,7 @@ impl Sample {
         shows_played: 0,
         unforeseen_contacts: 0,
         unsolved_frames: 0,
-        counts: Counts { frames: 0, overruns: 0, skipped: 0, end: End::Signal },
+        counts: LoopCounts { frames: 0, overruns: 0, skipped: 0, end: End::Signal },
         lateness_ns: 0,
         step_ns: 0,
         subscribers: 0,
@@ -55,36 +55,36 @@ impl Sample {
 /// Percentiles of a duration, nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Percentiles {
-    /// Half are at most this.
+    /// The median.
     pub p50: u64,
-    /// 99 % are at most this.
+    /// The 99th percentile.
     pub p99: u64,
-    /// 99.9 % are at most this.
+    /// The 99.9th percentile.
     pub p999: u64,
-    /// All are at most this.
+    /// The maximum.
     pub max: u64,
 }
 
 impl Percentiles {
-    /// The percentiles of what a histogram holds; zeros where it holds nothing.
+    /// Returns the percentiles of a histogram, zeros for an empty one.
     pub fn of(histogram: &Histogram<u64>) -> Self {
         let at = |quantile| histogram.value_at_quantile(quantile);
         Self { p50: at(0.5), p99: at(0.99), p999: at(0.999), max: histogram.max() }
     }
 }
 
-/// What is known of a run at its end.
+/// The figures of a run at its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Summary {
     /// Wake-up lateness against the intended deadlines; skipped periods count with the lateness they would have had.
     pub wakeup_ns: Percentiles,
     /// Cost of a step: frame, publishing and waking subscribers.
     pub step_ns: Percentiles,
-    /// Frames whose samples came through the queue. The percentiles miss the others.
+    /// Samples received. The percentiles miss the other frames.
     pub samples: u64,
 }
 
-/// The distributions of the two durations over some time, nanoseconds.
+/// The distributions of lateness and step cost, nanoseconds.
 pub struct Durations {
     /// Wake-up lateness; skipped periods count with the lateness they would have had.
     pub lateness: Histogram<u64>,
@@ -99,16 +99,16 @@ impl Default for Durations {
 }
 
 impl Durations {
-    /// Nothing yet.
+    /// Creates empty distributions.
     pub fn new() -> Self {
         // 1 ns to an hour with three digits are bounds the constructor accepts.
         let histogram = || Histogram::new_with_bounds(1, LONGEST_NS, 3).expect("valid bounds");
         Self { lateness: histogram(), step: histogram() }
     }
 
-    /// Counts a sample. A late wake-up delays every period it covers, and each counts with what was left of it:
-    /// HdrHistogram's correction for coordinated omission. Where it covers very many, neighbours share an entry, so that
-    /// an hour's stop does not hold the thread up.
+    /// Records a sample. A late wake-up counts for each period that it covers, with the lateness that remains there:
+    /// HdrHistogram's correction for coordinated omission. A very late one has neighbouring periods share an entry, so that
+    /// a stop of an hour costs little time here.
     pub fn record(&mut self, sample: &Sample, period_ns: u64) {
         let values = (sample.lateness_ns / period_ns).max(1);
         let stride = values.div_ceil(MOST_ENTRIES);
@@ -119,14 +119,14 @@ impl Durations {
         self.step.saturating_record(sample.step_ns);
     }
 
-    /// Forgets all.
+    /// Empties the distributions.
     pub fn clear(&mut self) {
         self.lateness.reset();
         self.step.reset();
     }
 }
 
-/// What has been counted of a run so far.
+/// The statistics of a run so far.
 pub struct Accumulator {
     run_id: u64,
     rate: f64,
@@ -136,14 +136,14 @@ pub struct Accumulator {
     second: Durations,
     latest: Option<Sample>,
     samples: u64,
-    /// When the latest status was made, or the run began, and the frames published until then.
+    /// The time of the latest status, or of the start, and the frames published until then.
     second_began_ns: u64,
     frames_before: u64,
     status_due_ns: u64,
 }
 
 impl Accumulator {
-    /// Nothing yet, at `now_ns` of CLOCK_MONOTONIC.
+    /// Starts at `now_ns` of CLOCK_MONOTONIC.
     pub fn new(run_id: u64, rate: f64, scene: &str, now_ns: u64) -> Self {
         Self {
             run_id,
@@ -159,7 +159,7 @@ impl Accumulator {
         }
     }
 
-    /// Counts a frame.
+    /// Records a sample.
     pub fn record(&mut self, sample: &Sample) {
         let period_ns = (1e9 / self.rate) as u64;
         self.total.record(sample, period_ns);
@@ -168,22 +168,21 @@ impl Accumulator {
         self.latest = Some(*sample);
     }
 
-    /// The status, where a second is over; once for every second, whether or not a frame came in it. `None` before the
-    /// first frame.
+    /// Returns the status once a second, with or without new frames. Returns `None` before the first frame.
     ///
-    /// `stamp_ns`, `resident_bytes` and `file_descriptors` are left 0.
+    /// `stamp_ns`, `resident_bytes` and `file_descriptors` are 0.
     pub fn status_if_due(&mut self, now_ns: u64) -> Option<LoopStatus> {
         if now_ns < self.status_due_ns {
             return None;
         }
         let status = self.status(now_ns)?;
-        // The next whole second since the beginning, so that late calls do not add up.
+        // The next whole second since the start, so that late calls do not add up.
         self.status_due_ns += SECOND_NS * ((now_ns - self.status_due_ns) / SECOND_NS + 1);
         Some(status)
     }
 
-    /// The status of what has happened since the latest one, however short. `None` where no time has passed since, and
-    /// before the first frame. The fields that [`Accumulator::status_if_due`] leaves 0 are 0 here too.
+    /// Returns the status of the time since the latest one. Returns `None` if no time has passed, and before the first
+    /// frame. The same fields are 0 as in [`Accumulator::status_if_due`].
     pub fn status(&mut self, now_ns: u64) -> Option<LoopStatus> {
         let sample = self.latest?;
         let elapsed_ns = now_ns.saturating_sub(self.second_began_ns);
@@ -230,7 +229,7 @@ impl Accumulator {
         })
     }
 
-    /// What is known of the run.
+    /// Returns the summary of the run so far.
     pub fn summary(&self) -> Summary {
         let (wakeup_ns, step_ns) = (Percentiles::of(&self.total.lateness), Percentiles::of(&self.total.step));
         Summary { wakeup_ns, step_ns, samples: self.samples }

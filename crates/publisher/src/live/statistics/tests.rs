@@ -6,7 +6,7 @@ use std::rc::Rc;
 use proptest::prelude::*;
 
 use super::*;
-use crate::live::{Counts, End};
+use crate::live::{End, LoopCounts};
 use bench_dragon_messages::CollisionAlert;
 use bench_dragon_testing::simulated::{REALTIME_OFFSET_NS, SimulatedClock};
 
@@ -20,7 +20,7 @@ fn sample(sequence: u64, lateness_ns: u64, step_ns: u64) -> Sample {
         shows_played: 2,
         unforeseen_contacts: 3,
         unsolved_frames: 4,
-        counts: Counts { frames: sequence + 1, overruns: 5, skipped: 6, end: End::Signal },
+        counts: LoopCounts { frames: sequence + 1, overruns: 5, skipped: 6, end: End::Signal },
         lateness_ns,
         step_ns,
         subscribers: 7,

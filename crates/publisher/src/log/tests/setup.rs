@@ -4,13 +4,13 @@ use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use super::super::arithmetic::Arithmetic;
-use super::super::lines::{Line, Seal, ShowLine};
+use super::super::lines::{HashChain, Line, ShowLine};
 use super::super::verify::{Verdict, VerifyError, verify};
 use super::super::writer::LogWriter;
 use super::super::{LogPublisher, LogReader, queue_of};
-use crate::live::control::{Door, Doors, door};
+use crate::live::control::{CommandQueues, CommandSender, command_queue};
 use crate::live::show_source::ShowSource;
-use crate::live::{Counts, FrameSource, LoopOptions, Outgoing, Period, PublishError, Publisher, Reports, run_loop};
+use crate::live::{FrameSource, LoopCounts, LoopOptions, Outgoing, Period, PublishError, Publisher, Reports, run_loop};
 use bench_dragon_messages::control::Command;
 use bench_dragon_motion::solve::table::Instructions;
 use bench_dragon_show::convert::Stamps;
@@ -39,7 +39,7 @@ pub const NEWTON: &str = "solver = \"newton\"";
 /// Conducts a show from the inside: each frame sends what is next, and takes the answers.
 pub struct Conducted {
     show: ShowSource,
-    door: Door,
+    door: CommandSender,
     commands: std::vec::IntoIter<Command>,
     answers: Rc<RefCell<Vec<Outcome>>>,
 }
@@ -94,7 +94,7 @@ pub struct Inline {
     reader: LogReader,
     writer: LogWriter<Shared>,
     held_up: fn(u64) -> bool,
-    ended: Rc<Cell<Option<Counts>>>,
+    ended: Rc<Cell<Option<LoopCounts>>>,
 }
 
 impl Publisher for Inline {
@@ -185,7 +185,7 @@ impl Setup {
         let ended = Rc::new(Cell::new(None));
         let writer = LogWriter::new(Shared(file.clone()), line);
         let publisher = Inline { publisher, reader, writer, held_up: self.held_up, ended: ended.clone() };
-        let (port, door) = door();
+        let (port, door) = command_queue();
         let answers = Rc::new(RefCell::new(Vec::new()));
         let show = ShowSource::new(show);
         let mut frames = Conducted { show, door, commands: self.commands.into_iter(), answers: answers.clone() };
@@ -195,7 +195,7 @@ impl Setup {
         let options = LoopOptions { run_id: 7, rate: playback.rate, periods: Some(self.periods) };
         let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(Failing(self.fails_at)), Box::new(publisher)];
         let reports = Reports { samples, announcements };
-        let mut doors = Doors::new(vec![port]);
+        let mut doors = CommandQueues::new(vec![port]);
         let counts = run_loop(&clock, &mut frames, &mut doors, &mut publishers, options, reports, &clock.stop);
         let counts = counts.unwrap_or_else(|(counts, _)| counts);
         frames.exchange();
@@ -210,22 +210,22 @@ impl Setup {
 }
 
 pub struct Run {
-    pub counts: Counts,
+    pub counts: LoopCounts,
     pub answers: Vec<Outcome>,
     pub log: Vec<u8>,
 }
 
 impl Run {
     pub fn lines(&self) -> Vec<Line> {
-        let mut seal = Seal::default();
+        let mut chain = HashChain::default();
         let text = std::str::from_utf8(&self.log).unwrap();
-        text.split_inclusive('\n').map(|line| seal.read(line).unwrap()).collect()
+        text.split_inclusive('\n').map(|line| chain.read(line).unwrap()).collect()
     }
 }
 
 pub fn sealed(lines: &[Line]) -> Vec<u8> {
-    let mut seal = Seal::default();
-    lines.iter().flat_map(|line| seal.line(line).into_bytes()).collect()
+    let mut chain = HashChain::default();
+    lines.iter().flat_map(|line| chain.line(line).into_bytes()).collect()
 }
 
 pub fn verified(log: &[u8]) -> Result<Verdict, VerifyError> {

@@ -1,4 +1,4 @@
-//! Plays a show from the lines of its log, in the order of ticks, and compares as it goes.
+//! Plays a show from the lines of its log, in the order of ticks, and compares each second.
 
 use super::super::hash::{FrameHasher, columns, header_words};
 use super::super::lines::{Line, SecondLine, ShowLine, command_of};
@@ -11,7 +11,7 @@ use bench_dragon_show::convert::{Stamps, frame_header};
 use bench_dragon_show::scene::Scene;
 use bench_dragon_show::{Frame, Playback, Show, StartError, solve_at_or_just_before};
 
-/// A show that follows a log.
+/// A show that replays a log.
 pub(super) struct Player {
     show: Show,
     rate: f64,
@@ -20,7 +20,7 @@ pub(super) struct Player {
     /// The next tick.
     tick: u64,
     sequence: u64,
-    /// What the log has of the commands before the frame of `tick`.
+    /// The log's commands before the frame of `tick`.
     announced: Vec<Line>,
     /// The line of the latest command.
     command_line: u64,
@@ -29,12 +29,12 @@ pub(super) struct Player {
     hashed: Option<(u64, u64)>,
     latest: Sample,
     difference: Option<Difference>,
-    counts: Counts,
-    /// Of the counts, what no hash has been compared with yet.
-    uncompared: Counts,
+    counts: VerifiedCounts,
+    /// The part of the counts since the latest hash.
+    uncompared: VerifiedCounts,
 }
 
-/// The latest frame, as far as the line of a second has it.
+/// The latest frame, as in the line of a second.
 #[derive(Default)]
 struct Sample {
     tick: u64,
@@ -43,7 +43,7 @@ struct Sample {
 }
 
 #[derive(Default)]
-struct Counts {
+struct VerifiedCounts {
     seconds: u64,
     same_seconds: u64,
     frames: u64,
@@ -53,25 +53,24 @@ struct Counts {
     last_tick: Option<u64>,
 }
 
-/// Seconds that the times of events, at which a show freezes or pauses and from which it goes on, may be apart between two
-/// arithmetics.
+/// Seconds by which two arithmetics may differ in the times of events, at which a show ends or pauses.
 const EVENT_TIME: f64 = 1e-9;
-/// How much an error of a place can grow along the chain, at most. It grows as handles are faster than those before them,
-/// without bound at a lock; there the error is about the root of the rounding, which is so many times the rounding.
+/// The greatest growth of a position error along the chain. The error grows with the speed of the handles, without bound at
+/// a lock. Near a lock it is about sqrt(eps), 1e6 times eps.
 const MOST_GROWTH: f64 = 1e6;
 
-/// The second solver, for a machine whose bits are others.
+/// The second solver, for a machine with different bits.
 struct Reference {
     solver: Box<dyn Solver>,
     chain: Chain,
     head_speed: f64,
     accuracy: f64,
-    /// Metres: the greatest distance seen, and what was allowed there.
+    /// Metres: the greatest distance so far, and its tolerance.
     worst: Option<(f64, f64)>,
 }
 
 impl Player {
-    /// The player of a scene.
+    /// Creates the player of a scene.
     pub fn new(scene: &Scene, playback: Playback, same_arithmetic: bool) -> Result<Self, StartError> {
         let motion = &scene.motion;
         let timeline = match scene.alerts {
@@ -97,20 +96,20 @@ impl Player {
             hashed: None,
             latest: Sample::default(),
             difference: None,
-            counts: Counts::default(),
-            uncompared: Counts::default(),
+            counts: VerifiedCounts::default(),
+            uncompared: VerifiedCounts::default(),
         })
     }
 
-    /// The first difference so far.
+    /// Returns the first difference so far.
     pub fn difference(&self) -> Option<&Difference> {
         self.difference.as_ref()
     }
 
-    /// Follows a line.
+    /// Plays the frames of a line and compares.
     ///
     /// # Errors
-    /// What is wrong with a line that no run can have written.
+    /// The problem of a line that no run can have written.
     pub fn line(&mut self, number: u64, line: &Line) -> Result<(), String> {
         match line {
             Line::Command { tick, command, value, code } => {
@@ -153,7 +152,7 @@ impl Player {
                 if let Some((from, _)) = self.hashed {
                     return Err(format!("the frames from tick {from} on have no hash"));
                 }
-                let Counts { frames: played, skipped: passed, lost: missing, .. } = self.counts;
+                let VerifiedCounts { frames: played, skipped: passed, lost: missing, .. } = self.counts;
                 if (*frames, *skipped, *lost) != (played, passed, missing) {
                     return Err(format!(
                         "{frames} frames, {skipped} periods skipped, {lost} frames lost, expected {played}, {passed}, \
@@ -166,9 +165,9 @@ impl Player {
         Ok(())
     }
 
-    /// What was found.
+    /// Returns the verdict.
     pub fn verdict(self, show: &ShowLine, complete: bool, cut: bool) -> Verdict {
-        let Counts { seconds, same_seconds, skipped, lost, last_tick, .. } = self.counts;
+        let VerifiedCounts { seconds, same_seconds, skipped, lost, last_tick, .. } = self.counts;
         let frames = self.counts.frames - self.uncompared.frames;
         let commands = self.counts.commands - self.uncompared.commands;
         let verdict = match &self.difference {
@@ -197,7 +196,7 @@ impl Player {
         }
     }
 
-    /// Ticks in a range of a line that begins at the next tick.
+    /// Returns the number of ticks in a line's range, which must begin at the next tick.
     fn range(&self, from: u64, to: u64) -> Result<u64, String> {
         if from != self.tick || to < from || to == u64::MAX {
             return Err(format!("ticks {from} to {to} are out of order, expected to begin at tick {}", self.tick));
@@ -215,7 +214,7 @@ impl Player {
         if tick < self.tick {
             return Err(format!("tick {tick} is out of order, expected {} or a later one", self.tick));
         }
-        // Frames of two seconds have the line of the first between them; this also bounds what a wrong digit costs.
+        // Two seconds have the line of the first between them. This also bounds the work after a wrong digit.
         if tick > self.tick && second_of(tick - 1, self.rate) != second_of(self.tick, self.rate) {
             return Err(format!(
                 "ticks {} to {} are of several seconds without their hash, expected the line of second {}",
@@ -230,7 +229,7 @@ impl Player {
         Ok(())
     }
 
-    /// Leaves periods out, before which all commands have had their frame.
+    /// Skips periods. The commands before them must have had their frame.
     fn skip_to(&mut self, number: u64, tick: u64) -> Result<(), String> {
         if !self.announced.is_empty() {
             return Err(format!("the period {} is skipped, expected its frame after line {number}", self.tick));
@@ -264,7 +263,7 @@ impl Player {
 
     fn second(&mut self, number: u64, line: &SecondLine) -> Result<(), String> {
         let next = line.to.checked_add(1).ok_or("the tick is too large")?;
-        // Frames that were lost at the second's end have been played.
+        // The frames lost at the end of the second have been played.
         self.play_until(number, next.max(self.tick))?;
         let Some((from, frames)) = self.hashed.take().filter(|_| self.difference.is_none()) else {
             return if self.difference.is_some() { Ok(()) } else { Err("there is no frame for its hash".to_owned()) };
@@ -278,9 +277,9 @@ impl Player {
             ));
         }
         self.counts.seconds += 1;
-        // Commands of the tick that comes next have no frame yet.
+        // The commands of the next tick have no frame yet.
         let commands = self.announced.iter().filter(|line| matches!(line, Line::Command { .. })).count() as u64;
-        self.uncompared = Counts { commands, ..Counts::default() };
+        self.uncompared = VerifiedCounts { commands, ..VerifiedCounts::default() };
         let (hash, sample) = (self.hasher.take(), &self.latest);
         let (same_hash, same_sample) = (hash == line.hash, sample.is(line));
         if same_hash && same_sample {
@@ -324,14 +323,14 @@ impl Sample {
         self.handles.extend(handles.map(|handle| (handle as u32, chain.x[handle], chain.y[handle])));
     }
 
-    /// Whether a line has these very bits.
+    /// Returns true if a line has the same bits.
     fn is(&self, line: &SecondLine) -> bool {
         let bits = |(handle, x, y): &(u32, f64, f64)| (*handle, x.to_bits(), y.to_bits());
         self.sim_time.to_bits() == line.sim_time.to_bits()
             && self.handles.iter().map(bits).eq(line.handles.iter().map(bits))
     }
 
-    /// Metres between the handles of a line and these, at most; `None` where they are others.
+    /// Returns the greatest distance in metres from the handles of a line. Returns `None` for other handle numbers.
     fn distance(&self, line: &SecondLine) -> Option<f64> {
         let same_handles = self.handles.iter().map(|of| of.0).eq(line.handles.iter().map(|of| of.0));
         let pairs = self.handles.iter().zip(&line.handles);
@@ -351,7 +350,7 @@ impl Reference {
         }
     }
 
-    /// Compares the handles of a line, and its time, with those of the second solver, and of the show.
+    /// Compares the time of a line with the show's, and its handles with the second solver's.
     fn compare(&mut self, line: &SecondLine, shown: f64) -> Result<(), String> {
         let time = line.sim_time;
         let apart = (time - shown).abs();
@@ -364,7 +363,7 @@ impl Reference {
         for (handle, x, y) in &line.handles {
             let place = self.chain.x.get(*handle as usize).zip(self.chain.y.get(*handle as usize));
             let metres = place.map_or(f64::INFINITY, |(own_x, own_y)| (x - own_x).hypot(y - own_y));
-            // Both solutions may be off by what doubles do not hold.
+            // Both solutions have rounding errors.
             let rounding = 8.0 * f64::EPSILON * (x.hypot(*y) + self.head_speed * time);
             let tolerance = self.accuracy + 2.0 * rounding * growth(&self.chain.speed, *handle as usize);
             if metres.is_nan() || metres > tolerance {
@@ -381,15 +380,15 @@ impl Reference {
     }
 }
 
-/// By how much an error of a place before a handle can have grown there, from the speeds of the handles.
+/// Returns the growth of a position error up to a handle, from the speeds of the handles.
 fn growth(speeds: &[f64], handle: usize) -> f64 {
     let least = speeds.iter().take(handle + 1).map(|speed| speed.abs()).fold(f64::INFINITY, f64::min);
     let growth = speeds.get(handle).map_or(f64::NAN, |speed| speed.abs()) / least;
-    // Not a number where a handle stands still and so do those behind it.
+    // NaN if this handle and one before it stand still.
     if growth.is_nan() { MOST_GROWTH } else { growth.clamp(1.0, MOST_GROWTH) }
 }
 
-/// Commands in words.
+/// Returns the commands in words.
 fn listed(lines: &[Line]) -> String {
     let words = lines.iter().map(|line| match line {
         Line::Command { command, value, code, .. } => {

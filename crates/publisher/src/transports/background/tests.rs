@@ -98,7 +98,7 @@ fn what_is_published_is_sent_in_order_and_whole() {
     }
     status.publish_status(&LoopStatus { tick: 3, ..LoopStatus::default() });
     drop((publisher, status));
-    assert_eq!(thread.finish(), Deliveries { frames: 4, skipped: 0, discarded: 7 });
+    assert_eq!(thread.finish(), TransportCounters { frames: 4, skipped: 0, discarded: 7 });
     let all: Vec<Sent> = sent.iter().collect();
     let ticks = |of: fn(&Sent) -> Option<u64>| all.iter().filter_map(of).collect::<Vec<_>>();
     assert_eq!(ticks(|sent| if let Sent::Frame { tick, .. } = sent { Some(*tick) } else { None }), [0, 1, 2, 3]);
@@ -198,7 +198,7 @@ fn a_sink_that_never_catches_up_keeps_nothing_but_frames_waiting() {
     let seldom = |of: fn(&Sent) -> bool| sent.iter().filter(|sent| of(sent)).count();
     assert_eq!(seldom(|sent| matches!(sent, Sent::Alert { .. })), 100);
     assert_eq!(seldom(|sent| matches!(sent, Sent::Status { .. })), 999);
-    assert_eq!(worker.deliveries(), Deliveries { frames, skipped: 1000 - frames, discarded: 0 });
+    assert_eq!(worker.counters(), TransportCounters { frames, skipped: 1000 - frames, discarded: 0 });
     assert!(frames < 600, "{frames} of 1000");
 }
 

@@ -1,7 +1,7 @@
-//! The door for commands over shared memory: the request-response service `<name>/control`, on a thread of its own.
+//! Commands over shared memory: the request-response service `<name>/control`, on its own thread.
 //!
-//! A client that is dead or floods the door costs the loop nothing: the thread takes requests, the loop takes one command
-//! a period from a queue of bounded length.
+//! A dead client, or one that floods the service, costs the loop nothing: this thread takes the requests, and the loop
+//! executes one command in each period from a queue of bounded length.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,7 +19,7 @@ use ::iceoryx2::service::builder::request_response::{
 use ::iceoryx2::service::port_factory::server::ServerCreateError;
 
 use super::{SPARE_NODES, node, retry_while_incomplete, service_name};
-use crate::live::control::{Answer, Door, MOST_WAITING};
+use crate::live::control::{Answer, CommandSender, MOST_WAITING};
 use bench_dragon_client::shared_memory::{OpenError, failed, incomplete};
 use bench_dragon_messages::control::{Code, Command};
 use bench_dragon_messages::state::PlaybackState;
@@ -28,9 +28,9 @@ use bench_dragon_show::convert::control_response;
 
 /// Clients that the service admits at once.
 const MOST_CLIENTS: usize = 16;
-/// Requests of one client that may have no answer yet, so that one which floods the door leaves room for the others.
+/// The most requests of one client without an answer, so that a flood of one client leaves room for the others.
 const MOST_REQUESTS: usize = 8;
-/// How often requests are looked for, and answers while some are awaited: iceoryx2 has no wake-up for either.
+/// The intervals at which requests are polled, and answers while some are pending. iceoryx2 has no wake-up for either.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 const ANSWER_INTERVAL: Duration = Duration::from_micros(500);
 
@@ -40,7 +40,7 @@ type Request = ActiveRequest<ipc::Service, ControlRequest, (), ControlResponse, 
 struct Pending {
     ticket: u64,
     request: Request,
-    /// What to answer in place of the loop's code: the request itself could not be passed on.
+    /// The code of the response in place of the loop's, for a request that is no command.
     instead: Option<Code>,
 }
 
@@ -55,7 +55,7 @@ impl ControlThread {
     ///
     /// # Errors
     /// [`OpenError`]
-    pub(super) fn start(name: &str, door: Door) -> Result<Self, OpenError> {
+    pub(super) fn start(name: &str, commands: CommandSender) -> Result<Self, OpenError> {
         let stop = Arc::new(AtomicBool::new(false));
         let (opened, opening) = mpsc::channel();
         let thread = {
@@ -64,7 +64,7 @@ impl ControlThread {
                 // The node is dropped last: the server belongs to it.
                 Ok((_node, server)) => {
                     let _ = opened.send(Ok(()));
-                    serve(&server, door, &stop);
+                    serve(&server, commands, &stop);
                 }
                 Err(error) => drop(opened.send(Err(error))),
             }
@@ -95,14 +95,14 @@ fn open(name: &str) -> Result<Opened, OpenError> {
     let service = node
         .service_builder(&service_name(name, "control")?)
         .request_response::<ControlRequest, ControlResponse>()
-        // This is what keeps a second show from the name.
+        // This limit refuses the name to a second show.
         .max_servers(1)
         .max_clients(MOST_CLIENTS)
         .max_nodes(MOST_CLIENTS + SPARE_NODES)
         .max_active_requests_per_client(MOST_REQUESTS)
         .open_or_create()
         .map_err(|error| match error {
-            // A show that was killed while it made this.
+            // A show was killed while it created the service.
             OpenOrCreate::RequestResponseOpenError(Open::HangsInCreation)
             | OpenOrCreate::RequestResponseCreateError(Create::HangsInCreation) => incomplete(name, "control"),
             other => failed(name, "control", other),
@@ -119,43 +119,47 @@ fn open(name: &str) -> Result<Opened, OpenError> {
     Ok((node, server))
 }
 
-fn serve(server: &Server<ipc::Service, ControlRequest, (), ControlResponse, ()>, mut door: Door, stop: &AtomicBool) {
+fn serve(
+    server: &Server<ipc::Service, ControlRequest, (), ControlResponse, ()>,
+    mut commands: CommandSender,
+    stop: &AtomicBool,
+) {
     let mut pending: Vec<Pending> = Vec::with_capacity(MOST_WAITING);
     while !stop.load(Ordering::Acquire) {
-        // Bounded, so that a client which floods the door does not keep answers back.
+        // Bounded, so that a flood of requests does not delay answers.
         for _ in 0..MOST_WAITING {
             let Ok(Some(request)) = server.receive() else { break };
             let of_client = pending.iter().filter(|waiting| waiting.request.origin() == request.origin()).count();
             if of_client < MOST_REQUESTS {
-                pending.extend(pass_on(&mut door, request));
+                pending.extend(pass_on(&mut commands, request));
             } else {
                 refuse(&request, Code::TooMany);
             }
         }
-        while let Some(Answer { ticket, outcome }) = door.answer() {
+        while let Some(Answer { ticket, outcome }) = commands.answer() {
             let Some(index) = pending.iter().position(|waiting| waiting.ticket == ticket) else { continue };
             let Pending { request, instead, .. } = pending.swap_remove(index);
             let code = match instead {
-                // While held every command but three is refused, whatever its value.
+                // A held show refuses every command but three, whatever its value.
                 Some(Code::OutOfRange) if outcome.playback == PlaybackState::Held => Code::Refused,
                 instead => instead.unwrap_or(outcome.code),
             };
             let outcome = bench_dragon_show::Outcome { code, ..outcome };
-            // A client that has gone needs no answer.
+            // The client may have ended.
             let _ = request.send_copy(control_response(request.payload().id, &outcome));
         }
-        std::thread::sleep(if door.waiting() == 0 { POLL_INTERVAL } else { ANSWER_INTERVAL });
+        std::thread::sleep(if commands.waiting() == 0 { POLL_INTERVAL } else { ANSWER_INTERVAL });
     }
 }
 
-/// Passes a request on to the loop. One that cannot be understood is answered with how the show stands.
-fn pass_on(door: &mut Door, request: Request) -> Option<Pending> {
+/// Passes a request to the loop. For a request that is no command, the loop returns the state of the show.
+fn pass_on(commands: &mut CommandSender, request: Request) -> Option<Pending> {
     let ControlRequest { value, command, .. } = *request.payload();
     let (command, instead) = match Command::of_number(command, value) {
         Ok(command) => (command, None),
         Err(code) => (Command::State, Some(code)),
     };
-    match door.send(command) {
+    match commands.send(command) {
         Ok(ticket) => Some(Pending { ticket, request, instead }),
         Err(code) => {
             refuse(&request, code);
@@ -164,7 +168,7 @@ fn pass_on(door: &mut Door, request: Request) -> Option<Pending> {
     }
 }
 
-/// Answers a request that the loop never sees.
+/// Answers a request that is not passed to the loop.
 fn refuse(request: &Request, code: Code) {
     let id = request.payload().id;
     let _ = request.send_copy(ControlResponse { id, code: code as u32, ..Default::default() });

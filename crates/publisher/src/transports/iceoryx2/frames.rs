@@ -18,17 +18,17 @@ use super::{PublisherConfig, SPARE_NODES, Sender, Service};
 use bench_dragon_client::clock::{monotonic_clock_name, monotonic_ns};
 use bench_dragon_messages::FrameHeader;
 
-/// The attribute of a decimated service that states one handle in how many it has.
+/// The attribute of a decimated service that states the decimation.
 const EVERY: &str = "every";
 
-/// What distinguishes a service of frames from another.
+/// The properties of a service of frames.
 pub(super) struct FrameService {
     /// The last part of its name.
     pub(super) service: &'static str,
     /// Poses in a frame.
     pub(super) poses: usize,
-    /// One handle in how many has a pose, where a subscriber cannot know: it becomes the service's attribute
-    /// [`EVERY`]. A service that others keep open has to have the same one.
+    /// The decimation of the handles, which becomes the service's attribute [`EVERY`]. `None` for all handles. A service that
+    /// others keep open must have the same attribute.
     pub(super) every: Option<usize>,
 }
 
@@ -39,7 +39,7 @@ pub(super) struct FrameSender<Pose: ZeroCopySend + Debug + 'static> {
 }
 
 impl<Pose: ZeroCopySend + Debug + Default + 'static> FrameSender<Pose> {
-    /// Opens the service, and the port on this thread.
+    /// Opens the service, and the port on the calling thread.
     pub(super) fn open(
         node: &Node<ipc::Service>,
         config: &PublisherConfig,
@@ -57,7 +57,7 @@ impl<Pose: ZeroCopySend + Debug + Default + 'static> FrameSender<Pose> {
         Ok(Self { port, service })
     }
 
-    /// Sends a frame: `header` completed, and the poses.
+    /// Completes `header` and sends it with the poses.
     pub(super) fn send(
         &self,
         header: &FrameHeader,
@@ -65,25 +65,25 @@ impl<Pose: ZeroCopySend + Debug + Default + 'static> FrameSender<Pose> {
     ) -> Result<(), String> {
         let handles = poses.len();
         let sample = self.port.loan_slice_uninit(handles).map_err(|error| error.to_string())?;
-        // There are as many as it states: the default is never used.
+        // The iterator has exactly `handles` items: the default is never used.
         let mut sample = sample.write_from_fn(|_| poses.next().unwrap_or_default());
         let handles = handles as u32;
         *sample.user_header_mut() = FrameHeader { handles, sent_ns: monotonic_ns(), ..*header };
         sample.send().map(|_| ()).map_err(|error| error.to_string())
     }
 
-    /// Lets late subscribers in.
+    /// Delivers the history to newly connected subscribers.
     pub(super) fn update_connections(&self) {
         let _ = self.port.update_connections();
     }
 
-    /// The subscribers that are connected.
+    /// Returns the number of connected subscribers.
     pub(super) fn subscribers(&self) -> u32 {
         self.service.dynamic_config().number_of_subscribers() as u32
     }
 }
 
-/// One left by a watcher can have shorter queues than this publisher would make: it is used as it is.
+/// Opens or creates the service. A service that a subscriber keeps open can have shorter queues, and is used.
 fn open_service<Pose: ZeroCopySend + Debug + 'static>(
     node: &Node<ipc::Service>,
     config: &PublisherConfig,
@@ -119,7 +119,7 @@ fn open_service<Pose: ZeroCopySend + Debug + 'static>(
     }
 }
 
-/// What a service has to have, as its attributes; where it is made, it gets them.
+/// Returns the attributes that a service must have. A new service gets them.
 fn attributes(described: &FrameService) -> Result<AttributeVerifier, String> {
     let with = |attributes: AttributeVerifier, key: &str, value: String| {
         let key = AttributeKey::try_from(key).map_err(|error| format!("{error:?}"))?;

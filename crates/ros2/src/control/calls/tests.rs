@@ -18,22 +18,22 @@ fn result_of(next: Next) -> u8 {
 
 #[test]
 fn a_stop_that_another_client_resumes_meanwhile_fails() {
-    let mut conductor = Conductor::default();
+    let mut adapter = ServiceAdapter::default();
     let stop = Call::SetState(state::STOPPED);
-    assert_eq!(conductor.begin(stop), Next::Obey(Command::Pause));
+    assert_eq!(adapter.begin(stop), Next::Execute(Command::Pause));
     let paused = outcome(Code::Done, PlaybackState::Paused, 70.0);
-    assert_eq!(conductor.proceed(stop, Command::Pause, &paused), Next::Obey(Command::Restart));
+    assert_eq!(adapter.proceed(stop, Command::Pause, &paused), Next::Execute(Command::Restart));
     let resumed = outcome(Code::Done, PlaybackState::Playing, 50.0);
-    assert_eq!(result_of(conductor.proceed(stop, Command::Restart, &resumed)), result::STATE_TRANSITION_ERROR);
+    assert_eq!(result_of(adapter.proceed(stop, Command::Restart, &resumed)), result::STATE_TRANSITION_ERROR);
     // Held meanwhile: not from this state.
     let held = outcome(Code::Refused, PlaybackState::Held, 70.0);
-    assert_eq!(result_of(conductor.proceed(stop, Command::Restart, &held)), result::INCORRECT_TRANSITION);
+    assert_eq!(result_of(adapter.proceed(stop, Command::Restart, &held)), result::INCORRECT_TRANSITION);
 }
 
 #[test]
 fn stopped_is_where_a_reset_has_left_a_paused_show_and_nowhere_else() {
-    let mut conductor = Conductor::default();
-    let state_at = |conductor: &mut Conductor, playback, time| match conductor.proceed(
+    let mut adapter = ServiceAdapter::default();
+    let state_at = |adapter: &mut ServiceAdapter, playback, time| match adapter.proceed(
         Call::GetState,
         Command::State,
         &outcome(Code::Done, playback, time),
@@ -41,23 +41,23 @@ fn stopped_is_where_a_reset_has_left_a_paused_show_and_nowhere_else() {
         Next::Answer(Response::State(state, _)) => state,
         other => panic!("{other:?}"),
     };
-    assert_eq!(state_at(&mut conductor, PlaybackState::Paused, 50.0), state::PAUSED);
-    conductor.proceed(Call::Reset(0), Command::Restart, &outcome(Code::Done, PlaybackState::Paused, 50.0));
-    assert_eq!(state_at(&mut conductor, PlaybackState::Paused, 50.0), state::STOPPED);
+    assert_eq!(state_at(&mut adapter, PlaybackState::Paused, 50.0), state::PAUSED);
+    adapter.proceed(Call::Reset(0), Command::Restart, &outcome(Code::Done, PlaybackState::Paused, 50.0));
+    assert_eq!(state_at(&mut adapter, PlaybackState::Paused, 50.0), state::STOPPED);
     // Another door has moved it, plays it, holds it, or it is at its end.
-    assert_eq!(state_at(&mut conductor, PlaybackState::Paused, 60.0), state::PAUSED);
-    assert_eq!(state_at(&mut conductor, PlaybackState::Playing, 50.0), state::PLAYING);
-    assert_eq!(state_at(&mut conductor, PlaybackState::Held, 50.0), state::PAUSED);
-    assert_eq!(state_at(&mut conductor, PlaybackState::Ended, 50.0), state::PLAYING);
-    conductor.proceed(Call::Reset(0), Command::Restart, &outcome(Code::Done, PlaybackState::Playing, 50.0));
-    assert_eq!(state_at(&mut conductor, PlaybackState::Paused, 50.0), state::PAUSED);
+    assert_eq!(state_at(&mut adapter, PlaybackState::Paused, 60.0), state::PAUSED);
+    assert_eq!(state_at(&mut adapter, PlaybackState::Playing, 50.0), state::PLAYING);
+    assert_eq!(state_at(&mut adapter, PlaybackState::Held, 50.0), state::PAUSED);
+    assert_eq!(state_at(&mut adapter, PlaybackState::Ended, 50.0), state::PLAYING);
+    adapter.proceed(Call::Reset(0), Command::Restart, &outcome(Code::Done, PlaybackState::Playing, 50.0));
+    assert_eq!(state_at(&mut adapter, PlaybackState::Paused, 50.0), state::PAUSED);
 }
 
 #[test]
 fn a_step_that_is_broken_off_is_distinguished_from_one_that_a_playing_show_refuses() {
-    let mut conductor = Conductor::default();
+    let mut adapter = ServiceAdapter::default();
     let mut answer = |playback| {
-        let next = conductor.proceed(Call::Step(5), Command::Step(5), &outcome(Code::Refused, playback, 50.0));
+        let next = adapter.proceed(Call::Step(5), Command::Step(5), &outcome(Code::Refused, playback, 50.0));
         match next {
             Next::Answer(Response::Result(result)) => (result.result, result.error_message),
             other => panic!("{other:?}"),

@@ -2,7 +2,7 @@
 //! period, in turn of the doors, however late the loop is.
 
 use super::*;
-use crate::live::control::{Answer, Door, door};
+use crate::live::control::{Answer, CommandSender, command_queue};
 use bench_dragon_messages::control::Code;
 use bench_dragon_messages::state::PlaybackState;
 use bench_dragon_show::scene::Scene;
@@ -29,7 +29,7 @@ struct Obeyed {
 /// Frames during which commands arrive, and which note when each is obeyed.
 struct Arrivals {
     clock: Rc<SimulatedClock>,
-    doors: Vec<Door>,
+    doors: Vec<CommandSender>,
     /// For each frame, the doors at which a command arrives while it is computed.
     arrivals: VecDeque<Vec<usize>>,
     cost_ns: VecDeque<u64>,
@@ -82,7 +82,7 @@ proptest! {
         let arrivals: VecDeque<Vec<usize>> =
             arrivals.iter().map(|at| at.iter().map(|index| index.index(doors)).collect()).collect();
         let sent: usize = arrivals.iter().map(Vec::len).sum();
-        let (ports, outer): (Vec<_>, Vec<_>) = (0..doors).map(|_| door()).unzip();
+        let (ports, outer): (Vec<_>, Vec<_>) = (0..doors).map(|_| command_queue()).unzip();
         let mut frames = Arrivals {
             clock: clock.clone(),
             doors: outer,
@@ -98,7 +98,7 @@ proptest! {
         let (samples, _received) = rtrb::RingBuffer::new(1024);
         let (announcements, _announced) = rtrb::RingBuffer::new(1);
         let reports = Reports { samples, announcements };
-        run_loop(&*clock, &mut frames, &mut Doors::new(ports), &mut [], options, reports, &clock.stop).unwrap();
+        run_loop(&*clock, &mut frames, &mut CommandQueues::new(ports), &mut [], options, reports, &clock.stop).unwrap();
 
         prop_assert_eq!((frames.obeyed.len(), frames.waiting.len()), (sent, 0));
         let mut before: Option<&Obeyed> = None;
@@ -135,8 +135,8 @@ fn steps_on_each_others_heels_are_all_answered() {
     let playback = Playback { paused: true, ..Playback::of(&scene) };
     let show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), playback).unwrap();
     let mut show = ShowSource::new(show);
-    let (port, mut door) = door();
-    let mut doors = Doors::new(vec![port]);
+    let (port, mut door) = command_queue();
+    let mut doors = CommandQueues::new(vec![port]);
     for periods in [1, 1, 2, 1] {
         door.send(Command::Step(periods)).unwrap();
     }

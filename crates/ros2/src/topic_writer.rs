@@ -1,10 +1,9 @@
-//! A publisher of one topic: its quality of service, what it keeps for late and slow subscribers, and what it discards.
+//! The writer of one topic: its quality of service, its messages for late and slow subscribers, its discarded messages.
 //!
-//! A transient-local topic holds one message here: the latest. RustDDS keeps more, whatever the depth: what a subscriber has
-//! not acknowledged, and the rest until it tidies up every six seconds; a late subscriber would get all of that first. So
-//! what nobody subscribes to is not written, but held until somebody asks for it, and a publisher that has kept more than
-//! the latest is replaced once the last subscriber has left. Whoever comes while others are there still gets what RustDDS
-//! keeps; the current message is the last.
+//! A transient-local topic holds one message here: the latest. RustDDS keeps more, whatever the depth: unacknowledged
+//! messages, and all others until its cleanup every six seconds. A late subscriber would get all of them first. So a message
+//! without subscribers is held here and not written, and a writer that has kept more than the latest message is replaced
+//! after its last subscriber has left. A subscriber that joins others still gets all that RustDDS keeps, the latest last.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -20,42 +19,42 @@ use bench_dragon_messages::{QUEUE_BYTES, Stage};
 use bench_dragon_ros2_messages::MessageType;
 use bench_dragon_ros2_messages::settings::{Durability, Qos, Reliability, Topic};
 
-/// How long a subscriber that has died counts as slow: its lease.
+/// Seconds for which a dead subscriber counts as slow: its lease.
 const LEASE_SECONDS: f64 = 12.0;
 /// RustDDS's own limit.
 const UNACKNOWLEDGED_MESSAGES: f64 = 8192.0;
-/// How long a subscriber that has just been matched is given to match in turn. Now and then RustDDS does not deliver what it
-/// sends meanwhile, although it keeps it.
+/// The time for a newly matched subscriber to match in turn. RustDDS sometimes does not deliver a message sent meanwhile,
+/// although it keeps it.
 const SETTLING_TIME: Duration = Duration::from_millis(200);
-/// When the first message is sent once more, for a subscriber that took longer.
+/// The time after which the first message is retransmitted, for a subscriber that took longer.
 const REPETITION_TIME: Duration = Duration::from_millis(1500);
-/// More bytes than a message has besides its handles.
+/// An upper bound of a message's bytes besides its handles.
 pub(super) const HEADER_BYTES: usize = 200;
-/// More bytes than any message has that is not of every frame; the largest of them is the stage.
-pub(super) const SELDOM_BYTES: usize = HEADER_BYTES + size_of::<Stage>();
+/// An upper bound of an event-driven message's bytes; the largest is the stage.
+pub(super) const EVENT_BYTES: usize = HEADER_BYTES + size_of::<Stage>();
 
-/// A publisher of one topic.
-pub(super) struct Port<Message: Serialize> {
+/// The writer of one topic.
+pub(super) struct TopicWriter<Message: Serialize> {
     publisher: Publisher<Arc<Message>>,
     dds: rustdds::Topic,
     topic: String,
     reported: bool,
-    /// Only where late subscribers get what was sent before.
+    /// The held message of a transient-local topic.
     latched: Option<Latched<Message>>,
 }
 
-/// What a transient-local topic holds.
+/// The state of a transient-local topic.
 struct Latched<Message> {
     latest: Option<Arc<Message>>,
-    /// Whether the latest has been written.
+    /// True if the latest message has been written.
     is_written: bool,
-    /// Messages that the publisher has written, one that was written twice counted once.
+    /// Messages that the publisher has written; a retransmission does not count.
     written: u64,
-    /// Whether the one message has been written a second time.
+    /// True after the retransmission.
     is_repeated: bool,
-    /// Since when somebody has been there without a break.
+    /// The time since which there has always been a subscriber.
     reader_since: Option<Instant>,
-    /// Whether those who are there have come just now.
+    /// True while the subscribers are newly matched.
     is_settling: bool,
 }
 
@@ -70,13 +69,14 @@ impl<Message> Latched<Message> {
     };
 }
 
-impl<Message: Serialize> Port<Message> {
-    /// A publisher of this message, which is changed before each time it is sent.
+impl<Message: Serialize> TopicWriter<Message> {
+    /// Creates a stream of this message, which is changed before each sending.
     pub(super) fn stream(self, message: Message) -> Stream<Message> {
         Stream { port: self, message: Arc::new(message) }
     }
 
-    /// Sends a message, or holds it until somebody subscribes. What a full queue does not take is counted, and reported once.
+    /// Sends a message, or holds it until there is a subscriber. Messages discarded by a full queue are counted, and reported
+    /// once.
     pub(super) fn send(&mut self, message: Arc<Message>, discarded: &mut u64) {
         if let Some(latched) = &mut self.latched {
             latched.latest = Some(Arc::clone(&message));
@@ -110,7 +110,7 @@ impl<Message: Serialize> Port<Message> {
         is_written
     }
 
-    /// Begins anew with a publisher that has written nothing.
+    /// Replaces the publisher by one without history.
     fn replace(&mut self, node: &mut Node) {
         match node.create_publisher(&self.dds, None) {
             Ok(publisher) => self.publisher = publisher,
@@ -122,15 +122,15 @@ impl<Message: Serialize> Port<Message> {
     }
 }
 
-/// A publisher that knows what late subscribers are to get.
-pub(super) trait Attend {
-    /// Sends what is held where somebody asks for it, and forgets what was sent when the last subscriber has left. To be
-    /// called often.
-    fn attend(&mut self, matches: &Matches, node: &mut Node);
+/// A writer that serves late subscribers.
+pub(super) trait Serviced {
+    /// Sends the held message to new subscribers, and drops the history after the last subscriber has left. Must be called
+    /// often.
+    fn service(&mut self, matches: &Matches, node: &mut Node);
 }
 
-impl<Message: Serialize> Attend for Port<Message> {
-    fn attend(&mut self, matches: &Matches, node: &mut Node) {
+impl<Message: Serialize> Serviced for TopicWriter<Message> {
+    fn service(&mut self, matches: &Matches, node: &mut Node) {
         let Some(latched) = &mut self.latched else { return };
         let readers = matches.readers(self.publisher.guid());
         if !readers.any() {
@@ -142,11 +142,11 @@ impl<Message: Serialize> Attend for Port<Message> {
             return;
         }
         let present = latched.reader_since.get_or_insert_with(Instant::now).elapsed();
-        // Who has not asked for what was sent before awaits what is sent from now on, at once.
+        // A volatile subscriber expects each new message at once.
         latched.is_settling = readers.volatile == 0 && present < SETTLING_TIME;
         let Some(latest) = latched.latest.clone().filter(|_| readers.transient_local > 0) else { return };
         if !latched.is_written && !latched.is_settling {
-            // For those who have not asked for it, it would be news. Of a new publisher they get what comes from now on.
+            // A volatile subscriber would take the held message for a new one. From a new publisher it gets later ones only.
             if readers.volatile > 0 {
                 self.replace(node);
             }
@@ -158,15 +158,15 @@ impl<Message: Serialize> Attend for Port<Message> {
     }
 }
 
-impl<Message: Serialize> Attend for Stream<Message> {
-    fn attend(&mut self, matches: &Matches, node: &mut Node) {
-        self.port.attend(matches, node);
+impl<Message: Serialize> Serviced for Stream<Message> {
+    fn service(&mut self, matches: &Matches, node: &mut Node) {
+        self.port.service(matches, node);
     }
 }
 
-/// A publisher whose message is changed from frame to frame, so that its memory is used again.
+/// A writer whose message is changed from frame to frame, so that its memory is reused.
 pub(super) struct Stream<Message: Serialize> {
-    port: Port<Message>,
+    port: TopicWriter<Message>,
     message: Arc<Message>,
 }
 
@@ -177,15 +177,15 @@ impl<Message: Serialize + Clone> Stream<Message> {
     }
 }
 
-/// Makes the publishers of one node.
-pub(super) struct Maker<'a> {
+/// Creates the writers of one node.
+pub(super) struct WriterFactory<'a> {
     pub(super) context: Context,
     pub(super) node: Node,
     pub(super) config: &'a Ros2Config,
 }
 
-impl Maker<'_> {
-    /// As [`Maker::port`], for what is sent with every frame: `each` bytes a handle, `message` being filled later.
+impl WriterFactory<'_> {
+    /// As [`WriterFactory::port`], for a message of every frame with `each` bytes a handle. `message` is filled later.
     pub(super) fn stream<Message: Serialize>(
         &mut self,
         topic: Topic,
@@ -197,29 +197,29 @@ impl Maker<'_> {
         Ok(port.map(|port| port.stream(message())))
     }
 
-    /// A publisher for `topic` if the scene requests it. `bytes` is the message's size, for a bound of the memory.
+    /// Creates the writer of `topic` if the scene requests it. `bytes` is the message's size, for a bound of the memory.
     pub(super) fn port<Message: Serialize>(
         &mut self,
         topic: Topic,
         bytes: usize,
         rate: f64,
-    ) -> Result<Option<Port<Message>>, Ros2Error> {
+    ) -> Result<Option<TopicWriter<Message>>, Ros2Error> {
         let Some(qos) = self.config.settings.topics.get(&topic) else { return Ok(None) };
         let name = topic.path(&self.config.name);
         let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(format!("topic {name}: {error}"));
         let (participant, type_name) = (self.context.domain_participant(), MessageType::of(topic).dds_name());
-        // Made here and not through the node, whose quality of service knows no limit of memory.
+        // Not created through the node, whose quality of service has no limit of memory.
         let dds = participant
             .create_topic(format!("rt{name}"), type_name, &policies(*qos, bytes, rate), TopicKind::NoKey)
             .map_err(|error| failed(&error))?;
         let publisher = self.node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
         let latched = (qos.durability == Durability::TransientLocal).then_some(Latched::NOTHING);
-        Ok(Some(Port { publisher, dds, topic: name, reported: false, latched }))
+        Ok(Some(TopicWriter { publisher, dds, topic: name, reported: false, latched }))
     }
 }
 
-/// The quality of service on the wire. A full queue refuses at once instead of blocking; it holds what a dead subscriber
-/// leaves unacknowledged during its lease, as far as memory allows.
+/// Returns the quality of service on the wire. A full queue refuses at once instead of blocking. It holds the messages that a
+/// dead subscriber leaves unacknowledged during its lease, as far as memory allows.
 fn policies(qos: Qos, bytes: usize, rate: f64) -> QosPolicies {
     let reliability = match qos.reliability {
         Reliability::Reliable => policy::Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO },
