@@ -30,7 +30,7 @@ pub struct ReplayArguments {
     /// The recording (MCAP) to play
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Send the frames evenly, so many a second, in place of at their recorded times
+    /// Send the frames evenly at this rate, in place of at their recorded times
     #[arg(
         long,
         value_name = "HZ",

@@ -67,7 +67,10 @@ fn only_the_model_knows_the_kinds_of_a_segment() {
     let files = crates().into_iter().flat_map(|name| sources(Path::new(&format!("crates/{name}/src"))));
     let mut seen = 0;
     for file in files.chain(sources(Path::new("src"))) {
-        let matches = std::fs::read_to_string(&file).unwrap().matches("Segment::").count();
+        let text = std::fs::read_to_string(&file).unwrap();
+        // Of `StageSegment::` and its like the name is another.
+        let is_own = |at: usize| !text[..at].ends_with(|before: char| before.is_alphanumeric());
+        let matches = text.match_indices("Segment::").filter(|(at, _)| is_own(*at)).count();
         if file.starts_with("crates/motion/src/model") || file.starts_with("crates/proof") {
             seen += matches;
         } else {

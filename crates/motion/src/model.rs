@@ -26,19 +26,6 @@ pub type Vector = nalgebra::Vector2<f64>;
 mod tests {
     use std::path::Path;
 
-    /// Counts how often a folder's sources, except one subfolder, name a kind of segment.
-    fn kinds_named(folder: &Path, except: &Path) -> usize {
-        let named = |entry: std::io::Result<std::fs::DirEntry>| {
-            let path = entry.unwrap().path();
-            match path.is_dir() {
-                true if path == except => 0,
-                true => kinds_named(&path, except),
-                false => std::fs::read_to_string(&path).unwrap().matches("Segment::").count(),
-            }
-        };
-        std::fs::read_dir(folder).unwrap().map(named).sum()
-    }
-
     /// Returns the lines of product code of a folder that call an elementary function of the standard library.
     fn elementary_calls(folder: &Path) -> Vec<String> {
         let methods = "sin cos sin_cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp exp2 exp_m1 ln \
@@ -64,14 +51,5 @@ mod tests {
     fn elementary_functions_have_the_same_bits_everywhere() {
         let calls = elementary_calls(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"));
         assert!(calls.is_empty(), "{calls:#?}");
-    }
-
-    #[test]
-    fn only_the_model_distinguishes_kinds_of_curves() {
-        let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-        let model = sources.join("model");
-        assert!(kinds_named(&model, Path::new("")) > 10);
-        // The one match is the string of this test.
-        assert_eq!(kinds_named(&sources, &model), 1);
     }
 }
