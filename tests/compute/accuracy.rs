@@ -189,7 +189,7 @@ fn the_choice_is_the_same_every_time() {
         for wish in WISHES {
             let [mut one, mut other] = [(), ()].map(|()| select(&motion, wish, Velocities::Computed).unwrap());
             assert_eq!(one.table.format(), other.table.format());
-            assert_eq!((one.error, one.allowed, one.moments), (other.error, other.allowed, other.moments));
+            assert_eq!((one.error, one.allowed, one.test_points), (other.error, other.allowed, other.test_points));
             let [mut first, mut second] = [(), ()].map(|()| Chain::new(motion.team().handles()));
             other.table.solve(1.0, &mut second).unwrap();
             for time in [0.0, 33.3, 150.0] {
