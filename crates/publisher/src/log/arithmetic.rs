@@ -1,5 +1,5 @@
-//! The arithmetic on which the bits of a frame depend: the processor's instructions and the system's elementary functions.
-//! The log names both, and `verify` compares them with those of its machine.
+//! The arithmetic on which the bits of a frame depend: the processor's instructions and the system's elementary
+//! functions. The log names both, and `verify` compares them with those of its machine.
 
 use std::sync::OnceLock;
 
@@ -21,8 +21,8 @@ pub struct Arithmetic {
     pub architecture: String,
     /// The name of the instructions that read the tables ([`Instructions::name`]).
     pub instructions: String,
-    /// The first 16 digits of a hash over results of the system's elementary functions. Their last digits differ between
-    /// libraries.
+    /// The first 16 digits of a hash over results of the system's elementary functions. Their last digits differ
+    /// between libraries.
     pub elementary_functions: String,
 }
 

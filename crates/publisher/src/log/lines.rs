@@ -1,7 +1,7 @@
 //! The lines of a log: JSON objects, each with a check over all bytes before it.
 //!
-//! [`HashChain`] creates and tests the checks. A line with a wrong check is damaged or forged. It is reported by its number,
-//! before anything is computed.
+//! [`HashChain`] creates and tests the checks. A line with a wrong check is damaged or forged. It is reported by its
+//! number, before anything is computed.
 
 use serde::{Deserialize, Serialize};
 
@@ -40,7 +40,7 @@ pub enum Line {
     StepFinished {
         /// The period.
         tick: u64,
-        /// How it ended, by name.
+        /// Its result, by name.
         code: String,
     },
     /// Periods without a frame: they had passed before it could be computed.
@@ -72,7 +72,8 @@ pub enum Line {
         skipped: u64,
         /// Frames in no hash.
         lost: u64,
-        /// The reason for the end of the run. After an error, the frame of the last period may be published and not logged.
+        /// The reason for the end of the run. After an error, the frame of the last period may be published and not
+        /// logged.
         reason: End,
     },
 }
@@ -220,7 +221,7 @@ impl Line {
 /// Returns the command of a name and a value. Returns `None` for a command that no log has.
 pub(super) fn command_of(name: &str, value: Option<f64>) -> Option<Command> {
     let number = Command::NAMES.iter().position(|known| *known == name)? as u32;
-    // A value that is not a number is null in the log.
+    // NaN is null in the log.
     Command::of_number(number, value.unwrap_or(f64::NAN)).ok()
 }
 
