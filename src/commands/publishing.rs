@@ -17,12 +17,12 @@ use bench_dragon::publisher::transports::{self, Transport, TransportConfig, Tran
 use super::lines::Lines;
 use super::{CommandError, Common, Output, severity_colour, shows_colour};
 
-/// A run's number that no other has.
+/// Returns a new run number.
 pub fn new_run_id() -> u64 {
     RandomState::new().hash_one(realtime_ns())
 }
 
-/// Every transport that this program has.
+/// All transports of this program.
 const TRANSPORTS: [transports::Open; 2] = [transports::iceoryx2::open, ros2_if_built];
 
 #[cfg(feature = "ros2")]

@@ -39,8 +39,8 @@ pub struct RecordArguments {
     /// The file to write; further ones are numbered after it
     #[arg(short, long, value_name = "FILE", required_unless_present = "recover")]
     output: Option<PathBuf>,
-    /// The topics to record, of handles, poses, alerts, stage, status, diagnostics, path, cues (all of which are recorded by
-    /// default), markers, clock, tf
+    /// The topics to record, of handles, poses, alerts, stage, status, diagnostics, path, cues (all of which are
+    /// recorded by default), markers, clock, tf
     #[arg(long, value_name = "TOPICS", value_delimiter = ',', value_parser = topic, conflicts_with = "recover")]
     topics: Vec<Topic>,
     /// Begin another file after so much (1GB, 500MB) or so long (1h, 90s); one begins with every run anyway
@@ -109,9 +109,9 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
     }
 }
 
-/// Passes the feed's events to the thread until the end. After the first frame, obstacles of a later publisher's services do
-/// not end the recording. Without its stage a recording cannot be replayed, so a stage that follows the first frames is
-/// awaited.
+/// Passes the feed's events to the thread until the end. After the first frame, obstacles of a later publisher's
+/// services do not end the recording. Without its stage a recording cannot be replayed, so a stage that follows the
+/// first frames is awaited.
 fn follow(
     feed: &mut Feed,
     queue: &RecordQueue,

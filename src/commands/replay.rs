@@ -1,4 +1,4 @@
-//! `replay`: plays a recording again, as the live publisher that it was made of.
+//! `replay`: plays a recording like a live publisher.
 
 use std::path::PathBuf;
 
@@ -21,7 +21,7 @@ use super::{CommandError, Common, number, stop_on_signals};
 
 /// Nanoseconds that waiting subscribers have before the first frame: unlike a show's, it is not sent again.
 const LEAD_NS: u64 = 500_000_000;
-/// The most cues that room is kept for, whatever a damaged stage states.
+/// The most cues for which memory is reserved, whatever a damaged stage states.
 const MOST_CUES: usize = 1000;
 
 /// Arguments of `replay`.
@@ -65,7 +65,7 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
     if arguments.ros2 {
         scene.ros2.get_or_insert_default();
     }
-    // A recording cannot be conducted.
+    // A recording executes no commands.
     scene.ros2.iter_mut().for_each(|settings| settings.control = false);
     service_name(common.name(), "poses")?;
     let shown = arguments.file.display().to_string();
@@ -132,7 +132,7 @@ impl ReplayArguments {
     }
 }
 
-/// What is offered: what the recording has, in the way that the scene states.
+/// Returns the transports' settings: the topics of the recording, with the scene's settings.
 fn config<'a>(common: &'a Common, scene: &'a Scene, prepared: &Prepared, run_id: u64) -> TransportConfig<'a> {
     let contents = prepared.contents();
     let stage = Stage { run_id, stamp_ns: realtime_ns(), ..contents.stage };
@@ -144,7 +144,7 @@ fn config<'a>(common: &'a Common, scene: &'a Scene, prepared: &Prepared, run_id:
     }
 }
 
-/// What a person wants to know of the recording.
+/// Returns the description of the recording.
 fn start_lines(file: &str, scene: &str, prepared: &Prepared) -> String {
     let contents = prepared.contents();
     let [first, _] = contents.ends;

@@ -111,10 +111,10 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
     session.run(show, &stop)
 }
 
-/// The log as a transport, and how it fares.
+/// The log as a transport, and its result.
 type OpenedLog = (Box<dyn Transport>, LogOutcome);
 
-/// All that the threads of a run have in common.
+/// The settings of a run.
 struct RunSession<'a> {
     common: &'a Common,
     arguments: &'a RunArguments,
@@ -124,18 +124,18 @@ struct RunSession<'a> {
     run_id: u64,
     timeline: Timeline,
     cues: Vec<ReachedCue>,
-    /// The solver and why it was chosen.
+    /// The solver and the reason for its choice.
     solver: String,
 }
 
 impl RunSession<'_> {
-    /// Opens what is published to, publishes, and prints the summary.
+    /// Opens the transports, publishes, and prints the summary.
     fn run(&self, show: Show, stop: &AtomicBool) -> Result<(), CommandError> {
         let scene_hash = bench_dragon::proof::scene_hash(&self.text.text);
         let stage = convert::stage(self.run_id, realtime_ns(), scene_hash, &self.scene.motion, &show);
         let config = TransportConfig::of(self.common.name(), self.scene, self.playback.rate, stage);
         let (mut transports, doors) = open_transports(&config)?;
-        // The last of them: what reaches the log has been published.
+        // The last transport, so that the log has only published frames.
         let log = self.open_log()?.map(|(transport, outcome)| {
             transports.push(transport);
             outcome
@@ -166,7 +166,7 @@ impl RunSession<'_> {
         failure.map_or(Ok(()), |sentence| Err(CommandError::Failed(sentence)))
     }
 
-    /// The log, where one is requested.
+    /// Opens the log, if requested.
     fn open_log(&self) -> Result<Option<OpenedLog>, CommandError> {
         let Some(file) = &self.arguments.log else { return Ok(None) };
         let run = (self.run_id, realtime_ns());
@@ -174,14 +174,14 @@ impl RunSession<'_> {
         Ok(Some(recording_log::open(file, show, self.scene.team().handles())?))
     }
 
-    /// The log of distributions, where one is requested.
+    /// Opens the log of distributions, if requested.
     fn open_histograms(&self) -> Result<Option<HistogramLog>, CommandError> {
         let Some(file) = &self.arguments.histograms else { return Ok(None) };
         let log = HistogramLog::create(file, self.playback.rate, realtime_ns());
         log.map(Some).map_err(|sentence| CommandError::BadInput(format!("--histograms: {sentence}")))
     }
 
-    /// What a person wants to know at the start, on standard error: standard output is for the summary.
+    /// Prints the description of the run on standard error: standard output is for the summary.
     fn print_start(&self, transports: &[Box<dyn Transport>]) {
         if self.common.quiet || self.common.json {
             return;

@@ -1,7 +1,7 @@
 //! The live loop: wait for the deadline, get the frame, pass it to the publishers, count.
 //!
-//! In: a [`FrameSource`] and a [`Clock`]. Out: frames to every [`Publisher`], samples and alerts to a queue that never blocks.
-//! It knows no transport and no solver. [`run`](crate::run) calls [`run_loop`] on one thread and
+//! In: a [`FrameSource`] and a [`Clock`]. Out: frames to every [`Publisher`], samples and alerts to a queue that never
+//! blocks. It knows no transport and no solver. [`run`](crate::run) calls [`run_loop`] on one thread and
 //! [`statistics`], which empties that queue, on another.
 
 pub mod control;
@@ -85,8 +85,8 @@ impl<'a> Outgoing<'a> {
     }
 }
 
-/// A destination of frames. Called on the real-time thread: an implementation must not allocate, lock, log or make a system
-/// call besides its transport's.
+/// A destination of frames. Called on the real-time thread: an implementation must not allocate, lock, log or make a
+/// system call besides its transport's.
 pub trait Publisher {
     /// Sends one frame with its alerts and cues.
     ///
@@ -224,8 +224,8 @@ pub struct Reports {
 
 /// Publishes one frame in each period until `stop` is set or the periods are over.
 ///
-/// A frame is computed in its period, however late. A period that has wholly passed is skipped and counted. Later deadlines
-/// do not shift.
+/// A frame is computed in its period, however late. A period that has wholly passed is skipped and counted. Later
+/// deadlines do not shift.
 ///
 /// # Errors
 /// The first [`PublishError`], with the counts up to the failure.
@@ -330,8 +330,8 @@ fn wait<C: Clock>(
     }
 }
 
-/// Passes the sample, the alerts and the cues to the statistics thread. If its queue is full, the percentiles miss the sample
-/// or the terminal misses the line. The published frame and alert are not affected.
+/// Passes the sample, the alerts and the cues to the statistics thread. If its queue is full, the percentiles miss the
+/// sample or the terminal misses the line. The published frame and alert are not affected.
 fn report(reports: &mut Reports, outgoing: Outgoing<'_>, sample: Sample) {
     for alert in outgoing.alerts {
         let announcement = Announcement::Alert { alert: *alert, time_scale: outgoing.header.time_scale };

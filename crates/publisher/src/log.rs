@@ -1,9 +1,9 @@
 //! `run --log`: a transport that writes a file.
 //!
 //! [`LogPublisher`] is the loop's end. It copies the arrays of a frame into a queue without a lock, an allocation or a
-//! system call. A thread orders them as in the message, hashes them and writes. Unlike `transports::background`, it skips no
-//! frame while there is room. Without room, it records the frame's tick as lost. A frame and its commands are queued
-//! together, or not at all.
+//! system call. A thread orders them as in the message, hashes them and writes. Unlike `transports::background`, it
+//! skips no frame while there is room. Without room, it records the frame's tick as lost. A frame and its commands are
+//! queued together, or not at all.
 
 pub mod arithmetic;
 pub mod hash;
@@ -103,7 +103,8 @@ struct NoStatus;
 /// Creates the file and starts its thread.
 ///
 /// # Errors
-/// [`TransportError::BadInput`] if the file cannot be created, [`TransportError::Failed`] if the thread cannot be started.
+/// [`TransportError::BadInput`] if the file cannot be created, [`TransportError::Failed`] if the thread cannot be
+/// started.
 pub fn open(file: &Path, show: ShowLine, handles: usize) -> Result<(Box<dyn Transport>, LogOutcome), TransportError> {
     let shown = file.display().to_string();
     let refused = |error| TransportError::BadInput(format!("--log: {shown}: {error}, expected a file to write"));
@@ -208,8 +209,8 @@ impl Publisher for LogPublisher {
         Ok(())
     }
 
-    /// Writes zeros to the memory of the next frame. The log's thread has read that memory on another processor; now it is in
-    /// this processor's cache.
+    /// Writes zeros to the memory of the next frame. The log's thread has read that memory on another processor; now it
+    /// is in this processor's cache.
     fn prepare(&mut self) {
         drop(self.queue.write_chunk(self.frame_words.min(MOST_PREPARED)));
     }

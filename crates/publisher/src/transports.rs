@@ -1,8 +1,8 @@
 //! The transports.
 //!
 //! In: a [`TransportConfig`]. Out: for each requested transport, a [`Publisher`] for the loop's thread and a
-//! [`StatusPublisher`] for the statistics thread. Transports know messages, no solver, and not each other. [`background`]
-//! keeps a slow transport off the loop. Called by [`run`](crate::run).
+//! [`StatusPublisher`] for the statistics thread. Transports know messages, no solver, and not each other.
+//! [`background`] keeps a slow transport off the loop. Called by [`run`](crate::run).
 
 pub mod background;
 pub mod iceoryx2;
@@ -92,8 +92,8 @@ impl From<OpenError> for TransportError {
 
 /// A transport.
 ///
-/// It is created before the loop's thread gets its priority, so that the transport's threads do not inherit it. The threads
-/// that use its ends open them: ports of iceoryx2 stay on the thread that made them.
+/// It is created before the loop's thread gets its priority, so that the transport's threads do not inherit it. The
+/// threads that use its ends open them: ports of iceoryx2 stay on the thread that made them.
 pub trait Transport: Send {
     /// Returns a description for people, in one line.
     fn describe(&self) -> String;
@@ -110,8 +110,8 @@ pub trait Transport: Send {
     /// [`TransportError`]
     fn status(&mut self) -> Result<Box<dyn StatusPublisher>, TransportError>;
 
-    /// Serves commands on a thread of this transport and returns `None`. Returns `commands` if the transport has no commands.
-    /// Called once, before the loop's thread starts.
+    /// Serves commands on a thread of this transport and returns `None`. Returns `commands` if the transport has no
+    /// commands. Called once, before the loop's thread starts.
     ///
     /// # Errors
     /// [`TransportError`]

@@ -1,9 +1,9 @@
 //! A subscriber that records: from the feed through a queue to a thread that compresses and writes.
 //!
-//! The feed's end copies each frame, so that a slow disk does not delay it. If the thread is 64 MB behind, the feed's end
-//! waits with the next frame. Frames then stay in the shared memory until the oldest are overwritten, which is a gap in the
-//! recording. The publisher and this process's memory are not affected. Event-driven messages are small and never wait.
-//! Called by the command `record`.
+//! The feed's end copies each frame, so that a slow disk does not delay it. If the thread is 64 MB behind, the feed's
+//! end waits with the next frame. Frames then stay in the shared memory until the oldest are overwritten, which is a
+//! gap in the recording. The publisher and this process's memory are not affected. Event-driven messages are small and
+//! never wait. Called by the command `record`.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -128,8 +128,8 @@ impl RecordThread {
         self.shared.recorded.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Ends the thread after it has written the contents of `queue`. Returns the recording, and the reason if it is incomplete.
-    /// A thread without progress is abandoned.
+    /// Ends the thread after it has written the contents of `queue`. Returns the recording, and the reason if it is
+    /// incomplete. A thread without progress is abandoned.
     pub fn finish(self, queue: RecordQueue) -> (Recorded, Option<UnfinishedError>) {
         drop(queue);
         let (mut left, mut since) = (usize::MAX, Instant::now());

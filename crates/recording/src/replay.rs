@@ -1,9 +1,9 @@
 //! A recording as the loop's frame source.
 //!
-//! In: a [`Recording`] and [`ReplayOptions`]. Out: a [`Replay`], the loop's [`FrameSource`], and a thread that reads ahead into
-//! a queue of bounded size. A frame is due as many periods after the first as in the recording. If the loop skips periods, or
-//! the disk is late, all later frames shift, so that no frame is skipped and none is sent in a burst. Called by the command
-//! `replay`.
+//! In: a [`Recording`] and [`ReplayOptions`]. Out: a [`Replay`], the loop's [`FrameSource`], and a thread that reads
+//! ahead into a queue of bounded size. A frame is due as many periods after the first as in the recording. If the loop
+//! skips periods, or the disk is late, all later frames shift, so that no frame is skipped and none is sent in a burst.
+//! Called by the command `replay`.
 
 mod pass;
 #[cfg(test)]
@@ -339,7 +339,7 @@ impl FrameSource for Replay {
         }
         self.behind += tick - due;
         if let Some(used) = std::mem::replace(&mut self.sent, self.next.take()) {
-            // The ring has a place for every frame.
+            // The ring has room for every frame.
             let _ = self.free.push(used);
         }
         let Some(sent) = self.sent.as_deref_mut() else { return Period::Empty };

@@ -1,5 +1,5 @@
-//! visualization_msgs for RViz and Foxglove: the benches as cubes, the place of a contact, the place of the coming event, and
-//! a sentence.
+//! visualization_msgs for RViz and Foxglove: the benches as cubes, the place of a contact, the place of the coming
+//! event, and a sentence.
 
 use serde::Serialize;
 

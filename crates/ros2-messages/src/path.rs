@@ -38,8 +38,8 @@ impl Path {
     }
 }
 
-/// Returns points along segments with the direction of travel: the ends of every segment, and a point for each turn by five
-/// degrees. `pitch` is the pitch of the spirals, metres per turn.
+/// Returns points along segments with the direction of travel: the ends of every segment, and a point for each turn by
+/// five degrees. `pitch` is the pitch of the spirals, metres per turn.
 fn poses(segments: &[StageSegment], pitch: f64) -> Vec<Pose> {
     let turned: f64 = segments.iter().map(turn_of).sum();
     let turn = TURN.max(turned / MOST_POINTS);

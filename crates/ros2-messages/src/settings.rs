@@ -82,8 +82,9 @@ impl Topic {
 
     /// Returns the default quality of service.
     ///
-    /// All topics are reliable: a default subscription is reliable and gets nothing from a best-effort publisher, while a
-    /// best-effort subscription gets the messages of a reliable publisher. Event-driven messages are kept for late subscribers.
+    /// All topics are reliable: a default subscription is reliable and gets nothing from a best-effort publisher, while
+    /// a best-effort subscription gets the messages of a reliable publisher. Event-driven messages are kept for late
+    /// subscribers.
     pub fn default_qos(self) -> Qos {
         match self {
             Self::Alerts | Self::Stage | Self::Path | Self::Cues => {
@@ -132,7 +133,8 @@ pub struct DiagnosticLimits {
     pub skipped_warn: u64,
     /// Skipped periods for an error; by default a tenth of the loop's rate.
     pub skipped_error: Option<u64>,
-    /// Wake-up lateness for a warning, 99th percentile, seconds; infinite by default: lateness within a period is harmless.
+    /// Wake-up lateness for a warning, 99th percentile, seconds; infinite by default: lateness within a period is
+    /// harmless.
     pub lateness_warn: f64,
     /// The same for an error.
     pub lateness_error: f64,

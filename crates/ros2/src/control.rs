@@ -1,10 +1,10 @@
 //! Commands over ROS 2: the services below `/<name>`, on their own thread.
 //!
-//! The requests use ros2-client's subscriptions, so that the node shows its services; the responses use RustDDS's writers.
-//! ros2-client's `Server` does not fit: it hides the bytes of a request, which determine the mapping ([`mapping`]), and
-//! answers at once. A client whose reply reader is not matched yet would never get that answer, so an answer waits here
-//! ([`Matches`]). A dead client, or one that floods the services, costs the loop nothing: this thread takes the requests, and
-//! the loop executes one command in each period from a queue of bounded length.
+//! The requests use ros2-client's subscriptions, so that the node shows its services; the responses use RustDDS's
+//! writers. ros2-client's `Server` does not fit: it hides the bytes of a request, which determine the mapping
+//! ([`mapping`]), and answers at once. A client whose reply reader is not matched yet would never get that answer, so
+//! an answer waits here ([`Matches`]). A dead client, or one that floods the services, costs the loop nothing: this
+//! thread takes the requests, and the loop executes one command in each period from a queue of bounded length.
 
 mod calls;
 mod endpoints;
@@ -34,8 +34,8 @@ use services::{Call, Response};
 const MOST_CALLS: usize = 16;
 /// The most calls without an answer in all; further calls wait in their readers.
 const MOST_PENDING: usize = 512;
-/// The longest wait of an answer for its client's reply reader. RMW implementations stop after 0.1 s; a loaded machine takes
-/// longer. Other answers do not wait.
+/// The longest wait of an answer for its client's reply reader. RMW implementations stop after 0.1 s; a loaded machine
+/// takes longer. Other answers do not wait.
 const MATCHING_PATIENCE: Duration = Duration::from_secs(2);
 /// The intervals at which requests are polled, and answers while some are pending.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);

@@ -1,7 +1,8 @@
-//! ROS 2 topics, by ros2-client on RustDDS, on their own thread and at their own rate. If a scene requests it, also services
-//! that control the show, on another thread.
+//! ROS 2 topics, by ros2-client on RustDDS, on their own thread and at their own rate. If a scene requests it, also
+//! services that control the show, on another thread.
 //!
-//! In: a scene with `[publish.ros2]` and the process's environment. Out: a [`Transport`]. Called by the list of transports.
+//! In: a scene with `[publish.ros2]` and the process's environment. Out: a [`Transport`]. Called by the list of
+//! transports.
 
 mod control;
 pub mod environment;

@@ -1,8 +1,8 @@
 //! The remote endpoints that RustDDS has matched with the program's own: those that a message reaches.
 //!
-//! RustDDS reports each match once, in the events of its participant, which only this file reads. Called by the topics, which
-//! hold a message until there is a subscriber, and by the services: a response is lost if it is written before the client's
-//! reply reader is matched.
+//! RustDDS reports each match once, in the events of its participant, which only this file reads. Called by the topics,
+//! which hold a message until there is a subscriber, and by the services: a response is lost if it is written before
+//! the client's reply reader is matched.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -78,7 +78,8 @@ impl Matches {
         })
     }
 
-    /// Returns true if a response written to `responses` reaches the client that sent a request from `client` to `requests`.
+    /// Returns true if a response written to `responses` reaches the client that sent a request from `client` to
+    /// `requests`.
     ///
     /// Only Fast DDS names the `reader` of the response in the request. Otherwise every client of that process must be
     /// complete: as many of its readers as of its writers are matched here.

@@ -1,9 +1,10 @@
 //! The writer of one topic: its quality of service, its messages for late and slow subscribers, its discarded messages.
 //!
 //! A transient-local topic holds one message here: the latest. RustDDS keeps more, whatever the depth: unacknowledged
-//! messages, and all others until its cleanup every six seconds. A late subscriber would get all of them first. So a message
-//! without subscribers is held here and not written, and a writer that has kept more than the latest message is replaced
-//! after its last subscriber has left. A subscriber that joins others still gets all that RustDDS keeps, the latest last.
+//! messages, and all others until its cleanup every six seconds. A late subscriber would get all of them first. So a
+//! message without subscribers is held here and not written, and a writer that has kept more than the latest message is
+//! replaced after its last subscriber has left. A subscriber that joins others still gets all that RustDDS keeps, the
+//! latest last.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -23,8 +24,8 @@ use bench_dragon_ros2_messages::settings::{Durability, Qos, Reliability, Topic};
 const LEASE_SECONDS: f64 = 12.0;
 /// RustDDS's own limit.
 const UNACKNOWLEDGED_MESSAGES: f64 = 8192.0;
-/// The time for a newly matched subscriber to match in turn. RustDDS sometimes does not deliver a message sent meanwhile,
-/// although it keeps it.
+/// The time for a newly matched subscriber to match in turn. RustDDS sometimes does not deliver a message sent
+/// meanwhile, although it keeps it.
 const SETTLING_TIME: Duration = Duration::from_millis(200);
 /// The time after which the first message is retransmitted, for a subscriber that took longer.
 const REPETITION_TIME: Duration = Duration::from_millis(1500);
@@ -75,8 +76,8 @@ impl<Message: Serialize> TopicWriter<Message> {
         Stream { port: self, message: Arc::new(message) }
     }
 
-    /// Sends a message, or holds it until there is a subscriber. Messages discarded by a full queue are counted, and reported
-    /// once.
+    /// Sends a message, or holds it until there is a subscriber. Messages discarded by a full queue are counted, and
+    /// reported once.
     pub(super) fn send(&mut self, message: Arc<Message>, discarded: &mut u64) {
         if let Some(latched) = &mut self.latched {
             latched.latest = Some(Arc::clone(&message));
@@ -124,8 +125,8 @@ impl<Message: Serialize> TopicWriter<Message> {
 
 /// A writer that serves late subscribers.
 pub(super) trait Serviced {
-    /// Sends the held message to new subscribers, and drops the history after the last subscriber has left. Must be called
-    /// often.
+    /// Sends the held message to new subscribers, and drops the history after the last subscriber has left. Must be
+    /// called often.
     fn service(&mut self, matches: &Matches, node: &mut Node);
 }
 
@@ -146,7 +147,8 @@ impl<Message: Serialize> Serviced for TopicWriter<Message> {
         latched.is_settling = readers.volatile == 0 && present < SETTLING_TIME;
         let Some(latest) = latched.latest.clone().filter(|_| readers.transient_local > 0) else { return };
         if !latched.is_written && !latched.is_settling {
-            // A volatile subscriber would take the held message for a new one. From a new publisher it gets later ones only.
+            // A volatile subscriber would take the held message for a new one. From a new publisher it gets later ones
+            // only.
             if readers.volatile > 0 {
                 self.replace(node);
             }
@@ -197,7 +199,8 @@ impl WriterFactory<'_> {
         Ok(port.map(|port| port.stream(message())))
     }
 
-    /// Creates the writer of `topic` if the scene requests it. `bytes` is the message's size, for a bound of the memory.
+    /// Creates the writer of `topic` if the scene requests it. `bytes` is the message's size, for a bound of the
+    /// memory.
     pub(super) fn port<Message: Serialize>(
         &mut self,
         topic: Topic,
@@ -218,8 +221,8 @@ impl WriterFactory<'_> {
     }
 }
 
-/// Returns the quality of service on the wire. A full queue refuses at once instead of blocking. It holds the messages that a
-/// dead subscriber leaves unacknowledged during its lease, as far as memory allows.
+/// Returns the quality of service on the wire. A full queue refuses at once instead of blocking. It holds the messages
+/// that a dead subscriber leaves unacknowledged during its lease, as far as memory allows.
 fn policies(qos: Qos, bytes: usize, rate: f64) -> QosPolicies {
     let reliability = match qos.reliability {
         Reliability::Reliable => policy::Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO },

@@ -1,7 +1,8 @@
 //! The command queues: commands to the loop, answers back. They never block.
 //!
-//! [`CommandReceiver`] is the loop's end, [`CommandSender`] the end of a thread that gets commands from clients. The loop
-//! executes at most one command at the beginning of a period, so that each has an exact tick. The queues take turns.
+//! [`CommandReceiver`] is the loop's end, [`CommandSender`] the end of a thread that gets commands from clients. The
+//! loop executes at most one command at the beginning of a period, so that each has an exact tick. The queues take
+//! turns.
 
 use rtrb::{Consumer, Producer, RingBuffer};
 

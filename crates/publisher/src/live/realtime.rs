@@ -1,5 +1,5 @@
-//! Settings of the operating system for a thread with deadlines: timer slack, real-time priority, locked memory, a fixed CPU,
-//! CPUs that stay awake. Called once on the loop's thread, before the loop.
+//! Settings of the operating system for a thread with deadlines: timer slack, real-time priority, locked memory, a
+//! fixed CPU, CPUs that stay awake. Called once on the loop's thread, before the loop.
 
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -27,7 +27,8 @@ pub struct Scheduling {
 }
 
 impl Scheduling {
-    /// Requests the scheduling for the calling thread. The limit of the latency lasts until the returned file is closed.
+    /// Requests the scheduling for the calling thread. The limit of the latency lasts until the returned file is
+    /// closed.
     ///
     /// # Errors
     /// [`CpuError`]. A right that the user does not have is a warning.
@@ -49,8 +50,8 @@ fn set_timer_slack() {
 
 /// Gives this thread the real-time priority `priority` under SCHED_FIFO and locks the memory the process has so far.
 ///
-/// Without the right to either, a warning states how to get it. Memory that is mapped later, such as the queues in shared
-/// memory, is not locked: locking would allocate all of it, used or not.
+/// Without the right to either, a warning states how to get it. Memory that is mapped later, such as the queues in
+/// shared memory, is not locked: locking would allocate all of it, used or not.
 fn become_realtime(priority: u8) {
     // Every priority of PRIORITIES is a valid value.
     let value = ThreadPriorityValue::try_from(priority).unwrap_or(ThreadPriorityValue::MIN);
@@ -73,8 +74,8 @@ fn become_realtime(priority: u8) {
 /// The device for limits of the CPUs' wake-up latency (Linux, Documentation/power/pm_qos_interface.rst).
 const CPU_LATENCY_DEVICE: &str = "/dev/cpu_dma_latency";
 
-/// Limits the wake-up latency of all CPUs to `microseconds` while the returned file is open. With 0, idle CPUs do not sleep.
-/// cyclictest does the same by default.
+/// Limits the wake-up latency of all CPUs to `microseconds` while the returned file is open. With 0, idle CPUs do not
+/// sleep. cyclictest does the same by default.
 ///
 /// Without the right to it, a warning states how to get it.
 fn limit_cpu_latency(microseconds: u32) -> Option<File> {

@@ -1,8 +1,8 @@
 //! Statistics of the loop: percentiles of lateness and step cost, the status once a second, the summary at the end.
 //!
 //! In: samples and alerts from queues. Out: [`LoopStatus`] to every [`StatusPublisher`], alerts to the terminal, a
-//! [`Summary`]. Runs on its own thread, so that the loop's thread computes no percentile, reads no file and prints no line.
-//! [`accumulator`] does the arithmetic.
+//! [`Summary`]. Runs on its own thread, so that the loop's thread computes no percentile, reads no file and prints no
+//! line. [`accumulator`] does the arithmetic.
 
 pub mod accumulator;
 #[cfg(test)]

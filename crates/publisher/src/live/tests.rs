@@ -17,7 +17,7 @@ const SECOND_NS: u64 = 1_000_000_000;
 /// A deadline is rounded down to a nanosecond, and so is the test's.
 const ROUNDING_NS: u64 = 2;
 
-/// What goes wrong in a run; where a list ends, nothing takes any time.
+/// The delays of a run. After the end of a list there is no delay.
 #[derive(Debug, Clone, Default)]
 struct Script {
     wakes: Vec<Wake>,
@@ -34,7 +34,7 @@ impl Script {
     }
 }
 
-/// What the fakes saw, with the clock's nanoseconds.
+/// The calls of the fakes, with the clock's nanoseconds.
 #[derive(Debug, Default)]
 struct Log {
     computed: Vec<(u64, u64)>,
@@ -205,7 +205,7 @@ impl Setup {
     }
 }
 
-/// What holds of every run, `periods` of which elapsed.
+/// Checks a run of which `periods` elapsed.
 fn check(rate: Rate, observed: &Observed, counts: LoopCounts, periods: u64) -> Result<(), TestCaseError> {
     let Log { computed, published, .. } = &observed.log;
     prop_assert_eq!(counts.frames + counts.skipped, periods);
@@ -267,7 +267,7 @@ proptest! {
         let counts = *observed.result.as_ref().unwrap();
         prop_assert_eq!(counts.end, End::Signal);
         prop_assert!(observed.ended_ns >= stop_at_ns && observed.ended_ns <= stop_at_ns + 100_000_000 + held_up_ns);
-        // Those that have wholly passed; the one that has begun, if its frame went out.
+        // The periods that have wholly passed, and the current one if its frame was published.
         let elapsed = counts.frames + counts.skipped;
         prop_assert!(rate.deadline(elapsed.saturating_sub(1)) <= observed.ended_ns + ROUNDING_NS);
         prop_assert!(observed.ended_ns < rate.deadline(elapsed + 1) + ROUNDING_NS);

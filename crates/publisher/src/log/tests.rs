@@ -1,4 +1,4 @@
-//! Logs of the loop on a simulated clock: conducted, held up, cut, and of another machine.
+//! Logs of the loop on a simulated clock: with commands, delays and cuts, and of another machine.
 
 mod setup;
 mod wrong_lines;
@@ -221,7 +221,7 @@ fn the_last_line_says_why_the_run_ended_and_holds_the_periods_after_the_last_fra
     }
 }
 
-/// A file that is full after so many bytes.
+/// A file that is full after some bytes.
 struct Full(usize);
 
 impl std::io::Write for Full {
@@ -255,7 +255,7 @@ fn a_log_of_another_arithmetic_is_compared_with_a_second_solver() {
         let text = scene_text(method, false);
         let run = Setup { text, instructions: Instructions::Portable, ..Setup::new(150) }.run();
         assert_eq!(verified(&run.log).unwrap().verdict, "same", "this machine has those instructions too");
-        // As if it came from a machine that this one is not, whose last digits are others.
+        // As from another machine, with other last digits.
         let foreign = |line: &mut Line| {
             match line {
                 Line::Show(show) => show.arithmetic.instructions = "SVE".to_owned(),

@@ -1,9 +1,9 @@
 //! `verify`: replays the show of a log, tick by tick, and compares.
 //!
-//! In: the lines of a log. Out: a [`Verdict`], or a [`VerifyError`] that names the line. The code of `run` computes the show,
-//! with the instructions that the log names. If this machine lacks those, or its elementary functions round differently,
-//! different bits prove nothing. Then the handles in the line of each second are compared with those of a second solver,
-//! `newton`.
+//! In: the lines of a log. Out: a [`Verdict`], or a [`VerifyError`] that names the line. The code of `run` computes the
+//! show, with the instructions that the log names. If this machine lacks those, or its elementary functions round
+//! differently, different bits prove nothing. Then the handles in the line of each second are compared with those of a
+//! second solver, `newton`.
 
 mod player;
 
@@ -39,8 +39,8 @@ pub enum VerifyError {
 /// The result of `verify`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
-    /// `same`: every bit. `close`: on a machine with another arithmetic, every position within the tolerance. `differs`.
-    /// `nothing`: the log has no second to compare.
+    /// `same`: every bit. `close`: on a machine with another arithmetic, every position within the tolerance.
+    /// `differs`. `nothing`: the log has no second to compare.
     pub verdict: &'static str,
     /// The first difference.
     pub difference: Option<Difference>,

@@ -1,8 +1,8 @@
 //! Keeps a slow transport off the loop by a queue, a thread and a separate rate.
 //!
 //! [`BackgroundPublisher`] is the loop's end. It copies a frame into reserved memory without a lock, an allocation or a
-//! system call. The thread owns the transport's [`Sink`] and takes frames from the queue. If the thread falls behind, it
-//! continues with the newest frame and counts the skipped ones. Called by the ROS 2 transport.
+//! system call. The thread owns the transport's [`Sink`] and takes frames from the queue. If the thread falls behind,
+//! it continues with the newest frame and counts the skipped ones. Called by the ROS 2 transport.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -223,8 +223,8 @@ impl<S: Sink> Worker<S> {
         }
     }
 
-    /// Sends the contents of the queues. Returns the time of the next poll, CLOCK_MONOTONIC in nanoseconds. If the sink is
-    /// slower than the frame rate, this loop never returns, so event-driven messages are sent before each frame.
+    /// Sends the contents of the queues. Returns the time of the next poll, CLOCK_MONOTONIC in nanoseconds. If the sink
+    /// is slower than the frame rate, this loop never returns, so event-driven messages are sent before each frame.
     pub fn send(&mut self, clock: &impl Clock) -> u64 {
         let mut deadline_ns = None;
         loop {

@@ -1,12 +1,13 @@
 //! iceoryx2: frames, alerts, status and stage in shared memory, for any number of processes on this machine.
 //!
-//! [`SharedMemoryPublisher`] lives on the loop's thread, [`StatusSender`] on the statistics thread; both are made there,
-//! since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/alerts`, `/status`,
-//! `/stage`, the event service `<name>/tick` and, if a scene requests it, `<name>/poses32`.
+//! [`SharedMemoryPublisher`] lives on the loop's thread, [`StatusSender`] on the statistics thread; both are made
+//! there, since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/alerts`,
+//! `/status`, `/stage`, the event service `<name>/tick` and, if a scene requests it, `<name>/poses32`.
 //!
-//! A name belongs to one show: the service of commands, `<name>/control`, admits one server and is opened first. iceoryx2
-//! detects by a lock of the operating system whether the server's process lives. So a killed process does not block the
-//! name, and a stopped process keeps it. The other services admit a second publisher: a tunnel to other machines.
+//! A name belongs to one show: the service of commands, `<name>/control`, admits one server and is opened first.
+//! iceoryx2 detects by a lock of the operating system whether the server's process lives. So a killed process does not
+//! block the name, and a stopped process keeps it. The other services admit a second publisher: a tunnel to other
+//! machines.
 
 mod control;
 mod frames;
@@ -38,8 +39,8 @@ use bench_dragon_show::scene::SinglePrecision;
 use frames::{FrameSender, FrameService};
 use queues::{check_room, default_queue};
 
-/// The interval at which the stage, the latest alert and the latest cue are retransmitted to a tunnel. A tunnel keeps no
-/// history for machines that join later.
+/// The interval at which the stage, the latest alert and the latest cue are retransmitted to a tunnel. A tunnel keeps
+/// no history for machines that join later.
 const REPEAT_INTERVAL: Duration = Duration::from_secs(1);
 /// The nodes that may have a service open besides one for each subscriber: the publisher's, and dead nodes that are not
 /// removed yet.
@@ -165,8 +166,8 @@ pub struct SharedMemoryPublisher {
 }
 
 impl SharedMemoryPublisher {
-    /// Opens the services and sends the stage. Must be called on the thread that publishes. The caller ensures that no other
-    /// show has the name: a run calls [`Transport::control`] first.
+    /// Opens the services and sends the stage. Must be called on the thread that publishes. The caller ensures that no
+    /// other show has the name: a run calls [`Transport::control`] first.
     ///
     /// # Errors
     /// [`OpenError`]: each names the cause and the remedy.
@@ -372,8 +373,8 @@ fn sender<Message: ZeroCopySend + std::fmt::Debug + Copy>(
     Ok((port, opened))
 }
 
-/// Retries while a service is incomplete. Its creator either completes it or was killed; then [`stale_files`] removes its
-/// file.
+/// Retries while a service is incomplete. Its creator either completes it or was killed; then [`stale_files`] removes
+/// its file.
 fn retry_while_incomplete<Opened>(open: impl Fn() -> Result<Opened, OpenError>) -> Result<Opened, OpenError> {
     let began = Instant::now();
     loop {

@@ -1,7 +1,7 @@
 //! One MCAP file: its channels, its chunks, and its end.
 //!
-//! The channels are before the first chunk and again in it, so that one damaged copy does no harm. A chunk is half a second
-//! of messages, or 4 MB of them. A finished chunk can be read whatever happens to the rest. Called by the
+//! The channels are before the first chunk and again in it, so that one damaged copy does no harm. A chunk is half a
+//! second of messages, or 4 MB of them. A finished chunk can be read whatever happens to the rest. Called by the
 //! [`recorder`](super::recorder).
 
 use std::collections::BTreeMap;
@@ -20,8 +20,8 @@ use super::disk::Disk;
 use bench_dragon_ros2_messages::MessageType;
 use bench_dragon_ros2_messages::settings::{Durability, Qos, Reliability, Topic};
 
-/// The longest wait of messages for the end of their chunk. A kill may cost at most a second; the rest is a margin for a busy
-/// machine.
+/// The longest wait of messages for the end of their chunk. A kill may cost at most a second; the rest is a margin for
+/// a busy machine.
 const CHUNK_INTERVAL: Duration = Duration::from_millis(500);
 /// The bytes of messages after which a chunk ends early: readers hold whole chunks in memory.
 const CHUNK_BYTES: u64 = 4 << 20;
@@ -133,8 +133,8 @@ impl McapFile {
         Ok(self.bytes_with(batch.bound()) <= limit)
     }
 
-    /// Writes messages, all of them or none, with their own log times or `log_time`. Returns the number of messages of this
-    /// file's topics.
+    /// Writes messages, all of them or none, with their own log times or `log_time`. Returns the number of messages of
+    /// this file's topics.
     ///
     /// # Errors
     /// A failed write.

@@ -98,8 +98,8 @@ impl Messages {
         self.batch.push(Topic::Cues, cue.stamp_ns, sequence, &Stamped::cue(cue));
     }
 
-    /// Fills the messages of a status. The diagnostics compare it with the status `before`, by the default limits: the limits
-    /// of the scene are in no message.
+    /// Fills the messages of a status. The diagnostics compare it with the status `before`, by the default limits: the
+    /// limits of the scene are in no message.
     pub fn status(&mut self, sequence: u32, status: &LoopStatus, alert: Option<&CollisionAlert>, before: &LoopStatus) {
         self.batch.clear();
         self.batch.push(Topic::Status, status.stamp_ns, sequence, &Stamped::status(*status));

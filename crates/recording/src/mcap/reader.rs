@@ -1,8 +1,9 @@
 //! Reads a recording: checks that it can be played, reads its contents, and its chunks one by one.
 //!
-//! In: an MCAP file with an end, of `record` or of another recorder of the same ROS 2 topics. Out: a [`Recording`], which has
-//! frames of a known type; then [`Item`]s, chunk by chunk, in the order of the file. That is the order of reception: log times
-//! decrease if the recording machine's clock was set back. Called by the [`replay`](crate::replay).
+//! In: an MCAP file with an end, of `record` or of another recorder of the same ROS 2 topics. Out: a [`Recording`],
+//! which has frames of a known type; then [`Item`]s, chunk by chunk, in the order of the file. That is the order of
+//! reception: log times decrease if the recording machine's clock was set back. Called by the
+//! [`replay`](crate::replay).
 
 use std::collections::HashMap;
 use std::fmt::Display;

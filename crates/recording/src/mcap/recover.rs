@@ -1,7 +1,7 @@
 //! Repairs a recording that was cut by a kill, a full disk or a loss of power.
 //!
-//! In: the bytes of the file. Out: a complete file with exactly the messages of the finished chunks, in order. Called by the
-//! command `record --recover`.
+//! In: the bytes of the file. Out: a complete file with exactly the messages of the finished chunks, in order. Called
+//! by the command `record --recover`.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
@@ -164,7 +164,8 @@ impl<Input: Read> Records<Input> {
 /// Writes the kept records.
 struct Mender<Output: Write> {
     writer: Writer<NoSeek<Output>>,
-    /// By the file's numbers; the latest definition holds. Those before the first chunk have no check and are repeated in it.
+    /// By the file's numbers; the latest definition holds. Those before the first chunk have no check and are repeated
+    /// in it.
     schemas: BTreeMap<u16, Schema<'static>>,
     channels: BTreeMap<u16, Known>,
     /// True after the first chunk, even a damaged one: messages are then in chunks.
@@ -241,7 +242,8 @@ impl<Output: Write> Mender<Output> {
         Ok(())
     }
 
-    /// Returns true if a record outside of chunks can be of its type. The parser may accept a record with a damaged opcode.
+    /// Returns true if a record outside of chunks can be of its type. The parser may accept a record with a damaged
+    /// opcode.
     fn is_possible(&self, opcode: u8, body: &[u8]) -> bool {
         match opcode {
             // A file has all its messages in chunks, or none.
@@ -294,8 +296,8 @@ impl<Output: Write> Mender<Output> {
         Ok(())
     }
 
-    /// Returns the number in the repaired file of the file's channel `id`. The channel is added with its first message, when
-    /// its definition is complete.
+    /// Returns the number in the repaired file of the file's channel `id`. The channel is added with its first message,
+    /// when its definition is complete.
     fn channel(&mut self, id: u16) -> Result<Option<u16>, RecoverError> {
         let Some(Known { channel, id }) = self.channels.get_mut(&id) else { return Ok(None) };
         if id.is_some() {
@@ -355,8 +357,8 @@ pub(super) fn records_of_chunk(body: &[u8]) -> Result<Vec<Record<'static>>, Mcap
     Ok(records)
 }
 
-/// Returns true if the last record of an uncompressed chunk ends with the chunk: mcap 0.26.0 subtracts the records' lengths
-/// unchecked. A decompressor finds the end of any other chunk.
+/// Returns true if the last record of an uncompressed chunk ends with the chunk: mcap 0.26.0 subtracts the records'
+/// lengths unchecked. A decompressor finds the end of any other chunk.
 fn is_filled(body: &[u8]) -> Result<bool, McapError> {
     let Record::Chunk { header, data } = parse_record(op::CHUNK, body)? else { return Ok(false) };
     let mut left = if header.compression.is_empty() { &*data } else { &[] };

@@ -85,9 +85,9 @@ impl Run {
         }
     }
 
-    /// Returns the log time of a message: its own time, but not before the file's first frame if it belongs to that frame or
-    /// an earlier one. An older message, as a late subscriber gets it, would leave a gap. Ticks are compared, since a clock can
-    /// be set back.
+    /// Returns the log time of a message: its own time, but not before the file's first frame if it belongs to that
+    /// frame or an earlier one. An older message, as a late subscriber gets it, would leave a gap. Ticks are compared,
+    /// since a clock can be set back.
     pub fn log_time(&self, message: &Event) -> u64 {
         let ((stamp_ns, tick), began) = (message.stamp(), self.file_began_stamp_ns);
         match tick.cmp(&self.file_began_tick) {

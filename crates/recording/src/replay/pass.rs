@@ -1,7 +1,7 @@
 //! The frames of a recording from a start to its end, each with its alerts and cues.
 //!
-//! A recorder may receive an alert a little before or after its frame. Frames of a chunk are therefore returned after the
-//! next chunk has been read. Called by the [`replay`](super).
+//! A recorder may receive an alert a little before or after its frame. Frames of a chunk are therefore returned after
+//! the next chunk has been read. Called by the [`replay`](super).
 
 use std::collections::VecDeque;
 

@@ -73,7 +73,7 @@ proptest! {
         for (number, (header, due)) in headers.iter().zip(&due).enumerate() {
             prop_assert_eq!((header.sequence, header.sim_time), (number as u64, number as f64));
             prop_assert_eq!(header.deadline_ns, START_NS + header.tick * PERIOD_NS);
-            // No frame is earlier than recorded, and what has been lost once is not made up for.
+            // No frame is earlier than recorded, and lost time is not made up for.
             let later = header.tick.checked_sub(*due).unwrap();
             prop_assert!(later >= behind, "{later} periods later, {behind} before");
             behind = later;

@@ -1,4 +1,5 @@
-//! The DDS endpoints of the services: subscriptions that return requests as bytes, writers that send responses as bytes.
+//! The DDS endpoints of the services: subscriptions that return requests as bytes, writers that send responses as
+//! bytes.
 //!
 //! The control thread creates and drops them.
 
@@ -85,7 +86,7 @@ pub(super) struct ServiceEndpoint {
     pub(super) requests_guid: GUID,
     pub(super) responses_guid: GUID,
     responses: DataWriter<Vec<u8>, AsTheyAre>,
-    /// What has been reported once.
+    /// The warnings already reported.
     reported: Reported,
 }
 
@@ -138,7 +139,8 @@ impl Endpoints {
     }
 }
 
-/// Returns the quality of service of ROS 2 services: reliable, volatile. A full queue refuses at once instead of blocking.
+/// Returns the quality of service of ROS 2 services: reliable, volatile. A full queue refuses at once instead of
+/// blocking.
 fn policies(depth: i32) -> QosPolicies {
     QosPolicyBuilder::new()
         .reliability(policy::Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO })

@@ -1,9 +1,9 @@
 //! The two incompatible mappings of service calls to DDS.
 //!
-//! `rmw_cyclonedds_cpp` puts 16 bytes of the client before each request and each response. `rmw_fastrtps_cpp` ("enhanced" in
-//! RPC over DDS 1.0, section 7.2.4) identifies the request beside the message. A request of one mapping is random numbers in
-//! the other. All requests here have fixed lengths, so the length determines the mapping, and a request of the other mapping
-//! is never read. Called by the control thread.
+//! `rmw_cyclonedds_cpp` puts 16 bytes of the client before each request and each response. `rmw_fastrtps_cpp`
+//! ("enhanced" in RPC over DDS 1.0, section 7.2.4) identifies the request beside the message. A request of one mapping
+//! is random numbers in the other. All requests here have fixed lengths, so the length determines the mapping, and a
+//! request of the other mapping is never read. Called by the control thread.
 
 /// Bytes that Cyclone puts before a message: its client (8 bytes) and the number of the call (8 bytes).
 const CYCLONE_HEADER: usize = 16;
@@ -18,8 +18,8 @@ pub enum Mapping {
 }
 
 impl Mapping {
-    /// Returns the mapping that `RMW_IMPLEMENTATION` selects, and a warning if the mapping is assumed. `variable` returns the
-    /// value of a variable that is set.
+    /// Returns the mapping that `RMW_IMPLEMENTATION` selects, and a warning if the mapping is assumed. `variable`
+    /// returns the value of a variable that is set.
     pub fn of(variable: impl Fn(&str) -> Option<String>) -> (Self, Option<String>) {
         let value = variable("RMW_IMPLEMENTATION").unwrap_or_default();
         match value.trim() {

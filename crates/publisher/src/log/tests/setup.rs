@@ -36,7 +36,7 @@ pub fn scene_text(extra: &str, alerts_wanted: bool) -> SceneText {
 
 pub const NEWTON: &str = "solver = \"newton\"";
 
-/// Conducts a show from the inside: each frame sends what is next, and takes the answers.
+/// A show with commands: each frame sends the next command and takes the answers.
 pub struct Conducted {
     show: ShowSource,
     door: CommandSender,
@@ -240,7 +240,7 @@ pub fn conducted() -> Run {
     Setup { commands, wakes, ..Setup::new(150) }.run()
 }
 
-/// What is found where a line was changed and every check made anew.
+/// Verifies a log with a changed line and new checks.
 pub fn forged(run: &Run, change: impl Fn(&mut Line) -> bool) -> Result<Verdict, VerifyError> {
     let mut lines = run.lines();
     let changed = lines.iter_mut().filter_map(|line| change(line).then_some(())).count();

@@ -65,7 +65,7 @@ fn a_log_forged_with_right_checks_differs_in_the_second_that_was_forged() {
         own
     }));
     assert!(second == 1 && what.contains("not its hash"), "{second} {what}");
-    // What was commanded, and what came of it.
+    // The commands and their results.
     let (second, .., what) = difference(forged(&run, |line| match line {
         Line::Command { value: Some(value), command, .. } if command == "seek" => {
             *value += 1e-9;
@@ -139,7 +139,7 @@ fn lines_that_no_run_can_have_written_are_refused_with_their_number() {
     let mut lines = run.lines();
     lines.remove(0);
     assert!(problem(verified(&sealed(&lines))).1.contains("expected the line of the show"));
-    // What stands between the last hash and the end.
+    // The lines between the last hash and the end.
     let mut lines = run.lines();
     let end = lines.pop().unwrap();
     let late = Line::Command { tick: 150, command: "hold".to_owned(), value: None, code: Some("done".to_owned()) };

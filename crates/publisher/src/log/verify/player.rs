@@ -55,8 +55,8 @@ struct VerifiedCounts {
 
 /// Seconds by which two arithmetics may differ in the times of events, at which a show ends or pauses.
 const EVENT_TIME: f64 = 1e-9;
-/// The greatest growth of a position error along the chain. The error grows with the speed of the handles, without bound at
-/// a lock. Near a lock it is about sqrt(eps), 1e6 times eps.
+/// The greatest growth of a position error along the chain. The error grows with the speed of the handles, without
+/// bound at a lock. Near a lock it is about sqrt(eps), 1e6 times eps.
 const MOST_GROWTH: f64 = 1e6;
 
 /// The second solver, for a machine with different bits.
@@ -406,8 +406,8 @@ fn listed(lines: &[Line]) -> String {
 mod tests {
     use super::*;
 
-    /// Handles of a head that another arithmetic has rounded to the next place, up to the lock, where they run away from
-    /// every rounding.
+    /// Handles of a head that another arithmetic has rounded to the next place, up to the lock, where they run away
+    /// from every rounding.
     #[test]
     fn handles_of_another_rounding_are_close_up_to_the_lock() {
         let text = include_str!("../../../../../config/paper.toml").replace("accuracy = ", "# ");

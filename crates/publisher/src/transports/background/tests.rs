@@ -16,7 +16,7 @@ use bench_dragon_show::{Frame, ReachedCue};
 
 const HANDLES: usize = 3;
 
-/// What a sink was given.
+/// A message that a sink got.
 #[derive(Debug, PartialEq)]
 enum Sent {
     Frame { tick: u64, x: Vec<f64> },
@@ -120,7 +120,7 @@ fn a_sink_that_is_held_up_costs_frames_and_never_the_loop() {
     while !matches!(sent.recv_timeout(Duration::from_secs(10)).unwrap(), Sent::Alert { .. }) {}
     // Until the queue is empty and has room.
     while sent.recv_timeout(Duration::from_millis(500)).is_ok() {}
-    // What comes once it is free again is sent: the one left over of the burst, and then this.
+    // Once free, the sink sends the frame left of the burst, and then this one.
     publish(&mut publisher, 10 * depth, 0);
     drop(publisher);
     let done = thread.finish();
@@ -184,7 +184,7 @@ fn a_sink_that_never_catches_up_keeps_nothing_but_frames_waiting() {
         match sent {
             Sent::Frame { tick, .. } => {
                 frames += 1;
-                // What had come by then: no frame is older than the queue is deep.
+                // No frame is older than the depth of the queue.
                 assert!(tick + depth + 2 >= came, "frame {tick} when {came} had come");
                 came = (came + 2).min(1000);
             }

@@ -44,7 +44,7 @@ struct Pending {
     instead: Option<Code>,
 }
 
-/// The thread. Dropping it ends it.
+/// The thread. Dropping this value ends the thread.
 pub(super) struct ControlThread {
     stop: Arc<AtomicBool>,
     handle: Option<JoinHandle<()>>,
@@ -82,7 +82,7 @@ impl Drop for ControlThread {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Release);
         if let Some(handle) = self.handle.take() {
-            // A panic has been printed by then.
+            // The thread has printed its panic.
             let _ = handle.join();
         }
     }

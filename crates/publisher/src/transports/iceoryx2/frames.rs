@@ -27,8 +27,8 @@ pub(super) struct FrameService {
     pub(super) service: &'static str,
     /// Poses in a frame.
     pub(super) poses: usize,
-    /// The decimation of the handles, which becomes the service's attribute [`EVERY`]. `None` for all handles. A service that
-    /// others keep open must have the same attribute.
+    /// The decimation of the handles, which becomes the service's attribute [`EVERY`]. `None` for all handles. A
+    /// service that others keep open must have the same attribute.
     pub(super) every: Option<usize>,
 }
 
