@@ -18,7 +18,7 @@ pub struct Playback {
     pub at_end: AtEnd,
     /// Seconds of wall time for which a looping show stands at its end.
     pub end_hold: f64,
-    /// True if the show waits at its start for [`Command::Go`](super::control::Command::Go).
+    /// True if the show waits at its start for [`Command::Go`](bench_dragon_messages::control::Command::Go).
     pub paused: bool,
 }
 
