@@ -195,9 +195,9 @@ fn a_sink_that_never_catches_up_keeps_nothing_but_frames_waiting() {
             Sent::Cue { .. } => unreachable!(),
         }
     }
-    let seldom = |of: fn(&Sent) -> bool| sent.iter().filter(|sent| of(sent)).count();
-    assert_eq!(seldom(|sent| matches!(sent, Sent::Alert { .. })), 100);
-    assert_eq!(seldom(|sent| matches!(sent, Sent::Status { .. })), 999);
+    let count_of = |of: fn(&Sent) -> bool| sent.iter().filter(|sent| of(sent)).count();
+    assert_eq!(count_of(|sent| matches!(sent, Sent::Alert { .. })), 100);
+    assert_eq!(count_of(|sent| matches!(sent, Sent::Status { .. })), 999);
     assert_eq!(worker.counters(), TransportCounters { frames, skipped: 1000 - frames, discarded: 0 });
     assert!(frames < 600, "{frames} of 1000");
 }
