@@ -16,6 +16,11 @@ use serde_json::Value;
 /// The user id of a user without rights.
 const NOBODY: u32 = 65534;
 
+/// Returns the file of the program. Test programs that start no program are built without the program.
+fn executable() -> &'static str {
+    option_env!("CARGO_BIN_EXE_bench-dragon").expect("a test program that is built with the program")
+}
+
 /// A process that does not outlive its test.
 pub struct Process(Child);
 
@@ -173,7 +178,7 @@ impl Place {
 
     /// Returns the program in this place, under its usual name.
     pub fn program(&self) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+        let mut command = Command::new(executable());
         command.current_dir(self.folder());
         command
     }
@@ -249,13 +254,13 @@ fn reading(pipe: Option<impl Read>) -> impl FnOnce() -> Vec<u8> {
 /// Copies the program in another process. In this process, children of other threads would inherit the file open for
 /// writing, and the copy could not be started.
 pub fn copy_program(to: &Path) {
-    let copied = Command::new("cp").arg(env!("CARGO_BIN_EXE_bench-dragon")).arg(to).status().unwrap();
+    let copied = Command::new("cp").arg(executable()).arg(to).status().unwrap();
     assert!(copied.success());
 }
 
 /// Returns the program with a service name that no other test has.
 pub fn program(name: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    let mut command = Command::new(executable());
     command.args(["--name", &unique(name)]);
     command
 }
