@@ -5,6 +5,9 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use bench_dragon::messages::control::Command;
+use bench_dragon::show::scene::cue::{Cue, CueAction};
+use bench_dragon::show::scene::{OnContact, Scene};
+use bench_dragon::soak::conduct::ShowFacts;
 use bench_dragon::soak::conduct::load_generator;
 
 use super::soak::Parent;
@@ -40,11 +43,25 @@ pub fn conduct(common: &Common, arguments: &SoakConductorArguments) -> Result<()
     let scene = common.load_scene()?;
     let rate = arguments.rate.unwrap_or(scene.rate);
     let mut output = std::io::stdout().lock();
-    load_generator::conduct(common.name(), rate, arguments.seed, &stop, &mut |conducted| -> Result<(), CommandError> {
+    load_generator::conduct(common.name(), rate, arguments.seed, facts_of(&scene), &stop, &mut |conducted| -> Result<
+        (),
+        CommandError,
+    > {
         serde_json::to_writer(&mut output, &conducted).map_err(std::io::Error::from)?;
         writeln!(output)?;
         Ok(output.flush()?)
     })
+}
+
+/// Returns the facts of a scene's show. Searches for its events.
+fn facts_of(scene: &Scene) -> ShowFacts {
+    let timeline = scene.motion.timeline(&mut |_| ());
+    let timeline = if scene.alerts.is_some() { timeline } else { timeline.end_only() };
+    let stops = scene.alerts.is_some() && scene.on_contact == OnContact::Stop;
+    let cue = |cue: &Cue| Some((cue.time(&scene.motion, &timeline)?, cue.then == CueAction::Pause));
+    let mut cues = Vec::from_iter(scene.cues.iter().filter_map(cue));
+    cues.sort_by(|a, b| a.0.total_cmp(&b.0));
+    ShowFacts { end: timeline.freeze(stops).time, cues }
 }
 
 /// Requests the state of the show in a loop, so that it always awaits an answer, until it is killed.

@@ -18,7 +18,8 @@ const NOBODY: u32 = 65534;
 
 /// Returns the file of the program. Test programs that start no program are built without the program.
 fn executable() -> &'static str {
-    option_env!("CARGO_BIN_EXE_bench-dragon").expect("a test program that is built with the program")
+    const FILE: Option<&str> = option_env!("CARGO_BIN_EXE_bench-dragon");
+    FILE.expect("a test program that is built with the program")
 }
 
 /// A process that does not outlive its test.

@@ -79,3 +79,21 @@ fn only_the_model_knows_the_kinds_of_a_segment() {
     }
     assert!(seen > 10, "{seen} matches in the model");
 }
+
+/// `tests/run` names the test programs: one that it does not name would never run, and neither would tests of a crate that are no
+/// unit tests.
+#[test]
+fn tests_run_runs_every_test_program() {
+    let run = include_str!("../run");
+    let words: BTreeSet<&str> = run.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
+    let mut programs = 0;
+    for entry in std::fs::read_dir("tests").unwrap().map(|entry| entry.unwrap().path()) {
+        if entry.join("main.rs").exists() || entry.extension().is_some_and(|extension| extension == "rs") {
+            let name = entry.file_stem().unwrap().to_str().unwrap();
+            assert!(words.contains(name), "tests/run does not run {name}");
+            programs += 1;
+        }
+    }
+    assert!((8..=10).contains(&programs), "{programs} test programs");
+    assert!(crates().iter().all(|name| !Path::new(&format!("crates/{name}/tests")).exists()));
+}

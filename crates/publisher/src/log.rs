@@ -249,7 +249,8 @@ impl Transport for Log {
             std::thread::sleep(Duration::from_millis(1));
         }
         if !self.thread.is_finished() {
-            let sentence = format!("--log: {}: write failed, the log is incomplete", self.file.display());
+            let sentence =
+                format!("--log: {}: the file accepts no more data, the log is incomplete", self.file.display());
             fail(&self.shared, sentence);
         }
         let [frames, skipped] = [&self.shared.frames, &self.shared.lost].map(|count| count.load(Ordering::Acquire));

@@ -8,6 +8,8 @@ pub mod commands;
 pub mod load_generator;
 mod record;
 
+pub use answers::ShowFacts;
+
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! The check of responses against the table of commands: the codes and states that the responses so far allow.
 //!
-//! It knows no times, except those that the stage lists: the [`record`](super::record) compares times with frames. A
+//! It knows no times, except those that follow from the scene: the [`record`](super::record) compares times with frames. A
 //! step or a cue may change the state between two responses. Every possible state is kept, and each response removes
 //! the states that would have answered otherwise.
 
@@ -8,37 +8,38 @@ use bench_dragon_messages::control::{Code, Command, RATES, Refusal};
 use bench_dragon_messages::state::PlaybackState;
 use bench_dragon_messages::{ControlResponse, Stage};
 
-/// The facts of a show that its stage lists.
+/// The facts of a show that decide its answers: from its scene, not from the publisher under test.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct ShowFacts {
+pub struct ShowFacts {
     /// Simulated seconds at which it ends.
     pub end: f64,
     /// The times of its cues in their order, each with true if the show waits there.
     pub cues: Vec<(f64, bool)>,
-    /// Cues that the stage has no room for.
-    pub cues_not_listed: usize,
 }
 
 impl ShowFacts {
-    pub fn of(stage: &Stage) -> Self {
-        let cues: Vec<_> = stage.cues_in_use().iter().map(|cue| (cue.time, cue.pauses == 1)).collect();
-        Self { end: stage.freeze_time, cues_not_listed: stage.cues as usize - cues.len(), cues }
+    /// Returns true if a stage has the same end and, as far as it lists them, the same cues.
+    pub(super) fn agree_with(&self, stage: &Stage) -> bool {
+        let listed = stage.cues_in_use().iter().map(|cue| (cue.time, cue.pauses == 1));
+        stage.freeze_time == self.end
+            && stage.cues as usize == self.cues.len()
+            && self.cues.iter().copied().zip(listed).all(|(a, b)| a == b)
     }
 
     /// Returns true if the show waits at a cue at this time.
-    pub fn waits_at(&self, time: f64) -> bool {
-        self.cues_not_listed > 0 || self.cues.iter().any(|cue| cue.1 && cue.0 == time)
+    pub(super) fn waits_at(&self, time: f64) -> bool {
+        self.cues.iter().any(|cue| cue.1 && cue.0 == time)
     }
 
     fn has_pausing_cue(&self) -> bool {
-        self.cues_not_listed > 0 || self.cues.iter().any(|cue| cue.1)
+        self.cues.iter().any(|cue| cue.1)
     }
 
     /// Returns true if this number of cues can be passed at this time. A cue at the time itself may be passed or not.
     fn can_have_passed(&self, cue: u32, time: f64) -> bool {
         let before = self.cues.iter().filter(|cue| cue.0 < time).count();
         let until = self.cues.iter().filter(|cue| cue.0 <= time).count();
-        (before..=until + self.cues_not_listed).contains(&(cue as usize))
+        (before..=until).contains(&(cue as usize))
     }
 }
 

@@ -38,13 +38,17 @@ pub fn conduct<Failed: From<OpenError>>(
     name: &str,
     rate: f64,
     seed: u64,
+    facts: ShowFacts,
     stop: &AtomicBool,
     report: &mut dyn FnMut(Conducted) -> Result<(), Failed>,
 ) -> Result<(), Failed> {
     let mut feed = Feed::new(name, FeedOptions { wake: Wake::Never, frames: Delivery::All })?;
     let mut record = Record::new(seed, rate);
     report(record.conducted())?;
-    let Some(facts) = wait_for_stage(&mut feed, &mut record, stop)? else { return report(record.conducted()) };
+    record.show_is(&facts);
+    if !wait_for_stage(&mut feed, &mut record, &facts, stop)? {
+        return report(record.conducted());
+    }
     let (events, answers) = channel();
     std::thread::scope(|scope| {
         let commands = RandomCommands::new(seed, rate, facts.end);
@@ -74,19 +78,26 @@ pub fn conduct<Failed: From<OpenError>>(
     })
 }
 
-/// Reads until the stage has come. Returns `None` if it does not come in time.
-fn wait_for_stage(feed: &mut Feed, record: &mut Record, stop: &AtomicBool) -> Result<Option<ShowFacts>, OpenError> {
+/// Reads until the stage has come, and compares it with the facts of the scene. Returns false if it does not come in time.
+fn wait_for_stage(
+    feed: &mut Feed,
+    record: &mut Record,
+    facts: &ShowFacts,
+    stop: &AtomicBool,
+) -> Result<bool, OpenError> {
     let began = Instant::now();
-    let mut facts = None;
-    while facts.is_none() && began.elapsed() < START_TIMEOUT && !stop.load(Ordering::Relaxed) {
+    let mut agrees = None;
+    while agrees.is_none() && began.elapsed() < START_TIMEOUT && !stop.load(Ordering::Relaxed) {
         feed.poll(READ_INTERVAL, &mut |event| match event {
-            FeedEvent::Stage(stage) => facts = Some(ShowFacts::of(stage)),
+            FeedEvent::Stage(stage) => agrees = Some(facts.agree_with(stage)),
             FeedEvent::Frame { header, .. } => record.frame(header),
             _ => (),
         })?;
     }
-    facts.iter().for_each(|facts| record.show_is(facts));
-    Ok(facts)
+    if agrees == Some(false) {
+        record.contradict("the stage has another end or other cues than the scene".to_owned());
+    }
+    Ok(agrees.is_some())
 }
 
 /// A command and its answer, with the moments of both.

@@ -42,6 +42,10 @@ pub(super) struct Record {
     most_frames: usize,
     /// Answers whose frame has not come yet.
     waiting: Vec<Answered>,
+    /// The ticks of the latest seeks and restarts that were executed.
+    jumps_at: VecDeque<u64>,
+    /// The ticks at which the latest steps ended.
+    steps_end_at: VecDeque<u64>,
     applied: Histogram<u64>,
     answered: Histogram<u64>,
 }
@@ -56,6 +60,8 @@ impl Record {
             frames: VecDeque::new(),
             most_frames: 100 + (rate * KEPT_SECONDS) as usize,
             waiting: Vec::new(),
+            jumps_at: VecDeque::new(),
+            steps_end_at: VecDeque::new(),
             applied: histogram(),
             answered: histogram(),
         }
@@ -69,23 +75,45 @@ impl Record {
     /// Checks the header of a frame against the one before, and keeps it.
     pub fn frame(&mut self, header: &FrameHeader) {
         if let Some(fault) = self.frames.back().and_then(|before| self.fault_of_frame(before, header)) {
-            self.conducted.contradicted += 1;
-            self.fault(format!("{fault}: {header:?}"));
+            self.contradict(format!("{fault}: {header:?}"));
         }
-        if self.frames.len() == self.most_frames {
-            self.frames.pop_front();
+        if self.frames.len() == self.most_frames
+            && let Some(gone) = self.frames.pop_front()
+            && let Some(next) = self.frames.front()
+            && self.begins_again_unasked(&gone, next)
+        {
+            self.contradict(format!("the show begins again before its end, without a command: {next:?}"));
         }
         self.frames.push_back(*header);
     }
 
+    /// Counts frames that contradict the commands.
+    pub fn contradict(&mut self, fault: String) {
+        self.conducted.contradicted += 1;
+        self.fault(fault);
+    }
+
+    /// Returns true if simulated time jumps between two frames without a seek, a restart or the end of the show. To be called
+    /// once every answer of these periods has come.
+    fn begins_again_unasked(&self, before: &FrameHeader, frame: &FrameHeader) -> bool {
+        before.run_id == frame.run_id
+            && before.tick + 1 == frame.tick
+            && before.epoch != frame.epoch
+            && before.playback_state() != Some(PlaybackState::Ended)
+            && !self.jumps_at.contains(&frame.tick)
+    }
+
     /// Returns the fault of a frame that passes a cue which pauses, or begins the show again at another time than 0.
     fn fault_of_frame(&self, before: &FrameHeader, frame: &FrameHeader) -> Option<&'static str> {
-        let cues = &self.facts.as_ref()?.cues;
+        let ShowFacts { end, cues } = self.facts.as_ref()?;
         let passed = cues.get(before.cue as usize..cues.len().min(frame.cue as usize)).unwrap_or_default();
         let waits = passed.iter().find(|cue| cue.1);
-        let is_next = before.run_id == frame.run_id && before.tick + 1 == frame.tick;
+        // Where a frame between was missed, the show may have waited in it.
+        let is_next = before.run_id == frame.run_id && before.sequence + 1 == frame.sequence;
         let begins_again = before.playback_state() == Some(PlaybackState::Ended) && before.epoch + 1 == frame.epoch;
-        if before.epoch == frame.epoch && waits.is_some_and(|cue| cue.0 != frame.sim_time) {
+        if frame.playback_state() == Some(PlaybackState::Ended) && frame.sim_time != *end {
+            Some("the show ends at another time than its scene")
+        } else if is_next && before.epoch == frame.epoch && waits.is_some_and(|cue| cue.0 != frame.sim_time) {
             Some("the show does not wait at its cue")
         } else if is_next && begins_again && frame.sim_time != 0.0 {
             Some("the show does not begin again at its start")
@@ -105,7 +133,8 @@ impl Record {
             if before.tick + 1 != frame.tick || periods > 0 && waits {
                 return None;
             }
-            if before.time_scale == 0.0 {
+            let follows_a_step = periods > 0 && self.steps_end_at.contains(&frame.tick);
+            if before.time_scale == 0.0 || follows_a_step {
                 return Some(periods);
             }
             (periods, place) = (periods + 1, place - 1);
@@ -149,6 +178,10 @@ impl Record {
         }
         if is_jump(&answered, &answer) {
             self.conducted.jumps += 1;
+            keep(&mut self.jumps_at, answer.tick);
+        }
+        if answered.is_step_that_ran {
+            keep(&mut self.steps_end_at, answer.tick);
         }
         if !answered.is_step_that_ran {
             self.answered.saturating_record(answered.answered_ns.saturating_sub(answered.sent_ns));
@@ -205,6 +238,16 @@ impl Record {
         let of = |histogram: &Histogram<u64>| (!histogram.is_empty()).then(|| Percentiles::of(histogram));
         Conducted { applied_ns: of(&self.applied), answered_ns: of(&self.answered), ..self.conducted.clone() }
     }
+}
+
+/// Ticks that are kept of each kind: those of as many commands as are sent while their frames are kept.
+const MOST_TICKS: usize = 10_000;
+
+fn keep(ticks: &mut VecDeque<u64>, tick: u64) {
+    if ticks.len() == MOST_TICKS {
+        ticks.pop_front();
+    }
+    ticks.push_back(tick);
 }
 
 fn is_jump(answered: &Answered, answer: &ControlResponse) -> bool {

@@ -118,6 +118,9 @@ impl Fit {
     }
 }
 
+/// The least pivot of the fit, as a share of the greatest, that is more than rounding.
+const LEAST_PIVOT: f64 = 1e-15;
+
 /// Returns the coefficients with which A of a follower less A of its front is 1, by least squares.
 fn fitted(span: f64, rear_of: impl Fn(f64) -> Option<f64>) -> Option<Vec<f64>> {
     let scaled = |ahead: f64| 2.0 * ahead / span - 1.0;
@@ -134,6 +137,12 @@ fn fitted(span: f64, rear_of: impl Fn(f64) -> Option<f64>) -> Option<Vec<f64>> {
     let factors = equations.qr();
     let mut ones = DVector::from_element(FITTED_PLACES, 1.0);
     factors.q_tr_mul(&mut ones);
-    let solution = factors.r().solve_upper_triangular(&ones.rows(0, FITTED_DEGREE).clone_owned())?;
+    let triangle = factors.r();
+    let diagonal = || (0..FITTED_DEGREE).map(|row| triangle[(row, row)].abs());
+    // A nearly singular system would have coefficients of rounding errors.
+    if diagonal().fold(f64::INFINITY, f64::min) < LEAST_PIVOT * diagonal().fold(0.0, f64::max) {
+        return None;
+    }
+    let solution = triangle.solve_upper_triangular(&ones.rows(0, FITTED_DEGREE).clone_owned())?;
     Some(solution.iter().copied().collect())
 }

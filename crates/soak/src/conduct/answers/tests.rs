@@ -40,7 +40,7 @@ impl Checked {
             paused: true,
         };
         let times = cues.iter().map(|(time, pauses)| CueTime { time: *time, pauses: *pauses }).collect();
-        let facts = ShowFacts { end: 7.0, cues, cues_not_listed: 0 };
+        let facts = ShowFacts { end: 7.0, cues };
         let mut record = Record::new(1, RATE);
         record.show_is(&facts);
         Self {
@@ -218,7 +218,7 @@ fn after_a_lost_answer_the_next_one_is_the_truth() {
 #[test]
 fn a_cue_that_is_passed_and_a_beginning_elsewhere_are_noticed() {
     let mut record = Record::new(1, RATE);
-    record.show_is(&ShowFacts { end: 7.0, cues: vec![(3.0, true)], cues_not_listed: 0 });
+    record.show_is(&ShowFacts { end: 7.0, cues: vec![(3.0, true)] });
     let frame = |tick, sim_time, cue, playback: PlaybackState, epoch| FrameHeader {
         run_id: 1,
         tick,
