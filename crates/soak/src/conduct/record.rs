@@ -115,7 +115,7 @@ impl Record {
             Some("the show ends at another time than its scene")
         } else if is_next && before.epoch == frame.epoch && waits.is_some_and(|cue| cue.0 != frame.sim_time) {
             Some("the show does not wait at its cue")
-        } else if is_next && begins_again && frame.sim_time != 0.0 {
+        } else if before.tick + 1 == frame.tick && begins_again && frame.sim_time != 0.0 {
             Some("the show does not begin again at its start")
         } else {
             None

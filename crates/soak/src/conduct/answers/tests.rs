@@ -222,6 +222,7 @@ fn a_cue_that_is_passed_and_a_beginning_elsewhere_are_noticed() {
     let frame = |tick, sim_time, cue, playback: PlaybackState, epoch| FrameHeader {
         run_id: 1,
         tick,
+        sequence: tick,
         sim_time,
         time_scale: 1.0,
         cue,
@@ -233,7 +234,15 @@ fn a_cue_that_is_passed_and_a_beginning_elsewhere_are_noticed() {
     record.frame(&frame(1, 3.01, 1, PlaybackState::Playing, 0));
     record.frame(&frame(2, 7.0, 1, PlaybackState::Ended, 0));
     record.frame(&frame(3, 0.02, 0, PlaybackState::Playing, 1));
+    record.frame(&frame(4, 6.0, 0, PlaybackState::Ended, 1));
+    record.frame(&frame(5, 0.0, 0, PlaybackState::Playing, 2));
+    record.frame(&frame(6, 0.0, 0, PlaybackState::Playing, 3));
+    // The frames are kept for a while, since answers may still come.
+    (7..100_000).for_each(|tick| record.frame(&frame(tick, 0.01, 0, PlaybackState::Playing, 3)));
     let faults = record.conducted().faults;
     assert!(faults[0].starts_with("the show does not wait at its cue"), "{faults:?}");
     assert!(faults[1].starts_with("the show does not begin again at its start"), "{faults:?}");
+    assert!(faults[2].starts_with("the show ends at another time"), "{faults:?}");
+    assert!(faults[3].starts_with("the show begins again before its end"), "{faults:?}");
+    assert_eq!(record.conducted().contradicted, 4, "{faults:?}");
 }
