@@ -4,12 +4,12 @@
 //! The publisher and the server are separate processes; `control` reads the state of the publisher.
 //! `tests/python/conduct_page.py` tests the page's transport bar in Debian's Chromium. No test asserts a speed.
 
-use crate::harness;
+use crate::{ONE_AT_A_TIME, harness};
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 
 use harness::{
@@ -311,9 +311,6 @@ fn pages_of_ones_own_are_served_and_nothing_beside_them() {
     assert!(text(&refused.stderr).contains("--pages /nowhere"), "{}", text(&refused.stderr));
 }
 
-/// Chromium uses a whole core.
-static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
-
 fn in_a_browser(scenario: &str) {
     if !can_run(chromium().and_then(|()| python_modules(&["playwright"]))) {
         return;
@@ -321,8 +318,13 @@ fn in_a_browser(scenario: &str) {
     let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let scene = cued_scene(scenario);
     let program = env!("CARGO_BIN_EXE_bench-dragon");
-    let arguments =
-        ["tests/python/conduct_page.py", scenario, program, &unique(&scenario[..6]), scene.to_str().unwrap()];
+    let arguments = [
+        "tests/python/conduct_page.py",
+        scenario,
+        program,
+        &unique(&format!("c_{}", &scenario[..6])),
+        scene.to_str().unwrap(),
+    ];
     let output = Process::start(python().args(arguments)).output_within(320);
     assert!(output.status.success(), "{}", text(&output.stderr));
 }

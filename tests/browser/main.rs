@@ -6,3 +6,6 @@ mod harness;
 mod proved;
 mod several;
 mod view;
+
+/// One browser at a time: a second one would leave neither the processor that it needs.
+static ONE_AT_A_TIME: std::sync::Mutex<()> = std::sync::Mutex::new(());

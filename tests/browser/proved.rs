@@ -1,11 +1,11 @@
 //! The proved results of a show: found by the hash of its scene's text, which the stage carries, and a certificate of
 //! the same text. `tests/python/stage_proofs.py` tests the browser. No test asserts a speed.
 
-use crate::harness;
+use crate::{ONE_AT_A_TIME, harness};
 
 use std::path::{Path, PathBuf};
 use std::process::Output;
-use std::sync::{Mutex, PoisonError};
+use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 
 use harness::{Process, can_run, chromium, json_lines, program, python, python_modules, text, unique};
@@ -150,16 +150,13 @@ fn a_program_is_told_what_is_proved() {
     }
 }
 
-/// Chromium uses a whole core.
-static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
-
 fn in_a_browser(scenario: &str) {
     if !can_run(chromium().and_then(|()| python_modules(&["playwright", "numpy"]))) {
         return;
     }
     let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let script = "tests/python/stage_proofs.py";
-    let arguments = [script, scenario, env!("CARGO_BIN_EXE_bench-dragon"), &unique(&scenario[..6])];
+    let arguments = [script, scenario, env!("CARGO_BIN_EXE_bench-dragon"), &unique(&format!("p_{}", &scenario[..6]))];
     let output = Process::start(python().args(arguments)).output_within(180);
     assert!(output.status.success(), "{}", text(&output.stderr));
 }

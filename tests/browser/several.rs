@@ -2,10 +2,10 @@
 //! `tests/python/several_page.py` tests the browser; `tests/python/psn_peer.py` tests the desk. No test asserts a
 //! speed.
 
-use crate::harness;
+use crate::{ONE_AT_A_TIME, harness};
 
 use std::net::UdpSocket;
-use std::sync::{Mutex, PoisonError};
+use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 
 use harness::{
@@ -226,16 +226,17 @@ fn metrics_and_osc_tell_two_dragons_apart() {
     until([1, 0]);
 }
 
-/// Chromium uses a whole core.
-static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
-
 fn in_a_browser(scenario: &str) {
     if !can_run(chromium().and_then(|()| python_modules(&["playwright", "numpy"]))) {
         return;
     }
     let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let arguments =
-        ["tests/python/several_page.py", scenario, env!("CARGO_BIN_EXE_bench-dragon"), &unique(&scenario[..3])];
+    let arguments = [
+        "tests/python/several_page.py",
+        scenario,
+        env!("CARGO_BIN_EXE_bench-dragon"),
+        &unique(&format!("s_{}", &scenario[..3])),
+    ];
     let output = Process::start(python().args(arguments)).output_within(200);
     println!("{}", text(&output.stdout));
     assert!(output.status.success(), "{}", text(&output.stderr));

@@ -3,10 +3,10 @@
 //! The browser is Debian's Chromium; its tests are in `tests/python/stage_picture.py`, `stage_motion.py`,
 //! `stage_show.py` and `stage_places.py`. No test asserts a speed.
 
-use crate::harness;
+use crate::{ONE_AT_A_TIME, harness};
 
 use std::net::TcpStream;
-use std::sync::{Mutex, PoisonError};
+use std::sync::PoisonError;
 use std::time::Duration;
 
 use bench_dragon::client::clock::monotonic_ns;
@@ -241,9 +241,6 @@ fn an_address_that_cannot_be_used_is_one_sentence() {
     assert_eq!(other.status.code(), Some(2), "{printed}");
     assert!(printed.contains("--listen") && printed.lines().count() == 1, "{printed}");
 }
-
-/// Chromium uses a whole core.
-static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 fn in_a_browser(scenario: &str) {
     run_scenario("tests/python/stage_picture.py", scenario);

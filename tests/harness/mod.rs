@@ -4,11 +4,13 @@
 
 pub mod hosts;
 
+use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -267,7 +269,20 @@ pub fn program(name: &str) -> Command {
 }
 
 pub fn unique(name: &str) -> String {
+    assert_used_by_one_module(name);
     format!("test_{}_{name}", std::process::id())
+}
+
+/// Fails if tests of two modules of one test program use the same name: their services would be the same, or their files.
+fn assert_used_by_one_module(name: &str) {
+    static USERS: Mutex<BTreeMap<String, String>> = Mutex::new(BTreeMap::new());
+    // A test runs on a thread with its name; threads that it starts itself have none.
+    let thread = std::thread::current();
+    let Some((module, _)) = thread.name().and_then(|test| test.split_once("::")) else { return };
+    let mut users = USERS.lock().unwrap_or_else(PoisonError::into_inner);
+    let user = users.entry(name.to_owned()).or_insert_with(|| module.to_owned()).clone();
+    drop(users);
+    assert_eq!(user, module, "the name \"{name}\" is used by tests of two modules");
 }
 
 pub fn python() -> Command {
@@ -394,7 +409,7 @@ pub fn scene_file(name: &str, replacements: &[(&str, &str)]) -> PathBuf {
         assert!(scene.contains(from));
         scene = scene.replace(from, to);
     }
-    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{}.toml", unique(name)));
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{}.toml", unique(&format!("scene_{name}"))));
     std::fs::write(&file, scene).unwrap();
     file
 }

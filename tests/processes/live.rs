@@ -118,13 +118,13 @@ fn a_publisher_that_starts_again_is_no_loss_to_the_python_example() {
     if !can_run(python_modules(&PEER)) {
         return;
     }
-    let name = unique("again");
+    let name = unique("starts_again");
     let arguments = ["examples/python/subscribe.py", "--json", "--seconds", "12", "--name", &name];
     let subscriber = Process::start(python().args(arguments));
-    let scene = scene_file("again", &[("[publish]", "[publish]\nqueue = 120")]);
+    let scene = scene_file("starts_again", &[("[publish]", "[publish]\nqueue = 120")]);
     let summaries = [(); 2].map(|()| {
         let arguments = ["run", "--json", "--rate", "50", "--duration", "2"];
-        summary(&Process::start(program("again").arg("--scene").arg(&scene).args(arguments)).output_within(60))
+        summary(&Process::start(program("starts_again").arg("--scene").arg(&scene).args(arguments)).output_within(60))
     });
     let published = summaries.map(|summary| summary["frames"].as_u64().unwrap());
     let end = json_lines(&subscriber.output_within(60)).pop().unwrap();

@@ -17,7 +17,7 @@ fn in_a_terminal(scenario: &str) {
 
 fn run_script(script: &str, scenario: &str, further: &[&str]) {
     let program = env!("CARGO_BIN_EXE_bench-dragon");
-    let name = unique(&scenario[..6]);
+    let name = unique(&format!("w_{}", &scenario[..6]));
     let arguments = [&[script, scenario, program, &name], further].concat();
     let output = Process::start(python().args(arguments)).output_within(220);
     println!("{}", text(&output.stdout));

@@ -39,5 +39,7 @@ fn source(root: &Path, folder: &str, name: &str) -> Option<String> {
 
 fn files_below(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    entries.flat_map(|path| if path.is_dir() { files_below(&path) } else { Vec::from([path]) }).collect()
+    let is_source = |path: &PathBuf| path.is_dir() || path.extension().is_some_and(|extension| extension == "rs");
+    let sources = entries.filter(is_source);
+    sources.flat_map(|path| if path.is_dir() { files_below(&path) } else { Vec::from([path]) }).collect()
 }
