@@ -168,7 +168,7 @@ pub struct Place {
 
 impl Place {
     pub fn new(name: &str) -> Self {
-        let (folder, prefix) = (tempfile::tempdir().unwrap(), format!("{}_", unique(name)));
+        let (folder, prefix) = (tempfile::tempdir().unwrap(), format!("{}_", unique(&format!("place_{name}"))));
         std::fs::create_dir(folder.path().join("config")).unwrap();
         let settings = format!("[global]\nroot-path = \"{}/root/\"\nprefix = \"{prefix}\"\n", folder.path().display());
         std::fs::write(folder.path().join("config/iceoryx2.toml"), settings).unwrap();
