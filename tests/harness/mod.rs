@@ -313,6 +313,23 @@ pub fn summary(output: &Output) -> Value {
     json_lines(output).pop().unwrap()
 }
 
+/// Ends a process and returns the summary that it prints.
+pub fn stopped(process: Process) -> Value {
+    process.signal(nix::sys::signal::Signal::SIGINT);
+    summary(&process.output_within(60))
+}
+
+/// Waits until a file has `bytes` bytes.
+pub fn wait_for_bytes(file: &Path, bytes: u64) {
+    for _ in 0..3000 {
+        if std::fs::metadata(file).is_ok_and(|data| data.len() >= bytes) {
+            return;
+        }
+        wait(0.02);
+    }
+    panic!("{} has no {bytes} bytes", file.display());
+}
+
 /// Returns the answer of a server of this machine, header and body, or nothing if it does not answer.
 pub fn http_get(url: &str, accept: &str) -> String {
     let (address, _) = url.strip_prefix("http://").unwrap().split_once('/').unwrap();

@@ -1,6 +1,7 @@
 //! Control clients of a publisher that is stopped, dies, or executes a long command: their answers, and the commands
 //! that are not executed any more. The publisher is a separate process. No test asserts a speed.
 
+use crate::control::{control, done};
 use crate::harness;
 
 use std::time::{Duration, Instant};
@@ -8,9 +9,8 @@ use std::time::{Duration, Instant};
 use bench_dragon::client::control::command_client::{Action, CommandClient};
 use bench_dragon::client::control::{ControlError, Controller, PendingCommand};
 use bench_dragon::messages::control::Command as Conduct;
-use harness::{Process, json_lines, long, program, scene_file, text, unique, wait};
+use harness::{Process, long, program, scene_file, text, unique, wait};
 use nix::sys::signal::Signal;
-use serde_json::Value;
 
 fn publisher(name: &str, arguments: &[&str]) -> Process {
     let scene = scene_file(name, &[("accuracy = 1e-9", "solver = \"newton\"")]);
@@ -25,19 +25,6 @@ fn publisher(name: &str, arguments: &[&str]) -> Process {
         wait(0.1);
     }
     panic!("no publisher");
-}
-
-/// Returns the exit code, the response as printed, and the sentence on standard error.
-fn control(name: &str, arguments: &[&str]) -> (i32, Value, String) {
-    let output = program(name).args(["--json", "control"]).args(arguments).output().unwrap();
-    let line = json_lines(&output).pop().unwrap_or(Value::Null);
-    (output.status.code().unwrap(), line, text(&output.stderr))
-}
-
-fn done(name: &str, arguments: &[&str]) -> Value {
-    let (code, line, sentence) = control(name, arguments);
-    assert_eq!((code, &line["code"]), (0, &"done".into()), "{arguments:?}: {line} {sentence}");
-    line
 }
 
 /// Returns the numbers of actions in the order of their answers, each with its result in a word.

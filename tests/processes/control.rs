@@ -34,13 +34,13 @@ fn publisher(name: &str, arguments: &[&str]) -> Process {
 }
 
 /// Returns the exit code, the response as printed, and the sentence on standard error.
-fn control(name: &str, arguments: &[&str]) -> (i32, Value, String) {
+pub fn control(name: &str, arguments: &[&str]) -> (i32, Value, String) {
     let output = program(name).args(["--json", "control"]).args(arguments).output().unwrap();
     let line = json_lines(&output).pop().unwrap_or(Value::Null);
     (output.status.code().unwrap(), line, text(&output.stderr))
 }
 
-fn done(name: &str, arguments: &[&str]) -> Value {
+pub fn done(name: &str, arguments: &[&str]) -> Value {
     let (code, line, sentence) = control(name, arguments);
     assert_eq!((code, &line["code"]), (0, &"done".into()), "{arguments:?}: {line} {sentence}");
     line

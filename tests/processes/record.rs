@@ -11,7 +11,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use harness::{Process, can_run, json_lines, long, program, python, python_modules, root, text, unique, wait};
+use harness::{
+    Process, can_run, json_lines, long, program, python, python_modules, root, stopped, text, unique, wait,
+    wait_for_bytes,
+};
 use mcap::{MessageStream, Summary};
 use nix::sys::signal::Signal;
 use serde_json::Value;
@@ -42,23 +45,6 @@ fn recorder(name: &str, file: &Path, arguments: &[&str]) -> Process {
     command.arg("--default-signal=HUP").arg(program.get_program()).args(program.get_args());
     command.args(["--json", "record", "--output", file.to_str().unwrap()]).args(arguments);
     Process::start(&mut command)
-}
-
-/// Ends a recorder and returns its summary.
-fn stopped(recorder: Process) -> Value {
-    recorder.signal(Signal::SIGINT);
-    harness::summary(&recorder.output_within(60))
-}
-
-/// Waits until a file has `bytes` bytes.
-fn wait_for_bytes(file: &Path, bytes: u64) {
-    for _ in 0..3000 {
-        if std::fs::metadata(file).is_ok_and(|data| data.len() >= bytes) {
-            return;
-        }
-        wait(0.02);
-    }
-    panic!("{} has no {bytes} bytes", file.display());
 }
 
 fn files(summary: &Value) -> Vec<PathBuf> {

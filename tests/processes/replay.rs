@@ -9,7 +9,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use files::{Bytes, Kept, read};
-use harness::{Process, can_run, json_lines, program, python, python_modules, text, unique, wait};
+use harness::{
+    Process, can_run, json_lines, program, python, python_modules, stopped, text, unique, wait, wait_for_bytes,
+};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
@@ -28,23 +30,6 @@ fn scene(folder: &Path, name: &str, queue: u32, added: &str) -> PathBuf {
 fn recorder(name: &str, file: &Path) -> Process {
     let mut command = program(name);
     Process::start(command.args(["--json", "record", "--output", file.to_str().unwrap()]))
-}
-
-/// Ends a process and returns the summary that it prints.
-fn stopped(process: Process) -> Value {
-    process.signal(Signal::SIGINT);
-    harness::summary(&process.output_within(60))
-}
-
-/// Waits until a file has `bytes` bytes.
-fn wait_for_bytes(file: &Path, bytes: u64) {
-    for _ in 0..3000 {
-        if std::fs::metadata(file).is_ok_and(|data| data.len() >= bytes) {
-            return;
-        }
-        wait(0.02);
-    }
-    panic!("{} has no {bytes} bytes", file.display());
 }
 
 fn replay(name: &str, file: &Path, scene: &Path, arguments: &[&str]) -> Command {

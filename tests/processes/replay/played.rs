@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use nix::sys::signal::Signal;
 
 use crate::harness::{Process, program, wait};
+use crate::harness::{stopped, wait_for_bytes};
 use crate::replay::files::{Bytes, Kept, read};
-use crate::replay::{assert_same, recorded_replay, recorder, scene, stopped, wait_for_bytes};
+use crate::replay::{assert_same, recorded_replay, recorder, scene};
 
 /// Frames per second of the recording.
 const RATE: f64 = 40.0;
