@@ -5,7 +5,6 @@
 //! centre.
 
 use bench_dragon::motion::clearance::{ClearanceMonitor, board, least_clearance_all_pairs};
-use bench_dragon::motion::model::Point;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::model::path::Path;
 use bench_dragon::motion::model::separation::{separation_board_board, signed_distance_board_board};
@@ -54,7 +53,7 @@ fn turnaround() -> Path {
 
 /// Returns the path of `config/procession.toml`.
 fn procession() -> Path {
-    let corner = Path::route(Point::new(-30.0, -10.0), 0.0).line(40.0).arc(Side::Left, 6.0, 0.25).line(12.0);
+    let corner = Path::route(0.0).line(40.0).arc(Side::Left, 6.0, 0.25).line(12.0);
     let bends = corner.arc(Side::Right, 5.0, 0.5).line(10.0).arc(Side::Left, 5.0, 0.5).line(120.0);
     bends.build().expect("its segments join")
 }

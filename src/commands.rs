@@ -14,6 +14,7 @@ pub mod draw;
 pub mod events;
 mod lines;
 pub mod metrics;
+mod new_file;
 pub mod plan;
 mod publishing;
 mod realtime_scheduling;
@@ -29,15 +30,16 @@ pub mod verify;
 pub mod view;
 pub mod watch;
 
+use new_file::NewFile;
 use std::ffi::OsString;
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, StdoutLock, Write};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 use anstyle::AnsiColor;
-use bench_dragon::messages::sentence::rounded;
+use bench_dragon::messages::sentence::{self, number, rounded};
 use bench_dragon::messages::state::Severity;
 use bench_dragon::motion::Method;
 use bench_dragon::motion::timeline::Timeline;
@@ -148,18 +150,39 @@ impl From<io::Error> for CommandError {
 
 /// Returns the error for a `file` that cannot be created.
 pub fn not_writable(file: impl std::fmt::Display, error: &io::Error) -> CommandError {
-    CommandError::BadInput(format!("{file}: {error}, expected a file to write"))
+    CommandError::BadInput(sentence::not_writable(file, error))
 }
 
 /// The destination of a command's result: standard output, or a file that the user named.
 pub struct Output {
-    writer: BufWriter<Box<dyn Write>>,
+    writer: BufWriter<Destination>,
+}
+
+enum Destination {
+    Standard(StdoutLock<'static>),
+    File(NewFile),
+}
+
+impl Write for Destination {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Standard(output) => output.write(bytes),
+            Self::File(file) => file.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::Standard(output) => output.flush(),
+            Self::File(file) => file.flush(),
+        }
+    }
 }
 
 impl Output {
     /// Creates an output to standard output.
     pub fn standard() -> Self {
-        Self { writer: BufWriter::new(Box::new(io::stdout().lock())) }
+        Self { writer: BufWriter::new(Destination::Standard(io::stdout().lock())) }
     }
 
     /// Creates an output to a new file.
@@ -167,8 +190,7 @@ impl Output {
     /// # Errors
     /// Bad input: the file cannot be written.
     pub fn file(file: &Path) -> Result<Self, CommandError> {
-        let created = File::create(file).map_err(|error| not_writable(file.display(), &error))?;
-        Ok(Self { writer: BufWriter::new(Box::new(created)) })
+        Ok(Self { writer: BufWriter::new(Destination::File(NewFile::create(file)?)) })
     }
 
     /// Writes a line.
@@ -182,9 +204,13 @@ impl Output {
         Ok(writeln!(self.writer)?)
     }
 
-    /// Writes the buffered rest.
+    /// Writes the buffered rest, and completes a file.
     pub fn finish(mut self) -> Result<(), CommandError> {
-        Ok(self.writer.flush()?)
+        self.writer.flush()?;
+        match self.writer.into_inner().map_err(io::Error::from)? {
+            Destination::Standard(_) => Ok(()),
+            Destination::File(file) => file.finish(),
+        }
     }
 }
 
@@ -195,13 +221,6 @@ pub fn severity_colour(severity: Severity) -> AnsiColor {
         Severity::Warning => AnsiColor::Yellow,
         Severity::Error => AnsiColor::Red,
     }
-}
-
-/// Formats a number with the fewest digits that read back to the same bits.
-pub fn number(value: f64) -> String {
-    let plain = format!("{value}");
-    // Rust writes every zero of a longer one.
-    if plain.len() > 24 { format!("{value:e}") } else { plain }
 }
 
 /// Formats a number for people: to a billionth, rounding errors as zero, very large and very small numbers with an
@@ -220,8 +239,11 @@ pub fn progress_bar(length: u64, common: &Common) -> ProgressBar {
         return ProgressBar::hidden();
     }
     // The template is a constant that a test has parsed.
-    let style = ProgressStyle::with_template("{msg} {wide_bar} {percent} % {eta}");
-    ProgressBar::new(length).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+    let style = ProgressStyle::with_template("{spinner} {msg} {wide_bar} {percent} % {elapsed} ({eta})");
+    let bar = ProgressBar::new(length).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    // A search may stay at one place of the motion for long: the elapsed time still moves.
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
 }
 
 /// Returns all events of a scene, with a progress bar for the long searches.

@@ -69,6 +69,15 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         team.hole_inset
     ))?;
     output.line(&format!("  Path: {}; the head moves at {} m/s.", path(&scene.motion), scene.motion.head_speed()))?;
+    if let Some(placement) = &scene.placement {
+        let (origin, turns) = (placement.origin(), number(placement.rotation_turns()));
+        let mirrored = if placement.is_mirrored() { "mirrored, then " } else { "" };
+        output.line(&format!(
+            "  Placement: the path's coordinates {mirrored}turned by {turns} turns, then moved by ({}, {}) m.",
+            number(origin.x),
+            number(origin.y)
+        ))?;
+    }
     let choice = scene.motion.solver(scene.velocities);
     output.line(&format!("  Solver: {}.", choice.reason))?;
     output.line(match scene.velocities {
@@ -209,7 +218,7 @@ fn proved(scene: &str, file: &Path, common: &Common) -> Result<Vec<String>, Comm
 
 /// Describes the path in words.
 fn path(motion: &Motion) -> String {
-    let outline = motion.outline();
+    let outline = motion.path().outline();
     if let [SegmentOutline { kind: OutlineKind::Spiral { pitch, first, .. }, .. }] = outline.as_slice() {
         let turn = first / std::f64::consts::TAU;
         return format!("inward spiral, {pitch} m per turn, the head starting on turn {}", figure(turn));

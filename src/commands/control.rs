@@ -9,7 +9,7 @@ use bench_dragon::messages::control::{Code, Command};
 use bench_dragon::messages::state::PlaybackState;
 use serde::Serialize;
 
-use super::{CommandError, Common, Output};
+use super::{CommandError, Common, Output, number};
 
 /// Arguments of `control`.
 #[derive(Debug, clap::Args)]
@@ -41,10 +41,10 @@ enum Action {
         /// Seconds since the start of the scene
         time: f64,
     },
-    #[command(about = help(5))]
+    #[command(about = help(5), allow_negative_numbers = true)]
     Step {
         /// Periods of the loop
-        #[arg(default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1 << 53))]
+        #[arg(default_value_t = 1, value_parser = periods)]
         periods: u64,
     },
     #[command(about = help(6))]
@@ -55,6 +55,12 @@ enum Action {
     Release,
     #[command(about = help(9))]
     Go,
+}
+
+fn periods(text: &str) -> Result<u64, String> {
+    const MOST: u64 = 1 << 53;
+    let periods = text.parse().ok().filter(|periods| (1..=MOST).contains(periods));
+    periods.ok_or_else(|| format!("expected a whole number from 1 to {MOST}"))
 }
 
 /// Returns the help of the command of a number.
@@ -76,7 +82,8 @@ struct ResponseLine {
 /// Sends one command and prints its result.
 pub fn control(common: &Common, arguments: &ControlArguments) -> Result<(), CommandError> {
     let timeout = arguments.timeout.map(|seconds| {
-        let sentence = || CommandError::BadInput(format!("--timeout is {seconds}, expected a number of seconds"));
+        let sentence =
+            || CommandError::BadInput(format!("--timeout is {}, expected a number of seconds", number(seconds)));
         Duration::try_from_secs_f64(seconds).map_err(|_| sentence())
     });
     let timeout = timeout.transpose()?;

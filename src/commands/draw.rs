@@ -6,12 +6,12 @@ use bench_dragon::drawing::{Drawing, Extent, Framing, Length, Look, Surroundings
 use bench_dragon::motion::model::Point;
 use bench_dragon::motion::solve::{Chain, Solver, Velocities};
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::show::scene::Scene;
+use bench_dragon::show::scene::{Accepted, Scene};
 use bench_dragon::show::solve_at_or_just_before;
 use serde::Serialize;
 
 use super::solve::time_of;
-use super::{CommandError, Common, Output, figure, progress_bar, search_timeline};
+use super::{CommandError, Common, Output, figure, number, progress_bar, search_timeline};
 
 /// Arguments of `draw`.
 #[derive(Debug, clap::Args)]
@@ -90,6 +90,9 @@ const MOST_MOMENTS: f64 = 2000.0;
 /// Seconds between two moments of an animation, at least: the last one stands as many steps as there are in seconds.
 const LEAST_STEP: f64 = 1e-3;
 
+/// The radius or the width of a picture.
+const VIEW: Accepted = Accepted { least: 1e-9, greatest: 1e9, unit: "metres" };
+
 /// Draws the stage.
 pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandError> {
     let scene = common.load_scene()?;
@@ -121,17 +124,24 @@ pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandErr
 /// Returns the number of steps of --every between two times.
 fn steps(every: f64, from: f64, until: f64) -> Result<u64, CommandError> {
     if !(every.is_finite() && every > 0.0) {
-        return Err(CommandError::BadInput(format!("--every is {every}, expected a number of seconds above 0")));
+        return Err(CommandError::BadInput(format!(
+            "--every is {}, expected a number of seconds above 0",
+            number(every)
+        )));
     }
     if until < from {
-        return Err(CommandError::BadInput(format!("--until is before --from, expected a time from {from} s on")));
+        return Err(CommandError::BadInput(format!(
+            "--until is before --from, expected a time from {} s on",
+            number(from)
+        )));
     }
     // A last picture that rounding puts past --until by less than a part in 10^9 of a step still counts.
     let steps = ((until - from) / every + 1e-9).floor();
     let pictures = steps + 1.0;
     if pictures > MOST {
         return Err(CommandError::BadInput(format!(
-            "--every {every} gives {pictures:e} pictures, expected at most {MOST:e}"
+            "--every {} gives {pictures:e} pictures, expected at most {MOST:e}",
+            number(every)
         )));
     }
     Ok(steps as u64)
@@ -202,9 +212,10 @@ impl<'a> Session<'a> {
         let steps = steps.round();
         if !(1.0..=MOST_MOMENTS).contains(&steps) {
             return Err(CommandError::BadInput(format!(
-                "--animated from {} to {} s has {steps} moments after the first, expected 1 to {MOST_MOMENTS}: change --every",
+                "--animated from {} to {} s has {} moments after the first, expected 1 to {MOST_MOMENTS}: change --every",
                 figure(from),
-                figure(until)
+                figure(until),
+                number(steps)
             )));
         }
         let step = (until - from) / steps;
@@ -271,12 +282,7 @@ impl Pattern {
 impl LookArguments {
     fn look(&self) -> Result<Look, CommandError> {
         let framing = match (self.radius, self.view) {
-            (Some(radius), _) if radius.is_finite() && radius > 0.0 => Framing::Radius(radius),
-            (Some(radius), _) => {
-                return Err(CommandError::BadInput(format!(
-                    "--radius is {radius}, expected a number of metres above 0"
-                )));
-            }
+            (Some(radius), _) => Framing::Radius(VIEW.check("--radius", radius).map_err(CommandError::BadInput)?),
             (None, Some(view)) => view,
             (None, None) => Framing::Everything,
         };
@@ -297,10 +303,23 @@ fn theme(text: &str) -> Result<Theme, String> {
 fn view(text: &str) -> Result<Framing, String> {
     let numbers: Vec<f64> = text.split(',').map(|number| number.trim().parse().unwrap_or(f64::NAN)).collect();
     match numbers[..] {
-        [x, y, across] if x.is_finite() && y.is_finite() && across > 0.0 && across.is_finite() => {
+        [x, y, across] => {
+            for coordinate in [x, y] {
+                Accepted::PLACE.check("a coordinate", coordinate)?;
+            }
+            VIEW.check("the width", across)?;
+            // Fewer digits would be left of the coordinates in the picture.
+            let least = 1e-9 * x.abs().max(y.abs());
+            if across < least {
+                return Err(format!(
+                    "the width is {}, expected at least {} metres there",
+                    number(across),
+                    number(least)
+                ));
+            }
             Ok(Framing::View(Point::new(x, y), across))
         }
-        _ => Err("expected a point and a width above 0 in metres, as in 1.5,2,4".to_owned()),
+        _ => Err("expected a point and a width in metres, as in 1.5,2,4".to_owned()),
     }
 }
 

@@ -9,7 +9,8 @@ use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
 use bench_dragon::show::scene::Scene;
 use serde::Serialize;
 
-use super::{CommandError, Common, Output, expect_exact_motion, figure, not_writable, progress_bar, search_timeline};
+use super::new_file::NewFile;
+use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar, search_timeline};
 
 /// Arguments of `events`.
 #[derive(Debug, clap::Args)]
@@ -99,9 +100,7 @@ fn certified(
     common: &Common,
 ) -> Result<Vec<CertifiedEvent>, CommandError> {
     expect_exact_motion(scene)?;
-    let shown = file.display();
-    let created = std::fs::File::create(file).map_err(|error| not_writable(&shown, &error))?;
-    let mut writer = BufWriter::new(created);
+    let mut writer = BufWriter::new(NewFile::create(file)?);
     let bar = progress_bar(1000, common).with_message("proving");
     let mut write = |line: &certify::CertificateLine| {
         serde_json::to_writer(&mut writer, line).map_err(io::Error::from)?;
@@ -110,8 +109,9 @@ fn certified(
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
     let outcomes = certify::certify(&scene.motion, timeline, text, MOST_STEPS, &mut write, &mut progress);
     bar.finish_and_clear();
-    let outcomes = outcomes.and_then(|outcomes| Ok(writer.flush().map(|()| outcomes)?));
-    outcomes.map_err(|CertifyError::Write(error)| CommandError::Failed(format!("{shown}: {error}")))
+    let outcomes = outcomes.map_err(|CertifyError::Write(error)| error)?;
+    writer.into_inner().map_err(io::Error::from)?.finish()?;
+    Ok(outcomes)
 }
 
 fn enclosure(status: &Status) -> Enclosure {
@@ -125,8 +125,11 @@ fn enclosure(status: &Status) -> Enclosure {
 fn proof_sentence(kind: EventKind, status: &Status) -> String {
     let name = kind.name().replace('_', " ");
     match status {
-        Status::Proved { time_lo, time_hi, .. } => {
-            format!("           Proved: the first {name} is between t = {time_lo} s and {time_hi} s.")
+        Status::Proved { time_lo, time_hi, because, .. } => {
+            let wide =
+                because.as_ref().map(|because| format!(" They are {:.1e} s apart: {because}.", time_hi - time_lo));
+            let wide = wide.unwrap_or_default();
+            format!("           Proved: the first {name} is between t = {time_lo} s and {time_hi} s.{wide}")
         }
         Status::None { time_lo: None } => "           Proved.".to_owned(),
         Status::None { time_lo: Some(time_lo) } => {

@@ -12,7 +12,7 @@ use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use bench_dragon::client::polling::Obstacle;
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::recording::mcap::recorder::{
-    DEFAULT_TOPICS, Recorded, RecordedCounts, Recorder, RecorderConfig, Split, create,
+    DEFAULT_TOPICS, Recorded, RecordedCounts, Recorder, RecorderConfig, Split,
 };
 use bench_dragon::recording::mcap::recover::{RecoverError, Recovered, check_magic, recover};
 use bench_dragon::recording::record::{self, RecordQueue, RecordThread};
@@ -20,6 +20,7 @@ use bench_dragon::ros2_messages::settings::Topic;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
+use super::new_file::NewFile;
 use super::{CommandError, Common, Output, not_writable, progress_bar, stop_on_signals, wall_seconds};
 
 /// Frames that may wait in the shared memory between two polls, for the shortest queue.
@@ -230,40 +231,41 @@ fn mend(common: &Common, file: &Path, arguments: &RecordArguments) -> Result<(),
     // Checked before the output is created.
     let mut input = BufReader::new(input);
     check_magic(&mut input).map_err(bad)?;
-    let output = create(&path, arguments.force).and_then(|file| file.set_len(0).map(|()| file));
-    let output = output.map_err(|error| refused(&path, &error))?;
+    if !arguments.force && path.symlink_metadata().is_ok() {
+        return Err(refused(&path, &io::ErrorKind::AlreadyExists.into()));
+    }
+    let mut output = BufWriter::new(NewFile::create(&path)?);
     let bar = progress_bar(length, common).with_message("mending");
-    let mended = recover(bar.wrap_read(input), length, BufWriter::new(&output));
+    let mended = recover(bar.wrap_read(input), length, &mut output);
     bar.finish_and_clear();
-    let mended = mended.and_then(|recovered| output.sync_all().map(|()| recovered).map_err(RecoverError::Write));
-    let recovered = mended.map_err(|error| {
-        // An incomplete output is removed.
-        let _ = std::fs::remove_file(&path);
-        match error {
-            RecoverError::Write(error) => CommandError::Failed(format!("{}: {error}", path.display())),
-            other => bad(other),
-        }
+    let recovered = mended.map_err(|error| match error {
+        RecoverError::Write(error) => error.into(),
+        other => bad(other),
     })?;
+    output.into_inner().map_err(io::Error::from)?.finish()?;
     let mut lines = Output::standard();
     let output = path.display().to_string();
-    if common.json {
-        lines.json(&MendedLine { file: shown, output, recovered })?;
-        return lines.finish();
-    }
     let Recovered { chunks, messages, damaged, lost_messages, unknown, lost_bytes, whole, .. } = recovered;
-    lines.line(&format!("{output} has the {messages} messages of {chunks} finished chunks of {shown}."))?;
-    if damaged > 0 {
-        lines.line(&format!("Left out: {damaged} damaged records, with at least {lost_messages} messages."))?;
+    if common.json {
+        lines.json(&MendedLine { file: shown.clone(), output, recovered })?;
+    } else {
+        lines.line(&format!("{output} has the {messages} messages of {chunks} finished chunks of {shown}."))?;
+        if damaged > 0 {
+            lines.line(&format!("Left out: {damaged} damaged records, with at least {lost_messages} messages."))?;
+        }
+        if unknown > 0 {
+            lines.line(&format!("Left out: {unknown} messages whose channel cannot be read."))?;
+        }
+        if lost_bytes > 0 {
+            lines.line(&format!("Lost: {lost_bytes} bytes behind lengths that cannot be."))?;
+        }
+        lines.line(if whole { "The file has its end." } else { "The file was cut before its end." })?;
     }
-    if unknown > 0 {
-        lines.line(&format!("Left out: {unknown} messages whose channel cannot be read."))?;
+    lines.finish()?;
+    if messages == 0 {
+        return Err(CommandError::Failed(format!("no message of {shown} could be read")));
     }
-    match lost_bytes {
-        _ if whole => lines.line("Nothing had been cut off.")?,
-        0 => lines.line("It was cut between two records.")?,
-        _ => lines.line(&format!("Lost: the last {lost_bytes} bytes, from the first record that cannot be read."))?,
-    }
-    lines.finish()
+    Ok(())
 }
 
 /// Returns the error for a file that cannot be created.

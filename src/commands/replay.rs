@@ -126,7 +126,7 @@ impl ReplayArguments {
             None => Pace::Recorded(checked(Accepted::TIME_SCALE, "--time-scale", self.time_scale)?),
         };
         if let Some(start) = self.start.filter(|start| !start.is_finite()) {
-            return Err(CommandError::BadInput(format!("--start is {start}, expected simulated seconds")));
+            return Err(CommandError::BadInput(format!("--start is {}, expected simulated seconds", number(start))));
         }
         Ok(ReplayOptions { pace, start: self.start, looping: self.looping })
     }

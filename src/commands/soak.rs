@@ -1,7 +1,6 @@
 //! `soak`: a publisher and subscribers as processes for hours, and a verdict. It starts `soak-subscriber`.
 
 use std::ffi::OsString;
-use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -25,7 +24,7 @@ use indicatif::ProgressBar;
 use nix::sys::signal::{SigSet, Signal};
 
 use super::realtime_scheduling::RealtimeScheduling;
-use super::{CommandError, Common, Output, not_writable, progress_bar, stop_on_signals, wall_seconds};
+use super::{CommandError, Common, Output, progress_bar, stop_on_signals, wall_seconds};
 
 /// Sleep of a slow subscriber: longer than a queue of 64 frames lasts at 60 Hz.
 const SLOW_PAUSE: Duration = Duration::from_millis(1500);
@@ -259,26 +258,28 @@ fn with_end(stem: &Path, end: &str) -> OsString {
 
 /// Both files of a report, opened before the test: after eight hours a failure would be too late.
 struct ReportFiles {
-    json: File,
-    html: File,
+    json: Output,
+    html: Output,
 }
 
 impl ReportFiles {
     fn create(stem: &Path) -> Result<Self, CommandError> {
         let create = |end: &str| {
-            let name = with_end(stem, end);
-            let shown = format!("--report: {}", Path::new(&name).display());
-            File::create(&name).map_err(|error| not_writable(shown, &error))
+            Output::file(Path::new(&with_end(stem, end))).map_err(|error| match error {
+                CommandError::BadInput(sentence) => CommandError::BadInput(format!("--report: {sentence}")),
+                other => other,
+            })
         };
-        // The publisher creates these again.
+        // The publisher creates these.
         [HISTOGRAMS, LOG].into_iter().try_for_each(|end| create(end).map(drop))?;
         Ok(Self { json: create(".json")?, html: create(".html")? })
     }
 
     fn write(mut self, report: &Report) -> Result<(), CommandError> {
-        serde_json::to_writer(&mut self.json, report).map_err(std::io::Error::from)?;
-        writeln!(self.json)?;
-        Ok(self.html.write_all(report.html().as_bytes())?)
+        self.json.json(report)?;
+        self.json.finish()?;
+        self.html.line(&report.html())?;
+        self.html.finish()
     }
 }
 

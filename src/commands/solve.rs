@@ -96,21 +96,30 @@ impl SolveArguments {
     fn regular_times(&self, every: f64, until: f64, timeline: &Timeline) -> Result<Times, CommandError> {
         let from = self.from;
         if !(every.is_finite() && every > 0.0) {
-            return Err(CommandError::BadInput(format!("--every is {every}, expected a number of seconds above 0")));
+            return Err(CommandError::BadInput(format!(
+                "--every is {}, expected a number of seconds above 0",
+                number(every)
+            )));
         }
         if !(from.is_finite() && from >= 0.0) {
-            return Err(CommandError::BadInput(format!("--from is {from}, expected a number of seconds, at least 0")));
+            return Err(CommandError::BadInput(format!(
+                "--from is {}, expected a number of seconds, at least 0",
+                number(from)
+            )));
         }
         if !(until.is_finite() && until >= from) {
             return Err(CommandError::BadInput(format!(
-                "--until is {until}, expected a number of seconds from {from} on"
+                "--until is {}, expected a number of seconds from {} on",
+                number(until),
+                number(from)
             )));
         }
         // A last row that rounding puts past --until by less than a part in 10^9 of a step still counts.
         let steps = ((until - from) / every + 1e-9).floor();
         if steps >= 1e9 {
             return Err(CommandError::BadInput(format!(
-                "--every {every} gives {steps:e} rows, expected fewer than 1e9"
+                "--every {} gives {steps:e} rows, expected fewer than 1e9",
+                number(every)
             )));
         }
         let end = timeline.end();

@@ -20,7 +20,6 @@ use bench_dragon::messages::{CollisionAlert, LoopStatus};
 use bench_dragon::outputs::monitor::{IntervalReport, Latency, Monitor, Presence};
 use keys::{KEY_INTERVAL, KeyOutcome, Keyboard};
 use serde::Serialize;
-use terminal_size::{Width, terminal_size};
 
 use super::{CommandError, Common, severity_colour, shows_colour, stop_on_signals, wall_seconds};
 
@@ -223,7 +222,8 @@ impl Screen<'_> {
         }
         self.clear_previous(&mut output)?;
         // Some terminals have no known size.
-        let columns = terminal_size().map_or(80, |(Width(columns), _)| columns.into());
+        let columns = rustix::termios::tcgetwinsize(&output).map_or(0, |size| usize::from(size.ws_col));
+        let columns = if columns == 0 { 80 } else { columns };
         writeln!(output, "{}", textwrap::fill(line, textwrap::Options::new(columns).subsequent_indent(INDENT)))?;
         self.draw(&mut output)?;
         Ok(output.flush()?)

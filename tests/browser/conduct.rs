@@ -122,7 +122,10 @@ fn a_program_conducts_over_the_socket_and_sees_the_time_line() {
     let refused = ask(&mut socket, r#"{"command":"seek","value":1e9}"#);
     assert_eq!(
         (&refused["code"], refused["sentence"].as_str().unwrap()),
-        (&"out_of_range".into(), "seek is refused: 1000000000.0 is out of range")
+        (
+            &"out_of_range".into(),
+            "seek is refused: 1000000000 is out of range, expected seconds from 0 to the end of the show"
+        )
     );
     // A cue that is passed is sent with its name.
     ask(&mut socket, r#"{"command":"resume"}"#);

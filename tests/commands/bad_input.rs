@@ -185,6 +185,16 @@ fn arguments_that_cannot_be_used() {
         (vec!["solve", "--at", "0", "-o", "/no/such/folder/table.csv"], "/no/such/folder"),
         (vec!["draw", "--at", "never"], "--at"),
         (vec!["draw", "--radius", "0"], "--radius"),
+        (vec!["draw", "--radius", "1e308"], "--radius is 1e308, expected a number from 1e-9 to 1e9 metres"),
+        (vec!["draw", "--view", "1e308,1e308,1e308"], "a coordinate is 1e308, expected"),
+        (vec!["draw", "--view", "1e16,0,1"], "a coordinate is 1e16, expected a number from -1e9 to 1e9 metres"),
+        (vec!["draw", "--view", "1e9,0,0.1"], "the width is 0.1, expected at least 1 metres there"),
+        (vec!["draw", "--view", "0,0,1e-300"], "the width is 1e-300, expected a number from 1e-9 to 1e9 metres"),
+        (vec!["draw", "--every", "1e-300", "--until", "1", "-o", "%d.svg"], "--every 1e-300 gives 9.99"),
+        (vec!["draw", "--every=-1e300", "--until", "1", "-o", "%d.svg"], "--every is -1e300, expected"),
+        (vec!["run", "--rate", "1e308"], "--rate is 1e308, expected"),
+        (vec!["plan", "speed", "--max-handle-speed", "1e308"], "--max-handle-speed is 1e308, expected"),
+        (vec!["control", "step", "-1"], "'[PERIODS]': expected a whole number from 1 to 9007199254740992"),
         (
             vec!["draw", "--animated", "--every", "1e-5", "--from", "412", "--until", "412.01", "-o", "never.svg"],
             "--every",
@@ -197,6 +207,8 @@ fn arguments_that_cannot_be_used() {
     ] {
         let printed = refusal(&arguments);
         assert!(printed.contains(word), "{arguments:?} is refused without naming {word:?}: {printed}");
+        let digits = printed.split(|letter: char| !letter.is_ascii_digit()).map(str::len).max();
+        assert!(digits < Some(40), "{arguments:?}: {printed}");
     }
 }
 

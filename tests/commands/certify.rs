@@ -6,6 +6,7 @@
 use crate::harness;
 
 mod changes;
+mod second_judge;
 mod tampering;
 mod truth;
 

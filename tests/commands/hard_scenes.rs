@@ -8,7 +8,6 @@ use std::process::Command;
 use bench_dragon::certify::plan::{greatest_speed, least_pitch};
 use bench_dragon::messages::state::EventKind::{self, Contact, Lock, PathEnd, Stall};
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
-use bench_dragon::motion::model::Point;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::model::description::{PathDescription, RouteStep};
 use bench_dragon::motion::model::team::Team;
@@ -143,7 +142,6 @@ fn bends_as_wide_as_a_link_are_searched() {
     for (link, offset) in links.into_iter().flat_map(|link| offsets.map(|offset| (link, offset))) {
         let radius = 0.5 * link * (1.0 + offset);
         let description = PathDescription::Route {
-            start: Point::origin(),
             heading_turns: 0.0,
             steps: vec![
                 RouteStep::Line { length: 3.0 * link },

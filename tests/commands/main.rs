@@ -3,6 +3,8 @@
 mod bad_input;
 mod certify;
 mod draw;
+mod files;
 mod hard_scenes;
 #[path = "../harness/mod.rs"]
 mod harness;
+mod placement;

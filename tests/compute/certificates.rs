@@ -77,6 +77,50 @@ fn the_paper_scene_is_enclosed_to_a_nanosecond() {
     assert_eq!(outcomes[3].status, Status::None { time_lo: None });
 }
 
+/// Returns the paper's scene with one of its lines replaced.
+fn paper_with(key: &str, value: &str) -> Scene {
+    let text = std::fs::read_to_string("config/paper.toml").unwrap();
+    let line = text.lines().find(|line| line.starts_with(key)).unwrap().to_owned();
+    Scene::parse(&text.replace(&line, &format!("{key} = {value}")), "changed", "changed").unwrap()
+}
+
+/// Boards that meet slowly, long paths and heavy heads: every enclosure is at most a nanosecond wide.
+#[test]
+fn enclosures_are_a_nanosecond_wide() {
+    let changes = [
+        ("head_length", "2.2"),
+        ("head_length", "6.0"),
+        ("pitch", "0.41"),
+        ("pitch", "0.43"),
+        ("pitch", "0.45"),
+        ("pitch", "1.7"),
+        ("start_turn", "40"),
+    ];
+    let scenes = changes.iter().map(|(key, value)| (format!("{key} {value}"), paper_with(key, value)));
+    let named = ["school", "tight", "wide"].map(|name| (name.to_owned(), load(&format!("config/{name}.toml"))));
+    for (name, scene) in scenes.chain(named) {
+        let (outcomes, timeline) = outcomes(&scene, STEPS);
+        let (wrong, undecided) = compared(&outcomes, &timeline);
+        assert!(wrong.is_empty() && undecided == 0, "{name}: {wrong:?} {outcomes:?}");
+        for outcome in &outcomes {
+            if let Status::Proved { time_lo, time_hi, because, .. } = &outcome.status {
+                assert!(time_hi - time_lo <= 1e-9 && because.is_none(), "{name}: {outcome:?}");
+            }
+        }
+    }
+}
+
+/// Where doubles resolve no nanosecond, the certificate says why.
+#[test]
+fn a_wide_enclosure_has_a_reason() {
+    let (outcomes, _) = outcomes(&paper_with("head_speed", "1e-9"), STEPS);
+    for outcome in &outcomes[..3] {
+        let Status::Proved { time_lo, time_hi, because, .. } = &outcome.status else { panic!("{outcome:?}") };
+        let because = because.as_deref().unwrap_or_default();
+        assert!(time_hi - time_lo > 1e-9 && because.contains("doubles resolve"), "{outcome:?}");
+    }
+}
+
 #[test]
 fn every_scene_of_the_repository_agrees() {
     let long = std::env::var_os("BENCH_DRAGON_LONG").is_some();
@@ -154,13 +198,6 @@ fn random_scenes_agree() {
     assert!(decided * 100 >= 92 * count, "{decided} of {count}");
 }
 
-/// Returns the paper's scene with another pitch.
-fn pitched(pitch: f64) -> Scene {
-    let text = std::fs::read_to_string("config/paper.toml").unwrap();
-    let line = text.lines().find(|line| line.starts_with("pitch")).unwrap().to_owned();
-    Scene::parse(&text.replace(&line, &format!("pitch = {pitch}")), "pitched", "pitched").unwrap()
-}
-
 #[test]
 fn boards_that_pass_within_micrometres_are_told_from_boards_that_touch() {
     // The least pitch with which the head reaches a radius: a little below, two boards touch outside; a little above,
@@ -169,7 +206,7 @@ fn boards_that_pass_within_micrometres_are_told_from_boards_that_touch() {
     let team = *Scene::paper().team();
     let least = bench_dragon::certify::plan::least_pitch(&team, REACH, &mut |_| ()).unwrap().value_lo;
     let contact = |pitch: f64| {
-        let scene = pitched(pitch);
+        let scene = paper_with("pitch", &pitch.to_string());
         let (outcomes, timeline) = outcomes(&scene, MOST_STEPS);
         let (wrong, _) = compared(&outcomes, &timeline);
         assert!(wrong.is_empty(), "{wrong:?}");

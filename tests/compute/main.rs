@@ -1,6 +1,7 @@
 //! Results of the library against independent sources: tables of 50 digits, brute force, other implementations.
 //! These tests start no program, so that they can be built with debug assertions and overflow checks.
 
+mod accepted;
 mod accuracy;
 mod certificates;
 mod display;
@@ -8,9 +9,11 @@ mod events;
 mod greatest_speed;
 #[path = "../harness/mod.rs"]
 mod harness;
+mod kinks;
 mod least_clearance;
 mod oracle;
 mod paths;
+mod placement;
 mod scene;
 mod show;
 mod solvers;

@@ -31,10 +31,12 @@ fn timeline(scene: &Scene) -> Timeline {
     scene.motion.timeline(&mut |_| ())
 }
 
-/// Computes the chain at `travelled` metres with the safe solver.
+/// Computes the chain on the stage at `travelled` metres with the safe solver.
 fn chain_at(scene: &Scene, travelled: f64, chain: &mut Chain) -> bool {
     let newton = Newton::new(scene.motion.path().clone(), *scene.team(), 1.0, Velocities::Computed);
-    newton.solve_at(travelled, chain).is_ok()
+    let solved = newton.solve_at(travelled, chain).is_ok();
+    scene.motion.placement().chain(chain);
+    solved
 }
 
 #[test]

@@ -13,7 +13,6 @@ use std::cell::Cell;
 use std::f64::consts::{PI, TAU};
 
 use bench_dragon::messages::state::EventKind;
-use bench_dragon::motion::model::Point;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::model::description::{PathDescription, RouteStep};
 use bench_dragon::motion::model::team::Team;

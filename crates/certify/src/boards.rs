@@ -1,7 +1,7 @@
 //! Lemmas 2, 3 and 5 of `docs/proofs.md`: boards that are apart over a step, and boards that have a point in common.
 
 use super::capsule::Capsule;
-use super::interval::{Interval, Vector, cross, dot, minus, norm, norm_squared};
+use super::interval::{Interval, Vector, cross, dot, minus, norm, norm_squared, plus};
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::separation::closest_points_board_board;
@@ -41,13 +41,12 @@ impl Shape {
         let along = minus(front.point, rear.point).map(Interval::middle);
         let length = along[0].hypot(along[1]);
         let share = self.inset.over(link);
-        // Every point is s of the way between the handles, s in [-e, 1 + e], and half a width aside. The middle of the
-        // two handles moves no more than both handles do.
+        // "Discs" in Lemma 2: half as much again as both handles move.
         let slack = [front, rear]
             .iter()
             .fold(Interval::ZERO, |sum, capsule| sum + Interval::point(capsule.half) + Interval::point(capsule.radius));
         let off = norm([middle[0] - Interval::point(centre[0]), middle[1] - Interval::point(centre[1])]);
-        let radius = (link * 0.5 + self.inset + self.half_width + slack + off).hi;
+        let radius = (link * 0.5 + self.inset + self.half_width + slack * 1.5 + off).hi;
         let direction = along.map(|part| part / length);
         MovingBoard { front, rear, link, share, half_width: self.half_width, centre, radius, direction }
     }
@@ -144,16 +143,28 @@ impl MovingBoard {
         axis + self.half_width * across.over(self.link).min(Interval::point(length))
     }
 
-    /// Returns true if a point is proved to be in the board at every moment of the step.
+    /// Returns true if a point is proved to be in the board at every moment of the step: "Contact" in Lemma 5.
     pub fn holds(&self, point: Vector) -> bool {
-        let slack =
-            |capsule: &Capsule| Interval::within((Interval::point(capsule.half) + Interval::point(capsule.radius)).hi);
-        let ends = [&self.front, &self.rear].map(|capsule| capsule.point.map(|part| part + slack(capsule)));
-        let [front, rear] = ends;
-        let (along, to) = (minus(front, rear), minus(point, rear));
+        let Self { front, rear, .. } = self;
+        let (from_rear, from_front) = (minus(point, rear.point), minus(point, front.point));
+        let link = minus(front.point, rear.point);
+        // Bounds of the product of a vector with the handle's distance from the middle of its capsule.
+        let moved = |capsule: &Capsule, along: Interval, vector: Vector| {
+            (along.abs() * capsule.half + norm(vector) * capsule.radius).hi
+        };
+        let slack = |capsule: &Capsule| Interval::point(capsule.half) + Interval::point(capsule.radius);
+        let (of_front, of_rear) = (slack(front), slack(rear));
+        let both = plus(from_rear, link);
+        let off = Interval::point(moved(front, dot(from_rear, front.tangent), from_rear))
+            + Interval::point(moved(rear, dot(both, rear.tangent), both))
+            + of_rear * (of_rear + of_front).hi;
+        let reach = dot(from_rear, link) + Interval::within(off.hi);
+        let aside = Interval::point(moved(front, cross(from_rear, front.tangent), from_rear))
+            + Interval::point(moved(rear, cross(from_front, rear.tangent), from_front))
+            + of_rear * of_front.hi;
+        let across = cross(from_rear, link) + Interval::within(aside.hi);
         let square = self.link.square();
-        let reach = dot(to, along);
         let (least, most) = (-(self.share * square), (Interval::ONE + self.share) * square);
-        least.is_below(reach) && reach.is_below(most) && cross(to, along).abs().is_below(self.link * self.half_width)
+        least.is_below(reach) && reach.is_below(most) && across.abs().is_below(self.link * self.half_width)
     }
 }

@@ -37,12 +37,12 @@ pub(super) struct Spanned {
 
 impl Capsule {
     pub fn new(path: &ExactPath, Span(first, last): Span) -> Self {
-        let middle = if first.0 == last.0 { Place(first.0, 0.5 * first.1 + 0.5 * last.1) } else { first };
+        let middle = path.middle(first, last);
         let half = path.length(first, middle).max(path.length(middle, last));
         let curvature = path.curvature(first, last);
         let radius = (Interval::point(curvature) * Interval::point(half).square() * 0.5).hi;
-        let curve = path.curve(middle);
-        Self { middle, point: curve.point(middle.1), tangent: curve.tangent(middle.1), half, radius, curvature }
+        let (point, tangent) = path.at(middle);
+        Self { middle, point, tangent, half, radius, curvature }
     }
 
     /// Returns a bound of |n . x - n . point| over the capsule.
@@ -108,8 +108,7 @@ impl Capsule {
 impl Spanned {
     pub fn new(path: &ExactPath, span: Span) -> Self {
         let Span(first, last) = span;
-        let point = |place: Place| path.curve(place).point(place.1);
-        Self { span, first: point(first), last: point(last), capsule: Capsule::new(path, span) }
+        Self { span, first: path.point(first), last: path.point(last), capsule: Capsule::new(path, span) }
     }
 }
 

@@ -10,7 +10,7 @@ use super::interval::Interval;
 use super::lines::Links;
 use super::path::{Curve, ExactPath, Place};
 use super::search::{LEAST, path_end};
-use super::step::{Chain, Claim, Listed, Obstacle, PADS};
+use super::step::{Chain, Claim, Listed, Obstacle};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::contact::LeastClearance;
@@ -124,7 +124,7 @@ impl<'a> Descent<'a> {
     /// Creates a search from the start to `end`, metres of travel.
     pub fn new(chain: Chain<'a>, end: f64, most_steps: u64) -> Self {
         let step = 0.25 * chain.team.shortest_link();
-        let at = GridPoint::at(Place(0, 0.0), 0.0);
+        let at = GridPoint::at(Place(0, 0.0, 0.0), 0.0);
         let mut descent = Self {
             chain,
             at,
@@ -212,13 +212,13 @@ impl<'a> Descent<'a> {
             let Some(last) = chain.spans(&mut to, &mut end, link) else { return false };
             let Some(window) = chain.until_lock(at, link, &handles[link], &last[link]) else { return false };
             handles.push(Spanned::new(&chain.exact, window));
-            PADS.iter().any(|pads| self.are_apart_behind(handles.clone(), window, *pads))
+            self.are_apart_behind(handles, window)
         })
     }
 
     /// Returns true if all boards are apart while the last of `handles` is anywhere in the window and the others are in
     /// their spans.
-    fn are_apart_behind(&self, handles: Vec<Spanned>, window: Span, pads: f64) -> bool {
+    fn are_apart_behind(&self, handles: Vec<Spanned>, window: Span) -> bool {
         let chain = &self.chain;
         let [mut from, mut to] = [window.0, window.1].map(|place| {
             let mut point = GridPoint::at(place, self.at.travelled);
@@ -228,7 +228,7 @@ impl<'a> Descent<'a> {
         // Lemma 4 applies if handle 1 is lost.
         let is_covered = handles.len() == 2 && chain.start.is_some_and(|start| chain.exact.in_order(start, window.0));
         let links = if is_covered { self.links } else { Links::All };
-        let mut listed = Listed::behind(chain, handles, pads);
+        let mut listed = Listed::behind(chain, handles, f64::INFINITY);
         while listed.handles.len() <= chain.team.benches && !self.is_enough(&listed, links) {
             if listed.extend(&mut from, &mut to, Claim { links, moving: false, clear: false }).is_err() {
                 return false;
@@ -247,7 +247,7 @@ impl<'a> Descent<'a> {
     /// pitch" in `docs/proofs.md`.
     pub fn after_all_further_out(mut self) -> Self {
         self.links = Links::Front;
-        self.chain.start = Some(Place(0, f64::INFINITY));
+        self.chain.start = Some(Place(0, f64::INFINITY, 0.0));
         self
     }
 
@@ -300,15 +300,12 @@ impl<'a> Descent<'a> {
     /// Returns an upper bound of the clearance of two boards with the head anywhere between two places.
     fn upper_between(&self, mut from: GridPoint, mut to: GridPoint, benches: [usize; 2]) -> Option<Upper> {
         let mut middle = from.clone();
-        PADS.iter().find_map(|pads| {
-            let mut first_order =
-                FirstOrderStep::new(&self.chain, &step_points(&mut from, &mut middle, &mut to), *pads);
-            while first_order.listed.handles.len() <= benches[1] + 1 {
-                first_order.extend(step_points(&mut from, &mut middle, &mut to), Links::All).ok()?;
-            }
-            let [one, other] = benches.map(|bench| first_order.board(bench));
-            Some(Upper { value: one.at_most(&other, When::Always), travelled: to.travelled, benches })
-        })
+        let mut first_order = FirstOrderStep::new(&self.chain, &step_points(&mut from, &mut middle, &mut to));
+        while first_order.listed.handles.len() <= benches[1] + 1 {
+            first_order.extend(step_points(&mut from, &mut middle, &mut to), Links::All).ok()?;
+        }
+        let [one, other] = benches.map(|bench| first_order.board(bench));
+        Some(Upper { value: one.at_most(&other, When::Always), travelled: to.travelled, benches })
     }
 
     /// Goes to `target`. Returns the travel that it reached if a step before cannot be shown.
@@ -385,23 +382,9 @@ impl<'a> Descent<'a> {
         Ok(())
     }
 
-    /// Shows a step with growing pads. Returns true if every link behind the head's goes forward, with the spans of
-    /// handles 1 and 2.
+    /// Shows a step. Returns true if every link behind the head's goes forward, with the spans of handles 1 and 2.
     fn show_between(&self, points: &mut StepPoints) -> Result<(bool, Span, Option<Span>), Refused> {
-        let mut refused = None;
-        for pads in PADS {
-            match self.show_with(points, pads) {
-                Err(Refused { obstacle: Obstacle::Link(link), .. }) => {
-                    refused = refused.or(Some(Refused { obstacle: Obstacle::Link(link), nearer: None }));
-                }
-                other => return other,
-            }
-        }
-        Err(refused.unwrap_or(Refused { obstacle: Obstacle::Link(0), nearer: None }))
-    }
-
-    fn show_with(&self, points: &mut StepPoints, pads: f64) -> Result<(bool, Span, Option<Span>), Refused> {
-        let mut first_order = FirstOrderStep::new(&self.chain, points, pads);
+        let mut first_order = FirstOrderStep::new(&self.chain, points);
         while first_order.listed.handles.len() <= self.chain.team.benches
             && !self.is_enough(&first_order.listed, self.links)
         {

@@ -1,5 +1,7 @@
 //! Enclosures of pi, sine and cosine, arctangent and logarithm, from their series.
 
+use std::sync::LazyLock;
+
 use super::interval::Interval;
 
 /// Pi / 2 as a sum of three doubles of 26 bits each: their products with a whole number below 2^27 are exact.
@@ -19,8 +21,7 @@ pub(super) fn pi() -> Interval {
 
 /// Returns sine and cosine of a double.
 ///
-/// x = k pi / 2 + y with |y| <= 0.79. The series of y end with y^19 and y^20. Terms alternate and fall, so the
-/// remainder is below the next term, 0.79^21 / 21! < 2e-22.
+/// x = k pi / 2 + y with |y| <= 0.79, and y is a kept angle and a rest, whose sines and cosines are summed.
 pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     if x.is_nan() || x.abs() > GREATEST_ARGUMENT {
         let any = Interval::within(1.0);
@@ -30,10 +31,15 @@ pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     let [high, middle, low] = HALF_PI.map(|part| Interval::point(part * turns));
     let rest = Interval::point(turns) * Interval { lo: 0.0, hi: HALF_PI_REST };
     let y = Interval::point(x) - high - middle - low - rest;
-    let square = y.square();
-    let remainder = Interval::within(2e-22);
-    let sine = y * (alternating(square, &ODD) + remainder);
-    let cosine = alternating(square, &EVEN) + remainder;
+    // y = k / 32 + z with |z| <= 0.016: the series of z end with z^9 and z^10, with remainders below 1e-22.
+    let k = (y.middle() * PER_RADIAN).round();
+    let (kept_sine, kept_cosine) = NEAR[k.abs() as usize];
+    let kept_sine = if k < 0.0 { -kept_sine } else { kept_sine };
+    let z = y - Interval::point(k / PER_RADIAN);
+    let square = z.square();
+    let sine = z * (alternating(square, &ODD[..4]) + Interval::within(1e-22));
+    let cosine = alternating(square, &EVEN[..5]) + Interval::within(1e-22);
+    let (sine, cosine) = (kept_sine * cosine + kept_cosine * sine, kept_cosine * cosine - kept_sine * sine);
     let within = |value: Interval| Interval { lo: value.lo.max(-1.0), hi: value.hi.min(1.0) };
     let (sine, cosine) = (within(sine), within(cosine));
     // A whole number below 2^27 is exact in both types.
@@ -45,18 +51,45 @@ pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     }
 }
 
-/// Divisors of the terms of the sine, n (n - 1): each term is the term before it times -y^2 over this.
-const ODD: [f64; 9] = [6.0, 20.0, 42.0, 72.0, 110.0, 156.0, 210.0, 272.0, 342.0];
+/// Number of angles in a radian whose sine and cosine are kept.
+const PER_RADIAN: f64 = 32.0;
 
-/// Divisors of the terms of the cosine.
-const EVEN: [f64; 10] = [2.0, 12.0, 30.0, 56.0, 90.0, 132.0, 182.0, 240.0, 306.0, 380.0];
+/// Sine and cosine of k / [`PER_RADIAN`] for k from 0 to 26. Their series end with y^19 and y^20. Terms alternate and
+/// fall, so the remainder is below the next term, 0.82^21 / 21! < 4e-22.
+static NEAR: LazyLock<[(Interval, Interval); 27]> = LazyLock::new(|| {
+    std::array::from_fn(|k| {
+        let y = Interval::point(k as f64 / PER_RADIAN);
+        let (square, remainder) = (y.square(), Interval::within(4e-22));
+        (y * (alternating(square, &ODD) + remainder), alternating(square, &EVEN) + remainder)
+    })
+});
 
-/// Returns 1 - s/q1 (1 - s/q2 (1 - ...)), the sum of the series whose terms have the divisors q1, q2, ...
-fn alternating(s: Interval, quotients: &[f64]) -> Interval {
-    quotients.iter().rev().fold(Interval::ONE, |sum, quotient| {
-        // Divisors are whole numbers below 2^53: their reciprocals have one rounding.
-        let reciprocal = Interval::outward(1.0 / quotient, 1.0 / quotient);
-        Interval::ONE - s * reciprocal * sum
+/// Enclosures of the reciprocals of the divisors of the terms of the sine, n (n - 1): each term is the term before it
+/// times -y^2 over its divisor.
+const ODD: [Interval; 9] = reciprocals([6.0, 20.0, 42.0, 72.0, 110.0, 156.0, 210.0, 272.0, 342.0]);
+
+/// The same for the cosine.
+const EVEN: [Interval; 10] = reciprocals([2.0, 12.0, 30.0, 56.0, 90.0, 132.0, 182.0, 240.0, 306.0, 380.0]);
+
+/// Returns enclosures of the reciprocals of whole numbers below 2^53: they have one rounding.
+const fn reciprocals<const N: usize>(divisors: [f64; N]) -> [Interval; N] {
+    let mut reciprocals = [Interval::ONE; N];
+    let mut n = 0;
+    while n < N {
+        let reciprocal = 1.0 / divisors[n];
+        reciprocals[n] = Interval { lo: reciprocal.next_down(), hi: reciprocal.next_up() };
+        n += 1;
+    }
+    reciprocals
+}
+
+/// Returns 1 - s q1 (1 - s q2 (1 - ...)), the sum of a series whose terms have the factors -s q1, -s q2, ..., for s from
+/// 0 to 1. All partial sums are from 0 to 1, so that the ends of products are the products of ends.
+fn alternating(s: Interval, factors: &[Interval]) -> Interval {
+    factors.iter().rev().fold(Interval::ONE, |sum, factor| {
+        let least = ((s.lo.max(0.0) * factor.lo).next_down() * sum.lo).next_down();
+        let most = ((s.hi * factor.hi).next_up() * sum.hi).next_up();
+        Interval { lo: (1.0 - most).next_down().max(0.0), hi: (1.0 - least).next_up() }
     })
 }
 

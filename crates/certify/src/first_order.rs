@@ -71,8 +71,8 @@ impl FirstOrderHandle {
     }
 
     fn new(path: &ExactPath, span: &Spanned, place: Place, rate: Interval, offset: f64, half_step: f64) -> Self {
-        let (curve, curvature) = (path.curve(place), span.capsule.curvature);
-        let (point, tangent) = (curve.point(place.1), curve.tangent(place.1));
+        let curvature = span.capsule.curvature;
+        let (point, tangent) = path.at(place);
         let zero = [Interval::ZERO; 2];
         Self { point, tangent, velocity: zero, rate, offset, still: 0.0, error: 0.0, curvature }
             .with_rate(rate, half_step)
@@ -109,7 +109,7 @@ impl FirstOrderHandle {
         if !rear_product.is_positive() {
             return None;
         }
-        let point = path.curve(place).point(place.1);
+        let point = path.point(place);
         let miss = (norm_squared(minus(self.point, point)) - link.square()).abs() * 0.5;
         let moved = Interval::point(product.magnitude()) * self.offset;
         let offset = (miss + moved).over(rear_product).hi;

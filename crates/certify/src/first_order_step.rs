@@ -35,9 +35,9 @@ pub(super) struct FirstOrderStep<'c, 'a> {
 }
 
 impl<'c, 'a> FirstOrderStep<'c, 'a> {
-    pub fn new(chain: &'c Chain<'a>, StepPoints { from, middle, to }: &StepPoints, pads: f64) -> Self {
+    pub fn new(chain: &'c Chain<'a>, StepPoints { from, middle, to }: &StepPoints) -> Self {
         let exact = &chain.exact;
-        let listed = Listed::new(chain, Span(from.head, to.head), pads);
+        let listed = Listed::new(chain, Span(from.head, to.head), to.travelled - from.travelled);
         // Rounding may put the middle outside; every place between the two is valid.
         let inside = exact.in_order(from.head, middle.head) && exact.in_order(middle.head, to.head);
         let at = if inside { middle.head } else { from.head };

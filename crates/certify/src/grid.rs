@@ -4,6 +4,7 @@
 use super::capsule::Span;
 use super::path::{ExactPath, Place};
 use bench_dragon_motion::linkage::{NoFollower, follower, link_pose};
+use bench_dragon_motion::model::curve::Coordinate;
 use bench_dragon_motion::model::path::{Param, Path};
 use bench_dragon_motion::model::team::Team;
 
@@ -30,7 +31,7 @@ impl GridPoint {
         let param = path.param_at(travelled);
         let place = place(param);
         let tiny = 1e-14 * (1.0 + travelled.abs());
-        let head = if exact.is_inside(place) { place } else { exact.moved(place, tiny) };
+        let head = if exact.is_inside(place) { place } else { exact.moved(place, tiny, false) };
         Self::at(head, travelled)
     }
 
@@ -54,17 +55,24 @@ impl GridPoint {
 
 /// Returns the parameter of a place.
 pub(super) fn param(place: Place) -> Param {
-    Param::new(place.0, bench_dragon_motion::model::curve::Coordinate { high: place.1, low: 0.0 })
+    Param::new(place.0, Coordinate { high: place.1, low: place.2 })
 }
 
 /// Returns the place nearest to a parameter.
 pub(super) fn place(param: Param) -> Place {
-    Place(param.segment(), param.coordinate().high)
+    Place(param.segment(), param.coordinate().high, 0.0)
 }
 
-/// Returns the span of a handle between two grid points, `pad` metres longer at both ends.
-pub(super) fn span(exact: &ExactPath, one: Param, other: Param, pad: f64) -> Span {
-    let (one, other) = (place(one), place(other));
+/// Returns the place of a parameter, with its low word.
+fn fine_place(param: Param) -> Place {
+    let Coordinate { high, low } = param.coordinate();
+    Place(param.segment(), high, low)
+}
+
+/// Returns the span of a handle between two grid points, `pad` metres longer at both ends. Its ends are places of one
+/// double each unless `fine` is true.
+pub(super) fn span(exact: &ExactPath, one: Param, other: Param, pad: f64, fine: bool) -> Span {
+    let (one, other) = if fine { (fine_place(one), fine_place(other)) } else { (place(one), place(other)) };
     let (first, last) = if exact.in_order(one, other) { (one, other) } else { (other, one) };
-    Span(exact.moved(first, -pad), exact.moved(last, pad))
+    Span(exact.moved(first, -pad, fine), exact.moved(last, pad, fine))
 }

@@ -28,7 +28,7 @@ use std::io;
 
 pub use capsule::Span;
 pub use clearance::{ClearanceEnclosure, MOST_CLEARANCE_STEPS, enclose_least_clearance};
-pub use lines::{CertificateLine, CertifiedEvent, FORMAT, Links, Status, Step};
+pub use lines::{CertificateLine, CertifiedEvent, FORMAT, Links, Status, Step, WIDE};
 pub use path::Place;
 
 use bench_dragon_motion::Motion;

@@ -8,7 +8,10 @@ use super::path::Place;
 use bench_dragon_messages::state::EventKind;
 
 /// The version of the file format.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
+
+/// Seconds between the times of a proved event beyond which the search gives the reason.
+pub const WIDE: f64 = 1e-9;
 
 /// The links for which a step is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -125,6 +128,9 @@ pub enum Status {
         bench_a: Option<usize>,
         /// The second bench.
         bench_b: Option<usize>,
+        /// The reason why the times are further apart than [`WIDE`], in words.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        because: Option<String>,
     },
     /// There is no such event before the motion ends.
     None {

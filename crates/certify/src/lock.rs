@@ -14,13 +14,22 @@ use bench_dragon_motion::model::root::{bisect_predicate, golden_section_min};
 const JUMP_SAMPLES: i32 = 400;
 const JUMP_RATIO: f64 = 1.05;
 
+/// Distances of a window's ends from the follower, as multiples of the distance of the place of greatest distance.
+const WIDER: [f64; 6] = [2.0, 4.0, 16.0, 64.0, 256.0, 1024.0];
+
 /// Limit of halvings of the stretch in which a link that locks has no follower any more.
 const LOCK_HALVINGS: u32 = 12;
 
 impl Chain<'_> {
-    /// Returns places behind and ahead of the follower of a link that it cannot pass while the front is in `front`.
-    /// Between them is no follower for any front in `last`.
-    pub fn lock_window(&self, at: &mut GridPoint, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
+    /// Returns places behind and ahead of `follower`, a span of the follower of a link, that it cannot pass while the
+    /// front is in `front`. Between them is no follower for any front in `last`.
+    pub fn lock_window(
+        &self,
+        at: &mut GridPoint,
+        link: usize,
+        follower: Span,
+        (front, last): (&Spanned, &Spanned),
+    ) -> Option<Span> {
         let Chain { path, exact, team, links, .. } = self;
         at.extend_to(link + 1, path, team).ok()?;
         let (before, rear) = (at.handles[link].param, at.handles[link + 1].param);
@@ -40,15 +49,13 @@ impl Chain<'_> {
         let top = bisect_predicate(|metres| product(metres) <= 0.0, 0.0, beyond);
         let length = links[link.min(1)];
         let square = length.square();
-        let follower = span(exact, rear, rear, 0.0);
-        [2.0, 4.0, 16.0, 64.0].iter().find_map(|wider| {
+        WIDER.iter().find_map(|wider| {
             let behind = path.param_at(path.travelled(rear) - top * (1.0 + wider));
             let ahead = path.param_at(path.travelled(rear) + top * wider);
-            let window = Span(exact.moved(place(behind), 0.0), exact.moved(place(ahead), 0.0));
-            let near =
-                |place: Place| front.capsule.distance_squared(exact.curve(place).point(place.1)).is_below(square);
-            let holds = exact.in_order(window.0, follower.0)
-                && exact.in_order(follower.1, window.1)
+            let window = Span(exact.moved(place(behind), 0.0, false), exact.moved(place(ahead), 0.0, false));
+            let near = |place: Place| front.capsule.distance_squared(exact.point(place)).is_below(square);
+            let holds = exact.is_before(window.0, follower.0)
+                && exact.is_before(follower.1, window.1)
                 && exact.in_order(window.1, front.span.0)
                 && near(window.0)
                 && near(window.1)
@@ -62,12 +69,12 @@ impl Chain<'_> {
     pub fn until_lock(&self, at: &mut GridPoint, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
         let exact = &self.exact;
         let begins = self.spans(&mut at.clone(), &mut at.clone(), link + 1)?[link + 1].span;
-        let window = self.lock_window(at, link, front, last).or_else(|| {
-            let jump = self.lock_jump(at, link, front, last)?;
+        let window = self.lock_window(at, link, begins, (front, last)).or_else(|| {
+            let jump = self.lock_jump(at, link, begins, (front, last))?;
             let rear = at.handles[link + 1];
             let reach = exact.length(front.span.0, front.span.1) / rear.rear_cosine.max(1e-12);
             let around = |wider: &f64| {
-                let rear = Spanned::new(exact, span(exact, rear.param, rear.param, reach * wider));
+                let rear = Spanned::new(exact, span(exact, rear.param, rear.param, reach * wider, false));
                 one_place_within(exact, front, &rear, self.link(link)).map(|_| rear.span)
             };
             exact.in_order(begins.1, jump.0).then(|| [2.0, 16.0, 256.0].iter().find_map(around))?
@@ -75,9 +82,15 @@ impl Chain<'_> {
         (exact.in_order(window.0, begins.0) && exact.in_order(begins.1, window.1)).then_some(window)
     }
 
-    /// Returns two places ahead of the follower of a link. The first is nearer than the link for all of `front`; the
-    /// second, ahead of it, is further than the link for all of `last`.
-    pub fn lock_jump(&self, at: &mut GridPoint, link: usize, front: &Spanned, last: &Spanned) -> Option<Span> {
+    /// Returns two places ahead of `follower`, a span of the follower of a link. The first is nearer than the link for
+    /// all of `front`; the second, ahead of it, is further than the link for all of `last`.
+    pub fn lock_jump(
+        &self,
+        at: &mut GridPoint,
+        link: usize,
+        follower: Span,
+        (front, last): (&Spanned, &Spanned),
+    ) -> Option<Span> {
         let Chain { path, exact, team, links, .. } = self;
         at.extend_to(link + 1, path, team).ok()?;
         let rear = at.handles[link + 1].param;
@@ -94,14 +107,13 @@ impl Chain<'_> {
         let falling = (1..JUMP_SAMPLES).find(|k| distance(sampled(*k)) > distance(sampled(k - 1)))?;
         let peak = (falling..JUMP_SAMPLES).max_by(|j, k| distance(sampled(*j)).total_cmp(&distance(sampled(*k))))?;
         let (_, top) = golden_section_min(|at| -distance(at), sampled(peak - 1), sampled(peak + 1));
-        let at = |travelled: f64| exact.moved(place(path.param_at(travelled)), 0.0);
+        let at = |travelled: f64| exact.moved(place(path.param_at(travelled)), 0.0, false);
         let (between, beyond) = (at(sampled(falling - 1)), at(top));
-        let point = |place: Place| exact.curve(place).point(place.1);
-        let holds = exact.in_order(span(exact, rear, rear, 0.0).1, between)
+        let holds = exact.is_before(follower.1, between)
             && exact.in_order(between, beyond)
             && exact.in_order(beyond, front.span.0)
-            && front.capsule.distance_squared(point(between)).is_below(square)
-            && square.is_below(last.capsule.distance_squared(point(beyond)));
+            && front.capsule.distance_squared(exact.point(between)).is_below(square)
+            && square.is_below(last.capsule.distance_squared(exact.point(beyond)));
         holds.then_some(Span(between, beyond))
     }
 }

@@ -1,16 +1,70 @@
 //! The path in intervals: places, points, tangents, and bounds of curvature, length and turning. See the definitions in
 //! `docs/proofs.md`.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::elementary::{atan, ln, pi, sin_cos};
 use super::interval::{Interval, Vector, cross, plus, scaled};
 use bench_dragon_motion::model::curve::Side;
 use bench_dragon_motion::model::description::{PathDescription, RouteStep};
 
-/// A place on the path: a segment, counted from 0, and a coordinate on it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Place(pub usize, pub f64);
+/// A place on the path: a segment, counted from 0, and a coordinate on it. The coordinate is the exact sum of two
+/// doubles, of which the second is at most half a unit in the last place of the first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place(pub usize, pub f64, pub f64);
+
+impl Place {
+    /// Creates the place whose coordinate is the sum of two doubles, the second much the smaller one.
+    fn sum(segment: usize, high: f64, low: f64) -> Self {
+        // Dekker's fast two-sum: no error if |high| >= |low|.
+        let sum = high + low;
+        Self(segment, sum, low - (sum - high))
+    }
+
+    /// Returns the place `by` further in the coordinate, and the nearest double to it if `fine` is false.
+    fn plus(self, by: f64, fine: bool) -> Self {
+        let Self(segment, at, rest) = self;
+        if !fine {
+            return Self(segment, at + by, 0.0);
+        }
+        let (high, low) = two_sum(at, by);
+        Self::sum(segment, high, low + rest)
+    }
+
+    /// Returns an enclosure of the coordinate less another place's.
+    fn minus(self, other: Self) -> Interval {
+        (Interval::point(self.1) - Interval::point(other.1)) + (Interval::point(self.2) - Interval::point(other.2))
+    }
+
+    /// Returns an enclosure of the coordinate.
+    fn coordinate(self) -> Interval {
+        if self.2 == 0.0 { Interval::point(self.1) } else { Interval::point(self.1) + Interval::point(self.2) }
+    }
+
+    /// Returns a place in the middle of two on one segment, as a double if there is one between.
+    fn middle(self, other: Self) -> Self {
+        let middle = Self(self.0, 0.5 * self.1 + 0.5 * other.1, 0.0);
+        if self.2 == 0.0 && other.2 == 0.0 {
+            return middle;
+        }
+        let (high, low) = two_sum(0.5 * self.1, 0.5 * other.1);
+        Self::sum(self.0, high, low + (0.5 * self.2 + 0.5 * other.2))
+    }
+}
+
+/// Returns the sum of two doubles, rounded and its error (Knuth).
+fn two_sum(one: f64, other: f64) -> (f64, f64) {
+    let sum = one + other;
+    let of_other = sum - one;
+    (sum, (one - (sum - of_other)) + (other - of_other))
+}
+
+impl Serialize for Place {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self(segment, at, rest) = self;
+        if *rest == 0.0 { (segment, at).serialize(serializer) } else { (segment, at, rest).serialize(serializer) }
+    }
+}
 
 /// A curve of the path.
 #[derive(Debug, Clone, Copy)]
@@ -45,16 +99,20 @@ impl Curve {
         !matches!(self, Self::Inward { .. })
     }
 
-    pub fn point(&self, at: f64) -> Vector {
-        self.point_of(Interval::point(at), sin_cos(at))
+    pub fn point(&self, place: Place) -> Vector {
+        self.point_of([Interval::point(place.1), Interval::point(place.2)], sin_cos_at(place))
     }
 
-    /// Returns the point at a coordinate from the coordinate's sine and cosine.
-    fn point_of(&self, at: Interval, (sine, cosine): (Interval, Interval)) -> Vector {
+    /// Returns the point at a coordinate, the sum of two numbers, from the coordinate's sine and cosine.
+    fn point_of(&self, at: [Interval; 2], (sine, cosine): (Interval, Interval)) -> Vector {
+        let times = |factor: Interval| {
+            let [high, low] = at;
+            if low == Interval::ZERO { factor * high } else { factor * high + factor * low }
+        };
         match *self {
-            Self::Inward { a } => scaled([cosine, sine], a * at),
-            Self::Outward { a } => scaled([cosine, sine], -(a * at)),
-            Self::Line { origin, direction } => plus(origin, scaled(direction, at)),
+            Self::Inward { a } => scaled([cosine, sine], times(a)),
+            Self::Outward { a } => scaled([cosine, sine], -times(a)),
+            Self::Line { origin, direction } => plus(origin, direction.map(times)),
             Self::Arc { origin, direction, inward, radius } => {
                 let versine = Interval::ONE - cosine;
                 plus(origin, scaled(plus(scaled(direction, sine), scaled(inward, versine)), radius))
@@ -62,8 +120,11 @@ impl Curve {
         }
     }
 
-    pub fn tangent(&self, at: f64) -> Vector {
-        self.tangent_of(Interval::point(at), sin_cos(at))
+    /// Returns the point of a place, and the tangent there.
+    pub fn at(&self, place: Place) -> (Vector, Vector) {
+        let sin_cos = sin_cos_at(place);
+        let at = [Interval::point(place.1), Interval::point(place.2)];
+        (self.point_of(at, sin_cos), self.tangent_of(place.coordinate(), sin_cos))
     }
 
     fn tangent_of(&self, at: Interval, (sine, cosine): (Interval, Interval)) -> Vector {
@@ -78,14 +139,14 @@ impl Curve {
     }
 
     /// Returns the curvatures between two coordinates, 1/m, positive to the left.
-    fn bend(&self, one: f64, other: f64) -> Interval {
+    fn bend(&self, least: f64, greatest: f64) -> Interval {
         let of_spiral = |a: Interval| {
             let at = |theta: f64| {
                 let square = Interval::point(theta).square();
                 let w = (Interval::ONE + square).sqrt();
                 (square + Interval::point(2.0)).over(a * w * w.square())
             };
-            Interval { lo: at(one.max(other)).lo.max(0.0), hi: at(one.min(other)).hi }
+            Interval { lo: at(greatest).lo.max(0.0), hi: at(least).hi }
         };
         match *self {
             Self::Inward { a } => -of_spiral(a),
@@ -100,10 +161,10 @@ impl Curve {
 
     /// Returns the rate of the curvature between two coordinates, 1/m per metre of travel: -theta (theta^2 + 4) / (a^2
     /// w^6).
-    fn bend_rate(&self, one: f64, other: f64) -> Interval {
+    fn bend_rate(&self, one: Interval, other: Interval) -> Interval {
         match *self {
             Self::Inward { a } | Self::Outward { a } => {
-                let theta = Interval { lo: one.min(other), hi: one.max(other) };
+                let theta = Interval { lo: one.min(other).lo, hi: one.max(other).hi };
                 let (square, w_square) = (theta.square(), Interval::ONE + theta.square());
                 -(theta * (square + Interval::point(4.0))).over((a * w_square).square() * w_square)
             }
@@ -111,9 +172,8 @@ impl Curve {
         }
     }
 
-    /// Returns an upper bound of the metres between two coordinates.
-    fn length(&self, one: Interval, other: Interval) -> f64 {
-        let between = (one - other).abs();
+    /// Returns an upper bound of the metres between two coordinates that are `between` apart.
+    fn length(&self, between: Interval, one: Interval, other: Interval) -> f64 {
         match *self {
             Self::Inward { a } | Self::Outward { a } => {
                 (between * a * (Interval::ONE + one.max(other).square()).sqrt()).hi
@@ -123,9 +183,8 @@ impl Curve {
         }
     }
 
-    /// Returns an upper bound of the radians by which the path turns between two coordinates.
-    fn turning(&self, one: Interval, other: Interval) -> f64 {
-        let between = (one - other).abs();
+    /// Returns an upper bound of the radians by which the path turns between two coordinates that are `between` apart.
+    fn turning(&self, between: Interval, one: Interval, other: Interval) -> f64 {
         match *self {
             Self::Inward { .. } | Self::Outward { .. } => {
                 let square = one.min(other).max(Interval::ZERO).square();
@@ -161,12 +220,12 @@ impl ExactPath {
                 let angle = atan(theta) * 2.0;
                 let turn = sin_cos_of(theta);
                 let inward = Curve::Inward { a };
-                let (start, tangent) = (inward.point_of(theta, turn), inward.tangent_of(theta, turn));
+                let (start, tangent) = (inward.point_of(exactly(theta), turn), inward.tangent_of(theta, turn));
                 let right: Vector = [tangent[1], -tangent[0]];
                 let first = Curve::Arc { origin: start, direction: tangent, inward: right, radius: first_radius };
                 // The end of arc 2 and its tangent are known. Its begin is `angle` radians back.
                 let (sine, cosine) = sin_cos_of(angle);
-                let middle = first.point_of(angle, (sine, cosine));
+                let middle = first.point_of(exactly(angle), (sine, cosine));
                 let direction = first.tangent_of(angle, (sine, cosine));
                 let left: Vector = [-direction[1], direction[0]];
                 let second = Curve::Arc { origin: middle, direction, inward: left, radius: second_radius };
@@ -186,9 +245,7 @@ impl ExactPath {
                 ];
                 Self { segments }
             }
-            PathDescription::Route { start, heading_turns, steps } => {
-                route([start.x, start.y].map(Interval::point), *heading_turns, steps)
-            }
+            PathDescription::Route { heading_turns, steps } => route(*heading_turns, steps),
         }
     }
 
@@ -199,6 +256,21 @@ impl ExactPath {
         Self { segments: vec![Segment { curve, begin, end: Interval::ZERO, travelled }] }
     }
 
+    /// Returns the point of a place.
+    pub fn point(&self, place: Place) -> Vector {
+        self.curve(place).point(place)
+    }
+
+    /// Returns the point of a place, and the tangent there.
+    pub fn at(&self, place: Place) -> (Vector, Vector) {
+        self.curve(place).at(place)
+    }
+
+    /// Returns a place of the span between two: near the middle on one segment, else the first.
+    pub fn middle(&self, first: Place, last: Place) -> Place {
+        if first.0 == last.0 { first.middle(last) } else { first }
+    }
+
     /// Returns the curve at a place.
     pub fn curve(&self, place: Place) -> &Curve {
         &self.segments[place.0].curve
@@ -206,28 +278,36 @@ impl ExactPath {
 
     /// Returns true if `x` is before `y` on the path, or equal.
     pub fn in_order(&self, x: Place, y: Place) -> bool {
-        x.0 < y.0 || x.0 == y.0 && if self.curve(x).grows() { x.1 <= y.1 } else { x.1 >= y.1 }
+        let (of_x, of_y) = ((x.1, x.2), (y.1, y.2));
+        x.0 < y.0 || x.0 == y.0 && if self.curve(x).grows() { of_x <= of_y } else { of_x >= of_y }
+    }
+
+    /// Returns true if `x` is before `y` on the path.
+    pub fn is_before(&self, x: Place, y: Place) -> bool {
+        x != y && self.in_order(x, y)
     }
 
     /// Returns true if a place is strictly inside its segment. The last segment continues beyond its end, but not
     /// through a centre.
-    pub fn is_inside(&self, Place(segment, at): Place) -> bool {
+    pub fn is_inside(&self, place: Place) -> bool {
+        let Place(segment, at, _) = place;
         let Some(Segment { curve, begin, end, .. }) = self.segments.get(segment) else { return false };
         let last = segment + 1 == self.segments.len();
         if !at.is_finite() {
             return false;
         }
+        let at = place.coordinate();
         if curve.grows() {
-            at > begin.hi && (last || at < end.lo)
+            at.lo > begin.hi && (last || at.hi < end.lo)
         } else {
-            at < begin.lo && if last { at >= 0.0 } else { at > end.hi }
+            at.hi < begin.lo && if last { at.lo >= 0.0 } else { at.lo > end.hi }
         }
     }
 
     /// Returns a place `metres` further on, or back if negative, strictly inside its segment. The distance is about
-    /// `metres`, and never less.
-    pub fn moved(&self, place: Place, metres: f64) -> Place {
-        let Place(segment, at) = place;
+    /// `metres`, and never less. The coordinate is one double unless `fine` is true.
+    pub fn moved(&self, place: Place, metres: f64, fine: bool) -> Place {
+        let Place(segment, at, _) = place;
         let Segment { curve, begin, end, .. } = &self.segments[segment];
         let rate = match curve {
             Curve::Inward { a } | Curve::Outward { a } => a.lo * 1f64.hypot(at),
@@ -235,32 +315,32 @@ impl ExactPath {
             Curve::Arc { radius, .. } => radius.lo,
         };
         let by = 1.0001 * metres / rate;
-        let moved = if curve.grows() { at + by } else { at - by };
-        let moved = if moved != at || metres == 0.0 {
+        let moved = place.plus(if curve.grows() { by } else { -by }, fine);
+        let moved = if moved != place || metres == 0.0 {
             moved
         } else if (metres > 0.0) == curve.grows() {
-            at.next_up()
+            Place(segment, at.next_up(), 0.0)
         } else {
-            at.next_down()
+            Place(segment, at.next_down(), 0.0)
         };
-        let moved = Place(segment, moved);
         if self.is_inside(moved) {
             return moved;
         }
         let last = segment + 1 == self.segments.len();
         if metres >= 0.0 && last {
             // The centre of a spiral.
-            return Place(segment, end.hi);
+            return Place(segment, end.hi, 0.0);
         }
         let beyond = if metres >= 0.0 { self.after(segment) } else { self.before(segment) };
         // The first segment has no beginning to fall off.
-        beyond.unwrap_or(Place(segment, begin.middle()))
+        beyond.unwrap_or(Place(segment, begin.middle(), 0.0))
     }
 
     /// Returns the first place that is surely on the segment after this one.
     fn after(&self, segment: usize) -> Option<Place> {
         let Segment { curve, begin, .. } = self.segments.get(segment + 1)?;
-        Some(Place(segment + 1, if curve.grows() { begin.hi.next_up() } else { begin.lo.next_down() }))
+        let at = if curve.grows() { begin.hi.next_up() } else { begin.lo.next_down() };
+        Some(Place(segment + 1, at, 0.0))
     }
 
     /// Returns the last place that is surely on the segment before this one.
@@ -271,15 +351,15 @@ impl ExactPath {
 
     fn last_inside(&self, segment: usize) -> Place {
         let Segment { curve, end, .. } = &self.segments[segment];
-        Place(segment, if curve.grows() { end.lo.next_down() } else { end.hi.next_up() })
+        Place(segment, if curve.grows() { end.lo.next_down() } else { end.hi.next_up() }, 0.0)
     }
 
     /// Returns a place between two: the middle on one segment, else the end of the earlier segment or the beginning of
     /// the later one. `None` if there is none.
     pub fn between(&self, x: Place, y: Place) -> Option<Place> {
         if x.0 == y.0 {
-            let middle = 0.5 * x.1 + 0.5 * y.1;
-            return (middle != x.1 && middle != y.1).then_some(Place(x.0, middle));
+            let middle = x.middle(y);
+            return (middle != x && middle != y).then_some(middle);
         }
         let end = self.last_inside(x.0);
         if x != end && self.in_order(x, end) {
@@ -289,13 +369,14 @@ impl ExactPath {
     }
 
     /// Returns the sum over the stretches of segments between two places.
-    fn sum(&self, x: Place, y: Place, of: impl Fn(&Curve, Interval, Interval) -> f64) -> f64 {
+    fn sum(&self, x: Place, y: Place, of: impl Fn(&Curve, Interval, Interval, Interval) -> f64) -> f64 {
         let mut sum = Interval::ZERO;
         for segment in x.0..=y.0 {
             let Segment { curve, begin, end, .. } = &self.segments[segment];
-            let from = if segment == x.0 { Interval::point(x.1) } else { *begin };
-            let to = if segment == y.0 { Interval::point(y.1) } else { *end };
-            sum = sum + Interval::point(of(curve, from, to));
+            let from = if segment == x.0 { x.coordinate() } else { *begin };
+            let to = if segment == y.0 { y.coordinate() } else { *end };
+            let between = if x.0 == y.0 { x.minus(y) } else { from - to };
+            sum = sum + Interval::point(of(curve, between.abs(), from, to));
         }
         sum.hi
     }
@@ -320,9 +401,9 @@ impl ExactPath {
         let bends = (x.0..=y.0).map(|segment| {
             let Segment { curve, begin, end, .. } = &self.segments[segment];
             // A place that is outside the segment by rounding bends more, if anything.
-            let from = if segment == x.0 { x.1 } else { begin.lo };
-            let to = if segment == y.0 { y.1 } else { end.lo };
-            curve.bend(from, to)
+            let from = if segment == x.0 { x.coordinate() } else { Interval::point(begin.lo) };
+            let to = if segment == y.0 { y.coordinate() } else { Interval::point(end.lo) };
+            curve.bend(from.min(to).lo, from.max(to).hi)
         });
         let hull = |a: Interval, b: Interval| Interval { lo: a.lo.min(b.lo), hi: a.hi.max(b.hi) };
         bends.reduce(hull).unwrap_or(Interval::ZERO)
@@ -331,13 +412,13 @@ impl ExactPath {
     /// Returns the rate of the curvature between two places of one segment, 1/m per metre; `None` for places of two
     /// segments.
     pub fn bend_rate(&self, x: Place, y: Place) -> Option<Interval> {
-        (x.0 == y.0).then(|| self.curve(x).bend_rate(x.1, y.1))
+        (x.0 == y.0).then(|| self.curve(x).bend_rate(x.coordinate(), y.coordinate()))
     }
 
     /// Returns the travel of the head at a place, metres.
-    pub fn travelled(&self, Place(segment, at): Place) -> Interval {
-        let Segment { curve, begin, end, travelled } = &self.segments[segment];
-        let at = Interval::point(at);
+    pub fn travelled(&self, place: Place) -> Interval {
+        let Segment { curve, begin, end, travelled } = &self.segments[place.0];
+        let at = place.coordinate();
         let reference = if begin.lo.is_infinite() { *end } else { *begin };
         match *curve {
             Curve::Inward { a } => *travelled - (spiral_length(a, at) - spiral_length(a, reference)),
@@ -348,10 +429,10 @@ impl ExactPath {
     }
 }
 
-/// Creates a route: a line without a beginning up to the start, then the steps.
-fn route(start: Vector, heading_turns: f64, steps: &[RouteStep]) -> ExactPath {
+/// Creates a route: a line without a beginning up to the start at the origin, then the steps.
+fn route(heading_turns: f64, steps: &[RouteStep]) -> ExactPath {
     let (zero, mut turns) = (Interval::ZERO, Interval::point(heading_turns));
-    let mut origin = start;
+    let mut origin = [zero; 2];
     let (mut direction, mut travelled) = (of_turns(turns), zero);
     let curve = Curve::Line { origin, direction };
     let mut segments = vec![Segment { curve, begin: Interval::point(-FAR), end: zero, travelled: zero }];
@@ -372,7 +453,7 @@ fn route(start: Vector, heading_turns: f64, steps: &[RouteStep]) -> ExactPath {
         };
         segments.push(Segment { curve, begin: zero, end, travelled });
         travelled = travelled + length;
-        origin = curve.point_of(end, sin_cos_of(end));
+        origin = curve.point_of(exactly(end), sin_cos_of(end));
         direction = of_turns(turns);
     }
     ExactPath { segments }
@@ -382,6 +463,22 @@ fn route(start: Vector, heading_turns: f64, steps: &[RouteStep]) -> ExactPath {
 fn of_turns(turns: Interval) -> Vector {
     let (sine, cosine) = sin_cos_of(pi() * 2.0 * turns);
     [cosine, sine]
+}
+
+/// Returns a coordinate as a sum of two numbers.
+fn exactly(at: Interval) -> [Interval; 2] {
+    [at, Interval::ZERO]
+}
+
+/// Returns sine and cosine of a coordinate: those of its first double, turned by the second one, whose square bounds the
+/// error.
+fn sin_cos_at(Place(_, at, rest): Place) -> (Interval, Interval) {
+    let (sine, cosine) = sin_cos(at);
+    if rest == 0.0 {
+        return (sine, cosine);
+    }
+    let error = Interval::within((Interval::point(rest).square()).hi);
+    (sine + cosine * rest + error, cosine - sine * rest + error)
 }
 
 /// Returns sine and cosine of an interval: those of its middle, each off by no more than the interval's radius.

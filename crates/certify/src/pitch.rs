@@ -14,7 +14,7 @@ use super::grid::GridPoint;
 use super::interval::Interval;
 use super::lines::Links;
 use super::path::{ExactPath, Place};
-use super::step::{Chain, Claim, Listed, PADS, links_of};
+use super::step::{Chain, Claim, Listed, links_of};
 use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::model::path::Path;
 use bench_dragon_motion::model::team::Team;
@@ -55,7 +55,7 @@ impl Pitches<'_> {
         // The path and the team only give the starting guess of the handles.
         let [wide, narrow] = [from, to].map(|pitch| Path::spiral(pitch, theta / std::f64::consts::TAU));
         let handle = benches[1] + 1;
-        let mut ends = [GridPoint::at(Place(0, theta), 0.0), GridPoint::at(Place(0, theta), 0.0)];
+        let mut ends = [GridPoint::at(Place(0, theta, 0.0), 0.0), GridPoint::at(Place(0, theta, 0.0), 0.0)];
         let [first, last] = &mut ends;
         if first.extend_to(handle, &wide, team).is_err() || last.extend_to(handle, &narrow, team).is_err() {
             return false;
@@ -65,15 +65,13 @@ impl Pitches<'_> {
         let Shape { inset, half_width } = chain.shape;
         chain.shape = Shape { inset: inset.over(a), half_width: half_width.over(a) };
         let claim = Claim { links: Links::All, moving: false, clear: false };
-        PADS.iter().any(|pads| {
-            let mut listed = Listed::new(&chain, Span(Place(0, theta), Place(0, theta)), *pads);
-            while listed.handles.len() <= handle {
-                if listed.extend(first, last, claim).is_err() {
-                    return false;
-                }
+        let mut listed = Listed::new(&chain, Span(Place(0, theta, 0.0), Place(0, theta, 0.0)), f64::INFINITY);
+        while listed.handles.len() <= handle {
+            if listed.extend(first, last, claim).is_err() {
+                return false;
             }
-            chain.common_point(&listed.handles, benches).is_some()
-        })
+        }
+        chain.common_point(&listed.handles, benches).is_some()
     }
 }
 
@@ -142,7 +140,7 @@ pub(crate) fn reaches(team: &Team, pitch: f64, radius: f64, most_steps: u64, pro
     let exact = ExactPath::new(&description);
     let a = Interval::point(pitch).over(pi() * 2.0);
     let theta = Interval::point(radius).over(a).lo;
-    let end = GridPoint::at(Place(0, theta), exact.travelled(Place(0, theta)).middle());
+    let end = GridPoint::at(Place(0, theta, 0.0), exact.travelled(Place(0, theta, 0.0)).middle());
     let travelled = end.travelled;
     let descent = Descent::new(Chain::new(&path, exact, team), travelled, most_steps).after_all_further_out();
     begin <= (a * descent.head().1).lo && descent.stays_clear_to(&end, progress)

@@ -3,10 +3,10 @@
 
 use std::io;
 
-use super::capsule::Spanned;
+use super::capsule::{Span, Spanned};
 use super::grid::{GridPoint, place};
 use super::interval::Interval;
-use super::lines::{CertificateLine, CertifiedEvent, Links, Status};
+use super::lines::{CertificateLine, CertifiedEvent, Links, Status, WIDE};
 use super::path::{ExactPath, Place};
 use super::step::{Chain, Claim, Obstacle, Shown};
 use super::{CertifyError, Given};
@@ -15,10 +15,16 @@ use bench_dragon_motion::event::Event;
 use bench_dragon_motion::model::path::Path;
 
 /// Half width of the proved interval of an event, seconds.
-const AROUND: f64 = 3e-10;
+const AROUND: f64 = 1e-10;
 
 /// Distance that doubles can resolve, as a share of the path length in metres.
-pub(super) const LEAST: f64 = 7e-13;
+pub(super) const LEAST: f64 = 1e-13;
+
+/// The shortest step, as a share of the path length in metres.
+const LEAST_STEP: f64 = 2e-15;
+
+/// Share of the distance from an event to which the nearest place beyond it is found at which the event is shown.
+const BESIDE: f64 = 0.1;
 
 /// Factors of the step length after a step that is shown, and after a step that is not.
 const GROWTH: f64 = 1.3;
@@ -33,6 +39,8 @@ pub(super) struct CertificateSearch<'a, 'w> {
     write: &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>,
     /// The end of the last step.
     at: GridPoint,
+    /// The spans of the last step, from handle 1 on.
+    spans: Vec<Span>,
     links: Links,
     /// The claims that steps still make.
     moving: bool,
@@ -69,7 +77,8 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         let at = GridPoint::new(given.path, &chain.exact, before);
         let step = 0.25 * given.team.shortest_link();
         let (links, proofs) = (Links::All, [const { None }; 4]);
-        Self { given, chain, write, at, links, moving: true, clear: true, covered: true, proofs, step, steps: 0 }
+        let spans = Vec::new();
+        Self { given, chain, write, at, spans, links, moving: true, clear: true, covered: true, proofs, step, steps: 0 }
     }
 
     /// Writes the certificate and returns what it proves.
@@ -149,18 +158,42 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
     fn at_path_end(&self) -> Status {
         let length = self.given.path.length();
         let end = place(self.given.path.param_at(length));
-        let (before, after) = (self.chain.exact.moved(end, -LEAST * (1.0 + length)), self.at.head);
-        Status::Proved { time_lo: self.time(before).lo, time_hi: self.time(after).hi, bench_a: None, bench_b: None }
+        let (before, after) = (self.chain.exact.moved(end, -LEAST * (1.0 + length), false), self.at.head);
+        self.proved(EventKind::PathEnd, before, after, [None; 2])
     }
 
-    /// Returns travels beyond an event, from near to far, at which the search tries to show it.
-    fn beyond(&self, event: &Event) -> impl Iterator<Item = f64> + use<> {
-        let around = self.around().max(2.0 * (event.travelled - self.at.travelled));
-        let (at, most) = (event.travelled, NEAR * self.given.team.shortest_link());
-        (0..24)
-            .map(move |power| around * 2f64.powi(power))
-            .take_while(move |far| *far <= most.max(around))
-            .map(move |far| at + far)
+    /// Returns the nearest grid point beyond an event that is found at which `shown` returns a result, with the result.
+    fn beyond<T>(
+        &mut self,
+        event: &Event,
+        shown: impl Fn(&mut Self, &mut GridPoint) -> Option<T>,
+    ) -> Option<(GridPoint, T)> {
+        let around = self.around();
+        let most = around.max(NEAR * self.given.team.shortest_link());
+        let try_at = |search: &mut Self, far: f64| {
+            let mut point = search.grid_point(event.travelled + far);
+            let result = shown(search, &mut point)?;
+            Some((point, result))
+        };
+        let (mut not_shown, mut far) = (0.0, around);
+        let mut found = loop {
+            match try_at(self, far) {
+                Some(found) => break found,
+                None => not_shown = far,
+            }
+            far *= 2.0;
+            if far > most {
+                return None;
+            }
+        };
+        while not_shown > 0.0 && far - not_shown > BESIDE * far {
+            let middle = 0.5 * (not_shown + far);
+            match try_at(self, middle) {
+                Some(nearer) => (found, far) = (nearer, middle),
+                None => not_shown = middle,
+            }
+        }
+        Some(found)
     }
 
     /// Goes to a travel: see [`CertificateSearch::go_to_point`].
@@ -180,7 +213,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         event: Option<&Event>,
         progress: &mut dyn FnMut(f64),
     ) -> Result<(), Halt> {
-        let least = 0.01 * LEAST * (1.0 + self.given.path.length());
+        let least = LEAST_STEP * (1.0 + self.given.path.length());
         let longest = self.given.team.shortest_link();
         while self.at.head != target.head {
             let remaining = target.travelled - self.at.travelled;
@@ -229,7 +262,11 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         {
             self.links = Links::Front;
         }
-        (self.write)(&CertificateLine::Step(step))?;
+        let line = CertificateLine::Step(step);
+        (self.write)(&line)?;
+        if let CertificateLine::Step(step) = line {
+            self.spans = step.spans;
+        }
         self.at = to;
         self.steps += 1;
         if self.steps > self.given.most_steps {
@@ -276,18 +313,34 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         }
     }
 
-    fn proved(&self, from: Place, to: Place, bench_a: Option<u32>, bench_b: Option<u32>) -> Status {
-        let [bench_a, bench_b] = [bench_a, bench_b].map(|bench| bench.map(|bench| bench as usize));
-        Status::Proved { time_lo: self.time(from).lo, time_hi: self.time(to).hi, bench_a, bench_b }
+    fn proved(&self, event: EventKind, from: Place, to: Place, benches: [Option<u32>; 2]) -> Status {
+        let [bench_a, bench_b] = benches.map(|bench| bench.map(|bench| bench as usize));
+        let (time_lo, time_hi) = (self.time(from).lo, self.time(to).hi);
+        let because = (time_hi - time_lo > WIDE).then(|| {
+            let resolved = 3.0 * LEAST * (1.0 + self.given.path.length()) / self.given.head_speed;
+            match event {
+                _ if time_hi - time_lo <= resolved => {
+                    let metres = self.given.path.length();
+                    format!("doubles resolve a path of {metres:.3e} m at this speed to no less than {resolved:.1e} s")
+                }
+                EventKind::Contact => {
+                    "the boards meet so slowly that rounding hides the contact for so long".to_owned()
+                }
+                _ => "rounding of the handles' places hides the event for so long".to_owned(),
+            }
+        });
+        Status::Proved { time_lo, time_hi, bench_a, bench_b, because }
     }
 
     /// Handles boards that overlap at the start.
     fn overlap_at_start(&mut self, event: &Event) -> Result<(), Halt> {
-        let (from, mut to) = (self.at.clone(), self.grid_point(LEAST * (1.0 + self.given.path.length())));
+        let (mut from, mut to) = (self.at.clone(), self.grid_point(LEAST * (1.0 + self.given.path.length())));
         self.clear = false;
-        let status = if self.touch(event, from, &mut to)? {
+        let status = if let Some((spans, point)) = self.touch(event, &mut from, &mut to) {
+            let benches = benches(event);
+            (self.write)(&CertificateLine::Contact { benches, from: from.head, to: to.head, spans, point })?;
             let [bench_a, bench_b] = [event.bench_a, event.bench_b].map(|bench| bench.map(|bench| bench as usize));
-            Status::Proved { time_lo: 0.0, time_hi: 0.0, bench_a, bench_b }
+            Status::Proved { time_lo: 0.0, time_hi: 0.0, bench_a, bench_b, because: None }
         } else {
             let because = "the boards that overlap from the start overlap too little for doubles".to_owned();
             Status::Undecided { time_lo: 0.0, because }
@@ -296,15 +349,13 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Ok(())
     }
 
-    /// Writes the contact line if two boards are proved to have a common point while the head is between two grid
-    /// points. Returns true if so.
-    fn touch(&mut self, event: &Event, mut from: GridPoint, to: &mut GridPoint) -> Result<bool, Halt> {
-        let benches = [event.bench_a, event.bench_b].map(|bench| bench.unwrap_or(0) as usize);
-        let Some(handles) = self.chain.spans(&mut from, to, benches[1] + 1) else { return Ok(false) };
-        let Some(point) = self.chain.common_point(&handles, benches) else { return Ok(false) };
-        let spans = handles[1..].iter().map(|handle| handle.span).collect();
-        (self.write)(&CertificateLine::Contact { benches, from: from.head, to: to.head, spans, point })?;
-        Ok(true)
+    /// Returns the spans of handles 1 and on and a point, if two boards are proved to have the point in common while the
+    /// head is between two grid points.
+    fn touch(&self, event: &Event, from: &mut GridPoint, to: &mut GridPoint) -> Option<(Vec<Span>, [f64; 2])> {
+        let benches = benches(event);
+        let handles = self.chain.spans(from, to, benches[1] + 1)?;
+        let point = self.chain.common_point(&handles, benches)?;
+        Some((handles[1..].iter().map(|handle| handle.span).collect(), point))
     }
 
     fn contact(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
@@ -313,17 +364,17 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         }
         let earliest = self.at.head;
         self.clear = false;
-        for travelled in self.beyond(event) {
-            self.go_to(travelled, None, progress)?;
-            let (from, mut to) = (self.at.clone(), self.at.clone());
-            if self.touch(event, from, &mut to)? {
-                let status = self.proved(earliest, self.at.head, event.bench_a, event.bench_b);
-                self.proofs[EventKind::Contact as usize] = Some(status);
-                return Ok(());
-            }
-        }
-        let because = "doubles cannot tell whether the boards touch that come so near".to_owned();
-        let status = Status::Undecided { time_lo: self.time(earliest).lo, because };
+        let found = self.beyond(event, |search, point| search.touch(event, &mut point.clone(), point));
+        let status = if let Some((point, (spans, common))) = found {
+            self.go_to_point(&point, None, progress)?;
+            let head = point.head;
+            let line = CertificateLine::Contact { benches: benches(event), from: head, to: head, spans, point: common };
+            (self.write)(&line)?;
+            self.proved(event.kind, earliest, head, [event.bench_a, event.bench_b])
+        } else {
+            let because = "doubles cannot tell whether the boards touch that come so near".to_owned();
+            Status::Undecided { time_lo: self.time(earliest).lo, because }
+        };
         self.proofs[EventKind::Contact as usize] = Some(status);
         Ok(())
     }
@@ -338,55 +389,64 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         if link > 0 {
             self.links = Links::All;
         }
-        for travelled in self.beyond(event) {
-            self.go_to(travelled, None, progress)?;
-            let (mut from, mut to) = (self.at.clone(), self.at.clone());
-            let handles = self.chain.spans(&mut from, &mut to, link + 1);
-            let stalled =
-                |handles: &Vec<Spanned>| handles[link].capsule.product(&handles[link + 1].capsule, false).is_negative();
-            if let Some(handles) = handles.filter(stalled) {
-                let (head, spans) = (self.at.head, handles[1..].iter().map(|handle| handle.span).collect());
-                (self.write)(&CertificateLine::Stall { link, from: head, to: head, spans })?;
-                self.proofs[EventKind::Stall as usize] = Some(self.proved(earliest, head, event.bench_a, None));
-                return Ok(());
-            }
-        }
-        let because = "doubles cannot tell whether the link stalls that comes so near a stall".to_owned();
-        self.proofs[EventKind::Stall as usize] = Some(Status::Undecided { time_lo: self.time(earliest).lo, because });
+        let found = self.beyond(event, |search, point| {
+            let handles = search.chain.spans(&mut point.clone(), point, link + 1)?;
+            let stalled = handles[link].capsule.product(&handles[link + 1].capsule, false).is_negative();
+            stalled.then(|| handles[1..].iter().map(|handle| handle.span).collect())
+        });
+        let status = if let Some((point, spans)) = found {
+            self.go_to_point(&point, None, progress)?;
+            (self.write)(&CertificateLine::Stall { link, from: point.head, to: point.head, spans })?;
+            self.proved(event.kind, earliest, point.head, [event.bench_a, None])
+        } else {
+            let because = "doubles cannot tell whether the link stalls that comes so near a stall".to_owned();
+            Status::Undecided { time_lo: self.time(earliest).lo, because }
+        };
+        self.proofs[EventKind::Stall as usize] = Some(status);
         Ok(())
     }
 
     fn lock(&mut self, event: &Event) -> Result<(), Halt> {
         let link = event.bench_a.unwrap_or(0) as usize;
-        for travelled in self.beyond(event) {
-            let mut to = self.grid_point(travelled);
-            let Some(handles) = self.chain.spans(&mut self.at, &mut to, link) else { continue };
-            let mut end = to.clone();
-            let Some(last) = self.chain.spans(&mut to, &mut end, link) else { continue };
-            let (window, jump) = match self.chain.lock_window(&mut self.at, link, &handles[link], &last[link]) {
-                Some(window) => (Some(window), None),
-                None => (None, self.chain.lock_jump(&mut self.at, link, &handles[link], &last[link])),
-            };
-            if window.is_none() && jump.is_none() {
-                continue;
-            }
-            let spans = |handles: &[Spanned]| handles[1..].iter().map(|handle| handle.span).collect();
-            let line =
-                CertificateLine::Lock { link, to: to.head, spans: spans(&handles), last: spans(&last), window, jump };
-            (self.write)(&line)?;
-            self.proofs[EventKind::Lock as usize] = Some(self.proved(self.at.head, to.head, event.bench_a, None));
-            return Ok(());
-        }
-        Err(Halt::Stuck(format!("doubles cannot tell whether bench {} (counting from 1) locks there", link + 1)))
+        let rear = self.spans.get(link).copied();
+        let found = rear.and_then(|rear| {
+            self.beyond(event, |search, to| {
+                let chain = &search.chain;
+                let handles = chain.spans(&mut search.at, to, link)?;
+                let last = chain.spans(&mut to.clone(), to, link)?;
+                let fronts = (&handles[link], &last[link]);
+                let window = chain.lock_window(&mut search.at, link, rear, fronts);
+                let jump = match window {
+                    Some(_) => None,
+                    None => Some(chain.lock_jump(&mut search.at, link, rear, fronts)?),
+                };
+                let spans = |handles: &[Spanned]| handles[1..].iter().map(|handle| handle.span).collect();
+                let (spans, last) = (spans(&handles), spans(&last));
+                Some(CertificateLine::Lock { link, to: to.head, spans, last, window, jump })
+            })
+        });
+        let Some((to, line)) = found else {
+            let because = format!("doubles cannot tell whether bench {} (counting from 1) locks there", link + 1);
+            return Err(Halt::Stuck(because));
+        };
+        (self.write)(&line)?;
+        self.proofs[EventKind::Lock as usize] =
+            Some(self.proved(event.kind, self.at.head, to.head, [event.bench_a, None]));
+        Ok(())
     }
+}
+
+/// Returns the two benches of a contact.
+fn benches(event: &Event) -> [usize; 2] {
+    [event.bench_a, event.bench_b].map(|bench| bench.unwrap_or(0) as usize)
 }
 
 /// Returns a grid point at the path's end or beyond it.
 pub(super) fn path_end(exact: &ExactPath, path: &Path) -> GridPoint {
     let length = path.length();
     let end = place(path.param_at(length));
-    let beyond = exact.moved(end, LEAST * (1.0 + length));
+    let beyond = exact.moved(end, LEAST * (1.0 + length), false);
     let inward = matches!(exact.segments[beyond.0].curve, super::path::Curve::Inward { .. });
-    let head = if inward { Place(beyond.0, 0.0) } else { beyond };
+    let head = if inward { Place(beyond.0, 0.0, 0.0) } else { beyond };
     GridPoint::at(head, length)
 }

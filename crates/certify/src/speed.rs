@@ -153,6 +153,6 @@ impl RatioSearch<'_> {
         if travelled <= self.end {
             return GridPoint::new(path, exact, travelled);
         }
-        GridPoint::at(exact.moved(place(path.param_at(self.end)), travelled - self.end), travelled)
+        GridPoint::at(exact.moved(place(path.param_at(self.end)), travelled - self.end, false), travelled)
     }
 }

@@ -68,8 +68,13 @@ pub(super) struct Chain<'a> {
 /// Length added to both ends of a span, as a multiple of the rounding of doubles.
 const PAD: f64 = 64.0 * f64::EPSILON;
 
-/// Multiples of the pad, tried in this order.
-pub(super) const PADS: [f64; 3] = [1.0, 16.0, 256.0];
+/// Multiples of the pad that are tried for each handle, in this order: for most steps, and for steps next to an event,
+/// where the width of the spans is the width of the event's enclosure.
+const COARSE: [f64; 3] = [1.0, 16.0, 256.0];
+const FINE: [f64; 11] = [0.015625, 0.03125, 0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 16.0, 256.0];
+
+/// Length of a step next to an event, in links.
+const NEXT_TO_EVENT: f64 = 1e-9;
 
 /// Returns the metres between the handles of the head's bench, and of every other bench.
 pub(super) fn links_of(team: &Team) -> [Interval; 2] {
@@ -91,19 +96,7 @@ impl<'a> Chain<'a> {
     /// # Errors
     /// The obstacle.
     pub fn show(&self, from: &mut GridPoint, to: &mut GridPoint, claim: Claim) -> Result<Shown, Obstacle> {
-        let mut unlinked = None;
-        for pads in PADS {
-            match self.show_with(from, to, claim, pads) {
-                // If wider spans are long enough for the links, the obstacle is another.
-                Err(Obstacle::Link(link)) => unlinked = unlinked.or(Some(link)),
-                other => return other,
-            }
-        }
-        Err(Obstacle::Link(unlinked.unwrap_or(0)))
-    }
-
-    fn show_with(&self, from: &mut GridPoint, to: &mut GridPoint, claim: Claim, pads: f64) -> Result<Shown, Obstacle> {
-        let mut listed = Listed::new(self, Span(from.head, to.head), pads);
+        let mut listed = Listed::new(self, Span(from.head, to.head), to.travelled - from.travelled);
         while listed.handles.len() <= self.team.benches && !listed.is_enough(claim) {
             listed.extend(from, to, claim)?;
         }
@@ -130,13 +123,11 @@ impl<'a> Chain<'a> {
         enough: impl Fn(&[Spanned]) -> bool,
     ) -> Option<Vec<Spanned>> {
         let claim = Claim { links: Links::All, moving: false, clear: false };
-        PADS.iter().find_map(|pads| {
-            let mut listed = Listed::new(self, Span(from.head, to.head), *pads);
-            while !enough(&listed.handles) {
-                listed.extend(from, to, claim).ok()?;
-            }
-            Some(listed.handles)
-        })
+        let mut listed = Listed::new(self, Span(from.head, to.head), to.travelled - from.travelled);
+        while !enough(&listed.handles) {
+            listed.extend(from, to, claim).ok()?;
+        }
+        Some(listed.handles)
     }
 
     /// Returns a point that is proved to be in both boards.
@@ -164,22 +155,33 @@ impl<'a> Chain<'a> {
 pub(super) struct Listed<'c, 'a> {
     chain: &'c Chain<'a>,
     pub handles: Vec<Spanned>,
+    /// Pad of the last handle, metres.
     pad: f64,
-    pads: f64,
+    /// Multiples of the pad to try, and the number of those that were too small for the last handle.
+    multiples: &'static [f64],
+    too_small: usize,
     /// True if every link behind the head's surely goes forward.
     pub body_forward: bool,
 }
 
 impl<'c, 'a> Listed<'c, 'a> {
-    pub fn new(chain: &'c Chain<'a>, head: Span, pads: f64) -> Self {
+    /// Lists the head over a step of `metres`.
+    pub fn new(chain: &'c Chain<'a>, head: Span, metres: f64) -> Self {
         let handles = vec![Spanned::new(&chain.exact, head)];
-        Self { chain, handles, pad: 0.0, pads, body_forward: true }
+        Self::behind(chain, handles, metres)
     }
 
     /// Continues behind handles that are already enclosed. The span between the two grid points must be the last
     /// handle's.
-    pub fn behind(chain: &'c Chain<'a>, handles: Vec<Spanned>, pads: f64) -> Self {
-        Self { chain, handles, pad: 0.0, pads, body_forward: true }
+    pub fn behind(chain: &'c Chain<'a>, handles: Vec<Spanned>, metres: f64) -> Self {
+        let is_fine = metres < NEXT_TO_EVENT * chain.team.shortest_link();
+        let multiples = if is_fine { &FINE[..] } else { &COARSE };
+        Self { chain, handles, pad: 0.0, multiples, too_small: 0, body_forward: true }
+    }
+
+    /// Returns true for a step next to an event: places have low words.
+    fn is_fine(&self) -> bool {
+        self.multiples.len() == FINE.len()
     }
 
     /// Returns true if a handle is on a straight line without a beginning.
@@ -191,7 +193,7 @@ impl<'c, 'a> Listed<'c, 'a> {
     /// Returns a lower bound of the distance from the centre of all handles from this one on; minus infinity if
     /// unknown.
     fn ring(&self, handle: usize) -> f64 {
-        let Place(segment, theta) = self.handles[handle].span.1;
+        let Place(segment, theta, _) = self.handles[handle].span.1;
         match self.chain.exact.segments[0].curve {
             Curve::Inward { a } if segment == 0 => (a * theta).lo,
             _ => f64::NEG_INFINITY,
@@ -233,8 +235,9 @@ impl<'c, 'a> Listed<'c, 'a> {
         let front = self.handles[link];
         let ends = [from.handles[link + 1], to.handles[link + 1]];
         let length = self.chain.link(link);
+        let fine = self.is_fine();
         // A unit in the last place of a spiral's coordinate theta is theta times as many metres as one of its radius.
-        let turned = if matches!(exact.curve(front.span.0), Curve::Inward { .. } | Curve::Outward { .. }) {
+        let turned = if !fine && matches!(exact.curve(front.span.0), Curve::Inward { .. } | Curve::Outward { .. }) {
             front.span.0.1
         } else {
             0.0
@@ -243,15 +246,21 @@ impl<'c, 'a> Listed<'c, 'a> {
         let size = length.hi + radius * (1.0 + 0.1 * turned);
         let rear_cosine = ends[0].rear_cosine.min(ends[1].rear_cosine).max(1e-12);
         let front_cosine = ends.iter().map(|end| end.front_cosine.abs()).fold(0.0, f64::max);
-        let mut pad = (self.pads * PAD * size + 1.000_001 * self.pad * front_cosine) / rear_cosine;
+        let mut least = 1.000_001 * self.pad * front_cosine / rear_cosine;
         let turns = ends[0].front_cosine.signum() != ends[1].front_cosine.signum();
         if turns {
             let half = front.capsule.half;
-            pad += 4.0 * (1.0 + front.capsule.curvature * length.hi) * half * (half / length.lo) / rear_cosine;
+            least += 4.0 * (1.0 + front.capsule.curvature * length.hi) * half * (half / length.lo) / rear_cosine;
         }
-        self.pad = pad;
-        let rear = Spanned::new(exact, span(exact, ends[0].param, ends[1].param, pad));
-        let sign = follower_within(exact, &front, &rear, length).ok_or(Obstacle::Link(link))?;
+        let first = self.too_small.saturating_sub(1);
+        let padded = self.multiples.iter().enumerate().skip(first).find_map(|(too_small, multiple)| {
+            let pad = least + multiple * PAD * size / rear_cosine;
+            let rear = Spanned::new(exact, span(exact, ends[0].param, ends[1].param, pad, fine));
+            let sign = follower_within(exact, &front, &rear, length)?;
+            Some((too_small, pad, rear, sign))
+        });
+        let (too_small, pad, rear, sign) = padded.ok_or(Obstacle::Link(link))?;
+        (self.too_small, self.pad) = (too_small, pad);
         let forward = sign == Front::Forward;
         if !forward && (claim.moving || link == 1 && claim.links == Links::Front) {
             return Err(Obstacle::Stall(link));

@@ -14,7 +14,8 @@ use iceoryx2::service::builder::request_response::RequestResponseOpenError as Op
 use iceoryx2::service::port_factory::request_response;
 
 use crate::shared_memory::{OpenError, check_room_to_subscribe, node, service_name};
-use bench_dragon_messages::control::{Code, Command};
+use bench_dragon_messages::control::{Code, Command, RATES};
+use bench_dragon_messages::sentence::number;
 use bench_dragon_messages::state::PlaybackState;
 use bench_dragon_messages::{ControlRequest, ControlResponse, FrameHeader, HandlePose};
 
@@ -274,7 +275,13 @@ pub fn refusal(response: &ControlResponse, command: Command) -> Option<String> {
             Some(format!("go is refused: the show waits for nothing ({playback})"))
         }
         Some(Code::Refused) => Some(format!("{name} is refused: the show is {playback}")),
-        Some(Code::OutOfRange) => Some(format!("{name} is refused: {value:?} is out of range")),
+        Some(Code::OutOfRange) => {
+            let expected = match command {
+                Command::Rate(_) => format!("{} to {}", number(*RATES.start()), number(*RATES.end())),
+                _ => "seconds from 0 to the end of the show".to_owned(),
+            };
+            Some(format!("{name} is refused: {} is out of range, expected {expected}", number(value)))
+        }
         Some(Code::TooMany) => Some(format!("{name} is refused: too many commands are waiting")),
         Some(Code::NotUnderstood) | None => Some(format!("{name} is not understood by this publisher")),
     }

@@ -64,11 +64,11 @@ impl StageBox {
             && other.least.y <= self.greatest.y
     }
 
-    /// Returns the least and the greatest distance from the origin of a point in the box, metres.
-    pub fn radii(&self) -> (f64, f64) {
-        let nearest = Point::origin().sup(&self.least).inf(&self.greatest);
-        let farthest = self.least.coords.abs().sup(&self.greatest.coords.abs());
-        (nearest.coords.norm(), farthest.norm())
+    /// Returns the least and the greatest distance from `centre` of a point in the box, metres.
+    pub fn radii(&self, centre: Point) -> (f64, f64) {
+        let nearest = centre.sup(&self.least).inf(&self.greatest);
+        let farthest = (self.least - centre).abs().sup(&(self.greatest - centre).abs());
+        ((nearest - centre).norm(), farthest.norm())
     }
 }
 

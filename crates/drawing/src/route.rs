@@ -10,6 +10,7 @@ use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::model::path::{OutlineKind, SegmentOutline};
 use bench_dragon_motion::model::spiral::Direction;
 use bench_dragon_motion::model::{Point, Vector};
+use bench_dragon_motion::placement::Placement;
 
 /// Cubic curves per turn of a spiral: their error is at most 0.02 mm at the paper's scale.
 const CURVES_PER_TURN: f64 = 24.0;
@@ -20,28 +21,31 @@ const LEAST_PITCH: f64 = 1.5;
 /// Returns the data of the path in the picture of a camera. The path behind the start, where the team stands, is drawn
 /// to the edge of the picture.
 pub fn data(motion: &Motion, camera: &Camera) -> String {
-    let view = camera.view();
+    let (view, outline) = (camera.view(), motion.outline());
     let mut data = String::new();
     match motion.description() {
-        PathDescription::Spiral { pitch, .. } => spiral(&mut data, Direction::Inward, *pitch, (0.0, f64::MAX), camera),
+        PathDescription::Spiral { pitch, .. } => {
+            spiral(&mut data, Direction::Inward, *pitch, (0.0, f64::MAX), motion.placement(), camera);
+        }
         PathDescription::Turnaround { pitch, turn_radius, .. } => {
             let turn = TAU * turn_radius / pitch;
-            spiral(&mut data, Direction::Inward, *pitch, (turn, f64::MAX), camera);
+            spiral(&mut data, Direction::Inward, *pitch, (turn, f64::MAX), motion.placement(), camera);
         }
-        PathDescription::Route { start, heading_turns, .. } => {
-            let reach = (view.centre() - start).norm() + view.width() + view.height();
-            let behind = start - reach * direction(TAU * heading_turns);
-            line(&mut data, behind, *start);
+        PathDescription::Route { .. } => {
+            if let Some(SegmentOutline { start, heading, .. }) = outline.first() {
+                let reach = (view.centre() - start).norm() + view.width() + view.height();
+                line(&mut data, start - reach * direction(*heading), *start);
+            }
         }
     }
-    for segment in motion.outline() {
+    for segment in outline {
         match segment.kind {
             OutlineKind::Line => {
                 line(&mut data, segment.start, segment.start + segment.length * direction(segment.heading));
             }
             OutlineKind::Arc { curvature } => arc(&mut data, &segment, curvature),
-            OutlineKind::Spiral { direction: Direction::Outward, pitch, first, last } => {
-                spiral(&mut data, Direction::Outward, pitch, (first, last), camera);
+            OutlineKind::Spiral { direction: Direction::Outward, pitch, first, last, .. } => {
+                spiral(&mut data, Direction::Outward, pitch, (first, last), motion.placement(), camera);
             }
             // Drawn above, with the path behind the start.
             OutlineKind::Spiral { direction: Direction::Inward, .. } => {}
@@ -96,12 +100,19 @@ fn spiral_point(way: Direction, pitch: f64, theta: f64) -> Point {
     Point::from(theta * unwound(way, pitch, theta))
 }
 
-/// Appends the turns of a spiral between two polar angles that the picture can show, as cubic curves.
-fn spiral(data: &mut String, direction: Direction, pitch: f64, (from, to): (f64, f64), camera: &Camera) {
+/// Appends the turns of a placed spiral between two polar angles that the picture can show, as cubic curves.
+fn spiral(
+    data: &mut String,
+    direction: Direction,
+    pitch: f64,
+    (from, to): (f64, f64),
+    placement: &Placement,
+    camera: &Camera,
+) {
     if pitch * camera.scale < LEAST_PITCH {
         return;
     }
-    let (near, far) = camera.view().radii();
+    let (near, far) = camera.view().radii(placement.origin());
     let (from, to) = (from.max(TAU * near / pitch - TAU), to.min(TAU * far / pitch + TAU));
     if from >= to {
         return;
@@ -114,7 +125,7 @@ fn spiral(data: &mut String, direction: Direction, pitch: f64, (from, to): (f64,
     let at = |theta: f64| {
         // d/dtheta of a theta e(theta) is a e + a theta e'.
         let (point, outward) = (spiral_point(direction, pitch, theta), unwound(direction, pitch, theta));
-        (point, outward + Vector::new(-point.y, point.x))
+        (placement.point(point), placement.vector(outward + Vector::new(-point.y, point.x)))
     };
     let (mut point, mut rate) = at(from);
     let _ = write!(data, "M{}", pair(point));
@@ -187,8 +198,9 @@ mod tests {
     fn a_route_comes_from_beyond_the_picture_and_its_arcs_have_both_ends() {
         let steps =
             vec![RouteStep::Line { length: 3.0 }, RouteStep::Arc { side: Side::Left, radius: 2.0, turns: 1.25 }];
-        let description = PathDescription::Route { start: Point::new(1.0, 1.0), heading_turns: 0.0, steps };
+        let description = PathDescription::Route { heading_turns: 0.0, steps };
         let motion = Motion::new(description, TEAM, 1.0, Method::Newton).unwrap();
+        let motion = motion.placed(Placement::IDENTITY.after_moving_by(Vector::new(1.0, 1.0)));
         let drawn = data(&motion, &camera(20.0));
         let behind: f64 = drawn[1..].split(' ').next().unwrap().parse().unwrap();
         assert!(behind < -10.0 && drawn.contains("L1 1M1 1L4 1M4 1A2 2 0 0 1 "), "{drawn}");

@@ -85,7 +85,7 @@ pub fn title(title: &str, below: &str, colour: &str, palette: &Palette) -> Group
 pub fn axes(camera: &Camera, palette: &Palette) -> Group {
     let (viewport, view) = (camera.viewport, camera.view());
     let step = round_step(130.0 / camera.scale);
-    let decimals = (-step.log10().floor()).max(0.0) as usize;
+    let decimals = (-step.log10().floor()).clamp(0.0, 12.0) as usize;
     let mut ticks = String::new();
     let mut group = Group::new().set("id", "axes");
     for x in multiples(step, view.least.x, view.greatest.x) {

@@ -3,6 +3,9 @@
 //! In: a [`CollisionAlert`] and the number of benches. Out: a sentence. Called by `run`, `watch` and the stage
 //! picture's server, so that all of them print the same.
 
+use std::fmt::Display;
+use std::io;
+
 use super::layouts::{CollisionAlert, Cue};
 use crate::state::EventKind;
 use crate::state::{FrameState, Level};
@@ -94,6 +97,18 @@ fn coming(alert: &CollisionAlert, kind: EventKind, benches: u32, figures: Figure
 /// stands still.
 pub fn time_until(simulated_seconds: f64, time_scale: f64) -> String {
     if time_scale > 0.0 { format!("in {:.1} s", simulated_seconds / time_scale) } else { "not while paused".to_owned() }
+}
+
+/// Returns a number with the fewest digits that read back to the same bits: with an exponent outside 1e-6 to 1e15, where
+/// Rust would write every zero.
+pub fn number(value: f64) -> String {
+    let is_plain = value == 0.0 || !value.is_finite() || (1e-6..1e15).contains(&value.abs());
+    if is_plain { value.to_string() } else { format!("{value:e}") }
+}
+
+/// Returns the sentence for a file that cannot be created.
+pub fn not_writable(file: impl Display, error: &io::Error) -> String {
+    format!("{file}: {error}, expected a file to write")
 }
 
 /// Returns a number with at most `decimals` decimals: no zeros at its end, and no minus before zero.

@@ -10,6 +10,7 @@ pub mod contact;
 pub mod event;
 pub mod linkage;
 pub mod model;
+pub mod placement;
 pub mod singularities;
 pub mod solve;
 pub mod timeline;
@@ -29,6 +30,7 @@ use crate::solve::{Solver, Velocities};
 use clearance::ClearanceMonitor;
 use contact::{ConservativeAdvancement, LeastClearance};
 use event::{Budget, Event};
+use placement::{Placed, Placement};
 use singularities::Singularities;
 use timeline::{TimedClearance, TimedEvent, Timeline};
 
@@ -104,6 +106,7 @@ pub struct Motion {
     head_speed: f64,
     method: Method,
     instructions: Instructions,
+    placement: Placement,
 }
 
 /// Units of work after which the search for stall and lock gives up: about ten seconds.
@@ -150,7 +153,22 @@ impl Motion {
             return Err(MotionError::PaperElsewhere);
         }
         let instructions = Instructions::fastest(team.handles());
-        Ok(Self { description, path, team, head_speed, method, instructions })
+        Ok(Self { description, path, team, head_speed, method, instructions, placement: Placement::IDENTITY })
+    }
+
+    /// Returns the same motion at another place of the stage.
+    pub fn placed(self, placement: Placement) -> Self {
+        Self { placement, ..self }
+    }
+
+    /// Returns the same motion in the path's own coordinates: its chains are those of [`Motion::path`].
+    pub fn in_own_frame(&self) -> Self {
+        self.clone().placed(Placement::IDENTITY)
+    }
+
+    /// Returns the mapping of the path's own coordinates to the stage.
+    pub fn placement(&self) -> &Placement {
+        &self.placement
     }
 
     /// Returns the numbers of which the path is made.
@@ -158,7 +176,7 @@ impl Motion {
         &self.description
     }
 
-    /// Returns the path.
+    /// Returns the path, in its own coordinates.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -184,7 +202,7 @@ impl Motion {
     /// [`MotionError::PaperElsewhere`]
     pub fn with_method(&self, method: Method) -> Result<Self, MotionError> {
         let other = Self::new(self.description.clone(), self.team, self.head_speed, method)?;
-        Ok(Self { instructions: self.instructions, ..other })
+        Ok(Self { instructions: self.instructions, placement: self.placement, ..other })
     }
 
     /// Returns the instructions that read a table: the fastest of this processor, unless others were requested.
@@ -201,7 +219,8 @@ impl Motion {
     /// rounding of the handles' coordinates.
     pub fn link_tolerance(&self) -> f64 {
         // Each end of a link may have the rounding of a product and of a sum, in both coordinates.
-        let rounding = 4.0 * f64::EPSILON * self.path.largest_summand(self.team.length());
+        let placed = self.placement.origin().coords.amax();
+        let rounding = 4.0 * f64::EPSILON * self.path.largest_summand(self.team.length()).max(placed);
         match self.method {
             Method::Accuracy(accuracy) => selection::link_tolerance(&self.team, accuracy) + rounding,
             _ => rounding,
@@ -220,13 +239,21 @@ impl Motion {
         }
     }
 
-    /// Returns the outline of the path, segment by segment.
+    /// Returns the outline of the path on the stage, segment by segment.
     pub fn outline(&self) -> Vec<SegmentOutline> {
-        self.path.outline()
+        self.path.outline().into_iter().map(|segment| self.placement.outline(segment)).collect()
     }
 
-    /// Makes the solver.
+    /// Makes the solver. Its chains are placed on the stage.
     pub fn solver(&self, velocities: Velocities) -> Choice {
+        let choice = self.solver_in_own_frame(velocities);
+        if self.placement.is_identity() {
+            return choice;
+        }
+        Choice { solver: Box::new(Placed { solver: choice.solver, placement: self.placement }), ..choice }
+    }
+
+    fn solver_in_own_frame(&self, velocities: Velocities) -> Choice {
         let newton = |reason: String| {
             let newton = Newton::new(self.path.clone(), self.team, self.head_speed, velocities);
             Choice { solver: Box::new(newton), reason, table: None }
@@ -397,10 +424,14 @@ impl Motion {
         if is_past { time.next_down() } else { time }
     }
 
-    /// Returns the events with their times, and the time up to which they are complete.
+    /// Returns the events, placed on the stage, with their times, and the time up to which they are complete.
     fn timed(&self, events: Vec<Event>, searched_until: f64) -> Timeline {
         let end = events.iter().fold(0.0, |end: f64, event| end.max(event.travelled));
-        let timed = events.into_iter().map(|event| TimedEvent { event, time: self.time_of(&event) }).collect();
+        let timed = events.into_iter().map(|event| {
+            let place = event.place.map(|place| self.placement.point(place));
+            TimedEvent { event: Event { place, ..event }, time: self.time_of(&event) }
+        });
+        let timed = timed.collect();
         Timeline::new(timed, (searched_until < end).then(|| self.time_at(searched_until)))
     }
 }

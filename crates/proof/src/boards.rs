@@ -3,6 +3,7 @@
 //! Doubles choose the direction in which two boards may be apart; intervals prove it.
 
 use std::cell::OnceCell;
+use std::f64::consts::TAU;
 
 use super::capsule::Capsule;
 use super::interval::{Interval, Vector};
@@ -10,6 +11,10 @@ use super::scene::Team;
 
 /// Limit of directions tried for a pair, the best first.
 const MOST_TRIES: usize = 4;
+/// Number of directions all around that are tried where none of the best is enough, and the angle in radians to which
+/// the best of them is refined.
+const SECTORS: usize = 64;
+const LEAST_ANGLE: f64 = 1e-9;
 /// Distance by doubles, metres, from which on one of the eight fixed directions is tried first.
 const CLEARLY_APART: f64 = 1e-2;
 
@@ -50,8 +55,8 @@ impl<'a> Board<'a> {
     /// Creates a board between its handles.
     pub fn new(front: &'a Capsule, rear: &'a Capsule, length: Interval, team: &Team) -> Self {
         let middle = front.point.minus(&rear.point);
-        let overhang = &team.hole_inset / &length;
-        let half_width = &team.width * Interval::new(0.5);
+        let overhang = team.hole_inset / length;
+        let half_width = team.width * Interval::new(0.5);
         let rough = Rough::new(front, rear, length.rough(), overhang.rough(), half_width.rough());
         Self { front, rear, middle, length, overhang, half_width, rough, compass: Default::default() }
     }
@@ -60,21 +65,21 @@ impl<'a> Board<'a> {
     fn extent(&self, axis: &Axis) -> Interval {
         let Axis { n, norm } = axis;
         let projected = |capsule: &Capsule| {
-            let slack = n.dot(&capsule.tangent).abs() * &capsule.half + norm * &capsule.sag;
+            let slack = n.dot(&capsule.tangent).abs() * capsule.half + norm * capsule.sag;
             (n.dot(&capsule.point), slack)
         };
         let ((f, f_slack), (r, r_slack)) = (projected(self.front), projected(self.rear));
-        let slack = &f_slack + &r_slack;
+        let slack = f_slack + r_slack;
         // Beyond a handle the board reaches e (F - R) further, which is no longer than e l.
-        let longest = norm * &self.length;
-        let beyond = |towards: Interval| &self.overhang * (towards + &slack).min(&longest);
-        let ahead = &f + &f_slack + beyond(&f - &r);
-        let behind = &r + &r_slack + beyond(&r - &f);
+        let longest = norm * self.length;
+        let beyond = |towards: Interval| self.overhang * (towards + slack).min(&longest);
+        let ahead = f + f_slack + beyond(f - r);
+        let behind = r + r_slack + beyond(r - f);
         let across = n.cross(&self.middle).abs()
-            + n.cross(&self.front.tangent).abs() * &self.front.half
-            + n.cross(&self.rear.tangent).abs() * &self.rear.half
-            + norm * (&self.front.sag + &self.rear.sag);
-        ahead.max(&behind) + &self.half_width * norm.min(&(across / &self.length))
+            + n.cross(&self.front.tangent).abs() * self.front.half
+            + n.cross(&self.rear.tangent).abs() * self.rear.half
+            + norm * (self.front.sag + self.rear.sag);
+        ahead.max(&behind) + self.half_width * norm.min(&(across / self.length))
     }
 
     fn compass_extent(&self, direction: usize) -> &Interval {
@@ -91,14 +96,39 @@ impl<'a> Board<'a> {
         if metres > CLEARLY_APART && (self.compass_extent(direction) + other.compass_extent(opposite)).is_negative() {
             return true;
         }
+        let proved = |n: [f64; 2]| {
+            let axis = Axis::new(n);
+            let opposite = Axis { n: Vector { x: -axis.n.x, y: -axis.n.y }, norm: axis.norm };
+            (self.extent(&axis) + other.extent(&opposite)).is_negative()
+        };
         let mut axes: Vec<_> = self.rough.axes(&other.rough).into_iter().map(|n| (n, apart(n))).collect();
         axes.sort_by(|a, b| b.1.total_cmp(&a.1));
-        axes.iter().take(MOST_TRIES).any(|(n, _)| {
-            let axis = Axis::new(*n);
-            let opposite = Axis { n: Vector { x: -&axis.n.x, y: -&axis.n.y }, norm: axis.norm.clone() };
-            (self.extent(&axis) + other.extent(&opposite)).is_negative()
-        })
+        axes.iter().take(MOST_TRIES).any(|(n, _)| proved(*n)) || best_direction(apart).is_some_and(proved)
     }
+}
+
+/// Returns the direction with the greatest distance by doubles, if that distance is positive: the best of directions
+/// all around, refined by golden sections.
+fn best_direction(apart: impl Fn([f64; 2]) -> f64) -> Option<[f64; 2]> {
+    let unit = |angle: f64| [angle.cos(), angle.sin()];
+    let at = |angle: f64| apart(unit(angle));
+    let sector = TAU / SECTORS as f64;
+    // The distance has several peaks: each sector that is higher than its neighbours may hold the highest.
+    let samples: Vec<f64> = (0..SECTORS).map(|sample| at(sample as f64 * sector)).collect();
+    let is_peak = |sample: &usize| {
+        let beside = |step: usize| samples[(sample + step) % SECTORS];
+        samples[*sample] >= beside(1) && samples[*sample] >= beside(SECTORS - 1)
+    };
+    let refined = (0..SECTORS).filter(is_peak).map(|sample| {
+        let (mut from, mut to) = ((sample as f64 - 1.0) * sector, (sample as f64 + 1.0) * sector);
+        while to - from > LEAST_ANGLE {
+            let (one, other) = (from + 0.382 * (to - from), to - 0.382 * (to - from));
+            if at(one) > at(other) { to = other } else { from = one }
+        }
+        (unit(from), at(from))
+    });
+    let (direction, metres) = refined.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (metres > 0.0).then_some(direction)
 }
 
 /// The same board in doubles.
@@ -174,9 +204,9 @@ impl Rough {
         [at(-e, -v), at(-e, v), at(1.0 + e, -v), at(1.0 + e, v)]
     }
 
-    /// Returns directions in which another board may be apart: the normals of all edges, and the direction between the
-    /// nearest corners.
-    fn axes(&self, other: &Self) -> [[f64; 2]; 9] {
+    /// Returns directions in which another board may be apart: the normals of all edges, and the directions between the
+    /// nearest corners and between the middles.
+    fn axes(&self, other: &Self) -> [[f64; 2]; 10] {
         let of_edges = |board: &Self| {
             let [x, y] = board.direction();
             [[x, y], [-y, x], [-x, -y], [y, -x]]
@@ -185,9 +215,13 @@ impl Rough {
         let corners =
             self.corners().into_iter().flat_map(|from| other.corners().map(|to| [to[0] - from[0], to[1] - from[1]]));
         let nearest = corners.min_by(|a, b| dot(*a, *a).total_cmp(&dot(*b, *b))).unwrap_or([1.0, 0.0]);
-        let norm = nearest[0].hypot(nearest[1]);
-        let nearest = [nearest[0] / norm, nearest[1] / norm];
-        [own[0], own[1], own[2], own[3], others[0], others[1], others[2], others[3], nearest]
+        let middle = |board: &Self| [0, 1].map(|axis| board.front.point[axis] + board.rear.point[axis]);
+        let (from, to) = (middle(self), middle(other));
+        let [nearest, between] = [nearest, [to[0] - from[0], to[1] - from[1]]].map(|[x, y]| {
+            let norm = x.hypot(y);
+            [x / norm, y / norm]
+        });
+        [own[0], own[1], own[2], own[3], others[0], others[1], others[2], others[3], nearest, between]
     }
 }
 
@@ -196,28 +230,36 @@ impl Rough {
 /// metres.
 pub(super) fn is_inside_ring(team: &Team, reach: &Interval, ring: &Interval) -> bool {
     let half_link = team.link(1) * Interval::new(0.5);
-    let half_width = &team.width * Interval::new(0.5);
+    let half_width = team.width * Interval::new(0.5);
     if !half_link.is_below(ring) {
         return false;
     }
-    let inner = (ring.square() - half_link.square()).sqrt().min(&(ring - &team.hole_inset)) - &half_width;
+    let inner = (ring.square() - half_link.square()).sqrt().min(&(ring - team.hole_inset)) - half_width;
     let outer = reach + (team.hole_inset.square() + half_width.square()).sqrt();
     outer.is_below(&inner)
 }
 
 /// Returns true if a point is in a board for all positions of its handles in their spans (Lemma 5, *Contact*).
 pub(super) fn covers(board: &Board, point: &Vector) -> bool {
-    let all = |capsule: &Capsule| {
-        let along = capsule.tangent.scaled(&capsule.half.around_zero());
-        let sag = capsule.sag.around_zero();
-        capsule.point.plus(&along).plus(&Vector { x: sag.clone(), y: sag })
-    };
-    let (front, rear) = (all(board.front), all(board.rear));
-    let (to_point, link) = (point.minus(&rear), front.minus(&rear));
+    let (front, rear, link) = (board.front, board.rear, board.middle);
+    let (from_rear, from_front) = (point.minus(&rear.point), point.minus(&front.point));
+    // A handle is at most this far from the middle of its capsule.
+    let slack = |capsule: &Capsule| (capsule.half + capsule.sag).upper();
+    // Bounds of a product of this distance and a vector.
+    let moved =
+        |capsule: &Capsule, along: Interval, vector: &Vector| along.abs() * capsule.half + vector.norm() * capsule.sag;
+    let both = from_rear.plus(&link);
+    let off_along = moved(front, from_rear.dot(&front.tangent), &from_rear)
+        + moved(rear, both.dot(&rear.tangent), &both)
+        + slack(rear) * (slack(rear) + slack(front));
+    let off_across = moved(front, from_rear.cross(&front.tangent), &from_rear)
+        + moved(rear, from_front.cross(&rear.tangent), &from_front)
+        + slack(rear) * slack(front);
+    let along = from_rear.dot(&link) + off_along.around_zero();
+    let across = from_rear.cross(&link) + off_across.around_zero();
     let squared = board.length.square();
-    let along = to_point.dot(&link);
-    let margin = &board.overhang * &squared;
-    (-&margin).is_at_most(&along)
-        && along.is_at_most(&(&squared + &margin))
-        && to_point.cross(&link).abs().is_at_most(&(&board.length * &board.half_width))
+    let margin = board.overhang * squared;
+    (-margin).is_at_most(&along)
+        && along.is_at_most(&(squared + margin))
+        && across.abs().is_at_most(&(board.length * board.half_width))
 }

@@ -29,8 +29,8 @@ impl Capsule {
         let middle = Some(path.middle(lo, hi)).filter(|place| between(*place)).unwrap_or(lo);
         let half = path.metres_bound(lo, middle).max(&path.metres_bound(middle, hi));
         let curvature = path.curvature_bound(lo, hi);
-        let turn = (&curvature * &half).upper();
-        let sag = (&turn * &half * Interval::new(0.5)).upper();
+        let turn = (curvature * half).upper();
+        let sag = (turn * half * Interval::new(0.5)).upper();
         let At { point, tangent } = path.at(middle);
         Self { span, point, tangent, half, curvature, sag, turn }
     }
@@ -58,15 +58,15 @@ pub(super) struct Pair<'a> {
 impl<'a> Pair<'a> {
     pub fn new(front: &'a Capsule, rear: &'a Capsule) -> Self {
         let middle = front.point.minus(&rear.point);
-        let distance = (middle.norm() + &front.half + &rear.half).upper();
+        let distance = (middle.norm() + front.half + rear.half).upper();
         let along = front.tangent.dot(&rear.tangent).abs();
-        Self { front, rear, middle, distance, sag: (&front.sag + &rear.sag).upper(), along }
+        Self { front, rear, middle, distance, sag: (front.sag + rear.sag).upper(), along }
     }
 
     /// Returns t . d for all tangents t of `of`. `of` and `other` are the two spans.
     fn product(&self, of: &Capsule, other: &Capsule) -> Interval {
         // |t(m) . V| is h for the capsule's own V, since t(m) is a unit vector.
-        let slack = &of.half + &other.half * &self.along + &self.sag + &of.turn * &self.distance;
+        let slack = of.half + other.half * self.along + self.sag + of.turn * self.distance;
         of.tangent.dot(&self.middle) + slack.around_zero()
     }
 

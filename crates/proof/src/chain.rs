@@ -1,7 +1,7 @@
 //! The chain over the spans of its handles: Lemma 1 for each listed link.
 
 use super::capsule::Capsule;
-use super::interval::Interval;
+use super::interval::{Interval, Vector};
 use super::link;
 use super::path::{Place, Span};
 use super::scene::Scene;
@@ -24,16 +24,21 @@ impl Chain {
         if spans.len() > team.benches {
             return Err(format!("{} spans, but there are only {} benches", spans.len(), team.benches));
         }
-        let mut capsules = Vec::with_capacity(spans.len() + 1);
+        let mut capsules: Vec<Capsule> = Vec::with_capacity(spans.len() + 1);
+        let mut products = Vec::with_capacity(spans.len());
+        let mut front_ends: Option<[Vector; 2]> = None;
         for (handle, span) in std::iter::once(&head).chain(spans).enumerate() {
             span_is_one(scene, *span).map_err(|problem| format!("handle {handle}: {problem}"))?;
-            capsules.push(Capsule::new(path, *span));
+            let (capsule, ends) = (Capsule::new(path, *span), [span.0, span.1].map(|place| path.at(place).point));
+            if let (Some(front), Some(front_ends)) = (capsules.last(), front_ends) {
+                let index = handle - 1;
+                let product = link::check(path, (front, front_ends), (&capsule, ends), team.link(index))
+                    .map_err(|problem| format!("link {index}: {problem} (Lemma 1)"))?;
+                products.push(product);
+            }
+            capsules.push(capsule);
+            front_ends = Some(ends);
         }
-        let links = capsules.windows(2).enumerate().map(|(index, pair)| {
-            link::check(path, &pair[0], &pair[1], team.link(index))
-                .map_err(|problem| format!("link {index}: {problem} (Lemma 1)"))
-        });
-        let products = links.collect::<Result<_, _>>()?;
         Ok(Self { capsules, products })
     }
 
@@ -51,9 +56,10 @@ impl Chain {
 
 /// Checks that a span is valid: two places strictly inside segments, in order.
 pub(super) fn span_is_one(scene: &Scene, Span(lo, hi): Span) -> Result<(), String> {
-    for Place(segment, coordinate) in [lo, hi] {
-        if !scene.path.has(Place(segment, coordinate)) {
-            return Err(format!("[{segment}, {coordinate}] is not inside a segment of the path"));
+    for place in [lo, hi] {
+        if !scene.path.has(place) {
+            let Place(segment, coordinate, _) = place;
+            return Err(format!("[{segment}, {coordinate:?}] is not inside a segment of the path"));
         }
     }
     if scene.path.in_order(lo, hi) { Ok(()) } else { Err("the span's ends are not in order".to_owned()) }

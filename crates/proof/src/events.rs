@@ -78,7 +78,7 @@ impl Events {
         let point = Vector::new(point[0], point[1]);
         for bench in benches {
             let (front, rear) = (&chain.capsules[bench], &chain.capsules[bench + 1]);
-            let board = Board::new(front, rear, scene.team.link(bench).clone(), &scene.team);
+            let board = Board::new(front, rear, *scene.team.link(bench), &scene.team);
             if !covers(&board, &point) {
                 return Err(format!("the point may be outside bench {bench} (Lemma 5)"));
             }
@@ -148,7 +148,7 @@ impl Events {
         let (front, front_at_end) = (&while_going.capsules[link], &at_end.capsules[link]);
         let squared = scene.team.link(link).square();
         let is_before = |a: Place, b: Place| a != b && path.in_order(a, b);
-        let cannot_be_at = |place: Place| link::is_all_nearer(path, front, Span(place, place), &squared, &mut 1);
+        let cannot_be_at = |place: Place| link::is_nearer_at(path, front, place, &squared);
         match shown {
             LockShown::Vanishes(window) => {
                 span_is_one(scene, window).map_err(|problem| format!("the window: {problem}"))?;
@@ -159,8 +159,7 @@ impl Events {
                 if !(cannot_be_at(w1) && cannot_be_at(w2)) {
                     return Err("an end of the window may be at the link's length (Lemma 5)".to_owned());
                 }
-                let mut stretches = link::MOST_STRETCHES;
-                if !link::is_all_nearer(path, front_at_end, window, &squared, &mut stretches) {
+                if !link::is_all_nearer(path, front_at_end, window, &squared) {
                     return Err("a place of the window may be at the link's length in the end (Lemma 5)".to_owned());
                 }
             }

@@ -1,24 +1,21 @@
 //! Interval arithmetic of the checker, with ends of 128 bits.
 //!
 //! Every operation returns an interval that holds the result for all numbers of its operands: lower ends are rounded
-//! down, upper ends up. It relies only on `+`, `-`, `*`, `/` and the comparisons of `astro-float`. An operation without
-//! a value is NaN: a division by an interval that holds 0, or a root of a number that may be negative. NaN propagates,
+//! down, upper ends up. It relies only on the operations and the comparisons of [`Number`]. An operation without a
+//! value is NaN: a division by an interval that holds 0, or a root of a number that may be negative. NaN propagates,
 //! and every comparison with it is false.
 
 use std::borrow::Borrow;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use astro_float::RoundingMode::{Down, Up};
-use astro_float::{BigFloat, Sign};
-
-/// Bits of each end.
-pub(super) const BITS: usize = 128;
+use super::number::Number;
+use super::number::Round::{Down, Up};
 
 /// All real numbers from `lo` to `hi`.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Interval {
-    lo: BigFloat,
-    hi: BigFloat,
+    lo: Number,
+    hi: Number,
 }
 
 /// The sign of an interval's numbers.
@@ -30,36 +27,32 @@ enum Side {
 }
 
 impl Interval {
-    /// Creates the interval of a single number, exactly. `astro-float` converts subnormal numbers wrongly, so they
-    /// become the interval between the least normal number and its negative.
-    pub fn new(number: f64) -> Self {
-        if number.is_subnormal() {
-            return Self::new(f64::MIN_POSITIVE).around_zero();
-        }
-        let end = BigFloat::from_f64(number, BITS);
-        Self { lo: end.clone(), hi: end }
+    /// Creates the interval of a single number, exactly.
+    pub const fn new(number: f64) -> Self {
+        let end = Number::new(number);
+        Self { lo: end, hi: end }
     }
 
     /// Creates the interval between two numbers.
     #[cfg(test)]
-    pub fn between(lo: BigFloat, hi: BigFloat) -> Self {
+    pub fn between(lo: Number, hi: Number) -> Self {
         Self { lo, hi }
     }
 
     /// Returns both ends.
     #[cfg(test)]
-    pub fn ends(&self) -> (&BigFloat, &BigFloat) {
-        (&self.lo, &self.hi)
+    pub fn ends(&self) -> (Number, Number) {
+        (self.lo, self.hi)
     }
 
     fn not_a_number() -> Self {
-        Self { lo: astro_float::NAN, hi: astro_float::NAN }
+        Self { lo: Number::NAN, hi: Number::NAN }
     }
 
     fn side(&self) -> Side {
-        if self.lo.is_zero() || self.lo.is_positive() {
+        if !self.lo.is_negative() {
             Side::NotNegative
-        } else if self.hi.is_zero() || self.hi.is_negative() {
+        } else if !self.hi.is_positive() {
             Side::NotPositive
         } else {
             Side::Across
@@ -82,12 +75,12 @@ impl Interval {
 
     /// Returns true if every number is greater than 0.
     pub fn is_positive(&self) -> bool {
-        !self.is_not_a_number() && self.lo.is_positive() && !self.lo.is_zero()
+        !self.is_not_a_number() && self.lo.is_positive()
     }
 
     /// Returns true if every number is less than 0.
     pub fn is_negative(&self) -> bool {
-        !self.is_not_a_number() && self.hi.is_negative() && !self.hi.is_zero()
+        !self.is_not_a_number() && self.hi.is_negative()
     }
 
     /// Returns true if no number is less than 0.
@@ -97,38 +90,38 @@ impl Interval {
 
     /// Returns the upper end alone.
     pub fn upper(&self) -> Self {
-        Self { lo: self.hi.clone(), hi: self.hi.clone() }
+        Self { lo: self.hi, hi: self.hi }
     }
 
     /// Returns all numbers from the negative of the upper end to the upper end.
     pub fn around_zero(&self) -> Self {
-        Self { lo: negative(&self.hi), hi: self.hi.clone() }
+        Self { lo: self.hi.negative(), hi: self.hi }
     }
 
     /// Returns the greater of the two.
     pub fn max(&self, other: &Self) -> Self {
-        Self { lo: greater(&self.lo, &other.lo), hi: greater(&self.hi, &other.hi) }
+        Self { lo: greater(self.lo, other.lo), hi: greater(self.hi, other.hi) }
     }
 
     /// Returns the smaller of the two.
     pub fn min(&self, other: &Self) -> Self {
-        Self { lo: smaller(&self.lo, &other.lo), hi: smaller(&self.hi, &other.hi) }
+        Self { lo: smaller(self.lo, other.lo), hi: smaller(self.hi, other.hi) }
     }
 
     /// Returns the absolute value.
     pub fn abs(&self) -> Self {
         match self.side() {
             _ if self.is_not_a_number() => Self::not_a_number(),
-            Side::NotNegative => self.clone(),
+            Side::NotNegative => *self,
             Side::NotPositive => -self,
-            Side::Across => Self { lo: zero(), hi: greater(&negative(&self.lo), &self.hi) },
+            Side::Across => Self { lo: Number::ZERO, hi: greater(self.lo.negative(), self.hi) },
         }
     }
 
     /// Returns the square.
     pub fn square(&self) -> Self {
         let size = self.abs();
-        Self { lo: size.lo.mul(&size.lo, BITS, Down), hi: size.hi.mul(&size.hi, BITS, Up) }
+        Self { lo: size.lo.times(size.lo, Down), hi: size.hi.times(size.hi, Up) }
     }
 
     /// Returns the square root.
@@ -136,69 +129,45 @@ impl Interval {
         if !self.is_not_negative() {
             return Self::not_a_number();
         }
-        Self { lo: root(&self.lo).0, hi: root(&self.hi).1 }
+        Self { lo: root(self.lo).0, hi: root(self.hi).1 }
     }
 
     /// Returns a double near the middle, for choices and never for proofs.
     pub fn rough(&self) -> f64 {
-        let lo = rough(&self.lo);
-        lo + (rough(&self.hi) - lo) / 2.0
+        let lo = self.lo.rough();
+        lo + (self.hi.rough() - lo) / 2.0
     }
 }
 
-fn zero() -> BigFloat {
-    BigFloat::from_f64(0.0, BITS)
-}
-
-fn negative(number: &BigFloat) -> BigFloat {
-    number.clone().neg()
-}
-
-fn greater(a: &BigFloat, b: &BigFloat) -> BigFloat {
+fn greater(a: Number, b: Number) -> Number {
     if a.is_nan() || b.is_nan() {
-        return astro_float::NAN;
+        return Number::NAN;
     }
-    if a < b { b.clone() } else { a.clone() }
+    if a < b { b } else { a }
 }
 
-fn smaller(a: &BigFloat, b: &BigFloat) -> BigFloat {
+fn smaller(a: Number, b: Number) -> Number {
     if a.is_nan() || b.is_nan() {
-        return astro_float::NAN;
+        return Number::NAN;
     }
-    if b < a { b.clone() } else { a.clone() }
+    if b < a { b } else { a }
 }
 
 /// Returns numbers below and above the root of a number of at least 0: for every s > 0, the root lies between s and x
 /// / s. Near the root, one step of Newton's method brings the two together.
-fn root(x: &BigFloat) -> (BigFloat, BigFloat) {
-    if x.is_zero() {
-        return (zero(), zero());
+fn root(x: Number) -> (Number, Number) {
+    if !x.is_positive() {
+        return (x, x);
     }
-    let guess = rough(x).sqrt();
-    let guess = if guess.is_normal() { BigFloat::from_f64(guess, BITS) } else { x.sqrt(BITS, Down) };
-    let half = BigFloat::from_f64(0.5, BITS);
-    let s = x.div(&guess, BITS, Down).add(&guess, BITS, Down).mul(&half, BITS, Down);
-    if !s.is_positive() || s.is_zero() {
-        return (astro_float::NAN, astro_float::NAN);
-    }
-    (smaller(&s, &x.div(&s, BITS, Down)), greater(&s, &x.div(&s, BITS, Up)))
-}
-
-/// Returns the nearest double towards zero.
-fn rough(number: &BigFloat) -> f64 {
-    let Some((words, _, sign, exponent, _)) = number.as_raw_parts() else { return f64::NAN };
-    let leading = words.last().copied().unwrap_or(0) >> 11;
-    // The number is 0.leading... times 2^exponent; two factors, since one alone may overflow.
-    let exponent = exponent.saturating_sub(53);
-    let half = exponent / 2;
-    let size = leading as f64 * 2f64.powi(half) * 2f64.powi(exponent - half);
-    if sign == Sign::Neg { -size } else { size }
+    let guess = x.rough_root();
+    let s = x.over(guess, Down).plus(guess, Down).times(Number::new(0.5), Down);
+    (smaller(s, x.over(s, Down)), greater(s, x.over(s, Up)))
 }
 
 impl Neg for &Interval {
     type Output = Interval;
     fn neg(self) -> Interval {
-        Interval { lo: negative(&self.hi), hi: negative(&self.lo) }
+        Interval { lo: self.hi.negative(), hi: self.lo.negative() }
     }
 }
 
@@ -210,32 +179,29 @@ impl Neg for Interval {
 }
 
 fn sum(a: &Interval, b: &Interval) -> Interval {
-    Interval { lo: a.lo.add(&b.lo, BITS, Down), hi: a.hi.add(&b.hi, BITS, Up) }
+    Interval { lo: a.lo.plus(b.lo, Down), hi: a.hi.plus(b.hi, Up) }
 }
 
 fn difference(a: &Interval, b: &Interval) -> Interval {
-    Interval { lo: a.lo.sub(&b.hi, BITS, Down), hi: a.hi.sub(&b.lo, BITS, Up) }
+    Interval { lo: a.lo.minus(b.hi, Down), hi: a.hi.minus(b.lo, Up) }
 }
 
 /// Returns the product. The signs decide which ends make the least and the greatest product.
 fn product(a: &Interval, b: &Interval) -> Interval {
     use Side::{Across, NotNegative, NotPositive};
-    let of = |x: &BigFloat, y: &BigFloat, z: &BigFloat, w: &BigFloat| Interval {
-        lo: x.mul(y, BITS, Down),
-        hi: z.mul(w, BITS, Up),
-    };
+    let of = |x: Number, y: Number, z: Number, w: Number| Interval { lo: x.times(y, Down), hi: z.times(w, Up) };
     match (a.side(), b.side()) {
-        (NotNegative, NotNegative) => of(&a.lo, &b.lo, &a.hi, &b.hi),
-        (NotPositive, NotPositive) => of(&a.hi, &b.hi, &a.lo, &b.lo),
-        (NotNegative, NotPositive) => of(&a.hi, &b.lo, &a.lo, &b.hi),
-        (NotPositive, NotNegative) => of(&a.lo, &b.hi, &a.hi, &b.lo),
-        (NotNegative, Across) => of(&a.hi, &b.lo, &a.hi, &b.hi),
-        (Across, NotNegative) => of(&a.lo, &b.hi, &a.hi, &b.hi),
-        (NotPositive, Across) => of(&a.lo, &b.hi, &a.lo, &b.lo),
-        (Across, NotPositive) => of(&a.hi, &b.lo, &a.lo, &b.lo),
+        (NotNegative, NotNegative) => of(a.lo, b.lo, a.hi, b.hi),
+        (NotPositive, NotPositive) => of(a.hi, b.hi, a.lo, b.lo),
+        (NotNegative, NotPositive) => of(a.hi, b.lo, a.lo, b.hi),
+        (NotPositive, NotNegative) => of(a.lo, b.hi, a.hi, b.lo),
+        (NotNegative, Across) => of(a.hi, b.lo, a.hi, b.hi),
+        (Across, NotNegative) => of(a.lo, b.hi, a.hi, b.hi),
+        (NotPositive, Across) => of(a.lo, b.hi, a.lo, b.lo),
+        (Across, NotPositive) => of(a.hi, b.lo, a.lo, b.lo),
         (Across, Across) => {
-            let (one, other) = (of(&a.lo, &b.hi, &a.lo, &b.lo), of(&a.hi, &b.lo, &a.hi, &b.hi));
-            Interval { lo: smaller(&one.lo, &other.lo), hi: greater(&one.hi, &other.hi) }
+            let (one, other) = (of(a.lo, b.hi, a.lo, b.lo), of(a.hi, b.lo, a.hi, b.hi));
+            Interval { lo: smaller(one.lo, other.lo), hi: greater(one.hi, other.hi) }
         }
     }
 }
@@ -248,9 +214,9 @@ fn quotient(a: &Interval, b: &Interval) -> Interval {
         return Interval::not_a_number();
     }
     // The least quotient has the greatest divisor if the dividend is positive, else the least.
-    let least_by = if a.lo.is_negative() { &b.lo } else { &b.hi };
-    let greatest_by = if a.hi.is_negative() { &b.hi } else { &b.lo };
-    Interval { lo: a.lo.div(least_by, BITS, Down), hi: a.hi.div(greatest_by, BITS, Up) }
+    let least_by = if a.lo.is_negative() { b.lo } else { b.hi };
+    let greatest_by = if a.hi.is_negative() { b.hi } else { b.lo };
+    Interval { lo: a.lo.over(least_by, Down), hi: a.hi.over(greatest_by, Up) }
 }
 
 /// Implements an operator between any two of `Interval` and `&Interval`.
@@ -277,7 +243,7 @@ operator!(Mul, mul, product);
 operator!(Div, div, quotient);
 
 /// A vector of two intervals.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Vector {
     pub x: Interval,
     pub y: Interval,
@@ -291,12 +257,12 @@ impl Vector {
 
     /// Returns the scalar product.
     pub fn dot(&self, other: &Self) -> Interval {
-        &self.x * &other.x + &self.y * &other.y
+        self.x * other.x + self.y * other.y
     }
 
     /// Returns the determinant of the two vectors as columns.
     pub fn cross(&self, other: &Self) -> Interval {
-        &self.x * &other.y - &self.y * &other.x
+        self.x * other.y - self.y * other.x
     }
 
     /// Returns the squared length.
@@ -311,16 +277,16 @@ impl Vector {
 
     /// Returns the vector `factor` times as long.
     pub fn scaled(&self, factor: &Interval) -> Self {
-        Self { x: &self.x * factor, y: &self.y * factor }
+        Self { x: self.x * factor, y: self.y * factor }
     }
 
     /// Returns the sum.
     pub fn plus(&self, other: &Self) -> Self {
-        Self { x: &self.x + &other.x, y: &self.y + &other.y }
+        Self { x: self.x + other.x, y: self.y + other.y }
     }
 
     /// Returns the difference.
     pub fn minus(&self, other: &Self) -> Self {
-        Self { x: &self.x - &other.x, y: &self.y - &other.y }
+        Self { x: self.x - other.x, y: self.y - other.y }
     }
 }

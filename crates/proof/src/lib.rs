@@ -12,6 +12,7 @@ mod events;
 mod interval;
 mod lines;
 mod link;
+mod number;
 mod path;
 mod results;
 mod scene;
@@ -32,7 +33,7 @@ use self::scene::Scene;
 use self::steps::{Step, Steps};
 
 /// The version of the file format.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 /// Limit of the length of a line, bytes.
 const LONGEST_LINE: u64 = 1 << 28;
 

@@ -102,7 +102,7 @@ pub struct ProvedEvent {
     /// The second bench.
     #[serde(default)]
     pub bench_b: Option<usize>,
-    /// The reason for `undecided`, from the program that wrote the certificate. It is not checked.
+    /// The reason for `undecided`, or for times far apart, from the program that wrote the certificate. It is not checked.
     #[serde(default)]
     pub because: Option<String>,
 }

@@ -8,16 +8,30 @@ use serde::Deserialize;
 use super::elementary;
 use super::interval::{Interval, Vector};
 
-/// A place: the segment, and the coordinate on it.
+/// A place: the segment, and the coordinate on it, the sum of two doubles. The second, which a file may leave out, is
+/// at most half a unit in the last place of the first.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-pub(super) struct Place(pub usize, pub f64);
+pub(super) struct Place(pub usize, pub f64, #[serde(default)] pub f64);
+
+impl Place {
+    /// Returns the coordinate.
+    fn coordinate(self) -> Interval {
+        let coordinate = Interval::new(self.1);
+        if self.2 == 0.0 { coordinate } else { coordinate + Interval::new(self.2) }
+    }
+
+    /// Returns true if the coordinate is a number.
+    fn is_number(self) -> bool {
+        // The sum is rounded to the first double where the second is small enough.
+        self.1.is_finite() && self.1 + self.2 == self.1
+    }
+}
 
 /// A span, the earlier end first.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub(super) struct Span(pub Place, pub Place);
 
 /// A curve, as a function of its coordinate.
-#[expect(clippy::large_enum_variant, reason = "a path has few, and each is made once")]
 pub(super) enum Curve {
     /// Towards the centre: the coordinate falls with travel. `a` is in metres of radius per radian.
     Inward { a: Interval },
@@ -39,7 +53,7 @@ pub(super) struct At {
 impl Curve {
     /// Creates an arc that begins at `origin` with `direction`. `to_left` is 1 if its centre is on the left, else -1.
     pub fn arc(origin: Vector, direction: Vector, to_left: Interval, radius: Interval) -> Self {
-        let to_centre = Vector { x: -(&direction.y * &to_left), y: &direction.x * &to_left };
+        let to_centre = Vector { x: -(direction.y * to_left), y: direction.x * to_left };
         Self::Arc { origin, direction, to_centre, radius }
     }
 
@@ -53,11 +67,11 @@ impl Curve {
                 At { point: Vector { x: -point.x, y: -point.y }, tangent }
             }
             Self::Line { origin, direction } => {
-                At { point: origin.plus(&direction.scaled(coordinate)), tangent: direction.clone() }
+                At { point: origin.plus(&direction.scaled(coordinate)), tangent: *direction }
             }
             Self::Arc { origin, direction, to_centre, radius } => {
                 let (sine, cosine) = elementary::sin_cos(coordinate);
-                let across = to_centre.scaled(&(Interval::new(1.0) - &cosine));
+                let across = to_centre.scaled(&(Interval::new(1.0) - cosine));
                 let chord = direction.scaled(&sine).plus(&across);
                 let tangent = direction.scaled(&cosine).plus(&to_centre.scaled(&sine));
                 At { point: origin.plus(&chord.scaled(radius)), tangent }
@@ -99,7 +113,7 @@ impl Curve {
     fn turning_bound(&self, from: &Interval, to: &Interval) -> Interval {
         let spiral = |outer: &Interval, inner: &Interval| {
             let square = inner.square();
-            (outer - inner) * (&square + Interval::new(2.0)) / (square + Interval::new(1.0))
+            (outer - inner) * (square + Interval::new(2.0)) / (square + Interval::new(1.0))
         };
         match self {
             Self::Inward { .. } => spiral(from, to),
@@ -128,22 +142,22 @@ fn spiral_at(a: &Interval, theta: &Interval) -> At {
     let (sine, cosine) = elementary::sin_cos(theta);
     let w = w(theta);
     let radius = a * theta;
-    let point = Vector { x: &cosine * &radius, y: &sine * &radius };
-    let tangent = Vector { x: (theta * &sine - &cosine) / &w, y: -(theta * &cosine + &sine) / &w };
+    let point = Vector { x: cosine * radius, y: sine * radius };
+    let tangent = Vector { x: (theta * sine - cosine) / w, y: -(theta * cosine + sine) / w };
     At { point, tangent }
 }
 
 /// Returns the metres from the centre: a / 2 (theta w + asinh theta).
 fn spiral_metres(a: &Interval, theta: &Interval) -> Interval {
     let w = w(theta);
-    let asinh = elementary::ln(&(theta + &w));
-    a * Interval::new(0.5) * (theta * &w + asinh)
+    let asinh = elementary::ln(&(theta + w));
+    a * Interval::new(0.5) * (theta * w + asinh)
 }
 
 fn spiral_curvature(a: &Interval, theta: &Interval) -> Interval {
     let square = theta.square();
-    let w_squared = &square + Interval::new(1.0);
-    (square + Interval::new(2.0)) / (a * &w_squared * w_squared.sqrt())
+    let w_squared = square + Interval::new(1.0);
+    (square + Interval::new(2.0)) / (a * w_squared * w_squared.sqrt())
 }
 
 /// A curve with its first coordinate (none for the first segment) and its last (none without an end).
@@ -174,10 +188,10 @@ pub(super) struct Path {
 impl Path {
     /// Creates the path of these segments. The first segment ends `ahead` metres after the start.
     pub fn new(segments: Vec<Segment>, ahead: Interval, path_end: PathEnd, length: Interval) -> Self {
-        let mut travelled = vec![ahead.clone()];
+        let mut travelled = vec![ahead];
         let mut so_far = ahead;
         for segment in &segments[1..] {
-            travelled.push(so_far.clone());
+            travelled.push(so_far);
             if let (Some(begin), Some(end)) = (&segment.begin, &segment.end) {
                 so_far = so_far + segment.curve.metres(begin, end);
             }
@@ -187,7 +201,7 @@ impl Path {
 
     /// Returns point and tangent of a place.
     pub fn at(&self, place: Place) -> At {
-        self.segments[place.0].curve.at(&Interval::new(place.1))
+        self.segments[place.0].curve.at(&place.coordinate())
     }
 
     /// Returns the metres from the start, negative before it.
@@ -196,7 +210,7 @@ impl Path {
         // The first segment is measured from its end, the other segments from their beginning.
         let anchor = if place.0 == 0 { &segment.end } else { &segment.begin };
         match anchor {
-            Some(anchor) => &self.travelled[place.0] + segment.curve.metres(anchor, &Interval::new(place.1)),
+            Some(anchor) => self.travelled[place.0] + segment.curve.metres(anchor, &place.coordinate()),
             // A path has more than one segment, or its first one has an end.
             None => Interval::new(0.0) / Interval::new(0.0),
         }
@@ -206,7 +220,7 @@ impl Path {
     pub fn is_at_end(&self, place: Place) -> bool {
         match &self.path_end {
             PathEnd::Coordinate(end) if place.0 + 1 == self.segments.len() => {
-                let at = Interval::new(place.1);
+                let at = place.coordinate();
                 if self.falls(place.0) { at.is_at_most(end) } else { end.is_at_most(&at) }
             }
             PathEnd::Coordinate(_) => false,
@@ -218,7 +232,7 @@ impl Path {
     pub fn is_within(&self, place: Place) -> bool {
         match &self.path_end {
             PathEnd::Coordinate(end) if place.0 + 1 == self.segments.len() => {
-                let at = Interval::new(place.1);
+                let at = place.coordinate();
                 if self.falls(place.0) { end.is_at_most(&at) } else { at.is_at_most(end) }
             }
             PathEnd::Coordinate(_) => true,
@@ -233,11 +247,11 @@ impl Path {
     /// Returns true if the place is valid: a number strictly inside a segment. The centre of a spiral that is the whole
     /// path is valid too, since it is no junction.
     pub fn has(&self, place: Place) -> bool {
-        let Some(segment) = self.segments.get(place.0).filter(|_| place.1.is_finite()) else { return false };
+        let Some(segment) = self.segments.get(place.0).filter(|_| place.is_number()) else { return false };
+        let at = place.coordinate();
         if self.segments.len() == 1 {
-            return place.1 >= 0.0;
+            return at.is_not_negative();
         }
-        let at = Interval::new(place.1);
         let before = |a: &Interval, b: &Interval| if self.falls(place.0) { b.is_below(a) } else { a.is_below(b) };
         segment.begin.as_ref().is_none_or(|begin| before(begin, &at))
             && segment.end.as_ref().is_none_or(|end| before(&at, end))
@@ -246,7 +260,19 @@ impl Path {
     /// Returns the order of two places on the path.
     pub fn order(&self, a: Place, b: Place) -> Ordering {
         // Both are strictly inside their segments, and numbers.
-        let along = a.1.partial_cmp(&b.1).unwrap_or(Ordering::Equal);
+        let along = if a.2 == 0.0 && b.2 == 0.0 {
+            a.1.partial_cmp(&b.1).unwrap_or(Ordering::Equal)
+        } else {
+            // One of the two differences is exact, or it is greater than any of the other.
+            let by = (Interval::new(a.1) - Interval::new(b.1)) + (Interval::new(a.2) - Interval::new(b.2));
+            if by.is_positive() {
+                Ordering::Greater
+            } else if by.is_negative() {
+                Ordering::Less
+            } else {
+                Ordering::Equal
+            }
+        };
         a.0.cmp(&b.0).then(if self.falls(a.0) { along.reverse() } else { along })
     }
 
@@ -263,7 +289,7 @@ impl Path {
     /// Returns the metres from the centre at a place of an inward spiral.
     pub fn spiral_radius(&self, place: Place) -> Option<Interval> {
         match &self.segments[place.0].curve {
-            Curve::Inward { a } => Some(a * Interval::new(place.1)),
+            Curve::Inward { a } => Some(a * place.coordinate()),
             _ => None,
         }
     }
@@ -273,9 +299,8 @@ impl Path {
         (from.0..=to.0).map(move |index| {
             let nothing = || Interval::new(0.0) / Interval::new(0.0);
             let segment = &self.segments[index];
-            let begin =
-                if index == from.0 { Interval::new(from.1) } else { segment.begin.clone().unwrap_or_else(nothing) };
-            let end = if index == to.0 { Interval::new(to.1) } else { segment.end.clone().unwrap_or_else(nothing) };
+            let begin = if index == from.0 { Interval::new(from.1) } else { segment.begin.unwrap_or_else(nothing) };
+            let end = if index == to.0 { to.coordinate() } else { segment.end.unwrap_or_else(nothing) };
             (index, begin, end)
         })
     }
@@ -311,7 +336,13 @@ impl Path {
     /// between.
     pub fn middle(&self, from: Place, to: Place) -> Place {
         if from.0 == to.0 {
-            return Place(from.0, from.1 + (to.1 - from.1) / 2.0);
+            let high = from.1 + (to.1 - from.1) / 2.0;
+            if from.2 == 0.0 && to.2 == 0.0 {
+                return Place(from.0, high, 0.0);
+            }
+            let low = (from.2 + to.2) / 2.0 + ((from.1 - high) + (to.1 - high)) / 2.0;
+            let sum = high + low;
+            return Place(from.0, sum, low - (sum - high));
         }
         let rough: Vec<(usize, f64, f64, f64)> = self
             .parts(from, to)
@@ -323,7 +354,7 @@ impl Path {
             .collect();
         let mut rest = rough.iter().map(|part| part.3).sum::<f64>() / 2.0;
         for (index, begin, speed, metres) in rough {
-            let place = Place(index, begin + rest / speed);
+            let place = Place(index, begin + rest / speed, 0.0);
             if rest <= metres && self.has(place) && self.in_order(from, place) && self.in_order(place, to) {
                 return place;
             }

@@ -68,8 +68,8 @@ pub(super) fn check(
 
 fn known(scene: &Scene, steps: &Steps, events: &Events, event: EventKind) -> Known {
     let zero = Interval::new(0.0);
-    let seconds = |place: Place| (scene.path.travelled(place) / &scene.head_speed).max(&zero);
-    let after = |place: Option<Place>| place.map_or_else(|| zero.clone(), seconds);
+    let seconds = |place: Place| (scene.path.travelled(place) / scene.head_speed).max(&zero);
+    let after = |place: Option<Place>| place.map_or_else(|| zero, seconds);
     let finished = events.finish.is_some();
     match event {
         EventKind::Contact => Known {
@@ -91,10 +91,10 @@ fn known(scene: &Scene, steps: &Steps, events: &Events, event: EventKind) -> Kno
             never: matches!(events.finish, Some(Finish::PathEnd)),
         },
         EventKind::PathEnd => {
-            let seconds = (&scene.path.length / &scene.head_speed).max(&zero);
+            let seconds = (scene.path.length / scene.head_speed).max(&zero);
             let reached = matches!(events.finish, Some(Finish::PathEnd));
             Known {
-                not_before: seconds.clone(),
+                not_before: seconds,
                 by: reached.then_some((seconds, None, None)),
                 never: matches!(events.finish, Some(Finish::Lock(..))),
             }

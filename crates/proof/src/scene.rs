@@ -105,12 +105,16 @@ fn positive(field: &str, number: f64) -> Result<Interval, String> {
     if number.is_finite() && number > 0.0 {
         Ok(Interval::new(number))
     } else {
-        Err(format!("{field} is {number}, expected a positive number"))
+        Err(format!("{field} is {number:?}, expected a positive number"))
     }
 }
 
 fn finite(field: &str, number: f64) -> Result<Interval, String> {
-    if number.is_finite() { Ok(Interval::new(number)) } else { Err(format!("{field} is {number}, expected a number")) }
+    if number.is_finite() {
+        Ok(Interval::new(number))
+    } else {
+        Err(format!("{field} is {number:?}, expected a number"))
+    }
 }
 
 impl Scene {
@@ -141,7 +145,7 @@ impl TeamText {
         }
         let hole_inset = positive("team.hole_inset", self.hole_inset)?;
         let link = |field: &str, length: f64| {
-            let link = positive(field, length)? - Interval::new(2.0) * &hole_inset;
+            let link = positive(field, length)? - Interval::new(2.0) * hole_inset;
             if link.is_positive() { Ok(link) } else { Err(format!("{field} leaves no bench between its holes")) }
         };
         Ok(Team {
@@ -164,7 +168,7 @@ fn spiral(pitch: f64, start_turn: f64) -> Result<Path, String> {
     let inward = Segment { curve: Curve::Inward { a: growth(pitch)? }, begin: None, end: Some(Interval::new(0.0)) };
     let start = elementary::turns(start_turn);
     let length = inward.curve.metres(&start, &Interval::new(0.0));
-    Ok(Path::new(vec![inward], length.clone(), PathEnd::Coordinate(Interval::new(0.0)), length))
+    Ok(Path::new(vec![inward], length, PathEnd::Coordinate(Interval::new(0.0)), length))
 }
 
 fn turnaround(text: &PathText, team: &Team) -> Result<Path, String> {
@@ -174,8 +178,8 @@ fn turnaround(text: &PathText, team: &Team) -> Result<Path, String> {
     let a = growth(*pitch)?;
     let radius = positive("path.turn_radius", *turn_radius)?;
     let ratio = positive("path.arc_ratio", *arc_ratio)?;
-    let turn = &radius / &a;
-    let inward = Curve::Inward { a: a.clone() };
+    let turn = radius / a;
+    let inward = Curve::Inward { a };
     let lead_in = match (lead_in, start_turn) {
         (Some(metres), None) if *metres == 0.0 => Interval::new(0.0),
         (Some(metres), None) => positive("path.lead_in", *metres)?,
@@ -196,18 +200,18 @@ fn turnaround(text: &PathText, team: &Team) -> Result<Path, String> {
         None => team.links(0, team.benches - 1),
     };
     let both = (radius.square() + a.square()).sqrt();
-    let second_radius = &both / (Interval::new(1.0) + &ratio);
-    let first_radius = &both - &second_radius;
+    let second_radius = both / (Interval::new(1.0) + ratio);
+    let first_radius = both - second_radius;
     let angle = elementary::atan(&turn) * Interval::new(2.0);
     let at = inward.at(&turn);
     let first = Curve::arc(at.point, at.tangent, Interval::new(-1.0), first_radius);
     let middle = first.at(&angle);
     let second = Curve::arc(middle.point, middle.tangent, Interval::new(1.0), second_radius);
     let zero = || Some(Interval::new(0.0));
-    let length = &lead_in + &both * &angle + &lead_out;
+    let length = lead_in + both * angle + lead_out;
     let segments = vec![
-        Segment { curve: inward, begin: None, end: Some(turn.clone()) },
-        Segment { curve: first, begin: zero(), end: Some(angle.clone()) },
+        Segment { curve: inward, begin: None, end: Some(turn) },
+        Segment { curve: first, begin: zero(), end: Some(angle) },
         Segment { curve: second, begin: zero(), end: Some(angle) },
         Segment { curve: Curve::Outward { a }, begin: Some(turn), end: None },
     ];
@@ -219,11 +223,13 @@ fn route(start: [f64; 2], heading_turns: f64, pieces: &[PieceText]) -> Result<Pa
         return Err(format!("path.pieces has {} pieces, expected from 1 to {MOST}", pieces.len()));
     }
     finite("path.heading_turns", heading_turns)?;
-    let mut origin = Vector { x: finite("path.start", start[0])?, y: finite("path.start", start[1])? };
+    finite("path.start", start[0]).and(finite("path.start", start[1]))?;
+    // The route in its own coordinates: no statement of a certificate depends on the place of its start.
+    let mut origin = Vector { x: Interval::new(0.0), y: Interval::new(0.0) };
     let (sine, cosine) = elementary::sin_cos(&elementary::turns(heading_turns));
     let mut direction = Vector { x: cosine, y: sine };
     let zero = || Interval::new(0.0);
-    let behind = Curve::Line { origin: origin.clone(), direction: direction.clone() };
+    let behind = Curve::Line { origin, direction };
     let mut segments = vec![Segment { curve: behind, begin: None, end: Some(zero()) }];
     let (mut length, mut end) = (zero(), zero());
     for piece in pieces {
@@ -239,7 +245,7 @@ fn route(start: [f64; 2], heading_turns: f64, pieces: &[PieceText]) -> Result<Pa
                         positive("path.pieces.turns", *turns)?;
                         elementary::turns(*turns)
                     }
-                    (None, Some(length)) => positive("path.pieces.length", *length)? / &radius,
+                    (None, Some(length)) => positive("path.pieces.length", *length)? / radius,
                     _ => return Err("an arc has either turns or a length".to_owned()),
                 };
                 let to_left = Interval::new(if matches!(side, Side::Left) { 1.0 } else { -1.0 });
@@ -249,7 +255,7 @@ fn route(start: [f64; 2], heading_turns: f64, pieces: &[PieceText]) -> Result<Pa
         length = length + curve.metres(&zero(), &end);
         let at = curve.at(&end);
         (origin, direction) = (at.point, at.tangent);
-        segments.push(Segment { curve, begin: Some(zero()), end: Some(end.clone()) });
+        segments.push(Segment { curve, begin: Some(zero()), end: Some(end) });
     }
     // The last segment continues beyond the path's end.
     if let Some(last) = segments.last_mut() {

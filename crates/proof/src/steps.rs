@@ -1,5 +1,7 @@
 //! The steps of a certificate and their consequences: the rules of a step, Lemmas 3 and 4 of docs/proofs.md.
 
+use std::ops::Range;
+
 use super::boards::{Board, is_inside_ring};
 use super::capsule::Capsule;
 use super::chain::{Chain, span_is_one};
@@ -157,13 +159,13 @@ impl Steps {
 fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String> {
     let team = &scene.team;
     let boards: Vec<Board> = (chain.capsules.windows(2).enumerate())
-        .map(|(index, pair)| Board::new(&pair[0], &pair[1], team.link(index).clone(), team))
+        .map(|(index, pair)| Board::new(&pair[0], &pair[1], *team.link(index), team))
         .collect();
     let about = if links == Links::All { boards.len() } else { boards.len().min(2) };
     let mut pairs = 0;
     for a in 0..about {
         for b in a + 2..boards.len() {
-            if !boards[a].is_apart_from(&boards[b]) {
+            if !boards[a].is_apart_from(&boards[b]) && check_ring(scene, chain, a..a + 1, b).is_err() {
                 return Err(format!("it claims to be clear, but benches {a} and {b} may touch (Lemma 2)"));
             }
             pairs += 1;
@@ -177,7 +179,7 @@ fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String
         return Ok(pairs + about as u64);
     }
     // Only a step of the front links gets here.
-    check_ring(scene, chain)?;
+    check_ring(scene, chain, 0..2, chain.last())?;
     Ok(pairs + about as u64)
 }
 
@@ -186,7 +188,7 @@ fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String
 fn check_line(scene: &Scene, chain: &Chain, about: &[Board]) -> Result<(), String> {
     let team = &scene.team;
     let last = chain.last();
-    if !(&team.hole_inset + &team.hole_inset).is_below(team.link(1)) {
+    if !(team.hole_inset + team.hole_inset).is_below(team.link(1)) {
         return Err("it claims to be clear, but benches on a line touch (Lemma 3)".to_owned());
     }
     for (a, board) in about.iter().enumerate() {
@@ -209,13 +211,13 @@ fn check_line(scene: &Scene, chain: &Chain, about: &[Board]) -> Result<(), Strin
     Ok(())
 }
 
-/// Checks Lemma 3, *Ring*: boards 0 and 1 are apart from all boards behind the last listed handle.
-fn check_ring(scene: &Scene, chain: &Chain) -> Result<(), String> {
-    let Span(_, latest) = chain.capsules[chain.last()].span;
+/// Checks Lemma 3, *Ring*: some boards are apart from all body boards from a handle on.
+fn check_ring(scene: &Scene, chain: &Chain, boards: Range<usize>, from_handle: usize) -> Result<(), String> {
+    let Span(_, latest) = chain.capsules[from_handle].span;
     let ring = scene.path.spiral_radius(latest).filter(|_| latest.0 == 0);
-    let ring = ring.ok_or("it claims to be clear, but the last handle listed is not on segment 0, a line or spiral")?;
-    let reach = (chain.capsules.iter().take(3))
-        .map(|capsule| capsule.point.norm() + &capsule.half)
+    let ring = ring.ok_or("it claims to be clear, but the last handle listed is not on segment 0, an inward spiral")?;
+    let reach = (chain.capsules[boards.start..=boards.end].iter())
+        .map(|capsule| capsule.point.norm() + capsule.half)
         .fold(Interval::new(0.0), |most, metres| most.max(&metres));
     if is_inside_ring(&scene.team, &reach, &ring) {
         Ok(())

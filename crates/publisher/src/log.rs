@@ -26,6 +26,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use crate::live::{LoopCounts, Outgoing, PublishError, Publisher, StatusPublisher, TransportCounters};
 use crate::transports::{Transport, TransportError};
 use bench_dragon_messages::control::{Code, Command, CommandRecord};
+use bench_dragon_messages::sentence::not_writable;
 use bench_dragon_messages::{LoopStatus, QUEUE_BYTES};
 use hash::{HANDLE_WORDS, HEADER_WORDS, columns, header_words};
 use lines::ShowLine;
@@ -107,7 +108,7 @@ struct NoStatus;
 /// started.
 pub fn open(file: &Path, show: ShowLine, handles: usize) -> Result<(Box<dyn Transport>, LogOutcome), TransportError> {
     let shown = file.display().to_string();
-    let refused = |error| TransportError::BadInput(format!("--log: {shown}: {error}, expected a file to write"));
+    let refused = |error: io::Error| TransportError::BadInput(format!("--log: {}", not_writable(&shown, &error)));
     let opened = File::create(file).map_err(refused)?;
     let (publisher, reader) = queue(handles, show.rate);
     let shared = Arc::clone(&publisher.shared);

@@ -77,7 +77,8 @@ fn pose_at(segment: &StageSegment, pitch: f64, share: f64) -> Pose {
             // Opposite to the derivative by theta: inward because theta decreases, outward because of the half turn.
             let (along_x, along_y) = (radius * sine - per_radian * cosine, -radius * cosine - per_radian * sine);
             let side = if kind == SEGMENT_INWARD_SPIRAL { 1.0 } else { -1.0 };
-            Pose::flat(side * radius * cosine, side * radius * sine, along_y.atan2(along_x))
+            let own = (side * radius * cosine, side * radius * sine, along_y.atan2(along_x));
+            if curvature.is_nan() { Pose::flat(own.0, own.1, own.2) } else { placed(segment, pitch, own) }
         }
         _ => {
             let (sine, cosine) = heading.sin_cos();
@@ -86,12 +87,29 @@ fn pose_at(segment: &StageSegment, pitch: f64, share: f64) -> Pose {
     }
 }
 
+/// Returns a pose of a spiral that is placed elsewhere, from its place on the spiral about the origin. Beginning and
+/// heading say where the spiral lies; an inward one bends to the right unless it is mirrored, an outward one to the
+/// left.
+fn placed(segment: &StageSegment, pitch: f64, (x, y, heading): (f64, f64, f64)) -> Pose {
+    let unplaced = StageSegment { curvature: f64::NAN, ..*segment };
+    let Pose { position: first, orientation } = pose_at(&unplaced, pitch, 0.0);
+    let first_heading = 2.0 * orientation.z.atan2(orientation.w);
+    let bend = if segment.kind == SEGMENT_INWARD_SPIRAL { -1.0 } else { 1.0 };
+    let side = bend * segment.curvature.signum();
+    let turned = segment.heading - side * first_heading;
+    let (sine, cosine) = turned.sin_cos();
+    let (right, up) = (x - first.x, side * (y - first.y));
+    let place = (segment.x + cosine * right - sine * up, segment.y + sine * right + cosine * up);
+    Pose::flat(place.0, place.1, side * heading + turned)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench_dragon_motion::model::Point;
     use bench_dragon_motion::model::curve::Side;
     use bench_dragon_motion::model::path::Path as ModelPath;
+    use bench_dragon_motion::model::{Point, Vector};
+    use bench_dragon_motion::placement::Placement;
     use bench_dragon_show::convert::stage_segment;
 
     /// Every pose lies on the path, and looks along it, by the path's own points and tangents.
@@ -124,10 +142,32 @@ mod tests {
     }
 
     #[test]
+    fn the_points_of_a_placed_path_are_the_paths_points_placed() {
+        for path in [ModelPath::spiral(0.55, 16.0), ModelPath::turnaround(1.7, 4.5, 2.0, 100.0, 60.0).unwrap()] {
+            let pitch = if path.segments() == 1 { 0.55 } else { 1.7 };
+            for (turns, mirror) in [(0.3, false), (0.0, true), (-0.2, true)] {
+                let placement = Placement::new(Vector::new(7.0, -3.0), turns, mirror);
+                let segments = |placement: &Placement| -> Vec<StageSegment> {
+                    path.outline().into_iter().map(|segment| stage_segment(&placement.outline(segment))).collect()
+                };
+                let (home, away) = (poses(&segments(&Placement::IDENTITY), pitch), poses(&segments(&placement), pitch));
+                assert_eq!(home.len(), away.len());
+                for (home, away) in home.iter().zip(&away) {
+                    let place = placement.point(Point::new(home.position.x, home.position.y));
+                    let apart = (place - Point::new(away.position.x, away.position.y)).norm();
+                    let [heading, shown] = [home, away].map(|pose| 2.0 * pose.orientation.z.atan2(pose.orientation.w));
+                    let turn = (placement.heading(heading) - shown).cos();
+                    assert!(apart < 1e-12 * 100.0 && turn > 1.0 - 1e-12, "{turns} {mirror}: {apart:e} m, {turn}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn the_points_lie_on_the_path_and_look_along_it() {
         check(&ModelPath::spiral(0.55, 16.0), 0.55);
         check(&ModelPath::turnaround(1.7, 4.5, 2.0, 100.0, 60.0).unwrap(), 1.7);
-        let route = ModelPath::route(Point::new(-3.0, 2.0), 0.1).line(5.0).arc(Side::Left, 3.0, 0.5);
+        let route = ModelPath::route(0.1).line(5.0).arc(Side::Left, 3.0, 0.5);
         check(&route.line(2.0).arc(Side::Right, 1.5, 0.75).build().unwrap(), f64::NAN);
     }
 }

@@ -220,7 +220,7 @@ pub fn stage(run_id: u64, stamp_ns: u64, scene_hash: [u8; SCENE_HASH_BYTES], mot
     let (mut segments, mut pitch, mut start_turn) = (0, f64::NAN, f64::NAN);
     for (slot, outline) in path.iter_mut().zip(motion.outline()) {
         *slot = stage_segment(&outline);
-        if let OutlineKind::Spiral { direction: Direction::Inward, pitch: metres, first, last: _ } = outline.kind {
+        if let OutlineKind::Spiral { direction: Direction::Inward, pitch: metres, first, .. } = outline.kind {
             (pitch, start_turn) = (metres, first / std::f64::consts::TAU);
         }
         segments += 1;
@@ -262,12 +262,12 @@ pub fn stage_segment(outline: &SegmentOutline) -> StageSegment {
     let (kind, curvature, theta_first, theta_last) = match kind {
         OutlineKind::Line => (SEGMENT_LINE, 0.0, f64::NAN, f64::NAN),
         OutlineKind::Arc { curvature } => (SEGMENT_ARC, curvature, f64::NAN, f64::NAN),
-        OutlineKind::Spiral { direction, pitch: _, first, last } => {
+        OutlineKind::Spiral { direction, pitch: _, first, last, curvature } => {
             let kind = match direction {
                 Direction::Inward => SEGMENT_INWARD_SPIRAL,
                 Direction::Outward => SEGMENT_OUTWARD_SPIRAL,
             };
-            (kind, f64::NAN, first, last)
+            (kind, curvature, first, last)
         }
     };
     StageSegment { x: start.x, y: start.y, heading, length, curvature, theta_first, theta_last, kind, reserved: 0 }

@@ -19,6 +19,7 @@ use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::clearance::{ClearanceMonitor, PairClearance};
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::linkage::NoFollower;
+use bench_dragon_motion::placement::Placement;
 use bench_dragon_motion::solve::{Chain, Solver, Velocities};
 use bench_dragon_motion::timeline::{TimedEvent, Timeline};
 use bench_dragon_motion::{Choice, Method};
@@ -135,8 +136,9 @@ pub struct Show {
     overlap_tolerance: Option<f64>,
     /// The time requested for the chain, and true if the chain moves then.
     solved: Option<(f64, bool)>,
-    /// The time of the solution; NaN before the first.
-    solved_at: f64,
+    /// The nearest two boards of the solution.
+    closest: Option<PairClearance>,
+    placement: Placement,
     /// The cues in the order of their times.
     cues: Vec<ReachedCue>,
     missing_cues: Vec<String>,
@@ -165,8 +167,10 @@ impl Show {
         let stops = scene.alerts.is_some() && playback.on_contact == OnContact::Stop;
         let freeze_time = timeline.freeze(stops).time;
         let level = scene.alerts.map(|rules| LevelTracker::new(rules, playback.rate));
-        let choice = scene.motion.solver(scene.velocities);
-        let clearance = scene.alerts.map(|_| scene.motion.clearance_monitor(&choice));
+        // The clearance has more digits in the path's own coordinates.
+        let own = scene.motion.in_own_frame();
+        let choice = own.solver(scene.velocities);
+        let clearance = scene.alerts.map(|_| own.clearance_monitor(&choice));
         let rounding = ROUNDING_OVERLAP * scene.team().longest_link() + choice.clearance_error(scene.team());
         let Choice { solver, reason, .. } = choice;
         let exact = !matches!(scene.motion.method(), Method::Paper(_));
@@ -184,7 +188,8 @@ impl Show {
             level,
             overlap_tolerance: exact.then_some(rounding),
             solved: None,
-            solved_at: f64::NAN,
+            closest: None,
+            placement: *scene.motion.placement(),
             cues,
             missing_cues,
             commands: Vec::with_capacity(COMMANDS_PER_FRAME),
@@ -282,35 +287,41 @@ impl Show {
         (frame.tick, frame.sim_time, frame.time_scale, frame.playback) = (tick, sim_time, time_scale, playback);
         (frame.epoch, frame.shows_played, frame.cue) = (epoch, shows_played, cues_passed as u32);
         self.solve(sim_time);
-        let closest = self.measure_clearance();
-        self.record_unforeseen_contact(closest);
-        self.update_state(jumped, closest);
+        self.record_unforeseen_contact(self.closest);
+        self.update_state(jumped, self.closest);
         &self.frame
     }
 
-    /// Solves the chain for a time. A show that stands still is solved once.
+    /// Solves the chain for a time, measures its clearance and places it on the stage. A show that stands still is
+    /// solved once.
     fn solve(&mut self, sim_time: f64) {
         let moves = self.frame.playback == PlaybackState::Playing;
         if self.solved == Some((sim_time, moves)) {
             return;
         }
         self.solved = Some((sim_time, moves));
-        let at = solve_at_or_just_before(self.solver.as_mut(), sim_time, &mut self.frame.chain);
-        self.solved_at = at.unwrap_or_else(|_| {
-            self.frame.unsolved_frames += 1;
-            f64::NAN
-        });
+        match solve_at_or_just_before(self.solver.as_mut(), sim_time, &mut self.frame.chain) {
+            Ok(solved_at) => {
+                self.closest = self.measure_clearance(solved_at);
+                self.placement.chain(&mut self.frame.chain);
+            }
+            Err(_) => self.frame.unsolved_frames += 1,
+        }
         if !moves && self.velocities == Velocities::Computed {
             let Chain { speed, vx, vy, .. } = &mut self.frame.chain;
             [speed, vx, vy].into_iter().for_each(|numbers| numbers.fill(0.0));
         }
     }
 
-    fn measure_clearance(&mut self) -> Option<PairClearance> {
-        let travelled = self.metres_per_second * self.solved_at;
+    fn measure_clearance(&mut self, solved_at: f64) -> Option<PairClearance> {
+        let travelled = self.metres_per_second * solved_at;
         let least = self.clearance.as_mut()?.least_clearance(&self.frame.chain, travelled);
         self.frame.min_clearance = least.map_or(f64::NAN, |least| least.value);
-        least
+        least.map(|pair| PairClearance {
+            point_a: self.placement.point(pair.point_a),
+            point_b: self.placement.point(pair.point_b),
+            ..pair
+        })
     }
 
     /// Records a contact if boards overlap although no contact has happened: the searches missed it.

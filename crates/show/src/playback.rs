@@ -1,6 +1,7 @@
 //! The settings for playing a scene. Commands that play a scene make a [`Playback`]; a recording keeps it.
 
 use crate::scene::{AtEnd, OnContact, Scene};
+use bench_dragon_messages::sentence::number;
 use bench_dragon_messages::state::EventKind;
 
 /// The settings for playing a scene that the command line may override.
@@ -33,7 +34,8 @@ impl Playback {
 /// The start is not before the motion's end.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "{start} s is outside the motion, expected at least 0 and less than {end:.9} s, at which it ends ({})",
+    "{} s is outside the motion, expected at least 0 and less than {end:.9} s, at which it ends ({})",
+    number(*.start),
     kind.name()
 )]
 pub struct StartError {

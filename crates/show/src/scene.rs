@@ -22,8 +22,10 @@ use self::precision::Precision;
 pub use self::precision::SinglePrecision;
 use self::ros2::RawRos2;
 pub use self::text::{SceneText, printable};
+use bench_dragon_motion::model::Vector;
 use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::model::team::Team;
+use bench_dragon_motion::placement::Placement;
 use bench_dragon_motion::solve::Velocities;
 use bench_dragon_motion::solve::paper::PaperRules;
 use bench_dragon_motion::{Method, Motion, MotionError};
@@ -104,6 +106,8 @@ pub struct Scene {
     pub name: String,
     /// The team on its path, with the accuracy.
     pub motion: Motion,
+    /// Where the path's coordinates stand on the stage, if the scene states it. The motion's own placement contains it.
+    pub placement: Option<Placement>,
     /// The reaction to a contact.
     pub on_contact: OnContact,
     /// The behaviour at the end of the show.
@@ -212,6 +216,16 @@ impl Source<'_> {
         accepted.check(field, *value.get_ref()).map_err(|sentence| self.field_error(value, &sentence))
     }
 
+    /// Returns a place of the stage; by default the origin.
+    fn place(&self, field: &str, value: Option<&Spanned<[f64; 2]>>) -> Result<Vector, SceneError> {
+        let Some(given) = value else { return Ok(Vector::zeros()) };
+        for number in given.get_ref() {
+            let checked = Accepted::PLACE.check(field, *number);
+            checked.map_err(|sentence| self.field_error(given, &sentence))?;
+        }
+        Ok(Vector::from(*given.get_ref()))
+    }
+
     fn check_count(&self, field: &str, value: &Spanned<i64>, accepted: Accepted) -> Result<usize, SceneError> {
         let number =
             accepted.check(field, *value.get_ref() as f64).map_err(|sentence| self.field_error(value, &sentence))?;
@@ -225,6 +239,7 @@ struct RawScene {
     name: Option<Spanned<String>>,
     team: RawTeam,
     path: RawPath,
+    placement: Option<RawPlacement>,
     motion: RawMotion,
     alerts: Option<RawAlerts>,
     #[serde(default)]
@@ -241,6 +256,15 @@ struct RawTeam {
     body_length: Spanned<f64>,
     width: Spanned<f64>,
     hole_inset: Spanned<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPlacement {
+    origin: Option<Spanned<[f64; 2]>>,
+    rotation_turns: Option<Spanned<f64>>,
+    #[serde(default)]
+    mirror: bool,
 }
 
 #[derive(Deserialize)]
@@ -303,6 +327,9 @@ impl RawScene {
                 _ => self.path.error(source, &error.to_string()),
             }
         })?;
+        let placement = self.placement.as_ref().map(|placement| placement.validated(source)).transpose()?;
+        let start = self.path.start(source)?;
+        let motion = motion.placed(placement.unwrap_or(Placement::IDENTITY).after_moving_by(start));
         let name = match &self.name {
             None => stem.to_owned(),
             Some(name) if name.get_ref().trim().is_empty() => {
@@ -321,6 +348,7 @@ impl RawScene {
         Ok(Scene {
             name,
             motion,
+            placement,
             on_contact: self.motion.on_contact.unwrap_or(OnContact::Stop),
             at_end: self.motion.at_end.unwrap_or(AtEnd::Hold),
             end_hold: self
@@ -364,6 +392,16 @@ impl RawTeam {
             }
         }
         Ok(team)
+    }
+}
+
+impl RawPlacement {
+    fn validated(&self, source: &Source) -> Result<Placement, SceneError> {
+        let origin = source.place("placement.origin", self.origin.as_ref())?;
+        let turns = self.rotation_turns.as_ref();
+        let turns =
+            turns.map_or(Ok(0.0), |turns| source.check("placement.rotation_turns", turns, Accepted::ROTATION))?;
+        Ok(Placement::new(origin, turns, self.mirror))
     }
 }
 

@@ -14,6 +14,7 @@ use std::time::{Duration, UNIX_EPOCH};
 use hdrhistogram::serialization::V2DeflateSerializer;
 use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, Tag};
 
+use bench_dragon_messages::sentence::not_writable;
 use bench_dragon_publisher::live::statistics::{Durations, Sample};
 
 /// The header of every interval log.
@@ -42,7 +43,7 @@ impl HistogramLog {
     /// A sentence, if the file cannot be created.
     pub fn create(file: &Path, rate: f64, began_ns: u64) -> Result<Self, String> {
         let name = file.display().to_string();
-        let failed = |error: io::Error| format!("{name}: {error}, expected a file to write");
+        let failed = |error: io::Error| not_writable(&name, &error);
         let opened = File::create(file).map_err(failed)?;
         Ok(Self::new(opened, name, rate, began_ns))
     }
@@ -106,7 +107,7 @@ impl<W: Write> HistogramLog<W> {
             && let Err(error) = self.file.write_all(&self.text)
         {
             let sentence = format!("{}: {error}: the histograms are cut", self.name);
-            log::error!("{sentence}; the show goes on");
+            log::error!("{sentence}; the show continues");
             self.failure = Some(sentence);
         }
         self.text.clear();

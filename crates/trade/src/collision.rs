@@ -57,7 +57,7 @@ pub(super) fn measure(
 
 /// Returns the first sample at or after `contact` at which boards overlap, simulated seconds.
 fn first_overlapping_sample(scene: &Scene, contact: f64, end: f64, interval: f64) -> Option<f64> {
-    let mut solver = scene.motion.solver(scene.velocities).solver;
+    let mut solver = scene.motion.in_own_frame().solver(scene.velocities).solver;
     let mut chain = Chain::new(scene.team().handles());
     let first = (contact / interval).ceil() as u64;
     (first..first + 1000).map(|sample| sample as f64 * interval).take_while(|time| *time < end).find(|time| {

@@ -97,9 +97,31 @@ pub fn parsed(data: &[u8]) -> Option<Vec<Record>> {
 }
 
 /// Returns the messages in chunks and those before the first chunk of a file whose every chunk is whole, readable and
-/// complete. Returns `None` for any other file.
+/// complete; behind a length beyond the file, those of all chunks that begin at any byte. Returns `None` for any other
+/// file.
 pub fn messages(data: &[u8]) -> Option<Vec<Known>> {
-    let records = parsed(data)?;
+    let mut records = parsed(data)?;
+    let bytes = |records: &[Record]| records.iter().map(|record| 9 + record.body.len()).sum::<usize>();
+    let mut rest = data.get(MAGIC.len() + bytes(&records)..)?;
+    if rest.first() != Some(&DATA_END) || number::<8>(rest, 1) != Some(DATA_END_BYTES as u64) {
+        let chunk = records.iter().rposition(|record| record.opcode == CHUNK).map_or(0, |chunk| chunk + 1);
+        rest = data.get(MAGIC.len() + bytes(&records[..chunk])..)?;
+        if rest.windows(4).any(|name| name == b"zstd") {
+            return None;
+        }
+        while let Some((opcode, body)) = rest.split_first() {
+            rest = body;
+            let length = number::<8>(body, 40).and_then(|length| usize::try_from(length).ok());
+            let found = length.and_then(|length| body.get(8..)?.get(..length.checked_add(40)?));
+            if let (CHUNK, Some(body), Some(inner)) = (*opcode, found, found.and_then(inner))
+                && !inner.is_empty()
+                && is_right(body)
+            {
+                rest = &rest[8 + body.len()..];
+                records.push(Record { opcode: CHUNK, body: body.to_vec(), inner: Some(inner) });
+            }
+        }
+    }
     // No record has this opcode.
     if records.iter().any(|record| record.opcode == 0) {
         return None;
@@ -110,9 +132,7 @@ pub fn messages(data: &[u8]) -> Option<Vec<Known>> {
         let of = match record.opcode {
             CHUNK => {
                 in_chunks = true;
-                let claimed = (number::<8>(&record.body, 16)?, number::<4>(&record.body, 24)?);
-                let inner = record.body.get(40..)?;
-                if claimed.0 != inner.len() as u64 || (claimed.1 != 0 && claimed.1 != u64::from(crc32(inner))) {
+                if !is_right(&record.body) {
                     return None;
                 }
                 record.inner.as_deref()?
@@ -125,6 +145,13 @@ pub fn messages(data: &[u8]) -> Option<Vec<Known>> {
         }
     }
     Some(messages)
+}
+
+/// Returns true if the size and the check of an uncompressed chunk agree with its records.
+fn is_right(body: &[u8]) -> bool {
+    let (size, check) = (number::<8>(body, 16), number::<4>(body, 24));
+    let Some(inner) = body.get(40..) else { return false };
+    size == Some(inner.len() as u64) && (check == Some(0) || check == Some(crc32(inner).into()))
 }
 
 fn known(body: &[u8]) -> Option<Known> {

@@ -1,11 +1,12 @@
-//! `record --recover` in the library: files that are cut at any byte, and files with a wrong byte.
+//! `record --recover`: files that are cut at any byte, files with a wrong byte, and files with a wrong length.
 
+use std::io::Cursor;
 use std::path::Path;
 
 use bench_dragon::recording::mcap::recover::{RecoverError, Recovered, check_magic, recover};
 use serde_json::Value;
 
-use super::harness::{can_run, json_lines, python, python_modules, text};
+use super::harness::{can_run, json_lines, program, python, python_modules, summary, text};
 use super::{Entry, entries, small_recording};
 
 /// Returns the chunks of a file by the reference implementation: the byte after each, and its messages.
@@ -33,7 +34,7 @@ fn record_starts(bytes: &[u8]) -> Vec<usize> {
 }
 
 fn recovered(bytes: &[u8]) -> Result<(Recovered, Vec<u8>), RecoverError> {
-    let (mut input, mut output) = (bytes, Vec::new());
+    let (mut input, mut output) = (Cursor::new(bytes), Vec::new());
     check_magic(&mut input)?;
     Ok((recover(input, bytes.len() as u64, &mut output)?, output))
 }
@@ -103,9 +104,7 @@ fn a_byte_that_is_wrong_costs_messages_and_invents_none() {
         let others = |chunk: &&(usize, Vec<Entry>)| record_of(chunk.0 - 1) != record;
         let others: Vec<_> = chunks.iter().filter(others).flat_map(|(_, messages)| messages.clone()).collect();
         if (1..9).contains(&(at - record)) {
-            // If a length is wrong, the beginning of the next record is unknown.
-            let before: usize = chunks.iter().take_while(|(end, _)| *end <= record).map(|chunk| chunk.1.len()).sum();
-            assert!(kept.len() >= before, "a length at {at}: {counts:?}");
+            assert!(kept == all, "the length at {at}, {} of {} messages: {counts:?}", kept.len(), all.len());
         } else {
             assert!(kept == all || kept == others, "byte {at}, in the record at {record}: {counts:?}");
             assert!(kept == all || counts.damaged == 1, "byte {at}, in the record at {record}: {counts:?}");
@@ -122,4 +121,74 @@ fn a_byte_that_is_wrong_costs_messages_and_invents_none() {
         let expected = (1, lost, 0, all.len() as u64 - lost);
         assert_eq!((counts.damaged, counts.lost_messages, counts.unknown, counts.messages), expected, "{opcode}");
     }
+}
+
+/// A length beyond the file says nothing of the next record, which the chunks' own lengths and checks show.
+#[test]
+fn a_damaged_length_costs_no_message() {
+    if !can_run(python_modules(&["mcap", "blake3"])) {
+        return;
+    }
+    let (name, folder) = ("record_length", tempfile::tempdir().unwrap());
+    let file = small_recording(name, folder.path());
+    let (bytes, chunks) = (std::fs::read(&file).unwrap(), chunks(&file));
+    let all: Vec<Entry> = chunks.iter().flat_map(|(_, messages)| messages.clone()).collect();
+    let starts = record_starts(&bytes);
+    let data_end = starts.iter().copied().find(|at| bytes[*at] == 15).unwrap();
+    let in_data: Vec<usize> = starts.iter().copied().filter(|at| *at <= data_end).collect();
+    let damaged = |at: usize, length: u64, end: usize| {
+        let mut damaged = bytes[..end].to_vec();
+        damaged[at + 1..at + 9].copy_from_slice(&length.to_le_bytes());
+        damaged
+    };
+    // Every record, with lengths that are too great and too small, in a whole file and in one without its end.
+    let ends = [bytes.len(), data_end];
+    for (at, end) in in_data.iter().flat_map(|at| ends.map(|end| (*at, end))).filter(|(at, end)| at < end) {
+        let right = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap());
+        for length in [1 << 63, 0, right + 5000, right.saturating_sub(3)] {
+            let (counts, output) = recovered(&damaged(at, length, end)).unwrap();
+            let kept = entries(&output);
+            let place = format!("length {length} for {right} at {at}, opcode {}: {counts:?}", bytes[at]);
+            assert!(kept == all, "{} of {} messages, {place}", kept.len(), all.len());
+            assert_eq!((counts.messages as usize, counts.whole), (all.len(), end == bytes.len()), "{place}");
+            let is_attachment_lost = bytes[at] == 9 || at < chunks[0].0;
+            assert!(counts.attachments == 1 || is_attachment_lost, "{place}");
+        }
+    }
+    // The other length of a chunk, of its compressed records: a greater one hides the next chunk.
+    for at in in_data.iter().copied().filter(|at| bytes[*at] == 6) {
+        let mut wrong = bytes.clone();
+        let size = at + 45..at + 53;
+        let right = u64::from_le_bytes(wrong[size.clone()].try_into().unwrap());
+        for greater in [1, 300, 5000] {
+            wrong[size.clone()].copy_from_slice(&(right + greater).to_le_bytes());
+            let (counts, output) = recovered(&wrong).unwrap();
+            let kept = entries(&output);
+            let least = all.len() - chunks.iter().find(|(end, _)| *end > at).unwrap().1.len();
+            assert!(kept.len() >= least, "{} messages, {greater} more at {at}: {counts:?}", kept.len());
+            assert!(kept.iter().all(|entry| all.contains(entry)) && kept.len() <= all.len(), "{counts:?}");
+        }
+    }
+    // As a program, and read by the reference implementation: the first record, a chunk and a message index.
+    let middle = starts.iter().copied().filter(|at| *at > bytes.len() / 2);
+    let of = |opcode: u8| middle.clone().find(|at| bytes[*at] == opcode).unwrap();
+    for (at, end) in [starts[0], of(6), of(7)].into_iter().flat_map(|at| ends.map(|end| (at, end))) {
+        let (wrong, mended) = (folder.path().join("wrong.mcap"), folder.path().join("mended.mcap"));
+        std::fs::write(&wrong, damaged(at, 1 << 63, end)).unwrap();
+        let mut mend = program(name);
+        mend.args(["--json", "record", "--force", "--recover"]).arg(&wrong).arg("--output").arg(&mended);
+        let counts = summary(&mend.output().unwrap());
+        assert_eq!((&counts["messages"], &counts["whole"]), (&all.len().into(), &(end == bytes.len()).into()));
+        let read: Vec<Entry> = self::chunks(&mended).into_iter().flat_map(|(_, messages)| messages).collect();
+        assert!(read == all, "{} of {} messages after byte {at}", read.len(), all.len());
+    }
+    // Nothing is left of a file whose chunks have a wrong check.
+    let mut empty = bytes[..chunks[0].0].to_vec();
+    empty[chunks[0].0 - 20] ^= 1;
+    let wrong = folder.path().join("empty.mcap");
+    std::fs::write(&wrong, empty).unwrap();
+    let output = program(name).args(["record", "--recover", wrong.to_str().unwrap()]).output().unwrap();
+    let sentence = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{sentence}");
+    assert!(sentence.contains("no message of") && sentence.contains("empty.mcap could be read"), "{sentence}");
 }

@@ -7,7 +7,7 @@
 use std::f64::consts::TAU;
 
 use super::PlanError;
-use super::trial::{Obstacle, deepest, free_from, obstacle};
+use super::trial::{Nearest, Obstacle, deepest, free_from, obstacle};
 use crate::pitch::{Pitches, head_locks, reaches};
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_show::scene::Accepted;
@@ -63,7 +63,8 @@ const LEAST_SHARE: f64 = 1e-14;
 const FIRST_SHARE: f64 = 1e-4;
 const GROWTH: f64 = 1.1;
 
-/// Share of its first depth below which an overlap is replaced by another pair of boards.
+/// Share of its first depth below which another pair of boards is searched for that overlaps more deeply. It is squared
+/// after a search that finds the same pair.
 const SHALLOW: f64 = 0.5;
 
 /// Encloses the least pitch with which the head of a team comes in to `radius` metres from the centre, within a
@@ -95,7 +96,8 @@ fn decided(
             team.link(1)
         )));
     }
-    let mut blocked = Blocked { team, radius, pitch: from, locks: false, deepest: None, shown: None, intervals: 0 };
+    let mut blocked =
+        Blocked { team, radius, pitch: from, locks: false, deepest: None, shown: None, shallow: SHALLOW, intervals: 0 };
     let reaches = |pitch: f64, progress: &mut dyn FnMut(f64)| reaches(team, pitch, radius, MOST_STEPS, progress);
     let mut value_hi = None;
     let mut next = from;
@@ -155,6 +157,8 @@ struct Blocked<'a> {
     deepest: Option<Deepest>,
     /// The boards that were shown to overlap with that pitch; `None` for a lock.
     shown: Option<Overlap>,
+    /// Share of its first depth below which the overlap is shallow.
+    shallow: f64,
     intervals: u64,
 }
 
@@ -208,16 +212,23 @@ impl Blocked<'_> {
         if let Some(Deepest { pair, depth, head_radius }) = self.deepest
             && !self.locks
         {
-            let (clearance, head_radius) = deepest(self.team, self.pitch, self.radius, pair, head_radius);
-            if clearance < -SHALLOW * depth {
-                self.deepest = Some(Deepest { pair, depth, head_radius });
-                return true;
+            // As the pitch grows, the head meets a board a little further back.
+            let (a, b) = pair;
+            for pairs in [&[pair][..], &[(a, b + 1), (a, b + 2), (a, b.saturating_sub(1).max(a + 2))]] {
+                let nearest = deepest(self.team, self.pitch, self.radius, pairs, head_radius);
+                if nearest.clearance < -self.shallow * depth {
+                    let depth = if nearest.pair == pair { depth } else { -nearest.clearance };
+                    self.deepest = Some(Deepest { pair: nearest.pair, depth, head_radius: nearest.head_radius });
+                    return true;
+                }
             }
         }
         let found = obstacle(self.team, self.pitch, self.radius);
         self.locks = matches!(found, Some(Obstacle::Lock));
         let Some(Obstacle::Touch { pair, head_radius }) = found else { return self.locks };
-        let (clearance, head_radius) = deepest(self.team, self.pitch, self.radius, pair, head_radius);
+        let Nearest { clearance, head_radius, .. } = deepest(self.team, self.pitch, self.radius, &[pair], head_radius);
+        let is_same = self.deepest.is_some_and(|deepest| deepest.pair == pair);
+        self.shallow = if is_same { self.shallow * self.shallow } else { SHALLOW };
         self.deepest = (clearance < 0.0).then_some(Deepest { pair, depth: -clearance, head_radius });
         self.deepest.is_some()
     }

@@ -65,11 +65,45 @@ pub(super) fn free_from(
                 return None;
             }
         }
+        let free_at = match obstacle {
+            Obstacle::Lock => bisect_predicate(free, pitch, pitch * GROWTH),
+            Obstacle::Touch { pair, head_radius } => {
+                let clearance = |pitch: f64| deepest(team, pitch, radius, &[pair], head_radius).clearance;
+                sign_change(clearance, pitch, pitch * GROWTH)
+            }
+        };
         // Beyond the rounding of a touch.
-        pitch = bisect_predicate(free, pitch, pitch * GROWTH) * (1.0 + 1e-13);
+        pitch = free_at * (1.0 + 1e-13);
         progress(pitch);
     }
     (pitch <= to).then_some(pitch)
+}
+
+/// Returns the place within `low..=high` where a function becomes positive, to the last bits: the least place known to
+/// have a positive value. It assumes that the function is at most 0 at `low` and positive at `high`. Illinois method
+/// (Dowell and Jarratt, 1971).
+fn sign_change(function: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    let (mut below, mut above) = (function(low), function(high));
+    let mut last_side = 0;
+    while high - low > 4.0 * f64::EPSILON * high {
+        let secant = high - above * (high - low) / (above - below);
+        // Rounding must not leave the bracket.
+        let at = if secant > low && secant < high { secant } else { 0.5 * low + 0.5 * high };
+        let value = function(at);
+        let side = if value > 0.0 { 1 } else { -1 };
+        if side > 0 {
+            (high, above) = (at, value);
+            below *= if last_side == side { 0.5 } else { 1.0 };
+        } else {
+            (low, below) = (at, value);
+            above *= if last_side == side { 0.5 } else { 1.0 };
+        }
+        if value == 0.0 {
+            break;
+        }
+        last_side = side;
+    }
+    high
 }
 
 impl Obstacle {
@@ -77,22 +111,41 @@ impl Obstacle {
     fn blocks(&self, team: &Team, pitch: f64, radius: f64) -> bool {
         match *self {
             Self::Lock => Trial::near(team, pitch, radius).locks(),
-            Self::Touch { pair, head_radius } => deepest(team, pitch, radius, pair, head_radius).0 <= 0.0,
+            Self::Touch { pair, head_radius } => deepest(team, pitch, radius, &[pair], head_radius).clearance <= 0.0,
         }
     }
 }
 
-/// Returns the least clearance of two boards while the head is near a radius, and the head's radius at that moment.
-pub(super) fn deepest(team: &Team, pitch: f64, radius: f64, pair: (u32, u32), head_radius: f64) -> (f64, f64) {
+/// The least clearance of two boards while the head is near a radius.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Nearest {
+    /// Clearance in metres, negative for an overlap.
+    pub clearance: f64,
+    /// The two benches, counted from 0.
+    pub pair: (u32, u32),
+    /// Distance of the head from the centre at that moment, metres.
+    pub head_radius: f64,
+}
+
+/// Returns the least clearance of several pairs of boards, at least one, while the head is near a radius.
+pub(super) fn deepest(team: &Team, pitch: f64, radius: f64, pairs: &[(u32, u32)], head_radius: f64) -> Nearest {
     let trial = Trial::new(team, pitch, radius, head_radius.max(radius) + TURNS_ABOUT * pitch);
     let around = WINDOW * trial.team.shortest_link();
     let at = trial.path.length() - Path::spiral(pitch, head_radius / pitch).length();
     let (advancement, at) = (trial.advancement(), at.clamp(0.0, trial.limit));
     let parts = [((at - around).max(0.0), at), (at, (at + around).min(trial.limit))];
-    let nearest = parts.map(|(from, to)| advancement.minimum_of(pair, from, to));
-    let (clearance, travelled) = if nearest[0].0 <= nearest[1].0 { nearest[0] } else { nearest[1] };
-    // Rounding must not move the head inside the radius.
-    (clearance, trial.head_radius(travelled).max(radius * (1.0 + 1e-12)))
+    let mut least = Nearest { clearance: f64::INFINITY, pair: pairs[0], head_radius };
+    for pair in pairs.iter().filter(|pair| pair.1 < trial.team.benches as u32) {
+        for (from, to) in parts {
+            let (clearance, travelled) = advancement.minimum_of(*pair, from, to);
+            if clearance < least.clearance {
+                // Rounding must not move the head inside the radius.
+                let head_radius = trial.head_radius(travelled).max(radius * (1.0 + 1e-12));
+                least = Nearest { clearance, pair: *pair, head_radius };
+            }
+        }
+    }
+    least
 }
 
 /// The foremost part of a team that comes in to a radius on a spiral of one pitch.
@@ -118,7 +171,12 @@ impl Trial {
         // A board that touches one of the first two from more than two turns away also touches a board before it.
         let benches = ((length(start + 2.0) - path.length()) / team.link(1)).ceil() as usize + 3;
         let team = Team { benches: benches.min(team.benches), ..*team };
-        let singularities = Singularities::search(&path, &team, &mut Budget::new(TRIAL_BUDGET, &mut |_| ()));
+        // A link turns round or locks only where the spiral is narrower than the link is long.
+        let singularities = if radius > team.longest_link() {
+            Singularities { stall: None, end: None, searched_until: limit, head_turns: vec![], body_turns: vec![] }
+        } else {
+            Singularities::search(&path, &team, &mut Budget::new(TRIAL_BUDGET, &mut |_| ()))
+        };
         Self { team, path, singularities, limit }
     }
 

@@ -75,7 +75,7 @@ impl Speeds<'_> {
     /// Returns true if no handle behind the last one can be faster than it.
     fn is_enough(&self, handles: &[Spanned]) -> bool {
         let (last, benches) = (handles.len() - 1, self.chain.team.benches);
-        let Place(segment, at) = handles[last].span.1;
+        let Place(segment, at, _) = handles[last].span.1;
         if last == benches {
             return true;
         }
@@ -129,7 +129,8 @@ impl Speeds<'_> {
         let length = self.chain.link(link);
         let size = length.hi + (front.first[0].magnitude() + front.first[1].magnitude()) * (1.0 + 0.1 * turned);
         PADS.iter().find_map(|pad| {
-            let rear = Spanned::new(exact, span(exact, rear, rear, pad * f64::EPSILON * size / rear_cosine.max(1e-12)));
+            let rear =
+                Spanned::new(exact, span(exact, rear, rear, pad * f64::EPSILON * size / rear_cosine.max(1e-12), false));
             follower_within(exact, &front, &rear, length)?;
             Some(product_ratio(&front.capsule, &rear.capsule))
         })

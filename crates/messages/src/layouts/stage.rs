@@ -31,9 +31,12 @@ pub struct StageSegment {
     pub heading: f64,
     /// Metres along it.
     pub length: f64,
-    /// Of an arc, 1/m, positive if it turns left; of a line 0; of a spiral NaN.
+    /// Of an arc, 1/m, positive if it turns left; of a line 0; of a spiral NaN, if its centre is the stage's origin and
+    /// its turns begin on the x axis. Of a spiral that the scene places elsewhere, the curvature at its beginning:
+    /// beginning, heading and the side of the curvature say where it lies.
     pub curvature: f64,
-    /// Of a spiral, the polar angle at which it begins, radians (for an outward one: before it is turned); else NaN.
+    /// Of a spiral, the polar angle at which it begins, radians (for an outward one: before it is turned; of a placed
+    /// one: before it is placed); else NaN.
     pub theta_first: f64,
     /// Of a spiral, the polar angle at which it ends, radians; else NaN.
     pub theta_last: f64,

@@ -57,7 +57,7 @@ fn runs(length: f64, frames: usize) -> Vec<f64> {
 
 /// In, round a corner and through two bends: `config/procession.toml`.
 fn procession() -> Path {
-    let corner = Path::route(Point::new(-30.0, -10.0), 0.0).line(40.0).arc(Side::Left, 6.0, 0.25).line(12.0);
+    let corner = Path::route(0.0).line(40.0).arc(Side::Left, 6.0, 0.25).line(12.0);
     let bends = corner.arc(Side::Right, 5.0, 0.5).line(10.0).arc(Side::Left, 5.0, 0.5).line(120.0);
     bends.build().unwrap()
 }
@@ -275,7 +275,7 @@ fn any_team() -> impl Strategy<Value = Team> {
 /// Paths of every kind, and lanes side by side in opposite directions.
 fn any_lanes() -> impl Strategy<Value = Path> {
     let hairpin = (0.2..2.0f64, 0.45..0.55f64, 5.0..40.0f64).prop_map(|(radius, turns, length)| {
-        let lane = Path::route(Point::new(3.0, -2.0), 0.3).line(length);
+        let lane = Path::route(0.3).line(length);
         lane.arc(Side::Left, radius, turns).line(length).arc(Side::Right, radius, turns).line(length).build().unwrap()
     });
     prop_oneof![2 => any_path(), 1 => hairpin]

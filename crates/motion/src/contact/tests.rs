@@ -76,7 +76,7 @@ fn spirals_touch_where_the_earlier_searches_did() {
 #[test]
 fn a_touch_within_a_step_in_which_handles_turn_is_found() {
     let team = Team { benches: 12, head_length: 1.7, body_length: 3.7, width: 0.05, hole_inset: 0.6 };
-    let lane = Path::route(Point::origin(), 0.25).line(19.994_074_807_700_006).arc(Side::Right, 3.0, 0.75).line(2.1);
+    let lane = Path::route(0.25).line(19.994_074_807_700_006).arc(Side::Right, 3.0, 0.75).line(2.1);
     let bend = lane.arc(Side::Left, 0.3, 0.25).line(0.36).arc(Side::Left, 0.01, 1.0);
     let path = bend.arc(Side::Left, 0.039_788_735_772_973_836, 4.0).build().unwrap();
     assert_contact(&path, &team, 37.145_313_188_924, (1, 8));
@@ -93,7 +93,7 @@ fn the_least_clearance_of_a_turnaround() {
 
 #[test]
 fn a_straight_procession_is_one_step() {
-    let path = Path::route(Point::origin(), 0.1).line(1e6).build().unwrap();
+    let path = Path::route(0.1).line(1e6).build().unwrap();
     for team in [PAPER, Team { benches: 3, ..PAPER }] {
         let searches = ConservativeAdvancement::new(&path, &team, &[], &[]);
         let mut unreported = |_| {};
@@ -156,7 +156,7 @@ fn any_route() -> impl Strategy<Value = Path> {
             1 => route.arc(Side::Left, radius, turns),
             _ => route.arc(Side::Right, radius, turns),
         };
-        pieces.into_iter().fold(Path::route(Point::origin(), 0.0), add).build().unwrap()
+        pieces.into_iter().fold(Path::route(0.0), add).build().unwrap()
     })
 }
 

@@ -1,7 +1,6 @@
 //! A path by its numbers in a scene: from them [`Path`] is built in doubles, and the reference builds its path with
 //! more digits.
 
-use super::Point;
 use super::curve::Side;
 use super::path::{Disjoint, Path};
 
@@ -28,11 +27,10 @@ pub enum PathDescription {
         /// Metres of travel after it.
         lead_out: f64,
     },
-    /// Lines and arcs: see [`Path::route`].
+    /// Lines and arcs: see [`Path::route`]. The head starts at the origin of the path's own coordinates; a
+    /// [`Placement`](crate::placement::Placement) moves the start.
     Route {
-        /// Start of the head.
-        start: Point,
-        /// The direction there, turns counter-clockwise from x.
+        /// The direction at the start, turns counter-clockwise from x.
         heading_turns: f64,
         /// The segments after the start, in order.
         steps: Vec<RouteStep>,
@@ -69,8 +67,8 @@ impl PathDescription {
             Self::Turnaround { pitch, turn_radius, arc_ratio, lead_in, lead_out } => {
                 Path::turnaround(*pitch, *turn_radius, *arc_ratio, *lead_in, *lead_out)
             }
-            Self::Route { start, heading_turns, steps } => {
-                let route = steps.iter().fold(Path::route(*start, *heading_turns), |route, step| match *step {
+            Self::Route { heading_turns, steps } => {
+                let route = steps.iter().fold(Path::route(*heading_turns), |route, step| match *step {
                     RouteStep::Line { length } => route.line(length),
                     RouteStep::Arc { side, radius, turns } => route.arc(side, radius, turns),
                 });

@@ -112,6 +112,9 @@ pub enum OutlineKind {
         first: f64,
         /// Polar angle of its end on the unturned spiral, radians.
         last: f64,
+        /// Curvature at its beginning, 1/m, positive to the left, of a spiral that a placement moves, turns or mirrors;
+        /// NaN of a spiral about the origin.
+        curvature: f64,
     },
 }
 
@@ -181,9 +184,10 @@ impl Path {
         path.joined()
     }
 
-    /// Creates a route that begins at `start` in the direction `heading_turns` turns counter-clockwise from x, with an
-    /// infinite straight line behind it. Lines and arcs are added one by one.
-    pub fn route(start: Point, heading_turns: f64) -> Route {
+    /// Creates a route that begins at the origin in the direction `heading_turns` turns counter-clockwise from x, with
+    /// an infinite straight line behind it. Lines and arcs are added one by one.
+    pub fn route(heading_turns: f64) -> Route {
+        let start = Point::origin();
         let (sine, cosine) = DoubleDouble::from_turns(heading_turns).sine_and_cosine();
         let segment = Segment::Line(Line { origin: start, direction: Vector::new(cosine, sine) });
         let zero = Coordinate::ZERO;
@@ -318,6 +322,7 @@ impl Path {
                         pitch: spiral.pitch(),
                         first: first.high,
                         last: last.high,
+                        curvature: f64::NAN,
                     },
                 };
                 let start = placed.segment.point(first);

@@ -97,7 +97,7 @@ fn check(path: &Path, link: f64) {
 }
 
 fn route() -> Route {
-    Path::route(Point::origin(), 0.0)
+    Path::route(0.0)
 }
 
 /// Asserts the first stall and the end, as metres of travel and link, to `tolerance` metres.
@@ -231,7 +231,7 @@ fn a_spent_budget_says_how_far_it_came() {
 }
 
 fn u_turn(link: f64, radius: f64) -> Path {
-    Path::route(Point::origin(), 0.0).line(4.0 * link).arc(Side::Left, radius, 0.5).line(10.0 * link).build().unwrap()
+    Path::route(0.0).line(4.0 * link).arc(Side::Left, radius, 0.5).line(10.0 * link).build().unwrap()
 }
 
 /// A narrow lobe to the left of the path, then most of a circle.
@@ -252,7 +252,7 @@ fn routes() -> impl Strategy<Value = Path> {
     let radius = prop_oneof![0.003f64..0.1, 0.1f64..1.0, 0.4f64..0.6, 1.0f64..5.0];
     let leg = (radius, 0.02f64..1.1, 0..3, 0.01f64..3.0);
     prop::collection::vec(leg, 1..12).prop_map(|legs| {
-        let mut route = Path::route(Point::new(1.0, 2.0), 0.1).line(2.0);
+        let mut route = Path::route(0.1).line(2.0);
         for (radius, turns, kind, length) in legs {
             route = match kind {
                 0 => route.line(length),

@@ -6,8 +6,8 @@
 //!
 //! Every candidate starts from one table of T whose polynomials have an error of a sixteenth of the requested accuracy.
 //! The loss of a format is bounded over all phases while the format is made. Then frames are compared with the safe
-//! solver's at test points over the whole path, junctions and the last metres of the table included. Half the requested
-//! accuracy is left for the error between test points.
+//! solver's at test points over the whole path: positions, and velocities where they are computed. Test points include
+//! junctions, kinks and the last metres of the table. Half the requested accuracy is left for the error between them.
 
 use std::time::{Duration, Instant};
 
@@ -18,9 +18,11 @@ use crate::model::elementary::hypot;
 use crate::model::path::Path;
 use crate::model::team::Team;
 
-/// Greatest numbers of test points: spread over the path, at each junction, and towards the table's end.
+/// Greatest numbers of test points: spread over the path, at each junction, where handles cross junctions, and towards
+/// the table's end.
 const SPREAD_TEST_POINTS: usize = 200;
 const JUNCTION_TEST_POINTS: usize = 60;
+const KINK_TEST_POINTS: usize = 300;
 const LAST_TEST_POINTS: usize = 12;
 
 /// Handles that the safe solver may solve for the comparison, about 0.1 s. Larger teams have fewer test points.
@@ -47,6 +49,14 @@ const SHARE_OF_ROWS: f64 = 1.0 / 16.0;
 const SHARE_OF_FORMAT: f64 = 3.0 / 8.0;
 const SHARE_MEASURED: f64 = 0.5;
 
+/// The promised error of a velocity, as a part of the handle's speed, for an error of one link in its position.
+const SPEED_PER_LINK: f64 = 10.0;
+
+/// Parts of the promised error of velocities: for the format, and for the measured sum with the polynomials' share. A
+/// format loses up to its share at some phase, and [`SHARE_OF_ROWS`] is the polynomials'.
+const SPEED_SHARE_OF_FORMAT: f64 = 0.8;
+const SPEED_SHARE_MEASURED: f64 = 0.9;
+
 /// Returns the metres by which links may be off, besides rounding, at a requested accuracy: twice that of a handle.
 pub fn link_tolerance(team: &Team, accuracy: f64) -> f64 {
     if accuracy > EXACT_LINKS { 2.0 * accuracy.min(COARSEST * team.shortest_link()) } else { 0.0 }
@@ -63,6 +73,8 @@ pub struct Selection {
     /// Greatest measured error that is accepted, metres: the share of the requested accuracy, or the rounding of
     /// doubles if that is more.
     pub allowed: f64,
+    /// Greatest measured error of a velocity, as a part of what is accepted; 0 without velocities.
+    pub speed_error: f64,
     /// The number of test points.
     pub test_points: usize,
     /// Time to make all candidates and to measure them.
@@ -70,9 +82,9 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// Returns true if the measured error meets the requested accuracy.
+    /// Returns true if the measured errors meet the requested accuracy.
     pub fn meets(&self) -> bool {
-        self.error <= self.allowed
+        self.error <= self.allowed && self.speed_error <= 1.0
     }
 
     /// Returns true if rounding alone can exceed the requested accuracy at the handle with the largest relative error.
@@ -107,16 +119,16 @@ pub fn cheapest_with(
     };
     let tolerance = tolerance(&team, accuracy);
     let rows = make(tolerance)?;
-    let measurement = ErrorMeasurement::new(path, team, head_speed, &rows);
+    let measurement = ErrorMeasurement::new(path, team, head_speed, velocities, &rows);
     let select = |table: FollowerTable| {
-        let (error, allowed) = measurement.error(&table, accuracy);
+        let Measured { error, allowed, speed_error } = measurement.measure(&table, accuracy);
         let (test_points, made_in) = (measurement.test_points.len(), began.elapsed());
-        Selection { table: table.promising(accuracy), accuracy, error, allowed, test_points, made_in }
+        Selection { table: table.promising(accuracy), accuracy, error, allowed, speed_error, test_points, made_in }
     };
     if accuracy > EXACT_LINKS {
         let link = team.shortest_link();
         let speed = match velocities {
-            Velocities::Computed => 8.0 * accuracy / link,
+            Velocities::Computed => SPEED_SHARE_OF_FORMAT * SPEED_PER_LINK * accuracy / link,
             Velocities::Omitted => f64::INFINITY,
         };
         let allowed = Allowed { place: SHARE_OF_FORMAT * accuracy, heading: 1.5 * accuracy / link, speed };
@@ -139,7 +151,7 @@ fn tolerance(team: &Team, accuracy: f64) -> Tolerance {
         return exact;
     }
     let place = (SHARE_OF_ROWS * accuracy).max(exact.place);
-    let speed = 10.0 * SHARE_OF_ROWS * accuracy / team.shortest_link();
+    let speed = SPEED_PER_LINK * SHARE_OF_ROWS * accuracy / team.shortest_link();
     if accuracy <= EXACT_LINKS {
         Tolerance { place, speed: speed.clamp(exact.speed, FINEST_SPEED), ..exact }
     } else {
@@ -149,26 +161,28 @@ fn tolerance(team: &Team, accuracy: f64) -> Tolerance {
 
 /// The safe solver's handles at the test points.
 struct ErrorMeasurement {
+    link: f64,
     head_speed: f64,
-    test_points: Vec<TestPoint>,
+    velocities: Velocities,
+    test_points: Vec<(f64, Chain)>,
 }
 
-/// The safe solver's chain at one time: seconds, metres.
-struct TestPoint {
-    time: f64,
-    x: Vec<f64>,
-    y: Vec<f64>,
+/// The measured errors of a table: see [`Selection`].
+struct Measured {
+    error: f64,
+    allowed: f64,
+    speed_error: f64,
 }
 
 impl ErrorMeasurement {
-    fn new(path: &Path, team: Team, head_speed: f64, table: &FollowerTable) -> Self {
+    fn new(path: &Path, team: Team, head_speed: f64, velocities: Velocities, table: &FollowerTable) -> Self {
         let times = times(path, &team, head_speed, table.valid_until());
-        let newton = Newton::new(path.clone(), team, head_speed, Velocities::Omitted);
-        let solve = |times: &[f64]| -> Vec<TestPoint> {
-            let mut chain = Chain::new(team.handles());
+        let newton = Newton::new(path.clone(), team, head_speed, velocities);
+        let solve = |times: &[f64]| -> Vec<(f64, Chain)> {
             let solved = times.iter().filter_map(|&time| {
+                let mut chain = Chain::new(team.handles());
                 newton.solve_at(head_speed * time, &mut chain).ok()?;
-                Some(TestPoint { time, x: chain.x.clone(), y: chain.y.clone() })
+                Some((time, chain))
             });
             solved.collect()
         };
@@ -179,28 +193,43 @@ impl ErrorMeasurement {
             test_points.extend(second.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
             test_points
         });
-        Self { head_speed, test_points }
+        Self { link: team.shortest_link(), head_speed, velocities, test_points }
     }
 
-    /// Returns the error of the handle with the largest ratio of error to allowed error, and its allowed error, metres.
-    fn error(&self, table: &FollowerTable, accuracy: f64) -> (f64, f64) {
+    /// Returns the error of the handle with the largest ratio of error to allowed error, and its allowed error, metres;
+    /// and the largest ratio for a velocity.
+    fn measure(&self, table: &FollowerTable, accuracy: f64) -> Measured {
         let mut table = table.clone();
-        let mut worst = (0.0, SHARE_MEASURED * accuracy);
-        for TestPoint { time, x, y } in &self.test_points {
-            let mut chain = Chain::new(x.len());
+        let mut worst = Measured { error: 0.0, allowed: SHARE_MEASURED * accuracy, speed_error: 0.0 };
+        for (time, safe) in &self.test_points {
+            let mut chain = Chain::new(safe.handles());
             if table.solve(*time, &mut chain).is_err() {
-                return (f64::INFINITY, worst.1);
+                return Measured { error: f64::INFINITY, ..worst };
             }
-            for (handle, (x, y)) in x.iter().zip(y).enumerate() {
+            for handle in 0..safe.handles() {
+                let (x, y) = (safe.x[handle], safe.y[handle]);
                 let error = hypot(chain.x[handle] - x, chain.y[handle] - y);
-                let floor = 8.0 * f64::EPSILON * (hypot(*x, *y) + self.head_speed * time);
+                let floor = 8.0 * f64::EPSILON * (hypot(x, y) + self.head_speed * time);
                 let allowed = (SHARE_MEASURED * accuracy).max(floor);
-                if error.is_nan() || error * worst.1 > worst.0 * allowed {
-                    worst = (error, allowed);
+                if error.is_nan() || error * worst.allowed > worst.error * allowed {
+                    (worst.error, worst.allowed) = (error, allowed);
+                }
+                if self.velocities == Velocities::Computed {
+                    let accuracy = (SPEED_SHARE_MEASURED * accuracy).max(floor);
+                    worst.speed_error = worst.speed_error.max(self.speed_error(&chain, safe, handle, accuracy));
                 }
             }
         }
         worst
+    }
+
+    /// Returns the error of a handle's velocity, as a part of what is allowed where positions are within `accuracy`
+    /// metres.
+    fn speed_error(&self, chain: &Chain, safe: &Chain, handle: usize, accuracy: f64) -> f64 {
+        let off = hypot(chain.vx[handle] - safe.vx[handle], chain.vy[handle] - safe.vy[handle]);
+        let off = off.max((chain.speed[handle] - safe.speed[handle]).abs());
+        let speed = safe.speed[handle].abs().max(self.head_speed);
+        off * self.link / (SPEED_PER_LINK * accuracy * speed)
     }
 }
 
@@ -221,6 +250,11 @@ fn times(path: &Path, team: &Team, head_speed: f64, end: f64) -> Vec<f64> {
     let wanted = JUNCTION_TEST_POINTS.min(most.div_ceil(4));
     let step = crossings.len().div_ceil(wanted).max(1);
     times.extend(crossings.into_iter().step_by(step));
+    let kinks = FollowerTable::kinks(path, team).into_iter().map(|metres| metres / head_speed);
+    let kinks: Vec<f64> = kinks.filter(|time| (0.0..end).contains(time)).collect();
+    let left = most.saturating_sub(times.len()).clamp(1, KINK_TEST_POINTS);
+    let step = kinks.len().div_ceil(left).max(1);
+    times.extend(kinks.into_iter().step_by(step));
     times.sort_by(f64::total_cmp);
     times
 }

@@ -166,6 +166,11 @@ impl FollowerTable {
         })
     }
 
+    /// Returns the metres that the head has travelled where frames have kinks.
+    pub(crate) fn kinks(path: &Path, team: &Team) -> Vec<f64> {
+        layout::crossings(&Track::new(path), team)
+    }
+
     /// Returns the same solver with other instructions, or `None` if this processor lacks them.
     pub fn with_instructions(self, instructions: Instructions) -> Option<Self> {
         instructions.is_available().then_some(Self { instructions, ..self })

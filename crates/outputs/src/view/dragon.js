@@ -1,7 +1,7 @@
 // One publisher's dragon: its stream, its present pose, its path and colours, its state and its marks. Knows the words
 // for its marks, and no canvas.
 
-import { pathOf } from "./drawing.js";
+import { centreOf, pathOf } from "./drawing.js";
 import { STRIDE } from "./hermite.js";
 import { Overlap, marksOf } from "./marks.js";
 import { SpeedScale } from "./palette.js";
@@ -18,10 +18,10 @@ const SILENCE = 2000;
 /** Milliseconds between the frames of the slowest publisher. */
 const LONGEST_PERIOD = 10_000;
 
-/** Returns the distance of the outermost bench from the centre. */
-function reachOf(stage, handles) {
+/** Returns the distance of the outermost bench from a place. */
+function reachOf(stage, handles, { x, y }) {
   let most = 0;
-  for (let k = 0; k < handles.length; k += STRIDE) most = Math.max(most, Math.hypot(handles[k], handles[k + 1]));
+  for (let k = 0; k < handles.length; k += STRIDE) most = Math.max(most, Math.hypot(handles[k] - x, handles[k + 1] - y));
   return most + stage.width + stage.hole_inset || 1;
 }
 
@@ -152,12 +152,13 @@ export class Dragon {
 
   /** Sets the extent of the team, and draws the path as far out. */
   measure(stage, newest) {
-    const reach = (this.reach = reachOf(stage, newest.handles));
+    const centre = centreOf(stage), turns = reachOf(stage, newest.handles, centre);
+    this.reach = centre.x || centre.y ? reachOf(stage, newest.handles, { x: 0, y: 0 }) : turns;
     // The rounding of positions to 32 bits moves the outermost bench a little.
-    if (this.path && this.path.run === this.run && reach <= 1.001 * this.path.reach) return;
+    if (this.path && this.path.run === this.run && turns <= 1.001 * this.path.turns) return;
     // A team that moves outward gets room ahead.
-    const far = this.path?.run === this.run ? 1.1 * reach : reach;
-    this.path = { run: this.run, reach: far, lines: pathOf(stage, far) };
+    const room = this.path?.run === this.run ? 1.1 : 1;
+    this.path = { run: this.run, reach: room * this.reach, turns: room * turns, lines: pathOf(stage, room * turns) };
   }
 
   /** Words for the marks, in the page's language. */

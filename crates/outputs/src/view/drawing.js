@@ -24,13 +24,39 @@ export function outline(context, { x, y, c, s, l, w }) {
   context.closePath();
 }
 
+/** A point and the direction of travel at a polar angle of a spiral about the origin, as [x, y, along x, along y]. */
+function onSpiral(a, angle) {
+  const c = Math.cos(angle), s = Math.sin(angle), x = a * angle * c, y = a * angle * s;
+  return [x, y, a * c - y, a * s + x];
+}
+
 /**
- * The path of a stage, in metres. A spiral on which the team comes in is drawn as far out as `reach`, where the team
- * stands.
+ * How a segment's spiral stands on the stage: its centre `x`, `y`, and the direction `c`, `s` of its x axis; `side` is -1
+ * where it is mirrored. Its beginning and the side to which it bends say so; without a curvature it is about the origin.
+ */
+export function spiralFrame({ kind, x, y, heading, curvature, theta_first }, pitch) {
+  if (curvature === null) return { x: 0, y: 0, c: 1, s: 0, side: 1 };
+  const inward = kind === "inward_spiral", a = (inward ? pitch : -pitch) / (2 * Math.PI);
+  const [px, py, dx, dy] = onSpiral(a, theta_first), side = Math.sign(inward ? -curvature : curvature);
+  const turned = heading - side * (inward ? Math.atan2(-dy, -dx) : Math.atan2(dy, dx));
+  const c = Math.cos(turned), s = Math.sin(turned);
+  return { x: x - c * px + s * side * py, y: y - s * px - c * side * py, c, s, side };
+}
+
+/** The place of the centre of a stage's spirals; the origin where it has none. */
+export function centreOf({ pitch, path }) {
+  const spiral = path.find(({ kind }) => kind.endsWith("_spiral"));
+  return spiral ? spiralFrame(spiral, pitch) : { x: 0, y: 0 };
+}
+
+/**
+ * The path of a stage, in metres. A spiral on which the team comes in is drawn as far out as `reach` from its centre,
+ * where the team stands.
  */
 export function pathOf({ pitch, path: segments }, reach) {
   const path = new Path2D();
-  for (const { kind, x, y, heading, length, curvature, theta_first, theta_last } of segments) {
+  for (const segment of segments) {
+    const { kind, x, y, heading, length, curvature, theta_first, theta_last } = segment;
     const c = Math.cos(heading), s = Math.sin(heading);
     if (kind === "line") {
       path.moveTo(x, y);
@@ -40,22 +66,22 @@ export function pathOf({ pitch, path: segments }, reach) {
       path.moveTo(x, y);
       path.arc(cx, cy, 1 / Math.abs(curvature), from, from + curvature * length, curvature < 0);
     } else if (kind === "inward_spiral") {
-      addSpiral(path, pitch, theta_last, Math.max(theta_first, (2 * Math.PI * reach) / pitch));
+      addSpiral(path, spiralFrame(segment, pitch), pitch, theta_last, Math.max(theta_first, (2 * Math.PI * reach) / pitch));
     } else {
-      addSpiral(path, -pitch, theta_first, theta_last);
+      addSpiral(path, spiralFrame(segment, pitch), -pitch, theta_first, theta_last);
     }
   }
   return path;
 }
 
 /** The spiral r = pitch * turn from one polar angle to another, as cubic curves with its tangents. */
-function addSpiral(path, pitch, from, to) {
+function addSpiral(path, { x: cx, y: cy, c, s, side }, pitch, from, to) {
   const turns = (to - from) / (2 * Math.PI);
   if (turns > MOST_TURNS) return;
   const a = pitch / (2 * Math.PI), steps = Math.ceil(12 * turns), step = (to - from) / steps;
   const at = (angle) => {
-    const c = Math.cos(angle), s = Math.sin(angle), x = a * angle * c, y = a * angle * s;
-    return [x, y, a * c - y, a * s + x];
+    const [x, y, dx, dy] = onSpiral(a, angle);
+    return [cx + c * x - s * side * y, cy + s * x + c * side * y, c * dx - s * side * dy, s * dx + c * side * dy];
   };
   let [x, y, dx, dy] = at(from);
   path.moveTo(x, y);

@@ -43,7 +43,7 @@ fn step(from: f64, to: f64) -> Value {
 }
 
 fn certificate() -> Vec<Value> {
-    let mut lines = vec![json!({"type": "certificate", "format": 1, "version": "0.1.0", "scene": SCENE})];
+    let mut lines = vec![json!({"type": "certificate", "format": 2, "version": "0.1.0", "scene": SCENE})];
     let ends = [-0.5, 0.3, 1.3, 2.3, 3.3, 4.3, 5.3, 6.3, 7.3, 8.3, 9.3, 10.0];
     lines.extend(ends.windows(2).map(|ends| step(ends[0], ends[1])));
     lines.push(json!({"type": "path_end"}));

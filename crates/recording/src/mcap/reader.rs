@@ -19,6 +19,7 @@ use serde::de::DeserializeOwned;
 
 use super::index::{Index, index, told};
 use super::recover::records_of_chunk;
+use bench_dragon_messages::sentence::number;
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, LoopStatus, Stage};
 use bench_dragon_ros2_messages::settings::Topic;
 use bench_dragon_ros2_messages::{HandlePoses, Header, MessageType, Stamped, fields};
@@ -86,7 +87,7 @@ pub enum ReadError {
     #[error("it has a frame {0}")]
     Frame(String),
     /// The recording ends before the start.
-    #[error("--start is {start} and the recording reaches {end} s of the show, expected an earlier start")]
+    #[error("--start is {} and the recording reaches {end} s of the show, expected an earlier start", number(*.start))]
     Start {
         /// The requested simulated seconds.
         start: f64,

@@ -359,7 +359,7 @@ impl Recorder {
 ///
 /// # Errors
 /// The file cannot be created, or exists and must not be replaced.
-pub fn create(path: &Path, replace: bool) -> io::Result<File> {
+fn create(path: &Path, replace: bool) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.write(true);
     if replace {

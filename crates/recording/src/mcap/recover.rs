@@ -1,10 +1,11 @@
-//! Repairs a recording that was cut by a kill, a full disk or a loss of power.
+//! Repairs a recording that was cut by a kill, a full disk or a loss of power, or has damaged bytes.
 //!
-//! In: the bytes of the file. Out: a complete file with exactly the messages of the finished chunks, in order. Called
-//! by the command `record --recover`.
+//! In: the bytes of the file. Out: a complete file with exactly the messages of the finished chunks, in order. Records
+//! are read one after another. Behind a damaged length the next record is the next chunk or attachment whose own
+//! lengths and check agree: it needs no readable summary. Called by the command `record --recover`.
 
 use std::collections::BTreeMap;
-use std::io::{self, Read, Write};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 
 use mcap::read::parse_record;
 use mcap::records::{self, Header, Record, op};
@@ -17,6 +18,8 @@ use super::file::{io_error, options};
 
 /// A longer record counts as damaged: a chunk must fit into memory.
 const MOST_RECORD_BYTES: u64 = 1 << 30;
+/// Bytes of a record before its content: its opcode and its length.
+const HEAD_BYTES: usize = 9;
 /// Bytes of the footer, and of the record that ends the messages.
 const FOOTER_BYTES: usize = 20;
 const DATA_END_BYTES: usize = 4;
@@ -28,8 +31,14 @@ const MESSAGE_INDEX_ENTRY_BYTES: usize = 16;
 const FIRST_PRIVATE: u8 = 0x80;
 /// Bytes of a chunk's record besides the name of its compression and its records.
 const CHUNK_BYTES: usize = 40;
+/// Bytes of a chunk's record before the name of its compression.
+const CHUNK_NAME_AT: usize = 28;
 /// Bytes of an attachment's record besides its two names and its data.
 const ATTACHMENT_BYTES: usize = 36;
+/// Bytes that show the length of a chunk: its head, and its content up to its records.
+const CHUNK_HEAD_BYTES: usize = HEAD_BYTES + CHUNK_BYTES + "zstd".len();
+/// Bytes that are searched at a time for the beginning of a chunk.
+const BLOCK_BYTES: usize = 1 << 20;
 
 /// The counts of a repair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -46,7 +55,7 @@ pub struct Recovered {
     pub lost_messages: u64,
     /// Messages whose channel cannot be read.
     pub unknown: u64,
-    /// Bytes from the first unreadable record to the end.
+    /// Bytes behind a length that cannot be, up to the next readable record or the end.
     pub lost_bytes: u64,
     /// True if the file has its end.
     pub whole: bool,
@@ -85,79 +94,198 @@ pub fn check_magic(mut input: impl Read) -> Result<(), RecoverError> {
     if magic == MAGIC { Ok(()) } else { Err(RecoverError::NotMcap) }
 }
 
-/// Writes the complete records of a recording of `length` bytes, and an end. `input` starts after [`check_magic`].
+/// Writes the readable records of a recording of `length` bytes, and an end.
 ///
 /// # Errors
 /// [`RecoverError`]
-pub fn recover(input: impl Read, length: u64, output: impl Write) -> Result<Recovered, RecoverError> {
-    let mut input = Records { input, left: length.saturating_sub(MAGIC.len() as u64), body: Vec::new() };
-    let mut opcode = input.next()?;
+pub fn recover(input: impl Read + Seek, length: u64, output: impl Write) -> Result<Recovered, RecoverError> {
+    const FIRST: u64 = MAGIC.len() as u64;
+    let mut input = Records { input, length, at: FIRST, body: Vec::new(), searched: FIRST, allowed: length };
+    let ends = input.ends()?;
     let mut made = options();
-    if opcode == Some(op::HEADER)
+    if input.seek(FIRST)?.next()? == Some(op::HEADER)
         && let Ok(Record::Header(Header { profile, library })) = parse_record(op::HEADER, &input.body)
     {
         made = WriteOptions::library(made.profile(profile), library);
-        opcode = input.next()?;
     }
     let writer = made.create(NoSeek::new(output))?;
     let (schemas, channels) = (BTreeMap::new(), BTreeMap::new());
     let recovered = Recovered::default();
     let (has_chunks, held, lost_chunk) = (false, None, false);
     let mut mender = Mender { writer, schemas, channels, has_chunks, held, lost_chunk, recovered };
+    if let Some([summary, footer]) = ends {
+        input.seek(summary)?;
+        while input.at < footer
+            && let Some(opcode) = input.next()?
+        {
+            // The summary repeats the definitions: the first ones may be lost.
+            if let (op::SCHEMA | op::CHANNEL, Ok(record)) = (opcode, parse_record(opcode, &input.body)) {
+                mender.keep_record(record)?;
+            }
+        }
+    }
+    input.seek(FIRST)?;
     let mut in_index = false;
-    while let Some(found) = opcode {
-        match (found, input.body.len()) {
-            (op::FOOTER, FOOTER_BYTES) if input.left == MAGIC.len() as u64 => {
+    loop {
+        let begin = input.at;
+        let read = input.next()?;
+        let is_kept = match (read, input.body.len()) {
+            (Some(op::FOOTER), FOOTER_BYTES) if input.at + MAGIC.len() as u64 == length => {
                 mender.recovered.whole = input.fill(MAGIC.len() as u64)? && input.body == MAGIC;
                 break;
             }
             // The index follows, which is rebuilt.
-            (op::DATA_END, DATA_END_BYTES) => in_index = true,
-            _ if in_index => (),
-            _ => mender.keep(found, &input.body)?,
+            (Some(op::DATA_END), DATA_END_BYTES) => {
+                in_index = true;
+                true
+            }
+            (Some(opcode), _) => in_index || mender.keep(opcode, &input.body)?,
+            (None, _) => false,
+        };
+        let search_end = match read {
+            Some(opcode) if has_right_length(opcode, &input.body) => {
+                input.searched = input.at;
+                mender.recovered.damaged += u64::from(!is_kept);
+                continue;
+            }
+            Some(_) if is_kept => continue,
+            Some(_) => input.at,
+            None => length,
+        };
+        // The length may be wrong: then the next chunk or attachment is in this record or behind it.
+        let found = if in_index { None } else { input.find(search_end)? };
+        if let Some((at, opcode)) = found {
+            mender.recovered.damaged += u64::from(at != begin);
+            mender.recovered.lost_bytes += if read.is_none() { at.saturating_sub(begin) } else { 0 };
+            mender.keep_found(opcode, &input.body)?;
+        } else if read.is_some() {
+            mender.recovered.damaged += 1;
+        } else if let Some(at) = ends.into_iter().flatten().find(|at| *at > begin) {
+            mender.recovered.damaged += 1;
+            mender.recovered.lost_bytes += at - begin;
+            in_index = true;
+            input.seek(at)?;
+        } else {
+            mender.recovered.lost_bytes += length.saturating_sub(begin);
+            break;
         }
-        opcode = input.next()?;
     }
-    mender.recovered.lost_bytes = if mender.recovered.whole { 0 } else { input.left };
     mender.finish()
 }
 
-/// The complete records of a file.
+/// The records of a file.
 struct Records<Input> {
     input: Input,
-    /// The remaining bytes.
-    left: u64,
+    /// The bytes of the file.
+    length: u64,
+    /// The byte after the last record read.
+    at: u64,
     /// The content of the record.
     body: Vec<u8>,
+    /// No chunk that is still to be found begins before this byte.
+    searched: u64,
+    /// Bytes of possible chunks that may still be read in vain: a search costs no more than another reading of the
+    /// file.
+    allowed: u64,
 }
 
-impl<Input: Read> Records<Input> {
+impl<Input: Read + Seek> Records<Input> {
     /// Reads the next record. Returns its opcode, or `None` without a complete record.
     fn next(&mut self) -> Result<Option<u8>, RecoverError> {
-        const HEAD: u64 = 9;
-        if self.left < HEAD {
-            return Ok(None);
+        self.body.clear();
+        let left = self.length.saturating_sub(self.at);
+        let begin = self.at;
+        if left >= HEAD_BYTES as u64 && self.fill(HEAD_BYTES as u64)? {
+            let opcode = self.body.first().copied().unwrap_or_default();
+            let length = self.body.last_chunk().map_or(0, |length| u64::from_le_bytes(*length));
+            // A loss of power can leave zeros at the end of a growing file.
+            if opcode != 0 && length <= (left - HEAD_BYTES as u64).min(MOST_RECORD_BYTES) && self.fill(length)? {
+                return Ok(Some(opcode));
+            }
         }
-        let mut head = [0; HEAD as usize];
-        if !self.fill(HEAD)? {
-            return Ok(None);
-        }
-        head.copy_from_slice(&self.body);
-        let [opcode, length @ ..] = head;
-        let length = u64::from_le_bytes(length);
-        // A loss of power can leave zeros at the end of a growing file.
-        if opcode == 0 || length > (self.left - HEAD).min(MOST_RECORD_BYTES) || !self.fill(length)? {
-            return Ok(None);
-        }
-        self.left -= HEAD + length;
-        Ok(Some(opcode))
+        self.seek(begin)?;
+        Ok(None)
     }
 
     /// Fills the buffer with `length` bytes. Returns false at the end of the file.
     fn fill(&mut self, length: u64) -> Result<bool, RecoverError> {
         self.body.clear();
         let read = self.input.by_ref().take(length).read_to_end(&mut self.body).map_err(RecoverError::Read)?;
+        self.at += read as u64;
         Ok(read as u64 == length)
+    }
+
+    /// Goes to a byte of the file.
+    fn seek(&mut self, at: u64) -> Result<&mut Self, RecoverError> {
+        self.input.seek(SeekFrom::Start(at)).map_err(RecoverError::Read)?;
+        self.at = at;
+        Ok(self)
+    }
+
+    /// Returns the bytes at which the index and the footer begin, or `None` for a file without its end.
+    fn ends(&mut self) -> Result<Option<[u64; 2]>, RecoverError> {
+        let Some(footer) = self.length.checked_sub((HEAD_BYTES + FOOTER_BYTES + MAGIC.len()) as u64) else {
+            return Ok(None);
+        };
+        let is_footer = self.seek(footer)?.next()? == Some(op::FOOTER) && self.body.len() == FOOTER_BYTES;
+        let summary = self.body.first_chunk().map_or(0, |summary| u64::from_le_bytes(*summary));
+        let summary = if (1..footer).contains(&summary) { summary } else { footer };
+        Ok((is_footer && self.fill(MAGIC.len() as u64)? && self.body == MAGIC).then_some([summary, footer]))
+    }
+
+    /// Reads the next chunk or attachment that begins before the byte `end`, from the last byte searched. Returns its
+    /// beginning and its opcode. Without one, the next record stays the same.
+    fn find(&mut self, end: u64) -> Result<Option<(u64, u8)>, RecoverError> {
+        let (next, mut block) = (self.at, Vec::new());
+        while self.searched < end {
+            let start = self.searched;
+            self.seek(start)?.fill((BLOCK_BYTES + CHUNK_HEAD_BYTES) as u64)?;
+            std::mem::swap(&mut block, &mut self.body);
+            for (at, head) in (start..end).zip(block.windows(CHUNK_HEAD_BYTES)).take(BLOCK_BYTES) {
+                let left = self.length.saturating_sub(at + HEAD_BYTES as u64).min(self.allowed);
+                let Some(length) = checked_length(head).filter(|length| *length <= left) else { continue };
+                self.seek(at + HEAD_BYTES as u64)?.fill(length)?;
+                if has_right_check(head[0], &self.body)? {
+                    // Where its two lengths differ, the next chunk may begin before the end.
+                    self.searched = if head[1..HEAD_BYTES] == length.to_le_bytes() { self.at } else { at + 1 };
+                    return Ok(Some((at, head[0])));
+                }
+                self.allowed -= length;
+            }
+            self.searched = (start + BLOCK_BYTES as u64).min(end);
+        }
+        self.seek(next)?;
+        Ok(None)
+    }
+}
+
+/// Returns the length of a chunk or an attachment that may begin with these bytes. The lengths in a chunk determine the
+/// chunk's, which may be damaged.
+fn checked_length(head: &[u8]) -> Option<u64> {
+    let number = |at: usize| head.get(at..)?.first_chunk().map(|bytes| u64::from_le_bytes(*bytes));
+    let length = match *head.first()? {
+        op::CHUNK => {
+            let name = head.get(HEAD_BYTES + CHUNK_NAME_AT..)?;
+            let (size, name) =
+                name.split_first_chunk().map(|(size, name)| (u32::from_le_bytes(*size) as usize, name))?;
+            let is_known = [&b"zstd"[..], b"lz4", b""].iter().any(|known| name.get(..size) == Some(known));
+            let records = number(HEAD_BYTES + CHUNK_BYTES - size_of::<u64>() + size).filter(|_| is_known)?;
+            records.checked_add((CHUNK_BYTES + size) as u64).filter(|_| records > 0)?
+        }
+        op::ATTACHMENT => number(1).filter(|length| *length >= ATTACHMENT_BYTES as u64)?,
+        _ => return None,
+    };
+    (length <= MOST_RECORD_BYTES).then_some(length)
+}
+
+/// Returns true for a chunk that can be read, or an attachment with a check that agrees.
+fn has_right_check(opcode: u8, body: &[u8]) -> Result<bool, RecoverError> {
+    match opcode {
+        op::CHUNK => match records_of_chunk(body) {
+            Err(McapError::UnsupportedCompression(name)) if name == "lz4" => Err(RecoverError::Compression(name)),
+            records => Ok(records.is_ok_and(|records| !records.is_empty())),
+        },
+        _ => Ok(is_attachment(body) && !body.ends_with(&[0; 4]) && parse_record(opcode, body).is_ok()),
     }
 }
 
@@ -185,8 +313,14 @@ struct Known {
 }
 
 impl<Output: Write> Mender<Output> {
-    /// Keeps a complete record of the file.
-    fn keep(&mut self, opcode: u8, body: &[u8]) -> Result<(), RecoverError> {
+    /// Keeps a chunk or an attachment after records of unknown length, of which the last may not have been a message.
+    fn keep_found(&mut self, opcode: u8, body: &[u8]) -> Result<(), RecoverError> {
+        self.held = None;
+        self.keep(opcode, body).map(drop)
+    }
+
+    /// Keeps a complete record of the file. Returns false for a damaged record.
+    fn keep(&mut self, opcode: u8, body: &[u8]) -> Result<bool, RecoverError> {
         // An index belongs to a chunk, even a damaged one.
         let is_index = opcode == op::MESSAGE_INDEX && message_index_entries(body).is_some();
         self.has_chunks |= is_index || opcode == op::CHUNK && is_chunk(body);
@@ -200,6 +334,7 @@ impl<Output: Write> Mender<Output> {
             None => (),
         }
         let kept = match opcode {
+            op::CHUNK if !is_chunk(body) => false,
             // The whole chunk is read before any record is kept: its check comes last.
             op::CHUNK => match records_of_chunk(body) {
                 Ok(records) => {
@@ -231,7 +366,6 @@ impl<Output: Write> Mender<Output> {
                 Err(_) => false,
             },
         };
-        self.recovered.damaged += u64::from(!kept);
         match opcode {
             op::MESSAGE_INDEX if kept && self.lost_chunk => {
                 self.recovered.lost_messages += message_index_entries(body).unwrap_or_default() as u64;
@@ -239,7 +373,7 @@ impl<Output: Write> Mender<Output> {
             op::MESSAGE_INDEX => (),
             _ => self.lost_chunk = !kept,
         }
-        Ok(())
+        Ok(kept)
     }
 
     /// Returns true if a record outside of chunks can be of its type. The parser may accept a record with a damaged
@@ -370,6 +504,16 @@ fn is_filled(body: &[u8]) -> Result<bool, McapError> {
     Ok(left.is_empty())
 }
 
+/// Returns true for a record whose length agrees with the lengths in it.
+fn has_right_length(opcode: u8, body: &[u8]) -> bool {
+    match opcode {
+        op::CHUNK => is_chunk(body),
+        op::MESSAGE_INDEX => message_index_entries(body).is_some(),
+        op::ATTACHMENT => is_attachment(body),
+        _ => false,
+    }
+}
+
 /// Returns true if the lengths in a chunk's record agree, as they do not after damage of an opcode.
 fn is_chunk(body: &[u8]) -> bool {
     match parse_record(op::CHUNK, body) {
@@ -395,5 +539,8 @@ fn is_attachment(body: &[u8]) -> bool {
         Some(u32::from_le_bytes([length[0], length[1], length[2], length[3]]) as usize)
     };
     let names = text_at(16).and_then(|name| Some(name + text_at(20usize.checked_add(name)?)?));
-    names.is_some_and(|names| names + ATTACHMENT_BYTES <= body.len())
+    let data = names.and_then(|names| Some((names + ATTACHMENT_BYTES, body.get(names + 24..)?.first_chunk()?)));
+    data.is_some_and(|(rest, size)| {
+        body.len().checked_sub(rest).map(|size| size as u64) == Some(u64::from_le_bytes(*size))
+    })
 }

@@ -1,5 +1,7 @@
 //! The ranges of numbers that a scene, or the command line, may request. Called by the scene and the commands.
 
+use bench_dragon_messages::sentence;
+
 /// A closed range of accepted numbers and their unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accepted {
@@ -28,6 +30,8 @@ impl Accepted {
     pub const HEADING: Self = Self { least: -1.0, greatest: 1.0, unit: "turns" };
     /// A coordinate on the stage.
     pub const PLACE: Self = Self { least: -1e9, greatest: 1e9, unit: "metres" };
+    /// The rotation of a path on the stage.
+    pub const ROTATION: Self = Self { least: -1e3, greatest: 1e3, unit: "turns" };
     /// Speed of the head.
     pub const SPEED: Self = Self { least: 1e-9, greatest: 1e6, unit: "metres per second" };
     /// Frames per second.
@@ -70,7 +74,8 @@ impl Accepted {
         } else {
             let Self { least, greatest, unit } = self;
             let [least, greatest] = [least, greatest].map(short);
-            Err(format!("{field} is {number}, expected a number from {least} to {greatest} {unit}"))
+            let shown = sentence::number(number);
+            Err(format!("{field} is {shown}, expected a number from {least} to {greatest} {unit}"))
         }
     }
 }

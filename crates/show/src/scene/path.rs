@@ -9,8 +9,9 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::{Accepted, SceneError, Source};
+use bench_dragon_messages::sentence::number;
 use bench_dragon_motion::linkage::follower;
-use bench_dragon_motion::model::Point;
+use bench_dragon_motion::model::Vector;
 use bench_dragon_motion::model::curve::{Curve, Side};
 use bench_dragon_motion::model::description::{PathDescription, RouteStep};
 use bench_dragon_motion::model::double_double::DoubleDouble;
@@ -62,7 +63,12 @@ enum RawSide {
 }
 
 impl RawPath {
-    /// Checks the table and returns its path.
+    /// Returns the place where a route starts, metres.
+    pub(super) fn start(&self, source: &Source) -> Result<Vector, SceneError> {
+        source.place("path.start", self.start.as_ref())
+    }
+
+    /// Checks the table and returns its path, in the path's own coordinates.
     pub(super) fn validated(&self, source: &Source, team: &Team) -> Result<PathDescription, SceneError> {
         match self.kind.get_ref().as_str() {
             "spiral" => self.spiral(source, team),
@@ -138,8 +144,9 @@ impl RawPath {
         let start_turn = source.check("path.start_turn", given, Accepted::START_TURN)?;
         if let Some(least) = least_legal_start(pitch, start_turn, team) {
             let sentence = format!(
-                "path.start_turn is {start_turn}, which is so near the centre that a bench is folded back on itself, \
-                 expected at least {least:.9}"
+                "path.start_turn is {}, which is so near the centre that a bench is folded back on itself, \
+                 expected at least {least:.9}",
+                number(start_turn)
             );
             return Err(source.field_error(given, &sentence));
         }
@@ -184,8 +191,10 @@ impl RawPath {
                 let start_turn = source.check("path.start_turn", given, Accepted::START_TURN)?;
                 if start_turn < turn {
                     let sentence = format!(
-                        "path.start_turn is {start_turn}, which is inside the turn, expected at least {turn} \
-                         (path.turn_radius / path.pitch)"
+                        "path.start_turn is {}, which is inside the turn, expected at least {} \
+                         (path.turn_radius / path.pitch)",
+                        number(start_turn),
+                        number(turn)
                     );
                     return Err(source.field_error(given, &sentence));
                 }
@@ -200,17 +209,6 @@ impl RawPath {
 
     fn route(&self, source: &Source) -> Result<PathDescription, SceneError> {
         self.only(source, &["start", "heading_turns", "pieces"])?;
-        let start = match &self.start {
-            Some(given) => {
-                for number in given.get_ref() {
-                    Accepted::PLACE
-                        .check("path.start", *number)
-                        .map_err(|sentence| source.field_error(given, &sentence))?;
-                }
-                Point::from(*given.get_ref())
-            }
-            None => Point::origin(),
-        };
         let heading_turns = match &self.heading_turns {
             Some(given) => source.check("path.heading_turns", given, Accepted::HEADING)?,
             None => 0.0,
@@ -222,7 +220,7 @@ impl RawPath {
         }
         let segments = given.get_ref().iter().map(|step| step.get_ref().validated(source, step));
         let steps = segments.collect::<Result<_, _>>()?;
-        Ok(PathDescription::Route { start, heading_turns, steps })
+        Ok(PathDescription::Route { heading_turns, steps })
     }
 }
 

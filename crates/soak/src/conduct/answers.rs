@@ -121,14 +121,33 @@ pub(super) struct AnswerCheck {
     possible: Vec<Possible>,
     /// Simulated seconds per second while the show plays.
     rate: f64,
+    /// Tick and simulated time of the latest response.
     tick: u64,
+    time: f64,
+    /// Frames per second.
+    frame_rate: f64,
 }
 
 impl AnswerCheck {
     /// Creates the check of a show that waits at its start.
-    pub fn new(facts: ShowFacts) -> Self {
+    pub fn new(facts: ShowFacts, frame_rate: f64) -> Self {
         let waiting = Possible { mode: Mode::Paused, waits: true, step: Step::None };
-        Self { facts, possible: vec![waiting], rate: 1.0, tick: 0 }
+        Self { facts, possible: vec![waiting], rate: 1.0, tick: 0, time: 0.0, frame_rate }
+    }
+
+    /// Returns true if the show can have waited at a cue since the latest response, at the speed it plays at.
+    fn can_have_waited(&self, tick: u64) -> bool {
+        let reach = (tick.saturating_sub(self.tick) + 1) as f64 / self.frame_rate * self.rate;
+        // A looping show may have begun again.
+        let ahead = |cue: f64| (cue - self.time).rem_euclid(self.facts.end);
+        self.facts.cues.iter().any(|(time, waits)| *waits && ahead(*time) <= reach)
+    }
+
+    /// Continues from the latest response.
+    fn take_time(&mut self, answer: &ControlResponse) {
+        if answer.tick >= self.tick {
+            (self.tick, self.time) = (answer.tick, answer.sim_time);
+        }
     }
 
     /// Records that a step was sent, whose response comes later: [`step_answered`](Self::step_answered).
@@ -174,7 +193,7 @@ impl AnswerCheck {
         if result.is_err() {
             self.adopt(answer);
         }
-        self.tick = self.tick.max(answer.tick);
+        self.take_time(answer);
         result
     }
 
@@ -187,7 +206,7 @@ impl AnswerCheck {
         let is_at_cue = self.facts.waits_at(time);
         // A jump leaves the time of the cue, and so does a step that begins there.
         let has_left = has_jumped(answer.result()) || self.possible.iter().any(|state| state.step == Step::Sent);
-        self.advance(is_at_cue || has_left && self.facts.has_pausing_cue());
+        self.advance(is_at_cue || has_left && self.can_have_waited(answer.tick));
         let mut allowed: Vec<Possible> = Vec::new();
         let mut expected = Vec::new();
         for state in std::mem::take(&mut self.possible) {
@@ -257,7 +276,7 @@ impl AnswerCheck {
         }
         self.possible.iter_mut().for_each(|state| state.step = Step::None);
         self.possible.dedup();
-        self.tick = self.tick.max(answer.tick);
+        self.take_time(answer);
         result
     }
 
@@ -272,7 +291,7 @@ impl AnswerCheck {
             self.rate = answer.time_scale;
         }
         self.possible = [true, false].map(|waits| Possible { mode, waits, step: Step::None }).to_vec();
-        self.tick = self.tick.max(answer.tick);
+        self.take_time(answer);
     }
 }
 

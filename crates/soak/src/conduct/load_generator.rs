@@ -52,7 +52,8 @@ pub fn conduct<Failed: From<OpenError>>(
     let (events, answers) = channel();
     std::thread::scope(|scope| {
         let commands = RandomCommands::new(seed, rate, facts.end);
-        let ended = scope.spawn(move || LoadGenerator::run(name, AnswerCheck::new(facts), commands, stop, &events));
+        let ended =
+            scope.spawn(move || LoadGenerator::run(name, AnswerCheck::new(facts, rate), commands, stop, &events));
         let mut next = Instant::now() + Duration::from_secs(1);
         let mut end = None;
         loop {

@@ -175,11 +175,11 @@ impl RealPath {
                 path.turnaround(pitch, turn_radius, arc_ratio);
                 path.between(lead_in, lead_out);
             }
-            PathDescription::Route { start, heading_turns, ref steps } => {
+            PathDescription::Route { heading_turns, ref steps } => {
                 path.heading = path.functions.turn() * Real::from(heading_turns);
                 let direction = path.functions.unit_vector(&path.heading);
-                let origin = RealVector { x: Real::from(start.x), y: Real::from(start.y) };
                 let zero = Real::from(0.0);
+                let origin = RealVector { x: zero.clone(), y: zero.clone() };
                 path.push(Curve::Line { origin, direction }, zero.clone(), &zero);
                 for step in steps {
                     path.step(step);

@@ -5,7 +5,7 @@
 
 use super::beginning::Beginning;
 use super::rows::Piece;
-use super::track::Track;
+use super::track::{Node, Track};
 use crate::linkage;
 use crate::model::curve::Curve;
 use crate::model::path::Param;
@@ -93,6 +93,21 @@ pub(super) fn kinks(track: &Track, beginning: &Beginning, link: f64, end: usize)
         .collect();
     kinks.sort_by(|a, b| a.fract().total_cmp(&b.fract()));
     kinks
+}
+
+/// Returns the metres that the head has travelled when a handle behind it crosses a junction, for each junction and as
+/// far as handles have one place each: at these places frames have kinks. It does not depend on a table.
+pub(super) fn crossings(track: &Track, team: &Team) -> Vec<f64> {
+    let path = track.path;
+    let of_segment = |segment: usize| {
+        let at = Param { segment, at: path.first(segment) };
+        let first = Node { at, tangent: path.tangent(at), spacing: 1.0, heading: 0.0, heading_rate: 0.0 };
+        let (mut gap, mut head_gap) = (team.link(1), team.link(0));
+        let second_handles = std::iter::successors(Some(first), move |rear| track.ahead(rear, &mut gap, team.link(1)));
+        let heads = second_handles.map_while(move |second| track.ahead(&second, &mut head_gap, team.link(0)));
+        heads.take(team.benches).map(|head| path.travelled(head.at)).take_while(|travelled| *travelled < path.length())
+    };
+    (1..path.segments()).flat_map(of_segment).collect()
 }
 
 /// Returns the pieces into which the kinks of a band cut the phases.

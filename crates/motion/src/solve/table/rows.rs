@@ -47,6 +47,9 @@ impl Tolerance {
     }
 }
 
+/// The largest gap between two pieces, as a multiple of a piece's error: twice the error of each.
+const LARGEST_GAP: f64 = 4.0;
+
 /// Numbers of coefficients of the polynomials of a band.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Lengths {
@@ -271,8 +274,12 @@ impl Rows {
 
     /// Returns alpha of a place near `guess` (Newton's method), and the derivative of T there. Used only while the
     /// table is made.
+    ///
+    /// Where two pieces meet, T jumps by up to the error of each. A place in that gap is on neither piece, and the
+    /// iteration bounces between both to the end: both are within the table's error of the place.
     pub(super) fn locate(&self, track: &Track, place: Param, guess: Alpha) -> Option<(Alpha, Vector)> {
         let mut alpha = guess;
+        let mut bounce = None;
         for _ in 0..30 {
             let (centre, local) = self.local(alpha)?;
             let miss = track.displacement(centre, place) - local.offset;
@@ -280,10 +287,12 @@ impl Rows {
             // The rate is the one before the step; the step has to be short enough for that.
             let settled = step.abs() < 1e-13;
             alpha = alpha.plus(step.clamp(-0.5, 0.5));
+            let found = (alpha.number() >= self.valid_from).then_some((alpha, local.rate));
             if settled {
-                return (alpha.number() >= self.valid_from).then_some((alpha, local.rate));
+                return found;
             }
+            bounce = found.filter(|_| step.abs() * local.rate.norm() <= LARGEST_GAP * self.tolerance.place);
         }
-        None
+        bounce
     }
 }

@@ -1,13 +1,12 @@
 //! The table, exact and in every format, against the safe solver.
 
 use super::*;
-use crate::model::Point;
 use crate::model::curve::Side;
 
 const TEAM: Team = Team { benches: 60, head_length: 3.41, body_length: 2.2, width: 0.3, hole_inset: 0.275 };
 
 fn paths() -> [Path; 3] {
-    let route = Path::route(Point::new(-30.0, -10.0), 0.0).line(40.0).arc(Side::Left, 6.0, 0.25).line(12.0);
+    let route = Path::route(0.0).line(40.0).arc(Side::Left, 6.0, 0.25).line(12.0);
     let route = route.arc(Side::Right, 5.0, 0.5).line(10.0).arc(Side::Left, 5.0, 0.5).line(120.0);
     let turnaround = Path::turnaround(1.7, 4.5, 2.0, 100.0, 100.0).unwrap();
     [Path::spiral(0.55, 16.0), turnaround, route.build().unwrap()]
@@ -116,7 +115,7 @@ fn what_cannot_be_packed_is_refused() {
 /// the library's only unsafe code.
 #[test]
 fn a_small_table_is_read_as_exactly() {
-    let path = Path::route(Point::new(0.0, 0.0), 0.0).line(2.0).arc(Side::Left, 3.0, 0.1).line(2.0).build().unwrap();
+    let path = Path::route(0.0).line(2.0).arc(Side::Left, 3.0, 0.1).line(2.0).build().unwrap();
     let team = Team { benches: 2, ..TEAM };
     let newton = Newton::new(path.clone(), team, 1.0, Velocities::Computed);
     let tolerance = Tolerance { place: 1e-3, relative: f64::INFINITY, speed: 1e-2 };

@@ -64,6 +64,8 @@ struct Reference {
     solver: Box<dyn Solver>,
     chain: Chain,
     head_speed: f64,
+    /// Metres from the stage's origin to that of the path's own coordinates.
+    placed: f64,
     accuracy: f64,
     /// Metres: the greatest distance so far, and its tolerance.
     worst: Option<(f64, f64)>,
@@ -345,6 +347,7 @@ impl Reference {
             solver: motion.solver(Velocities::Computed).solver,
             chain: Chain::new(motion.team().handles()),
             head_speed: motion.head_speed(),
+            placed: motion.placement().origin().coords.norm(),
             accuracy,
             worst: None,
         }
@@ -364,7 +367,7 @@ impl Reference {
             let place = self.chain.x.get(*handle as usize).zip(self.chain.y.get(*handle as usize));
             let metres = place.map_or(f64::INFINITY, |(own_x, own_y)| (x - own_x).hypot(y - own_y));
             // Both solutions have rounding errors.
-            let rounding = 8.0 * f64::EPSILON * (x.hypot(*y) + self.head_speed * time);
+            let rounding = 8.0 * f64::EPSILON * (x.hypot(*y) + self.head_speed * time + self.placed);
             let tolerance = self.accuracy + 2.0 * rounding * growth(&self.chain.speed, *handle as usize);
             if metres.is_nan() || metres > tolerance {
                 let handle = handle + 1;

@@ -45,7 +45,7 @@ impl Checked {
         record.show_is(&facts);
         Self {
             clock: ShowClock::new(&playback, 7.0, times),
-            check: AnswerCheck::new(facts),
+            check: AnswerCheck::new(facts, RATE),
             record,
             tick: 0,
             sent: None,
@@ -181,6 +181,22 @@ proptest! {
         let mut other = checked.clone();
         prop_assert!(other.fault(command, wrong, false).is_err(), "{:?}: {:?}", command, wrong);
         prop_assert_eq!(checked.fault(command, right, false), Ok(()));
+    }
+}
+
+/// A pause is allowed after a seek only if the show can have come to a cue that pauses before.
+#[test]
+fn a_seek_that_pauses_is_noticed_far_from_a_cue() {
+    for (cue, is_near) in [(0.5, false), (3.0, false), (1.1, true)] {
+        let mut checked = Checked::new(vec![(cue, true)]);
+        for (gap, command) in [(3, Command::Seek(1.0)), (3, Command::Go), (2, Command::State)] {
+            checked.check(gap, command).unwrap();
+        }
+        let right = checked.command(5, Command::Seek(2.0));
+        let paused = ControlResponse { playback: PlaybackState::Paused as u32, time_scale: 0.0, ..right };
+        let result = checked.check.clone().answered(Command::Seek(2.0), &paused);
+        assert_eq!(result.is_ok(), is_near, "cue at {cue} s: {result:?}");
+        assert_eq!(checked.check.answered(Command::Seek(2.0), &right), Ok(()), "cue at {cue} s");
     }
 }
 

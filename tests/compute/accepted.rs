@@ -1,0 +1,161 @@
+//! Every certificate that the search writes is accepted by the checker: on tight routes, full turns, S-bends near a lock,
+//! and on the random scenes of the oracle.
+//!
+//! `BENCH_DRAGON_LONG=1` makes 100,000 scenes in place of 400, `BENCH_DRAGON_CASES=few` 40.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::io;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use bench_dragon::certify::{CertificateLine, certify};
+use bench_dragon::proof::{Status, verify};
+use bench_dragon::show::scene::Scene;
+use fastrand::Rng;
+
+use crate::harness;
+use crate::oracle::scenes;
+
+/// Most steps of a search: scenes that need more are given up, and the certificate says up to when it proves.
+const MOST_STEPS: u64 = 2000;
+
+/// Returns a number between two, of three decimals: junctions then come to lie at simple coordinates.
+fn decimals(random: &mut Rng, low: f64, high: f64) -> f64 {
+    ((low + (high - low) * random.f64()) * 1000.0).round() / 1000.0
+}
+
+/// Returns the share of a turn of an arc: often a simple one.
+fn turns(random: &mut Rng) -> f64 {
+    const SIMPLE: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
+    match random.u8(..4) {
+        0 => decimals(random, 0.02, 1.0),
+        1 => random.choice(SIMPLE).unwrap_or(1.0) + decimals(random, -0.005, 0.005),
+        _ => random.choice(SIMPLE).unwrap_or(1.0),
+    }
+    .min(1.0)
+}
+
+/// Returns a short team on a route of bends that are hardly wider than its links, or narrower.
+fn tight_route(random: &mut Rng) -> String {
+    let (head, body) = (decimals(random, 0.6, 3.0), decimals(random, 0.6, 3.0));
+    let (benches, width) = (random.choice([1, 1, 2, 3, 3, 4, 6]).unwrap_or(1), decimals(random, 0.03, 0.4));
+    let link = head - 0.2;
+    let mut text = format!(
+        "[team]\nbenches = {benches}\nhead_length = {head}\nbody_length = {body}\nwidth = {width}\nhole_inset = 0.1\n\
+         [motion]\nhead_speed = 1.0\n[path]\nkind = \"pieces\"\npieces = ["
+    );
+    let mut side = ["left", "right"];
+    for piece in 0..1 + random.usize(..5) {
+        if random.u8(..3) == 0 {
+            let _ = write!(text, "{{ kind = \"line\", length = {} }}, ", decimals(random, 0.05, 4.0));
+            continue;
+        }
+        let radius = match random.u8(..4) {
+            // About the least bend that the head's link passes.
+            0 => 0.5 * link * (1.0 + 10f64.powi(-random.i32(1..7)) * (2.0 * random.f64() - 1.0)),
+            1 => decimals(random, 0.1, 0.5) * link + 0.001,
+            _ => decimals(random, 0.2, 1.2) * link + 0.001,
+        };
+        // An S-bend is the rule, a longer bend to one side the exception.
+        if piece > 0 && random.u8(..3) > 0 {
+            side.reverse();
+        }
+        let _ = write!(
+            text,
+            "{{ kind = \"arc\", radius = {radius}, side = \"{}\", turns = {} }}, ",
+            side[0],
+            turns(random)
+        );
+    }
+    text.push_str("]\n");
+    text
+}
+
+/// Returns a scene of one of all families.
+fn scene(index: usize, random: &mut Rng) -> String {
+    if index.is_multiple_of(8) {
+        let family = random.usize(..scenes::FAMILIES.len());
+        return scenes::random_scene(family, &mut scenes::Random(random.u64(..)));
+    }
+    tight_route(random)
+}
+
+/// Writes a certificate and has it checked. Returns the status of each result; `None` for a scene that is refused.
+///
+/// # Panics
+/// The checker refuses the certificate.
+fn certified(text: &str) -> Option<Vec<Status>> {
+    certified_in(text, MOST_STEPS)
+}
+
+/// The same with another limit of steps.
+fn certified_in(text: &str, most_steps: u64) -> Option<Vec<Status>> {
+    let scene = Scene::parse(text, "tight", "tight").ok()?;
+    let timeline = scene.motion.timeline(&mut |_| ());
+    let mut lines = Vec::new();
+    let mut write = |line: &CertificateLine| {
+        serde_json::to_writer(&mut lines, line).map_err(io::Error::other)?;
+        lines.push(b'\n');
+        Ok(())
+    };
+    certify(&scene.motion, &timeline, text, most_steps, &mut write, &mut |_| ()).unwrap();
+    let proved = verify(lines.as_slice(), &mut |_| ()).unwrap_or_else(|refused| panic!("{refused}\n{text}"));
+    Some(proved.results.into_iter().map(|outcome| outcome.status).collect())
+}
+
+#[test]
+fn every_certificate_of_a_tight_route_is_accepted() {
+    let is_short = std::env::var_os("BENCH_DRAGON_CASES").is_some_and(|cases| cases == "few");
+    let count = if harness::long() { 100_000 } else { [400, 40][usize::from(is_short)] };
+    let next = AtomicUsize::new(0);
+    let statuses: Mutex<BTreeMap<String, usize>> = Mutex::default();
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    if index >= count {
+                        return;
+                    }
+                    let text = scene(index, &mut Rng::with_seed(0x7163 + index as u64));
+                    let results = certified(&text).unwrap_or_default();
+                    let mut statuses = statuses.lock().unwrap();
+                    for status in results {
+                        *statuses.entry(format!("{status:?}")).or_default() += 1;
+                    }
+                }
+            });
+        }
+    });
+    let statuses = statuses.into_inner().unwrap();
+    println!("{count} scenes: {statuses:?}");
+    let [proved, none, undecided] =
+        ["Proved", "None", "Undecided"].map(|status| statuses.get(status).copied().unwrap_or(0));
+    // Most scenes are legal, and most of those are decided.
+    assert!(proved > count && none > count / 2 && undecided * 10 < proved + none, "{statuses:?}");
+}
+
+/// Places beside a contact have a second double: spans that are hardly wider than a unit in the last place are read as
+/// they were written.
+#[test]
+fn certificates_of_slow_contacts_are_accepted() {
+    let paper = std::fs::read_to_string("config/paper.toml").unwrap();
+    for pitch in ["0.412", "0.43", "0.431"] {
+        let text = paper.replace("pitch = 0.55", &format!("pitch = {pitch}"));
+        assert_ne!(text, paper);
+        let results = certified_in(&text, 20_000).unwrap();
+        assert!(!results.contains(&Status::Undecided), "{pitch}: {results:?}");
+    }
+}
+
+/// Certificates that an earlier checker refused: places beside a junction at coordinate 0, boards that are apart only
+/// along the line between their middles, a lock whose window has to be wider than the last step.
+#[test]
+fn certificates_that_were_refused_are_accepted() {
+    for name in ["beside_a_junction", "apart_between_middles", "wide_lock_window"] {
+        let text = std::fs::read_to_string(format!("tests/scenes/{name}.toml")).unwrap();
+        let results = certified(&text).unwrap();
+        assert!(!results.contains(&Status::Undecided), "{name}: {results:?}");
+    }
+}

@@ -1,0 +1,618 @@
+"""Checks the claims of certificates with the ball arithmetic of Arb. It shares no code with the program.
+
+    second_judge.py [--places N] [--seed S] CERTIFICATE...
+
+Of a certificate of `events --certify` it checks each event at both ends of its enclosure; at N random times of the
+stretches that are said to be clear, or to move forward, all boards and links; in N random steps that the spans contain
+the handles. If there is a file CERTIFICATE.clearance with the output of `check --prove --json`, it checks the least
+clearance at those times too. Path and chain are built as docs/proofs.md defines them: a follower is the first point
+backward along the path at the distance of the link, enclosed in numbers of 192 bits.
+
+Prints a JSON object for each file: `refused` and `undecided`, a sentence or null, and the numbers of what was checked,
+with the random places that were undecided.
+"""
+
+import argparse
+import json
+import math
+import random
+import sys
+import tomllib
+from pathlib import Path
+
+from flint import arb, ctx
+
+ctx.prec = 192
+PI = arb.pi()
+# Lines of a certificate that are not checked here, by name: any other unknown line is refused.
+NOT_JUDGED = frozenset()
+EVENTS = ("contact", "stall", "lock", "path_end")
+# The most points of the path that are looked at for one follower.
+MOST_POINTS = 3000
+
+
+class Refused(Exception):
+    """A claim is false, or the file is no certificate."""
+
+
+class Undecided(Exception):
+    """The arithmetic did not decide."""
+
+
+def require(condition, sentence):
+    if not condition:
+        raise Refused(sentence)
+
+
+def hull(a, b):
+    return a.union(b)
+
+
+def sub(p, q):
+    return p[0] - q[0], p[1] - q[1]
+
+
+def dot(p, q):
+    return p[0] * q[0] + p[1] * q[1]
+
+
+def cross(p, q):
+    return p[0] * q[1] - p[1] * q[0]
+
+
+class Segment:
+    """A curve of the path: its coordinate runs from `begin` to `end`, which are None where it has no end. `sense` is 1
+    if the coordinate grows along the path, else -1."""
+
+    begin = end = None
+    sense = 1
+
+    def back(self, c, metres):
+        """Returns a coordinate at most some metres further back."""
+        return (c - self.sense * (metres / self.scale(c)) * (1 - arb(2) ** -40)).mid()
+
+
+class Line(Segment):
+    def __init__(self, origin, direction, begin, end):
+        self.origin, self.direction, self.begin, self.end = origin, direction, begin, end
+
+    def point(self, c):
+        return self.origin[0] + c * self.direction[0], self.origin[1] + c * self.direction[1]
+
+    def tangent(self, _):
+        return self.direction
+
+    def scale(self, _):
+        return arb(1)
+
+    def metres(self, c):
+        return c
+
+
+class Arc(Segment):
+    def __init__(self, origin, direction, radius, left, angle):
+        self.origin, self.direction, self.radius, self.begin, self.end = origin, direction, radius, arb(0), angle
+        side = 1 if left else -1
+        self.normal = (-direction[1] * side, direction[0] * side)
+
+    def point(self, c):
+        sin, cos = c.sin_cos()
+        d, n, r = self.direction, self.normal, self.radius
+        return tuple(self.origin[i] + r * (sin * d[i] + (1 - cos) * n[i]) for i in (0, 1))
+
+    def tangent(self, c):
+        sin, cos = c.sin_cos()
+        return tuple(cos * self.direction[i] + sin * self.normal[i] for i in (0, 1))
+
+    def scale(self, _):
+        return self.radius
+
+    def metres(self, c):
+        return self.radius * c
+
+
+class Spiral(Segment):
+    """r = a theta; inward with the angle falling, or outward with the angle growing, turned by half a turn."""
+
+    def __init__(self, a, inward, begin, end):
+        self.a, self.begin, self.end = a, begin, end
+        self.sense = -1 if inward else 1
+
+    def point(self, c):
+        sin, cos = c.sin_cos()
+        r = -self.sense * self.a * c
+        return r * cos, r * sin
+
+    def tangent(self, c):
+        sin, cos = c.sin_cos()
+        w = (1 + c * c).sqrt()
+        return -(cos - c * sin) / w, -(sin + c * cos) / w
+
+    def scale(self, c):
+        return self.a * (1 + c * c).sqrt()
+
+    def metres(self, c):
+        """Metres along the path from the centre, negative where the path comes in."""
+        return self.sense * self.a * (c * (1 + c * c).sqrt() + c.asinh()) / 2
+
+    def back(self, c, metres):
+        if self.sense > 0:
+            return super().back(c, metres)
+        # Further out a radian is longer.
+        return super().back(c, metres * self.scale(c) / self.scale(c + metres / self.scale(c)))
+
+
+class Scene:
+    def __init__(self, text):
+        file = tomllib.loads(text)
+        team, path, motion = file["team"], file["path"], file["motion"]
+        number = lambda table, key: arb(float(table[key]))
+        self.benches = team["benches"]
+        self.width, self.inset = number(team, "width"), number(team, "hole_inset")
+        head, body = number(team, "head_length") - 2 * self.inset, number(team, "body_length") - 2 * self.inset
+        self.links = [head] + [body] * (self.benches - 1)
+        self.speed = number(motion, "head_speed")
+        self.stops_at_contact = motion.get("on_contact", "stop") == "stop"
+        # Sets the segments, the head's place at the start, and the metres from there to the path's end.
+        getattr(self, path["kind"])(path, number)
+
+    def spiral(self, path, number):
+        spiral = Spiral(number(path, "pitch") / (2 * PI), True, None, arb(0))
+        self.segments, self.start = [spiral], (0, 2 * PI * number(path, "start_turn"))
+        self.length = -spiral.metres(self.start[1])
+
+    def turnaround(self, path, number):
+        a = number(path, "pitch") / (2 * PI)
+        theta = number(path, "turn_radius") / a
+        inward, outward = Spiral(a, True, None, theta), Spiral(a, False, theta, None)
+        radii = (a * a + number(path, "turn_radius") ** 2).sqrt()
+        ratio = number(path, "arc_ratio")
+        turn = 2 * theta.atan()
+        first = Arc(inward.point(theta), inward.tangent(theta), radii * ratio / (ratio + 1), False, turn)
+        second = Arc(first.point(turn), first.tangent(turn), radii / (ratio + 1), True, turn)
+        self.segments = [inward, first, second, outward]
+        if "lead_in" in path:
+            lead_in = number(path, "lead_in")
+            self.start = (0, self.inverse(inward, inward.metres(theta) - lead_in))
+        else:
+            self.start = (0, 2 * PI * number(path, "start_turn"))
+            lead_in = inward.metres(theta) - inward.metres(self.start[1])
+        lead_out = number(path, "lead_out") if "lead_out" in path else sum(self.links, arb(0))
+        self.length = lead_in + (first.radius + second.radius) * turn + lead_out
+
+    def pieces(self, path, number):
+        point = tuple(arb(float(c)) for c in path.get("start", [0.0, 0.0]))
+        turns = 2 * PI * arb(float(path.get("heading_turns", 0.0)))
+        direction = (turns.cos(), turns.sin())
+        self.segments, self.start, self.length = [Line(point, direction, None, arb(0))], (0, arb(0)), arb(0)
+        for piece in path["pieces"]:
+            if piece["kind"] == "line":
+                segment = Line(point, direction, arb(0), number(piece, "length"))
+            else:
+                radius = number(piece, "radius")
+                angle = 2 * PI * number(piece, "turns") if "turns" in piece else number(piece, "length") / radius
+                segment = Arc(point, direction, radius, piece["side"] == "left", angle)
+            point, direction = segment.point(segment.end), segment.tangent(segment.end)
+            self.length += segment.metres(segment.end)
+            self.segments.append(segment)
+
+    @staticmethod
+    def inverse(curve, metres):
+        """Returns the coordinate at these metres of a spiral."""
+        c = arb(math.sqrt(abs(2 * float(metres.mid()) / float(curve.a.mid()))))
+        for _ in range(60):
+            c = (c - (curve.metres(c) - metres) / (curve.sense * curve.scale(c))).mid()
+        around = c + arb(0, 1e-30) * (1 + c)
+        found = c - (curve.metres(c) - metres) / (curve.sense * curve.scale(around))
+        if not around.contains(found):
+            raise Undecided("metres of a spiral")
+        return found
+
+    def place(self, time):
+        """Returns the place of the head at a time, seconds."""
+        if time == 0:
+            return self.start
+        left = arb(time) * self.speed
+        for number, curve in enumerate(self.segments):
+            begin = self.start[1] if number == 0 else curve.begin
+            last = number == len(self.segments) - 1
+            length = None if last or curve.end is None else curve.metres(curve.end) - curve.metres(begin)
+            if length is None or left < length:
+                at = curve.metres(begin) + left
+                if isinstance(curve, Spiral):
+                    return number, self.inverse(curve, at)
+                return number, at / curve.scale(begin)
+            if not left > length:
+                raise Undecided("a place beside a junction")
+            left -= length
+        raise Refused("the place is beyond the path")
+
+    def point(self, place):
+        return self.segments[place[0]].point(place[1])
+
+    def tangent(self, place):
+        return self.segments[place[0]].tangent(place[1])
+
+    def not_after(self, a, b):
+        """Returns true if place a is certainly not further along the path than b."""
+        if a[0] != b[0]:
+            return a[0] < b[0]
+        return bool(a[1] <= b[1] if self.segments[a[0]].sense > 0 else a[1] >= b[1])
+
+    def products(self, front, rear):
+        """Returns the products of the tangents at the front and the rear handle with the link."""
+        link = sub(self.point(front), self.point(rear))
+        return dot(self.tangent(front), link), dot(self.tangent(rear), link)
+
+    def follower(self, front, link):
+        """Returns the first place behind `front` at the distance `link`, enclosed."""
+        point, square = self.point(front), link * link
+        number, c = front
+        step = link
+        for _ in range(MOST_POINTS):
+            curve = self.segments[number]
+            if curve.begin is not None and not c * curve.sense > curve.begin * curve.sense:
+                number, c = number - 1, self.segments[number - 1].end
+                continue
+            gap = sub(point, curve.point(c))
+            room = arb((link - dot(gap, gap).nonnegative_part().sqrt()).lower())
+            if not room > 0:
+                raise Undecided("a follower")
+            # From a distance of less than the link one can go back the rest without reaching it.
+            step = max(room, step, key=lambda metres: float(metres)) if float(room) < 0.2 * float(link) else room
+            if float(room) < 0.2 * float(link):
+                found = self.enclosed(number, c, point, link, square, room)
+                if found is not None:
+                    return number, found
+            while True:
+                to = curve.back(c, step)
+                if curve.begin is not None and to * curve.sense < curve.begin * curve.sense:
+                    to = curve.begin
+                if not step > room or self.is_nearer(curve, c, to, point, square):
+                    break
+                step = max(step / 2, room, key=lambda metres: float(metres))
+            c, step = to, 2 * step
+        raise Undecided("a follower")
+
+    def is_nearer(self, curve, c, to, point, square):
+        """Returns true if a stretch is certainly nearer than the link, by the mean value theorem."""
+        both, middle = hull(c, to), ((c + to) / 2).mid()
+        gap, wide = sub(point, curve.point(middle)), sub(point, curve.point(both))
+        slope = 2 * dot(wide, curve.tangent(both)) * curve.scale(both)
+        return bool(dot(gap, gap) + slope * (both - middle) < square)
+
+    def enclosed(self, number, c, point, link, square, room):
+        """Returns the follower if it is close behind, where the distance grows from less than the link to more."""
+        curve = self.segments[number]
+        gap = sub(point, curve.point(c))
+        lean = dot(gap, curve.tangent(c)) / link
+        if not lean > 0:
+            return None
+        behind = curve.back(c, arb((room / lean * arb(1.5)).upper()))
+        if curve.begin is not None and behind * curve.sense < curve.begin * curve.sense:
+            behind = curve.begin
+        gap = sub(point, curve.point(behind))
+        if not dot(gap, gap) > square:
+            return None
+        around = hull(c, behind)
+        for _ in range(12):
+            middle = around.mid()
+            gap, wide = sub(point, curve.point(middle)), sub(point, curve.point(around))
+            slope = -2 * curve.sense * dot(wide, curve.tangent(around)) * curve.scale(around)
+            if not slope * curve.sense < 0:
+                return None
+            newton = middle - (dot(gap, gap) - square) / slope
+            if not newton.overlaps(around):
+                raise Undecided("a follower that is none")
+            narrower = newton.intersection(around)
+            if narrower.rad() * 2 > around.rad():
+                return narrower
+            around = narrower
+        return around
+
+    def chain(self, head, handles):
+        """Returns the places of the first handles."""
+        places = [head]
+        for link in self.links[: handles - 1]:
+            places.append(self.follower(places[-1], link))
+        return places
+
+    def corners(self, front, rear, link):
+        """Returns the corners of a board, counter-clockwise."""
+        along = tuple(part / link for part in sub(front, rear))
+        across = (-along[1], along[0])
+        half = self.width / 2
+        corner = lambda p, i, j: tuple(p[k] + i * self.inset * along[k] + j * half * across[k] for k in (0, 1))
+        return [corner(front, 1, -1), corner(front, 1, 1), corner(rear, -1, 1), corner(rear, -1, -1)]
+
+    def boards(self, places):
+        points = [self.point(place) for place in places]
+        return [self.corners(points[i], points[i + 1], self.links[i]) for i in range(len(points) - 1)]
+
+
+def gap_of_sides(a, b):
+    """Returns the greatest gap between two boards along the normals of their sides, enclosed."""
+    best = None
+    for board, other in ((a, b), (b, a)):
+        for i in range(4):
+            side = sub(board[(i + 1) % 4], board[i])
+            normal = (side[1], -side[0])
+            reach = dot(normal, board[i])
+            gap = least([dot(normal, corner) - reach for corner in other]) / dot(side, side).sqrt()
+            best = gap if best is None else best.max(gap)
+    return best
+
+
+def least(numbers):
+    smallest = numbers[0]
+    for number in numbers[1:]:
+        smallest = smallest.min(number)
+    return smallest
+
+
+def clearance(a, b):
+    """Returns the distance of two boards, or minus the least translation that separates them, enclosed."""
+    gap = gap_of_sides(a, b)
+    if not gap > 0:
+        return gap
+    distances = []
+    for one, other in ((a, b), (b, a)):
+        for corner in one:
+            for i in range(4):
+                side, to = sub(other[(i + 1) % 4], other[i]), sub(corner, other[i])
+                share = (dot(to, side) / dot(side, side)).max(arb(0)).min(arb(1))
+                rest = tuple(to[k] - share * side[k] for k in (0, 1))
+                distances.append(dot(rest, rest).nonnegative_part().sqrt())
+    return least(distances)
+
+
+def is_inside(point, board):
+    return all(cross(sub(board[(i + 1) % 4], board[i]), sub(point, board[i])) > 0 for i in range(4))
+
+
+def overlap(a, b):
+    """Returns true if a point is certainly in both boards: the middle of the overlap of their middles."""
+    polygon = [tuple(part.mid() for part in corner) for corner in a]
+    for i in range(4):
+        start = tuple(part.mid() for part in b[i])
+        side = sub(tuple(part.mid() for part in b[(i + 1) % 4]), start)
+        cut = []
+        for at, point in enumerate(polygon):
+            before = polygon[at - 1]
+            here, there = cross(side, sub(point, start)), cross(side, sub(before, start))
+            if (here > 0) != (there > 0):
+                share = there / (there - here)
+                cut.append(tuple((before[k] + share * (point[k] - before[k])).mid() for k in (0, 1)))
+            if here > 0:
+                cut.append(point)
+        polygon = cut
+    if not polygon:
+        return False
+    middle = tuple(sum((point[k] for point in polygon), arb(0)) / len(polygon) for k in (0, 1))
+    return is_inside(middle, a) and is_inside(middle, b)
+
+
+def pairs(boards, distance=0.0):
+    """Returns the pairs that share no handle, but for those whose circumscribed circles are further apart."""
+    middles = [tuple(float(sum((corner[k] for corner in board), arb(0)).mid()) / 4 for k in (0, 1)) for board in boards]
+    radii = [float(sum((part * part for part in sub(board[0], board[2])), arb(0)).sqrt().mid()) / 2 for board in boards]
+    for i in range(len(boards)):
+        for j in range(i + 2, len(boards)):
+            if math.dist(middles[i], middles[j]) <= (radii[i] + radii[j]) * (1 + 1e-9) + 1e-9 + distance:
+                yield i, j
+
+
+class Judge:
+    def __init__(self, scene, seed):
+        self.scene, self.random = scene, random.Random(seed)
+        self.counts = {"places": 0, "undecided": 0, "spans": 0, "events": 0, "pairs": 0, "clearances": 0}
+
+    def check_apart(self, time, boards):
+        for i, j in pairs(boards):
+            self.counts["pairs"] += 1
+            require(gap_of_sides(boards[i], boards[j]) > 0, f"benches {i} and {j} are not apart at t = {time} s")
+
+    def at(self, time):
+        """Returns the places of all handles at a time."""
+        return self.scene.chain(self.scene.place(time), self.scene.benches + 1)
+
+    def check_links(self, time, places, moving):
+        for link, (front, rear) in enumerate(zip(places, places[1:])):
+            forward, behind = self.scene.products(front, rear)
+            require(behind > 0, f"link {link} does not hold at t = {time} s")
+            require(not moving or forward > 0, f"bench {link} does not move forward at t = {time} s")
+
+    def contact(self, result):
+        lo, hi, a, b = (result[key] for key in ("time_lo", "time_hi", "bench_a", "bench_b"))
+        require(b > a + 1, f"benches {a} and {b} share a handle")
+        if lo > 0:
+            self.check_apart(lo, self.scene.boards(self.at(lo)))
+        boards = self.scene.boards(self.scene.chain(self.scene.place(hi), b + 2))
+        require(overlap(boards[a], boards[b]), f"benches {a} and {b} do not overlap at t = {hi} s")
+
+    def stall(self, result):
+        lo, hi, link = result["time_lo"], result["time_hi"], result["bench_a"]
+        self.check_links(lo, self.at(lo), moving=True)
+        front, rear = self.scene.chain(self.scene.place(hi), link + 2)[link:]
+        require(self.scene.products(front, rear)[0] < 0, f"bench {link} has not stalled at t = {hi} s")
+
+    def lock(self, result):
+        scene, lo, hi, link = self.scene, result["time_lo"], result["time_hi"], result["bench_a"]
+        before = self.at(lo)
+        self.check_links(lo, before, moving=False)
+        front, rear = before[link], before[link + 1]
+        after = scene.chain(scene.place(hi), link + 1)[link]
+        if front[0] != after[0]:
+            raise Undecided("a lock beside a junction")
+        # The link's length at places around the rear handle: if it is on both sides less than the link, whichever place
+        # of [front, after] the front handle has, a follower cannot leave unnoticed.
+        square = scene.links[link] ** 2
+        meanwhile = scene.point((front[0], hull(front[1], after[1])))
+
+        def is_less(place):
+            gap = sub(meanwhile, scene.point(place))
+            return bool(dot(gap, gap) < square)
+
+        window = None
+        for exponent in range(4, 60):
+            metres = scene.links[link] * arb(2) ** -exponent
+            ends = self.around(rear, metres)
+            if ends is not None and all(is_less((rear[0], end)) for end in ends):
+                window = ends
+        if window is not None and self.is_all_nearer(scene.segments[rear[0]], *window, scene.point(after), square, 60):
+            return
+        # Or a nearer place has come to the distance.
+        later = scene.follower(after, scene.links[link])
+        require(scene.not_after(rear, later), f"bench {link} has not locked at t = {hi} s")
+        between = [scene.segments[later[0]].back(later[1], scene.links[link] * arb(2) ** -k) for k in range(2, 60)]
+        found = any(is_less((later[0], c)) and scene.not_after(rear, (later[0], c)) for c in between)
+        found = found or later[0] > rear[0] and is_less((rear[0], scene.segments[rear[0]].end))
+        require(found, f"bench {link} has not locked at t = {hi} s")
+
+    def around(self, place, metres):
+        """Returns the coordinates some metres before and after a place, if both are on its segment."""
+        curve, c = self.scene.segments[place[0]], place[1].mid()
+        by = curve.sense * metres / curve.scale(c)
+        ends = ((c - by).mid(), (c + by).mid())
+        for end in ends:
+            if curve.begin is not None and not (end - curve.begin) * curve.sense > 0:
+                return None
+            if curve.end is not None and not (curve.end - end) * curve.sense > 0:
+                return None
+        return ends
+
+    def is_all_nearer(self, curve, c, to, point, square, depth):
+        if self.scene.is_nearer(curve, c, to, point, square):
+            return True
+        middle = ((c + to) / 2).mid()
+        return depth > 0 and all(
+            self.is_all_nearer(curve, one, other, point, square, depth - 1) for one, other in ((c, middle), (middle, to))
+        )
+
+    def path_end(self, result):
+        end = self.scene.length / self.scene.speed
+        is_there = end > result["time_lo"] and end < result["time_hi"] or end.overlaps(arb(result["time_lo"]))
+        require(is_there, f"the path ends at {float(end.mid())} s")
+
+    def least_clearance(self, claim, until, number):
+        """Checks that no two boards are nearer than claimed, and that two are as near."""
+        lo, hi, time = (claim[key] for key in ("least_clearance_lo", "least_clearance_hi", "time"))
+        near = [min(max(time + self.random.uniform(-1, 1) * until / 100, 0.0), until) for _ in range(number)]
+        for at in near + [self.random.uniform(0, until) for _ in range(number)]:
+            boards = self.scene.boards(self.at(at))
+            for i, j in pairs(boards, max(lo, 0.0)):
+                self.counts["pairs"] += 1
+                require(clearance(boards[i], boards[j]) >= lo, f"benches {i} and {j} are nearer than {lo} m at t = {at} s")
+        # The time is that of the ordinary search, rounded to a double.
+        boards = self.scene.boards(self.at(time))
+        nearest = clearance(boards[claim["bench_a"]], boards[claim["bench_b"]])
+        is_least = nearest > lo - 1e-9 and nearest < hi + 1e-9
+        require(is_least, f"the clearance is {float(nearest)} m at t = {time} s, expected {lo} to {hi} m")
+        self.counts["clearances"] += 1
+
+    def random_places(self, number, until, clear, moving):
+        """Checks that boards are apart and links hold at random times."""
+        ends = {"clear": clear, "moving": moving}
+        for _ in range(number):
+            for claim, end in ends.items():
+                # Boards may overlap from the start.
+                if end == 0:
+                    continue
+                time = self.random.uniform(0, min(end, until))
+                try:
+                    places = self.at(time)
+                except Undecided:
+                    self.counts["undecided"] += 1
+                    continue
+                self.counts["places"] += 1
+                self.check_links(time, places, moving=time < moving)
+                if claim == "clear":
+                    self.check_apart(time, self.scene.boards(places))
+
+    def span(self, line):
+        """Checks that the spans of a step contain the chain at a random place of the head."""
+        scene = self.scene
+        begin, end = read_place(line["from"]), read_place(line["to"])
+        if begin[0] != end[0]:
+            head = begin
+        else:
+            share = arb(self.random.random())
+            head = (begin[0], (begin[1] + share * (end[1] - begin[1])).mid())
+        try:
+            places = scene.chain(head, len(line["spans"]) + 1)[1:]
+        except Undecided:
+            self.counts["undecided"] += 1
+            return
+        for handle, (place, (lo, hi)) in enumerate(zip(places, line["spans"]), 1):
+            lo, hi = read_place(lo), read_place(hi)
+            contained = scene.not_after(lo, place) and scene.not_after(place, hi)
+            require(contained, f"handle {handle} is not in its span while the head is at {head[0]}, {float(head[1])}")
+        self.counts["spans"] += len(places)
+
+
+def read_place(place):
+    """Returns the segment, and the coordinate: the sum of one or two numbers."""
+    return place[0], sum(map(arb, place[1:]), arb(0))
+
+
+def judged(lines, claim, places, seed):
+    first = json.loads(lines[0])
+    require(first.get("type") == "certificate" and first.get("format") == 2, "no certificate of format 2")
+    judge = Judge(Scene(first["scene"]), seed)
+    results, steps = {}, []
+    for number, text in enumerate(lines[1:], 2):
+        line = json.loads(text)
+        if line["type"] == "result":
+            require(line["event"] in EVENTS, f"line {number}: a result about {line['event']}, expected {EVENTS}")
+            results[line["event"]] = line
+        elif line["type"] == "step":
+            steps.append(line)
+        else:
+            known = line["type"] in EVENTS or line["type"] in NOT_JUDGED
+            require(known, f"line {number} is a {line['type']}, of which nothing is known here")
+    require(tuple(results) == EVENTS, f"results about {list(results)}, expected {EVENTS}")
+    scene = judge.scene
+    until = float((scene.length / scene.speed).mid()) * (1 - 1e-12)
+    if results["lock"]["status"] == "proved":
+        until = min(until, results["lock"]["time_lo"])
+    ends = {}
+    for event in EVENTS:
+        result = results[event]
+        status = result["status"]
+        if status == "proved":
+            require(result["time_lo"] <= result["time_hi"], f"{event}: the times are not in order")
+            getattr(judge, event)(result)
+            judge.counts["events"] += 1
+        ends[event] = until if status == "none" and "time_lo" not in result else result.get("time_lo") or 0.0
+    if results["lock"]["status"] == "undecided":
+        until = min(until, ends["lock"])
+    judge.random_places(places, until, ends["contact"], ends["stall"])
+    for line in judge.random.sample(steps, min(places, len(steps))):
+        judge.span(line)
+    if claim is not None and claim["least_clearance_status"] == "proved":
+        stop = min(until, ends["contact"]) if scene.stops_at_contact else until
+        judge.least_clearance(claim, stop, places)
+    return judge.counts
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--places", type=int, default=5)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("certificates", nargs="+")
+    arguments = parser.parse_args()
+    for file in arguments.certificates:
+        counts, refused, undecided = None, None, None
+        try:
+            claim = Path(f"{file}.clearance")
+            claim = json.loads(claim.read_text()) if claim.exists() else None
+            counts = judged(Path(file).read_text().splitlines(), claim, arguments.places, arguments.seed)
+        except Refused as error:
+            refused = str(error)
+        except Undecided as error:
+            undecided = str(error)
+        print(json.dumps({"file": file, "refused": refused, "undecided": undecided, "counts": counts}), flush=True)
+
+
+if __name__ == "__main__":
+    main()
