@@ -174,7 +174,7 @@ fn what_does_not_follow_is_refused() {
     refused(1, "missing field", &|lines| drop(lines[1].as_object_mut().unwrap().remove("clear")));
     refused(0, "first line", &|lines| lines.drain(..1).for_each(drop));
     refused(1, "second first line", &|lines| lines.insert(1, lines[0].clone()));
-    refused(0, "format 2", &|lines| lines[0]["format"] = json!(2));
+    refused(0, "format 3", &|lines| lines[0]["format"] = json!(3));
     refused(5, "", &|lines| lines[5]["to"] = json!([1, null]));
     refused(5, "", &|lines| lines[5]["to"] = json!([-1, 2.0]));
     refused(5, "", &|lines| lines[5]["to"] = json!([1, 2.0, 3.0]));
