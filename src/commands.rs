@@ -25,6 +25,7 @@ pub mod send;
 pub mod soak;
 pub mod soak_conductor;
 pub mod solve;
+pub mod swept;
 pub mod trade;
 pub mod verify;
 pub mod view;

@@ -10,11 +10,12 @@ use bench_dragon::motion::Motion;
 use bench_dragon::motion::model::path::{OutlineKind, SegmentOutline};
 use bench_dragon::motion::model::spiral::Direction;
 use bench_dragon::motion::solve::Velocities;
-use bench_dragon::motion::timeline::{TimedClearance, TimedEvent};
+use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
 use bench_dragon::show::scene::{AtEnd, OnContact, Scene};
 use serde::Serialize;
 
 use super::events::{find_least_clearance, least_clearance, sentence};
+use super::swept::{Benches, Stretch, Swept, benches, swept};
 use super::verify::certificate::proved_of;
 use super::{CommandError, Common, Output, expect_exact_motion, figure, number, progress_bar, search_timeline};
 
@@ -28,6 +29,18 @@ pub struct CheckArguments {
     /// with --json, print that alone
     #[arg(long)]
     prove: bool,
+    /// Write the ground that boards cover, true to 1 mm, as GeoJSON in metres of the stage
+    #[arg(long, value_name = "FILE")]
+    swept: Option<PathBuf>,
+    /// The first time of --swept: seconds, or an event; by default 0
+    #[arg(long, value_name = "TIME", requires = "swept", allow_negative_numbers = true)]
+    from: Option<String>,
+    /// The last time of --swept: seconds, or an event; by default the end of the show
+    #[arg(long, value_name = "TIME", requires = "swept", allow_negative_numbers = true)]
+    until: Option<String>,
+    /// The benches of --swept, counted from 1; by default all
+    #[arg(long, value_name = "FIRST-LAST", requires = "swept", value_parser = benches)]
+    benches: Option<Benches>,
 }
 
 /// The line of `check --prove --json`.
@@ -50,11 +63,18 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     let scene = text.parse()?;
     let timeline = search_timeline(&scene, common);
     let mut output = Output::standard();
+    let ground = arguments.ground(&scene, &timeline, common)?;
     let certified = arguments.certificate.as_ref().map(|file| proved(&text.text, file, common)).transpose()?;
+    if let (Some(ground), true) = (&ground, common.json) {
+        output.json(&ground.line())?;
+    }
     if arguments.prove && common.json {
         let (found, freeze) = find_least_clearance(&scene, &timeline, common);
         let enclosure = enclosed(&scene, found, freeze, common)?;
         output.json(&clearance_line(&scene, found, enclosure))?;
+        return output.finish();
+    }
+    if ground.is_some() && common.json {
         return output.finish();
     }
     let team = scene.team();
@@ -134,6 +154,9 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         let enclosure = enclosed(&scene, found, freeze, common)?;
         output.line(&format!("  {}", proof_sentence(&scene, enclosure)))?;
     }
+    if let Some(ground) = ground {
+        output.line(&format!("  {}", ground.sentence()))?;
+    }
     if let Some(sentences) = certified {
         output.line("  Proved of this scene:")?;
         for sentence in sentences {
@@ -144,6 +167,17 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         log::warn!("boards overlap at the start of scene \"{}\": widen the pitch or narrow the boards", scene.name);
     }
     output.finish()
+}
+
+impl CheckArguments {
+    /// Writes the file of --swept and returns what it holds.
+    fn ground(&self, scene: &Scene, timeline: &Timeline, common: &Common) -> Result<Option<Swept>, CommandError> {
+        let Some(file) = &self.swept else { return Ok(None) };
+        let stretch = Stretch { from: self.from.as_deref(), until: self.until.as_deref(), benches: self.benches };
+        let ground = swept(scene, timeline, stretch, common)?;
+        ground.write(scene, file)?;
+        Ok(Some(ground))
+    }
 }
 
 /// Encloses the least clearance between two numbers, if it can be proved.

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use bench_dragon::drawing::swept::SweptArea;
 use bench_dragon::drawing::{Drawing, Extent, Framing, Length, Look, Surroundings, Theme};
 use bench_dragon::motion::model::Point;
 use bench_dragon::motion::solve::{Chain, Solver, Velocities};
@@ -11,6 +12,7 @@ use bench_dragon::show::solve_at_or_just_before;
 use serde::Serialize;
 
 use super::solve::time_of;
+use super::swept::{Benches, Stretch, benches, swept};
 use super::{CommandError, Common, Output, figure, number, progress_bar, search_timeline};
 
 /// Arguments of `draw`.
@@ -33,14 +35,20 @@ pub struct DrawArguments {
 #[command(next_help_heading = "Many times")]
 struct Many {
     /// Simulated seconds between two pictures, which share one camera and one colour scale; with --until
-    #[arg(long, value_name = "SECONDS", requires = "until", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", requires = "until", allow_negative_numbers = true, group = "stretch")]
     every: Option<f64>,
+    /// The ground that boards cover, with its area, under the boards of --at
+    #[arg(long, group = "stretch")]
+    swept: bool,
     /// The first time: seconds, or an event
-    #[arg(long, value_name = "TIME", default_value = "0", requires = "every", allow_negative_numbers = true)]
+    #[arg(long, value_name = "TIME", default_value = "0", requires = "stretch", allow_negative_numbers = true)]
     from: String,
-    /// The last time, inclusive: seconds, or an event
-    #[arg(long, value_name = "TIME", requires = "every", allow_negative_numbers = true)]
+    /// The last time, inclusive: seconds, or an event; with --swept by default the end of the show
+    #[arg(long, value_name = "TIME", requires = "stretch", allow_negative_numbers = true)]
     until: Option<String>,
+    /// The benches whose ground is drawn, counted from 1; by default all
+    #[arg(long, value_name = "FIRST-LAST", requires = "swept", value_parser = benches)]
+    benches: Option<Benches>,
     /// One SVG that moves, in place of many: in real time, about --every seconds between two moments
     #[arg(long, requires = "every")]
     animated: bool,
@@ -117,7 +125,12 @@ pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandErr
                 session.draw_many(look, &times, common)
             }
         }
-        _ => session.draw_one(look, time_of("--at", &arguments.at, &timeline)?),
+        _ => {
+            let time = time_of("--at", &arguments.at, &timeline)?;
+            let stretch = Stretch { from: Some(&many.from), until: many.until.as_deref(), benches: many.benches };
+            let ground = many.swept.then(|| swept(&scene, &timeline, stretch, common)).transpose()?;
+            session.draw_one(look, time, ground.as_ref().map(|ground| &ground.area))
+        }
     }
 }
 
@@ -179,13 +192,18 @@ impl<'a> Session<'a> {
         Ok(extent)
     }
 
-    fn drawing(&self, extent: &Extent, look: Look) -> Drawing<'a> {
+    fn drawing<'d>(&self, extent: &Extent, look: Look) -> Drawing<'d>
+    where
+        'a: 'd,
+    {
         Drawing::new(&self.scene.name, &self.scene.motion, self.timeline, extent, look)
     }
 
-    fn draw_one(&mut self, look: Look, time: f64) -> Result<(), CommandError> {
-        let extent = self.extent(&[time])?;
-        let svg = self.drawing(&extent, look).svg(time, &self.chain);
+    fn draw_one(&mut self, look: Look, time: f64, swept: Option<&SweptArea>) -> Result<(), CommandError> {
+        let mut extent = self.extent(&[time])?;
+        swept.iter().for_each(|area| extent.include_ground(area));
+        let drawing = self.drawing(&extent, look);
+        let svg = swept.into_iter().fold(drawing, Drawing::on_ground).svg(time, &self.chain);
         self.write(time, &svg, self.file)
     }
 

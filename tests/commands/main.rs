@@ -8,3 +8,4 @@ mod hard_scenes;
 #[path = "../harness/mod.rs"]
 mod harness;
 mod placement;
+mod swept;

@@ -14,6 +14,7 @@ mod marks;
 pub mod palette;
 mod route;
 mod sheet;
+pub mod swept;
 
 use svg::Document;
 use svg::node::element::{ClipPath, Definitions, Description, Group, Path, Rectangle, Title};
@@ -30,6 +31,7 @@ use camera::{Camera, StageBox, Viewport};
 pub use look::{Framing, Length, Look, Surroundings, Theme};
 use marks::{Happened, Tense};
 use palette::Palette;
+use swept::SweptArea;
 
 /// Width of a sheet in its own units, for any size in print or on a screen.
 const WIDTH: f64 = 960.0;
@@ -58,6 +60,12 @@ impl Extent {
         self.speeds.include(chain);
         self.last = self.last.max(time);
     }
+
+    /// Adds the ground that boards cover.
+    pub fn include_ground(&mut self, area: &SweptArea) {
+        let corners = area.polygons().iter().flatten().flatten();
+        corners.for_each(|corner| self.boards.include(Point::from(*corner)));
+    }
 }
 
 /// One camera and one look for one picture or many.
@@ -69,6 +77,7 @@ pub struct Drawing<'a> {
     height: f64,
     camera: Camera,
     scale: Option<ColourScale>,
+    ground: Option<&'a SweptArea>,
 }
 
 impl<'a> Drawing<'a> {
@@ -104,7 +113,12 @@ impl<'a> Drawing<'a> {
         };
         let camera = Camera::showing(&shown, viewport);
         let scale = extent.speeds.scale(motion.head_speed());
-        Self { name, motion, timeline, look, height, camera, scale }
+        Self { name, motion, timeline, look, height, camera, scale, ground: None }
+    }
+
+    /// Returns the same drawings above the ground that boards cover.
+    pub fn on_ground(self, area: &'a SweptArea) -> Self {
+        Self { ground: Some(area), ..self }
     }
 
     /// Returns the SVG of a chain at a time.
@@ -116,7 +130,11 @@ impl<'a> Drawing<'a> {
         let (outlined, what) = outlined(&happened, &overlaps);
         let outlined: Vec<usize> =
             outlined.into_iter().filter(|bench| boards.iter().any(|(seen, _)| seen == bench)).collect();
-        let mut stage = self.stage().add(self.path(palette));
+        let mut stage = self.stage();
+        if let Some(area) = self.ground {
+            stage = stage.add(ground(area, palette));
+        }
+        stage = stage.add(self.path(palette));
         stage =
             stage.add(benches::group(&boards, |bench| self.fill(chain.speed[bench], palette), &self.camera, palette));
         stage = stage.add(benches::handles(self.motion.team(), chain, &self.camera, palette));
@@ -162,6 +180,7 @@ impl<'a> Drawing<'a> {
                 head: signs.0,
                 tail: signs.1,
                 outlined: (!outlined.is_empty()).then_some(what),
+                ground: self.ground.map(|area| format!("ground covered: {} m\u{b2}", rounded(area.area(), 3))),
                 events: &events,
             };
             let (below, colour) = self.subtitle(time, &happened, &overlaps, palette);
@@ -316,6 +335,16 @@ fn name(bench: usize, last: usize, outlined: &[usize]) -> Option<String> {
         _ if bench == last => Some("tail".to_owned()),
         _ => None,
     }
+}
+
+/// Returns the ground that boards cover.
+fn ground(area: &SweptArea, palette: &Palette) -> Path {
+    let mut data = String::new();
+    for ring in area.polygons().iter().flatten() {
+        let corners: Vec<String> = ring.iter().map(|[x, y]| format!("{} {}", metres(*x), metres(*y))).collect();
+        data += &format!("M{}z", corners.join("L"));
+    }
+    Path::new().set("id", "ground").set("d", data).set("fill", palette.line).set("fill-rule", "evenodd")
 }
 
 /// Returns metres as SVG data, to a tenth of a micrometre.

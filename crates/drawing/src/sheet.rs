@@ -28,6 +28,8 @@ pub struct Contents<'a> {
     pub tail: bool,
     /// The state of the outlined boards, if any.
     pub outlined: Option<&'static str>,
+    /// The words on the ground that boards cover, if it is drawn.
+    pub ground: Option<String>,
     /// The events whose marks are in the viewport, with their words.
     pub events: &'a [(Happened, String)],
 }
@@ -153,6 +155,11 @@ pub fn legend(contents: &Contents, camera: &Camera, palette: &Palette) -> Group 
         let board = board.set("width", 32).set("height", 10).set("fill", "none").set("stroke-linejoin", "round");
         group = group.add(board.set("stroke", palette.danger).set("stroke-width", 3));
         group = group.add(row.after(36.0, outlined, palette));
+    }
+    if let Some(ground) = &contents.ground {
+        let patch = Rectangle::new().set("x", rounded(row.x, 2)).set("y", rounded(y - 7.0, 2));
+        let patch = patch.set("width", 24).set("height", 14).set("fill", palette.line);
+        group = group.add(patch).add(row.after(24.0, ground, palette));
     }
     for (event, sentence) in contents.events {
         row = Row { x: LEFT, y: row.y + ROW };

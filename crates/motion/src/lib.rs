@@ -13,6 +13,7 @@ pub mod model;
 pub mod placement;
 pub mod singularities;
 pub mod solve;
+pub mod sweep;
 pub mod timeline;
 
 use bench_dragon_messages::state::EventKind;

@@ -1,0 +1,47 @@
+//! `check --swept` and `draw --swept`: the ground that boards cover, against the union of sampled boards by shapely.
+
+use crate::harness::{can_run, program, python, python_modules, text};
+use serde_json::Value;
+
+#[test]
+fn the_ground_is_that_of_sampled_boards() {
+    if !can_run(python_modules(&["numpy", "shapely"])) {
+        return;
+    }
+    let paper = ["3.41", "2.20", "0.30", "0.275"];
+    let cases: [(&str, [&str; 4]); 3] = [
+        // The whole coil.
+        ("config/paper.toml", ["411.5", "412", "1", "223"]),
+        // Through both arcs of the turn, and their junctions.
+        ("config/turnaround.toml", ["117", "135", "1", "3"]),
+        ("tests/scenes/placed_turnaround.toml", ["121", "126", "2", "12"]),
+    ];
+    for (scene, stretch) in cases {
+        let mut peer = python();
+        peer.args(["tests/python/swept.py", env!("CARGO_BIN_EXE_bench-dragon"), scene]).args(stretch).args(paper);
+        let output = peer.output().unwrap();
+        println!("{scene} {stretch:?}: {}", text(&output.stdout));
+        assert!(output.status.success(), "{scene} {stretch:?}: {}", text(&output.stderr));
+    }
+}
+
+fn printed(arguments: &[&str]) -> String {
+    let output = program("swept").args(arguments).output().unwrap();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    text(&output.stdout).to_owned()
+}
+
+#[test]
+fn the_whole_show_is_united() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("ground.json");
+    let said = printed(&["check", "--swept", file.to_str().unwrap()]);
+    let feature: Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+    let area = feature["properties"]["area"].as_f64().unwrap();
+    assert!(said.contains(&format!("{area:.3} m2, in 1 polygon")), "{said}");
+    let rings = feature["geometry"]["coordinates"][0].as_array().unwrap();
+    // The coil and the room that is left in its middle.
+    assert_eq!(rings.len(), 2);
+    let svg = printed(&["draw", "--swept", "--at", "300"]);
+    assert!(svg.contains(&format!("ground covered: {} m\u{b2}", (1e3 * area).round() / 1e3)), "{area}");
+}
