@@ -223,3 +223,62 @@ fn a_late_subscriber_gets_the_current_alert_and_a_volatile_one_none_before_it() 
     drop(watch);
     ended(publisher);
 }
+
+/// Returns the resident memory of a process, in MB.
+fn memory(process: u32) -> f64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
+    line.trim().trim_end_matches(" kB").parse::<f64>().unwrap() / 1024.0
+}
+
+/// Half of the subscribers are killed, the others leave. A subscriber that spins, as one of Fast DDS does that is sent an
+/// empty change, would never end.
+#[test]
+fn subscribers_that_come_and_go_cost_no_memory_and_none_is_left_without_messages() {
+    if !can_run(peer_program().map(drop)) {
+        return;
+    }
+    let name = "come_and_go";
+    let publisher = publisher(name, &["run", "--json", "--ros2", "--start", "300", "--loop", "--duration", "100000"]);
+    let (rounds, beside) = if long() { (250, 4) } else { (6, 4) };
+    let come_and_go = |index: usize| {
+        let (topic, durability) = [
+            ("handles", ""),
+            ("alerts", "--transient-local"),
+            ("handles", "--best-effort"),
+            ("stage", "--transient-local"),
+        ][index % 4];
+        let samples = if topic == "handles" { "20" } else { "1" };
+        let arguments = ["--seconds", "60", "--linger", "0", "--samples", samples, durability];
+        let arguments = arguments.iter().copied().filter(|argument| !argument.is_empty()).collect::<Vec<_>>();
+        let mut process = Process::start(&mut subscriber(name, topic, &arguments));
+        let printed = process.lines();
+        let is_killed = index / 4 % 2 == 1;
+        if is_killed {
+            printed.until("sample", 60);
+            process.signal(Signal::SIGKILL);
+        }
+        let rest = printed.rest(90);
+        let end = rest.iter().find(|line| line.contains("\"end\""));
+        let count = |line: &String| serde_json::from_str::<Value>(line).unwrap()["samples"].as_u64().unwrap();
+        assert!(is_killed || end.is_some_and(|line| count(line) >= samples.parse().unwrap()), "{topic}: {rest:?}");
+    };
+    let mut memories = Vec::new();
+    for round in 0..rounds {
+        std::thread::scope(|threads| {
+            for index in 0..beside {
+                threads.spawn(move || come_and_go(beside * round + index));
+            }
+        });
+        memories.push(memory(publisher.id()));
+    }
+    println!("{} subscribers, MB: {memories:.1?}", rounds * beside);
+    // Messages for killed subscribers are kept until their lease ends: a high-water mark within the first rounds.
+    let (first, last) = (memories[rounds / 3], memories[rounds - 1]);
+    assert!(last < first + 10.0, "{memories:.1?}");
+    // The publisher still serves, and ends.
+    let end =
+        lines(Process::start(&mut subscriber(name, "handles", &["--samples", "20", "--seconds", "60"])), "end", 90);
+    assert!(end[0]["samples"].as_u64() >= Some(20), "{end:?}");
+    ended(publisher);
+}
