@@ -49,7 +49,7 @@ struct Ends {
 impl Matches {
     /// Observes the matches of a context from now on.
     pub(super) fn new(context: &Context) -> Self {
-        let participant = context.domain_participant().clone();
+        let participant = context.domain_participant();
         let events = participant.status_listener();
         let [readers, writers] = [BTreeSet::new(), BTreeSet::new()];
         let ends = Ends { participant, events, readers, writers, transient_local: BTreeSet::new() };
