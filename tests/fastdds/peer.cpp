@@ -1,4 +1,4 @@
-// A Fast DDS process that subscribes to topics and calls services as rmw_fastrtps does, with uninterpreted CDR payloads.
+// A Fast DDS process that subscribes to topics and calls services as rmw_fastrtps does, with payloads as bytes.
 //
 //   peer subscribe TOPIC TYPE [--best-effort] [--transient-local] [--depth N] [--seconds S] [--samples N]
 //        [--linger S] [--joins N]
@@ -8,8 +8,9 @@
 // HEX is the request's body, little-endian, without the four bytes of the encapsulation.
 //
 // `subscribe` prints a JSON line for each sample, and one when the subscriber exists and when it has ended. It ends
-// after S seconds, or some time after N samples. With --joins that happens N times, each with a participant of its own. `call` makes the first call of N new clients, each with a participant that knows the
-// server before, and prints a JSON line for each. Called by tests/ros2/fast_dds.rs, which builds this file.
+// after S seconds, or some time after N samples. With --joins that happens N times, each with a participant of its own.
+// `call` makes the first call of N new clients, each with a participant that knows the server before, and prints a JSON
+// line for each. Called by tests/ros2/fast_dds.rs, which builds this file.
 
 #include <algorithm>
 #include <chrono>
@@ -286,7 +287,8 @@ void subscribe(const std::string& name, const std::string& type, const Options& 
         samples++;
         // The content of frames and paths is not printed.
         const std::string content = bytes.size() <= 1024 ? hex(bytes, 4) : "";
-        std::printf("{\"type\":\"sample\",\"received_ns\":%lld,\"source_ns\":%lld,\"sequence\":%llu,\"bytes\":%zu,\"hex\":\"%s\"}\n",
+        std::printf("{\"type\":\"sample\",\"received_ns\":%lld,\"source_ns\":%lld,\"sequence\":%llu,\"bytes\":%zu,"
+                    "\"hex\":\"%s\"}\n",
                     wall_ns(), static_cast<long long>(info.source_timestamp.to_ns()),
                     static_cast<unsigned long long>(info.sample_identity.sequence_number().to64long()), bytes.size(),
                     content.c_str());
@@ -317,13 +319,13 @@ void call(const std::string& service, const std::string& request_type, const std
     Events events;
     Peer peer(options, events);
     // A node has usually known the server for a while when it creates a client.
-    if (!events.wait(in(60.0), [&] { return events.knows("reads " + requests) && events.knows("writes " + responses); })) {
-      fail("no server of " + service);
-    }
+    const auto is_known = [&] { return events.knows("reads " + requests) && events.knows("writes " + responses); };
+    if (!events.wait(in(60.0), is_known)) fail("no server of " + service);
     const auto start = Clock::now();
     auto* reader = peer.reader(responses, response_type);
     auto* writer = peer.writer(requests, request_type);
-    if (!events.wait(in(60.0), [&] { return events.readers > 0 && events.writers > 0; })) fail("no match with " + service);
+    const auto is_matched = [&] { return events.readers > 0 && events.writers > 0; };
+    if (!events.wait(in(60.0), is_matched)) fail("no match with " + service);
     const double discovered = since(start);
     Bytes request = request_of(body);
     eprosima::fastrtps::rtps::WriteParams parameters;

@@ -44,7 +44,7 @@ pub(super) fn request_first(participant: &DomainParticipant, reader: GUID, write
         let any = if address.is_ipv4() { IpAddr::from(Ipv4Addr::UNSPECIFIED) } else { Ipv6Addr::UNSPECIFIED.into() };
         let sent = UdpSocket::bind((any, 0)).and_then(|socket| socket.send_to(&datagram, address));
         if let Err(error) = sent {
-            log::debug!("ROS 2: a first request was not requested again from {address}: {error}");
+            log::debug!("ROS 2: no retransmission is requested from {address}: {error}");
         }
     }
 }
