@@ -4,9 +4,10 @@
 
 Before each request and response come the client (uint64) and the number of the call (int64). Prints a JSON line for
 each response, or null if none came within some seconds. With --bare the 16 bytes are left out, as in the mapping of
-rmw_fastrtps_cpp. With --fresh, N clients, each with its own participant, make their first call to the first service.
-With --flood, one client calls the first service N times without waiting for a response. Without a call, prints the
-topics below NAME with their types, including those of services, and /clock and /tf.
+rmw_fastrtps_cpp. With --fresh, N clients, each with its own participant, make their first call to the first service,
+and a line has the seconds of the call too. With --flood, one client calls the first service N times without waiting for
+a response. Without a call, prints the topics below NAME with their types, including those of services, and /clock and
+/tf.
 """
 
 import argparse
@@ -204,7 +205,10 @@ def main():
         def first_call(_):
             client = Client(DomainParticipant(arguments.domain), arguments.name, arguments.calls[0])
             clients.append(client)
-            return client.call("", arguments.seconds) if client.ready(60) else "no service"
+            if not client.ready(60):
+                return {"response": "no service"}
+            sent = time.monotonic()
+            return {"response": client.call("", arguments.seconds), "seconds": time.monotonic() - sent}
 
         with ThreadPoolExecutor(10) as pool:
             for answer in pool.map(first_call, range(arguments.fresh)):

@@ -1,5 +1,6 @@
-//! ROS 2 topics and services, with Cyclone DDS and ros2-client as peers.
+//! ROS 2 topics and services, with Cyclone DDS, Fast DDS and ros2-client as peers.
 
+mod fast_dds;
 #[path = "../harness/mod.rs"]
 mod harness;
 mod ros2;

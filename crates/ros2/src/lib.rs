@@ -8,6 +8,7 @@ mod control;
 pub mod environment;
 mod matching;
 mod node;
+mod retransmission;
 mod topic_writer;
 
 use std::net::{IpAddr, Ipv4Addr};

@@ -9,7 +9,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use ros2_client::Context;
 use rustdds::policy::Durability;
-use rustdds::{DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, StatusEvented};
+use rustdds::{DomainParticipant, DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, StatusEvented};
+
+use super::retransmission;
 
 /// The matches of one participant, shared by its threads.
 #[derive(Clone)]
@@ -34,6 +36,7 @@ impl Readers {
 }
 
 struct Ends {
+    participant: DomainParticipant,
     events: DomainParticipantStatusListener,
     /// Pairs of a local writer and a remote reader.
     readers: BTreeSet<(GUID, GUID)>,
@@ -46,9 +49,10 @@ struct Ends {
 impl Matches {
     /// Observes the matches of a context from now on.
     pub(super) fn new(context: &Context) -> Self {
-        let events = context.domain_participant().status_listener();
+        let participant = context.domain_participant();
+        let events = participant.status_listener();
         let [readers, writers] = [BTreeSet::new(), BTreeSet::new()];
-        let ends = Ends { events, readers, writers, transient_local: BTreeSet::new() };
+        let ends = Ends { participant, events, readers, writers, transient_local: BTreeSet::new() };
         Self { ends: Arc::new(Mutex::new(ends)) }
     }
 
@@ -107,6 +111,7 @@ impl Ends {
                 }
                 Event::RemoteWriterMatched { local_reader, remote_writer } => {
                     self.writers.insert((local_reader, remote_writer));
+                    retransmission::request_first(&self.participant, local_reader, remote_writer);
                 }
                 // RustDDS sends this before the matches of that reader.
                 Event::ReaderDetected { reader } => {

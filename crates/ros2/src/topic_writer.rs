@@ -1,13 +1,12 @@
 //! The writer of one topic: its quality of service, its messages for late and slow subscribers, its discarded messages.
 //!
 //! A transient-local topic holds one message here: the latest. RustDDS keeps more, whatever the depth: unacknowledged
-//! messages, and all others until its cleanup every six seconds. A late subscriber would get all of them first. So a
-//! message without subscribers is held here and not written, and a writer that has kept more than the latest message is
-//! replaced after its last subscriber has left. A subscriber that joins others still gets all that RustDDS keeps, the
-//! latest last.
+//! messages, and all others until its cleanup every six seconds. A late subscriber would get all of them first; with
+//! Fast DDS also a volatile one, since RustDDS does not read the durability of a subscriber. So a message without
+//! subscribers is held here and not written, and a writer of events is replaced after its last subscriber has left. A
+//! subscriber that joins others still gets all that RustDDS keeps, the latest last.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 use ros2_client::{Context, Node, Publisher};
 use rustdds::policy::{self, ResourceLimits};
@@ -24,11 +23,6 @@ use bench_dragon_ros2_messages::settings::{Durability, Qos, Reliability, Topic};
 const LEASE_SECONDS: f64 = 12.0;
 /// RustDDS's own limit.
 const UNACKNOWLEDGED_MESSAGES: f64 = 8192.0;
-/// The time for a newly matched subscriber to match in turn. RustDDS sometimes does not deliver a message sent
-/// meanwhile, although it keeps it.
-const SETTLING_TIME: Duration = Duration::from_millis(200);
-/// The time after which the first message is retransmitted, for a subscriber that took longer.
-const REPETITION_TIME: Duration = Duration::from_millis(1500);
 /// An upper bound of a message's bytes besides its handles.
 pub(super) const HEADER_BYTES: usize = 200;
 /// An upper bound of an event-driven message's bytes; the largest is the stage.
@@ -49,25 +43,12 @@ struct Latched<Message> {
     latest: Option<Arc<Message>>,
     /// True if the latest message has been written.
     is_written: bool,
-    /// Messages that the publisher has written; a retransmission does not count.
+    /// Messages that the publisher has written.
     written: u64,
-    /// True after the retransmission.
-    is_repeated: bool,
-    /// The time since which there has always been a subscriber.
-    reader_since: Option<Instant>,
-    /// True while the subscribers are newly matched.
-    is_settling: bool,
-}
-
-impl<Message> Latched<Message> {
-    const NOTHING: Self = Self {
-        latest: None,
-        is_written: false,
-        written: 0,
-        is_repeated: false,
-        reader_since: None,
-        is_settling: false,
-    };
+    /// True if there is a subscriber.
+    has_reader: bool,
+    /// True if the message never changes.
+    is_constant: bool,
 }
 
 impl<Message: Serialize> TopicWriter<Message> {
@@ -82,7 +63,7 @@ impl<Message: Serialize> TopicWriter<Message> {
         if let Some(latched) = &mut self.latched {
             latched.latest = Some(Arc::clone(&message));
             latched.is_written = false;
-            if latched.reader_since.is_none() || latched.is_settling {
+            if !latched.has_reader {
                 return;
             }
         }
@@ -105,7 +86,7 @@ impl<Message: Serialize> TopicWriter<Message> {
         if let Some(latched) = &mut self.latched
             && is_written
         {
-            latched.written += u64::from(!latched.is_written);
+            latched.written += 1;
             latched.is_written = true;
         }
         is_written
@@ -118,7 +99,7 @@ impl<Message: Serialize> TopicWriter<Message> {
             Err(error) => log::warn!("ROS 2 topic {}: late subscribers get old messages first: {error}", self.topic),
         }
         if let Some(latched) = &mut self.latched {
-            (latched.written, latched.is_written, latched.is_repeated) = (0, false, false);
+            (latched.written, latched.is_written) = (0, false);
         }
     }
 }
@@ -134,29 +115,24 @@ impl<Message: Serialize> Serviced for TopicWriter<Message> {
     fn service(&mut self, matches: &Matches, node: &mut Node) {
         let Some(latched) = &mut self.latched else { return };
         let readers = matches.readers(self.publisher.guid());
-        if !readers.any() {
-            (latched.reader_since, latched.is_settling) = (None, false);
-            let keeps_latest_alone = latched.written == 1 && latched.is_written;
-            if latched.written > 0 && !keeps_latest_alone {
+        latched.has_reader = readers.any();
+        if !latched.has_reader {
+            // RustDDS sends a volatile subscriber of Fast DDS all that it keeps, which for an event is out of date.
+            if latched.written > 0 && !latched.is_constant {
                 self.replace(node);
             }
             return;
         }
-        let present = latched.reader_since.get_or_insert_with(Instant::now).elapsed();
-        // A volatile subscriber expects each new message at once.
-        latched.is_settling = readers.volatile == 0 && present < SETTLING_TIME;
-        let Some(latest) = latched.latest.clone().filter(|_| readers.transient_local > 0) else { return };
-        if !latched.is_written && !latched.is_settling {
-            // A volatile subscriber would take the held message for a new one. From a new publisher it gets later ones
-            // only.
-            if readers.volatile > 0 {
-                self.replace(node);
-            }
-            self.write(latest);
-        } else if latched.written == 1 && readers.volatile == 0 && !latched.is_repeated && present >= REPETITION_TIME {
-            latched.is_repeated = true;
-            self.write(latest);
+        if latched.is_written || readers.transient_local == 0 {
+            return;
         }
+        let Some(latest) = latched.latest.clone() else { return };
+        // A volatile subscriber would take the held message for a new one. From a new publisher it gets later ones only.
+        if readers.volatile > 0 {
+            self.replace(node);
+        }
+        // A subscriber that matches this publisher later requests the message when it does.
+        self.write(latest);
     }
 }
 
@@ -216,7 +192,9 @@ impl WriterFactory<'_> {
             .create_topic(format!("rt{name}"), type_name, &policies(*qos, bytes, rate), TopicKind::NoKey)
             .map_err(|error| failed(&error))?;
         let publisher = self.node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
-        let latched = (qos.durability == Durability::TransientLocal).then_some(Latched::NOTHING);
+        let is_constant = matches!(topic, Topic::Stage | Topic::Path);
+        let nothing = Latched { latest: None, is_written: false, written: 0, has_reader: false, is_constant };
+        let latched = (qos.durability == Durability::TransientLocal).then_some(nothing);
         Ok(Some(TopicWriter { publisher, dds, topic: name, reported: false, latched }))
     }
 }

@@ -1,0 +1,92 @@
+//! Retransmission of requests that Fast DDS clients sent before RustDDS had matched them.
+//!
+//! A Fast DDS client matches a service at once and sends its first request within a millisecond. RustDDS drops the
+//! request if its discovery thread has not matched the client's writer by then. RustDDS then sends an ACKNACK without
+//! requests, which Fast DDS answers after its heartbeat period of 3 s. RustDDS has no call for anything else. So this
+//! file sends one datagram for each match: a NACK_FRAG submessage (RTPS 2.5, section 9.4.5.14) that requests the first
+//! messages of the writer. A writer retransmits those that it has and ignores the rest, and the counter of NACK_FRAG
+//! is not that of the ACKNACKs of RustDDS. Called by the matches.
+
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
+
+use rustdds::{DomainParticipant, GUID};
+
+/// The first two bytes of the GUIDs of Fast DDS: its vendor id (RTPS 2.5, sections 9.3.1.5 and 9.4.4).
+const FAST_DDS: [u8; 2] = [1, 15];
+/// The vendor id of RustDDS.
+const RUSTDDS: [u8; 2] = [1, 18];
+/// The protocol version of RustDDS.
+const VERSION: [u8; 2] = [2, 4];
+/// The prefix of the topics of requests.
+const REQUEST_PREFIX: &str = "rq/";
+/// The messages requested from a new writer: as many calls as clients make before the first answer.
+const FIRST_MESSAGES: u32 = 4;
+/// Kinds of submessages.
+const INFO_DST: u8 = 0x0e;
+const NACK_FRAG: u8 = 0x12;
+const LITTLE_ENDIAN: u8 = 1;
+
+/// Requests the first messages of `writer` for the local `reader` if `writer` is that of a Fast DDS client.
+///
+/// If the datagram is lost, the request arrives after the heartbeat period of Fast DDS.
+pub(super) fn request_first(participant: &DomainParticipant, reader: GUID, writer: GUID) {
+    if !writer.to_bytes().starts_with(&FAST_DDS) {
+        return;
+    }
+    let writers = participant.discovered_writers();
+    let Some(data) = writers.into_iter().find(|data| data.writer_proxy.remote_writer_guid == writer) else { return };
+    if !data.publication_topic_data.topic_name.starts_with(REQUEST_PREFIX) {
+        return;
+    }
+    let datagram = datagram(reader.to_bytes(), writer.to_bytes());
+    let locators = data.writer_proxy.unicast_locator_list.into_iter().filter(|locator| locator.is_udp());
+    for address in locators.map(SocketAddr::from) {
+        let any = if address.is_ipv4() { IpAddr::from(Ipv4Addr::UNSPECIFIED) } else { Ipv6Addr::UNSPECIFIED.into() };
+        let sent = UdpSocket::bind((any, 0)).and_then(|socket| socket.send_to(&datagram, address));
+        if let Err(error) = sent {
+            log::debug!("ROS 2: no retransmission is requested from {address}: {error}");
+        }
+    }
+}
+
+/// Returns the message of `reader` to `writer`.
+fn datagram(reader: [u8; 16], writer: [u8; 16]) -> Vec<u8> {
+    let [(own_prefix, reader), (prefix, writer)] = [reader, writer].map(|guid| {
+        let (prefix, entity) = guid.split_at(12);
+        (prefix.to_vec(), entity.to_vec())
+    });
+    let mut bytes = [b"RTPS".as_slice(), &VERSION, &RUSTDDS, &own_prefix].concat();
+    bytes.extend([INFO_DST, LITTLE_ENDIAN, 12, 0]);
+    bytes.extend(&prefix);
+    for sequence in 1..=FIRST_MESSAGES {
+        bytes.extend([NACK_FRAG, LITTLE_ENDIAN, 32, 0]);
+        bytes.extend([reader.as_slice(), &writer].concat());
+        // The sequence number (high, low), the set of the first fragment alone (base, bits, bitmap), and the counter.
+        for word in [0, sequence, 1, 1, 1 << 31, sequence] {
+            bytes.extend(word.to_le_bytes());
+        }
+    }
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The bytes as RTPS 2.5 lays them out, written down by hand for the first message.
+    #[test]
+    fn the_datagram_is_that_of_the_standard() {
+        let reader = [1, 18, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0, 0, 21, 4];
+        let writer = [1, 15, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 0, 0, 22, 3];
+        #[rustfmt::skip]
+        let expected = [
+            b'R', b'T', b'P', b'S', 2, 4, 1, 18, 1, 18, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12,
+            0x0e, 1, 12, 0, 1, 15, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42,
+            0x12, 1, 32, 0, 0, 0, 21, 4, 0, 0, 22, 3, 0, 0, 0, 0, 1, 0, 0, 0,
+            1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 128, 1, 0, 0, 0,
+        ];
+        let bytes = datagram(reader, writer);
+        assert_eq!(bytes[..expected.len()], expected);
+        assert_eq!(bytes.len(), expected.len() + 3 * 36);
+    }
+}

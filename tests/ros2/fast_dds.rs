@@ -1,0 +1,284 @@
+//! ROS 2 topics and services as Fast DDS, the default of ROS 2, receives and calls them: a real Fast DDS process
+//! (`tests/fastdds/peer.cpp`), built at the first use.
+#![cfg(feature = "ros2")]
+
+use crate::harness;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+use harness::{Process, can_run, json_lines, long, program, scene_file, summary, text, unique, wait_until};
+use nix::sys::signal::Signal;
+use serde_json::Value;
+
+/// Builds the peer. Returns its file, or the reason why there is none.
+fn peer_program() -> Result<&'static Path, String> {
+    static BUILT: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    let built = BUILT.get_or_init(|| {
+        if !Path::new("/usr/include/fastdds/dds/domain/DomainParticipant.hpp").exists() {
+            return Err("no Fast DDS (libfastrtps-dev, libfastcdr-dev); tests/run installs it".to_owned());
+        }
+        let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("fastdds_peer_{}", std::process::id()));
+        let mut compiler = Command::new("g++");
+        compiler.current_dir(env!("CARGO_MANIFEST_DIR"));
+        compiler.args(["-std=c++17", "-O1", "-Wall", "-Wextra", "-Werror", "-o"]).arg(&file);
+        let output = compiler.args(["tests/fastdds/peer.cpp", "-lfastrtps", "-lfastcdr"]).output();
+        let output = output.map_err(|error| format!("no g++ ({error})"))?;
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        Ok(file)
+    });
+    built.as_deref().map_err(String::clone)
+}
+
+/// Returns a Fast DDS process. Call only after [`can_run`] of [`peer_program`].
+fn peer(arguments: &[&str]) -> Command {
+    let mut command = Command::new(peer_program().unwrap());
+    command.args(arguments).args(["--domain", &domain().to_string()]);
+    command
+}
+
+/// Returns a subscriber of a topic of our own messages.
+fn subscriber(name: &str, topic: &str, arguments: &[&str]) -> Command {
+    let kind = match topic {
+        "alerts" => "bench_dragon_msgs::msg::dds_::CollisionAlert_",
+        "cues" => "bench_dragon_msgs::msg::dds_::Cue_",
+        "handles" => "bench_dragon_msgs::msg::dds_::HandlePoses_",
+        "path" => "nav_msgs::msg::dds_::Path_",
+        "stage" => "bench_dragon_msgs::msg::dds_::Stage_",
+        _ => panic!("no type of {topic}"),
+    };
+    peer(&[&["subscribe", &format!("{}/{topic}", unique(name)), kind], arguments].concat())
+}
+
+/// Returns a ROS 2 domain that other tests do not use meanwhile.
+fn domain() -> u16 {
+    100 + (std::process::id() % 80) as u16
+}
+
+/// Starts a show and returns when it answers over shared memory.
+fn publisher(name: &str, arguments: &[&str]) -> Process {
+    let mut run = program(name);
+    let process = Process::start(run.env("ROS_DOMAIN_ID", domain().to_string()).args(arguments));
+    wait_until("the show runs", || {
+        program(name).args(["control", "state"]).output().is_ok_and(|output| output.status.success())
+    });
+    process
+}
+
+fn ended(publisher: Process) -> Value {
+    publisher.signal(Signal::SIGINT);
+    summary(&publisher.output_within(60))
+}
+
+/// Returns the lines of a peer of one type.
+fn lines(peer: Process, kind: &str, seconds: u64) -> Vec<Value> {
+    let output = peer.output_within(seconds);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    json_lines(&output).into_iter().filter(|line| kind.is_empty() || line["type"] == kind).collect()
+}
+
+/// A Fast DDS client sends its first request before RustDDS knows it, in half of all cases. Fast DDS repeats the request
+/// only after its heartbeat period, here an hour: an answer proves that the publisher requests it again.
+#[test]
+fn a_hundred_new_clients_each_get_the_answer_to_their_first_call() {
+    if !can_run(peer_program().map(drop)) {
+        return;
+    }
+    let name = "first_calls";
+    let publisher =
+        publisher(name, &["run", "--json", "--ros2", "--ros2-control", "--rate", "60", "--duration", "600"]);
+    let service = format!("{}/get_rate", unique(name));
+    let [request, response] =
+        ["Request", "Response"].map(|part| format!("rosbag2_interfaces::srv::dds_::GetRate_{part}_"));
+    let clients = |count: &str| {
+        let call = ["call", &service, &request, &response, "00", "--heartbeat", "3600", "--timeout", "30"];
+        Process::start(peer(&call).args(["--clients", count]))
+    };
+    let rate_of_one = Value::from(hex(&1.0_f64.to_le_bytes()));
+    // Side by side, and many in one process.
+    let processes: Vec<Process> = (0..4).map(|_| clients("25")).collect();
+    let answers: Vec<Value> = processes.into_iter().flat_map(|process| lines(process, "", 500)).collect();
+    let within = |seconds: f64| answers.iter().filter(|line| line["answered_s"].as_f64().unwrap() < seconds).count();
+    println!("{} of {} within 0.1 s, {} within 0.5 s", within(0.1), answers.len(), within(0.5));
+    assert_eq!(answers.len(), 100);
+    assert!(answers.iter().all(|line| line["response"] == rate_of_one), "{answers:?}");
+    ended(publisher);
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Returns the publisher's stamp, in nanoseconds, of a message that begins with a header.
+fn stamp(sample: &Value) -> u64 {
+    let hex = sample["hex"].as_str().unwrap();
+    let word = |at: usize| u64::from(u32::from_str_radix(&hex[8 * at..8 * at + 8], 16).unwrap().swap_bytes());
+    1_000_000_000 * word(0) + word(1)
+}
+
+/// The subscribers of these topics: the first, which the publisher discovers meanwhile, and one that joins it later.
+#[test]
+fn stage_path_and_each_cue_come_exactly_once_to_each_subscriber() {
+    if !can_run(peer_program().map(drop)) {
+        return;
+    }
+    let name = "once";
+    let scene = scene_file(name, &[]);
+    let cues: String = (1..=3)
+        .map(|number| format!("[[cues]]\nname = \"cue {number}\"\nat = {}\n", 50.25 + 0.05 * f64::from(number)))
+        .collect();
+    let topics = "[publish.ros2]\ntopics = [\"cues\", \"path\", \"stage\"]\n";
+    std::fs::write(&scene, format!("{}\n{topics}\n{cues}", std::fs::read_to_string(&scene).unwrap())).unwrap();
+    let scene = scene.to_str().unwrap();
+    let publisher =
+        publisher(name, &["--scene", scene, "run", "--json", "--paused", "--start", "50.25", "--duration", "600"]);
+    // Longer than any repetition would take.
+    let waiting = ["--transient-local", "--seconds", "120", "--linger", "4", "--samples"];
+    let start = |topic: &str, samples: &str| {
+        let mut process = Process::start(&mut subscriber(name, topic, &[&waiting[..], &[samples]].concat()));
+        let lines = process.lines();
+        (process, lines)
+    };
+    let constant = ["stage", "path"].map(|topic| start(topic, "1"));
+    let first = start("cues", "3");
+    first.1.until("made", 60);
+    constant.iter().for_each(|(_, lines)| drop(lines.until("sample", 60)));
+    let late = ["stage", "path"].map(|topic| start(topic, "1"));
+    for (_, lines) in constant.into_iter().chain(late) {
+        let rest = lines.until("end", 60);
+        let end: Value = serde_json::from_str(&rest).unwrap();
+        assert_eq!(end["samples"], 1, "{end}");
+    }
+    // The subscriber of cues is matched by now: no cue has passed.
+    let go = program(name).args(["control", "go"]).output().unwrap();
+    assert!(go.status.success(), "{}", text(&go.stderr));
+    let numbers = |printed: Vec<String>| -> Vec<u64> {
+        let samples = printed.iter().map(|line| serde_json::from_str::<Value>(line).unwrap());
+        samples.filter(|line| line["type"] == "sample").map(|sample| stamp(&sample)).collect()
+    };
+    let stamps = numbers(first.1.rest(120));
+    assert_eq!(stamps.len(), 3, "{stamps:?}");
+    assert!(stamps.is_sorted_by(|a, b| a < b), "{stamps:?}");
+    // The latest cue, alone: the first subscriber has left.
+    let late = start("cues", "1");
+    assert_eq!(numbers(late.1.rest(120)), stamps[2..]);
+    ended(publisher);
+}
+
+/// Returns for subscribers, one after the other, the time of creation and the stamps of their alerts.
+fn joined(name: &str, joins: u32, further: &[&str]) -> Vec<(u64, Vec<u64>)> {
+    let count = joins.to_string();
+    let arguments = [&["--joins", &count, "--samples", "1", "--linger", "0.15", "--seconds", "60"], further].concat();
+    let process = Process::start(&mut subscriber(name, "alerts", &arguments));
+    let mut joined: Vec<(u64, Vec<u64>)> = Vec::new();
+    for line in lines(process, "", 60 + 5 * u64::from(joins)) {
+        match line["type"].as_str() {
+            Some("made") => joined.push((line["made_ns"].as_u64().unwrap(), Vec::new())),
+            Some("sample") => joined.last_mut().unwrap().1.push(stamp(&line)),
+            _ => {}
+        }
+    }
+    assert_eq!(joined.len(), joins as usize);
+    joined
+}
+
+/// A countdown raises an alert each second.
+#[test]
+fn a_late_subscriber_gets_the_current_alert_and_a_volatile_one_none_before_it() {
+    if !can_run(peer_program().map(drop)) {
+        return;
+    }
+    let name = "joins";
+    let countdown = ("approach_time = 10.0", "approach_time = 1000.0");
+    let scene = scene_file(name, &[countdown, ("accuracy = 1e-9", "solver = \"newton\"")]);
+    let mut watch = Process::start(program(name).args(["watch", "--json"]));
+    let printed = watch.lines();
+    let show = ["--scene", scene.to_str().unwrap(), "run", "--ros2", "--json", "--rate", "30", "--duration", "600"];
+    let publisher = publisher(name, &show);
+    let mut published: Vec<u64> = Vec::new();
+    let mut publish_until = |instant: u64| {
+        while published.last().is_none_or(|stamp| *stamp < instant) {
+            let alert: Value = serde_json::from_str(&printed.until("\"type\":\"alert\"", 60)).unwrap();
+            published.push(alert["stamp_ns"].as_str().unwrap().parse().unwrap());
+        }
+        published.clone()
+    };
+    // Alerts without a subscriber on ROS 2.
+    let first = publish_until(0)[0];
+    publish_until(first + 3_000_000_000);
+    let joins = if long() { 50 } else { 12 };
+    let kept = ["--transient-local", "--depth", "10"];
+    for (made, alerts) in joined(name, joins, &kept) {
+        let published = publish_until(made.max(alerts[0]));
+        // An alert that was stamped just before may still be in flight.
+        let current = published.iter().rfind(|stamp| **stamp + 200_000_000 < made).unwrap();
+        assert!(alerts[0] >= *current, "{} ms old", (current - alerts[0]) / 1_000_000);
+        assert!(alerts.is_sorted_by(|a, b| a < b), "one comes twice: {alerts:?}");
+    }
+    // An alert may still be in flight on a busy machine; alerts of before are up to a second old.
+    for (made, alerts) in joined(name, joins, &[]) {
+        assert!(alerts[0] + 300_000_000 > made, "{} ms old", (made - alerts[0]) / 1_000_000);
+    }
+    drop(watch);
+    ended(publisher);
+}
+
+/// Returns the resident memory of a process, in MB.
+fn memory(process: u32) -> f64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
+    line.trim().trim_end_matches(" kB").parse::<f64>().unwrap() / 1024.0
+}
+
+/// Half of the subscribers are killed, the others leave. A subscriber that spins, as one of Fast DDS does that is sent an
+/// empty change, would never end.
+#[test]
+fn subscribers_that_come_and_go_cost_no_memory_and_none_is_left_without_messages() {
+    if !can_run(peer_program().map(drop)) {
+        return;
+    }
+    let name = "come_and_go";
+    let publisher = publisher(name, &["run", "--json", "--ros2", "--start", "300", "--loop", "--duration", "100000"]);
+    let (rounds, beside) = if long() { (250, 4) } else { (6, 4) };
+    let come_and_go = |index: usize| {
+        let (topic, durability) = [
+            ("handles", ""),
+            ("alerts", "--transient-local"),
+            ("handles", "--best-effort"),
+            ("stage", "--transient-local"),
+        ][index % 4];
+        let samples = if topic == "handles" { "20" } else { "1" };
+        let arguments = ["--seconds", "60", "--linger", "0", "--samples", samples, durability];
+        let arguments = arguments.iter().copied().filter(|argument| !argument.is_empty()).collect::<Vec<_>>();
+        let mut process = Process::start(&mut subscriber(name, topic, &arguments));
+        let printed = process.lines();
+        let is_killed = index / 4 % 2 == 1;
+        if is_killed {
+            printed.until("sample", 60);
+            process.signal(Signal::SIGKILL);
+        }
+        let rest = printed.rest(90);
+        let end = rest.iter().find(|line| line.contains("\"end\""));
+        let count = |line: &String| serde_json::from_str::<Value>(line).unwrap()["samples"].as_u64().unwrap();
+        assert!(is_killed || end.is_some_and(|line| count(line) >= samples.parse().unwrap()), "{topic}: {rest:?}");
+    };
+    let mut memories = Vec::new();
+    for round in 0..rounds {
+        std::thread::scope(|threads| {
+            for index in 0..beside {
+                threads.spawn(move || come_and_go(beside * round + index));
+            }
+        });
+        memories.push(memory(publisher.id()));
+    }
+    println!("{} subscribers, MB: {memories:.1?}", rounds * beside);
+    // Messages for killed subscribers are kept until their lease ends: a high-water mark within the first rounds.
+    let (first, last) = (memories[rounds / 3], memories[rounds - 1]);
+    assert!(last < first + 10.0, "{memories:.1?}");
+    // The publisher still serves, and ends.
+    let end =
+        lines(Process::start(&mut subscriber(name, "handles", &["--samples", "20", "--seconds", "60"])), "end", 90);
+    assert!(end[0]["samples"].as_u64() >= Some(20), "{end:?}");
+    ended(publisher);
+}
