@@ -410,6 +410,22 @@ class StageSegment(_Message):
     ]
 
 
+class SceneHeader(_Message):
+    """The header of a scene's text.
+
+    Over iceoryx2 the user header of `<name>/scene`, whose payload is the text (UTF-8, TOML) as a slice of bytes. Sent
+    at the start and kept for late subscribers. A replay has the service only if its recording holds the text.
+    """
+
+    LAYOUT = 1
+    _fields_ = [
+        # The run, as `FrameHeader.run_id`.
+        ("run_id", ctypes.c_uint64),
+        # BLAKE3 of the text, as `Stage.scene_hash`.
+        ("hash", ctypes.c_uint8 * 32),
+    ]
+
+
 class StageEvent(_Message):
     """An event of the show in a `Stage`."""
 
@@ -490,7 +506,7 @@ class Stage(_Message):
     ]
 
 
-MESSAGES = (HandlePose, HandlePose32, FrameHeader, CollisionAlert, LoopStatus, Cue, ControlRequest, ControlResponse, Stage)
+MESSAGES = (HandlePose, HandlePose32, FrameHeader, CollisionAlert, LoopStatus, Cue, ControlRequest, ControlResponse, SceneHeader, Stage)
 
 # From here on written by hand.
 

@@ -91,7 +91,7 @@ pub struct SoakSubscriberArguments {
 }
 
 /// Option of a process that exits when its parent process exits.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Clone, clap::Args)]
 pub struct Parent {
     /// End when the process that started this one ends, which has this number
     #[arg(long, value_name = "PID", hide = true)]

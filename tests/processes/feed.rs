@@ -35,7 +35,8 @@ fn poll(feed: &mut Feed, seen: &mut Vec<Seen>) {
         }
         FeedEvent::Silent => seen.push(Seen::Silent),
         FeedEvent::Gone => seen.push(Seen::Gone),
-        FeedEvent::Stage(_) | FeedEvent::Alert(_) | FeedEvent::Cue(_) | FeedEvent::Status(_) => (),
+        FeedEvent::Stage(_) | FeedEvent::Scene { .. } => (),
+        FeedEvent::Alert(_) | FeedEvent::Cue(_) | FeedEvent::Status(_) => (),
     });
     polled.unwrap();
 }
@@ -164,6 +165,7 @@ fn opened(name: &str, scene: &Scene, cues: usize, stage: Stage) -> SharedMemoryP
         subscribers: 2,
         alerts: false,
         cues,
+        scene: String::new(),
         stage,
     };
     SharedMemoryPublisher::open(&config).unwrap()
