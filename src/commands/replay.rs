@@ -52,7 +52,7 @@ pub struct ReplayArguments {
     /// Begin again whenever the recording is over
     #[arg(long = "loop", help_heading = "The show")]
     looping: bool,
-    /// Publish ROS 2 topics too, the default ones or those of --scene's [publish.ros2]
+    /// Publish ROS 2 topics too, those of --scene's [publish.ros2], or of the recorded scene, or the default ones
     #[arg(long)]
     ros2: bool,
     #[command(flatten)]
@@ -144,13 +144,14 @@ impl ReplayArguments {
 }
 
 /// Returns the transports' settings: the topics of the recording, with the scene's settings.
-fn config<'a>(common: &'a Common, scene: &'a Scene, prepared: &Prepared, run_id: u64) -> TransportConfig<'a> {
+fn config<'a>(common: &'a Common, scene: &'a Scene, prepared: &'a Prepared, run_id: u64) -> TransportConfig<'a> {
     let contents = prepared.contents();
     let stage = Stage { run_id, stamp_ns: realtime_ns(), ..contents.stage };
     TransportConfig {
         handles: contents.ends[0].handles as usize,
         alerts: contents.topics.contains(&Topic::Alerts),
         cues: (stage.cues as usize).min(MOST_CUES),
+        scene: contents.scene_text.as_deref().unwrap_or(""),
         ..TransportConfig::of(common.name(), scene, stage)
     }
 }

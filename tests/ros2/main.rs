@@ -4,4 +4,5 @@
 mod harness;
 mod ros2;
 mod ros2_control;
+mod ros2_feed;
 mod ros2_topics;

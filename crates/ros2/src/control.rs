@@ -4,7 +4,7 @@
 //! writers. ros2-client's `Server` does not fit: it hides the bytes of a request, which determine the mapping
 //! ([`mapping`]), and answers at once. A client whose reply reader is not matched yet would never get that answer, so
 //! an answer waits here ([`Matches`]). A dead client, or one that floods the services, costs the loop nothing: this
-X
+//! process takes the requests, and passes a bounded number of commands to the show at once.
 
 mod calls;
 mod endpoints;
