@@ -175,7 +175,7 @@ impl Supervisor {
     /// Keeps the process running until the show ends. Returns the counters of the last process.
     fn serve(&self) -> Option<TransportCounters> {
         let (shortest, longest) = DELAYS;
-        let mut delay = shortest;
+        let mut delay = Duration::ZERO;
         loop {
             let began = Instant::now();
             let ended = self.run_once();
