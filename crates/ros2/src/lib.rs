@@ -20,7 +20,7 @@ use rustdds::DomainParticipantBuilder;
 use bench_dragon_messages::Stage;
 use bench_dragon_ros2_messages::settings::Ros2Settings;
 
-use control::Mapping;
+pub use control::Mapping;
 use environment::{Network, Range, check_name};
 
 /// The reason why there are no ROS 2 topics.

@@ -8,9 +8,9 @@ use bench_dragon::publisher::live::TransportCounters;
 use bench_dragon::ros2::Ros2Error;
 use bench_dragon::ros2::bridge::{Bridge, BridgeConfig, BridgeCounters, Notice};
 
+use super::super::ros2_process::Ros2Line;
+use super::super::{CommandError, Common, Output, stop_on_signals};
 use super::Ros2Arguments;
-use crate::commands::ros2_process::Ros2Line;
-use crate::commands::{CommandError, Common, Output, stop_on_signals};
 
 /// Publishes until a signal comes.
 pub(super) fn ros2(common: &Common, arguments: &Ros2Arguments) -> Result<(), CommandError> {
