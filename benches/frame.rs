@@ -236,6 +236,7 @@ fn publish_over_iceoryx2(bencher: Bencher) {
         subscribers: 8,
         alerts: true,
         cues: 0,
+        scene: String::new(),
         stage: stage(1, 0, [0; 32], &scene.motion, &show),
     };
     let mut publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");

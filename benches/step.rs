@@ -163,6 +163,7 @@ fn publisher_and_subscriber(name: &str, scene: &Scene, show: &Show) -> (SharedMe
         subscribers: 1,
         alerts: true,
         cues: 0,
+        scene: String::new(),
         stage: stage(1, 0, [0; 32], &scene.motion, show),
     };
     let publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");

@@ -29,7 +29,7 @@ pub enum Command {
     Record(commands::record::RecordArguments),
     /// Publish a recording again, as the show was
     Replay(commands::replay::ReplayArguments),
-    /// Play the show of a log again and compare every bit
+    /// Play the show of a log again and compare every bit; or that of a recording, and compare every pose
     Verify(commands::verify::VerifyArguments),
     /// Watch a running publisher from another process
     Watch(commands::watch::WatchArguments),

@@ -1,5 +1,5 @@
 //! The loop itself allocates nothing after its first frame. Allocations are counted over the whole loop, across a
-//! contact and a loop of the show. The shared memory, the ROS 2 publisher and the log are real.
+//! contact and a loop of the show. The shared memory and the log are real.
 //!
 //! iceoryx2 0.10.0 keeps the state of each loaned sample in an `Rc`, made by `loan` and freed by `send`: one small
 //! allocation for every frame and every alert, which its interface does not avoid. The test demands exactly these.
@@ -108,17 +108,8 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     let timeline = scene.motion.timeline(&mut |_| ());
     let show = Show::new(&scene, timeline, playback).unwrap();
     let name = format!("test_{}_allocation", std::process::id());
-    let config = TransportConfig::of(&name, &scene, 500.0, stage(1, 0, [0; 32], &scene.motion, &show));
+    let config = TransportConfig::of(&name, &scene, stage(1, 0, [0; 32], &scene.motion, &show));
     let mut transports = transports::open(&config, &[transports::iceoryx2::open]).unwrap();
-    #[cfg(feature = "ros2")]
-    {
-        use bench_dragon::ros2::environment::{Network, Range};
-        use bench_dragon::ros2::open_on;
-        use bench_dragon::ros2_messages::settings::Ros2Settings;
-        let settings = Ros2Settings { rate: Some(100.0), ..Ros2Settings::default() };
-        let network = Network { domain: 93, range: Range::Localhost };
-        transports.push(open_on(network, None, &config, &settings).unwrap());
-    }
     let folder = tempfile::tempdir().unwrap();
     let line = ShowLine::new(&SceneText::paper(), &playback, Arithmetic::of(&scene), "", (1, 2));
     transports.push(log::open(&folder.path().join("log"), line, scene.team().handles()).unwrap().0);

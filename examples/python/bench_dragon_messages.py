@@ -348,7 +348,9 @@ class ControlRequest(_Message):
     _fields_ = [
         # A number that the client chooses; the response repeats it.
         ("id", ctypes.c_uint64),
-        # The value of a command that has one: simulated seconds per second, simulated seconds, or periods.
+        # The value of a command that has one: simulated seconds per second, simulated seconds, or periods. With the
+        # command state, 1 requests a response whose `time_scale` is the rate of the show when it plays, even while it
+        # is paused.
         ("value", ctypes.c_double),
         # 0 state, 1 pause, 2 resume, 3 rate, 4 seek, 5 step, 6 restart, 7 hold, 8 release, 9 go.
         ("command", ctypes.c_uint32),
@@ -368,7 +370,7 @@ class ControlResponse(_Message):
         ("tick", ctypes.c_uint64),
         # Simulated seconds of that period.
         ("sim_time", ctypes.c_double),
-        # Simulated seconds per second, as in force.
+        # Simulated seconds per second, as in force; 0 while paused or held, unless the request asks for another rate.
         ("time_scale", ctypes.c_double),
         # 0 done, 1 already so, 2 refused in this state, 3 value out of range, 4 not understood, 5 too many waiting.
         ("code", ctypes.c_uint32),
@@ -407,6 +409,23 @@ class StageSegment(_Message):
         ("kind", ctypes.c_uint32),
         # Always 0.
         ("reserved", ctypes.c_uint32),
+    ]
+
+
+class SceneHeader(_Message):
+    """The header of a scene's text.
+
+    Over iceoryx2 the user header of `<name>/scene`, whose payload is the text (UTF-8, TOML) as a slice of bytes. Sent
+    at the start and kept for late subscribers. The text is empty if it is not known, as in the replay of a recording
+    without it.
+    """
+
+    LAYOUT = 1
+    _fields_ = [
+        # The run, as `FrameHeader.run_id`.
+        ("run_id", ctypes.c_uint64),
+        # BLAKE3 of the text of the show, as `Stage.scene_hash`.
+        ("hash", ctypes.c_uint8 * 32),
     ]
 
 
@@ -490,7 +509,7 @@ class Stage(_Message):
     ]
 
 
-MESSAGES = (HandlePose, HandlePose32, FrameHeader, CollisionAlert, LoopStatus, Cue, ControlRequest, ControlResponse, Stage)
+MESSAGES = (HandlePose, HandlePose32, FrameHeader, CollisionAlert, LoopStatus, Cue, ControlRequest, ControlResponse, SceneHeader, Stage)
 
 # From here on written by hand.
 

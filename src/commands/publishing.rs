@@ -23,22 +23,7 @@ pub fn new_run_id() -> u64 {
 }
 
 /// All transports of this program.
-const TRANSPORTS: [transports::Open; 2] = [transports::iceoryx2::open, ros2_if_built];
-
-#[cfg(feature = "ros2")]
-use bench_dragon::ros2::open as ros2_if_built;
-
-#[cfg(not(feature = "ros2"))]
-fn ros2_if_built(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError> {
-    match config.ros2 {
-        None => Ok(None),
-        Some(_) => Err(TransportError::BadInput(
-            "ROS 2 is requested and this program was built without it: build it with the feature \"jazzy\" or \
-             \"humble\""
-                .to_owned(),
-        )),
-    }
-}
+const TRANSPORTS: [transports::Open; 1] = [transports::iceoryx2::open];
 
 /// Opens the transports that `config` requests. Returns them with the loop's ends of their command queues.
 pub fn open_transports(config: &TransportConfig) -> Result<(Vec<Box<dyn Transport>>, CommandQueues), CommandError> {

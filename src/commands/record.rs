@@ -29,7 +29,7 @@ const UNREAD_FRAMES: f64 = 2.0;
 const POLL_INTERVAL: (Duration, Duration) = (Duration::from_millis(1), Duration::from_millis(20));
 /// The interval of the progress on the terminal.
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(200);
-/// The longest wait for a stage after the first frame: a publisher detects a new subscriber within a second.
+/// The longest wait for stage and scene after the first frame: a publisher detects a new subscriber within a second.
 const STAGE_TIMEOUT: Duration = Duration::from_secs(2);
 /// The least size for `--split`.
 const LEAST_SPLIT: u64 = 1_000_000;
@@ -111,8 +111,8 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
 }
 
 /// Passes the feed's events to the thread until the end. After the first frame, obstacles of a later publisher's
-/// services do not end the recording. Without its stage a recording cannot be replayed, so a stage that follows the
-/// first frames is awaited.
+/// services do not end the recording. Without its stage a recording cannot be replayed, and without its scene not
+/// verified, so those that follow the first frames are awaited.
 fn follow(
     feed: &mut Feed,
     queue: &RecordQueue,
@@ -124,16 +124,17 @@ fn follow(
     let began = Instant::now();
     let (shortest, longest) = POLL_INTERVAL;
     let (mut interval, mut shown) = (shortest, began);
-    let (mut first_frame, mut has_stage) = (None, false);
+    let (mut first_frame, mut has_stage, mut has_scene) = (None, false, false);
     let mut obstacle = Obstacle::default();
     let over =
         || over() || thread.has_ended() || duration.is_some_and(|seconds| began.elapsed().as_secs_f64() >= seconds);
     let waits_for_stage = |first: Option<Instant>| first.is_some_and(|first| first.elapsed() < STAGE_TIMEOUT);
-    while !over() || !has_stage && waits_for_stage(first_frame) && !thread.has_ended() {
+    while !over() || !(has_stage && has_scene) && waits_for_stage(first_frame) && !thread.has_ended() {
         let polled = feed.poll(interval, &mut |event| {
             match event {
                 FeedEvent::Frame { .. } => drop(first_frame.get_or_insert_with(Instant::now)),
                 FeedEvent::Stage(_) => has_stage = true,
+                FeedEvent::Scene { .. } => has_scene = true,
                 FeedEvent::Status(status) => {
                     let seconds = Duration::try_from_secs_f64(UNREAD_FRAMES / status.rate);
                     interval = seconds.unwrap_or(longest).clamp(shortest, longest);

@@ -17,6 +17,7 @@ use jiff::{Timestamp, Unit};
 
 use super::publishing::{new_run_id, open_transports, print_summary, publish};
 use super::realtime_scheduling::RealtimeScheduling;
+use super::ros2_process::{Ros2Process, Ros2Request, Ros2Show};
 use super::{CommandError, Common, number, stop_on_signals};
 
 /// Nanoseconds that waiting subscribers have before the first frame: unlike a show's, it is not sent again.
@@ -51,7 +52,7 @@ pub struct ReplayArguments {
     /// Begin again whenever the recording is over
     #[arg(long = "loop", help_heading = "The show")]
     looping: bool,
-    /// Publish ROS 2 topics too, the default ones or those of --scene's [publish.ros2]
+    /// Publish ROS 2 topics too, those of --scene's [publish.ros2], or of the recorded scene, or the default ones
     #[arg(long)]
     ros2: bool,
     #[command(flatten)]
@@ -74,6 +75,12 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
     let rate = Accepted::RATE.check("the rate of the replay", prepared.rate()).map_err(|sentence| {
         CommandError::BadInput(format!("{shown}: {sentence}: choose another --rate or --time-scale"))
     })?;
+    let show = Ros2Show {
+        loop_rate: prepared.rate(),
+        alerts: prepared.contents().topics.contains(&Topic::Alerts),
+        cues: prepared.contents().stage.cues as usize,
+    };
+    let ros2 = scene.ros2.as_ref().map(|settings| Ros2Request::of(common, settings, show, true)).transpose()?;
     let stop = stop_on_signals()?;
     let run_id = new_run_id();
     let stem = || arguments.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -82,6 +89,7 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
     let start = start_lines(&shown, &of, &prepared);
     let benches = prepared.contents().stage.benches;
     let (mut frames, reading) = prepared.begin()?;
+    let process = ros2.as_ref().map(Ros2Process::start).transpose()?;
     let publishing = Publishing {
         scheduling: arguments.scheduling.scheduling(),
         run_id,
@@ -89,11 +97,13 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
         duration: arguments.duration,
         scene: &format!("replay of {of}"),
         lead_ns: LEAD_NS,
+        awaited: process.as_ref().map(Ros2Process::connected),
     };
     let print_start = |transports: &[Box<dyn Transport>]| {
         if !common.quiet && !common.json {
             eprintln!("{start}");
             transports.iter().for_each(|transport| eprintln!("{}", transport.describe()));
+            ros2.iter().for_each(|ros2| eprintln!("{}", ros2.description));
         }
     };
     let hooks = Hooks {
@@ -103,6 +113,7 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
         ended: Box::new(|_| ()),
     };
     let mut published = publish(common, benches, &publishing, &mut frames, (transports, doors), &stop, hooks)?;
+    published.deliveries.extend(process.and_then(Ros2Process::finish).map(|of| ("ros2".to_owned(), of)));
     let (waited, failure) = reading.finish();
     if waited > 0 {
         log::warn!("in {waited} periods a frame was due that had not been read from the disk: it went out later");
@@ -133,14 +144,15 @@ impl ReplayArguments {
 }
 
 /// Returns the transports' settings: the topics of the recording, with the scene's settings.
-fn config<'a>(common: &'a Common, scene: &'a Scene, prepared: &Prepared, run_id: u64) -> TransportConfig<'a> {
+fn config<'a>(common: &'a Common, scene: &'a Scene, prepared: &'a Prepared, run_id: u64) -> TransportConfig<'a> {
     let contents = prepared.contents();
     let stage = Stage { run_id, stamp_ns: realtime_ns(), ..contents.stage };
     TransportConfig {
         handles: contents.ends[0].handles as usize,
         alerts: contents.topics.contains(&Topic::Alerts),
         cues: (stage.cues as usize).min(MOST_CUES),
-        ..TransportConfig::of(common.name(), scene, prepared.rate(), stage)
+        scene: contents.scene_text.as_deref().unwrap_or(""),
+        ..TransportConfig::of(common.name(), scene, stage)
     }
 }
 

@@ -21,6 +21,7 @@ use bench_dragon::soak::histograms::HistogramLog;
 use super::events::sentence;
 use super::publishing::{new_run_id, open_transports, print_summary, publish};
 use super::realtime_scheduling::RealtimeScheduling;
+use super::ros2_process::{Ros2Process, Ros2Request, Ros2Show};
 use super::soak::Parent;
 use super::{CommandError, Common, number, search_timeline, stop_on_signals, warn_of_gap};
 
@@ -90,6 +91,8 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
     }
     let playback = arguments.playback(&scene)?;
     service_name(common.name(), "poses")?;
+    let show = Ros2Show { loop_rate: playback.rate, alerts: scene.alerts.is_some(), cues: scene.cues.len() };
+    let ros2 = scene.ros2.as_ref().map(|settings| Ros2Request::of(common, settings, show, false)).transpose()?;
     let timeline = if scene.alerts.is_some() {
         search_timeline(&scene, common)
     } else {
@@ -107,7 +110,7 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
     let (timeline, solver) = (show.timeline().clone(), show.solver_reason().to_owned());
     let cues = show.cues().to_vec();
     let session =
-        RunSession { common, arguments, text: &text, scene: &scene, playback, run_id, timeline, cues, solver };
+        RunSession { common, arguments, text: &text, scene: &scene, playback, run_id, timeline, cues, solver, ros2 };
     session.run(show, &stop)
 }
 
@@ -126,6 +129,8 @@ struct RunSession<'a> {
     cues: Vec<ReachedCue>,
     /// The solver and the reason for its choice.
     solver: String,
+    /// The process of ROS 2, if requested.
+    ros2: Option<Ros2Request>,
 }
 
 impl RunSession<'_> {
@@ -133,7 +138,8 @@ impl RunSession<'_> {
     fn run(&self, show: Show, stop: &AtomicBool) -> Result<(), CommandError> {
         let scene_hash = bench_dragon::proof::scene_hash(&self.text.text);
         let stage = convert::stage(self.run_id, realtime_ns(), scene_hash, &self.scene.motion, &show);
-        let config = TransportConfig::of(self.common.name(), self.scene, self.playback.rate, stage);
+        let config =
+            TransportConfig { scene: &self.text.text, ..TransportConfig::of(self.common.name(), self.scene, stage) };
         let (mut transports, doors) = open_transports(&config)?;
         // The last transport, so that the log has only published frames.
         let log = self.open_log()?.map(|(transport, outcome)| {
@@ -141,6 +147,7 @@ impl RunSession<'_> {
             outcome
         });
         let mut histograms = self.open_histograms()?;
+        let ros2 = self.ros2.as_ref().map(Ros2Process::start).transpose()?;
         let publishing = Publishing {
             scheduling: self.arguments.scheduling.scheduling(),
             run_id: self.run_id,
@@ -148,6 +155,7 @@ impl RunSession<'_> {
             duration: self.arguments.duration,
             scene: &self.scene.name,
             lead_ns: 0,
+            awaited: ros2.as_ref().map(Ros2Process::connected),
         };
         let mut source = ShowSource::new(show);
         let hooks = Hooks {
@@ -158,7 +166,8 @@ impl RunSession<'_> {
         };
         let benches = self.scene.team().benches as u32;
         let ends = (transports, doors);
-        let published = publish(self.common, benches, &publishing, &mut source, ends, stop, hooks)?;
+        let mut published = publish(self.common, benches, &publishing, &mut source, ends, stop, hooks)?;
+        published.deliveries.extend(ros2.and_then(Ros2Process::finish).map(|of| ("ros2".to_owned(), of)));
         print_summary(&published, self.common)?;
         let log_failure = log.and_then(|outcome| outcome.failure());
         let failure = published.error.map(|error| error.to_string()).or(log_failure);
@@ -196,6 +205,7 @@ impl RunSession<'_> {
         };
         eprintln!("{} frames per second{scale}, from {} s.", number(playback.rate), number(playback.start));
         transports.iter().for_each(|transport| eprintln!("{}", transport.describe()));
+        self.ros2.iter().for_each(|ros2| eprintln!("{}", ros2.description));
         match scene.alerts {
             Some(_) => eprintln!("Ahead, in simulated time:"),
             None => eprintln!("No alerts: contact and stall are not computed. Ahead, in simulated time:"),

@@ -1,5 +1,8 @@
 //! `send`: sends a running publisher's dragon to other machines. Each kind is a separate process.
 
+#[cfg(feature = "ros2")]
+mod ros2;
+
 use std::net::{Ipv4Addr, SocketAddrV4};
 use std::sync::atomic::Ordering;
 
@@ -12,6 +15,7 @@ use bench_dragon::outputs::send::osc_sender::{MOST_RATE, OscSender, OscSenders};
 use bench_dragon::outputs::send::psn_sender::{Notice, PsnOptions, PsnSender, USUAL_ADDRESS, USUAL_PORT, USUAL_RATE};
 use bench_dragon::outputs::send::trackers::{Numbers, Selection};
 
+use super::soak::Parent;
 use super::{CommandError, Common, Output, number, stop_on_signals};
 
 /// Arguments of `send`.
@@ -27,6 +31,9 @@ enum Kind {
     Psn(PsnArguments),
     /// OSC messages for show control: alerts, countdown, state, cues, the head
     Osc(OscArguments),
+    /// ROS 2 topics, and with --control services that conduct the show; the settings are those of the show's scene, or
+    /// of --scene
+    Ros2(Ros2Arguments),
 }
 
 /// Arguments of `send psn`.
@@ -76,6 +83,16 @@ struct OscArguments {
     rate: f64,
 }
 
+/// Arguments of `send ros2`.
+#[derive(Debug, Clone, clap::Args)]
+struct Ros2Arguments {
+    /// Offer services that conduct the show, to everybody whom ROS 2 reaches
+    #[arg(long)]
+    control: bool,
+    #[command(flatten)]
+    parent: Parent,
+}
+
 fn osc_destination(text: &str) -> Result<SocketAddrV4, String> {
     destination(text, None)
 }
@@ -99,6 +116,10 @@ pub fn send(common: &Common, arguments: &SendArguments) -> Result<(), CommandErr
     match &arguments.kind {
         Kind::Psn(arguments) => psn(common, arguments),
         Kind::Osc(arguments) => osc(common, arguments),
+        #[cfg(feature = "ros2")]
+        Kind::Ros2(arguments) => ros2::ros2(common, arguments),
+        #[cfg(not(feature = "ros2"))]
+        Kind::Ros2(_) => Err(super::ros2_process::not_built()),
     }
 }
 

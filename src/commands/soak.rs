@@ -75,7 +75,7 @@ pub struct SoakArguments {
     /// Wake-up lateness, 99.9th percentile: 200us, 1ms
     #[arg(long, value_name = "TIME", value_parser = nanoseconds, default_value = "200us", help_heading = "Limits")]
     max_lateness_p999: u64,
-    /// Growth of the publisher's resident memory after the first minute: 500kB, 1MB
+    /// Growth of the publisher's resident memory after the first minute, and of the ROS 2 process's: 500kB, 1MB
     #[arg(long, value_name = "SIZE", value_parser = bytes, default_value = "1MB", help_heading = "Limits")]
     max_rss_growth: u64,
 }
@@ -91,7 +91,7 @@ pub struct SoakSubscriberArguments {
 }
 
 /// Option of a process that exits when its parent process exits.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Clone, clap::Args)]
 pub struct Parent {
     /// End when the process that started this one ends, which has this number
     #[arg(long, value_name = "PID", hide = true)]
@@ -176,7 +176,8 @@ fn print(report: &Report, common: &Common) -> Result<(), CommandError> {
 
 impl SoakArguments {
     fn check(&self, common: &Common) -> Result<(), CommandError> {
-        let admitted = common.load_scene()?.subscribers;
+        let scene = common.load_scene()?;
+        let admitted = scene.subscribers;
         service_name(common.name(), "poses")?;
         if let Some(rate) = self.rate {
             Accepted::RATE.check("--rate", rate).map_err(CommandError::BadInput)?;
@@ -187,9 +188,10 @@ impl SoakArguments {
                 self.flaky_clients
             )));
         }
-        // The conductor reads the frames too.
-        let conductor = usize::from(self.conduct.is_some());
-        let all = self.subscribers.saturating_add(self.slow).saturating_add(self.flaky).saturating_add(conductor);
+        // The conductor and the process of ROS 2 read the frames too.
+        let (conducts, has_ros2) = (self.conduct.is_some(), self.ros2 || scene.ros2.is_some());
+        let others = usize::from(conducts) + usize::from(has_ros2);
+        let all = self.subscribers.saturating_add(self.slow).saturating_add(self.flaky).saturating_add(others);
         if self.subscribers == 0 || all > admitted {
             return Err(CommandError::BadInput(format!(
                 "--subscribers, --slow and --flaky are {}, {} and {}, expected at least 1 and together at most \
@@ -197,8 +199,13 @@ impl SoakArguments {
                 self.subscribers,
                 self.slow,
                 self.flaky,
-                admitted.saturating_sub(conductor),
-                if conductor > 0 { ", less one for --conduct" } else { "" }
+                admitted.saturating_sub(others),
+                match (conducts, has_ros2) {
+                    (false, false) => "",
+                    (true, false) => ", less one for --conduct",
+                    (false, true) => ", less one for ROS 2",
+                    (true, true) => ", less one each for --conduct and ROS 2",
+                }
             )));
         }
         Ok(())
@@ -223,7 +230,8 @@ impl SoakArguments {
             .chain(role(Role::Slow, self.slow))
             .chain(role(Role::Flaky, self.flaky));
         let conduct = self.conduct.map(|seed| ConductPlan { seed, rate: self.rate, flaky_clients: self.flaky_clients });
-        Ok(Plan { program: std::env::current_exe()?, common: shared, publisher, roles: roles.collect(), conduct })
+        let ros2 = self.ros2 || common.load_scene()?.ros2.is_some();
+        Ok(Plan { program: std::env::current_exe()?, common: shared, publisher, roles: roles.collect(), ros2, conduct })
     }
 
     fn limits(&self) -> Limits {

@@ -1,6 +1,8 @@
-//! `verify`: plays the show of a log again and compares every bit, or checks a certificate of events.
+//! `verify`: plays the show of a log again and compares every bit, checks a certificate of events, or computes the poses
+//! of a recording again.
 
 pub mod certificate;
+mod recording;
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
@@ -14,7 +16,7 @@ use super::{CommandError, Common, Output, progress_bar};
 /// Arguments of `verify`.
 #[derive(Debug, clap::Args)]
 pub struct VerifyArguments {
-    /// A log, as `run --log` writes it, or a certificate, as `events --certify` does
+    /// A log, as `run --log` writes it, a certificate, as `events --certify` does, or a recording, as `record` does
     #[arg(value_name = "FILE")]
     file: PathBuf,
 }
@@ -22,17 +24,25 @@ pub struct VerifyArguments {
 /// Bytes of the longest first line that is read to determine the kind of file.
 const LONGEST_FIRST_LINE: u64 = 1 << 26;
 
-/// Verifies a log or a certificate. Exit code 0: a log has the same show, or close to it; a certificate is valid. 1: a
-/// difference, nothing to compare; a line that does not follow. 2: a file that is neither.
+/// The first bytes of a recording.
+const MCAP_MAGIC: &[u8] = b"\x89MCAP";
+
+/// Verifies a log, a certificate or a recording. Exit code 0: a log or a recording has the same show, or close to it; a
+/// certificate is valid. 1: a difference, nothing to compare; a line that does not follow. 2: a file of another kind.
 pub fn verify(common: &Common, arguments: &VerifyArguments) -> Result<(), CommandError> {
     let shown = arguments.file.display().to_string();
-    let unread =
-        |error: io::Error| CommandError::BadInput(format!("{shown}: {error}, expected a log or a certificate to read"));
+    let unread = |error: io::Error| {
+        CommandError::BadInput(format!("{shown}: {error}, expected a log, a certificate or a recording to read"))
+    };
     let file = File::open(&arguments.file).map_err(unread)?;
     let bar = progress_bar(file.metadata().map_or(0, |data| data.len()), common);
     let mut file = BufReader::new(file);
     let mut first = Vec::new();
     file.by_ref().take(LONGEST_FIRST_LINE).read_until(b'\n', &mut first).map_err(unread)?;
+    if first.starts_with(MCAP_MAGIC) {
+        bar.finish_and_clear();
+        return recording::verify(common, &arguments.file);
+    }
     let is_certificate = is_certificate(&first);
     let lines = Cursor::new(first).chain(file);
     let mut progress = |bytes| bar.set_position(bytes);

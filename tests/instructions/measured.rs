@@ -133,6 +133,7 @@ impl Step {
             subscribers: 1,
             alerts: true,
             cues: 0,
+            scene: String::new(),
             stage: stage(1, 0, [0; 32], &scene.motion, &show),
         };
         let publisher = SharedMemoryPublisher::open(&config).unwrap();

@@ -1,5 +1,5 @@
-//! The actors beside the loop: the statistics thread, the thread of a transport, control clients, subscribers, and the
-//! actors that set the wall clock or stop the show.
+//! The actors beside the loop: the statistics thread, control clients, subscribers, and the actors that set the wall clock
+//! or stop the show.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -12,9 +12,7 @@ use bench_dragon::messages::control::Command;
 use bench_dragon::publisher::live::StatusPublisher;
 use bench_dragon::publisher::live::control::{CommandSender, MOST_WAITING};
 use bench_dragon::publisher::live::statistics::Collector;
-use bench_dragon::publisher::transports::background::Worker;
 
-use crate::behind::{Behind, Network};
 use crate::collected::Collected;
 use crate::oracle::Oracle;
 use crate::port::{Receiver, Receivers};
@@ -51,46 +49,6 @@ pub struct Statuses(pub Rc<RefCell<Collected>>);
 impl StatusPublisher for Statuses {
     fn publish_status(&mut self, status: &LoopStatus) {
         self.0.borrow_mut().status(status, status.stamp_ns);
-    }
-}
-
-/// The thread of a transport.
-pub struct Background {
-    pub worker: Rc<RefCell<Worker<Network>>>,
-    pub behind: Rc<RefCell<Behind>>,
-    pub period_ns: u64,
-}
-
-impl Actor for Background {
-    fn step(&mut self, world: &World) -> u64 {
-        let mut worker = self.worker.borrow_mut();
-        let poll_at = worker.send(&Frozen(world));
-        self.behind.borrow_mut().emptied(worker.counters());
-        let mut random = world.random.borrow_mut();
-        // The network blocks. At a low rate the thread polls less often than every 50 ms, so that a night costs less.
-        let blocked_ns = match random.below(40) {
-            0 => random.below(40 * self.period_ns),
-            1 => random.below(2 * SECOND_NS),
-            _ => random.below(self.period_ns / 4 + 1),
-        };
-        poll_at.max(world.now_ns() + 1) + blocked_ns
-    }
-}
-
-/// A clock without progress, for a step that takes no time.
-pub struct Frozen<'a>(pub &'a World);
-
-impl bench_dragon::client::clock::Clock for Frozen<'_> {
-    fn monotonic_ns(&self) -> u64 {
-        self.0.now_ns()
-    }
-
-    fn realtime_ns(&self) -> u64 {
-        self.0.realtime()
-    }
-
-    fn sleep_until(&self, _deadline_ns: u64) {
-        unreachable!("a step does not sleep");
     }
 }
 

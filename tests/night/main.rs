@@ -6,7 +6,6 @@
 //! events.
 
 mod actors;
-mod behind;
 mod collected;
 mod doors;
 mod levels;

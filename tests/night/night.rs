@@ -8,13 +8,11 @@ use bench_dragon::publisher::live::control::{CommandQueues, CommandSender, comma
 use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::publisher::live::statistics::{Collector, Run, queues_of};
 use bench_dragon::publisher::live::{End, LoopCounts, LoopOptions, Publisher, StatusPublisher, run_loop};
-use bench_dragon::publisher::transports::background::{self, BackgroundConfig, Worker};
 use bench_dragon::show::scene::AtEnd;
 use bench_dragon::show::{Playback, Show};
 use bench_dragon_testing::model::{Formula, Model, ModelCue, ModelShow};
 
-use crate::actors::{Background, Controller, Frozen, Statistics, Statuses, Stopper, Subscriber, WallClock};
-use crate::behind::{Behind, Network};
+use crate::actors::{Controller, Statistics, Statuses, Stopper, Subscriber, WallClock};
 use crate::collected::Collected;
 use crate::levels::Levels;
 use crate::oracle::{Checked, Oracle};
@@ -24,16 +22,12 @@ use crate::random::Random;
 use crate::tally::Tally;
 use crate::world::{Trace, World, same};
 
-/// A queue's oracle, and the thread at its other end.
-type Thread = (Rc<RefCell<Behind>>, Rc<RefCell<Worker<Network>>>);
-
 /// All actors and models, without the loop.
 struct Cast {
     world: Rc<World>,
     oracle: Rc<RefCell<Oracle>>,
     collected: Rc<RefCell<Collected>>,
     collector: Rc<RefCell<Collector<'static>>>,
-    thread: Option<Thread>,
     doors: Vec<Rc<RefCell<CommandSender>>>,
     subscribers: Vec<Rc<RefCell<Subscriber>>>,
 }
@@ -48,11 +42,9 @@ pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
     let (reports, inbox) = queues_of(plan.queues.0, plan.queues.1);
     let collected = Rc::new(RefCell::new(Collected::new(plan.queues.0, plan.queues.1, plan.begin_ns)));
 
-    let mut publishers: Vec<Box<dyn Publisher>> = Vec::new();
-    let mut sinks: Vec<Box<dyn StatusPublisher>> = vec![Box::new(Statuses(Rc::clone(&collected)))];
-    let thread = plan.background_rate.map(|rate| thread(&plan, stage, rate, &mut publishers, &mut sinks));
+    let sinks: Vec<Box<dyn StatusPublisher>> = vec![Box::new(Statuses(Rc::clone(&collected)))];
     let run_id = seed ^ 0x5eed;
-    let oracle = oracle(&plan, stage, &show, run_id, &collected, thread.as_ref());
+    let oracle = oracle(&plan, stage, &show, run_id, &collected);
     let oracle = Rc::new(RefCell::new(oracle));
     let [announced, sampled] = [(); 2].map(|()| Rc::clone(&collected));
     let run = Run {
@@ -83,9 +75,8 @@ pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
         quiet_maintenance: 1000,
         maintained: None,
     };
-    // First, so that a full memory is noticed before other transports have the frame.
-    publishers.insert(0, Box::new(shared_memory));
-    let cast = Cast { world, oracle, collected, collector, thread, doors, subscribers };
+    let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(shared_memory)];
+    let cast = Cast { world, oracle, collected, collector, doors, subscribers };
     cast.enter(&plan, stage);
 
     let mut frames =
@@ -104,41 +95,14 @@ pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
     cast.settle(&plan, &counts)
 }
 
-/// Adds a transport with a separate thread: its ends go to the loop and to the statistics.
-fn thread(
-    plan: &Plan,
-    stage: &Stage,
-    rate: f64,
-    publishers: &mut Vec<Box<dyn Publisher>>,
-    sinks: &mut Vec<Box<dyn StatusPublisher>>,
-) -> Thread {
-    let cues = stage.scene.cues.len();
-    let handles = stage.scene.team().handles();
-    let config = BackgroundConfig { name: "night", handles, cues, loop_rate: plan.rate, rate };
-    let (publisher, status, inbox) = background::queues(config);
-    publishers.push(Box::new(publisher));
-    sinks.push(Box::new(status));
-    let behind = Rc::new(RefCell::new(Behind::new(plan.rate, rate, cues)));
-    let worker = Worker::new(Network(Rc::clone(&behind)), inbox, rate);
-    (behind, Rc::new(RefCell::new(worker)))
-}
-
-fn oracle(
-    plan: &Plan,
-    stage: &Stage,
-    show: &Show,
-    run_id: u64,
-    collected: &Rc<RefCell<Collected>>,
-    thread: Option<&Thread>,
-) -> Oracle {
+fn oracle(plan: &Plan, stage: &Stage, show: &Show, run_id: u64, collected: &Rc<RefCell<Collected>>) -> Oracle {
     let Playback { rate, start, at_end, end_hold, paused, time_scale, .. } = plan.playback;
     let cues = show.cues().iter().map(|cue| ModelCue { time: cue.time, pauses: cue.pauses }).collect();
     let end_hold = (at_end == AtEnd::Loop).then(|| (end_hold * rate).round() as u64);
     let model = ModelShow { start, end: stage.freeze(&plan.playback), end_hold, cues };
     let model = Model::new(model, Formula::new(rate), time_scale, paused);
     let levels = stage.rules().map(|rules| Levels::new(rules, rate));
-    let behind = thread.map(|(behind, _)| Rc::clone(behind));
-    Oracle::new(run_id, (rate, model), levels, stage.events(), plan.doors.len(), Rc::clone(collected), behind)
+    Oracle::new(run_id, (rate, model), levels, stage.events(), plan.doors.len(), Rc::clone(collected))
 }
 
 impl Cast {
@@ -152,11 +116,6 @@ impl Cast {
             every_ns: plan.statistics_every_ns,
         };
         world.add(Box::new(statistics), soon(plan.statistics_every_ns));
-        if let (Some((behind, worker)), Some(rate)) = (&self.thread, plan.background_rate) {
-            let period_ns = (1e9 / rate) as u64;
-            let thread = Background { worker: Rc::clone(worker), behind: Rc::clone(behind), period_ns };
-            world.add(Box::new(thread), soon(period_ns));
-        }
         for (number, (pause_ns, door)) in plan.doors.iter().zip(&self.doors).enumerate() {
             let controller = Controller {
                 number,
@@ -181,18 +140,13 @@ impl Cast {
 
     /// Delivers the messages in flight after the end of the loop, and compares all counts.
     fn settle(self, plan: &Plan, counts: &LoopCounts) -> Tally {
-        let Self { world, oracle, collected, collector, thread, doors, subscribers } = self;
+        let Self { world, oracle, collected, collector, doors, subscribers } = self;
         oracle.borrow_mut().pace.ended(&world, counts, plan.periods);
         let mut last = collector.borrow_mut();
         last.take();
         let now_ns = world.now_ns();
         last.report(now_ns, true, |status| bench_dragon::messages::LoopStatus { stamp_ns: now_ns, ..status });
         collected.borrow().ended(&last.summary(), counts.frames);
-        if let Some((behind, worker)) = thread {
-            // No other actor runs now.
-            worker.borrow_mut().send(&Frozen(&world));
-            behind.borrow_mut().emptied(worker.borrow().counters());
-        }
         for (number, door) in doors.iter().enumerate() {
             while let Some(answer) = door.borrow_mut().answer() {
                 oracle.borrow_mut().entrance.taken(number, &answer);

@@ -16,7 +16,6 @@ use bench_dragon::show::Outcome;
 use bench_dragon::show::convert::Stamps;
 use bench_dragon_testing::model::{Formula, Model};
 
-use crate::behind::Behind;
 use crate::collected::{Announced, Collected, Expected};
 use crate::doors::Entrance;
 use crate::levels::Levels;
@@ -35,7 +34,6 @@ pub struct Oracle {
     pub events: Vec<(f64, FrameState)>,
     pub entrance: Entrance,
     pub collected: Rc<RefCell<Collected>>,
-    pub behind: Option<Rc<RefCell<Behind>>>,
     /// Epoch of the frame before.
     epoch: u32,
     shows_played: u64,
@@ -43,8 +41,6 @@ pub struct Oracle {
     began_ns: (u64, u64),
     sent_ns: u64,
     sample: Option<(FrameHeader, Vec<Announced>)>,
-    /// The place of its head, its alerts and its cues, in flight to a transport's queue.
-    queued: Option<(f64, Numbered, Numbered)>,
 }
 
 impl Oracle {
@@ -55,7 +51,6 @@ impl Oracle {
         events: Vec<(f64, FrameState)>,
         doors: usize,
         collected: Rc<RefCell<Collected>>,
-        behind: Option<Rc<RefCell<Behind>>>,
     ) -> Self {
         Self {
             run_id,
@@ -65,13 +60,11 @@ impl Oracle {
             events,
             entrance: Entrance::new(doors),
             collected,
-            behind,
             epoch: 0,
             shows_played: 0,
             began_ns: (0, 0),
             sent_ns: 0,
             sample: None,
-            queued: None,
         }
     }
 
@@ -103,7 +96,6 @@ impl Oracle {
         (self.epoch, self.shows_played) = (self.show.epoch, self.show.shows_played);
         let mut tally = world.tally.borrow_mut();
         (tally.alerts, tally.cues) = (tally.alerts + alerts.len() as u64, tally.cues + cues.len() as u64);
-        self.queued = Some((outgoing.chain.x[0], alerts.clone(), cues.clone()));
         let of = |what, list: Numbered| list.into_iter().map(move |(tick, number)| (tick, what, number));
         self.sample = Some((*header, of("alert", alerts).chain(of("cue", cues)).collect()));
     }
@@ -127,13 +119,9 @@ impl Oracle {
         same("the state", header.frame_state(), Some(expected));
     }
 
-    /// Records that the shared memory has the frame; the next transport gets it.
-    pub fn frame_was_sent(&mut self, world: &World, header: &FrameHeader) {
+    /// Records that the shared memory has the frame.
+    pub fn frame_was_sent(&mut self, world: &World) {
         self.sent_ns = world.now_ns();
-        let (x, alerts, cues) = self.queued.take().expect("a frame");
-        if let Some(behind) = &self.behind {
-            behind.borrow_mut().published(header, x, &alerts, &cues);
-        }
     }
 
     /// Checks the kept alert that a new subscriber gets.

@@ -117,8 +117,6 @@ pub struct Plan {
     /// Room of the statistics: samples, and alerts and cues.
     pub queues: (usize, usize),
     pub statistics_every_ns: u64,
-    /// The rate of a transport with a separate thread.
-    pub background_rate: Option<f64>,
     pub wall_clock_every_ns: f64,
 }
 
@@ -164,7 +162,6 @@ impl Plan {
             readers: (0..random.below(4)).map(|_| reader(random)).collect(),
             queues: random.pick(&[(1, 1), (300, 20), (1 << 12, 1 << 8), (1 << 14, 1 << 10), (1 << 14, 1 << 10)]),
             statistics_every_ns: if fast { SECOND_NS / 50 } else { often(random, 200.0, 8000.0) },
-            background_rate: random.once_in(2).then(|| rate * random.pick(&[1.0, 0.5, 0.013])),
             wall_clock_every_ns: random.magnitude(30.0, 30_000.0) * period_ns,
         }
     }

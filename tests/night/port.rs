@@ -110,7 +110,7 @@ impl Publisher for SharedMemory {
                 receiver.put(&header);
             }
         }
-        oracle.borrow_mut().frame_was_sent(world, outgoing.header);
+        oracle.borrow_mut().frame_was_sent(world);
         Ok(())
     }
 

@@ -35,7 +35,8 @@ fn poll(feed: &mut Feed, seen: &mut Vec<Seen>) {
         }
         FeedEvent::Silent => seen.push(Seen::Silent),
         FeedEvent::Gone => seen.push(Seen::Gone),
-        FeedEvent::Stage(_) | FeedEvent::Alert(_) | FeedEvent::Cue(_) | FeedEvent::Status(_) => (),
+        FeedEvent::Stage(_) | FeedEvent::Scene { .. } => (),
+        FeedEvent::Alert(_) | FeedEvent::Cue(_) | FeedEvent::Status(_) => (),
     });
     polled.unwrap();
 }
@@ -164,6 +165,7 @@ fn opened(name: &str, scene: &Scene, cues: usize, stage: Stage) -> SharedMemoryP
         subscribers: 2,
         alerts: false,
         cues,
+        scene: String::new(),
         stage,
     };
     SharedMemoryPublisher::open(&config).unwrap()
@@ -194,6 +196,7 @@ fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {
     let mut poll = |runs: &mut Vec<(&'static str, u64)>| {
         let polled = feed.poll(Duration::from_millis(20), &mut |event| match event {
             FeedEvent::Stage(stage) => runs.push(("stage", stage.run_id)),
+            FeedEvent::Scene { header, .. } => runs.push(("scene", header.run_id)),
             FeedEvent::Started { run_id } => runs.push(("started", run_id)),
             FeedEvent::Frame { header, .. } => runs.push(("frame", header.run_id)),
             other => panic!("{other:?}"),
@@ -217,6 +220,6 @@ fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {
         poll(&mut runs);
         sequence += 1;
     }
-    assert_eq!(runs[..3], [("stage", 8), ("started", 8), ("frame", 8)]);
-    assert!(runs[3..].iter().all(|one| *one == ("frame", 8)), "{runs:?}");
+    assert_eq!(runs[..4], [("stage", 8), ("scene", 8), ("started", 8), ("frame", 8)]);
+    assert!(runs[4..].iter().all(|one| *one == ("frame", 8)), "{runs:?}");
 }

@@ -14,6 +14,7 @@ mod metrics;
 mod readers;
 mod record;
 mod replay;
+mod scene;
 mod second_publisher;
 mod send;
 mod soak;

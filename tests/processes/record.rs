@@ -97,7 +97,7 @@ fn small_recording(name: &str, folder: &Path) -> PathBuf {
 
 #[test]
 fn every_message_of_every_topic_is_what_another_subscriber_got() {
-    if !can_run(python_modules(&["iceoryx2", "mcap", "mcap_ros2", "rosbags"])) {
+    if !can_run(python_modules(&["blake3", "iceoryx2", "mcap", "mcap_ros2", "rosbags"])) {
         return;
     }
     let (name, folder) = ("record_equal", tempfile::tempdir().unwrap());

@@ -4,6 +4,7 @@ mod files;
 mod played;
 use crate::harness;
 mod refused;
+mod verified;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

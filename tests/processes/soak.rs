@@ -128,6 +128,36 @@ fn assert_is_whole_page(page: &str, subscribers: usize) {
     }
 }
 
+#[cfg(feature = "ros2")]
+#[test]
+fn the_memory_of_the_process_of_ros_2_is_in_the_report() {
+    let place = Place::new("soak_ros2");
+    let soak = |arguments: &[&str]| {
+        let mut soak = place.program();
+        soak.args(["soak", "--json", "--ros2", "--duration", "5s"]).args(arguments).args(ANY_SPEED);
+        Process::start(&mut soak).output_within(90)
+    };
+    let output = soak(&["--subscribers", "2"]);
+    assert!(output.status.success(), "{} {}", text(&output.stderr), text(&output.stdout));
+    let report = json_lines(&output).pop().unwrap();
+    let publisher = &report["publisher"];
+    assert!(number(&publisher["ros2"], "frames") > 100, "{publisher}");
+    let columns = report["history"]["columns"].as_array().unwrap();
+    let [of_ros2, of_loop] = ["ros2_resident_bytes", "resident_bytes"].map(|name| {
+        let at = columns.iter().position(|column| column == name).unwrap();
+        let rows = report["history"]["rows"].as_array().unwrap();
+        rows.iter().map(|row| row["values"][at].as_f64().unwrap()).collect::<Vec<_>>()
+    });
+    // The memory of DDS is there, and not in the loop's process.
+    assert!(of_ros2.len() >= 4 && of_ros2.iter().all(|bytes| *bytes > 10e6), "{of_ros2:?}");
+    assert_ne!(of_ros2, of_loop);
+    // ROS 2 is one of the eight subscribers that the publisher admits.
+    let refused = soak(&["--subscribers", "8"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("less one for ROS 2"), "{}", text(&refused.stderr));
+    place.assert_clean();
+}
+
 #[test]
 fn a_scene_of_weak_accuracy_passes_with_the_links_it_promises() {
     let place = Place::new("weak");

@@ -213,6 +213,7 @@ class Comparison:
 
 
 def compare(name, kept, recordings):
+    from blake3 import blake3
     from mcap.reader import make_reader
     from mcap_ros2.decoder import DecoderFactory
 
@@ -229,8 +230,10 @@ def compare(name, kept, recordings):
                 assert "offered_qos_profiles" in channel.metadata, channel
                 times.append(raw.log_time)
                 comparison.message(channel.topic, raw.publish_time, raw.sequence, message)
-            attachments = {attachment.name: json.loads(attachment.data) for attachment in reader.iter_attachments()}
-            attached = attachments["bench_dragon.json"]
+            attachments = {attachment.name: attachment.data for attachment in reader.iter_attachments()}
+            attached = json.loads(attachments["bench_dragon.json"])
+            scene_hash = bytes(comparison.events["stage"][0].scene_hash)
+            assert blake3(attachments["scene.toml"]).digest() == scene_hash, "another scene than the show's"
             assert attached["name"] == name and attached["stage"]["benches"] == comparison.events["stage"][0].benches
             assert int(attached["run_id"]) == comparison.frames[0][0].run_id
             assert min(times) >= comparison.first, "a time before all frames"

@@ -28,7 +28,7 @@ use std::sync::LazyLock;
 use bench_dragon::messages::state::{FrameState, Level, PlaybackState};
 use bench_dragon::messages::{
     CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32, LoopStatus, NO_BENCH,
-    SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, Stage, StageCue, StageEvent,
+    SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, SceneHeader, Stage, StageCue, StageEvent,
     StageSegment,
 };
 use bench_dragon::ros2_messages::settings::Topic;
@@ -336,6 +336,7 @@ fn python_sees_the_layouts_and_the_names_of_rust() {
         layout::<Cue>(),
         layout::<ControlRequest>(),
         layout::<ControlResponse>(),
+        layout::<SceneHeader>(),
         layout::<Stage>(),
     ];
     assert_eq!(printed["messages"].as_array().unwrap().len(), messages.len(), "a message is not compared");

@@ -5,4 +5,5 @@ mod fast_dds;
 mod harness;
 mod ros2;
 mod ros2_control;
+mod ros2_feed;
 mod ros2_topics;

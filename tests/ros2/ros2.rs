@@ -7,6 +7,7 @@ use crate::harness;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use bench_dragon::soak::resources::child_of;
 use harness::hosts::Hosts;
 use harness::{
     Process, can_run, json_lines, long, not_run, program, python, python_modules, scene_file, summary, text, unique,
@@ -298,25 +299,37 @@ fn without_being_asked_there_is_no_dds_thread_and_no_network_socket() {
     let plain = Process::start(program("plain").args(["run", "--duration", "6"]));
     let requested = Process::start(program("requested").args(["run", "--ros2", "--duration", "6"]));
     wait_until("both have opened their transports", || {
-        let (threads, sockets) = of_process(requested.id());
         let is_open = of_process(plain.id()).0.iter().any(|name| name.trim() == "control");
-        is_open && dds_threads(&threads) >= 2 && sockets >= 2
+        is_open && child_of(requested.id()).is_some_and(speaks_dds)
     });
-    let (threads, sockets) = of_process(plain.id());
-    assert_eq!((dds_threads(&threads), sockets), (0, 0), "{threads:?}");
+    // The process of a show has none, whether or not ROS 2 is requested.
+    for show in [plain.id(), requested.id()] {
+        let (threads, sockets) = of_process(show);
+        assert_eq!((dds_threads(&threads), sockets), (0, 0), "{threads:?}");
+    }
     // Proves that the same test finds threads and sockets if they exist.
-    let (threads, sockets) = of_process(requested.id());
-    assert!(dds_threads(&threads) >= 2 && sockets >= 2, "{threads:?}, {sockets} sockets");
+    let child = child_of(requested.id()).unwrap();
+    let (threads, sockets) = of_process(child);
+    assert!(speaks_dds(child), "{threads:?}, {sockets} sockets");
+    assert_eq!(child_of(plain.id()), None);
+}
+
+/// Returns true if a process has the threads and sockets of DDS.
+fn speaks_dds(process: u32) -> bool {
+    let (threads, sockets) = of_process(process);
+    dds_threads(&threads) >= 2 && sockets >= 2
 }
 
 fn dds_threads(threads: &[String]) -> usize {
-    threads.iter().filter(|name| name.contains("DDS") || name.contains("ros2")).count()
+    threads.iter().filter(|name| name.contains("DDS")).count()
 }
 
 /// Returns the names of a process's threads and the number of its network sockets.
 fn of_process(process: u32) -> (Vec<String>, usize) {
-    let folder = |name: &str| std::fs::read_dir(format!("/proc/{process}/{name}")).unwrap().flatten();
-    let threads = folder("task").map(|task| std::fs::read_to_string(task.path().join("comm")).unwrap()).collect();
+    // A process can end meanwhile.
+    let folder = |name: &str| std::fs::read_dir(format!("/proc/{process}/{name}")).into_iter().flatten().flatten();
+    let threads =
+        folder("task").map(|task| std::fs::read_to_string(task.path().join("comm")).unwrap_or_default()).collect();
     let tables: String = ["tcp", "tcp6", "udp", "udp6"]
         .map(|table| std::fs::read_to_string(format!("/proc/{process}/net/{table}")).unwrap_or_default())
         .concat();
@@ -358,10 +371,7 @@ fn two_hosts_find_each_other_by_multicast_or_where_the_subscriber_names_the_publ
         run.args(["run", "--ros2", "--json", "--duration", "9"]);
         let publisher = Process::start(on("left", &run).env("ROS_AUTOMATIC_DISCOVERY_RANGE", range));
         // A subscriber announces itself to its static peers in a burst when it starts: the publisher must hear it.
-        wait_until("ROS 2 is up", || {
-            let (threads, sockets) = of_process(publisher.id());
-            dds_threads(&threads) >= 2 && sockets >= 2
-        });
+        wait_until("ROS 2 is up", || child_of(publisher.id()).is_some_and(speaks_dds));
         let subscriber = peer("hosts", "5", &["poses"]);
         let reader = Process::start(on("right", &subscriber).env("CYCLONEDDS_URI", peers));
         let output = reader.output_within(40);

@@ -3,6 +3,7 @@
 //! It keeps no counts: the [`feed`](super::feed), which calls it, decides when to open, to read and to disconnect. A
 //! service can have more than one publisher: `selected` has the one whose messages are read.
 
+mod scene;
 mod selected;
 
 use std::cell::RefCell;
@@ -23,6 +24,8 @@ use crate::shared_memory::{CLOCK, OpenError, check_room_to_subscribe, node, rese
 use bench_dragon_messages::{
     CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus, Stage,
 };
+use scene::SceneReceiver;
+pub use scene::SceneSample;
 use selected::{OfRun, Origin, Selected, publishers};
 
 type Receiver<Payload, Header> = Port<ipc::Service, Payload, Header>;
@@ -42,6 +45,7 @@ pub struct Connection {
     status: Option<Receiver<LoopStatus, ()>>,
     status_service: Option<PortFactory<ipc::Service, LoopStatus, ()>>,
     stage: Option<Receiver<Stage, ()>>,
+    scene: Option<SceneReceiver>,
     tick: Option<Listener<ipc::Service>>,
     selection: Selection,
 }
@@ -125,6 +129,7 @@ impl Subscription {
             self.service::<Cue>("cues")?;
             self.service::<LoopStatus>("status")?;
             self.service::<Stage>("stage")?;
+            self.scene_service()?;
             return Ok(None);
         }
         check_room_to_subscribe()?;
@@ -145,6 +150,7 @@ impl Subscription {
             status: self.receiver("status")?,
             status_service: self.service("status")?,
             stage: self.receiver("stage")?,
+            scene: self.scene_receiver()?,
             tick: self.listener(),
             selection: Selection::Undecided { statuses: Vec::new() },
         };
@@ -217,6 +223,9 @@ impl Subscription {
         if connection.stage.is_none() {
             connection.stage = self.receiver("stage")?;
         }
+        if connection.scene.is_none() {
+            connection.scene = self.scene_receiver()?;
+        }
         connection.tick = connection.tick.take().or_else(|| self.listener());
         if connection.missing() < missing { reserve_pages() } else { Ok(()) }
     }
@@ -268,9 +277,10 @@ impl Subscription {
 impl Connection {
     /// Returns the number of services that are not open.
     fn missing(&self) -> usize {
-        let Self { alerts, cues, status, stage, tick, .. } = self;
-        let open = [alerts.is_some(), cues.is_some(), status.is_some(), stage.is_some(), tick.is_some()];
-        open.into_iter().filter(|open| !open).count()
+        let Self { alerts, cues, status, stage, scene, tick, .. } = self;
+        let messages = [alerts.is_some(), cues.is_some(), status.is_some(), stage.is_some()];
+        let open = messages.into_iter().chain([scene.is_some(), tick.is_some()]);
+        open.filter(|open| !open).count()
     }
 
     /// Waits until a frame is announced, or for `timeout` but at least 1 ms. Does not wait if `timeout` is zero.

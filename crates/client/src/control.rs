@@ -14,7 +14,7 @@ use iceoryx2::service::builder::request_response::RequestResponseOpenError as Op
 use iceoryx2::service::port_factory::request_response;
 
 use crate::shared_memory::{OpenError, check_room_to_subscribe, node, service_name};
-use bench_dragon_messages::control::{Code, Command, RATES};
+use bench_dragon_messages::control::{Code, Command, PLAYING_RATE, RATES};
 use bench_dragon_messages::sentence::number;
 use bench_dragon_messages::state::PlaybackState;
 use bench_dragon_messages::{ControlRequest, ControlResponse, FrameHeader, HandlePose};
@@ -152,8 +152,20 @@ impl Controller {
     /// # Errors
     /// [`ControlError::Open`] if the service fails.
     pub fn request(&mut self, command: Command) -> Result<PendingCommand, ControlError> {
+        self.request_with_value(command.number_and_value())
+    }
+
+    /// Requests the state of the show. The response's `time_scale` is the rate of the show when it plays.
+    ///
+    /// # Errors
+    /// As [`Self::request`].
+    pub fn request_playing_rate(&mut self) -> Result<PendingCommand, ControlError> {
+        let (number, _) = Command::State.number_and_value();
+        self.request_with_value((number, PLAYING_RATE))
+    }
+
+    fn request_with_value(&mut self, (number, value): (u32, f64)) -> Result<PendingCommand, ControlError> {
         self.sent += 1;
-        let (number, value) = command.number_and_value();
         let request = ControlRequest { id: self.sent, value, command: number, reserved: 0 };
         let sent = self.client.send_copy(request);
         let pending = sent.map_err(|error| failed(&self.name, format!("{error:?}")))?;

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use super::connection::{Connection, Subscription, Wake};
 use crate::shared_memory::OpenError;
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, SceneHeader, Stage};
 use liveness::{Change, Liveness};
 use sequence::SequenceTracker;
 
@@ -62,6 +62,13 @@ pub enum FeedEvent<'a> {
     },
     /// The stage, at the start of each run.
     Stage(&'a Stage),
+    /// The text of the scene, at the start of each run.
+    Scene {
+        /// Its header.
+        header: &'a SceneHeader,
+        /// The text, TOML; empty if it is not known.
+        text: &'a str,
+    },
     /// An alert.
     Alert(&'a CollisionAlert),
     /// A cue that the show has reached. A feed that connects later gets the latest one.
@@ -103,6 +110,7 @@ pub enum FeedEvent<'a> {
 ///     subscribers: 1,
 ///     alerts: true,
 ///     cues: 0,
+///     scene: String::new(),
 ///     stage: stage(1, 0, [0; 32], &scene.motion, &show),
 /// };
 /// let mut publisher = SharedMemoryPublisher::open(&config)?;
@@ -140,8 +148,9 @@ struct Connected {
     received: bool,
     /// The moment since which no publisher has sent anything; used until something has been handed over.
     quiet_since: Instant,
-    /// The identity of the latest stage, alert and cue: a tunnel to other machines sends them again.
+    /// The identity of the latest stage, scene, alert and cue: a tunnel to other machines sends them again.
     stage: Option<(u64, u64)>,
+    scene: Option<u64>,
     alert: Option<(u64, u64, u32)>,
     cue: Option<(u64, u64, u32)>,
 }
@@ -241,6 +250,7 @@ impl Feed {
             received: false,
             quiet_since: now,
             stage: None,
+            scene: None,
             alert: None,
             cue: None,
         });
@@ -255,8 +265,8 @@ fn shares_clock(subscription: &Subscription, connection: &Connection) -> bool {
 }
 
 impl Connected {
-    /// Hands over the messages in the queues: the stage first, since it describes the frames, and frames before their
-    /// alerts and cues.
+    /// Hands over the messages in the queues: the stage and the scene first, since they describe the frames, and frames
+    /// before their alerts and cues.
     fn receive(&mut self, frames: Delivery, sequence: &mut SequenceTracker, handle: &mut dyn FnMut(FeedEvent<'_>)) {
         let Self {
             connection,
@@ -264,6 +274,7 @@ impl Connected {
             received,
             quiet_since,
             stage: latest_stage,
+            scene: latest_scene,
             alert: latest_alert,
             cue: latest_cue,
             ..
@@ -280,6 +291,13 @@ impl Connected {
             let of = Some((stage.run_id, stage.stamp_ns));
             if std::mem::replace(latest_stage, of) != of {
                 handle(FeedEvent::Stage(&stage));
+            }
+        }
+        while let Some(scene) = connection.scene() {
+            let header = scene.user_header();
+            let is_new = latest_scene.replace(header.run_id) != Some(header.run_id);
+            if let (true, Ok(text)) = (is_new, std::str::from_utf8(scene.payload())) {
+                handle(FeedEvent::Scene { header, text });
             }
         }
         let take_frame = |header: &FrameHeader, handles: &[HandlePose]| {

@@ -67,8 +67,9 @@ pub fn poll_until(
         Ok(Source { feed, obstacle: Obstacle::default(), next: Instant::now() })
     };
     let mut sources = names.iter().map(source).collect::<Result<Vec<_>, OpenError>>()?;
-    while !stop.load(Ordering::Relaxed) {
-        std::thread::sleep(POLL_INTERVAL);
+    loop {
+        // Read before the queues are emptied, so that everything sent before it was set is handled.
+        let ending = stop.load(Ordering::Relaxed);
         for (publisher, source) in sources.iter_mut().enumerate().filter(|(_, source)| source.next <= Instant::now()) {
             let polled = source.feed.poll(Duration::ZERO, &mut |event| handler.handle(publisher, event));
             if let Some(shares_clock) = source.feed.shares_clock() {
@@ -79,6 +80,9 @@ pub fn poll_until(
             }
         }
         handler.polled(Instant::now());
+        if ending {
+            return Ok(());
+        }
+        std::thread::sleep(POLL_INTERVAL);
     }
-    Ok(())
 }

@@ -123,7 +123,7 @@ impl Monitor {
                 self.status = None;
                 self.alert = None;
             }
-            FeedEvent::Started { .. } | FeedEvent::Stage(_) | FeedEvent::Cue(_) => (),
+            FeedEvent::Started { .. } | FeedEvent::Stage(_) | FeedEvent::Scene { .. } | FeedEvent::Cue(_) => (),
         }
     }
 

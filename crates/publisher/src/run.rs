@@ -22,6 +22,9 @@ use crate::transports::{self, Transport, TransportConfig, TransportError};
 /// Nanoseconds between two calls of [`Publisher::maintain`] before the first frame.
 const LEAD_INTERVAL_NS: u64 = 10_000_000;
 
+/// The longest wait for [`Publishing::awaited`], nanoseconds.
+const LONGEST_WAIT_NS: u64 = 5_000_000_000;
+
 /// The reason why a publisher could not run.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
@@ -69,6 +72,8 @@ pub struct Publishing<'a> {
     pub scene: &'a str,
     /// Nanoseconds that waiting subscribers have to connect before the first frame.
     pub lead_ns: u64,
+    /// A flag that a subscriber sets when it is connected. The first frame waits for the flag, some seconds at most.
+    pub awaited: Option<&'a AtomicBool>,
 }
 
 /// The transports of a run.
@@ -168,10 +173,15 @@ impl Publishing<'_> {
         Ok((publishers, transports, awake))
     }
 
-    /// Waits for [`lead_ns`](Self::lead_ns), or until `stop` is set.
+    /// Waits for [`lead_ns`](Self::lead_ns) and for [`awaited`](Self::awaited), or until `stop` is set.
     fn wait_for_subscribers(&self, clock: &impl Clock, publishers: &mut [Box<dyn Publisher>], stop: &AtomicBool) {
-        let until_ns = clock.monotonic_ns() + self.lead_ns;
-        while clock.monotonic_ns() < until_ns && !stop.load(Ordering::Relaxed) {
+        let began_ns = clock.monotonic_ns();
+        let is_early = || {
+            let waited_ns = clock.monotonic_ns() - began_ns;
+            let is_awaited = self.awaited.is_some_and(|connected| !connected.load(Ordering::Relaxed));
+            waited_ns < self.lead_ns || is_awaited && waited_ns < LONGEST_WAIT_NS
+        };
+        while is_early() && !stop.load(Ordering::Relaxed) {
             publishers.iter_mut().for_each(|publisher| publisher.maintain());
             clock.sleep_until(clock.monotonic_ns() + LEAD_INTERVAL_NS);
         }
@@ -294,6 +304,7 @@ mod tests {
             duration: periods.map(|periods| periods / 1000.0),
             scene: "test",
             lead_ns: 0,
+            awaited: None,
         };
         let hooks = Hooks {
             opened: Box::new(|_| log.lock().unwrap().push("opened")),

@@ -2,16 +2,14 @@
 //!
 //! In: a [`TransportConfig`]. Out: for each requested transport, a [`Publisher`] for the loop's thread and a
 //! [`StatusPublisher`] for the statistics thread. Transports know messages, no solver, and not each other.
-//! [`background`] keeps a slow transport off the loop. Called by [`run`](crate::run).
+//! Called by [`run`](crate::run).
 
-pub mod background;
 pub mod iceoryx2;
 
 use crate::live::control::CommandSender;
 use crate::live::{Publisher, StatusPublisher, TransportCounters};
 use bench_dragon_client::shared_memory::OpenError;
 use bench_dragon_messages::Stage;
-use bench_dragon_ros2_messages::settings::Ros2Settings;
 use bench_dragon_show::scene::{Scene, SinglePrecision};
 
 /// The settings of a run for every transport.
@@ -31,17 +29,15 @@ pub struct TransportConfig<'a> {
     pub queue: Option<usize>,
     /// Subscribers that each iceoryx2 service admits at once.
     pub subscribers: usize,
-    /// The ROS 2 topics; `None` for none.
-    pub ros2: Option<&'a Ros2Settings>,
-    /// Frames per second of the loop.
-    pub loop_rate: f64,
+    /// The text of the scene, whose hash is in the stage; empty if it is not known.
+    pub scene: &'a str,
     /// The stage.
     pub stage: Stage,
 }
 
 impl<'a> TransportConfig<'a> {
-    /// Returns the settings of a scene, published under `name`.
-    pub fn of(name: &'a str, scene: &'a Scene, loop_rate: f64, stage: Stage) -> Self {
+    /// Returns the settings of a scene, published under `name` without its text.
+    pub fn of(name: &'a str, scene: &'a Scene, stage: Stage) -> Self {
         Self {
             name,
             handles: scene.team().handles(),
@@ -50,8 +46,7 @@ impl<'a> TransportConfig<'a> {
             single_precision: scene.single_precision,
             queue: scene.queue,
             subscribers: scene.subscribers,
-            ros2: scene.ros2.as_ref(),
-            loop_rate,
+            scene: "",
             stage,
         }
     }

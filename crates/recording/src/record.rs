@@ -28,6 +28,7 @@ const FINISH_INTERVAL: Duration = Duration::from_millis(10);
 enum Item {
     Frame { header: FrameHeader, handles: Vec<HandlePose>, missed: u64 },
     Stage(Box<Stage>),
+    Scene { run_id: u64, text: String },
     Alert(CollisionAlert),
     Cue(Cue),
     Status(Box<LoopStatus>),
@@ -105,6 +106,7 @@ impl RecordQueue {
                 Item::Frame { header: **header, handles: copy, missed: *missed }
             }
             FeedEvent::Stage(stage) => Item::Stage(Box::new(**stage)),
+            FeedEvent::Scene { header, text } => Item::Scene { run_id: header.run_id, text: (*text).to_owned() },
             FeedEvent::Alert(alert) => Item::Alert(**alert),
             FeedEvent::Cue(cue) => Item::Cue(**cue),
             FeedEvent::Status(status) => Item::Status(Box::new(**status)),
@@ -153,6 +155,7 @@ impl RecordThread {
 fn bytes(item: &Item) -> usize {
     match item {
         Item::Frame { handles, .. } => size_of::<Item>() + size_of_val(&handles[..]),
+        Item::Scene { text, .. } => size_of::<Item>() + text.len(),
         _ => size_of::<Item>() + size_of::<Stage>(),
     }
 }
@@ -181,6 +184,7 @@ fn serve(
                 done
             }
             Some(Item::Stage(stage)) => recorder.stage(&stage),
+            Some(Item::Scene { run_id, text }) => recorder.scene(run_id, &text),
             Some(Item::Alert(alert)) => recorder.alert(&alert),
             Some(Item::Cue(cue)) => recorder.cue(&cue),
             Some(Item::Status(status)) => recorder.status(&status),

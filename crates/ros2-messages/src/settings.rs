@@ -184,8 +184,13 @@ impl Ros2Settings {
         self.topics.keys().copied().filter(filled)
     }
 
+    /// Returns the greatest number of frames per second on ROS 2, whatever the rate of the loop.
+    pub fn greatest_rate(&self) -> f64 {
+        self.rate.unwrap_or(60.0)
+    }
+
     /// Returns the frames per second on ROS 2 for a loop at `loop_rate`.
     pub fn rate_of(&self, loop_rate: f64) -> f64 {
-        self.rate.unwrap_or(60.0).min(loop_rate)
+        self.greatest_rate().min(loop_rate)
     }
 }

@@ -1,10 +1,10 @@
-//! Commands over ROS 2: the services below `/<name>`, on their own thread.
+//! Commands over ROS 2: the services below `/<name>`, on their own thread, as a client of the show's own service.
 //!
 //! The requests use ros2-client's subscriptions, so that the node shows its services; the responses use RustDDS's
 //! writers. ros2-client's `Server` does not fit: it hides the bytes of a request, which determine the mapping
 //! ([`mapping`]), and answers at once. A client whose reply reader is not matched yet would never get that answer, so
 //! an answer waits here ([`Matches`]). A dead client, or one that floods the services, costs the loop nothing: this
-//! thread takes the requests, and the loop executes one command in each period from a queue of bounded length.
+//! process takes the requests, and passes a bounded number of commands to the show at once.
 
 mod calls;
 mod endpoints;
@@ -22,8 +22,9 @@ use rustdds::{GUID, SampleIdentity, SequenceNumber};
 
 use super::Ros2Error;
 use super::matching::Matches;
+use crate::commands::{Answer, ShowCommands};
+use bench_dragon_client::control::command_client::MOST_WAITING;
 use bench_dragon_messages::control::{Code, Command};
-use bench_dragon_publisher::live::control::{Answer, CommandSender, MOST_WAITING};
 use calls::{Next, ServiceAdapter, refusal, sentence};
 use endpoints::{Client, Endpoints};
 pub use mapping::Mapping;
@@ -59,7 +60,7 @@ impl ControlThread {
         context: Context,
         matches: Matches,
         mapping: Mapping,
-        commands: CommandSender,
+        commands: ShowCommands,
     ) -> Result<Self, Ros2Error> {
         let stop = Arc::new(AtomicBool::new(false));
         let (opened, opening) = mpsc::channel();
@@ -114,13 +115,13 @@ struct Server {
     endpoints: Endpoints,
     matches: Matches,
     mapping: Mapping,
-    commands: CommandSender,
+    commands: ShowCommands,
     adapter: ServiceAdapter,
     pending: Vec<Pending>,
 }
 
 impl Server {
-    fn new(endpoints: Endpoints, matches: Matches, mapping: Mapping, commands: CommandSender) -> Self {
+    fn new(endpoints: Endpoints, matches: Matches, mapping: Mapping, commands: ShowCommands) -> Self {
         Self {
             endpoints,
             matches,
@@ -196,11 +197,23 @@ impl Server {
     }
 
     fn take_answers(&mut self) {
-        while let Some(Answer { ticket, outcome }) = self.commands.answer() {
-            let of_ticket =
-                |pending: &&mut Pending| matches!(pending.progress, Progress::Sent(sent, _) if sent == ticket);
-            let Some(pending) = self.pending.iter_mut().find(of_ticket) else { continue };
+        while let Some(Answer { ticket, result }) = self.commands.answer() {
+            let of_ticket = |pending: &Pending| matches!(pending.progress, Progress::Sent(sent, _) if sent == ticket);
+            let Some(index) = self.pending.iter().position(of_ticket) else { continue };
+            let pending = &mut self.pending[index];
             let Progress::Sent(_, command) = pending.progress else { continue };
+            let outcome = match result {
+                Ok(outcome) => outcome,
+                Err(error) => {
+                    let sentence = error.to_string();
+                    self.endpoints.ports[pending.port].report_refusal(&sentence);
+                    match refusal(pending.call, &sentence) {
+                        Some(response) => pending.progress = Progress::Answered(response, Instant::now()),
+                        None => drop(self.pending.remove(index)),
+                    }
+                    continue;
+                }
+            };
             if !matches!(outcome.code, Code::Done | Code::Already) {
                 self.endpoints.ports[pending.port].report_refusal(&sentence(command, &outcome));
             }

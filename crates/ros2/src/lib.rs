@@ -1,13 +1,15 @@
-//! ROS 2 topics, by ros2-client on RustDDS, on their own thread and at their own rate. If a scene requests it, also
-//! services that control the show, on another thread.
+//! ROS 2 topics, by ros2-client on RustDDS, of shows in other processes, and on request services that control them.
 //!
-//! In: a scene with `[publish.ros2]` and the process's environment. Out: a [`Transport`]. Called by the list of
-//! transports.
+//! In: the feed of a show and the process's environment. Out: a [`bridge`]. Called by `send ros2`, which `run` and
+//! `replay` start as a child process; both call [`describe`] first.
 
+pub mod bridge;
+mod commands;
 mod control;
 pub mod environment;
 mod matching;
 mod node;
+mod rate;
 mod retransmission;
 mod topic_writer;
 
@@ -17,18 +19,10 @@ use ros2_client::Context;
 use rustdds::DomainParticipantBuilder;
 
 use bench_dragon_messages::Stage;
-use bench_dragon_publisher::live::control::CommandSender;
-use bench_dragon_publisher::live::{Publisher, StatusPublisher, TransportCounters};
 use bench_dragon_ros2_messages::settings::Ros2Settings;
 
-use bench_dragon_publisher::transports::background::{
-    self, BackgroundConfig, BackgroundError, BackgroundPublisher, BackgroundStatus,
-};
-use bench_dragon_publisher::transports::{Transport, TransportConfig, TransportError};
-use control::ControlThread;
 pub use control::Mapping;
-use environment::{Network, Range, check_name, other_distribution};
-use matching::Matches;
+use environment::{Network, Range, check_name};
 
 /// The reason why there are no ROS 2 topics.
 #[derive(Debug, thiserror::Error)]
@@ -45,16 +39,6 @@ pub enum Ros2Error {
     /// RustDDS or ros2-client failed.
     #[error("ROS 2 could not be started: {0}")]
     Failed(String),
-}
-
-impl From<Ros2Error> for TransportError {
-    fn from(error: Ros2Error) -> Self {
-        match error {
-            Ros2Error::Failed(_) => Self::Failed(error.to_string()),
-            Ros2Error::Name(_) => Self::IllegalName(error.to_string()),
-            Ros2Error::Environment(_) => Self::BadInput(error.to_string()),
-        }
-    }
 }
 
 /// The settings of the topics.
@@ -76,83 +60,45 @@ struct Ros2Config {
     stage: Stage,
 }
 
-/// The open topics.
-struct Ros2 {
-    name: String,
-    description: String,
-    /// The parts of the services until these start; `None` if the scene requests none.
-    services: Option<(Context, Matches, Mapping)>,
-    control: Option<ControlThread>,
-    publisher: Option<BackgroundPublisher>,
-    status: Option<BackgroundStatus>,
-    thread: background::BackgroundThread,
+/// The facts of a show for [`describe`].
+#[derive(Debug, Clone, Copy)]
+pub struct ShowFacts {
+    /// Frames per second of the loop.
+    pub loop_rate: f64,
+    /// True if there are alerts.
+    pub alerts: bool,
+    /// The cues of the scene.
+    pub cues: usize,
 }
 
-/// Opens the topics that the scene requests, on the network that the environment names.
-///
-/// # Errors
-/// [`TransportError`]
-pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError> {
-    let Some(settings) = config.ros2 else { return Ok(None) };
-    let variable = |name: &str| std::env::var(name).ok();
-    let network = Network::of(variable)?;
-    if let Some(warning) = other_distribution(variable) {
-        log::warn!("{warning}");
-    }
-    let mapping = settings.control.then(|| Mapping::of(variable)).map(|(mapping, warning)| {
-        if let Some(warning) = warning {
-            log::warn!("{warning}");
-        }
-        mapping
-    });
-    Ok(Some(open_on(network, mapping, config, settings)?))
-}
-
-/// Opens the topics of `settings` on a network; with a `mapping` also the services.
+/// Tests that a show can be published on ROS 2 under `name` in the network that the environment names. Returns the
+/// topics and services in words.
 ///
 /// # Errors
 /// [`Ros2Error`]
-pub fn open_on(
-    network: Network,
-    mapping: Option<Mapping>,
-    config: &TransportConfig,
-    settings: &Ros2Settings,
-) -> Result<Box<dyn Transport>, Ros2Error> {
-    let TransportConfig {
-        name,
-        handles,
-        alerts,
-        cues,
-        single_precision: _,
-        queue: _,
-        subscribers: _,
-        ros2: _,
-        loop_rate,
-        stage,
-    } = *config;
+pub fn describe(name: &str, settings: &Ros2Settings, show: ShowFacts) -> Result<String, Ros2Error> {
+    let variable = |name: &str| std::env::var(name).ok();
+    let network = Network::of(variable)?;
     check_name(name)?;
+    let ShowFacts { loop_rate, alerts, cues } = show;
     if let Some(rate) = settings.rate.filter(|rate| *rate > loop_rate) {
         log::warn!("publish.ros2.rate is {rate}, more than the loop's {loop_rate}: ROS 2 gets {loop_rate} a second");
     }
     let rate = settings.rate_of(loop_rate);
-    let topics: Vec<String> = settings.offered(alerts, cues > 0).map(|topic| topic.path(name)).collect();
-    let services = mapping.map_or(String::new(), |mapping| {
-        format!("\nROS 2 services that conduct the show: /{name}/..., for clients of {}.", mapping.rmw())
-    });
-    let description =
-        format!("ROS 2 topics ({}, at {rate} frames per second): {}.{services}", network.sentence(), topics.join(", "));
-    let background = BackgroundConfig { name: "ros2", handles, cues, loop_rate, rate };
-    let context = context(network)?;
-    let matches = Matches::new(&context);
-    let services = mapping.map(|mapping| (context.clone(), matches.clone(), mapping));
-    let config = Ros2Config { name: name.to_owned(), handles, rate, settings: settings.clone(), alerts, cues, stage };
-    let started = background::start(background, move || node::Topics::open(context, matches, config));
-    let (publisher, status, thread) = started.map_err(|error| match error {
-        BackgroundError::Open(error) => error,
-        BackgroundError::Thread(reason) => Ros2Error::Failed(reason),
-    })?;
-    let (name, publisher, status) = (name.to_owned(), Some(publisher), Some(status));
-    Ok(Box::new(Ros2 { name, description, services, control: None, publisher, status, thread }))
+    let topics = topic_names(name, settings, alerts, cues).join(", ");
+    let services = match settings.control {
+        true => {
+            let (mapping, _) = Mapping::of(variable);
+            format!("\nROS 2 services that conduct the show: /{name}/..., for clients of {}.", mapping.rmw())
+        }
+        false => String::new(),
+    };
+    Ok(format!("ROS 2 topics ({}, at {rate} frames per second): {topics}.{services}", network.sentence()))
+}
+
+/// Returns the names of the topics that are offered.
+fn topic_names(name: &str, settings: &Ros2Settings, alerts: bool, cues: usize) -> Vec<String> {
+    settings.offered(alerts, cues > 0).map(|topic| topic.path(name)).collect()
 }
 
 /// Creates a participant of the network.
@@ -164,36 +110,4 @@ fn context(network: Network) -> Result<Context, Ros2Error> {
     }
     let participant = builder.build().map_err(|error| failed(&error))?;
     Context::from_domain_participant(participant).map_err(|error| failed(&error))
-}
-
-impl Transport for Ros2 {
-    fn describe(&self) -> String {
-        self.description.clone()
-    }
-
-    fn publisher(&mut self) -> Result<Box<dyn Publisher>, TransportError> {
-        match self.publisher.take() {
-            Some(publisher) => Ok(Box::new(publisher)),
-            None => Err(TransportError::Failed("the ROS 2 publisher is taken".to_owned())),
-        }
-    }
-
-    fn status(&mut self) -> Result<Box<dyn StatusPublisher>, TransportError> {
-        match self.status.take() {
-            Some(status) => Ok(Box::new(status)),
-            None => Err(TransportError::Failed("the ROS 2 status is taken".to_owned())),
-        }
-    }
-
-    fn control(&mut self, commands: CommandSender) -> Result<Option<CommandSender>, TransportError> {
-        let Some((context, matches, mapping)) = self.services.take() else { return Ok(Some(commands)) };
-        self.control = Some(ControlThread::start(&self.name, context, matches, mapping, commands)?);
-        Ok(None)
-    }
-
-    fn finish(mut self: Box<Self>) -> Option<(&'static str, TransportCounters)> {
-        // The participant leaves the network with its last owner, the thread.
-        drop((self.control.take(), self.services.take()));
-        Some(("ros2", self.thread.finish()))
-    }
 }

@@ -1,6 +1,6 @@
-//! The ROS 2 node and its topics: the sink of the background thread.
+//! The ROS 2 node and its topics, for one run of a show.
 //!
-//! All objects of ros2-client except the participant are created and dropped on that thread.
+//! The bridge creates and drops all objects of ros2-client on its thread.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,7 +11,6 @@ use super::matching::Matches;
 use super::topic_writer::{EVENT_BYTES, Serviced, Stream, TopicWriter, WriterFactory};
 use super::{Ros2Config, Ros2Error};
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
-use bench_dragon_publisher::transports::background::Sink;
 use bench_dragon_ros2_messages::diagnostics::{DiagnosticArray, LoopSecond};
 use bench_dragon_ros2_messages::markers::MarkerArray;
 use bench_dragon_ros2_messages::path::Path;
@@ -97,8 +96,9 @@ impl Topics {
     }
 }
 
-impl Sink for Topics {
-    fn service(&mut self) {
+impl Topics {
+    /// Does the periodic work of the writers. Must be called often.
+    pub(super) fn service(&mut self) {
         self.matches.update();
         fn end<T: Serviced>(end: &mut Option<T>) -> Option<&mut dyn Serviced> {
             end.as_mut().map(|end| end as &mut dyn Serviced)
@@ -111,7 +111,8 @@ impl Sink for Topics {
         }
     }
 
-    fn frame(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
+    /// Sends a frame.
+    pub(super) fn frame(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
         let discarded = &mut self.discarded;
         if let Some(stream) = &mut self.handles {
             stream.publish(discarded, |message| message.update(header, handles));
@@ -131,20 +132,23 @@ impl Sink for Topics {
         }
     }
 
-    fn alert(&mut self, alert: CollisionAlert) {
+    /// Sends an alert.
+    pub(super) fn alert(&mut self, alert: CollisionAlert) {
         self.latest_alert = Some(alert);
         if let Some(port) = &mut self.alerts {
             port.send(Arc::new(Stamped::alert(alert)), &mut self.discarded);
         }
     }
 
-    fn cue(&mut self, cue: Cue) {
+    /// Sends a cue.
+    pub(super) fn cue(&mut self, cue: Cue) {
         if let Some(port) = &mut self.cues {
             port.send(Arc::new(Stamped::cue(cue)), &mut self.discarded);
         }
     }
 
-    fn status(&mut self, status: &LoopStatus) {
+    /// Sends the loop's status, and the diagnostics that follow from it.
+    pub(super) fn status(&mut self, status: &LoopStatus) {
         if let Some(port) = &mut self.status {
             port.send(Arc::new(Stamped::status(*status)), &mut self.discarded);
         }
@@ -157,12 +161,15 @@ impl Sink for Topics {
         }
     }
 
-    fn discarded(&self) -> u64 {
+    /// Returns the number of messages that did not fit into the queues of RustDDS.
+    pub(super) fn discarded(&self) -> u64 {
         self.discarded
     }
 
-    fn linger(&self) -> Duration {
-        LINGER
+    /// Leaves the network after the time for reliable subscribers to get the last messages.
+    pub(super) fn finish(mut self) {
+        self.service();
+        std::thread::sleep(LINGER);
     }
 }
 

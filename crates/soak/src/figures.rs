@@ -20,6 +20,8 @@ const PUBLISHER_COLUMNS: [&str; 12] = [
     "file_descriptors",
     "shared_memory_bytes",
 ];
+/// The figure of the process of ROS 2 in a row of the history.
+pub const ROS2_COLUMN: &str = "ros2_resident_bytes";
 /// The figures of each subscriber in a row of the history.
 const SUBSCRIBER_COLUMNS: [&str; 5] =
     ["latency_p50_ns", "latency_p99_ns", "latency_max_ns", "latency_since_deadline_p99_ns", "missed"];
@@ -36,7 +38,8 @@ pub fn columns(fleet: &Fleet) -> Vec<String> {
         .members()
         .iter()
         .flat_map(|member| SUBSCRIBER_COLUMNS.iter().map(|name| column_of(&member.label, name)).collect::<Vec<_>>());
-    publisher.chain(subscribers).collect()
+    let ros2 = fleet.has_ros2().then(|| ROS2_COLUMN.to_owned());
+    publisher.chain(ros2).chain(subscribers).collect()
 }
 
 /// Returns the figures since the last call, in the order of [`columns`]; NaN for an unknown figure.
@@ -59,6 +62,9 @@ pub fn row(fleet: &mut Fleet) -> Vec<f64> {
         of_process(|held| held.file_descriptors),
         of_process(|held| held.shared_memory_bytes),
     ];
+    if fleet.has_ros2() {
+        figures.push(fleet.measure_ros2().map_or(f64::NAN, |held| held.resident_bytes as f64));
+    }
     for member in fleet.members_mut() {
         let fresh = member.take_fresh();
         let of = |value: fn(&Latencies) -> u64| fresh.as_ref().map_or(f64::NAN, |fresh| value(fresh) as f64);

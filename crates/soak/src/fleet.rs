@@ -14,7 +14,7 @@ use super::conducting::Conducting;
 use super::member::{Member, ProcessState, Role};
 use super::observation::Status;
 use super::processes::{Plan, ProcessEvent, signal};
-use super::resources::Resources;
+use super::resources::{Resources, child_of};
 use bench_dragon_publisher::live::statistics::RunSummary;
 
 /// The time after which a flaky subscriber is killed.
@@ -66,9 +66,29 @@ pub struct Fleet {
     sender: Sender<ProcessEvent>,
     /// Lines of the publisher's standard error since [`Fleet::take_stderr`].
     stderr: Vec<String>,
+    publisher_growth: Growth,
+    ros2_growth: Growth,
+    began: Instant,
+}
+
+/// The growth of a process's memory after [`SETTLING`].
+#[derive(Debug, Default)]
+struct Growth {
     settled_bytes: Option<u64>,
     most_bytes_after: u64,
-    began: Instant,
+}
+
+impl Growth {
+    fn record(&mut self, resident_bytes: u64, since_start: Duration) {
+        if since_start >= SETTLING {
+            self.settled_bytes.get_or_insert(resident_bytes);
+            self.most_bytes_after = self.most_bytes_after.max(resident_bytes);
+        }
+    }
+
+    fn bytes(&self) -> Option<u64> {
+        self.settled_bytes.map(|settled| self.most_bytes_after - settled)
+    }
 }
 
 impl Fleet {
@@ -89,8 +109,8 @@ impl Fleet {
             events,
             sender,
             stderr: Vec::new(),
-            settled_bytes: None,
-            most_bytes_after: 0,
+            publisher_growth: Growth::default(),
+            ros2_growth: Growth::default(),
             began: Instant::now(),
             plan,
         };
@@ -238,17 +258,33 @@ impl Fleet {
     /// Returns the present resources of the publisher's process, from which the growth of its memory follows.
     pub(super) fn measure_publisher(&mut self) -> Option<Resources> {
         let held = Resources::of(self.publisher.id())?;
-        if self.began.elapsed() >= SETTLING {
-            self.settled_bytes.get_or_insert(held.resident_bytes);
-            self.most_bytes_after = self.most_bytes_after.max(held.resident_bytes);
-        }
+        self.publisher_growth.record(held.resident_bytes, self.began.elapsed());
         Some(held)
+    }
+
+    /// Returns the present resources of the publisher's child process, which publishes on ROS 2, from which the growth of
+    /// its memory follows. Returns `None` without ROS 2, and while the process is restarted.
+    pub(super) fn measure_ros2(&mut self) -> Option<Resources> {
+        let child = self.plan.ros2.then(|| child_of(self.publisher.id())).flatten()?;
+        let held = Resources::of(child)?;
+        self.ros2_growth.record(held.resident_bytes, self.began.elapsed());
+        Some(held)
+    }
+
+    /// Returns true if the publisher has a process that publishes on ROS 2.
+    pub fn has_ros2(&self) -> bool {
+        self.plan.ros2
     }
 
     /// Returns the growth of the publisher's resident memory after [`SETTLING`], in bytes; `None` if the test was
     /// shorter.
     pub fn resident_growth(&self) -> Option<u64> {
-        self.settled_bytes.map(|settled| self.most_bytes_after - settled)
+        self.publisher_growth.bytes()
+    }
+
+    /// Returns the same of the process of ROS 2; `None` without one.
+    pub fn ros2_growth(&self) -> Option<u64> {
+        self.ros2_growth.bytes()
     }
 
     /// Returns true if the publisher ended without a signal, with an error, or not at all. Call it after the fleet has

@@ -27,6 +27,8 @@ pub struct Plan {
     pub publisher: Vec<OsString>,
     /// The subscribers.
     pub roles: Vec<Role>,
+    /// True if the publisher starts a process that publishes on ROS 2.
+    pub ros2: bool,
     /// The load generator and its clients, if any.
     pub conduct: Option<ConductPlan>,
 }

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::conduct::Conducted;
-use super::figures::column_of;
+use super::figures::{ROS2_COLUMN, column_of};
 use super::fleet::Fleet;
 use super::history::History;
 use super::member::{Member, Role};
@@ -263,11 +263,14 @@ impl Report {
             let title = format!("Latency from sending to receiving, {}", subscriber.label);
             sections.push((title, "us", Scale::Logarithmic, lines));
         }
+        let mut memory = vec![line("resident", "resident_bytes", 1e6)];
+        let ros2 = line("resident, the process of ROS 2", ROS2_COLUMN, 1e6);
+        memory.extend((!ros2.points.is_empty()).then_some(ros2));
         let counts = vec![line("overruns", "overruns", 1.0), line("skipped", "skipped", 1.0)];
         sections.extend([
             ("Missed frames since the start".to_owned(), "frames", Scale::Linear, of_each("missed", 1.0)),
             ("Overruns and skipped periods since the start".to_owned(), "", Scale::Linear, counts),
-            ("Resident memory".to_owned(), "MB", Scale::Linear, vec![line("resident", "resident_bytes", 1e6)]),
+            ("Resident memory".to_owned(), "MB", Scale::Linear, memory),
             (
                 "Shared memory in /dev/shm in use".to_owned(),
                 "MB",

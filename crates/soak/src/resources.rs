@@ -1,4 +1,4 @@
-//! The resources of a process, read from /proc. Called by the soak test for its publisher.
+//! The resources of a process, read from /proc. Called by the soak test for its publisher and the process of ROS 2.
 
 use std::collections::BTreeSet;
 use std::os::unix::fs::MetadataExt;
@@ -31,6 +31,20 @@ impl Resources {
             shared_memory_bytes: shared_memory_bytes(id)?,
         })
     }
+}
+
+/// Returns a child process of the process `parent`, or `None` if it has none.
+pub fn child_of(parent: u32) -> Option<u32> {
+    let processes = std::fs::read_dir("/proc").ok()?.flatten();
+    let numbers = processes.filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
+    numbers.into_iter().find(|number| parent_of(*number) == Some(parent))
+}
+
+/// Returns the parent of a process (proc(5), stat).
+fn parent_of(id: u32) -> Option<u32> {
+    let stat = std::fs::read_to_string(format!("/proc/{id}/stat")).ok()?;
+    // The name before may contain spaces and parentheses.
+    stat.rsplit_once(')')?.1.split_whitespace().nth(1)?.parse().ok()
 }
 
 fn shared_memory_bytes(id: u32) -> Option<u64> {

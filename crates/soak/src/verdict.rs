@@ -106,6 +106,11 @@ impl SoakVerdict {
             let limit = limits.resident_growth_bytes as f64;
             LimitCheck::new("growth of resident memory after the first minute", Unit::Bytes, limit, growth as f64)
         }));
+        checks.extend(fleet.ros2_growth().map(|growth| {
+            let limit = limits.resident_growth_bytes as f64;
+            let name = "growth of the ROS 2 process's resident memory after the first minute";
+            LimitCheck::new(name, Unit::Bytes, limit, growth as f64)
+        }));
         checks.extend([
             count("frames out of order, or with inconsistent timestamps", 0.0, of_all(|seen| seen.disordered)),
             count("frames with a link of a wrong length", 0.0, of_all(|seen| seen.wrong_links)),

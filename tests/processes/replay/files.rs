@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mcap::records::MessageHeader;
-use mcap::{Channel, Message, MessageStream, WriteOptions, Writer};
+use mcap::{Channel, Message, MessageStream, Summary, WriteOptions, Writer};
 
 /// The encapsulation, and a header whose frame is `stage`.
 const LAYOUT: usize = 28;
@@ -100,7 +100,7 @@ pub fn read(file: &Path) -> Kept {
     kept
 }
 
-/// Writes a recording again with each message as `change` returns it: removed, changed, or several messages.
+/// Writes a recording again with its attachments and with each message as `change` returns it: removed, changed, or several messages.
 pub fn rewrite<'a>(file: &'a [u8], to: &Path, change: impl Fn(Message<'a>) -> Vec<Message<'a>>) {
     let options = WriteOptions::new().profile("ros2").chunk_size(Some(50_000));
     let mut writer: Writer<_> = options.create(BufWriter::new(File::create(to).unwrap())).unwrap();
@@ -114,6 +114,9 @@ pub fn rewrite<'a>(file: &'a [u8], to: &Path, change: impl Fn(Message<'a>) -> Ve
             let header = MessageHeader { channel_id, sequence, log_time, publish_time };
             writer.write_to_known_channel(&header, &data).unwrap();
         }
+    }
+    for index in &Summary::read(file).unwrap().unwrap().attachment_indexes {
+        writer.attach(&mcap::read::attachment(file, index).unwrap()).unwrap();
     }
     writer.finish().unwrap();
 }

@@ -1,7 +1,7 @@
 //! Commands sent by a separate thread, so that the caller never waits for an answer or for a publisher that hangs.
 //!
-//! In: an [`Action`] with a tag. Out: the tag and the result, passed to a function on that thread. Called by
-//! `watch` for its keys and by the stage picture's server for its browsers.
+//! In: an [`Action`] with a tag. Out: the tag and the result, passed to a function on that thread. Called by `watch` for
+//! its keys, by the stage picture's server for its browsers and by the ROS 2 services.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -24,7 +24,7 @@ const IDLE: Duration = Duration::from_secs(1);
 const MOST_PENDING: usize = 4;
 const MOST_HOLDS: usize = 3;
 /// Commands that may be unanswered, sent or not.
-const MOST_WAITING: usize = 64;
+pub const MOST_WAITING: usize = 64;
 /// The action that drops all waiting actions: no action requested before a hold is done after it.
 const HOLD: Action = Action::Send(Command::Hold);
 
@@ -33,6 +33,8 @@ const HOLD: Action = Action::Send(Command::Hold);
 pub enum Action {
     /// This command.
     Send(Command),
+    /// Request the state, with the rate of the show when it plays as the response's `time_scale`.
+    PlayingRate,
     /// Pause a show that plays, resume one that is paused or waits.
     Toggle,
     /// Seek forward or back, within 0 and the end.
@@ -45,10 +47,16 @@ pub enum Action {
 }
 
 impl Action {
+    /// Returns true if the command is known only after a response with the state.
+    fn depends_on_the_state(self) -> bool {
+        matches!(self, Self::Toggle | Self::SeekBy { .. })
+    }
+
     /// Returns the command in the state that a response reports.
     pub fn command(self, state: &ControlResponse) -> Command {
         match self {
             Self::Send(command) => command,
+            Self::PlayingRate => Command::State,
             // A resume also ends the waiting at a cue or at the start. While held it is refused, with a sentence.
             Self::Toggle => match state.playback_state() {
                 Some(PlaybackState::Paused | PlaybackState::Held) => Command::Resume,
@@ -177,7 +185,7 @@ impl<Tag, Handle: FnMut(Tag, ActionResult)> CommandThread<Tag, Handle> {
     /// except a hold.
     fn next_waiting(&mut self) -> Option<(Tag, Action)> {
         let is_hold = self.waiting.front()?.1 == HOLD;
-        if !is_hold && self.pending.iter().any(|pending| !matches!(pending.action, Action::Send(_))) {
+        if !is_hold && self.pending.iter().any(|pending| pending.action.depends_on_the_state()) {
             return None;
         }
         let most = if is_hold { MOST_PENDING + MOST_HOLDS } else { MOST_PENDING };
@@ -190,7 +198,7 @@ impl<Tag, Handle: FnMut(Tag, ActionResult)> CommandThread<Tag, Handle> {
     }
 
     fn send(&mut self, tag: Tag, action: Action, command: Command, repeated: bool) {
-        match self.request(command) {
+        match self.request(action, command) {
             Ok(response) => {
                 if self.pending.is_empty() {
                     self.vigil = Vigil::new();
@@ -202,12 +210,15 @@ impl<Tag, Handle: FnMut(Tag, ActionResult)> CommandThread<Tag, Handle> {
         }
     }
 
-    fn request(&mut self, command: Command) -> Result<PendingCommand, ControlError> {
+    fn request(&mut self, action: Action, command: Command) -> Result<PendingCommand, ControlError> {
         let controller = match &mut self.controller {
             Some(controller) => controller,
             none => none.insert(Controller::new(&self.name)?),
         };
-        controller.request(command)
+        match action {
+            Action::PlayingRate => controller.request_playing_rate(),
+            _ => controller.request(command),
+        }
     }
 
     /// Polls the pending responses, in the order in which the requests were sent.
@@ -232,7 +243,7 @@ impl<Tag, Handle: FnMut(Tag, ActionResult)> CommandThread<Tag, Handle> {
                 Err(error) => Err(error),
             };
             let tag = pending.tag;
-            let is_question = command == Command::State && action != Action::Send(Command::State);
+            let is_question = command == Command::State && action.depends_on_the_state();
             match polled {
                 // A refused request for the state has no information.
                 Ok(state) if is_question && matches!(state.result(), Some(Code::Done | Code::Already)) => {

@@ -59,7 +59,8 @@ pub struct Cue {
 pub struct ControlRequest {
     /// A number that the client chooses; the response repeats it.
     pub id: u64,
-    /// The value of a command that has one: simulated seconds per second, simulated seconds, or periods.
+    /// The value of a command that has one: simulated seconds per second, simulated seconds, or periods. With the command
+    /// state, 1 requests a response whose `time_scale` is the rate of the show when it plays, even while it is paused.
     pub value: f64,
     /// 0 state, 1 pause, 2 resume, 3 rate, 4 seek, 5 step, 6 restart, 7 hold, 8 release, 9 go.
     pub command: u32,
@@ -90,7 +91,7 @@ pub struct ControlResponse {
     pub tick: u64,
     /// Simulated seconds of that period.
     pub sim_time: f64,
-    /// Simulated seconds per second, as in force.
+    /// Simulated seconds per second, as in force; 0 while paused or held, unless the request asks for another rate.
     pub time_scale: f64,
     /// 0 done, 1 already so, 2 refused in this state, 3 value out of range, 4 not understood, 5 too many waiting.
     pub code: u32,

@@ -68,6 +68,30 @@ pub const MOST_CUES: usize = 32;
 /// Bytes of the hash of a scene's text.
 pub const SCENE_HASH_BYTES: usize = 32;
 
+/// The header of a scene's text.
+///
+/// Over iceoryx2 the user header of `<name>/scene`, whose payload is the text (UTF-8, TOML) as a slice of bytes. Sent at
+/// the start and kept for late subscribers. The text is empty if it is not known, as in the replay of a recording without
+/// it.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon_messages::SceneHeader;
+///
+/// assert_eq!(size_of::<SceneHeader>(), 40);
+/// assert_eq!(SceneHeader::default().hash, [0; 32]);
+/// ```
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, ZeroCopySend)]
+#[type_name("bench_dragon/SceneHeader/1")]
+#[repr(C)]
+pub struct SceneHeader {
+    /// The run, as [`FrameHeader::run_id`](super::FrameHeader::run_id).
+    pub run_id: u64,
+    /// BLAKE3 of the text of the show, as [`Stage::scene_hash`].
+    pub hash: [u8; SCENE_HASH_BYTES],
+}
+
 /// Returns the digits of a hash as `b3sum` prints them.
 pub fn hexadecimal(hash: &[u8]) -> String {
     hash.iter().map(|byte| format!("{byte:02x}")).collect()

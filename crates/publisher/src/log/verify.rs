@@ -6,6 +6,7 @@
 //! second solver, `newton`.
 
 mod player;
+pub mod reference;
 
 use std::io::{BufRead, Read};
 

@@ -2,7 +2,7 @@
 //!
 //! [`SharedMemoryPublisher`] lives on the loop's thread, [`StatusSender`] on the statistics thread; both are made
 //! there, since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/alerts`,
-//! `/status`, `/stage`, the event service `<name>/tick` and, if a scene requests it, `<name>/poses32`.
+//! `/status`, `/stage`, `/scene`, the event service `<name>/tick` and, if a scene requests it, `<name>/poses32`.
 //!
 //! A name belongs to one show: the service of commands, `<name>/control`, admits one server and is opened first.
 //! iceoryx2 detects by a lock of the operating system whether the server's process lives. So a killed process does not
@@ -12,6 +12,7 @@
 mod control;
 mod frames;
 mod queues;
+mod scene;
 
 use std::time::{Duration, Instant};
 
@@ -38,6 +39,7 @@ use bench_dragon_show::scene::SinglePrecision;
 
 use frames::{FrameSender, FrameService};
 use queues::{check_room, default_queue};
+use scene::SceneSender;
 
 /// The interval at which the stage, the latest alert and the latest cue are retransmitted to a tunnel. A tunnel keeps
 /// no history for machines that join later.
@@ -67,6 +69,8 @@ pub struct PublisherConfig {
     pub alerts: bool,
     /// The number of the scene's cues; with none there is no cues service.
     pub cues: usize,
+    /// The text of the scene, sent once and kept for late subscribers; empty if it is not known.
+    pub scene: String,
     /// The stage, sent once and kept for late subscribers.
     pub stage: Stage,
 }
@@ -89,18 +93,7 @@ struct Iceoryx2 {
 /// # Errors
 /// [`TransportError::BadInput`] for a name that iceoryx2 cannot take.
 pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError> {
-    let TransportConfig {
-        name,
-        handles,
-        alerts,
-        cues,
-        single_precision,
-        queue,
-        subscribers,
-        ros2: _,
-        loop_rate: _,
-        stage,
-    } = *config;
+    let TransportConfig { name, handles, alerts, cues, single_precision, queue, subscribers, scene, stage } = *config;
     service_name(name, "poses")?;
     stale_files::spawn_reaper();
     let mut config = PublisherConfig {
@@ -111,6 +104,7 @@ pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, Tran
         subscribers,
         alerts,
         cues,
+        scene: scene.to_owned(),
         stage,
     };
     config.queue = queue.unwrap_or_else(|| default_queue(&config));
@@ -124,7 +118,7 @@ impl Transport for Iceoryx2 {
         let alerts = if *alerts { ", /alerts" } else { "" };
         let cues = if *cues > 0 { ", /cues" } else { "" };
         format!(
-            "iceoryx2 services: {name}/poses{single}{alerts}{cues}, /status, /stage, /tick, /control (queues of {queue} \
+            "iceoryx2 services: {name}/poses{single}{alerts}{cues}, /status, /stage, /scene, /tick, /control (queues of {queue} \
              frames for {subscribers} subscribers)."
         )
     }
@@ -159,6 +153,7 @@ pub struct SharedMemoryPublisher {
     alerts: Option<Repeated<CollisionAlert>>,
     cues: Option<Repeated<Cue>>,
     stage: Repeated<Stage>,
+    scene: SceneSender,
     tick: Notifier<ipc::Service>,
     tick_service: event::PortFactory<ipc::Service>,
     // Dropped last: the ports above belong to it.
@@ -195,6 +190,7 @@ impl SharedMemoryPublisher {
         let cues = (config.cues > 0).then(open_cues).transpose()?;
         let mut stage = Repeated::open(&node, config, "stage", SMALL_QUEUE)?;
         stage.send(config.stage).map_err(|error| failed(name, "stage", error))?;
+        let scene = SceneSender::open(&node, config)?;
         let tick_service = node
             .service_builder(&service_name(name, "tick")?)
             .event()
@@ -212,7 +208,7 @@ impl SharedMemoryPublisher {
             })?;
         let tick = tick_service.notifier_builder().create().map_err(|error| failed(name, "tick", error))?;
         reserve_pages()?;
-        Ok(Self { poses, poses_32, alerts, cues, stage, tick, tick_service, _node: node })
+        Ok(Self { poses, poses_32, alerts, cues, stage, scene, tick, tick_service, _node: node })
     }
 
     fn send_frame(&self, Outgoing { header, chain, .. }: Outgoing<'_>) -> Result<(), String> {
@@ -260,6 +256,7 @@ impl Publisher for SharedMemoryPublisher {
             cues.maintain();
         }
         self.stage.maintain();
+        self.scene.maintain();
         self.poses.update_connections();
         if let Some((port, _)) = &self.poses_32 {
             port.update_connections();

@@ -7,7 +7,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::sync::Arc;
 
 use mcap::read::ChannelAccumulator;
-use mcap::records::{ChunkIndex, Record, op};
+use mcap::records::{AttachmentIndex, ChunkIndex, Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Channel, MAGIC, McapError, parse_record};
 
@@ -22,6 +22,7 @@ const DATA_END_BYTES: u64 = 13;
 pub(super) struct Index {
     pub channels: HashMap<u16, Arc<Channel<'static>>>,
     pub chunks: Vec<ChunkIndex>,
+    pub attachments: Vec<AttachmentIndex>,
     /// Messages by channel, if the file counts them.
     pub counts: Option<BTreeMap<u16, u64>>,
 }
@@ -77,6 +78,10 @@ pub(super) fn index(file: &mut File, length: u64) -> Result<Index, ReadError> {
             }
             Record::ChunkIndex(chunk) => {
                 index.chunks.push(chunk);
+                Ok(())
+            }
+            Record::AttachmentIndex(attachment) => {
+                index.attachments.push(attachment);
                 Ok(())
             }
             Record::Statistics(statistics) => {

@@ -13,12 +13,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use byteorder::LittleEndian;
-use mcap::Channel;
-use mcap::records::{ChunkIndex, Record, op};
+use mcap::records::{AttachmentIndex, ChunkIndex, Record, op};
+use mcap::{Channel, parse_record};
 use serde::de::DeserializeOwned;
 
 use super::index::{Index, index, told};
 use super::recover::records_of_chunk;
+use super::run::SCENE_ATTACHMENT;
 use bench_dragon_messages::sentence::number;
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, LoopStatus, Stage};
 use bench_dragon_ros2_messages::settings::Topic;
@@ -138,6 +139,8 @@ pub struct Contents {
     pub ends: [FrameHeader; 2],
     /// The stage.
     pub stage: Stage,
+    /// The text of the scene, if the recording has it.
+    pub scene_text: Option<String>,
 }
 
 impl Contents {
@@ -156,7 +159,7 @@ impl Recording {
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let mut file = File::open(path)?;
         let length = file.seek(SeekFrom::End(0))?;
-        let Index { channels, mut chunks, counts } = index(&mut file, length)?;
+        let Index { channels, mut chunks, attachments, counts } = index(&mut file, length)?;
         let (channels, name) = played(&channels)?;
         chunks.sort_by_key(|chunk| chunk.chunk_start_offset);
         let handles = channels.iter().find(|(_, topic)| **topic == Topic::Handles).map(|(id, _)| *id);
@@ -170,6 +173,7 @@ impl Recording {
             frames,
             ends: [FrameHeader::default(); 2],
             stage: Stage::default(),
+            scene_text: scene_text(&mut file, length, &attachments)?,
         };
         let mut recording = Self { file, length, chunks, channels, contents };
         recording.read_contents()?;
@@ -278,6 +282,33 @@ impl Recording {
     fn may_hold(&self, chunk: usize, topic: Topic) -> bool {
         let offsets = &self.chunks[chunk].message_index_offsets;
         offsets.is_empty() || self.channels.iter().any(|(id, of)| *of == topic && offsets.contains_key(id))
+    }
+}
+
+/// Reads the attachment with the text of the scene.
+fn scene_text(file: &mut File, length: u64, attachments: &[AttachmentIndex]) -> Result<Option<String>, ReadError> {
+    let Some(index) = attachments.iter().find(|attachment| attachment.name == SCENE_ATTACHMENT) else {
+        return Ok(None);
+    };
+    let at = index.offset;
+    let damaged = |reason: &str| ReadError::Damaged { at, reason: reason.to_owned() };
+    let bytes = usize::try_from(index.length).ok().filter(|_| {
+        let end = at.checked_add(index.length);
+        end.is_some_and(|end| end <= length)
+    });
+    let mut record = vec![0; bytes.ok_or_else(|| damaged("an attachment beyond the file's end"))?];
+    file.seek(SeekFrom::Start(at))?;
+    file.read_exact(&mut record)?;
+    let Some(([op::ATTACHMENT, _, _, _, _, _, _, _, _], body)) = record.split_first_chunk() else {
+        return Err(damaged("no attachment is where the index has one"));
+    };
+    match parse_record(op::ATTACHMENT, body) {
+        Ok(Record::Attachment { data, .. }) => match String::from_utf8(data.into_owned()) {
+            Ok(text) => Ok(Some(text)),
+            Err(_) => Err(damaged("the text of the scene is not UTF-8")),
+        },
+        Ok(_) => Err(damaged("the scene cannot be read")),
+        Err(error) => Err(damaged(&told(&error))),
     }
 }
 

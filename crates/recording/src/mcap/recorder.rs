@@ -161,6 +161,14 @@ impl Recorder {
         self.event(Event::Stage(Box::new(*stage)))
     }
 
+    /// Attaches the text of a run's scene. An empty text is not known.
+    ///
+    /// # Errors
+    /// As [`Recorder::frame`].
+    pub fn scene(&mut self, run_id: u64, text: &str) -> Result<(), RecordError> {
+        self.event(Event::Scene { run_id, text: text.into() })
+    }
+
     /// Records an alert.
     ///
     /// # Errors
@@ -247,7 +255,9 @@ impl Recorder {
         let Some(run) = &self.run else { return Ok(()) };
         let Run { status, diagnosed, events, latest_deadline_ns, .. } = *run;
         let stage = run.stage.clone().map(Event::Stage);
-        let held = [stage, run.alert.map(Event::Alert), run.cue.map(Event::Cue)];
+        let run_id = run.run_id;
+        let scene = run.scene.clone().map(|text| Event::Scene { run_id, text });
+        let held = [stage, scene, run.alert.map(Event::Alert), run.cue.map(Event::Cue)];
         self.finish_run()?;
         let file = self.make_file()?;
         self.run = Some(Run { latest_deadline_ns, status, diagnosed, events, ..Run::new(file, frame) });
@@ -288,6 +298,9 @@ impl Recorder {
             }
             return Ok(());
         };
+        if let Event::Scene { text, .. } = message {
+            return run.attach_scene(text).or_else(|error| self.fail(error));
+        }
         let log_time = run.log_time(&message);
         let sequence = run.events;
         run.events = sequence.wrapping_add(1);
@@ -309,6 +322,7 @@ impl Recorder {
                 let before = run.diagnosed.replace(status).unwrap_or(status);
                 self.messages.status(sequence, &status, run.alert.as_ref(), &before);
             }
+            Event::Scene { .. } => return Ok(()),
         }
         let attached = if run.attached || run.stage.is_none() || run.status.is_none() {
             Ok(())

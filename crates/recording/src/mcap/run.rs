@@ -2,6 +2,7 @@
 
 use std::cmp::Ordering;
 use std::io;
+use std::sync::Arc;
 
 use serde_json::json;
 
@@ -9,13 +10,16 @@ use super::file::McapFile;
 use bench_dragon_messages::json::{Exact, StageObject};
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, LoopStatus, Stage};
 
-/// The name of the attachment.
+/// The name of the attachment with the description of the run.
 const ATTACHMENT: &str = "bench_dragon.json";
+/// The name of the attachment with the text of the scene.
+pub(super) const SCENE_ATTACHMENT: &str = "scene.toml";
 
 /// An event-driven message.
 #[derive(Debug, Clone)]
 pub(super) enum Event {
     Stage(Box<Stage>),
+    Scene { run_id: u64, text: Arc<str> },
     Alert(CollisionAlert),
     Cue(Cue),
     Status(LoopStatus),
@@ -26,6 +30,7 @@ impl Event {
     pub fn run_id(&self) -> u64 {
         match self {
             Self::Stage(stage) => stage.run_id,
+            Self::Scene { run_id, .. } => *run_id,
             Self::Alert(alert) => alert.run_id,
             Self::Cue(cue) => cue.run_id,
             Self::Status(status) => status.run_id,
@@ -36,6 +41,8 @@ impl Event {
     fn stamp(&self) -> (u64, u64) {
         match self {
             Self::Stage(stage) => (stage.stamp_ns, 0),
+            // It is no message.
+            Self::Scene { .. } => (0, 0),
             Self::Alert(alert) => (alert.stamp_ns, alert.tick),
             Self::Cue(cue) => (cue.stamp_ns, cue.tick),
             Self::Status(status) => (status.stamp_ns, status.tick),
@@ -56,6 +63,7 @@ pub(super) struct Run {
     pub attached: bool,
     /// The latest messages, as a subscriber that joins now gets them.
     pub stage: Option<Box<Stage>>,
+    pub scene: Option<Arc<str>>,
     pub alert: Option<CollisionAlert>,
     pub cue: Option<Cue>,
     pub status: Option<LoopStatus>,
@@ -77,6 +85,7 @@ impl Run {
             latest_deadline_ns: frame.deadline_ns,
             attached: false,
             stage: None,
+            scene: None,
             alert: None,
             cue: None,
             status: None,
@@ -95,6 +104,20 @@ impl Run {
             Ordering::Equal => stamp_ns.max(began),
             Ordering::Greater => stamp_ns,
         }
+    }
+
+    /// Attaches the text of the scene to the file, once.
+    ///
+    /// # Errors
+    /// A failed write.
+    pub fn attach_scene(&mut self, text: Arc<str>) -> io::Result<()> {
+        if self.scene.is_some() || text.is_empty() {
+            return Ok(());
+        }
+        let attached =
+            self.file.attach(SCENE_ATTACHMENT, "application/toml", self.file_began_stamp_ns, text.as_bytes());
+        self.scene = Some(text);
+        attached
     }
 
     /// Attaches the description of the run to the file, once.

@@ -3,13 +3,12 @@
 use super::super::hash::{FrameHasher, columns, header_words};
 use super::super::lines::{Line, SecondLine, ShowLine, command_of};
 use super::super::writer::{sampled, second_of};
-use super::{Difference, Verdict, accuracy_of};
+use super::reference::Reference;
+use super::{Difference, Verdict};
 use bench_dragon_messages::control::Code;
-use bench_dragon_motion::solve::{Chain, Solver, Velocities};
-use bench_dragon_motion::{Method, Motion};
 use bench_dragon_show::convert::{Stamps, frame_header};
 use bench_dragon_show::scene::Scene;
-use bench_dragon_show::{Frame, Playback, Show, StartError, solve_at_or_just_before};
+use bench_dragon_show::{Frame, Playback, Show, StartError};
 
 /// A show that replays a log.
 pub(super) struct Player {
@@ -53,24 +52,6 @@ struct VerifiedCounts {
     last_tick: Option<u64>,
 }
 
-/// Seconds by which two arithmetics may differ in the times of events, at which a show ends or pauses.
-const EVENT_TIME: f64 = 1e-9;
-/// The greatest growth of a position error along the chain. The error grows with the speed of the handles, without
-/// bound at a lock. Near a lock it is about sqrt(eps), 1e6 times eps.
-const MOST_GROWTH: f64 = 1e6;
-
-/// The second solver, for a machine with different bits.
-struct Reference {
-    solver: Box<dyn Solver>,
-    chain: Chain,
-    head_speed: f64,
-    /// Metres from the stage's origin to that of the path's own coordinates.
-    placed: f64,
-    accuracy: f64,
-    /// Metres: the greatest distance so far, and its tolerance.
-    worst: Option<(f64, f64)>,
-}
-
 impl Player {
     /// Creates the player of a scene.
     pub fn new(scene: &Scene, playback: Playback, same_arithmetic: bool) -> Result<Self, StartError> {
@@ -80,11 +61,7 @@ impl Player {
             None => motion.timeline_without_contact(),
         };
         let show = Show::new(scene, timeline, playback)?;
-        let other = match motion.method() {
-            Method::Paper(_) => motion.clone(),
-            _ => motion.with_method(Method::Newton).unwrap_or_else(|_| motion.clone()),
-        };
-        let reference = Reference::new(&other, accuracy_of(scene));
+        let reference = Reference::of(scene);
         Ok(Self {
             show,
             rate: playback.rate,
@@ -193,8 +170,8 @@ impl Player {
             version: show.version.clone(),
             instructions: show.arithmetic.instructions.clone(),
             same_arithmetic: self.same_arithmetic,
-            max_difference: self.reference.worst.map(|(metres, _)| metres),
-            tolerance: self.reference.worst.map(|(_, tolerance)| tolerance),
+            max_difference: self.reference.worst().map(|(metres, _)| metres),
+            tolerance: self.reference.worst().map(|(_, tolerance)| tolerance),
         }
     }
 
@@ -339,56 +316,6 @@ impl Sample {
         let most = pairs.map(|(a, b)| (a.1 - b.1).hypot(a.2 - b.2)).fold(0.0, f64::max);
         same_handles.then_some(most)
     }
-}
-
-impl Reference {
-    fn new(motion: &Motion, accuracy: f64) -> Self {
-        Self {
-            solver: motion.solver(Velocities::Computed).solver,
-            chain: Chain::new(motion.team().handles()),
-            head_speed: motion.head_speed(),
-            placed: motion.placement().origin().coords.norm(),
-            accuracy,
-            worst: None,
-        }
-    }
-
-    /// Compares the time of a line with the show's, and its handles with the second solver's.
-    fn compare(&mut self, line: &SecondLine, shown: f64) -> Result<(), String> {
-        let time = line.sim_time;
-        let apart = (time - shown).abs();
-        if apart.is_nan() || apart > EVENT_TIME + self.accuracy / self.head_speed + 8.0 * f64::EPSILON * shown {
-            return Err(format!("its simulated time is {time} s, computed {shown} s"));
-        }
-        if line.handles.is_empty() || solve_at_or_just_before(self.solver.as_mut(), time, &mut self.chain).is_err() {
-            return Err(format!("there is no solution at its simulated time of {time} s"));
-        }
-        for (handle, x, y) in &line.handles {
-            let place = self.chain.x.get(*handle as usize).zip(self.chain.y.get(*handle as usize));
-            let metres = place.map_or(f64::INFINITY, |(own_x, own_y)| (x - own_x).hypot(y - own_y));
-            // Both solutions have rounding errors.
-            let rounding = 8.0 * f64::EPSILON * (x.hypot(*y) + self.head_speed * time + self.placed);
-            let tolerance = self.accuracy + 2.0 * rounding * growth(&self.chain.speed, *handle as usize);
-            if metres.is_nan() || metres > tolerance {
-                let handle = handle + 1;
-                return Err(format!(
-                    "handle {handle}, counted from 1, is {metres:.1e} m from newton's place, more than {tolerance:.1e} m"
-                ));
-            }
-            if self.worst.is_none_or(|(worst, _)| metres > worst) {
-                self.worst = Some((metres, tolerance));
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Returns the growth of a position error up to a handle, from the speeds of the handles.
-fn growth(speeds: &[f64], handle: usize) -> f64 {
-    let least = speeds.iter().take(handle + 1).map(|speed| speed.abs()).fold(f64::INFINITY, f64::min);
-    let growth = speeds.get(handle).map_or(f64::NAN, |speed| speed.abs()) / least;
-    // NaN if this handle and one before it stand still.
-    if growth.is_nan() { MOST_GROWTH } else { growth.clamp(1.0, MOST_GROWTH) }
 }
 
 /// Returns the commands in words.

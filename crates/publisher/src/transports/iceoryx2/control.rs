@@ -21,7 +21,7 @@ use ::iceoryx2::service::port_factory::server::ServerCreateError;
 use super::{SPARE_NODES, node, retry_while_incomplete, service_name};
 use crate::live::control::{Answer, CommandSender, MOST_WAITING};
 use bench_dragon_client::shared_memory::{OpenError, failed, incomplete};
-use bench_dragon_messages::control::{Code, Command};
+use bench_dragon_messages::control::{Code, Command, PLAYING_RATE};
 use bench_dragon_messages::state::PlaybackState;
 use bench_dragon_messages::{ControlRequest, ControlResponse};
 use bench_dragon_show::convert::control_response;
@@ -42,6 +42,8 @@ struct Pending {
     request: Request,
     /// The code of the response in place of the loop's, for a request that is no command.
     instead: Option<Code>,
+    /// True if the response has the rate of the show when it plays.
+    playing_rate: bool,
 }
 
 /// The thread. Dropping this value ends the thread.
@@ -138,13 +140,14 @@ fn serve(
         }
         while let Some(Answer { ticket, outcome }) = commands.answer() {
             let Some(index) = pending.iter().position(|waiting| waiting.ticket == ticket) else { continue };
-            let Pending { request, instead, .. } = pending.swap_remove(index);
+            let Pending { request, instead, playing_rate, .. } = pending.swap_remove(index);
             let code = match instead {
                 // A held show refuses every command but three, whatever its value.
                 Some(Code::OutOfRange) if outcome.playback == PlaybackState::Held => Code::Refused,
                 instead => instead.unwrap_or(outcome.code),
             };
-            let outcome = bench_dragon_show::Outcome { code, ..outcome };
+            let time_scale = if playing_rate { outcome.playing_rate } else { outcome.time_scale };
+            let outcome = bench_dragon_show::Outcome { code, time_scale, ..outcome };
             // The client may have ended.
             let _ = request.send_copy(control_response(request.payload().id, &outcome));
         }
@@ -159,8 +162,9 @@ fn pass_on(commands: &mut CommandSender, request: Request) -> Option<Pending> {
         Ok(command) => (command, None),
         Err(code) => (Command::State, Some(code)),
     };
+    let playing_rate = command == Command::State && value == PLAYING_RATE && instead.is_none();
     match commands.send(command) {
-        Ok(ticket) => Some(Pending { ticket, request, instead }),
+        Ok(ticket) => Some(Pending { ticket, request, instead, playing_rate }),
         Err(code) => {
             refuse(&request, code);
             None

@@ -1,0 +1,148 @@
+//! A second solver that judges handles computed elsewhere: by a machine with other bits, or before they were recorded.
+//!
+//! In: a time and handles. Out: a sentence for the first handle outside of the tolerance. Called by the verification of
+//! logs and of recordings.
+
+use std::f64::consts::PI;
+
+use super::super::lines::SecondLine;
+use super::accuracy_of;
+use bench_dragon_messages::HandlePose;
+use bench_dragon_motion::solve::{Chain, Solver, Velocities};
+use bench_dragon_motion::{Method, Motion};
+use bench_dragon_show::scene::Scene;
+use bench_dragon_show::solve_at_or_just_before;
+
+/// Seconds by which two arithmetics may differ in the times of events, at which a show ends or pauses.
+const EVENT_TIME: f64 = 1e-9;
+/// The greatest growth of a position error along the chain. The error grows with the speed of the handles, without
+/// bound at a lock. Near a lock it is about sqrt(eps), 1e6 times eps.
+const MOST_GROWTH: f64 = 1e6;
+
+/// The error of an angle in (-pi, pi] from arctangents and sums, radians.
+const ROUNDING_OF_ANGLES: f64 = 1e-14;
+
+/// The second solver of a scene, and the greatest distance from it so far.
+pub struct Reference {
+    solver: Box<dyn Solver>,
+    chain: Chain,
+    head_speed: f64,
+    /// Metres from the stage's origin to that of the path's own coordinates.
+    placed: f64,
+    accuracy: f64,
+    /// Metres: the greatest distance so far, and its tolerance.
+    worst: Option<(f64, f64)>,
+}
+
+impl Reference {
+    /// Makes the second solver of a scene: `newton`, or the paper's rules for a scene that requests them.
+    pub fn of(scene: &Scene) -> Self {
+        let motion = &scene.motion;
+        let other = match motion.method() {
+            Method::Paper(_) => motion.clone(),
+            _ => motion.with_method(Method::Newton).unwrap_or_else(|_| motion.clone()),
+        };
+        Self::new(&other, accuracy_of(scene))
+    }
+
+    pub(super) fn new(motion: &Motion, accuracy: f64) -> Self {
+        Self {
+            solver: motion.solver(Velocities::Computed).solver,
+            chain: Chain::new(motion.team().handles()),
+            head_speed: motion.head_speed(),
+            placed: motion.placement().origin().coords.norm(),
+            accuracy,
+            worst: None,
+        }
+    }
+
+    /// Compares the time of a line with the show's, and its handles with the second solver's.
+    pub(super) fn compare(&mut self, line: &SecondLine, shown: f64) -> Result<(), String> {
+        let time = line.sim_time;
+        let apart = (time - shown).abs();
+        if apart.is_nan() || apart > EVENT_TIME + self.accuracy / self.head_speed + 8.0 * f64::EPSILON * shown {
+            return Err(format!("its simulated time is {time} s, computed {shown} s"));
+        }
+        if line.handles.is_empty() {
+            return Err(no_solution(time));
+        }
+        self.solve(time)?;
+        line.handles.iter().try_for_each(|(handle, x, y)| self.compare_place(*handle as usize, time, *x, *y).map(drop))
+    }
+
+    /// Compares the position and the heading of every handle of a frame with those of the time `time`.
+    ///
+    /// # Errors
+    /// A sentence for the first handle outside of the tolerance.
+    pub fn compare_frame(&mut self, time: f64, poses: &[HandlePose]) -> Result<(), String> {
+        if poses.len() != self.chain.handles() {
+            return Err(format!("it has {} handles, the scene {}", poses.len(), self.chain.handles()));
+        }
+        self.solve(time)?;
+        let places = poses.iter().enumerate().map(|(handle, pose)| self.compare_place(handle, time, pose.x, pose.y));
+        let tolerances: Vec<f64> = places.collect::<Result<_, _>>()?;
+        for (handle, HandlePose { heading, .. }) in poses.iter().enumerate() {
+            // The last handle has the last bench's heading.
+            let bench = handle.min(poses.len().saturating_sub(2));
+            // A bench turns by the distances of both its handles over its length.
+            let allowed = (tolerances[bench] + tolerances[bench + 1]) / self.link(bench) + ROUNDING_OF_ANGLES;
+            let turned = (heading - self.chain.heading[handle] + PI).rem_euclid(2.0 * PI) - PI;
+            if turned.is_nan() || turned.abs() > allowed {
+                return Err(format!(
+                    "the heading of handle {}, counted from 1, is {turned:.1e} rad from newton's, more than {allowed:.1e} rad",
+                    handle + 1
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the greatest distance so far and its tolerance, metres; `None` before the first comparison.
+    pub fn worst(&self) -> Option<(f64, f64)> {
+        self.worst
+    }
+
+    fn solve(&mut self, time: f64) -> Result<(), String> {
+        let solved = time.is_finite()
+            && time >= 0.0
+            && solve_at_or_just_before(self.solver.as_mut(), time, &mut self.chain).is_ok();
+        if solved { Ok(()) } else { Err(no_solution(time)) }
+    }
+
+    /// Returns the metres between the holes of a bench.
+    fn link(&self, bench: usize) -> f64 {
+        let Chain { x, y, .. } = &self.chain;
+        (x[bench] - x[bench + 1]).hypot(y[bench] - y[bench + 1])
+    }
+
+    /// Compares the place of a handle with the solution. Returns the tolerance in metres.
+    fn compare_place(&mut self, handle: usize, time: f64, x: f64, y: f64) -> Result<f64, String> {
+        let place = self.chain.x.get(handle).zip(self.chain.y.get(handle));
+        let metres = place.map_or(f64::INFINITY, |(own_x, own_y)| (x - own_x).hypot(y - own_y));
+        // Both solutions have rounding errors.
+        let rounding = 8.0 * f64::EPSILON * (x.hypot(y) + self.head_speed * time + self.placed);
+        let tolerance = self.accuracy + 2.0 * rounding * growth(&self.chain.speed, handle);
+        if metres.is_nan() || metres > tolerance {
+            let handle = handle + 1;
+            return Err(format!(
+                "handle {handle}, counted from 1, is {metres:.1e} m from newton's place, more than {tolerance:.1e} m"
+            ));
+        }
+        if self.worst.is_none_or(|(worst, _)| metres > worst) {
+            self.worst = Some((metres, tolerance));
+        }
+        Ok(tolerance)
+    }
+}
+
+fn no_solution(time: f64) -> String {
+    format!("there is no solution at its simulated time of {time} s")
+}
+
+/// Returns the growth of a position error up to a handle, from the speeds of the handles.
+fn growth(speeds: &[f64], handle: usize) -> f64 {
+    let least = speeds.iter().take(handle + 1).map(|speed| speed.abs()).fold(f64::INFINITY, f64::min);
+    let growth = speeds.get(handle).map_or(f64::NAN, |speed| speed.abs()) / least;
+    // NaN if this handle and one before it stand still.
+    if growth.is_nan() { MOST_GROWTH } else { growth.clamp(1.0, MOST_GROWTH) }
+}

@@ -1,0 +1,329 @@
+//! A subscriber that publishes running shows on ROS 2, and on request offers services that control them.
+//!
+//! In: the events of the feed of each name. Out: for each run of a show its node, topics and services, from its first
+//! frame until the show has ended. The scene, which the show sends along, has the topics, their quality of service and
+//! the limits of the diagnostics. Called by `send ros2` through [`poll_until`](bench_dragon_client::polling::poll_until).
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use ros2_client::Context;
+use serde::Serialize;
+
+use bench_dragon_client::feed::FeedEvent;
+use bench_dragon_client::polling::Handler;
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage};
+use bench_dragon_ros2_messages::settings::Ros2Settings;
+use bench_dragon_show::scene::Scene;
+
+use crate::commands::ShowCommands;
+use crate::control::{ControlThread, Mapping};
+use crate::environment::{Network, check_name, other_distribution};
+use crate::matching::Matches;
+use crate::node::Topics;
+use crate::rate::RateDivider;
+use crate::{Ros2Config, Ros2Error, context, topic_names};
+
+/// The longest wait for the scene after the first frame: a publisher detects a new subscriber within a second.
+const SCENE_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// The settings of a bridge.
+#[derive(Debug, Clone)]
+pub struct BridgeConfig {
+    /// The names of the shows.
+    pub names: Vec<String>,
+    /// The settings in place of those of the scenes.
+    pub settings: Option<Ros2Settings>,
+    /// True for services that control the shows.
+    pub control: bool,
+}
+
+/// The messages of a bridge.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct BridgeCounters {
+    /// Frames sent.
+    pub frames: u64,
+    /// Frames that were due and that the bridge missed because it was behind.
+    pub skipped: u64,
+    /// Messages that did not fit into a queue because a reliable subscriber was slow or dead.
+    pub discarded: u64,
+}
+
+/// A change of a bridge, for the user.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Notice {
+    /// The bridge is connected to a publisher, whose next frame it receives.
+    Connected,
+    /// The topics of a show are open.
+    Opened {
+        /// Their names.
+        topics: Vec<String>,
+    },
+    /// The show has ended, and its topics are closed.
+    Gone,
+}
+
+/// Publishes the shows of some names.
+pub struct Bridge<'a> {
+    shows: Vec<ShowBridge>,
+    network: DdsNetwork,
+    stop: &'a AtomicBool,
+    failure: Option<Ros2Error>,
+    notify: &'a mut dyn FnMut(usize, Notice),
+}
+
+/// The participant of this process.
+struct DdsNetwork {
+    context: Context,
+    matches: Matches,
+    /// The mapping of services; `None` without services.
+    mapping: Option<Mapping>,
+}
+
+/// The state of one name.
+struct ShowBridge {
+    name: String,
+    /// The settings in place of those of the scene.
+    settings: Option<Ros2Settings>,
+    connected: bool,
+    stage: Option<Stage>,
+    scene: Option<ShowScene>,
+    /// The latest alert and cue of a show whose topics are not open yet.
+    alert: Option<CollisionAlert>,
+    cue: Option<Cue>,
+    /// The time of the first frame without topics.
+    waiting_since: Option<Instant>,
+    open: Option<OpenShow>,
+    counters: BridgeCounters,
+}
+
+/// The parts of a scene that are not in its stage.
+struct ShowScene {
+    run_id: u64,
+    /// True if there are alerts.
+    alerts: bool,
+    settings: Ros2Settings,
+}
+
+/// The node of one run.
+struct OpenShow {
+    // Dropped before the topics: it may answer until then.
+    control: Option<ControlThread>,
+    topics: Topics,
+    divider: RateDivider,
+}
+
+impl<'a> Bridge<'a> {
+    /// Joins the network that the environment names. `notify` is called with each change of the show with that index
+    /// among the names. A later failure sets `stop`.
+    ///
+    /// # Errors
+    /// [`Ros2Error`]
+    pub fn join(
+        config: BridgeConfig,
+        stop: &'a AtomicBool,
+        notify: &'a mut dyn FnMut(usize, Notice),
+    ) -> Result<Self, Ros2Error> {
+        let BridgeConfig { names, settings, control } = config;
+        names.iter().try_for_each(|name| check_name(name))?;
+        let variable = |name: &str| std::env::var(name).ok();
+        let network = Network::of(variable)?;
+        if let Some(warning) = other_distribution(variable) {
+            log::warn!("{warning}");
+        }
+        let mapping = control.then(|| Mapping::of(variable)).map(|(mapping, warning)| {
+            if let Some(warning) = warning {
+                log::warn!("{warning}");
+            }
+            mapping
+        });
+        let context = context(network)?;
+        let matches = Matches::new(&context);
+        let show = |name| ShowBridge::new(name, settings.clone());
+        let shows = names.into_iter().map(show).collect();
+        Ok(Self { shows, network: DdsNetwork { context, matches, mapping }, stop, failure: None, notify })
+    }
+
+    /// Closes all topics and leaves the network. Returns the counters of all shows.
+    ///
+    /// # Errors
+    /// The [`Ros2Error`] that ended the bridge.
+    pub fn finish(mut self) -> Result<BridgeCounters, Ros2Error> {
+        self.shows.iter_mut().for_each(ShowBridge::close);
+        let sum = |sum: BridgeCounters, of: &ShowBridge| {
+            let BridgeCounters { frames, skipped, discarded } = of.counters;
+            BridgeCounters {
+                frames: sum.frames + frames,
+                skipped: sum.skipped + skipped,
+                discarded: sum.discarded + discarded,
+            }
+        };
+        let counters = self.shows.iter().fold(BridgeCounters::default(), sum);
+        self.failure.map_or(Ok(counters), Err)
+    }
+}
+
+impl Handler for Bridge<'_> {
+    fn handle(&mut self, publisher: usize, event: FeedEvent<'_>) {
+        let Self { shows, network, stop, failure, notify } = self;
+        match shows[publisher].handle(event, network) {
+            Ok(None) => (),
+            Ok(Some(notice)) => notify(publisher, notice),
+            Err(error) => {
+                *failure = Some(error);
+                stop.store(true, Ordering::Relaxed);
+            }
+        }
+    }
+
+    fn clock(&mut self, publisher: usize, _shares_clock: bool) {
+        if !std::mem::replace(&mut self.shows[publisher].connected, true) {
+            (self.notify)(publisher, Notice::Connected);
+        }
+    }
+
+    fn polled(&mut self, _now: Instant) {
+        self.network.matches.update();
+        self.shows.iter_mut().filter_map(|show| show.open.as_mut()).for_each(|open| open.topics.service());
+    }
+}
+
+impl ShowBridge {
+    fn new(name: String, settings: Option<Ros2Settings>) -> Self {
+        Self {
+            name,
+            settings,
+            connected: false,
+            stage: None,
+            scene: None,
+            alert: None,
+            cue: None,
+            waiting_since: None,
+            open: None,
+            counters: BridgeCounters::default(),
+        }
+    }
+
+    fn handle(&mut self, event: FeedEvent<'_>, network: &DdsNetwork) -> Result<Option<Notice>, Ros2Error> {
+        match event {
+            FeedEvent::Stage(stage) => self.stage = Some(*stage),
+            FeedEvent::Scene { header, text } => self.scene = Some(ShowScene::of(header.run_id, text)),
+            FeedEvent::Started { run_id } => {
+                self.close();
+                self.forget_other_runs(run_id);
+            }
+            FeedEvent::Frame { header, handles, missed } => return self.frame(header, handles, missed, network),
+            FeedEvent::Alert(alert) => match &mut self.open {
+                Some(open) => open.topics.alert(*alert),
+                None => self.alert = Some(*alert),
+            },
+            FeedEvent::Cue(cue) => match &mut self.open {
+                Some(open) => open.topics.cue(*cue),
+                None => self.cue = Some(*cue),
+            },
+            FeedEvent::Status(status) => {
+                if let Some(open) = &mut self.open {
+                    open.divider.set_loop_rate(status.rate);
+                    open.topics.status(status);
+                }
+            }
+            FeedEvent::Silent => (),
+            FeedEvent::Gone => {
+                self.close();
+                *self = Self { counters: self.counters, ..Self::new(self.name.clone(), self.settings.clone()) };
+                return Ok(Some(Notice::Gone));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Drops what belongs to another run than `run_id`.
+    fn forget_other_runs(&mut self, run_id: u64) {
+        self.stage = self.stage.filter(|stage| stage.run_id == run_id);
+        self.scene = self.scene.take().filter(|scene| scene.run_id == run_id);
+        self.alert = self.alert.filter(|alert| alert.run_id == run_id);
+        self.cue = self.cue.filter(|cue| cue.run_id == run_id);
+        self.waiting_since = None;
+    }
+
+    /// Sends a frame if it is due. The first frame opens the topics, when stage and scene have come.
+    fn frame(
+        &mut self,
+        header: &FrameHeader,
+        handles: &[HandlePose],
+        missed: u64,
+        network: &DdsNetwork,
+    ) -> Result<Option<Notice>, Ros2Error> {
+        let notice = if self.open.is_none() { self.open(header, network)? } else { None };
+        if let Some(open) = &mut self.open {
+            let choice = open.divider.choose(header, missed);
+            self.counters.skipped += choice.skipped;
+            if choice.is_due {
+                open.topics.service();
+                open.topics.frame(header, handles);
+                self.counters.frames += 1;
+            }
+        }
+        Ok(notice)
+    }
+
+    fn open(&mut self, header: &FrameHeader, network: &DdsNetwork) -> Result<Option<Notice>, Ros2Error> {
+        let waited = self.waiting_since.get_or_insert_with(Instant::now).elapsed();
+        let Some(stage) = self.stage else { return Ok(None) };
+        let scene = match self.scene.take() {
+            Some(scene) => scene,
+            None if waited < SCENE_TIMEOUT => return Ok(None),
+            None => {
+                log::warn!("the show \"{}\" sends no scene: ROS 2 gets the default topics", self.name);
+                ShowScene::unknown(header.run_id)
+            }
+        };
+        let ShowScene { run_id: _, alerts, settings } = scene;
+        let settings = self.settings.clone().unwrap_or(settings);
+        let (name, cues) = (self.name.clone(), stage.cues as usize);
+        let rate = settings.greatest_rate();
+        let topic_names = topic_names(&name, &settings, alerts, cues);
+        let config = Ros2Config { name, handles: header.handles as usize, rate, settings, alerts, cues, stage };
+        let DdsNetwork { context, matches, mapping } = network;
+        let topics = Topics::open(context.clone(), matches.clone(), config)?;
+        let services = |mapping: Mapping| {
+            let commands = ShowCommands::start(&self.name)?;
+            ControlThread::start(&self.name, context.clone(), matches.clone(), mapping, commands)
+        };
+        let control = mapping.map(services).transpose()?;
+        let mut open = OpenShow { control, topics, divider: RateDivider::new(rate) };
+        self.alert.take().into_iter().for_each(|alert| open.topics.alert(alert));
+        self.cue.take().into_iter().for_each(|cue| open.topics.cue(cue));
+        self.open = Some(open);
+        Ok(Some(Notice::Opened { topics: topic_names }))
+    }
+
+    /// Closes the topics and services of a run.
+    fn close(&mut self) {
+        let Some(OpenShow { control, topics, .. }) = self.open.take() else { return };
+        self.counters.discarded += topics.discarded();
+        drop(control);
+        topics.finish();
+    }
+}
+
+impl ShowScene {
+    /// Reads the text of the run's scene. The publisher has checked it; a publisher of a later version may know more.
+    fn of(run_id: u64, text: &str) -> Self {
+        if text.is_empty() {
+            return Self::unknown(run_id);
+        }
+        match Scene::parse(text, "the scene of the show", "scene") {
+            Ok(scene) => Self { run_id, alerts: scene.alerts.is_some(), settings: scene.ros2.unwrap_or_default() },
+            Err(error) => {
+                log::warn!("{error}: ROS 2 gets the default topics");
+                Self::unknown(run_id)
+            }
+        }
+    }
+
+    /// Returns the defaults for a show whose scene is not known.
+    fn unknown(run_id: u64) -> Self {
+        Self { run_id, alerts: true, settings: Ros2Settings::default() }
+    }
+}

@@ -1,0 +1,260 @@
+//! `send ros2`, the process that publishes a running show on ROS 2: attached late, killed, restarted, of two shows, with
+//! services. Cyclone DDS is the wire peer; shared memory shows that no frame is lost.
+#![cfg(feature = "ros2")]
+
+use crate::harness;
+
+use std::process::Command;
+use std::time::Instant;
+
+use bench_dragon::soak::resources::child_of;
+use harness::{
+    Lines, Process, can_run, json_lines, program, python, python_modules, scene_file, stopped, text, unique, wait_until,
+};
+use nix::sys::signal::Signal::{SIGINT, SIGKILL, SIGTERM};
+use nix::sys::signal::kill;
+use nix::unistd::Pid;
+use serde_json::Value;
+
+/// Starts a Cyclone DDS process that prints its messages of these topics, and waits until it reads.
+fn peer(name: &str, topics: &[&str]) -> (Process, Lines) {
+    let mut command = python();
+    command.args(["tests/python/ros2_peer.py", "--name", &unique(name), "--seconds", "300"]);
+    topics.iter().for_each(|topic| {
+        command.args(["--topic", topic]);
+    });
+    let mut process = Process::start(&mut command);
+    let lines = process.lines();
+    lines.until("ready", 60);
+    (process, lines)
+}
+
+/// Returns the next message of a topic.
+fn next(lines: &Lines, topic: &str) -> Value {
+    let line: Value = serde_json::from_str(&lines.until(&format!("\"topic\": \"{topic}\""), 60)).unwrap();
+    line["message"].clone()
+}
+
+/// Returns the run of a message of handles.
+fn run_of(message: &Value) -> u64 {
+    message["run_id"].as_u64().unwrap_or_else(|| panic!("{message}"))
+}
+
+/// Returns the process that publishes on ROS 2 for a `run` or a `replay`.
+fn ros2_of(process: &Process) -> u32 {
+    let mut child = None;
+    wait_until("there is a process of ROS 2", || {
+        child = child_of(process.id());
+        child.is_some()
+    });
+    child.unwrap()
+}
+
+fn exists(process: u32) -> bool {
+    std::fs::read_to_string(format!("/proc/{process}/stat")).is_ok_and(|stat| !stat.contains(") Z "))
+}
+
+/// Returns exit code and response of `control`, over shared memory.
+fn control(name: &str, arguments: &[&str]) -> (i32, Value) {
+    let output = program(name).args(["--json", "control"]).args(arguments).output().unwrap();
+    (output.status.code().unwrap(), json_lines(&output).pop().unwrap_or(Value::Null))
+}
+
+/// Returns the responses to these calls, one after the other, of one Cyclone client.
+fn call(name: &str, calls: &[&str]) -> Vec<Value> {
+    let mut command = python();
+    command.args(["tests/python/ros2_control_peer.py", "--name", &unique(name), "--domain", "0"]).args(calls);
+    let output = Process::start(&mut command).output_within(120);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    json_lines(&output).into_iter().map(|line| line["response"].clone()).collect()
+}
+
+#[test]
+fn a_running_show_gets_its_scenes_topics_late_and_loses_them_again() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let name = "attached";
+    let topics = "[publish.ros2]\nrate = 20.0\ntopics = [\"handles\", \"stage\"]\n";
+    let settings = scene_file(name, &[]);
+    std::fs::write(&settings, format!("{}\n{topics}", std::fs::read_to_string(&settings).unwrap())).unwrap();
+    let publisher = Process::start(program(name).args(["run", "--json", "--start", "300"]));
+    let mut watch = Process::start(program(name).args(["watch", "--json"]));
+    let seconds = watch.lines();
+    seconds.until("\"state\":\"moving\"", 60);
+    assert_eq!(child_of(publisher.id()), None, "no ROS 2 without a request");
+
+    // The default topics, which the show's scene does not change.
+    let (first_peer, first) = peer(name, &["handles", "poses", "alerts:reliable:transient_local"]);
+    let bridge = Process::start(program(name).args(["send", "ros2", "--json"]));
+    for topic in ["handles", "poses", "alerts:reliable:transient_local"] {
+        next(&first, topic);
+    }
+    let summary = stopped(bridge);
+    assert_eq!(
+        (&summary["type"], &summary["skipped"], &summary["discarded"]),
+        (&"summary".into(), &0.into(), &0.into())
+    );
+    assert!(summary["frames"].as_u64().unwrap() > 0, "{summary}");
+    first_peer.signal(SIGKILL);
+
+    // Attached once more, with the topics of another scene.
+    let (second_peer, second) = peer(name, &["handles", "poses", "stage:reliable:transient_local"]);
+    let mut bridge = program(name);
+    let mut bridge = Process::start(bridge.arg("--scene").arg(&settings).args(["send", "ros2", "--json"]));
+    let printed = bridge.lines();
+    let opened: Value = serde_json::from_str(&printed.until("opened", 60)).unwrap();
+    assert_eq!(
+        opened["topics"],
+        serde_json::json!([format!("/{0}/handles", unique(name)), format!("/{0}/stage", unique(name))])
+    );
+    next(&second, "stage:reliable:transient_local");
+    let ticks: Vec<u64> = (0..20).map(|_| next(&second, "handles")["tick"].as_u64().unwrap()).collect();
+    let apart = (ticks[19] - ticks[0]) as f64 / 19.0;
+    assert!(apart >= 2.9, "20 of 60 frames per second are sent: {ticks:?}");
+    bridge.signal(SIGTERM);
+    let rest = printed.rest(60);
+    assert!(rest.last().is_some_and(|line| line.contains("summary")), "{rest:?}");
+    second_peer.signal(SIGKILL);
+
+    // The show has noticed nothing.
+    assert_eq!(control(name, &["state"]).1["playback"], "playing");
+    watch.signal(SIGINT);
+    let missed = missed(&seconds.rest(60));
+    assert_eq!(missed, 0);
+    assert!(stopped(publisher).get("ros2").is_none());
+}
+
+/// Returns the frames that a `watch --json` has missed.
+fn missed(lines: &[String]) -> u64 {
+    let lines = lines.iter().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    lines.filter(|line| line["type"] == "second").map(|line| line["missed"].as_u64().unwrap()).sum()
+}
+
+#[test]
+fn a_killed_process_of_ros_2_is_restarted_and_the_show_loses_no_frame() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let name = "killed_child";
+    let scene = scene_file(name, &[("[publish]", "[publish]\nqueue = 500")]);
+    let mut run = program(name);
+    let publisher = Process::start(run.arg("--scene").arg(&scene).args(["run", "--ros2", "--json", "--start", "300"]));
+    let mut watch = Process::start(program(name).args(["watch", "--json"]));
+    let seconds = watch.lines();
+    let (subscriber, lines) = peer(name, &["handles"]);
+    let run = run_of(&next(&lines, "handles"));
+    let mut longest = 0.0_f64;
+    for _ in 0..3 {
+        let child = ros2_of(&publisher);
+        kill(Pid::from_raw(child as i32), SIGKILL).unwrap();
+        let killed = Instant::now();
+        wait_until("the killed process has ended", || !exists(child));
+        // A message of after the kill can only come from the next process.
+        let tick = control(name, &["state"]).1["tick"].as_u64().unwrap();
+        while next(&lines, "handles")["tick"].as_u64().unwrap() <= tick {}
+        longest = longest.max(killed.elapsed().as_secs_f64());
+        assert_ne!(ros2_of(&publisher), child);
+        // Long enough for a restart without delay.
+        let restarted = Instant::now();
+        while restarted.elapsed().as_secs_f64() < 5.5 {
+            assert_eq!(run_of(&next(&lines, "handles")), run);
+        }
+    }
+    println!("topics were back within {longest:.2} s");
+    watch.signal(SIGINT);
+    let lines = seconds.rest(60);
+    assert!(lines.len() > 15, "{} seconds", lines.len());
+    assert_eq!(missed(&lines), 0);
+    subscriber.signal(SIGKILL);
+    publisher.signal(SIGINT);
+    let output = publisher.output_within(60);
+    let summary = harness::summary(&output);
+    assert_eq!(summary["ros2"]["skipped"], 0, "{summary}");
+    assert_eq!(text(&output.stderr).matches("restarted").count(), 3, "{}", text(&output.stderr));
+}
+
+#[test]
+fn the_process_of_ros_2_ends_with_a_killed_publisher() {
+    let publisher = Process::start(program("killed_parent").args(["run", "--ros2"]));
+    let child = ros2_of(&publisher);
+    wait_until("the show runs", || control("killed_parent", &["state"]).0 == 0);
+    publisher.signal(SIGKILL);
+    publisher.output_within(60);
+    wait_until("the process of ROS 2 has ended", || !exists(child));
+}
+
+#[test]
+fn one_process_publishes_two_shows_and_follows_each_through_its_death() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let [gold, silver] = ["two_gold", "two_silver"];
+    let start = |name: &str| Process::start(program(name).args(["run", "--json", "--start", "300"]));
+    let bridge = Process::start(program(gold).args(["--name", &unique(silver), "send", "ros2", "--json"]));
+    let (_of_gold, gold_lines) = peer(gold, &["handles"]);
+    let (_of_silver, silver_lines) = peer(silver, &["handles"]);
+    // The process waits for shows.
+    let (first, other) = (start(gold), start(silver));
+    let (gold_run, silver_run) = (run_of(&next(&gold_lines, "handles")), run_of(&next(&silver_lines, "handles")));
+    assert_ne!(gold_run, silver_run);
+    first.signal(SIGKILL);
+    first.output_within(60);
+    let second = start(gold);
+    let mut latest = gold_run;
+    while latest == gold_run {
+        latest = run_of(&next(&gold_lines, "handles"));
+    }
+    let tick = control(silver, &["state"]).1["tick"].as_u64().unwrap();
+    loop {
+        let message = next(&silver_lines, "handles");
+        assert_eq!(run_of(&message), silver_run);
+        if message["tick"].as_u64().unwrap() > tick {
+            break;
+        }
+    }
+    let summary = stopped(bridge);
+    assert_eq!(summary["skipped"], 0, "{summary}");
+    stopped(second);
+    stopped(other);
+}
+
+#[test]
+fn services_of_a_show_that_was_paused_before_know_its_rate() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let name = "attached_paused";
+    let arguments = ["run", "--json", "--paused", "--start", "50", "--time-scale", "2"];
+    let publisher = Process::start(program(name).args(arguments));
+    wait_until("the show runs", || control(name, &["state"]).0 == 0);
+    let mut send = program(name);
+    let bridge =
+        Process::start(send.args(["send", "ros2", "--control"]).env("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp"));
+    let [rate, paused] = call(name, &["get_rate", "is_paused"]).try_into().unwrap();
+    assert_eq!((&rate["rate"], &paused["paused"]), (&2.0.into(), &true.into()));
+    // Another client changes the rate of the paused show.
+    assert_eq!(control(name, &["rate", "0.5"]).0, 0);
+    assert_eq!(call(name, &["get_rate"])[0]["rate"], 0.5);
+    // The rate in force is another one.
+    assert_eq!(control(name, &["state"]).1["time_scale"], 0.0);
+    assert_eq!(call(name, &["hold", "get_rate", "go"])[2]["success"], false);
+    assert_eq!(control(name, &["state"]).1["playback"], "held");
+    bridge.signal(SIGINT);
+    let output = bridge.output_within(60);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    stopped(publisher);
+}
+
+#[test]
+fn send_and_run_refuse_alike_what_ros_2_cannot_do() {
+    for command in [&["send", "ros2"][..], &["run", "--ros2"]] {
+        let mut refused = program("refused_send");
+        let output = Process::start(refused.env("ROS_DOMAIN_ID", "300").args(command)).output_within(60);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(text(&output.stderr).contains("0 to 232"), "{}", text(&output.stderr));
+        let mut refused = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+        let output = Process::start(refused.args(["--name", "2nd dragon"]).args(command)).output_within(60);
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+    }
+}
