@@ -117,7 +117,7 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
         use bench_dragon::ros2_messages::settings::Ros2Settings;
         let settings = Ros2Settings { rate: Some(100.0), ..Ros2Settings::default() };
         let network = Network { domain: 93, range: Range::Localhost };
-        transports.push(open_on(network, None, &config, &settings).unwrap());
+        transports.push(open_on(network, &config, &settings).unwrap());
     }
     let folder = tempfile::tempdir().unwrap();
     let line = ShowLine::new(&SceneText::paper(), &playback, Arithmetic::of(&scene), "", (1, 2));

@@ -1,5 +1,5 @@
-//! ROS 2 topics, by ros2-client on RustDDS, on their own thread and at their own rate. If a scene requests it, also
-//! services that control the show, on another thread.
+//! ROS 2 topics, by ros2-client on RustDDS, on their own thread and at their own rate. On another thread the services of
+//! the node: its parameter services and, if a scene requests them, those that control the show.
 //!
 //! In: a scene with `[publish.ros2]` and the process's environment. Out: a [`Transport`]. Called by the list of
 //! transports.
@@ -24,8 +24,8 @@ use bench_dragon_publisher::transports::background::{
     self, BackgroundConfig, BackgroundError, BackgroundPublisher, BackgroundStatus,
 };
 use bench_dragon_publisher::transports::{Transport, TransportConfig, TransportError};
-use control::ControlThread;
-pub use control::Mapping;
+pub use control::mappings_of;
+use control::{ControlThread, Endpoints};
 use environment::{Network, Range, check_name, other_distribution};
 use matching::Matches;
 
@@ -77,10 +77,11 @@ struct Ros2Config {
 
 /// The open topics.
 struct Ros2 {
-    name: String,
     description: String,
-    /// The parts of the services until these start; `None` if the scene requests none.
-    services: Option<(Context, Matches, Mapping)>,
+    /// The services until their thread starts.
+    services: Option<(Endpoints, Matches)>,
+    /// True if services conduct the show.
+    conducting: bool,
     control: Option<ControlThread>,
     publisher: Option<BackgroundPublisher>,
     status: Option<BackgroundStatus>,
@@ -98,22 +99,15 @@ pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, Tran
     if let Some(warning) = other_distribution(variable) {
         log::warn!("{warning}");
     }
-    let mapping = settings.control.then(|| Mapping::of(variable)).map(|(mapping, warning)| {
-        if let Some(warning) = warning {
-            log::warn!("{warning}");
-        }
-        mapping
-    });
-    Ok(Some(open_on(network, mapping, config, settings)?))
+    Ok(Some(open_on(network, config, settings)?))
 }
 
-/// Opens the topics of `settings` on a network; with a `mapping` also the services.
+/// Opens the topics and services of `settings` on a network.
 ///
 /// # Errors
 /// [`Ros2Error`]
 pub fn open_on(
     network: Network,
-    mapping: Option<Mapping>,
     config: &TransportConfig,
     settings: &Ros2Settings,
 ) -> Result<Box<dyn Transport>, Ros2Error> {
@@ -135,23 +129,24 @@ pub fn open_on(
     }
     let rate = settings.rate_of(loop_rate);
     let topics: Vec<String> = settings.offered(alerts, cues > 0).map(|topic| topic.path(name)).collect();
-    let services = mapping.map_or(String::new(), |mapping| {
-        format!("\nROS 2 services that conduct the show: /{name}/..., for clients of {}.", mapping.rmw())
-    });
+    let conducting = settings.control;
+    let services =
+        if conducting { format!("\nROS 2 services that conduct the show: /{name}/...") } else { String::new() };
     let description =
         format!("ROS 2 topics ({}, at {rate} frames per second): {}.{services}", network.sentence(), topics.join(", "));
     let background = BackgroundConfig { name: "ros2", handles, cues, loop_rate, rate };
     let context = context(network)?;
     let matches = Matches::new(&context);
-    let services = mapping.map(|mapping| (context.clone(), matches.clone(), mapping));
+    let mut node = node::open(&context, name)?;
+    let services = Some((Endpoints::open(name, &context, &mut node, conducting)?, matches.clone()));
     let config = Ros2Config { name: name.to_owned(), handles, rate, settings: settings.clone(), alerts, cues, stage };
-    let started = background::start(background, move || node::Topics::open(context, matches, config));
+    let started = background::start(background, move || node::Topics::open(context, node, matches, config));
     let (publisher, status, thread) = started.map_err(|error| match error {
         BackgroundError::Open(error) => error,
         BackgroundError::Thread(reason) => Ros2Error::Failed(reason),
     })?;
-    let (name, publisher, status) = (name.to_owned(), Some(publisher), Some(status));
-    Ok(Box::new(Ros2 { name, description, services, control: None, publisher, status, thread }))
+    let (publisher, status) = (Some(publisher), Some(status));
+    Ok(Box::new(Ros2 { description, services, conducting, control: None, publisher, status, thread }))
 }
 
 /// Creates a participant of the network.
@@ -185,9 +180,10 @@ impl Transport for Ros2 {
     }
 
     fn control(&mut self, commands: CommandSender) -> Result<Option<CommandSender>, TransportError> {
-        let Some((context, matches, mapping)) = self.services.take() else { return Ok(Some(commands)) };
-        self.control = Some(ControlThread::start(&self.name, context, matches, mapping, commands)?);
-        Ok(None)
+        let Some((endpoints, matches)) = self.services.take() else { return Ok(Some(commands)) };
+        let (of_services, rest) = if self.conducting { (Some(commands), None) } else { (None, Some(commands)) };
+        self.control = Some(ControlThread::start(endpoints, matches, of_services)?);
+        Ok(rest)
     }
 
     fn finish(mut self: Box<Self>) -> Option<(&'static str, TransportCounters)> {

@@ -1,6 +1,6 @@
 //! The ROS 2 node and its topics: the sink of the background thread.
 //!
-//! All objects of ros2-client except the participant are created and dropped on that thread.
+//! The writers of the topics are created and dropped on that thread.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -52,14 +52,22 @@ pub(super) struct Topics {
     node: Node,
 }
 
+/// Creates the node `/<name>`: its topics and services are below it.
+///
+/// # Errors
+/// [`Ros2Error`]
+pub(super) fn open(context: &Context, name: &str) -> Result<Node, Ros2Error> {
+    let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(error.to_string());
+    let (namespace, base) = name.rsplit_once('/').unwrap_or(("", name));
+    let node_name = NodeName::new(&format!("/{namespace}"), base).map_err(|error| failed(&error))?;
+    // ros2-client's own would speak one mapping of service calls, and keep one line of the log.
+    let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
+    context.new_node(node_name, options).map_err(|error| failed(&error))
+}
+
 impl Topics {
-    pub(super) fn open(context: Context, matches: Matches, config: Ros2Config) -> Result<Self, Ros2Error> {
+    pub(super) fn open(context: Context, node: Node, matches: Matches, config: Ros2Config) -> Result<Self, Ros2Error> {
         let Ros2Config { stage, handles, .. } = config;
-        let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(error.to_string());
-        let node_name = NodeName::new(&format!("/{}", config.name), "publisher").map_err(|error| failed(&error))?;
-        // Without these endpoints, subscribers do not warn about messages that RustDDS cannot send.
-        let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
-        let node = context.new_node(node_name, options).map_err(|error| failed(&error))?;
         let mut maker = WriterFactory { context, node, config: &config };
         let path = Arc::new(Path::of(&stage));
         let path_bytes = EVENT_BYTES + path.poses.len() * PATH_POSE_BYTES;
