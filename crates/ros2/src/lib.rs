@@ -8,6 +8,7 @@ mod control;
 pub mod environment;
 mod matching;
 mod node;
+pub mod rosout;
 mod topic_writer;
 
 use std::net::{IpAddr, Ipv4Addr};
