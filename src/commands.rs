@@ -20,6 +20,7 @@ mod publishing;
 mod realtime_scheduling;
 pub mod record;
 pub mod replay;
+pub mod ros_args;
 pub mod run;
 pub mod send;
 pub mod soak;

@@ -4,6 +4,7 @@
 
 mod clients;
 mod enhanced;
+mod nodes;
 use crate::harness;
 
 use std::process::Command;
