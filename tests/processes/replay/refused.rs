@@ -68,7 +68,9 @@ fn what_cannot_be_played_is_refused_with_a_sentence() {
     let bags = ["bag_of_none", "bag_of_two"].map(at);
     bags.iter().for_each(|bag| std::fs::create_dir(bag).unwrap());
     assert!(refusal(&bags[0], &[]).0.contains("no file of this directory ends in .mcap"));
-    ["0.mcap", "1.mcap"].iter().for_each(|name| drop(std::fs::copy(&file, bags[1].join(name)).unwrap()));
+    for name in ["0.mcap", "1.mcap"] {
+        std::fs::copy(&file, bags[1].join(name)).unwrap();
+    }
     let (sentence, _) = refusal(&bags[1], &[]);
     assert!(
         sentence.contains("2 recordings") && sentence.contains("0.mcap") && sentence.contains("1.mcap"),

@@ -2,8 +2,9 @@
 //!
 //! `rmw_cyclonedds_cpp` puts 16 bytes of the client before each request and each response. `rmw_fastrtps_cpp`
 //! ("enhanced" in RPC over DDS 1.0, section 7.2.4) identifies the request beside the message. A request of one mapping
-//! is random numbers in the other, but no bytes are a request of a service in both: most requests have fixed lengths,
-//! and those of the parameter services must end where their lists end. So each client gets its answer in its own
+//! is random numbers in the other. Requests that conduct the show have fixed lengths, so no bytes are a request in both.
+//! Requests for parameters must end where their lists end: Cyclone's would be taken for the other kind only if the 8
+//! bytes of the client, which are random, were the lengths of a fitting list. So each client gets its answer in its own
 //! mapping. Called by the control thread.
 
 /// Bytes that Cyclone puts before a message: its client (8 bytes) and the number of the call (8 bytes).
@@ -45,7 +46,7 @@ mod tests {
     }
 
     #[test]
-    fn no_bytes_are_a_request_in_both_mappings() {
+    fn bytes_alike_are_a_request_in_one_mapping() {
         // Bytes of fixed requests do not matter; lists of parameters are empty, or have more entries than bytes.
         for byte in [0, 1, 255] {
             let bytes = [byte; 128];
