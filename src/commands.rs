@@ -21,6 +21,7 @@ mod realtime_scheduling;
 pub mod record;
 pub mod replay;
 mod ros2_process;
+pub mod ros_args;
 pub mod run;
 pub mod send;
 pub mod soak;

@@ -1,11 +1,13 @@
-//! The command line: reads arguments, sets up logging, runs one subcommand, converts its error to an exit code.
+//! The command line: reads arguments, sets up the log, runs one subcommand, converts its error to an exit code.
 
 #[macro_use]
 mod commands;
+mod logging;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+pub use commands::ros_args;
 use commands::{CommandError, Common};
 
 /// Publishes a bench dragon live: handle poses and collision alerts at a fixed rate, over iceoryx2 shared memory and,
@@ -65,8 +67,15 @@ pub enum Command {
 }
 
 fn main() -> ExitCode {
-    let CommandLine { common, command } = CommandLine::parse();
-    set_up_logging(&common);
+    let (arguments, names) = match ros_args::translated(std::env::args_os()) {
+        Ok(translated) => translated,
+        Err(error) => return exit_code(Err(error)),
+    };
+    let CommandLine { mut common, command } = CommandLine::parse_from(arguments);
+    logging::set_up(&common);
+    if let [name] = &mut common.names[..] {
+        *name = names.applied_to(name);
+    }
     let takes_several = matches!(command, Command::View(_) | Command::Send(_) | Command::Metrics(_));
     let ready = common.check_names(takes_several).and_then(|()| commands::end_when_shared_memory_is_full());
     let done = ready.and_then(|()| match &command {
@@ -90,6 +99,11 @@ fn main() -> ExitCode {
         Command::SoakClient(arguments) => commands::soak_conductor::client(&common, arguments),
         Command::Check(arguments) => commands::check::check(&common, arguments),
     });
+    exit_code(done)
+}
+
+/// Prints the error of a command. Returns the exit code.
+fn exit_code(done: Result<(), CommandError>) -> ExitCode {
     match done {
         Ok(()) | Err(CommandError::ClosedPipe) => ExitCode::SUCCESS,
         Err(CommandError::BadInput(sentence)) => {
@@ -105,26 +119,4 @@ fn main() -> ExitCode {
 
 fn error_label() -> &'static str {
     if commands::shows_colour(&std::io::stderr()) { "\x1b[1;31merror\x1b[0m" } else { "error" }
-}
-
-fn set_up_logging(common: &Common) {
-    let level = match (common.quiet, common.verbose) {
-        (true, _) => log::LevelFilter::Error,
-        (false, 0) => log::LevelFilter::Warn,
-        (false, 1) => log::LevelFilter::Info,
-        (false, _) => log::LevelFilter::Debug,
-    };
-    iceoryx2::prelude::set_log_level(match level {
-        log::LevelFilter::Debug => iceoryx2::prelude::LogLevel::Debug,
-        log::LevelFilter::Info => iceoryx2::prelude::LogLevel::Warn,
-        // This program reports iceoryx2's refusals in its own words.
-        _ => iceoryx2::prelude::LogLevel::Fatal,
-    });
-    // RustDDS and ros2-client log every large message and every end, which is of no use to a user.
-    let of_dds = if common.verbose > 1 { log::LevelFilter::Warn } else { log::LevelFilter::Off };
-    env_logger::Builder::new()
-        .filter_level(level)
-        .filter_module("rustdds", of_dds)
-        .filter_module("ros2_client", of_dds)
-        .init();
 }

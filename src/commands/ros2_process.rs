@@ -13,7 +13,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use bench_dragon::publisher::live::TransportCounters;
-use bench_dragon::ros2_messages::settings::Ros2Settings;
+use bench_dragon::ros2_messages::settings::{Ros2Settings, StampClock};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde::{Deserialize, Serialize};
@@ -81,6 +81,7 @@ impl Ros2Request {
         arguments.extend(common.quiet.then(|| "--quiet".into()));
         arguments.extend(["send".into(), "ros2".into()]);
         arguments.extend(settings.control.then(|| "--control".into()));
+        arguments.push(format!("--use-sim-time={}", settings.stamps == StampClock::Sim).into());
         arguments.extend(["--end-with-parent".into(), std::process::id().to_string().into()]);
         Ok(Self { description, arguments })
     }

@@ -21,6 +21,7 @@ use bench_dragon::soak::histograms::HistogramLog;
 use super::events::sentence;
 use super::publishing::{new_run_id, open_transports, print_summary, publish};
 use super::realtime_scheduling::RealtimeScheduling;
+use super::ros_args::UseSimTime;
 use super::ros2_process::{Ros2Process, Ros2Request, Ros2Show};
 use super::soak::Parent;
 use super::{CommandError, Common, number, search_timeline, stop_on_signals, warn_of_gap};
@@ -68,6 +69,8 @@ pub struct RunArguments {
     #[arg(long)]
     ros2_control: bool,
     #[command(flatten)]
+    use_sim_time: UseSimTime,
+    #[command(flatten)]
     scheduling: RealtimeScheduling,
     #[command(flatten)]
     parent: Parent,
@@ -89,6 +92,7 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
         };
         settings.control = true;
     }
+    arguments.use_sim_time.apply(scene.ros2.as_mut())?;
     let playback = arguments.playback(&scene)?;
     service_name(common.name(), "poses")?;
     let show = Ros2Show { loop_rate: playback.rate, alerts: scene.alerts.is_some(), cues: scene.cues.len() };

@@ -15,6 +15,7 @@ use bench_dragon::outputs::send::osc_sender::{MOST_RATE, OscSender, OscSenders};
 use bench_dragon::outputs::send::psn_sender::{Notice, PsnOptions, PsnSender, USUAL_ADDRESS, USUAL_PORT, USUAL_RATE};
 use bench_dragon::outputs::send::trackers::{Numbers, Selection};
 
+use super::ros_args::UseSimTime;
 use super::soak::Parent;
 use super::{CommandError, Common, Output, number, stop_on_signals};
 
@@ -89,6 +90,8 @@ struct Ros2Arguments {
     /// Offer services that conduct the show, to everybody whom ROS 2 reaches
     #[arg(long)]
     control: bool,
+    #[command(flatten)]
+    use_sim_time: UseSimTime,
     #[command(flatten)]
     parent: Parent,
 }

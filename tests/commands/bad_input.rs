@@ -103,6 +103,8 @@ fn scenes_that_cannot_be_played() {
         ("velocities = true", "[publish.ros2]\ntopics = []", &["line 29", "publish.ros2.topics", "at least one"]),
         ("velocities = true", "[publish.ros2]\ntopics = [\"pose\"]", &["line 29", "pose", "poses"]),
         ("velocities = true", "[publish.ros2]\ncontrol = 1", &["line 29", "publish.ros2.control", "boolean"]),
+        ("velocities = true", "[publish.ros2]\nstamps = \"sim\"", &["line 29", "publish.ros2.stamps", "clock", "wall"]),
+        ("velocities = true", "[publish.ros2]\nstamps = \"gps\"", &["line 29", "gps", "sim"]),
         ("velocities = true", "[publish.ros2.qos.poses]\ndepth = 0", &["line 29", "publish.ros2.qos.poses.depth"]),
         ("velocities = true", "[publish.ros2.qos.markers]\ndepth = 5", &["line 28", "markers", "topics"]),
         (

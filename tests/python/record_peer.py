@@ -270,8 +270,26 @@ def with_rosbags(recordings, sizes):
             for of, (_, fields) in reader.typestore.fielddefs.items():
                 if of.split("/")[0] in STANDARD:
                     assert fields == known[of][1], f"{of}: {fields}, expected {known[of][1]}"
+        check_metadata(recording)
     assert sum(counts.values()) == sum(sizes)
     return counts
+
+
+def check_metadata(recording):
+    """Checks what `ros2 bag info` reads besides statistics and channels: the fields of rosbag2's metadata, version 8."""
+    from mcap.reader import make_reader
+    from ruamel.yaml import YAML
+
+    with open(recording, "rb") as file:
+        [metadata] = make_reader(file).iter_metadata()
+    assert metadata.name == "rosbag2" and list(metadata.metadata) == ["serialized_metadata"], metadata
+    fields = YAML(typ="safe").load(metadata.metadata["serialized_metadata"])
+    assert fields["version"] == 8 and fields["storage_identifier"] == "mcap" and fields["ros_distro"] == "jazzy", fields
+    # rosbag2 reads all of these, of these types.
+    assert [type(fields[field]) for field in ("relative_file_paths", "topics_with_message_count", "files")] == [list] * 3
+    assert fields["compression_format"] == fields["compression_mode"] == "" and fields["custom_data"] is None
+    assert fields["duration"] == {"nanoseconds": 0} and fields["starting_time"] == {"nanoseconds_since_epoch": 0}
+    assert fields["message_count"] == 0
 
 
 def main():

@@ -1,13 +1,12 @@
 """A client of the control services without ROS: Cyclone DDS calls them as rmw_cyclonedds_cpp does.
 
-    ros2_control_peer.py --name NAME [--domain D] [--bare] [--fresh N | --flood N] [SERVICE[=VALUE] ...]
+    ros2_control_peer.py --name NAME [--domain D] [--calls-of-input | --fresh N | --flood N] [SERVICE[=VALUE] ...]
 
 Before each request and response come the client (uint64) and the number of the call (int64). Prints a JSON line for
-each response, or null if none came within some seconds. With --bare the 16 bytes are left out, as in the mapping of
-rmw_fastrtps_cpp. With --fresh, N clients, each with its own participant, make their first call to the first service,
-and a line has the seconds of the call too. With --flood, one client calls the first service N times without waiting for
-a response. Without a call, prints the topics below NAME with their types, including those of services, and /clock and
-/tf.
+each response, or null if none came within some seconds. With --calls-of-input the calls are lines of standard input, and
+the clients of all services stay. With --fresh, N clients, each with its own participant, make their first call to the first service.
+With --flood, one client calls the first service N times without waiting for a response. Without a call, prints the
+topics below NAME with their types, including those of services, and /clock and /tf.
 """
 
 import argparse
@@ -55,6 +54,28 @@ Features = message(
     "SimulatorFeatures",
     [("features", idl.sequence[idl.uint16]), ("spawn_formats", idl.sequence[str]), ("custom_info", str)],
 )
+Value = message(
+    "rcl_interfaces",
+    "ParameterValue",
+    [
+        ("type", idl.uint8),
+        ("bool_value", bool),
+        ("integer_value", idl.int64),
+        ("double_value", idl.float64),
+        ("string_value", str),
+        ("byte_array_value", idl.sequence[idl.uint8]),
+        ("bool_array_value", idl.sequence[bool]),
+        ("integer_array_value", idl.sequence[idl.int64]),
+        ("double_array_value", idl.sequence[idl.float64]),
+        ("string_array_value", idl.sequence[str]),
+    ],
+)
+Parameter = message("rcl_interfaces", "Parameter", [("name", str), ("value", Value)])
+Descriptor = message("rcl_interfaces", "ParameterDescriptor", [("name", str)])
+SetResult = message("rcl_interfaces", "SetParametersResult", [("successful", bool), ("reason", str)])
+Listed = message("rcl_interfaces", "ListParametersResult", [("names", idl.sequence[str]), ("prefixes", idl.sequence[str])])
+NAMES = [("names", idl.sequence[str])]
+PARAMETERS = [("parameters", idl.sequence[Parameter])]
 EMPTY = [("structure_needs_at_least_one_member", idl.uint8)]
 RESULT = [("result", Result)]
 SUCCESS = [("success", bool)]
@@ -67,6 +88,10 @@ def simulation(name, request, response):
 
 def player(name, request, response):
     return ("rosbag2_interfaces", name, request, response)
+
+
+def parameters(name, request, response):
+    return ("rcl_interfaces", name, request, response)
 
 
 # Package, type, fields of the request, fields of the response: as the .srv files have them.
@@ -84,6 +109,14 @@ SERVICES = {
     "set_rate": player("SetRate", [("rate", idl.float64)], SUCCESS),
     "seek": player("Seek", [("time", Time)], SUCCESS),
     "play_next": player("PlayNext", EMPTY, SUCCESS),
+    "list_parameters": parameters(
+        "ListParameters", [("prefixes", idl.sequence[str]), ("depth", idl.uint64)], [("result", Listed)]
+    ),
+    "get_parameters": parameters("GetParameters", NAMES, [("values", idl.sequence[Value])]),
+    "get_parameter_types": parameters("GetParameterTypes", NAMES, [("values", idl.sequence[idl.uint8])]),
+    "describe_parameters": parameters("DescribeParameters", NAMES, [("descriptors", idl.sequence[Descriptor])]),
+    "set_parameters": parameters("SetParameters", PARAMETERS, [("results", idl.sequence[SetResult])]),
+    "set_parameters_atomically": parameters("SetParametersAtomically", PARAMETERS, [("result", SetResult)]),
     "hold": TRIGGER,
     "release": TRIGGER,
     "go": TRIGGER,
@@ -91,28 +124,33 @@ SERVICES = {
 HEADER = [("client", idl.uint64), ("sequence", idl.int64)]
 
 
-def ends(service, bare):
+def ends(service):
     """Returns the types of a service's request and response."""
     package, name, request, response = SERVICES[service]
-    header = [] if bare else HEADER
-    of = lambda direction, fields: struct(f"{package}::srv::dds_::{name}_{direction}_", header + fields)
+    of = lambda direction, fields: struct(f"{package}::srv::dds_::{name}_{direction}_", HEADER + fields)
     return of("Request", request), of("Response", response)
 
 
-def argument(service, text):
-    """Returns the only field of a request."""
-    kind = SERVICES[service][2][0][1]
+def arguments_of(service, text):
+    """Returns the fields of a request."""
+    kinds = [kind for _, kind in SERVICES[service][2]]
+    kind = kinds[0]
+    if SERVICES[service][0] == "rcl_interfaces":
+        names = [text] if text else []
+        if kind == idl.sequence[Parameter]:
+            return [[Parameter(name=name, value=Value(2, False, 7, 0.0, "", [], [], [], [], [])) for name in names]]
+        return [names, 0] if len(kinds) == 2 else [names]
     if kind is State:
-        return State(state=int(text))
+        return [State(state=int(text))]
     if kind is Time:
-        return Time(sec=int(float(text) // 1), nanosec=round(float(text) % 1 * 1e9))
-    return float(text) if kind is idl.float64 else int(text or 0)
+        return [Time(sec=int(float(text) // 1), nanosec=round(float(text) % 1 * 1e9))]
+    return [float(text) if kind is idl.float64 else int(text or 0)]
 
 
 def plain(value):
     if hasattr(value, "__dataclass_fields__"):
         return {name: plain(getattr(value, name)) for name in value.__dataclass_fields__}
-    return list(value) if isinstance(value, (list, tuple)) else value
+    return [plain(item) for item in value] if isinstance(value, (list, tuple)) else value
 
 
 class Client:
@@ -121,12 +159,12 @@ class Client:
     lock = threading.Lock()
     numbers = 0
 
-    def __init__(self, participant, name, service, bare=False):
-        self.service, self.bare = service, bare
+    def __init__(self, participant, name, service):
+        self.service = service
         with Client.lock:
             Client.numbers += 1
             self.number = 1000 * Client.numbers + 7
-        request, response = ends(service, bare)
+        request, response = ends(service)
         self.request = request
         requests = Topic(participant, f"rq/{name}/{service}Request", request, qos=SERVICE)
         responses = Topic(participant, f"rr/{name}/{service}Reply", response, qos=SERVICE)
@@ -145,8 +183,7 @@ class Client:
 
     def send(self, text):
         self.sequence += 1
-        header = [] if self.bare else [self.number, self.sequence]
-        self.writer.write(self.request(*header, argument(self.service, text)))
+        self.writer.write(self.request(self.number, self.sequence, *arguments_of(self.service, text)))
 
     def call(self, text, seconds):
         self.send(text)
@@ -157,7 +194,7 @@ class Client:
                 # The notice that a publisher has gone comes as an empty sample.
                 if fields is None:
                     continue
-                if self.bare or (sample.client, sample.sequence) == (self.number, self.sequence):
+                if (sample.client, sample.sequence) == (self.number, self.sequence):
                     return {name: plain(getattr(sample, name)) for name in fields if name not in dict(HEADER)}
             time.sleep(0.001)
         return None
@@ -188,7 +225,7 @@ def main():
     parser.add_argument("--name", required=True)
     parser.add_argument("--domain", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=20.0, help="greatest wait for a response")
-    parser.add_argument("--bare", action="store_true")
+    parser.add_argument("--calls-of-input", action="store_true")
     parser.add_argument("--fresh", type=int, default=0)
     parser.add_argument("--flood", type=int, default=0)
     parser.add_argument("--topics", type=int, default=1, help="topics to wait for if there is no call")
@@ -216,7 +253,7 @@ def main():
         return
 
     participant = DomainParticipant(arguments.domain)
-    if not arguments.calls:
+    if not arguments.calls and not arguments.calls_of_input:
         print(json.dumps(endpoints(participant, arguments.name, arguments.topics, arguments.seconds)))
         return
     if arguments.flood:
@@ -229,10 +266,10 @@ def main():
         time.sleep(arguments.seconds)
         return
     clients = {}
-    for call in arguments.calls:
+    for call in (line.strip() for line in sys.stdin) if arguments.calls_of_input else arguments.calls:
         service, _, text = call.partition("=")
         if service not in clients:
-            clients[service] = Client(participant, arguments.name, service, arguments.bare)
+            clients[service] = Client(participant, arguments.name, service)
             if not clients[service].ready(60):
                 sys.exit(f"no server for {service}")
         print(json.dumps({"call": call, "response": clients[service].call(text, arguments.seconds)}), flush=True)

@@ -114,6 +114,19 @@ TransformStamped = message(
     "TransformStamped",
     [("header", Header), ("child_frame_id", str), ("transform", Transform)],
 )
+Log = message(
+    "rcl_interfaces",
+    "Log",
+    [
+        ("stamp", Time),
+        ("level", idl.uint8),
+        ("name", str),
+        ("msg", str),
+        ("file", str),
+        ("function", str),
+        ("line", idl.uint32),
+    ],
+)
 TFMessage = message("tf2_msgs", "TFMessage", [("transforms", idl.sequence[TransformStamped])])
 
 
@@ -152,6 +165,7 @@ TOPICS = {
     "path": Path,
     "clock": Clock,
     "tf": TFMessage,
+    "rosout": Log,
 }
 
 
@@ -194,7 +208,7 @@ def main():
     readers = []
     for wanted in arguments.topic:
         kind, reliability, durability = (wanted.split(":") + ["reliable", "volatile"])[:3]
-        name = f"rt/{kind}" if kind in ("diagnostics", "clock", "tf") else f"rt/{arguments.name}/{kind}"
+        name = f"rt/{kind}" if kind in ("diagnostics", "clock", "tf", "rosout") else f"rt/{arguments.name}/{kind}"
         topic = Topic(participant, name, TOPICS[kind])
         readers.append((wanted, kind, DataReader(participant, topic, qos=quality(reliability, durability))))
     print(json.dumps({"type": "ready"}), flush=True)

@@ -4,11 +4,12 @@
 
 mod clients;
 mod enhanced;
+mod nodes;
 use crate::harness;
 
 use std::process::Command;
 
-use enhanced::{Empty, Features, Outcome, State, Time, Trigger, enhanced};
+use enhanced::{Empty, Features, Outcome, State, Time, Trigger, enhanced, first_call};
 use harness::{Process, can_run, json_lines, long, program, python, python_modules, summary, text, unique, wait};
 use serde_json::{Value, json};
 
@@ -17,9 +18,9 @@ fn domain() -> u16 {
     20 + (std::process::id() % 80) as u16
 }
 
-fn publisher(name: &str, rmw: &str, arguments: &[&str]) -> Process {
+fn publisher(name: &str, arguments: &[&str]) -> Process {
     let mut run = program(name);
-    run.env("ROS_DOMAIN_ID", domain().to_string()).env("RMW_IMPLEMENTATION", rmw);
+    run.env("ROS_DOMAIN_ID", domain().to_string());
     let process = Process::start(run.args(["run", "--json", "--ros2"]).args(arguments));
     for _ in 0..600 {
         if control(name, &["state"]).0 == 0 {
@@ -31,9 +32,6 @@ fn publisher(name: &str, rmw: &str, arguments: &[&str]) -> Process {
     process.signal(nix::sys::signal::Signal::SIGINT);
     panic!("no publisher: {}", text(&process.output_within(20).stderr));
 }
-
-const CYCLONE: &str = "rmw_cyclonedds_cpp";
-const FAST: &str = "rmw_fastrtps_cpp";
 
 /// Returns exit code and response of `control`, over shared memory.
 fn control(name: &str, arguments: &[&str]) -> (i32, Value) {
@@ -73,7 +71,7 @@ fn a_cyclone_client_conducts_by_every_service() {
         return;
     }
     let name = "services";
-    let publisher = publisher(name, CYCLONE, &["--ros2-control", "--paused", "--start", "50", "--duration", "300"]);
+    let publisher = publisher(name, &["--ros2-control", "--paused", "--start", "50", "--duration", "300"]);
     let state = |expected: u64, response: &Value| {
         assert_eq!((response["state"]["state"].as_u64(), result(response)), (Some(expected), (1, false)), "{response}");
     };
@@ -168,7 +166,7 @@ fn a_hold_is_latched_against_every_other_call() {
         return;
     }
     let name = "held";
-    let publisher = publisher(name, CYCLONE, &["--ros2-control", "--start", "50", "--duration", "300"]);
+    let publisher = publisher(name, &["--ros2-control", "--start", "50", "--duration", "300"]);
     let calls = ["hold", "hold", "get_simulation_state", "is_paused", "get_rate", "get_simulator_features"];
     let held = call(name, &calls);
     assert!(held[..2].iter().all(|response| response["success"] == true), "{held:?}");
@@ -216,10 +214,8 @@ fn without_the_flag_there_is_no_service_and_with_it_those_of_the_standards() {
         return;
     }
     let (without, with) = ("no_services", "all_services");
-    let publishers = [
-        publisher(without, CYCLONE, &["--duration", "300"]),
-        publisher(with, CYCLONE, &["--ros2-control", "--duration", "300"]),
-    ];
+    let publishers =
+        [publisher(without, &["--duration", "300"]), publisher(with, &["--ros2-control", "--duration", "300"])];
     let endpoints = |name: &str, topics: &str| {
         let output = Process::start(&mut peer(name, &["--seconds", "30", "--topics", topics])).output_within(90);
         let found = json_lines(&output).pop().unwrap_or_else(|| panic!("{}", text(&output.stderr)));
@@ -227,16 +223,29 @@ fn without_the_flag_there_is_no_service_and_with_it_those_of_the_standards() {
     };
     let of_services =
         |topics: &serde_json::Map<String, Value>| topics.keys().filter(|topic| !topic.starts_with("rt/")).count();
-    let [read, written] = endpoints(without, "5");
+    let [read, written] = endpoints(without, "17");
     let topics = ["poses", "handles", "alerts", "stage", "path"].map(|topic| format!("rt/{}/{topic}", unique(without)));
-    let mut offered: Vec<&String> = written.keys().collect();
+    let mut offered: Vec<&String> = written.keys().filter(|topic| topic.starts_with("rt/")).collect();
     let mut topics: Vec<&String> = topics.iter().collect();
     offered.sort();
     topics.sort();
     assert_eq!(offered, topics, "no other topic is on by default; a scene without cues has none for them");
-    assert_eq!(of_services(&read), 0, "{read:?}");
-    let [read, written] = endpoints(with, "37");
+    // Every node has its parameter services.
+    let parameters = (
+        "rcl_interfaces",
+        &[
+            "list_parameters:ListParameters",
+            "get_parameters:GetParameters",
+            "get_parameter_types:GetParameterTypes",
+            "describe_parameters:DescribeParameters",
+            "set_parameters:SetParameters",
+            "set_parameters_atomically:SetParametersAtomically",
+        ][..],
+    );
+    assert_eq!((of_services(&read), of_services(&written)), (6, 6), "{read:?}");
+    let [read, written] = endpoints(with, "49");
     let expected = [
+        parameters,
         (
             "simulation_interfaces",
             &[
@@ -285,7 +294,7 @@ fn a_flood_of_calls_is_refused_and_others_are_answered() {
         return;
     }
     let name = "flooded";
-    let publisher = publisher(name, CYCLONE, &["--ros2-control", "--duration", "300"]);
+    let publisher = publisher(name, &["--ros2-control", "--duration", "300"]);
     let mut flood = Process::start(&mut peer(name, &["--flood", "5000", "--seconds", "300", "get_rate"]));
     let flooded = flood.lines();
     let others = call(name, &["get_rate", "get_simulation_state", "pause", "get_simulation_state"]);
@@ -304,7 +313,7 @@ fn a_flood_of_calls_is_refused_and_others_are_answered() {
 #[test]
 fn a_fast_dds_client_conducts_by_every_service() {
     let name = "enhanced";
-    let publisher = publisher(name, FAST, &["--ros2-control", "--paused", "--start", "50", "--duration", "300"]);
+    let publisher = publisher(name, &["--ros2-control", "--paused", "--start", "50", "--duration", "300"]);
     let here = || control(name, &["state"]).1;
     let done = || Outcome { result: 1, error_message: String::new() };
     let simulation = |service: &str, kind: &'static str, request: u8| -> Outcome {

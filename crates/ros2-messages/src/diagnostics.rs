@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Header, level_of};
+use super::{HasStamp, Header, Time, level_of};
 use crate::settings::DiagnosticLimits;
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_messages::state::Severity;
@@ -140,6 +140,12 @@ impl DiagnosticArray {
             values,
         };
         Self { header: Header::of(status.stamp_ns), status: vec![the_loop, dragon] }
+    }
+}
+
+impl HasStamp for DiagnosticArray {
+    fn set_stamp(&mut self, stamp: Time) {
+        self.header.stamp = stamp;
     }
 }
 

@@ -97,6 +97,24 @@ impl Stamped<Cue> {
     }
 }
 
+/// A message whose headers have one stamp.
+pub trait HasStamp: Sized {
+    /// Sets the stamp of all headers.
+    fn set_stamp(&mut self, stamp: Time);
+
+    /// Returns the message with another stamp.
+    fn at(mut self, stamp: Time) -> Self {
+        self.set_stamp(stamp);
+        self
+    }
+}
+
+impl<Layout> HasStamp for Stamped<Layout> {
+    fn set_stamp(&mut self, stamp: Time) {
+        self.header.stamp = stamp;
+    }
+}
+
 /// rosgraph_msgs/Clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Clock {
@@ -134,6 +152,12 @@ impl HandlePoses {
         self.frame = *frame;
         self.poses.clear();
         self.poses.extend_from_slice(handles);
+    }
+}
+
+impl HasStamp for HandlePoses {
+    fn set_stamp(&mut self, stamp: Time) {
+        self.header.stamp = stamp;
     }
 }
 
@@ -211,6 +235,12 @@ impl PoseArray {
         self.header.stamp = Time::of(frame.stamp_ns);
         self.poses.clear();
         self.poses.extend(handles.iter().map(Pose::of));
+    }
+}
+
+impl HasStamp for PoseArray {
+    fn set_stamp(&mut self, stamp: Time) {
+        self.header.stamp = stamp;
     }
 }
 

@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use super::{Header, Pose, Time, Xyz, level_of};
+use super::{HasStamp, Header, Pose, Time, Xyz, level_of};
 use bench_dragon_messages::sentence::{Figures, alert_sentence, bench_name, state_sentence};
 use bench_dragon_messages::state::{FrameState, Severity};
 use bench_dragon_messages::{CollisionAlert, FrameHeader, HandlePose, Stage};
@@ -17,6 +17,14 @@ pub struct Duration {
     pub sec: i32,
     /// Nanoseconds.
     pub nanosec: u32,
+}
+
+impl Duration {
+    /// Converts seconds, not negative.
+    fn of_seconds(seconds: f64) -> Self {
+        let Time { sec, nanosec } = Time::of_seconds(seconds);
+        Self { sec, nanosec }
+    }
 }
 
 /// std_msgs/ColorRGBA.
@@ -80,7 +88,7 @@ pub struct Marker {
     pub scale: Xyz,
     /// The colour.
     pub color: Color,
-    /// Zero: until the next.
+    /// The time after which the marker disappears without a further message; zero, for never, in the first message.
     pub lifetime: Duration,
     /// False.
     pub frame_locked: bool,
@@ -117,6 +125,9 @@ const BENCH_HEIGHT: f64 = 0.1;
 /// The dashes of the ring around the coming event, and its radius in widths of a board.
 const DASHES: usize = 16;
 const RING_RADIUS: f64 = 2.5;
+/// The lifetime of a marker: this number of periods, and at least this number of seconds.
+const LIFETIME_PERIODS: f64 = 5.0;
+const LEAST_LIFETIME: f64 = 1.0;
 /// The most benches named at once: two of the event, and the two nearest.
 const MOST_NAMED: usize = 4;
 
@@ -156,6 +167,9 @@ impl Marker {
 pub struct MarkerArray {
     /// The benches from the head on, then `contact`, `coming`, `sentence` and the `numbers`.
     pub markers: Vec<Marker>,
+    /// The deadline of the latest frame, nanoseconds; 0 before the first.
+    #[serde(skip)]
+    latest_deadline_ns: u64,
 }
 
 impl MarkerArray {
@@ -175,7 +189,18 @@ impl MarkerArray {
         let mut markers: Vec<Marker> = (0..stage.benches).map(bench).collect();
         markers.extend([contact, coming, words("sentence", 0)]);
         markers.extend((0..MOST_NAMED as i32).map(|id| words("numbers", id)));
-        Self { markers }
+        Self { markers, latest_deadline_ns: 0 }
+    }
+
+    /// Returns the lifetime of the markers of a frame, from the time since the frame before. RViz counts simulated time
+    /// on `/clock` and else wall time, so the longer of both counts.
+    fn lifetime(&mut self, frame: &FrameHeader) -> Duration {
+        let before = std::mem::replace(&mut self.latest_deadline_ns, frame.deadline_ns);
+        if before == 0 {
+            return Duration::default();
+        }
+        let period = frame.deadline_ns.saturating_sub(before) as f64 * 1e-9;
+        Duration::of_seconds((LIFETIME_PERIODS * period).max(LEAST_LIFETIME) * frame.time_scale.max(1.0))
     }
 
     /// Updates every marker for a frame. `alert` is the latest alert.
@@ -187,6 +212,8 @@ impl MarkerArray {
         alert: Option<&CollisionAlert>,
     ) {
         let stamp = Time::of(frame.stamp_ns);
+        let lifetime = self.lifetime(frame);
+        self.markers.iter_mut().for_each(|marker| marker.lifetime = lifetime);
         let level = level_of(alert);
         let alert = alert.filter(|_| level.severity() > Severity::Ok);
         let named = alert.map_or_else(Vec::new, |alert| named(alert, level.has_happened()));
@@ -217,6 +244,12 @@ impl MarkerArray {
             let at = bench.and_then(|(bench, _)| benches.get(*bench as usize)).map(|marker| &marker.pose.position);
             put(marker, stamp, at.map(|place| (place.x, place.y)));
         }
+    }
+}
+
+impl HasStamp for MarkerArray {
+    fn set_stamp(&mut self, stamp: Time) {
+        self.markers.iter_mut().for_each(|marker| marker.header.stamp = stamp);
     }
 }
 
@@ -272,5 +305,30 @@ fn colour(severity: Severity) -> Color {
         Severity::Ok => Color { r: 0.2, g: 0.6, b: 0.3, a: 1.0 },
         Severity::Warning => Color { r: 1.0, g: 0.75, b: 0.0, a: 1.0 },
         Severity::Error => Color { r: 0.9, g: 0.1, b: 0.1, a: 1.0 },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_marker_lives_some_periods_and_at_least_a_second_of_either_clock() {
+        let stage = Stage { benches: 3, ..Stage::default() };
+        let mut markers = MarkerArray::of(&stage);
+        let mut lifetime = |seconds: f64, time_scale: f64| {
+            let frame = FrameHeader { deadline_ns: (seconds * 1e9) as u64, time_scale, ..FrameHeader::default() };
+            markers.update(&frame, &[HandlePose::default(); 4], &stage, None);
+            let [first, rest @ ..] = &markers.markers[..] else { panic!("no markers") };
+            assert!(rest.iter().all(|marker| marker.lifetime == first.lifetime));
+            f64::from(first.lifetime.sec) + f64::from(first.lifetime.nanosec) * 1e-9
+        };
+        // The period is unknown.
+        assert_eq!(lifetime(100.0, 1.0), 0.0);
+        assert_eq!(lifetime(100.125, 1.0), 1.0);
+        assert_eq!(lifetime(100.25, 0.0), 1.0);
+        assert_eq!(lifetime(100.375, 8.0), 8.0);
+        assert_eq!(lifetime(102.375, 1.0), 10.0);
+        assert_eq!(lifetime(102.5, 1e10), f64::from(i32::MAX));
     }
 }

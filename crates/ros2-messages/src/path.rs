@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Header, Pose};
+use super::{HasStamp, Header, Pose, Time};
 use bench_dragon_messages::{SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_OUTWARD_SPIRAL, Stage, StageSegment};
 
 /// The turn between two points, radians: the chord of a circle of 9 m is 9 mm off.
@@ -35,6 +35,13 @@ impl Path {
         let poses = poses(stage.path_in_use(), stage.pitch);
         let poses = poses.into_iter().map(|pose| PoseStamped { header: header.clone(), pose }).collect();
         Self { header, poses }
+    }
+}
+
+impl HasStamp for Path {
+    fn set_stamp(&mut self, stamp: Time) {
+        self.header.stamp = stamp;
+        self.poses.iter_mut().for_each(|pose| pose.header.stamp = stamp);
     }
 }
 

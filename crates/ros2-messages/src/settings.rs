@@ -6,6 +6,8 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
+use crate::Time;
+
 /// A topic that a scene can request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -126,6 +128,27 @@ pub struct Qos {
     pub depth: u32,
 }
 
+/// The clock of the stamps in ROS 2 headers.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StampClock {
+    /// The publisher's CLOCK_REALTIME.
+    #[default]
+    Wall,
+    /// Simulated time, as on `/clock`.
+    Sim,
+}
+
+impl StampClock {
+    /// Returns the stamp of a message of the wall time `stamp_ns`, in nanoseconds, and `sim_time`, in seconds.
+    pub fn at(self, stamp_ns: u64, sim_time: f64) -> Time {
+        match self {
+            Self::Wall => Time::of(stamp_ns),
+            Self::Sim => Time::of_seconds(sim_time),
+        }
+    }
+}
+
 /// The limits of the loop's last second for a warning and for an error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DiagnosticLimits {
@@ -162,6 +185,8 @@ pub struct Ros2Settings {
     pub topics: BTreeMap<Topic, Qos>,
     /// True for services that control the show.
     pub control: bool,
+    /// The clock of the stamps; simulated time only with [`Topic::Clock`].
+    pub stamps: StampClock,
     /// The limits of the diagnostics.
     pub diagnostics: DiagnosticLimits,
 }
@@ -169,7 +194,7 @@ pub struct Ros2Settings {
 impl Default for Ros2Settings {
     fn default() -> Self {
         let topics = Topic::DEFAULT.into_iter().map(|topic| (topic, topic.default_qos())).collect();
-        Self { rate: None, topics, control: false, diagnostics: DiagnosticLimits::default() }
+        Self { rate: None, topics, control: false, stamps: StampClock::Wall, diagnostics: DiagnosticLimits::default() }
     }
 }
 

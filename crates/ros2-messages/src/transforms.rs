@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Header, Pose, Quaternion, Time, Xyz};
+use super::{HasStamp, Header, Pose, Quaternion, Time, Xyz};
 use bench_dragon_messages::{FrameHeader, HandlePose};
 
 /// geometry_msgs/TransformStamped.
@@ -46,5 +46,11 @@ impl TfMessage {
             transform.header.stamp = stamp;
             (transform.translation, transform.rotation) = (position, orientation);
         }
+    }
+}
+
+impl HasStamp for TfMessage {
+    fn set_stamp(&mut self, stamp: Time) {
+        self.transforms.iter_mut().for_each(|transform| transform.header.stamp = stamp);
     }
 }

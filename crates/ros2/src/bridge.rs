@@ -13,14 +13,14 @@ use serde::Serialize;
 use bench_dragon_client::feed::FeedEvent;
 use bench_dragon_client::polling::Handler;
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage};
-use bench_dragon_ros2_messages::settings::Ros2Settings;
+use bench_dragon_ros2_messages::settings::{Ros2Settings, StampClock};
 use bench_dragon_show::scene::Scene;
 
 use crate::commands::ShowCommands;
-use crate::control::{ControlThread, Mapping};
+use crate::control::{ControlThread, Endpoints};
 use crate::environment::{Network, check_name, other_distribution};
 use crate::matching::Matches;
-use crate::node::Topics;
+use crate::node::{self, Topics};
 use crate::rate::RateDivider;
 use crate::{Ros2Config, Ros2Error, context, topic_names};
 
@@ -36,6 +36,8 @@ pub struct BridgeConfig {
     pub settings: Option<Ros2Settings>,
     /// True for services that control the shows.
     pub control: bool,
+    /// The clock of the stamps in place of the scenes'.
+    pub stamps: Option<StampClock>,
 }
 
 /// The messages of a bridge.
@@ -76,8 +78,9 @@ pub struct Bridge<'a> {
 struct DdsNetwork {
     context: Context,
     matches: Matches,
-    /// The mapping of services; `None` without services.
-    mapping: Option<Mapping>,
+    /// True for services that control the shows.
+    control: bool,
+    stamps: Option<StampClock>,
 }
 
 /// The state of one name.
@@ -108,7 +111,7 @@ struct ShowScene {
 /// The node of one run.
 struct OpenShow {
     // Dropped before the topics: it may answer until then.
-    control: Option<ControlThread>,
+    control: ControlThread,
     topics: Topics,
     divider: RateDivider,
 }
@@ -124,24 +127,18 @@ impl<'a> Bridge<'a> {
         stop: &'a AtomicBool,
         notify: &'a mut dyn FnMut(usize, Notice),
     ) -> Result<Self, Ros2Error> {
-        let BridgeConfig { names, settings, control } = config;
+        let BridgeConfig { names, settings, control, stamps } = config;
         names.iter().try_for_each(|name| check_name(name))?;
         let variable = |name: &str| std::env::var(name).ok();
         let network = Network::of(variable)?;
         if let Some(warning) = other_distribution(variable) {
             log::warn!("{warning}");
         }
-        let mapping = control.then(|| Mapping::of(variable)).map(|(mapping, warning)| {
-            if let Some(warning) = warning {
-                log::warn!("{warning}");
-            }
-            mapping
-        });
         let context = context(network)?;
         let matches = Matches::new(&context);
         let show = |name| ShowBridge::new(name, settings.clone());
         let shows = names.into_iter().map(show).collect();
-        Ok(Self { shows, network: DdsNetwork { context, matches, mapping }, stop, failure: None, notify })
+        Ok(Self { shows, network: DdsNetwork { context, matches, control, stamps }, stop, failure: None, notify })
     }
 
     /// Closes all topics and leaves the network. Returns the counters of all shows.
@@ -279,18 +276,18 @@ impl ShowBridge {
             }
         };
         let ShowScene { run_id: _, alerts, settings } = scene;
+        let DdsNetwork { context, matches, control, stamps } = network;
         let settings = self.settings.clone().unwrap_or(settings);
+        let settings = Ros2Settings { stamps: stamps.unwrap_or(settings.stamps), ..settings };
         let (name, cues) = (self.name.clone(), stage.cues as usize);
         let rate = settings.greatest_rate();
         let topic_names = topic_names(&name, &settings, alerts, cues);
         let config = Ros2Config { name, handles: header.handles as usize, rate, settings, alerts, cues, stage };
-        let DdsNetwork { context, matches, mapping } = network;
-        let topics = Topics::open(context.clone(), matches.clone(), config)?;
-        let services = |mapping: Mapping| {
-            let commands = ShowCommands::start(&self.name)?;
-            ControlThread::start(&self.name, context.clone(), matches.clone(), mapping, commands)
-        };
-        let control = mapping.map(services).transpose()?;
+        let mut node = node::open(context, &self.name)?;
+        let endpoints = Endpoints::open(&self.name, context, &mut node, *control)?;
+        let topics = Topics::open(context.clone(), node, matches.clone(), config)?;
+        let commands = control.then(|| ShowCommands::start(&self.name)).transpose()?;
+        let control = ControlThread::start(endpoints, matches.clone(), commands)?;
         let mut open = OpenShow { control, topics, divider: RateDivider::new(rate) };
         self.alert.take().into_iter().for_each(|alert| open.topics.alert(alert));
         self.cue.take().into_iter().for_each(|cue| open.topics.cue(cue));

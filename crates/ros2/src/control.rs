@@ -1,23 +1,23 @@
-//! Commands over ROS 2: the services below `/<name>`, on their own thread, as a client of the show's own service.
+//! Services over ROS 2, on their own thread: the node's parameter services and, on request, those below `/<name>` that
+//! conduct the show, as a client of the show's own service.
 //!
-//! The requests use ros2-client's subscriptions, so that the node shows its services; the responses use RustDDS's
-//! writers. ros2-client's `Server` does not fit: it hides the bytes of a request, which determine the mapping
-//! ([`mapping`]), and answers at once. A client whose reply reader is not matched yet would never get that answer, so
-//! an answer waits here ([`Matches`]). A dead client, or one that floods the services, costs the loop nothing: this
+//! Clients of both RMW implementations are answered, each in its own mapping ([`mapping`]). The requests use
+//! ros2-client's subscriptions, so that the node shows its services; the responses use RustDDS's writers. ros2-client's
+//! `Server` does not fit: it speaks one mapping, hides the bytes of a request, and answers at once. A client whose reply
+//! reader is not matched yet would never get that answer, so an answer waits here ([`Matches`]). A dead client, or one that floods the services, costs the loop nothing: this
 //! process takes the requests, and passes a bounded number of commands to the show at once.
 
 mod calls;
 mod endpoints;
 mod mapping;
+mod parameters;
 mod services;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use ros2_client::Context;
 use rustdds::{GUID, SampleIdentity, SequenceNumber};
 
 use super::Ros2Error;
@@ -26,9 +26,9 @@ use crate::commands::{Answer, ShowCommands};
 use bench_dragon_client::control::command_client::MOST_WAITING;
 use bench_dragon_messages::control::{Code, Command};
 use calls::{Next, ServiceAdapter, refusal, sentence};
-use endpoints::{Client, Endpoints};
-pub use mapping::Mapping;
-use mapping::Request;
+use endpoints::Client;
+pub(super) use endpoints::Endpoints;
+use mapping::split;
 use services::{Call, Response};
 
 /// The most calls of one process without an answer, so that a flood of one process leaves room for the others.
@@ -41,8 +41,19 @@ const MATCHING_PATIENCE: Duration = Duration::from_secs(2);
 /// The intervals at which requests are polled, and answers while some are pending.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 const ANSWER_INTERVAL: Duration = Duration::from_micros(500);
+/// The interval without services that conduct the show.
+const PARAMETERS_INTERVAL: Duration = Duration::from_millis(50);
 /// The time for clients to get the last answers.
 const LINGER: Duration = Duration::from_millis(20);
+
+/// Returns for each service its name, and whether the bytes are a request of `rmw_fastrtps_cpp` and of
+/// `rmw_cyclonedds_cpp`; never both for a service that conducts the show. For tests.
+pub fn mappings_of(bytes: &[u8]) -> impl Iterator<Item = (&'static str, [bool; 2])> {
+    services::SERVICES.iter().chain(&parameters::SERVICES).map(|service| {
+        let headed = bytes.split_at_checked(mapping::CYCLONE_HEADER).and_then(|(_, body)| (service.read)(body));
+        (service.name, [(service.read)(bytes).is_some(), headed.is_some()])
+    })
+}
 
 /// The thread. Dropping this value ends the thread.
 pub(super) struct ControlThread {
@@ -51,34 +62,23 @@ pub(super) struct ControlThread {
 }
 
 impl ControlThread {
-    /// Offers the services below `/<name>` and serves them.
+    /// Serves the services. Without `commands`, none of them may conduct the show.
     ///
     /// # Errors
     /// [`Ros2Error`]
     pub(super) fn start(
-        name: &str,
-        context: Context,
+        endpoints: Endpoints,
         matches: Matches,
-        mapping: Mapping,
-        commands: ShowCommands,
+        commands: Option<ShowCommands>,
     ) -> Result<Self, Ros2Error> {
         let stop = Arc::new(AtomicBool::new(false));
-        let (opened, opening) = mpsc::channel();
         let thread = {
-            let (name, stop) = (name.to_owned(), Arc::clone(&stop));
-            move || match Endpoints::open(&name, &context) {
-                Ok(endpoints) => {
-                    let _ = opened.send(Ok(()));
-                    Server::new(endpoints, matches, mapping, commands).serve(&stop);
-                }
-                Err(error) => drop(opened.send(Err(error))),
-            }
+            let stop = Arc::clone(&stop);
+            move || Server::new(endpoints, matches, commands).serve(&stop)
         };
         let spawned = std::thread::Builder::new().name("ros2 control".to_owned()).spawn(thread);
         let handle = Some(spawned.map_err(|error| Ros2Error::Failed(error.to_string()))?);
-        let thread = Self { stop, handle };
-        opening.recv().unwrap_or_else(|_| Err(Ros2Error::Failed("the control thread ended early".to_owned())))?;
-        Ok(thread)
+        Ok(Self { stop, handle })
     }
 }
 
@@ -114,18 +114,16 @@ enum Progress {
 struct Server {
     endpoints: Endpoints,
     matches: Matches,
-    mapping: Mapping,
-    commands: ShowCommands,
+    commands: Option<ShowCommands>,
     adapter: ServiceAdapter,
     pending: Vec<Pending>,
 }
 
 impl Server {
-    fn new(endpoints: Endpoints, matches: Matches, mapping: Mapping, commands: ShowCommands) -> Self {
+    fn new(endpoints: Endpoints, matches: Matches, commands: Option<ShowCommands>) -> Self {
         Self {
             endpoints,
             matches,
-            mapping,
             commands,
             adapter: ServiceAdapter::default(),
             pending: Vec::with_capacity(MOST_PENDING),
@@ -133,6 +131,7 @@ impl Server {
     }
 
     fn serve(mut self, stop: &AtomicBool) {
+        let idle = if self.commands.is_some() { POLL_INTERVAL } else { PARAMETERS_INTERVAL };
         while !stop.load(Ordering::Acquire) {
             for port in 0..self.endpoints.ports.len() {
                 self.take_requests(port);
@@ -140,7 +139,7 @@ impl Server {
             self.pass_on();
             self.take_answers();
             self.send_answers();
-            std::thread::sleep(if self.pending.is_empty() { POLL_INTERVAL } else { ANSWER_INTERVAL });
+            std::thread::sleep(if self.pending.is_empty() { idle } else { ANSWER_INTERVAL });
         }
         std::thread::sleep(LINGER);
     }
@@ -153,12 +152,9 @@ impl Server {
             }
             let end = &mut self.endpoints.ports[port];
             let Ok(Some((raw, info))) = end.requests.take() else { return };
-            let Request { header, body } = match self.mapping.split(raw.bytes(), end.service.lengths) {
-                Ok(request) => request,
-                Err(misfit) => {
-                    end.report_misfit(self.mapping, misfit);
-                    continue;
-                }
+            let Some((header, call)) = split(&raw.0, end.service.read) else {
+                end.report_misfit(raw.0.len());
+                continue;
             };
             let writer = GUID::from(info.publisher_gid());
             let named = info.related_request_id().map(|id| GUID::from(id.writer_gid));
@@ -167,7 +163,6 @@ impl Server {
                 writer_guid: reader.unwrap_or(writer),
                 sequence_number: SequenceNumber::from(info.sequence_number()),
             };
-            let call = (end.service.read)(body);
             let client = Client { writer, header: header.to_vec(), identity, reader };
             let of_process =
                 self.pending.iter().filter(|pending| pending.client.writer.prefix == writer.prefix).count();
@@ -188,16 +183,17 @@ impl Server {
 
     /// Passes commands to the loop, in the order of reception, as far as its queue has room.
     fn pass_on(&mut self) {
+        let Some(commands) = &mut self.commands else { return };
         for pending in &mut self.pending {
             if let Progress::Waiting(command) = pending.progress {
-                let Ok(ticket) = self.commands.send(command) else { return };
+                let Ok(ticket) = commands.send(command) else { return };
                 pending.progress = Progress::Sent(ticket, command);
             }
         }
     }
 
     fn take_answers(&mut self) {
-        while let Some(Answer { ticket, result }) = self.commands.answer() {
+        while let Some(Answer { ticket, result }) = self.commands.as_mut().and_then(ShowCommands::answer) {
             let of_ticket = |pending: &Pending| matches!(pending.progress, Progress::Sent(sent, _) if sent == ticket);
             let Some(index) = self.pending.iter().position(of_ticket) else { continue };
             let pending = &mut self.pending[index];
@@ -235,7 +231,12 @@ impl Server {
             if !reached && since.elapsed() < MATCHING_PATIENCE {
                 return true;
             }
-            endpoint.answer(client, response);
+            // A client of the other mapping would read this answer as random numbers. Without a match, all get the answer.
+            let readers = match client.reader.filter(|_| reached) {
+                Some(reader) => vec![reader],
+                None => matches.readers_in_process(endpoint.responses_guid, client.writer),
+            };
+            endpoint.answer(client, &readers, response);
             false
         });
     }

@@ -1,4 +1,5 @@
-//! ROS 2 topics, by ros2-client on RustDDS, of shows in other processes, and on request services that control them.
+//! ROS 2 topics, by ros2-client on RustDDS, of shows in other processes. On another thread the services of the node: its
+//! parameter services and, on request, those that control the show.
 //!
 //! In: the feed of a show and the process's environment. Out: a [`bridge`]. Called by `send ros2`, which `run` and
 //! `replay` start as a child process; both call [`describe`] first.
@@ -11,6 +12,7 @@ mod matching;
 mod node;
 mod rate;
 mod retransmission;
+pub mod rosout;
 mod topic_writer;
 
 use std::net::{IpAddr, Ipv4Addr};
@@ -21,7 +23,7 @@ use rustdds::DomainParticipantBuilder;
 use bench_dragon_messages::Stage;
 use bench_dragon_ros2_messages::settings::Ros2Settings;
 
-pub use control::Mapping;
+pub use control::mappings_of;
 use environment::{Network, Range, check_name};
 
 /// The reason why there are no ROS 2 topics.
@@ -87,10 +89,7 @@ pub fn describe(name: &str, settings: &Ros2Settings, show: ShowFacts) -> Result<
     let rate = settings.rate_of(loop_rate);
     let topics = topic_names(name, settings, alerts, cues).join(", ");
     let services = match settings.control {
-        true => {
-            let (mapping, _) = Mapping::of(variable);
-            format!("\nROS 2 services that conduct the show: /{name}/..., for clients of {}.", mapping.rmw())
-        }
+        true => format!("\nROS 2 services that conduct the show: /{name}/..."),
         false => String::new(),
     };
     Ok(format!("ROS 2 topics ({}, at {rate} frames per second): {topics}.{services}", network.sentence()))

@@ -101,6 +101,16 @@ impl Matches {
     }
 }
 
+impl Matches {
+    /// Returns the readers of a local writer in the process of `client`.
+    pub(super) fn readers_in_process(&self, writer: GUID, client: GUID) -> Vec<GUID> {
+        self.with(|ends| {
+            let readers = ends.readers.iter().filter(|(here, there)| *here == writer && there.prefix == client.prefix);
+            readers.map(|(_, reader)| *reader).collect()
+        })
+    }
+}
+
 impl Ends {
     fn update(&mut self) {
         use DomainParticipantStatusEvent as Event;

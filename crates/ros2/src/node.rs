@@ -8,15 +8,18 @@ use std::time::Duration;
 use ros2_client::{Context, Node, NodeName, NodeOptions};
 
 use super::matching::Matches;
+use super::rosout::Rosout;
 use super::topic_writer::{EVENT_BYTES, Serviced, Stream, TopicWriter, WriterFactory};
 use super::{Ros2Config, Ros2Error};
+use bench_dragon_messages::sentence::{Figures, alert_sentence, cue_sentence};
+use bench_dragon_messages::state::Severity;
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
 use bench_dragon_ros2_messages::diagnostics::{DiagnosticArray, LoopSecond};
 use bench_dragon_ros2_messages::markers::MarkerArray;
 use bench_dragon_ros2_messages::path::Path;
-use bench_dragon_ros2_messages::settings::{DiagnosticLimits, Topic};
+use bench_dragon_ros2_messages::settings::{DiagnosticLimits, StampClock, Topic};
 use bench_dragon_ros2_messages::transforms::TfMessage;
-use bench_dragon_ros2_messages::{Clock, HandlePoses, PoseArray, Stamped};
+use bench_dragon_ros2_messages::{Clock, HandlePoses, HasStamp, PoseArray, Stamped};
 
 /// An upper bound of the bytes of a point of the path.
 const PATH_POSE_BYTES: usize = 88;
@@ -40,7 +43,11 @@ pub(super) struct Topics {
     clock: Option<TopicWriter<Clock>>,
     transforms: Option<Stream<TfMessage>>,
     path: Option<TopicWriter<Path>>,
+    rosout: Rosout,
+    stamps: StampClock,
     latest_alert: Option<CollisionAlert>,
+    /// Simulated seconds per second, of the latest frame.
+    time_scale: f64,
     /// The latest status, and the messages discarded up to it.
     diagnosed: (LoopStatus, u64),
     limits: DiagnosticLimits,
@@ -51,16 +58,28 @@ pub(super) struct Topics {
     node: Node,
 }
 
+/// Creates the node `/<name>`: its topics and services are below it.
+///
+/// # Errors
+/// [`Ros2Error`]
+pub(super) fn open(context: &Context, name: &str) -> Result<Node, Ros2Error> {
+    let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(error.to_string());
+    let (namespace, base) = name.rsplit_once('/').unwrap_or(("", name));
+    let node_name = NodeName::new(&format!("/{namespace}"), base).map_err(|error| failed(&error))?;
+    // ros2-client's own would speak one mapping of service calls, and keep one line of the log.
+    let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
+    context.new_node(node_name, options).map_err(|error| failed(&error))
+}
+
 impl Topics {
-    pub(super) fn open(context: Context, matches: Matches, config: Ros2Config) -> Result<Self, Ros2Error> {
+    pub(super) fn open(context: Context, node: Node, matches: Matches, config: Ros2Config) -> Result<Self, Ros2Error> {
         let Ros2Config { stage, handles, .. } = config;
-        let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(error.to_string());
-        let node_name = NodeName::new(&format!("/{}", config.name), "publisher").map_err(|error| failed(&error))?;
-        // Without these endpoints, subscribers do not warn about messages that RustDDS cannot send.
-        let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
-        let node = context.new_node(node_name, options).map_err(|error| failed(&error))?;
         let mut maker = WriterFactory { context, node, config: &config };
-        let path = Arc::new(Path::of(&stage));
+        let rosout = Rosout::open(&maker.context, &mut maker.node, &config.name)?;
+        // Stage and path hold at any simulated time.
+        let stamps = config.settings.stamps;
+        let unchanging = stamps.at(stage.stamp_ns, 0.0);
+        let path = Arc::new(Path::of(&stage).at(unchanging));
         let path_bytes = EVENT_BYTES + path.poses.len() * PATH_POSE_BYTES;
         let mut topics = Self {
             name: config.name.clone(),
@@ -78,7 +97,10 @@ impl Topics {
                 .port(Topic::Tf, TRANSFORMS_BYTES, config.rate)?
                 .map(|port| port.stream(TfMessage::of(&config.name))),
             path: maker.port(Topic::Path, path_bytes, 1.0)?,
+            rosout,
+            stamps,
             latest_alert: None,
+            time_scale: 1.0,
             diagnosed: (LoopStatus::default(), 0),
             limits: config.settings.diagnostics,
             discarded: 0,
@@ -87,7 +109,7 @@ impl Topics {
         };
         // The messages that do not change.
         if let Some(port) = &mut topics.stages {
-            port.send(Arc::new(Stamped::stage(stage)), &mut topics.discarded);
+            port.send(Arc::new(Stamped::stage(stage).at(unchanging)), &mut topics.discarded);
         }
         if let Some(port) = &mut topics.path {
             port.send(path, &mut topics.discarded);
@@ -100,6 +122,7 @@ impl Topics {
     /// Does the periodic work of the writers. Must be called often.
     pub(super) fn service(&mut self) {
         self.matches.update();
+        self.rosout.send_queued();
         fn end<T: Serviced>(end: &mut Option<T>) -> Option<&mut dyn Serviced> {
             end.as_mut().map(|end| end as &mut dyn Serviced)
         }
@@ -113,51 +136,62 @@ impl Topics {
 
     /// Sends a frame.
     pub(super) fn frame(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
+        self.time_scale = header.time_scale;
+        let stamp = self.stamps.at(header.stamp_ns, header.sim_time);
         let discarded = &mut self.discarded;
         if let Some(stream) = &mut self.handles {
-            stream.publish(discarded, |message| message.update(header, handles));
+            stream.publish(discarded, stamp, |message| message.update(header, handles));
         }
         if let Some(stream) = &mut self.poses {
-            stream.publish(discarded, |message| message.update(header, handles));
+            stream.publish(discarded, stamp, |message| message.update(header, handles));
         }
         if let Some(port) = &mut self.clock {
             port.send(Arc::new(Clock::of(header)), discarded);
         }
         if let Some(stream) = &mut self.transforms {
-            stream.publish(discarded, |message| message.update(header, handles));
+            stream.publish(discarded, stamp, |message| message.update(header, handles));
         }
         if let Some(stream) = &mut self.markers {
             let (stage, alert) = (&self.stage, self.latest_alert.as_ref());
-            stream.publish(discarded, |message| message.update(header, handles, stage, alert));
+            stream.publish(discarded, stamp, |message| message.update(header, handles, stage, alert));
         }
     }
 
     /// Sends an alert.
     pub(super) fn alert(&mut self, alert: CollisionAlert) {
         self.latest_alert = Some(alert);
+        if let Some(level) = alert.alert_level() {
+            let figures = Figures::Shown { time_scale: self.time_scale };
+            let sentence = alert_sentence(&alert, self.stage.benches, figures);
+            self.rosout.tell(level.severity(), format!("{}: {sentence}", level.name()));
+        }
         if let Some(port) = &mut self.alerts {
-            port.send(Arc::new(Stamped::alert(alert)), &mut self.discarded);
+            let stamp = self.stamps.at(alert.stamp_ns, alert.sim_time);
+            port.send(Arc::new(Stamped::alert(alert).at(stamp)), &mut self.discarded);
         }
     }
 
     /// Sends a cue.
     pub(super) fn cue(&mut self, cue: Cue) {
+        self.rosout.tell(Severity::Ok, cue_sentence(&cue));
         if let Some(port) = &mut self.cues {
-            port.send(Arc::new(Stamped::cue(cue)), &mut self.discarded);
+            let stamp = self.stamps.at(cue.stamp_ns, cue.sim_time);
+            port.send(Arc::new(Stamped::cue(cue).at(stamp)), &mut self.discarded);
         }
     }
 
     /// Sends the loop's status, and the diagnostics that follow from it.
     pub(super) fn status(&mut self, status: &LoopStatus) {
+        let stamp = self.stamps.at(status.stamp_ns, status.sim_time);
         if let Some(port) = &mut self.status {
-            port.send(Arc::new(Stamped::status(*status)), &mut self.discarded);
+            port.send(Arc::new(Stamped::status(*status).at(stamp)), &mut self.discarded);
         }
         if let Some(port) = &mut self.diagnostics {
             let (before, discarded_before) = std::mem::replace(&mut self.diagnosed, (*status, self.discarded));
             let (discarded, limits) = (self.discarded, self.limits);
             let second = LoopSecond { before: &before, discarded, discarded_before, limits };
             let message = DiagnosticArray::of(&self.name, status, self.latest_alert.as_ref(), &second);
-            port.send(Arc::new(message), &mut self.discarded);
+            port.send(Arc::new(message.at(stamp)), &mut self.discarded);
         }
     }
 

@@ -16,8 +16,8 @@ use serde::Serialize;
 use super::matching::Matches;
 use super::{Ros2Config, Ros2Error};
 use bench_dragon_messages::{QUEUE_BYTES, Stage};
-use bench_dragon_ros2_messages::MessageType;
 use bench_dragon_ros2_messages::settings::{Durability, Qos, Reliability, Topic};
+use bench_dragon_ros2_messages::{HasStamp, MessageType, Time};
 
 /// Seconds for which a dead subscriber counts as slow: its lease.
 const LEASE_SECONDS: f64 = 12.0;
@@ -148,9 +148,11 @@ pub(super) struct Stream<Message: Serialize> {
     message: Arc<Message>,
 }
 
-impl<Message: Serialize + Clone> Stream<Message> {
-    pub(super) fn publish(&mut self, discarded: &mut u64, change: impl FnOnce(&mut Message)) {
-        change(Arc::make_mut(&mut self.message));
+impl<Message: Serialize + Clone + HasStamp> Stream<Message> {
+    pub(super) fn publish(&mut self, discarded: &mut u64, stamp: Time, change: impl FnOnce(&mut Message)) {
+        let message = Arc::make_mut(&mut self.message);
+        change(message);
+        message.set_stamp(stamp);
         self.port.send(Arc::clone(&self.message), discarded);
     }
 }
@@ -201,7 +203,7 @@ impl WriterFactory<'_> {
 
 /// Returns the quality of service on the wire. A full queue refuses at once instead of blocking. It holds the messages
 /// that a dead subscriber leaves unacknowledged during its lease, as far as memory allows.
-fn policies(qos: Qos, bytes: usize, rate: f64) -> QosPolicies {
+pub(super) fn policies(qos: Qos, bytes: usize, rate: f64) -> QosPolicies {
     let reliability = match qos.reliability {
         Reliability::Reliable => policy::Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO },
         Reliability::BestEffort => policy::Reliability::BestEffort,

@@ -27,7 +27,12 @@ pub(super) fn ros2(common: &Common, arguments: &Ros2Arguments) -> Result<(), Com
             stop.fetch_or(printed.is_err(), Ordering::Relaxed);
         }
     };
-    let config = BridgeConfig { names: common.names.clone(), settings, control: arguments.control };
+    let config = BridgeConfig {
+        names: common.names.clone(),
+        settings,
+        control: arguments.control,
+        stamps: arguments.use_sim_time.stamps(),
+    };
     let mut bridge = Bridge::join(config, &stop, &mut notify)?;
     if !common.json && !common.quiet {
         eprintln!("Publishing {} on ROS 2; Ctrl-C ends.", common.quoted_names());

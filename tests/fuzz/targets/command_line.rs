@@ -4,6 +4,7 @@
 #[allow(dead_code, unused_imports, reason = "the program's sources, of which its command line is used")]
 mod program;
 
+use std::ffi::OsString;
 use std::sync::OnceLock;
 use std::time::Duration;
 
@@ -28,7 +29,9 @@ fn run(data: &[u8]) -> bool {
     if arguments.iter().any(|argument| argument.starts_with("--to") || *argument == "send") && !is_numeric(&arguments) {
         return false;
     }
-    match CommandLine::command().try_get_matches_from(["bench-dragon"].iter().chain(&arguments)) {
+    let own = ["bench-dragon"].iter().chain(&arguments).map(OsString::from);
+    let Ok((own, _)) = program::ros_args::translated(own) else { return false };
+    match CommandLine::command().try_get_matches_from(own) {
         Ok(matches) => {
             assert!(CommandLine::from_arg_matches(&matches).is_ok(), "{arguments:?}");
             check_values(&matches);
@@ -109,7 +112,9 @@ fn words() -> &'static Words {
     WORDS.get_or_init(|| {
         let mut words = Words {
             commands: Vec::new(),
-            options: ["-v", "-o", "-h", "-V", "--"].map(str::to_owned).to_vec(),
+            options: ["-v", "-o", "-h", "-V", "--", "--ros-args", "-r", "-p", "--log-level"]
+                .map(str::to_owned)
+                .to_vec(),
             pairs: Vec::new(),
         };
         let mut left = vec![(String::new(), CommandLine::command())];
@@ -130,7 +135,11 @@ fn words() -> &'static Words {
     })
 }
 
-const VALUES: [&str; 26] = [
+const VALUES: [&str; 30] = [
+    "__ns:=/a",
+    "__node:=b",
+    "use_sim_time:=true",
+    "rate:=-1",
     "40-20",
     "1-4294967295",
     "5m",

@@ -225,7 +225,7 @@ pub fn seeds() -> Vec<Vec<u8>> {
 }
 
 /// Possible lines of a scene.
-const LINES: [&str; 24] = [
+const LINES: [&str; 25] = [
     "on_contact = \"stop\"",
     "on_contact = \"continue\"",
     "at_end = \"loop\"",
@@ -248,6 +248,7 @@ const LINES: [&str; 24] = [
     "kind = \"arc\"",
     "side = \"right\"",
     "[publish.ros2]",
+    "stamps = \"sim\"",
     "topics = [\"handles\"]",
     "lead_in = 0",
 ];

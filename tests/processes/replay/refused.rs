@@ -11,7 +11,7 @@ use bench_dragon::recording::replay::{Pace, Prepared, ReplayOptions};
 use bench_dragon::show::convert::Stamps;
 use mcap::{Message, Schema};
 
-use crate::harness::{Process, can_run, json_lines, python, python_modules, text};
+use crate::harness::{Process, can_run, json_lines, python, python_modules, summary, text};
 use crate::replay::files::{is_frame, on_channel, rewrite, with_bytes};
 use crate::replay::played::small_recording;
 use crate::replay::{replay, scene};
@@ -65,7 +65,17 @@ fn what_cannot_be_played_is_refused_with_a_sentence() {
         assert!(sentence.contains(expected) && sentence.contains(name), "{name}: {sentence}");
     }
     assert!(refusal(&at("nowhere"), &[]).0.contains("No such file"));
-    assert!(refusal(folder.path(), &[]).0.contains("Is a directory"));
+    let bags = ["bag_of_none", "bag_of_two"].map(at);
+    bags.iter().for_each(|bag| std::fs::create_dir(bag).unwrap());
+    assert!(refusal(&bags[0], &[]).0.contains("no file of this directory ends in .mcap"));
+    for name in ["0.mcap", "1.mcap"] {
+        std::fs::copy(&file, bags[1].join(name)).unwrap();
+    }
+    let (sentence, _) = refusal(&bags[1], &[]);
+    assert!(
+        sentence.contains("2 recordings") && sentence.contains("0.mcap") && sentence.contains("1.mcap"),
+        "{sentence}"
+    );
     let options: [(&[&str], &str); 6] = [
         (&["--start", "1e6"], "--start is 1000000 and the recording reaches 2"),
         (&["--start", "nan"], "--start is NaN"),
@@ -203,7 +213,13 @@ fn a_bag_of_another_recorder_is_played() {
     let bag = folder.path().join("bag");
     let written = python().arg("tests/python/bag_writer.py").args([&file, &bag]).output().unwrap();
     assert!(written.status.success(), "{}", text(&written.stderr));
-    assert_eq!(contents(&bag.join("bag.mcap"), None).unwrap(), contents(&file, None).unwrap());
+    let frames = contents(&file, None).unwrap();
+    assert_eq!(contents(&bag.join("bag.mcap"), None).unwrap(), frames);
+    // By its directory, as `ros2 bag play` takes it.
+    let scene = scene(folder.path(), "school", 64, "");
+    let played = Process::start(&mut replay("replay_bag_folder", &bag, &scene, &["--rate", "400"])).output_within(60);
+    let played = summary(&played);
+    assert_eq!((&played["frames"], &played["end"]), (&frames.len().into(), &"recording".into()), "{played}");
 }
 
 fn length_at(bytes: &[u8], at: usize) -> u64 {

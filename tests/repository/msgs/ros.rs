@@ -25,8 +25,8 @@ pub const MESSAGES: [Message; 9] = [
 
 /// The comment of a frame over ROS 2: the handles and their common values are one message.
 const HANDLE_POSES: &str = "One frame: every handle of the dragon, the head first, and what is true of all of them.";
-const HEADER: &str =
-    "The stamp is stamp_ns; frame_id is \"stage\": metres, x to the right, y up, origin at the centre.";
+const HEADER: &str = "The stamp is stamp_ns, or simulated time with stamps = \"sim\"; frame_id is \"stage\": metres, x to \
+                      the right, y up, origin at the centre.";
 
 /// Returns the text of a message's file.
 pub fn interface_file(source: &Source, message: &Message) -> String {

@@ -1,29 +1,30 @@
-//! Clients that have just started, and clients that use the other mapping.
+//! Clients that have just started, and clients of both RMW implementations at once.
+
+use std::io::Write as _;
 
 use super::*;
 
 #[test]
-fn a_hundred_new_clients_each_get_the_answer_to_their_first_call() {
+fn a_hundred_new_clients_of_each_kind_get_the_answer_to_their_first_call() {
     if !can_run(python_modules(&["cyclonedds"])) {
         return;
     }
-    let (cyclone, fast) = ("fresh_cyclone", "fresh_fast");
-    let publishers = [(cyclone, CYCLONE), (fast, FAST)]
-        .map(|(name, rmw)| publisher(name, rmw, &["--ros2-control", "--duration", "300"]));
+    let name = "fresh";
+    let publisher = publisher(name, &["--ros2-control", "--duration", "300"]);
     // One process for each client of Cyclone DDS, as users have them; most of the time is starting them.
     let calls = if long() { 100 } else { 12 };
     std::thread::scope(|threads| {
         for _ in 0..4 {
             threads.spawn(|| {
                 for _ in 0..25 {
-                    assert_eq!(enhanced::<_, f64>(fast, "get_rate", ("rosbag2_interfaces", "GetRate"), Empty(0)), 1.0);
+                    assert_eq!(enhanced::<_, f64>(name, "get_rate", ("rosbag2_interfaces", "GetRate"), Empty(0)), 1.0);
                 }
             });
         }
         for _ in 0..2 {
             threads.spawn(|| {
                 for _ in 0..calls / 2 {
-                    let peer = Process::start(&mut peer(cyclone, &["--fresh", "1", "--seconds", "10", "get_rate"]));
+                    let peer = Process::start(&mut peer(name, &["--fresh", "1", "--seconds", "10", "get_rate"]));
                     let output = peer.output_within(120);
                     let answers: Vec<_> = json_lines(&output).iter().map(|line| line["response"].clone()).collect();
                     assert_eq!(answers, [json!({"rate": 1.0})], "{}: {}", output.status, text(&output.stderr));
@@ -32,44 +33,97 @@ fn a_hundred_new_clients_each_get_the_answer_to_their_first_call() {
             });
         }
     });
-    publishers.into_iter().for_each(|publisher| drop(ended(publisher)));
+    let (_, printed) = ended(publisher);
+    assert!(!printed.contains("refused"), "{printed}");
 }
 
+/// Both kinds of client conduct one show by the same services, in turn. Cyclone DDS's stays all the time, so each
+/// answer to the other passes by its readers.
 #[test]
-fn a_call_in_the_other_mapping_is_refused_and_nothing_happens() {
+fn clients_of_both_implementations_conduct_one_show_in_turn() {
     if !can_run(python_modules(&["cyclonedds"])) {
         return;
     }
-    let (cyclone, fast) = ("other_cyclone", "other_fast");
-    let publishers = [(cyclone, CYCLONE), (fast, FAST)]
-        .map(|(name, rmw)| publisher(name, rmw, &["--ros2-control", "--paused", "--start", "50", "--duration", "300"]));
-    // One and eight bytes, each several times.
+    let name = "both";
+    let publisher = publisher(name, &["--ros2-control", "--paused", "--start", "50", "--duration", "300"]);
+    let here = || control(name, &["state"]).1;
+    let (mut cyclone, mut input) = Process::start_with_input(&mut peer(name, &["--calls-of-input"]));
+    let answers = cyclone.lines();
+    let mut of_cyclone = |call: &str| -> Value {
+        writeln!(input, "{call}").unwrap();
+        let line: Value = serde_json::from_str(&answers.until(call, 60)).unwrap();
+        line["response"].clone()
+    };
+    let set = |service: &str, kind: &'static str, value: f64| -> bool {
+        enhanced(name, service, ("rosbag2_interfaces", kind), value)
+    };
+    let rate = || -> f64 { enhanced(name, "get_rate", ("rosbag2_interfaces", "GetRate"), Empty(0)) };
+    for turn in 1..=5 {
+        let (of_fast, by_cyclone) = (f64::from(turn) + 0.25, f64::from(turn) + 0.5);
+        assert!(set("set_rate", "SetRate", of_fast));
+        assert_eq!(of_cyclone("get_rate"), json!({ "rate": of_fast }));
+        assert_eq!(of_cyclone(&format!("set_rate={by_cyclone}")), json!({"success": true}));
+        assert_eq!(rate(), by_cyclone);
+        let time = Time { sec: 100 + turn, nanosec: 0 };
+        assert!(enhanced::<_, bool>(name, "seek", ("rosbag2_interfaces", "Seek"), time));
+        assert_eq!(here()["sim_time"], 100.0 + f64::from(turn));
+        assert_eq!(of_cyclone(&format!("seek={}", 200 + turn)), json!({"success": true}));
+        assert_eq!(here()["sim_time"], 200.0 + f64::from(turn));
+        let stepped: Outcome = enhanced(name, "step_simulation", ("simulation_interfaces", "StepSimulation"), 1_u64);
+        assert_eq!(stepped, Outcome { result: 1, error_message: String::new() });
+        assert_eq!(result(&of_cyclone("step_simulation=1")), (1, false));
+        assert_eq!(of_cyclone("list_parameters"), json!({"result": {"names": [], "prefixes": []}}));
+        let listed: (Vec<String>, Vec<String>) =
+            enhanced(name, "list_parameters", ("rcl_interfaces", "ListParameters"), (Vec::<String>::new(), 0_u64));
+        assert_eq!(listed, (vec![], vec![]));
+    }
+    // A hold of one kind is released by the other.
+    assert_eq!(of_cyclone("hold")["success"], true);
+    assert!(enhanced::<_, Trigger>(name, "release", ("std_srvs", "Trigger"), Empty(0)).success);
+    assert_eq!(of_cyclone("release")["success"], false);
+    cyclone.signal(nix::sys::signal::Signal::SIGKILL);
+    let (_, printed) = ended(publisher);
+    assert!(!printed.contains("is none of"), "{printed}");
+}
+
+/// A request that is none of its service is refused; the next is answered.
+#[test]
+fn a_request_of_another_length_is_refused_and_nothing_happens() {
+    let name = "misfit";
+    let publisher = publisher(name, &["--ros2-control", "--paused", "--start", "50", "--duration", "300"]);
+    let kind = ("simulation_interfaces", "StepSimulation");
+    let twelve = (7_u64, 7_u32);
+    assert_eq!(first_call::<_, Outcome>(name, "step_simulation", kind, twelve, 1), None);
+    let here = control(name, &["state"]).1;
+    assert_eq!((&here["sim_time"], &here["playback"]), (&50.0.into(), &"paused".into()));
+    assert_eq!(enhanced::<_, Outcome>(name, "step_simulation", kind, 7_u64).result, 1);
+    let (_, printed) = ended(publisher);
+    assert_eq!(printed.matches("a request of 12 bytes is none of").count(), 1, "{printed}");
+}
+
+#[test]
+fn the_parameter_services_of_a_node_without_services_answer_at_once() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let name = "parameters";
+    let publisher = publisher(name, &["--duration", "300"]);
     let calls = [
-        "hold",
-        "go",
-        "go",
-        "resume",
-        "set_simulation_state=1",
-        "set_rate=3.5",
-        "seek=300",
-        "step_simulation=100",
-        "reset_simulation=255",
+        "list_parameters",
+        "get_parameters=use_sim_time",
+        "get_parameter_types=use_sim_time",
+        "describe_parameters=use_sim_time",
+        "set_parameters=use_sim_time",
+        "set_parameters_atomically=use_sim_time",
     ];
-    let bare = [&["--bare", "--seconds", "0.2"][..], &calls].concat();
-    let headed = [&["--seconds", "0.2"][..], &calls].concat();
-    for (name, arguments, of_client, publisher) in [(cyclone, bare, FAST, CYCLONE), (fast, headed, CYCLONE, FAST)] {
-        assert_eq!(call(name, &arguments), vec![Value::Null; calls.len()], "of a client of {of_client} by {publisher}");
-        let (_, here) = control(name, &["state"]);
-        assert_eq!((&here["sim_time"], &here["playback"]), (&50.0.into(), &"paused".into()));
-    }
-    // The publisher is there: clients of the same mapping get answers.
-    assert_eq!(call(cyclone, &["get_rate"]), [json!({"rate": 1.0})]);
-    assert_eq!(enhanced::<_, f64>(fast, "get_rate", ("rosbag2_interfaces", "GetRate"), Empty(0)), 1.0);
-    for (publisher, of_client) in publishers.into_iter().zip([FAST, CYCLONE]) {
-        let (_, printed) = ended(publisher);
-        let refused = printed.lines().filter(|line| line.contains("refused (reported once)"));
-        let refused: Vec<_> =
-            refused.filter(|line| line.contains(&format!("a client calls as {of_client} does"))).collect();
-        assert_eq!(refused.len(), calls.len() - 1, "once for each service: {printed}");
-    }
+    let answers = call(name, &calls);
+    assert_eq!(answers[0], json!({"result": {"names": [], "prefixes": []}}));
+    assert_eq!(answers[1..4], [json!({"values": []}), json!({"values": []}), json!({"descriptors": []})]);
+    let refused = |result: &Value| result["successful"] == false && result["reason"] != "";
+    assert!(refused(&answers[4]["results"][0]) && refused(&answers[5]["result"]), "{answers:?}");
+    // As rclcpp, rclpy and `ros2 param` of the other implementation call.
+    let names = vec!["use_sim_time".to_owned()];
+    let values: Vec<u8> = enhanced(name, "get_parameter_types", ("rcl_interfaces", "GetParameterTypes"), names);
+    assert!(values.is_empty());
+    ended(publisher);
 }

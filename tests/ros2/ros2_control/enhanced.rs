@@ -53,13 +53,13 @@ pub struct Trigger {
 struct Fields<T>(T);
 impl<T: Serialize + DeserializeOwned> Message for Fields<T> {}
 
-/// Calls a service as a new client with its own participant. Returns `None` if no answer comes.
-fn first_call<Request, Response>(
-    mapping: ServiceMapping,
+/// Calls a service as a new client with its own participant. Returns `None` if no answer comes within `seconds`.
+pub fn first_call<Request, Response>(
     name: &str,
     service: &str,
     kind: (&str, &str),
     request: Request,
+    seconds: u64,
 ) -> Option<Response>
 where
     Request: Serialize + DeserializeOwned + Clone + 'static,
@@ -70,15 +70,16 @@ where
     let mut node = context.new_node(NodeName::new("/", "caller").unwrap(), options).unwrap();
     let qos = DEFAULT_PUBLISHER_QOS;
     let service_name = Name::new(&format!("/{}", unique(name)), service).unwrap();
-    let client: Client<Fields<Request>, Fields<Response>> =
-        node.create_client(mapping, &service_name, &ServiceTypeName::new(kind.0, kind.1), qos.clone(), qos).unwrap();
+    let client: Client<Fields<Request>, Fields<Response>> = node
+        .create_client(ServiceMapping::Enhanced, &service_name, &ServiceTypeName::new(kind.0, kind.1), qos.clone(), qos)
+        .unwrap();
     let spinner = node.spinner().unwrap();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let answer = runtime.block_on(async {
         let call = async {
             let found = tokio::time::timeout(Duration::from_secs(90), client.wait_for_service(&node)).await;
             assert!(found.is_ok(), "{service} was not discovered");
-            tokio::time::timeout(Duration::from_secs(20), client.async_call_service(Fields(request))).await
+            tokio::time::timeout(Duration::from_secs(seconds), client.async_call_service(Fields(request))).await
         };
         tokio::select! {
             ended = spinner.spin() => panic!("the spinner ended: {ended:?}"),
@@ -95,5 +96,5 @@ where
     Request: Serialize + DeserializeOwned + Clone + 'static,
     Response: Serialize + DeserializeOwned + 'static,
 {
-    first_call(ServiceMapping::Enhanced, name, service, kind, request).unwrap_or_else(|| panic!("{service}: no answer"))
+    first_call(name, service, kind, request, 20).unwrap_or_else(|| panic!("{service}: no answer"))
 }

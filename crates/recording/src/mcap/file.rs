@@ -11,7 +11,7 @@ use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use byteorder::LittleEndian;
-use mcap::records::MessageHeader;
+use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 use serde::Serialize;
@@ -35,6 +35,24 @@ const CHUNK_INDEX_BYTES: u64 = 512;
 const END_BYTES: u64 = 64 << 10;
 /// zstd's default: handles are nearly random, so higher levels take much longer and save nothing.
 const COMPRESSION_LEVEL: u32 = 3;
+/// The metadata from which `ros2 bag info` takes the distribution, as rosbag2 writes it at the start of a bag. Its other
+/// values come from the file's statistics. Since version 9 the quality of service is in words.
+const ROSBAG2_METADATA: &str = "\
+version: 8
+storage_identifier: mcap
+duration:
+  nanoseconds: 0
+starting_time:
+  nanoseconds_since_epoch: 0
+message_count: 0
+topics_with_message_count: []
+compression_format: \"\"
+compression_mode: \"\"
+relative_file_paths: []
+files: []
+custom_data: ~
+ros_distro: jazzy
+";
 /// CDR, little-endian.
 const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
 
@@ -110,6 +128,8 @@ impl McapFile {
         // Both begin with the same header.
         let channel_bytes = bare.get(disk.position() as usize..).unwrap_or_default();
         disk.clone().write_all(channel_bytes)?;
+        let metadata = BTreeMap::from([("serialized_metadata".to_owned(), ROSBAG2_METADATA.to_owned())]);
+        writer.write_metadata(&Metadata { name: "rosbag2".to_owned(), metadata }).map_err(io_error)?;
         let channels = add_channels(&mut writer, name, topics)?;
         // A recorder that is killed within its first second leaves an empty recording in place of an empty file.
         disk.clone().flush()?;

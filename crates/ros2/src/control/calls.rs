@@ -67,6 +67,7 @@ impl ServiceAdapter {
             Call::Hold => Command::Hold,
             Call::Release => Command::Release,
             Call::Go => Command::Go,
+            Call::Parameters(call) => return Next::Answer(Response::Parameters(call.response())),
         };
         Next::Execute(command)
     }
@@ -112,6 +113,7 @@ impl ServiceAdapter {
             (Call::SetRate(_) | Call::Seek(_) | Call::PlayNext, _) => Response::Flag(succeeded),
             (Call::Hold | Call::Release | Call::Go, _) => Response::Trigger(succeeded, sentence(command, outcome)),
             (Call::Pause | Call::Resume | Call::TogglePaused | Call::GetFeatures, _) => Response::Empty(0),
+            (Call::Parameters(call), _) => Response::Parameters(call.response()),
         })
     }
 }
@@ -120,6 +122,7 @@ impl ServiceAdapter {
 pub fn refusal(call: Call, sentence: &str) -> Option<Response> {
     Some(match call {
         Call::GetFeatures => features(),
+        Call::Parameters(call) => Response::Parameters(call.response()),
         Call::GetState => Response::State(state::STOPPED, outcome_of(result::OPERATION_FAILED, sentence)),
         Call::SetState(_) | Call::Step(_) | Call::Reset(_) => failure(result::OPERATION_FAILED, sentence),
         Call::SetRate(_) | Call::Seek(_) | Call::PlayNext => Response::Flag(false),

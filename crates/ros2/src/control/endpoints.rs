@@ -1,12 +1,12 @@
 //! The DDS endpoints of the services: subscriptions that return requests as bytes, writers that send responses as
 //! bytes.
 //!
-//! The control thread creates and drops them.
+//! Created with the node, before the control thread that uses them.
 
 use std::convert::Infallible;
 use std::fmt;
 
-use ros2_client::{Context, Node, NodeName, NodeOptions, Subscription};
+use ros2_client::{Context, Node, Subscription};
 use rustdds::bytes::Bytes;
 use rustdds::no_key::{DataWriter, SerializerAdapter};
 use rustdds::policy::{self, ResourceLimits};
@@ -16,7 +16,7 @@ use rustdds::{
 };
 use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
 
-use super::mapping::{Mapping, Misfit};
+use super::parameters;
 use super::services::{Response, SERVICES, Service};
 use crate::Ros2Error;
 
@@ -24,21 +24,11 @@ use crate::Ros2Error;
 const REQUEST_DEPTH: i32 = 256;
 /// Answers of one service kept for clients that are slow or dead.
 const MOST_ANSWERS: i32 = 4096;
-/// An upper bound of the bytes of a request.
-const MOST_REQUEST_BYTES: usize = 64;
+/// The most bytes of a request that are read. Only requests for parameters have no fixed length.
+const MOST_REQUEST_BYTES: usize = 4096;
 
 /// The bytes of a request.
-pub(super) struct Raw {
-    bytes: [u8; MOST_REQUEST_BYTES],
-    length: usize,
-}
-
-impl Raw {
-    /// Returns the bytes.
-    pub(super) fn bytes(&self) -> &[u8] {
-        &self.bytes[..self.length]
-    }
-}
+pub(super) struct Raw(pub(super) Vec<u8>);
 
 impl<'de> Deserialize<'de> for Raw {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -51,13 +41,12 @@ impl<'de> Deserialize<'de> for Raw {
             }
 
             fn visit_seq<A: SeqAccess<'de>>(self, mut bytes: A) -> Result<Raw, A::Error> {
-                let mut raw = Raw { bytes: [0; MOST_REQUEST_BYTES], length: 0 };
+                let mut raw = Vec::new();
                 // CDR contains no length: the error at the end of the message determines it.
                 while let Ok(Some(byte)) = bytes.next_element() {
-                    raw.bytes[raw.length] = byte;
-                    raw.length += 1;
+                    raw.push(byte);
                 }
-                Ok(raw)
+                Ok(Raw(raw))
             }
         }
         deserializer.deserialize_tuple(MOST_REQUEST_BYTES, AllBytes)
@@ -98,19 +87,18 @@ struct Reported {
     discarded: bool,
 }
 
-/// All services, and the node that they belong to.
-pub(super) struct Endpoints {
+/// All services of the node.
+pub(crate) struct Endpoints {
     pub(super) ports: Vec<ServiceEndpoint>,
-    // Dropped after the ports: they belong to it.
-    _node: Node,
 }
 
 impl Endpoints {
-    pub(super) fn open(name: &str, context: &Context) -> Result<Self, Ros2Error> {
+    /// Opens the parameter services of the node `/<name>`, and if `conducting` those that conduct the show.
+    ///
+    /// # Errors
+    /// [`Ros2Error`]
+    pub(crate) fn open(name: &str, context: &Context, node: &mut Node, conducting: bool) -> Result<Self, Ros2Error> {
         let failed = |error: &dyn fmt::Display| Ros2Error::Failed(error.to_string());
-        let node_name = NodeName::new(&format!("/{name}"), "control").map_err(|error| failed(&error))?;
-        let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
-        let mut node = context.new_node(node_name, options).map_err(|error| failed(&error))?;
         let participant = context.domain_participant();
         let publisher = participant.create_publisher(&policies(MOST_ANSWERS)).map_err(|error| failed(&error))?;
         let mut open = |service: &'static Service| {
@@ -134,8 +122,9 @@ impl Endpoints {
                 reported: Reported::default(),
             })
         };
-        let ports = SERVICES.iter().map(&mut open).collect::<Result<_, Ros2Error>>()?;
-        Ok(Self { ports, _node: node })
+        let services = parameters::SERVICES.iter().chain(if conducting { &SERVICES[..] } else { &[] });
+        let ports = services.map(&mut open).collect::<Result<_, Ros2Error>>()?;
+        Ok(Self { ports })
     }
 }
 
@@ -163,16 +152,20 @@ pub(super) struct Client {
 }
 
 impl ServiceEndpoint {
-    /// Sends a response.
-    pub(super) fn answer(&mut self, client: &Client, response: &Response) {
+    /// Sends a response to these readers, or to all if there are none.
+    pub(super) fn answer(&mut self, client: &Client, readers: &[GUID], response: &Response) {
         let mut bytes = client.header.clone();
         // The header's 16 bytes do not change the alignment.
         let Ok(body) = CDRSerializerAdapter::<Response>::to_bytes(response) else { return };
         bytes.extend_from_slice(&body);
-        let options = WriteOptionsBuilder::new().related_sample_identity(client.identity).build();
-        if self.responses.write_with_options(bytes, options).is_err()
-            && !std::mem::replace(&mut self.reported.discarded, true)
-        {
+        let options = || WriteOptionsBuilder::new().related_sample_identity(client.identity);
+        let written = match readers {
+            [] => self.responses.write_with_options(bytes, options().build()).is_ok(),
+            _ => readers.iter().all(|reader| {
+                self.responses.write_with_options(bytes.clone(), options().to_single_reader(*reader).build()).is_ok()
+            }),
+        };
+        if !written && !std::mem::replace(&mut self.reported.discarded, true) {
             log::warn!(
                 "ROS 2 service {}: a client is so slow, or dead, that answers are discarded until it is back or its lease \
                  ends (reported once)",
@@ -181,23 +174,14 @@ impl ServiceEndpoint {
         }
     }
 
-    pub(super) fn report_misfit(&mut self, mapping: Mapping, misfit: Misfit) {
-        if std::mem::replace(&mut self.reported.misfit, true) {
-            return;
-        }
-        let name = self.service.name;
-        match misfit {
-            Misfit::OtherMapping(other) => log::warn!(
-                "ROS 2 service {name}: a client calls as {} does, and this publisher answers those of {}: refused \
-                 (reported once). Set RMW_IMPLEMENTATION alike on both sides",
-                other.rmw(),
-                mapping.rmw()
-            ),
-            Misfit::Length(bytes) => log::warn!(
-                "ROS 2 service {name}: a request of {bytes} bytes is none of {}/{}: refused (reported once)",
+    pub(super) fn report_misfit(&mut self, bytes: usize) {
+        if !std::mem::replace(&mut self.reported.misfit, true) {
+            log::warn!(
+                "ROS 2 service {}: a request of {bytes} bytes is none of {}/{}: refused (reported once)",
+                self.service.name,
                 self.service.package,
                 self.service.kind
-            ),
+            );
         }
     }
 

@@ -6,6 +6,9 @@
 
 use serde::Serialize;
 
+use super::mapping::body;
+use super::parameters::{ParameterCall, ParameterResponse};
+
 /// A service: its name below the publisher's, its type, and the form of a request.
 pub struct Service {
     /// The last part of the name.
@@ -14,64 +17,52 @@ pub struct Service {
     pub package: &'static str,
     /// The type in that package.
     pub kind: &'static str,
-    /// The legal lengths of a request in bytes.
-    pub lengths: &'static [usize],
-    /// Reads a request with a legal length.
-    pub read: fn(&[u8]) -> Call,
+    /// Reads a request; returns `None` for bytes that are none.
+    pub read: fn(&[u8]) -> Option<Call>,
 }
 
-/// A request without a field is one byte on the wire.
-const EMPTY: &[usize] = &[1];
-const BYTE: &[usize] = &[1];
-const EIGHT_BYTES: &[usize] = &[8];
-
-/// All services.
+/// All services that conduct the show.
 pub const SERVICES: [Service; 16] = {
-    const fn simulation(
-        name: &'static str,
-        kind: &'static str,
-        lengths: &'static [usize],
-        read: fn(&[u8]) -> Call,
-    ) -> Service {
-        Service { name, package: "simulation_interfaces", kind, lengths, read }
+    type Read = fn(&[u8]) -> Option<Call>;
+    const fn simulation(name: &'static str, kind: &'static str, read: Read) -> Service {
+        Service { name, package: "simulation_interfaces", kind, read }
     }
-    const fn player(
-        name: &'static str,
-        kind: &'static str,
-        lengths: &'static [usize],
-        read: fn(&[u8]) -> Call,
-    ) -> Service {
-        Service { name, package: "rosbag2_interfaces", kind, lengths, read }
+    const fn player(name: &'static str, kind: &'static str, read: Read) -> Service {
+        Service { name, package: "rosbag2_interfaces", kind, read }
     }
-    const fn trigger(name: &'static str, read: fn(&[u8]) -> Call) -> Service {
-        Service { name, package: "std_srvs", kind: "Trigger", lengths: EMPTY, read }
+    const fn trigger(name: &'static str, read: Read) -> Service {
+        Service { name, package: "std_srvs", kind: "Trigger", read }
     }
     [
-        simulation("get_simulator_features", "GetSimulatorFeatures", EMPTY, |_| Call::GetFeatures),
-        simulation("get_simulation_state", "GetSimulationState", EMPTY, |_| Call::GetState),
-        simulation("set_simulation_state", "SetSimulationState", BYTE, |body| Call::SetState(body[0])),
-        simulation("step_simulation", "StepSimulation", EIGHT_BYTES, |body| {
-            Call::Step(u64::from_le_bytes(eight(body)))
+        simulation("get_simulator_features", "GetSimulatorFeatures", |bytes| empty(bytes, Call::GetFeatures)),
+        simulation("get_simulation_state", "GetSimulationState", |bytes| empty(bytes, Call::GetState)),
+        simulation("set_simulation_state", "SetSimulationState", |bytes| {
+            body(bytes).map(|[state]| Call::SetState(state))
         }),
-        simulation("reset_simulation", "ResetSimulation", BYTE, |body| Call::Reset(body[0])),
-        player("pause", "Pause", EMPTY, |_| Call::Pause),
+        simulation("step_simulation", "StepSimulation", |bytes| {
+            body(bytes).map(|steps| Call::Step(u64::from_le_bytes(steps)))
+        }),
+        simulation("reset_simulation", "ResetSimulation", |bytes| body(bytes).map(|[scope]| Call::Reset(scope))),
+        player("pause", "Pause", |bytes| empty(bytes, Call::Pause)),
         // Since Lyrical a request has a time, which the player ignores.
-        player("resume", "Resume", &[1, 8], |_| Call::Resume),
-        player("toggle_paused", "TogglePaused", EMPTY, |_| Call::TogglePaused),
-        player("is_paused", "IsPaused", EMPTY, |_| Call::IsPaused),
-        player("get_rate", "GetRate", EMPTY, |_| Call::GetRate),
-        player("set_rate", "SetRate", EIGHT_BYTES, |body| Call::SetRate(f64::from_le_bytes(eight(body)))),
-        player("seek", "Seek", EIGHT_BYTES, |body| Call::Seek(seconds(eight(body)))),
-        player("play_next", "PlayNext", EMPTY, |_| Call::PlayNext),
-        trigger("hold", |_| Call::Hold),
-        trigger("release", |_| Call::Release),
-        trigger("go", |_| Call::Go),
+        player("resume", "Resume", |bytes| {
+            empty(bytes, Call::Resume).or_else(|| body::<8>(bytes).map(|_| Call::Resume))
+        }),
+        player("toggle_paused", "TogglePaused", |bytes| empty(bytes, Call::TogglePaused)),
+        player("is_paused", "IsPaused", |bytes| empty(bytes, Call::IsPaused)),
+        player("get_rate", "GetRate", |bytes| empty(bytes, Call::GetRate)),
+        player("set_rate", "SetRate", |bytes| body(bytes).map(|rate| Call::SetRate(f64::from_le_bytes(rate)))),
+        player("seek", "Seek", |bytes| body(bytes).map(|time| Call::Seek(seconds(time)))),
+        player("play_next", "PlayNext", |bytes| empty(bytes, Call::PlayNext)),
+        trigger("hold", |bytes| empty(bytes, Call::Hold)),
+        trigger("release", |bytes| empty(bytes, Call::Release)),
+        trigger("go", |bytes| empty(bytes, Call::Go)),
     ]
 };
 
-/// Returns the eight bytes of a request.
-fn eight(body: &[u8]) -> [u8; 8] {
-    std::array::from_fn(|byte| body.get(byte).copied().unwrap_or(0))
+/// Returns `call` for a request without a field, which is one byte on the wire.
+fn empty(bytes: &[u8], call: Call) -> Option<Call> {
+    body::<1>(bytes).map(|_| call)
 }
 
 /// Converts a builtin_interfaces/Time (i32 seconds, u32 nanoseconds) to seconds.
@@ -115,6 +106,8 @@ pub enum Call {
     Release,
     /// std_srvs/Trigger `go`.
     Go,
+    /// A parameter service of the node.
+    Parameters(ParameterCall),
 }
 
 /// The response to a call: its fields in order.
@@ -135,6 +128,8 @@ pub enum Response {
     Features(Features),
     /// std_srvs/Trigger: success, and a sentence.
     Trigger(bool, String),
+    /// A parameter service of the node.
+    Parameters(ParameterResponse),
 }
 
 /// simulation_interfaces/Result.

@@ -4,7 +4,9 @@
 
 use std::collections::BTreeMap;
 
-use bench_dragon_ros2_messages::settings::{DiagnosticLimits, Durability, Qos, Reliability, Ros2Settings, Topic};
+use bench_dragon_ros2_messages::settings::{
+    DiagnosticLimits, Durability, Qos, Reliability, Ros2Settings, StampClock, Topic,
+};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -18,6 +20,7 @@ pub(super) struct RawRos2 {
     topics: Option<Spanned<Vec<Topic>>>,
     #[serde(default)]
     control: bool,
+    stamps: Option<Spanned<StampClock>>,
     #[serde(default)]
     qos: BTreeMap<Topic, Spanned<RawQos>>,
     diagnostics: Option<Spanned<RawDiagnostics>>,
@@ -110,7 +113,18 @@ impl RawRos2 {
             }
             Some(raw) => raw.get_ref().validated(source)?,
         };
-        Ok(Ros2Settings { rate, topics, control: self.control, diagnostics })
+        let has_clock = topics.contains_key(&Topic::Clock);
+        let stamps = match &self.stamps {
+            Some(given) if *given.get_ref() == StampClock::Sim && !has_clock => {
+                let sentence = "publish.ros2.stamps is \"sim\" but \"clock\" is not among publish.ros2.topics, expected both, \
+                                or \"wall\"";
+                return Err(source.field_error(given, sentence));
+            }
+            Some(given) => *given.get_ref(),
+            None if has_clock => StampClock::Sim,
+            None => StampClock::Wall,
+        };
+        Ok(Ros2Settings { rate, topics, control: self.control, stamps, diagnostics })
     }
 }
 

@@ -1,0 +1,97 @@
+//! The parameter services of the node, which has no parameters: every node of ROS 2 has these services, and `ros2 param
+//! list` waits for all six.
+//!
+//! In: the bytes of a request. Out: a [`ParameterCall`], and its [`ParameterResponse`]. Called by the control thread.
+
+use ros2_client::rcl_interfaces::{GetParametersRequest, ListParametersRequest, SetParametersRequest};
+use rustdds::RepresentationIdentifier;
+use rustdds::serialization::deserialize_from_cdr_with_rep_id;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::services::{Call, Service};
+
+/// A call of a parameter service.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ParameterCall {
+    /// ListParameters.
+    List,
+    /// GetParameters, GetParameterTypes or DescribeParameters.
+    Get,
+    /// SetParameters: the number of parameters.
+    Set(usize),
+    /// SetParametersAtomically.
+    SetAtomically,
+}
+
+/// The response of a node without parameters.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(untagged)]
+pub enum ParameterResponse {
+    /// ListParameters: empty lists.
+    List {
+        /// The names of the parameters.
+        names: Vec<String>,
+        /// The prefixes of the names.
+        prefixes: Vec<String>,
+    },
+    /// GetParameters, GetParameterTypes and DescribeParameters: an empty list, which has no type on the wire.
+    Values(Vec<u8>),
+    /// SetParameters: a refusal for each parameter.
+    Results(Vec<SetResult>),
+    /// SetParametersAtomically: a refusal.
+    Result(SetResult),
+}
+
+/// rcl_interfaces/SetParametersResult.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct SetResult {
+    /// Always false.
+    pub successful: bool,
+    /// The reason for the refusal.
+    pub reason: String,
+}
+
+impl ParameterCall {
+    /// Returns the response.
+    pub fn response(self) -> ParameterResponse {
+        let reason = "this node has no parameters: its settings are those of its command line and its scene";
+        let refused = SetResult { successful: false, reason: reason.to_owned() };
+        match self {
+            Self::List => ParameterResponse::List { names: Vec::new(), prefixes: Vec::new() },
+            Self::Get => ParameterResponse::Values(Vec::new()),
+            Self::Set(count) => ParameterResponse::Results(vec![refused; count]),
+            Self::SetAtomically => ParameterResponse::Result(refused),
+        }
+    }
+}
+
+/// The parameter services of a node.
+pub const SERVICES: [Service; 6] = {
+    const fn service(name: &'static str, kind: &'static str, read: fn(&[u8]) -> Option<Call>) -> Service {
+        Service { name, package: "rcl_interfaces", kind, read }
+    }
+    const GET: fn(&[u8]) -> Option<Call> =
+        |bytes| whole::<GetParametersRequest>(bytes).map(|_| Call::Parameters(ParameterCall::Get));
+    [
+        service("list_parameters", "ListParameters", |bytes| {
+            whole::<ListParametersRequest>(bytes).map(|_| Call::Parameters(ParameterCall::List))
+        }),
+        service("get_parameters", "GetParameters", GET),
+        service("get_parameter_types", "GetParameterTypes", GET),
+        service("describe_parameters", "DescribeParameters", GET),
+        service("set_parameters", "SetParameters", |bytes| {
+            let request = whole::<SetParametersRequest>(bytes)?;
+            Some(Call::Parameters(ParameterCall::Set(request.parameter.len())))
+        }),
+        service("set_parameters_atomically", "SetParametersAtomically", |bytes| {
+            whole::<SetParametersRequest>(bytes).map(|_| Call::Parameters(ParameterCall::SetAtomically))
+        }),
+    ]
+};
+
+/// Returns the message of these bytes, if it ends where they end, with or without padding.
+fn whole<Message: DeserializeOwned>(bytes: &[u8]) -> Option<Message> {
+    let (message, used) = deserialize_from_cdr_with_rep_id(bytes, RepresentationIdentifier::CDR_LE).ok()?;
+    (bytes.len().checked_sub(used)? < 4).then_some(message)
+}

@@ -1,0 +1,115 @@
+//! `/rosout`: the lines of the program's log, the alerts and the cues, as rcl_interfaces/Log.
+//!
+//! In: records of the program's logger, kept in a queue from the start of the process ([`enqueue`]), so that warnings of
+//! before the node are sent too. Out: messages. Stamps are wall time, as in every node of ROS 2. Called by the topics'
+//! thread, which alone sends, and by the program's logger.
+
+use std::collections::VecDeque;
+use std::sync::{Mutex, PoisonError};
+
+use ros2_client::builtin_interfaces::Time;
+use ros2_client::builtin_topics::rosout::{TOPIC_NAME, TYPE_NAME};
+use ros2_client::{Context, Log, Node, Publisher};
+use rustdds::TopicKind;
+
+use super::Ros2Error;
+use super::topic_writer::policies;
+use bench_dragon_messages::state::Severity;
+use bench_dragon_ros2_messages::settings::{Durability, Qos, Reliability};
+
+/// The most lines in the queue; then the oldest is dropped.
+const QUEUED_LINES: usize = 256;
+/// The lines kept for late subscribers.
+const DEPTH: u32 = 100;
+/// A usual length of a message in bytes, for the bound of the memory.
+const LINE_BYTES: usize = 400;
+
+/// The lines that wait for the node. The logger is one for the process, and older than the node.
+static LINES: Mutex<VecDeque<Line>> = Mutex::new(VecDeque::new());
+
+/// A line of the program's log.
+struct Line {
+    stamp: Time,
+    level: u8,
+    text: String,
+    file: String,
+    line: u32,
+}
+
+/// Queues a record of the program's logger. Never blocks on the network.
+pub fn enqueue(record: &log::Record<'_>) {
+    // Sending makes these log in turn.
+    if ["rustdds", "ros2_client"].iter().any(|name| record.target().starts_with(name)) {
+        return;
+    }
+    let level = match record.level() {
+        log::Level::Error => Log::ERROR,
+        log::Level::Warn => Log::WARN,
+        log::Level::Info => Log::INFO,
+        log::Level::Debug | log::Level::Trace => Log::DEBUG,
+    };
+    let line = Line {
+        stamp: Time::now(),
+        level,
+        text: record.args().to_string(),
+        file: record.file().unwrap_or_default().to_owned(),
+        line: record.line().unwrap_or_default(),
+    };
+    let mut lines = LINES.lock().unwrap_or_else(PoisonError::into_inner);
+    if lines.len() == QUEUED_LINES {
+        lines.pop_front();
+    }
+    lines.push_back(line);
+}
+
+/// The writer of the topic.
+pub(super) struct Rosout {
+    publisher: Publisher<Log>,
+    /// The logger's name, as rcl derives it from the node's.
+    name: String,
+}
+
+impl Rosout {
+    /// Opens the topic for the node `/<name>`.
+    ///
+    /// # Errors
+    /// [`Ros2Error`]
+    pub(super) fn open(context: &Context, node: &mut Node, name: &str) -> Result<Self, Ros2Error> {
+        let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(format!("/rosout: {error}"));
+        // ros2-client's own writer keeps one line.
+        let qos = Qos { reliability: Reliability::Reliable, durability: Durability::TransientLocal, depth: DEPTH };
+        let dds = context
+            .domain_participant()
+            .create_topic(
+                TOPIC_NAME.to_owned(),
+                TYPE_NAME.to_owned(),
+                &policies(qos, LINE_BYTES, 1.0),
+                TopicKind::NoKey,
+            )
+            .map_err(|error| failed(&error))?;
+        let publisher = node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
+        Ok(Self { publisher, name: name.replace('/', ".") })
+    }
+
+    /// Sends the lines of the log.
+    pub(super) fn send_queued(&self) {
+        let lines = std::mem::take(&mut *LINES.lock().unwrap_or_else(PoisonError::into_inner));
+        lines.into_iter().for_each(|line| self.send(line));
+    }
+
+    /// Sends a sentence about the show.
+    pub(super) fn tell(&self, severity: Severity, text: String) {
+        let level = match severity {
+            Severity::Ok => Log::INFO,
+            Severity::Warning => Log::WARN,
+            Severity::Error => Log::ERROR,
+        };
+        self.send(Line { stamp: Time::now(), level, text, file: String::new(), line: 0 });
+    }
+
+    fn send(&self, Line { stamp, level, text, file, line }: Line) {
+        let message = Log { stamp, level, name: self.name.clone(), msg: text, file, function: String::new(), line };
+        // A full queue cannot be reported here: the report would be one more line.
+        let _ = self.publisher.publish(message);
+    }
+}
