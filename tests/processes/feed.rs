@@ -35,7 +35,9 @@ fn poll(feed: &mut Feed, seen: &mut Vec<Seen>) {
         }
         FeedEvent::Silent => seen.push(Seen::Silent),
         FeedEvent::Gone => seen.push(Seen::Gone),
-        FeedEvent::Stage(_) | FeedEvent::Alert(_) | FeedEvent::Cue(_) | FeedEvent::Status(_) => (),
+        FeedEvent::Stage(_) | FeedEvent::Alert(_) | FeedEvent::Cue(_) | FeedEvent::Status(_) | FeedEvent::Chase(_) => {
+            ()
+        }
     });
     polled.unwrap();
 }

@@ -2,20 +2,33 @@
 //!
 //! A loop of second order: each reading corrects position and rate by a part of its error. The parts are those of a
 //! Kalman filter of constant rate (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and
-//! Navigation, 6.2). They begin large and fall to a constant, which is a loop of about 0.1 rad/s.
+//! Navigation, 6.2). They begin large and fall to a
+//! constant, which for timecode is a loop of about 0.1 rad/s.
 
-/// Standard deviation of the jitter of a reading, seconds.
-const JITTER: f64 = 0.005;
-/// Standard deviation of the rate of a source that has just begun: the clocks of two machines.
-const CLOCK_SPREAD: f64 = 3e-4;
-/// The same of a source that has left its rate: a player with another speed.
-pub const SPEED_SPREAD: f64 = 0.03;
-/// Growth of the variance of the rate, 1/s.
-const DRIFT: f64 = 1e-10;
+/// The standard deviations of a source. Units of the position are free: seconds of timecode, metres of a path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Of a reading: its jitter.
+    pub jitter: f64,
+    /// Of the rate at the beginning, per second.
+    pub spread: f64,
+    /// Growth of the variance of the rate, per second.
+    pub drift: f64,
+}
+
+impl Noise {
+    /// Timecode: jitter of 5 ms, and the clocks of two machines.
+    pub const TIMECODE: Self = Self { jitter: 0.005, spread: 3e-4, drift: 1e-10 };
+    /// Timecode that has left its rate: a player with another speed.
+    pub const TIMECODE_OF_ANOTHER_SPEED: Self = Self { spread: 0.03, ..Self::TIMECODE };
+    /// A tracked performer in metres of the path: 15 cm, and a walk that changes within a second.
+    pub const TRACKER: Self = Self { jitter: 0.15, spread: 0.5, drift: 1.5e-4 };
+}
 
 /// An estimate of a source: its position runs at a rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DelayLockedLoop {
+    noise: Noise,
     at_ns: u64,
     position: f64,
     rate: f64,
@@ -26,44 +39,46 @@ pub struct DelayLockedLoop {
 }
 
 impl DelayLockedLoop {
-    /// Creates a loop from a first reading: a position in seconds at a moment of CLOCK_MONOTONIC, for a source at about
-    /// `rate` seconds per second. `spread` is the standard deviation of that rate; `None` is that of a clock.
-    pub fn new(at_ns: u64, position: f64, rate: f64, spread: Option<f64>) -> Self {
-        let spread = spread.unwrap_or(CLOCK_SPREAD);
+    /// Creates a loop from a first reading: a position at a moment of CLOCK_MONOTONIC, of a source at about `rate` units
+    /// per second.
+    pub fn new(at_ns: u64, position: f64, rate: f64, noise: Noise) -> Self {
         Self {
+            noise,
             at_ns,
             position,
             rate,
-            position_variance: JITTER * JITTER,
+            position_variance: noise.jitter * noise.jitter,
             covariance: 0.0,
-            rate_variance: spread * spread,
+            rate_variance: noise.spread * noise.spread,
         }
     }
 
-    /// Returns the position at a moment, seconds.
+    /// Returns the position at a moment.
     pub fn position(&self, at_ns: u64) -> f64 {
         self.position + self.rate * seconds_between(self.at_ns, at_ns)
     }
 
-    /// Returns the rate, seconds per second.
+    /// Returns the rate, units per second.
     pub fn rate(&self) -> f64 {
         self.rate
     }
 
     /// Corrects the estimate by a reading.
     pub fn correct(&mut self, at_ns: u64, position: f64) {
+        let Noise { jitter, drift, .. } = self.noise;
         let step = seconds_between(self.at_ns, at_ns).max(0.0);
         let error = position - self.position(at_ns);
         // The variances at the moment of the reading, then the gains.
-        let rate_variance = self.rate_variance + DRIFT * step;
-        let covariance = self.covariance + self.rate_variance * step + DRIFT * step * step / 2.0;
+        let rate_variance = self.rate_variance + drift * step;
+        let covariance = self.covariance + self.rate_variance * step + drift * step * step / 2.0;
         let position_variance = self.position_variance
             + 2.0 * self.covariance * step
             + self.rate_variance * step * step
-            + DRIFT * step * step * step / 3.0;
-        let total = position_variance + JITTER * JITTER;
+            + drift * step * step * step / 3.0;
+        let total = position_variance + jitter * jitter;
         let (position_gain, rate_gain) = (position_variance / total, covariance / total);
         *self = Self {
+            noise: self.noise,
             at_ns: self.at_ns.max(at_ns),
             position: self.position(self.at_ns.max(at_ns)) + position_gain * error,
             rate: self.rate + rate_gain * error,
@@ -83,6 +98,8 @@ pub fn seconds_between(from_ns: u64, to_ns: u64) -> f64 {
 mod tests {
     use super::*;
 
+    const JITTER: f64 = 0.005;
+
     #[test]
     fn jitter_is_taken_out_and_skew_is_followed() {
         let mut random = fastrand::Rng::with_seed(7);
@@ -91,7 +108,7 @@ mod tests {
         for _ in 0..200 {
             let rate = 1.0 + 1e-4 * normal();
             let begin = 5.0 + JITTER * normal();
-            let mut estimate = DelayLockedLoop::new(1_000_000_000, begin, 1.0, None);
+            let mut estimate = DelayLockedLoop::new(1_000_000_000, begin, 1.0, Noise::TIMECODE);
             for k in 1..2_000u64 {
                 let at_ns = 1_000_000_000 + 40_000_000 * k;
                 let place = 5.0 + rate * 0.04 * k as f64;

@@ -22,7 +22,7 @@ pub struct Schedule {
 impl Schedule {
     /// Returns the limits of the corrections at this speed.
     pub fn limits(&self) -> Limits {
-        Limits { take_up: TAKE_UP * self.speed, seek_above: SEEK_ABOVE * self.speed }
+        Limits { take_up: TAKE_UP * self.speed, seek_above: SEEK_ABOVE * self.speed, seeks_back: true }
     }
 
     /// Returns the simulated time of a position of timecode, both in seconds: from six hours before the offset to

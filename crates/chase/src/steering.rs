@@ -60,6 +60,8 @@ pub struct Limits {
     pub take_up: f64,
     /// The error above which the show is sent to its time, seconds.
     pub seek_above: f64,
+    /// False if a playing show is never sent back.
+    pub seeks_back: bool,
 }
 
 /// A command that has been sent.
@@ -273,7 +275,7 @@ impl Show {
             let is_there = error.abs() < limits.seek_above.min(0.1);
             return Some(if is_there { Command::Resume } else { Command::Seek(place) });
         }
-        if error.abs() > limits.seek_above {
+        if error.abs() > limits.seek_above && (error > 0.0 || limits.seeks_back) {
             return Some(Command::Seek(place));
         }
         let within = if error.abs() > SMALL { TAKE_UP_FAST } else { TAKE_UP };

@@ -6,7 +6,7 @@
 
 use std::collections::VecDeque;
 
-use crate::filter::{DelayLockedLoop, SPEED_SPREAD, seconds_between};
+use crate::filter::{DelayLockedLoop, Noise, seconds_between};
 
 /// The greatest error of a reading that corrects the loop, seconds.
 const GATE: f64 = 0.040;
@@ -189,7 +189,7 @@ impl Synchronizer {
             return;
         }
         let [Some(first), Some(last)] = [self.run.front().copied(), self.run.back().copied()] else { return };
-        let (mut rate, mut spread) = (1.0, None);
+        let (mut rate, mut noise) = (1.0, Noise::TIMECODE);
         if let State::Running { estimate, reached, .. } = self.state {
             let expected = estimate.position(last.at_ns);
             let error = wrapped(last.position - expected, last.day);
@@ -199,11 +199,11 @@ impl Synchronizer {
                 return;
             }
             if error.abs() < SAME_RUN {
-                (rate, spread) = (estimate.rate(), Some(SPEED_SPREAD));
+                (rate, noise) = (estimate.rate(), Noise::TIMECODE_OF_ANOTHER_SPEED);
             }
             self.jumps += 1;
         }
-        let mut estimate = DelayLockedLoop::new(first.at_ns, first.position, rate, spread);
+        let mut estimate = DelayLockedLoop::new(first.at_ns, first.position, rate, noise);
         for reading in self.run.drain(..).skip(1) {
             let expected = estimate.position(reading.at_ns);
             estimate.correct(reading.at_ns, expected + wrapped(reading.position - expected, reading.day));

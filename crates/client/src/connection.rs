@@ -21,7 +21,7 @@ use crate::clock::monotonic_clock_name;
 use crate::shared_memory::MOST_PUBLISHERS;
 use crate::shared_memory::{CLOCK, OpenError, check_room_to_subscribe, node, reserve_pages, service_name, stale_files};
 use bench_dragon_messages::{
-    CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus, Stage,
+    ChaseStatus, CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus, Stage,
 };
 use selected::{OfRun, Origin, Selected, publishers};
 
@@ -42,6 +42,7 @@ pub struct Connection {
     status: Option<Receiver<LoopStatus, ()>>,
     status_service: Option<PortFactory<ipc::Service, LoopStatus, ()>>,
     stage: Option<Receiver<Stage, ()>>,
+    chase: Option<Receiver<ChaseStatus, ()>>,
     tick: Option<Listener<ipc::Service>>,
     selection: Selection,
 }
@@ -145,6 +146,7 @@ impl Subscription {
             status: self.receiver("status")?,
             status_service: self.service("status")?,
             stage: self.receiver("stage")?,
+            chase: self.receiver("chase")?,
             tick: self.listener(),
             selection: Selection::Undecided { statuses: Vec::new() },
         };
@@ -217,6 +219,9 @@ impl Subscription {
         if connection.stage.is_none() {
             connection.stage = self.receiver("stage")?;
         }
+        if connection.chase.is_none() {
+            connection.chase = self.receiver("chase")?;
+        }
         connection.tick = connection.tick.take().or_else(|| self.listener());
         if connection.missing() < missing { reserve_pages() } else { Ok(()) }
     }
@@ -268,8 +273,9 @@ impl Subscription {
 impl Connection {
     /// Returns the number of services that are not open.
     fn missing(&self) -> usize {
-        let Self { alerts, cues, status, stage, tick, .. } = self;
-        let open = [alerts.is_some(), cues.is_some(), status.is_some(), stage.is_some(), tick.is_some()];
+        let Self { alerts, cues, status, stage, chase, tick, .. } = self;
+        let open =
+            [alerts.is_some(), cues.is_some(), status.is_some(), stage.is_some(), chase.is_some(), tick.is_some()];
         open.into_iter().filter(|open| !open).count()
     }
 
@@ -377,6 +383,12 @@ impl Connection {
     pub fn stage(&mut self) -> Option<Stage> {
         self.decide();
         self.next(self.stage.as_ref())
+    }
+
+    /// Returns the next status of a chase of this run, if one has come.
+    pub fn chase(&mut self) -> Option<ChaseStatus> {
+        self.decide();
+        self.next(self.chase.as_ref())
     }
 
     /// Returns the next message that belongs to the frames of the selected publisher. Before a publisher is selected,

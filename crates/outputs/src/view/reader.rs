@@ -105,7 +105,7 @@ impl Reader<'_> {
                 self.describe();
                 return true;
             }
-            FeedEvent::Silent | FeedEvent::Started { .. } => return false,
+            FeedEvent::Silent | FeedEvent::Started { .. } | FeedEvent::Chase(_) => return false,
         }
         self.picture.waiting = Default::default();
         true
