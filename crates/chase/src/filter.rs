@@ -36,7 +36,14 @@ pub struct DelayLockedLoop {
     position_variance: f64,
     covariance: f64,
     rate_variance: f64,
+    /// The mean error of the latest readings.
+    bias: f64,
 }
+
+/// The part of a reading in the mean error: the mean is of about eight readings.
+const BIAS_PART: f64 = 0.125;
+/// The mean error, in standard deviations of a reading, that jitter alone does not reach: its own deviation is 0.26.
+const MOST_BIAS: f64 = 1.5;
 
 impl DelayLockedLoop {
     /// Creates a loop from a first reading: a position at a moment of CLOCK_MONOTONIC, of a source at about `rate` units
@@ -50,6 +57,7 @@ impl DelayLockedLoop {
             position_variance: noise.jitter * noise.jitter,
             covariance: 0.0,
             rate_variance: noise.spread * noise.spread,
+            bias: 0.0,
         }
     }
 
@@ -64,10 +72,18 @@ impl DelayLockedLoop {
     }
 
     /// Corrects the estimate by a reading.
+    ///
+    /// If the latest readings are off in one direction, the first readings were late or the source has moved: the
+    /// position counts as less certain, so that the next readings correct it at once.
     pub fn correct(&mut self, at_ns: u64, position: f64) {
         let Noise { jitter, drift, .. } = self.noise;
         let step = seconds_between(self.at_ns, at_ns).max(0.0);
         let error = position - self.position(at_ns);
+        self.bias += BIAS_PART * (error - self.bias);
+        if self.bias.abs() > MOST_BIAS * jitter {
+            self.position_variance += self.bias * self.bias;
+            self.bias = 0.0;
+        }
         // The variances at the moment of the reading, then the gains.
         let rate_variance = self.rate_variance + drift * step;
         let covariance = self.covariance + self.rate_variance * step + drift * step * step / 2.0;
@@ -85,6 +101,7 @@ impl DelayLockedLoop {
             position_variance: (1.0 - position_gain) * position_variance,
             covariance: (1.0 - position_gain) * covariance,
             rate_variance: rate_variance - rate_gain * covariance,
+            bias: self.bias,
         };
     }
 }
@@ -121,5 +138,18 @@ mod tests {
         }
         // 400,000 readings of 5 ms, the greatest of which is 22 ms off.
         assert!(worst < 0.004 && worst_rate < 8e-4, "{worst} s, {worst_rate}");
+    }
+
+    #[test]
+    fn late_first_readings_are_forgotten() {
+        let mut random = fastrand::Rng::with_seed(8);
+        let mut normal = || JITTER * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+        let mut estimate = DelayLockedLoop::new(0, -0.035, 1.0, Noise::TIMECODE);
+        for k in 1..100u64 {
+            let late = if k < 25 { 0.035 } else { 0.0 };
+            estimate.correct(40_000_000 * k, 0.04 * k as f64 - late + normal());
+        }
+        let error = estimate.position(3_960_000_000) - 3.96;
+        assert!(error.abs() < 0.004, "{error}");
     }
 }

@@ -117,7 +117,6 @@ pub enum Notice {
 
 /// The chase of one show.
 pub struct Chase<'a> {
-    source: ChaseSource,
     leader: Leader,
     inputs: Receiver<Input>,
     steering: Steering,
@@ -162,7 +161,6 @@ impl<'a> Chase<'a> {
         };
         let status = ChaseStatus { source: source as u32, tracker, ..ChaseStatus::default() };
         Ok(Self {
-            source,
             leader,
             inputs,
             steering: Steering::new(limits),
@@ -284,11 +282,6 @@ impl<'a> Chase<'a> {
         if std::mem::replace(&mut self.status.state, state as u32) != state as u32 {
             (self.notify)(Notice::Changed(self.status));
         }
-    }
-
-    /// Returns the source.
-    pub fn source(&self) -> ChaseSource {
-        self.source
     }
 }
 
