@@ -8,6 +8,7 @@ macro_rules! eprintln {
     }};
 }
 
+pub mod chase;
 pub mod check;
 pub mod control;
 pub mod draw;

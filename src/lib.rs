@@ -15,6 +15,7 @@
 //! - `publisher`: the fixed-rate loop, its shared memory, its log.
 //! - `ros2_messages`, `ros2`: the messages of ROS 2, and its topics and services.
 //! - `recording`: MCAP recordings, their replay, and the verification of logs.
+//! - `chase`: a show follows timecode, or a performer with a tracker.
 //! - `outputs`: the stage page, PosiStageNet, OSC, metrics.
 //! - `soak`, `trade`, `drawing`: the soak test, the measurements of accuracy against cost, the pictures.
 
@@ -25,6 +26,8 @@ compile_error!("choose one ROS 2 distribution: `--no-default-features --features
 
 #[cfg(feature = "library")]
 pub use bench_dragon_certify as certify;
+#[cfg(feature = "library")]
+pub use bench_dragon_chase as chase;
 pub use bench_dragon_client as client;
 #[cfg(feature = "library")]
 pub use bench_dragon_drawing as drawing;

@@ -39,6 +39,8 @@ pub enum Command {
     View(commands::view::ViewArguments),
     /// Send a running publisher's dragon to lighting desks and other hosts
     Send(commands::send::SendArguments),
+    /// Make a running publisher follow timecode, or a performer with a tracker
+    Chase(commands::chase::ChaseArguments),
     /// Serve a running publisher's figures to Prometheus
     Metrics(commands::metrics::MetricsArguments),
     /// Solve a scene offline and print every handle as a table
@@ -87,6 +89,7 @@ fn main() -> ExitCode {
         Command::Watch(arguments) => commands::watch::watch(&common, arguments),
         Command::View(arguments) => commands::view::view(&common, arguments),
         Command::Send(arguments) => commands::send::send(&common, arguments),
+        Command::Chase(arguments) => commands::chase::chase(&common, arguments),
         Command::Metrics(arguments) => commands::metrics::metrics(&common, arguments),
         Command::Solve(arguments) => commands::solve::solve(&common, arguments),
         Command::Events(arguments) => commands::events::events(&common, arguments),

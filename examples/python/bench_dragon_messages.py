@@ -314,6 +314,50 @@ class LoopStatus(_Message):
     ]
 
 
+class ChaseStatus(_Message):
+    """The status of the process that makes a show follow an outside time, five times a second. Payload of `<name>/chase`.
+    """
+
+    LAYOUT = 1
+    _fields_ = [
+        # The run that is chased, as `FrameHeader.run_id`.
+        ("run_id", ctypes.c_uint64),
+        # CLOCK_REALTIME in nanoseconds when this was written.
+        ("stamp_ns", ctypes.c_uint64),
+        # Readings of the source so far: frames of timecode, or positions of the tracker.
+        ("readings", ctypes.c_uint64),
+        # Messages from outside that were malformed, or of another sender or stream, so far.
+        ("ignored", ctypes.c_uint64),
+        # Jumps of the source so far.
+        ("jumps", ctypes.c_uint64),
+        # Published simulated time minus the time that the source requests, simulated seconds; NaN if either is not
+        # known.
+        ("error", ctypes.c_double),
+        # Simulated seconds per second that the source requests; NaN if not known.
+        ("rate", ctypes.c_double),
+        # Metres from the tracker to the path; NaN without a tracker.
+        ("distance", ctypes.c_double),
+        # 0 ArtTimeCode, 1 MIDI timecode, 2 LTC, 3 PosiStageNet.
+        ("source", ctypes.c_uint32),
+        # 0 silent, 1 locking, 2 locked, 3 freewheeling, 4 standing, 5 backward, 6 lost, 7 held, 8 paused, 9 sought, 10
+        # ended. 7 to 9: the chase waits, because the show is held, or another client has paused it or sent it to
+        # another time.
+        ("state", ctypes.c_uint32),
+        # The label of timecode now: hours. 0 without a label.
+        ("hours", ctypes.c_uint32),
+        # The label: minutes.
+        ("minutes", ctypes.c_uint32),
+        # The label: seconds.
+        ("seconds", ctypes.c_uint32),
+        # The label: frames.
+        ("frames", ctypes.c_uint32),
+        # The rate of the labels: 0 none, 1 24, 2 25, 3 29.97, 4 29.97 drop frame, 5 30.
+        ("frame_rate", ctypes.c_uint32),
+        # The number of the tracker; 0 without a tracker.
+        ("tracker", ctypes.c_uint32),
+    ]
+
+
 class Cue(_Message):
     """A cue that the show has reached. Payload of `<name>/cues`.
 
@@ -509,7 +553,7 @@ class Stage(_Message):
     ]
 
 
-MESSAGES = (HandlePose, HandlePose32, FrameHeader, CollisionAlert, LoopStatus, Cue, ControlRequest, ControlResponse, SceneHeader, Stage)
+MESSAGES = (HandlePose, HandlePose32, FrameHeader, CollisionAlert, LoopStatus, ChaseStatus, Cue, ControlRequest, ControlResponse, SceneHeader, Stage)
 
 # From here on written by hand.
 

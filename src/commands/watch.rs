@@ -12,11 +12,11 @@ use bench_dragon::client::clock::monotonic_ns;
 use bench_dragon::client::connection::Wake;
 use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use bench_dragon::client::polling::Obstacle;
-use bench_dragon::messages::json::{AlertObject, CueObject};
-use bench_dragon::messages::sentence::{Figures, alert_sentence, cue_sentence, time_until};
+use bench_dragon::messages::json::{AlertObject, ChaseObject, CueObject};
+use bench_dragon::messages::sentence::{Figures, alert_sentence, chase_sentence, cue_sentence, rounded, time_until};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::messages::state::{FrameState, Level, PlaybackState, Severity};
-use bench_dragon::messages::{CollisionAlert, LoopStatus};
+use bench_dragon::messages::{ChaseStatus, CollisionAlert, LoopStatus};
 use bench_dragon::outputs::monitor::{IntervalReport, Latency, Monitor, Presence};
 use keys::{KEY_INTERVAL, KeyOutcome, Keyboard};
 use serde::Serialize;
@@ -42,6 +42,16 @@ struct IntervalLine {
     received: u64,
     missed: u64,
     latency_ns: Option<Latency>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    chase: Option<ChaseLine>,
+}
+
+/// The chase in that line, where one runs or has died.
+#[derive(Serialize)]
+struct ChaseLine {
+    #[serde(flatten)]
+    status: ChaseObject,
+    has_died: bool,
 }
 
 /// Escape sequences of a terminal (ECMA-48, and DEC's private mode 7).
@@ -150,6 +160,7 @@ impl Screen<'_> {
                     received: report.received,
                     missed: report.missed,
                     latency_ns: report.latency,
+                    chase: report.chase.map(|(status, has_died)| ChaseLine { status: (&status).into(), has_died }),
                 };
                 write_json(&mut output, &line)?;
             }
@@ -202,9 +213,8 @@ impl Screen<'_> {
             FeedEvent::Silent => format!("The publisher of \"{name}\" is running but sends nothing."),
             FeedEvent::Alert(alert) => self.alert_line(alert),
             FeedEvent::Cue(cue) => format!("{:>10.3} s  {}", cue.sim_time, cue_sentence(cue)),
-            FeedEvent::Frame { .. } | FeedEvent::Stage(_) | FeedEvent::Scene { .. } | FeedEvent::Status(_) => {
-                return Ok(());
-            }
+            FeedEvent::Frame { .. } | FeedEvent::Stage(_) | FeedEvent::Scene { .. } => return Ok(()),
+            FeedEvent::Status(_) | FeedEvent::Chase(_) => return Ok(()),
         };
         if self.display == Display::Terminal && matches!(event, FeedEvent::Started { .. } | FeedEvent::Gone) {
             // The last report belongs to another publisher, or to none.
@@ -283,6 +293,7 @@ impl Screen<'_> {
             ),
         ];
         lines.extend(report.status.iter().flat_map(status_lines));
+        lines.extend(report.chase.map(|(status, has_died)| chase_line(&status, has_died, header.time_scale)));
         lines
     }
 
@@ -310,6 +321,14 @@ impl Screen<'_> {
             }
             _ => Style::new(),
         }
+    }
+}
+
+/// Returns the line of a chase.
+fn chase_line(status: &ChaseStatus, has_died: bool, time_scale: f64) -> String {
+    match has_died {
+        true => format!("chase: has died; the show stays at its last rate of {}", rounded(time_scale, 4)),
+        false => format!("chase: {}", chase_sentence(status)),
     }
 }
 

@@ -165,6 +165,11 @@ fn certificate() {
 }
 
 #[test]
+fn timecode() {
+    fuzz("timecode");
+}
+
+#[test]
 fn environment() {
     fuzz("environment");
 }

@@ -1,5 +1,6 @@
 //! The program as users start it: publishers, subscribers and commands in separate processes.
 
+mod chase;
 mod cli;
 mod conductor;
 mod control;

@@ -27,9 +27,9 @@ use std::sync::LazyLock;
 
 use bench_dragon::messages::state::{FrameState, Level, PlaybackState};
 use bench_dragon::messages::{
-    CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32, LoopStatus, NO_BENCH,
-    SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, SceneHeader, Stage, StageCue, StageEvent,
-    StageSegment,
+    ChaseStatus, CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32,
+    LoopStatus, NO_BENCH, SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, SceneHeader, Stage,
+    StageCue, StageEvent, StageSegment,
 };
 use bench_dragon::ros2_messages::settings::Topic;
 use bench_dragon::ros2_messages::{HandlePoses, Header, MessageType, Stamped};
@@ -333,6 +333,7 @@ fn python_sees_the_layouts_and_the_names_of_rust() {
         layout::<FrameHeader>(),
         layout::<CollisionAlert>(),
         layout::<LoopStatus>(),
+        layout::<ChaseStatus>(),
         layout::<Cue>(),
         layout::<ControlRequest>(),
         layout::<ControlResponse>(),

@@ -22,7 +22,7 @@ use crate::clock::monotonic_clock_name;
 use crate::shared_memory::MOST_PUBLISHERS;
 use crate::shared_memory::{CLOCK, OpenError, check_room_to_subscribe, node, reserve_pages, service_name, stale_files};
 use bench_dragon_messages::{
-    CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus, Stage,
+    ChaseStatus, CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus, Stage,
 };
 use scene::SceneReceiver;
 pub use scene::SceneSample;
@@ -46,6 +46,7 @@ pub struct Connection {
     status_service: Option<PortFactory<ipc::Service, LoopStatus, ()>>,
     stage: Option<Receiver<Stage, ()>>,
     scene: Option<SceneReceiver>,
+    chase: Option<Receiver<ChaseStatus, ()>>,
     tick: Option<Listener<ipc::Service>>,
     selection: Selection,
 }
@@ -151,6 +152,7 @@ impl Subscription {
             status_service: self.service("status")?,
             stage: self.receiver("stage")?,
             scene: self.scene_receiver()?,
+            chase: self.receiver("chase")?,
             tick: self.listener(),
             selection: Selection::Undecided { statuses: Vec::new() },
         };
@@ -226,6 +228,9 @@ impl Subscription {
         if connection.scene.is_none() {
             connection.scene = self.scene_receiver()?;
         }
+        if connection.chase.is_none() {
+            connection.chase = self.receiver("chase")?;
+        }
         connection.tick = connection.tick.take().or_else(|| self.listener());
         if connection.missing() < missing { reserve_pages() } else { Ok(()) }
     }
@@ -277,9 +282,9 @@ impl Subscription {
 impl Connection {
     /// Returns the number of services that are not open.
     fn missing(&self) -> usize {
-        let Self { alerts, cues, status, stage, scene, tick, .. } = self;
+        let Self { alerts, cues, status, stage, scene, chase, tick, .. } = self;
         let messages = [alerts.is_some(), cues.is_some(), status.is_some(), stage.is_some()];
-        let open = messages.into_iter().chain([scene.is_some(), tick.is_some()]);
+        let open = messages.into_iter().chain([scene.is_some(), chase.is_some(), tick.is_some()]);
         open.filter(|open| !open).count()
     }
 
@@ -387,6 +392,12 @@ impl Connection {
     pub fn stage(&mut self) -> Option<Stage> {
         self.decide();
         self.next(self.stage.as_ref())
+    }
+
+    /// Returns the next status of a chase of this run, if one has come.
+    pub fn chase(&mut self) -> Option<ChaseStatus> {
+        self.decide();
+        self.next(self.chase.as_ref())
     }
 
     /// Returns the next message that belongs to the frames of the selected publisher. Before a publisher is selected,

@@ -12,7 +12,9 @@ use std::time::{Duration, Instant};
 
 use super::connection::{Connection, Subscription, Wake};
 use crate::shared_memory::OpenError;
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, SceneHeader, Stage};
+use bench_dragon_messages::{
+    ChaseStatus, CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, SceneHeader, Stage,
+};
 use liveness::{Change, Liveness};
 use sequence::SequenceTracker;
 
@@ -75,6 +77,8 @@ pub enum FeedEvent<'a> {
     Cue(&'a Cue),
     /// The status of the publisher's loop.
     Status(&'a LoopStatus),
+    /// The status of a chase of this run, five times a second while a chase runs.
+    Chase(&'a ChaseStatus),
     /// The publisher is alive and has stopped sending. The next frame ends that.
     Silent,
     /// The publisher has ended or died, and all its messages have been handed over. Or it is the silent end of a
@@ -329,6 +333,9 @@ impl Connected {
         while let Some(status) = connection.status() {
             liveness.rate(status.rate);
             handle(FeedEvent::Status(&status));
+        }
+        while let Some(status) = connection.chase() {
+            handle(FeedEvent::Chase(&status));
         }
     }
 }

@@ -5,7 +5,8 @@
 
 use serde::Serialize;
 
-use super::layouts::{CollisionAlert, Cue, NO_BENCH, Stage, StageCue, StageEvent, StageSegment};
+use super::layouts::{ChaseStatus, CollisionAlert, Cue, NO_BENCH, Stage, StageCue, StageEvent, StageSegment};
+use crate::chase::{ChaseSource, ChaseState};
 use crate::state::EventKind;
 use crate::state::Level;
 
@@ -86,6 +87,47 @@ impl From<&Cue> for CueObject {
         let Cue { run_id, tick, stamp_ns, sim_time, cue_time, number, pauses, ref name } = *cue;
         let (run_id, stamp_ns, pauses, name) = (Exact(run_id), Exact(stamp_ns), pauses == 1, name.as_str().to_owned());
         Self { run_id, tick, stamp_ns, sim_time, cue_time, number, pauses, name }
+    }
+}
+
+/// A [`ChaseStatus`] with names. NaN becomes null.
+#[derive(Debug, Clone, Serialize)]
+#[serde(tag = "type", rename = "chase")]
+pub struct ChaseObject {
+    run_id: Exact,
+    stamp_ns: Exact,
+    source: &'static str,
+    state: &'static str,
+    timecode: Option<String>,
+    frame_rate: Option<&'static str>,
+    tracker: Option<u32>,
+    error: f64,
+    rate: f64,
+    distance: f64,
+    readings: u64,
+    ignored: u64,
+    jumps: u64,
+}
+
+impl From<&ChaseStatus> for ChaseObject {
+    fn from(status: &ChaseStatus) -> Self {
+        let ChaseStatus { run_id, stamp_ns, readings, ignored, jumps, error, rate, distance, tracker, .. } = *status;
+        const RATES: [&str; 5] = ["24", "25", "29.97", "29.97df", "30"];
+        Self {
+            run_id: Exact(run_id),
+            stamp_ns: Exact(stamp_ns),
+            source: status.chase_source().map_or("unknown", ChaseSource::name),
+            state: status.chase_state().map_or("unknown", ChaseState::name),
+            timecode: status.label(),
+            frame_rate: RATES.get((status.frame_rate as usize).wrapping_sub(1)).copied(),
+            tracker: (tracker > 0).then_some(tracker),
+            error,
+            rate,
+            distance,
+            readings,
+            ignored,
+            jumps,
+        }
     }
 }
 

@@ -10,6 +10,7 @@
 //! of iceoryx2 alone stand in a paragraph that begins with "Over iceoryx2", which `msgs/msg` leaves out. A link to a
 //! constant or to an enum of [`state`](crate::state) gives the ROS 2 message those constants.
 
+mod chase;
 mod control;
 mod stage;
 
@@ -17,6 +18,7 @@ use iceoryx2_bb_derive_macros::ZeroCopySend;
 use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+pub use chase::*;
 pub use control::*;
 pub use stage::*;
 

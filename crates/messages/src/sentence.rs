@@ -6,7 +6,8 @@
 use std::fmt::Display;
 use std::io;
 
-use super::layouts::{CollisionAlert, Cue};
+use super::layouts::{ChaseStatus, CollisionAlert, Cue};
+use crate::chase::{ChaseSource, ChaseState};
 use crate::state::EventKind;
 use crate::state::{FrameState, Level};
 
@@ -26,6 +27,26 @@ pub enum Figures {
 pub fn cue_sentence(cue: &Cue) -> String {
     let waits = if cue.pauses == 1 { ": waiting for go" } else { "" };
     format!("cue {} \"{}\"{waits}", cue.number, cue.name.as_str())
+}
+
+/// Returns the status of a chase as a sentence: the source, its label or tracker, the state and the error.
+pub fn chase_sentence(status: &ChaseStatus) -> String {
+    let source = status.chase_source().map_or("unknown source", ChaseSource::title);
+    let state = status.chase_state();
+    let subject = match (status.label(), status.tracker) {
+        (Some(label), _) => format!("{source} {label}"),
+        (None, 0) => source.to_owned(),
+        (None, tracker) => format!("{source} tracker {tracker}"),
+    };
+    let is_at_work = matches!(state, Some(ChaseState::Locked | ChaseState::Freewheeling));
+    let error = if is_at_work && !status.error.is_nan() {
+        format!(", {} ms", rounded(1e3 * status.error, 1))
+    } else {
+        String::new()
+    };
+    let distance =
+        if status.distance.is_nan() { String::new() } else { format!(", {:.2} m off the path", status.distance) };
+    format!("{subject} {}{error}{distance}", state.map_or("in an unknown state", ChaseState::words))
 }
 
 /// Returns the name of a bench for people, counted from 1.

@@ -1,13 +1,17 @@
 //! The figures of a publisher: rate, gaps, latency, state, alert. In: the events of a
 //! [`feed`](bench_dragon_client::feed). Out: an [`IntervalReport`] on request. Called by `watch` and `metrics`.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use hdrhistogram::Histogram;
 
 use bench_dragon_client::feed::FeedEvent;
+use bench_dragon_messages::chase::ChaseState;
 use bench_dragon_messages::state::FrameState;
-use bench_dragon_messages::{CollisionAlert, FrameHeader, HandlePose, LoopStatus};
+use bench_dragon_messages::{ChaseStatus, CollisionAlert, FrameHeader, HandlePose, LoopStatus};
+
+/// Time without a status after which a chase counts as dead. It sends five a second.
+const CHASE_SILENCE: Duration = Duration::from_secs(2);
 
 /// The presence of a publisher.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,6 +58,8 @@ pub struct IntervalReport {
     pub alert: Option<CollisionAlert>,
     /// The latest status of the loop.
     pub status: Option<LoopStatus>,
+    /// The latest status of a chase that has not ended, and true if the chase has died without ending.
+    pub chase: Option<(ChaseStatus, bool)>,
 }
 
 impl IntervalReport {
@@ -81,6 +87,7 @@ pub struct Monitor {
     shares_clock: bool,
     alert: Option<CollisionAlert>,
     status: Option<LoopStatus>,
+    chase: Option<(ChaseStatus, Instant)>,
 }
 
 impl Default for Monitor {
@@ -98,6 +105,7 @@ impl Default for Monitor {
             shares_clock: true,
             alert: None,
             status: None,
+            chase: None,
         }
     }
 }
@@ -117,11 +125,16 @@ impl Monitor {
             }
             FeedEvent::Alert(alert) => self.alert = Some(*alert),
             FeedEvent::Status(status) => self.status = Some(*status),
+            FeedEvent::Chase(status) => {
+                let has_ended = status.chase_state() == Some(ChaseState::Ended);
+                self.chase = (!has_ended).then(|| (*status, Instant::now()));
+            }
             FeedEvent::Silent => self.presence = Presence::Silent,
             FeedEvent::Gone => {
                 self.presence = Presence::Waiting;
                 self.status = None;
                 self.alert = None;
+                self.chase = None;
             }
             FeedEvent::Started { .. } | FeedEvent::Stage(_) | FeedEvent::Scene { .. } | FeedEvent::Cue(_) => (),
         }
@@ -153,6 +166,7 @@ impl Monitor {
             shares_clock: self.shares_clock,
             alert: self.alert,
             status: self.status,
+            chase: self.chase.map(|(status, at)| (status, at.elapsed() >= CHASE_SILENCE)),
         };
         self.latency.reset();
         self.received_in_interval = 0;

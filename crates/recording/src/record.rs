@@ -111,7 +111,7 @@ impl RecordQueue {
             FeedEvent::Cue(cue) => Item::Cue(**cue),
             FeedEvent::Status(status) => Item::Status(Box::new(**status)),
             FeedEvent::Gone => Item::Gone,
-            FeedEvent::Started { .. } | FeedEvent::Silent => return,
+            FeedEvent::Started { .. } | FeedEvent::Chase(_) | FeedEvent::Silent => return,
         };
         self.shared.queued_bytes.fetch_add(bytes(&item), Ordering::AcqRel);
         // After a failure nothing is queued; the error is reported when the thread is joined.

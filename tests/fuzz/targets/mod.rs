@@ -15,6 +15,7 @@ mod mcap_records;
 pub mod page;
 pub mod recording;
 pub mod scene;
+pub mod timecode;
 
 #[path = "../../commands/certify/changes.rs"]
 mod changes;
@@ -42,7 +43,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 8] = [
+pub const TARGETS: [Target; 9] = [
     scene::TARGET,
     control::TARGET,
     page::TARGET,
@@ -51,4 +52,5 @@ pub const TARGETS: [Target; 8] = [
     certificate::TARGET,
     environment::TARGET,
     command_line::TARGET,
+    timecode::TARGET,
 ];

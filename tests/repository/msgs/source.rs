@@ -85,6 +85,7 @@ impl Source {
     pub fn read() -> Self {
         let files = [
             "crates/messages/src/layouts.rs",
+            "crates/messages/src/layouts/chase.rs",
             "crates/messages/src/layouts/control.rs",
             "crates/messages/src/layouts/stage.rs",
         ];

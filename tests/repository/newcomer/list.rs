@@ -8,7 +8,11 @@ pub type Line = (&'static str, &'static str);
 pub const NOT_HERE: &[Line] = &[
     (".venv/bin/python benches/", "measures for minutes"),
     ("apt install ros-", "needs ROS 2"),
+    ("arecord", "needs a sound card: tests/processes/chase.rs pipes the sound of libltc"),
     ("apt-get install", "changes the machine"),
+    ("bench-dragon chase ltc show.wav", "the reader's own recording"),
+    ("bench-dragon chase mtc /dev/snd/", "needs a MIDI device: tests/processes/chase.rs pipes the bytes of mido"),
+    ("bench-dragon chase psn", "needs a network with multicast: tests/processes/chase.rs has a tracker"),
     ("cargo +nightly", "needs a nightly toolchain"),
     ("cargo build", "builds for minutes: tests/run builds each way"),
     ("cargo deny check", "needs cargo-deny and the network"),

@@ -7,8 +7,9 @@
 
 use super::exposition::{Family, Kind};
 use crate::monitor::{IntervalReport, Presence};
+use bench_dragon_messages::chase::ChaseState;
 use bench_dragon_messages::state::{FrameState, PlaybackState};
-use bench_dragon_messages::{CollisionAlert, FrameHeader, LoopStatus};
+use bench_dragon_messages::{ChaseStatus, CollisionAlert, FrameHeader, LoopStatus};
 
 /// Returns all families of the publisher `name`. Without a running publisher most of them have no samples.
 pub fn families(name: &str, report: &IntervalReport) -> Vec<Family> {
@@ -22,6 +23,9 @@ pub fn families(name: &str, report: &IntervalReport) -> Vec<Family> {
     }
     if let Some(alert) = &report.alert {
         all.push(families.of_alert(alert));
+    }
+    if let Some((status, has_died)) = &report.chase {
+        all.extend(families.of_chase(status, *has_died));
     }
     all
 }
@@ -235,6 +239,30 @@ impl Families<'_> {
                 Some("meters"),
                 "Distance of the nearest two boards that share no handle, negative if they overlap.",
                 header.min_clearance,
+            ));
+        }
+        families
+    }
+
+    fn of_chase(&self, status: &ChaseStatus, has_died: bool) -> Vec<Family> {
+        let state = status.chase_state().filter(|_| !has_died).unwrap_or(ChaseState::Ended);
+        let mut families = vec![
+            self.states(
+                "bench_dragon_chase_state",
+                "State of the chase: 1 for the present state; ended for a chase that has died.",
+                ChaseState::ALL.into_iter().map(ChaseState::name),
+                Some(state.name()),
+            ),
+            self.count("bench_dragon_chase_readings", "Readings of the chased source.", status.readings),
+            self.count("bench_dragon_chase_ignored", "Malformed and foreign messages to the chase.", status.ignored),
+        ];
+        if !status.error.is_nan() && !has_died {
+            families.push(self.one(
+                "bench_dragon_chase_error_seconds",
+                Kind::Gauge,
+                Some("seconds"),
+                "Published simulated time minus the time that the chased source requests.",
+                status.error,
             ));
         }
         families

@@ -36,6 +36,15 @@ impl Axes {
         })
     }
 
+    /// Returns a vector of the receiver's axes in those of the stage (x, y, up): the inverse of [`Self::vector`].
+    pub fn stage(&self, of_receiver: [f64; 3]) -> [f64; 3] {
+        let mut of_stage = [0.0; 3];
+        for (axis, part) in self.0.iter().zip(of_receiver) {
+            of_stage[axis.of_stage] = axis.sign * part;
+        }
+        of_stage
+    }
+
     /// Returns a turn by `heading` radians from x towards y as axis times angle, in the receiver's axes. There, as
     /// everywhere, a positive turn about the first axis is from the second towards the third, so that axes of the other
     /// handedness reverse it.
@@ -122,6 +131,11 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_vector_comes_back_from_every_axes() {
+        assert!(all().iter().all(|axes| axes.stage(axes.vector([1.0, 2.0, 3.0])) == [1.0, 2.0, 3.0]));
     }
 
     #[test]

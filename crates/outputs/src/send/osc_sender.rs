@@ -155,7 +155,8 @@ impl OscSender {
             FeedEvent::Alert(alert) => self.take_alert(alert),
             FeedEvent::Cue(cue) => self.take_cue(cue),
             FeedEvent::Gone => self.stage = None,
-            FeedEvent::Started { .. } | FeedEvent::Scene { .. } | FeedEvent::Status(_) | FeedEvent::Silent => (),
+            FeedEvent::Started { .. } | FeedEvent::Scene { .. } => (),
+            FeedEvent::Status(_) | FeedEvent::Chase(_) | FeedEvent::Silent => (),
         }
     }
 

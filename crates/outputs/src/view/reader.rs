@@ -105,7 +105,9 @@ impl Reader<'_> {
                 self.describe();
                 return true;
             }
-            FeedEvent::Silent | FeedEvent::Started { .. } | FeedEvent::Scene { .. } => return false,
+            FeedEvent::Silent | FeedEvent::Started { .. } | FeedEvent::Scene { .. } | FeedEvent::Chase(_) => {
+                return false;
+            }
         }
         self.picture.waiting = Default::default();
         true

@@ -1,0 +1,347 @@
+//! The chase of a running show: reads a source, follows the frames of the show, sends commands, reports. In: the events
+//! of a feed, and the inputs of a source. Out: commands, the status of the chase. Called by the command `chase`.
+
+use std::net::IpAddr;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use bench_dragon_client::clock::{monotonic_ns, realtime_ns};
+use bench_dragon_client::control::command_client::{Action, ActionResult, CommandClient};
+use bench_dragon_client::feed::FeedEvent;
+use bench_dragon_client::polling::Handler;
+use bench_dragon_messages::chase::{ChaseSource, ChaseState};
+use bench_dragon_messages::control::Command;
+use bench_dragon_messages::{ChaseStatus, FrameHeader};
+use bench_dragon_motion::model::Point;
+
+use crate::schedule::Schedule;
+use crate::sources::Input;
+use crate::status::{StatusError, StatusPort};
+use crate::steering::{Goal, Limits, Steering, Waiting};
+use crate::synchronizer::{Motion, Options, Reading, Synchronizer};
+use crate::timecode::{FrameRate, Label};
+use crate::track::{Following, Track};
+
+/// The interval of the status.
+const STATUS_INTERVAL: Duration = Duration::from_millis(200);
+/// How long the last command of a chase that ends is waited for.
+const LAST_COMMAND: Duration = Duration::from_millis(500);
+
+/// The source of a chase.
+pub enum Leader {
+    /// Timecode.
+    Timecode(TimecodeLeader),
+    /// A tracked performer.
+    Tracker(TrackerLeader),
+}
+
+/// Timecode as the leader.
+pub struct TimecodeLeader {
+    schedule: Schedule,
+    /// The rate that the user has given; `None` is that of the source.
+    given_rate: Option<FrameRate>,
+    freewheel: f64,
+    synchronizer: Synchronizer,
+    options: Options,
+    rate: FrameRate,
+    was_locked: bool,
+    /// The sender and the stream that are followed.
+    sender: Option<(IpAddr, u8)>,
+}
+
+impl TimecodeLeader {
+    /// Creates the leader of a show with this schedule. `given_rate` replaces the source's own account of its rate;
+    /// `freewheel` is in seconds.
+    pub fn new(source: ChaseSource, schedule: Schedule, given_rate: Option<FrameRate>, freewheel: f64) -> Self {
+        // Readings of MIDI timecode take two frames, and eight messages agree in each.
+        let readings_to_lock = if source == ChaseSource::Mtc { 2 } else { 3 };
+        let options = Options { freewheel, readings_to_lock };
+        Self {
+            schedule,
+            given_rate,
+            freewheel,
+            synchronizer: Synchronizer::new(options),
+            options,
+            rate: given_rate.unwrap_or(FrameRate::Ebu25),
+            was_locked: false,
+            sender: None,
+        }
+    }
+
+    /// Handles a frame of a sender. Returns false if the frame is ignored.
+    fn frame(&mut self, label: Label, rate: FrameRate, age: f64, at_ns: u64, sender: Option<(IpAddr, u8)>) -> bool {
+        if self.sender.is_some() && sender != self.sender && self.synchronizer.quiet_for(at_ns) <= self.freewheel {
+            return false;
+        }
+        let Some(reading) = self.reading(label, rate, age, at_ns) else { return false };
+        self.sender = sender;
+        self.synchronizer.read(reading);
+        true
+    }
+
+    /// Returns the reading of a label. Another rate than before is another source.
+    fn reading(&mut self, label: Label, rate: FrameRate, age: f64, at_ns: u64) -> Option<Reading> {
+        let rate = self.given_rate.unwrap_or(rate);
+        let frame = rate.frame(label)?;
+        if rate != self.rate {
+            self.rate = rate;
+            self.synchronizer = Synchronizer::new(self.options);
+        }
+        let day = rate.seconds(f64::from(rate.frames_per_day()));
+        Some(Reading { position: rate.seconds(f64::from(frame) + age), at_ns, day })
+    }
+}
+
+/// A tracked performer as the leader.
+pub struct TrackerLeader {
+    /// The number of the tracker.
+    pub tracker: u16,
+    /// The path and the filter.
+    pub track: Track,
+    /// From the sender's axes to the stage, metres.
+    pub to_stage: Box<dyn Fn([f64; 3]) -> [f64; 2]>,
+    /// BLAKE3 of the text of the scene whose path this is.
+    pub scene_hash: [u8; 32],
+}
+
+/// A message to the user.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Notice {
+    /// The chase or its source does something else than before.
+    Changed(ChaseStatus),
+    /// The show has another scene than the chase: no place on the path can be known.
+    OtherScene,
+    /// The stream of the source has ended.
+    End,
+}
+
+/// The chase of one show.
+pub struct Chase<'a> {
+    leader: Leader,
+    inputs: Receiver<Input>,
+    steering: Steering,
+    commands: CommandClient<()>,
+    answers: Receiver<ActionResult>,
+    port: StatusPort,
+    shares_clock: bool,
+    status: ChaseStatus,
+    next_status: Instant,
+    notify: &'a mut dyn FnMut(Notice),
+}
+
+/// The reason why a chase cannot begin.
+#[derive(Debug, thiserror::Error)]
+pub enum ChaseError {
+    /// The status cannot be published, or another chase runs.
+    #[error(transparent)]
+    Status(#[from] StatusError),
+    /// The system has no thread left.
+    #[error("no thread can be started: {0}")]
+    Thread(#[from] std::io::Error),
+}
+
+impl<'a> Chase<'a> {
+    /// Creates the chase of the show `name` by a source, whose `inputs` come from a thread of [`sources`](crate::sources).
+    ///
+    /// # Errors
+    /// [`ChaseError`]: another chase runs, for example.
+    pub fn new(
+        name: &str,
+        source: ChaseSource,
+        leader: Leader,
+        inputs: Receiver<Input>,
+        notify: &'a mut dyn FnMut(Notice),
+    ) -> Result<Self, ChaseError> {
+        let port = StatusPort::open(name)?;
+        let (sender, answers) = channel();
+        let commands = CommandClient::start(name, move |(), result| drop(sender.send(result)))?;
+        let (limits, tracker): (Limits, u32) = match &leader {
+            Leader::Timecode(timecode) => (timecode.schedule.limits(), 0),
+            Leader::Tracker(tracker) => (tracker.track.limits(), tracker.tracker.into()),
+        };
+        let status = ChaseStatus { source: source as u32, tracker, ..ChaseStatus::default() };
+        Ok(Self {
+            leader,
+            inputs,
+            steering: Steering::new(limits),
+            commands,
+            answers,
+            port,
+            shares_clock: true,
+            status,
+            next_status: Instant::now(),
+            notify,
+        })
+    }
+
+    /// Ends the chase: the show goes on at the rate of its source, without a correction. Returns the last status.
+    pub fn finish(mut self) -> ChaseStatus {
+        if self.status.state == ChaseState::Locked as u32 && self.status.rate > 0.0 {
+            while self.answers.try_recv().is_ok() {}
+            let last = Action::Send(Command::Rate(self.status.rate));
+            if self.commands.request((), last).is_ok() {
+                let _ = self.answers.recv_timeout(LAST_COMMAND);
+            }
+        }
+        self.status.state = ChaseState::Ended as u32;
+        self.status.stamp_ns = realtime_ns();
+        self.port.send(&self.status);
+        self.status
+    }
+
+    fn frame(&mut self, header: &FrameHeader) {
+        // A frame of another machine counts as made now.
+        let frame_ns = if self.shares_clock { header.deadline_ns } else { monotonic_ns() };
+        self.steering.frame_came(header, frame_ns);
+        self.status.run_id = header.run_id;
+    }
+
+    fn input(&mut self, input: Input) {
+        let show_time = self.steering.show_time(monotonic_ns());
+        let is_used = match (&mut self.leader, input) {
+            (_, Input::End) => {
+                (self.notify)(Notice::End);
+                return;
+            }
+            (Leader::Timecode(timecode), Input::Frame { label, rate, age, at_ns, sender }) => {
+                timecode.frame(label, rate, age, at_ns, sender)
+            }
+            (Leader::Timecode(timecode), Input::Located { label, rate, at_ns }) => {
+                let reading = timecode.reading(label, rate, 0.0, at_ns);
+                reading.map(|reading| timecode.synchronizer.located(reading)).is_some()
+            }
+            (Leader::Timecode(timecode), Input::Backward(at_ns)) => {
+                timecode.synchronizer.backward(at_ns);
+                true
+            }
+            (Leader::Tracker(tracker), Input::Position { position, at_ns }) => {
+                let [x, y] = (tracker.to_stage)(position.map(f64::from));
+                // Without a show there is no place to begin at.
+                show_time.map(|time| tracker.track.read(Point::new(x, y), at_ns, time)).is_some()
+            }
+            _ => false,
+        };
+        *(if is_used { &mut self.status.readings } else { &mut self.status.ignored }) += 1;
+    }
+
+    /// Returns the goal of the show and the state of the source.
+    fn goal(&mut self, now_ns: u64) -> (Goal, ChaseState) {
+        match &mut self.leader {
+            Leader::Timecode(leader) => {
+                let motion = leader.synchronizer.motion(now_ns);
+                leader.was_locked |= matches!(motion, Motion::Locked { .. });
+                self.status.jumps = leader.synchronizer.jumps();
+                let (state, position) = match motion {
+                    Motion::Silent => (ChaseState::Silent, None),
+                    Motion::Locking => (ChaseState::Locking, None),
+                    Motion::Locked { position, .. } => (ChaseState::Locked, Some(position)),
+                    Motion::Freewheeling { position, .. } => (ChaseState::Freewheeling, Some(position)),
+                    Motion::Standing(position) => (ChaseState::Standing, Some(position)),
+                    Motion::Backward => (ChaseState::Backward, None),
+                    Motion::Lost => (ChaseState::Lost, None),
+                };
+                if let Some(position) = position {
+                    self.status.set_label(leader.rate, position);
+                }
+                (leader.schedule.goal(motion, leader.rate, leader.was_locked), state)
+            }
+            Leader::Tracker(leader) => {
+                self.status.distance = leader.track.distance();
+                let state = match leader.track.following(now_ns) {
+                    Following::Silent => ChaseState::Silent,
+                    Following::Locking => ChaseState::Locking,
+                    Following::Locked => ChaseState::Locked,
+                    Following::Freewheeling => ChaseState::Freewheeling,
+                    Following::Lost => ChaseState::Lost,
+                };
+                (leader.track.goal(now_ns), state)
+            }
+        }
+    }
+
+    fn steer(&mut self) {
+        let now_ns = monotonic_ns();
+        let (goal, state) = self.goal(now_ns);
+        if let Some(command) = self.steering.command(goal, now_ns)
+            && self.commands.request((), Action::Send(command)).is_err()
+        {
+            self.steering.answered(None);
+        }
+        let state = match self.steering.waiting() {
+            Some(Waiting::Held) => ChaseState::Held,
+            Some(Waiting::Paused) => ChaseState::Paused,
+            Some(Waiting::Sought) => ChaseState::Sought,
+            None => state,
+        };
+        (self.status.rate, self.status.error) = match (goal, self.steering.show_time(now_ns)) {
+            (Goal::Follow { time, rate }, Some(show)) => (rate, show - time),
+            (Goal::Follow { rate, .. }, None) => (rate, f64::NAN),
+            _ => (f64::NAN, f64::NAN),
+        };
+        self.status.stamp_ns = realtime_ns();
+        if std::mem::replace(&mut self.status.state, state as u32) != state as u32 {
+            (self.notify)(Notice::Changed(self.status));
+        }
+    }
+}
+
+impl Handler for Chase<'_> {
+    fn handle(&mut self, _publisher: usize, event: FeedEvent<'_>) {
+        match event {
+            FeedEvent::Frame { header, .. } => self.frame(header),
+            FeedEvent::Stage(stage) => {
+                self.steering.set_end(stage.freeze_time);
+                if let Leader::Tracker(tracker) = &self.leader
+                    && stage.scene_hash != tracker.scene_hash
+                {
+                    (self.notify)(Notice::OtherScene);
+                }
+            }
+            FeedEvent::Gone => {
+                self.steering.gone();
+                self.status.run_id = 0;
+            }
+            FeedEvent::Started { .. }
+            | FeedEvent::Alert(_)
+            | FeedEvent::Cue(_)
+            | FeedEvent::Status(_)
+            | FeedEvent::Chase(_)
+            | FeedEvent::Silent => (),
+        }
+    }
+
+    fn clock(&mut self, _publisher: usize, shares_clock: bool) {
+        self.shares_clock = shares_clock;
+    }
+
+    fn polled(&mut self, now: Instant) {
+        while let Ok(result) = self.answers.try_recv() {
+            let answer = result.ok().and_then(|(_, response)| Some((response.result()?, response.tick)));
+            self.steering.answered(answer);
+        }
+        while let Ok(input) = self.inputs.try_recv() {
+            self.input(input);
+        }
+        self.steer();
+        if now >= self.next_status {
+            self.next_status = now + STATUS_INTERVAL;
+            self.port.send(&self.status);
+        }
+    }
+}
+
+/// The label of a status.
+trait SetLabel {
+    fn set_label(&mut self, rate: FrameRate, position: f64);
+}
+
+impl SetLabel for ChaseStatus {
+    fn set_label(&mut self, rate: FrameRate, position: f64) {
+        let day = f64::from(rate.frames_per_day());
+        let frame = (position / rate.seconds(1.0) + 1e-6).rem_euclid(day);
+        let Label { hours, minutes, seconds, frames } = rate.label(frame as u32);
+        [self.hours, self.minutes, self.seconds, self.frames] = [hours, minutes, seconds, frames].map(u32::from);
+        // The layout's numbers are in the order of `FrameRate::ALL`, from 1.
+        self.frame_rate = rate as u32 + 1;
+    }
+}

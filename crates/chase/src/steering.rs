@@ -1,0 +1,287 @@
+//! From the time that a show should have to commands: rate, seek, pause, resume. Pure: frames and answers in, at most
+//! one command at a time out.
+//!
+//! The frames tell which simulated time the show had at which moment. An error is taken up by the rate; a larger one is
+//! a seek. A hold, and a pause or a seek of another client, is obeyed until the show plays again.
+
+use bench_dragon_messages::FrameHeader;
+use bench_dragon_messages::control::{Code, Command, RATES};
+use bench_dragon_messages::state::PlaybackState;
+
+use crate::filter::seconds_between;
+
+/// The interval of changes of the rate, nanoseconds.
+const RATE_INTERVAL_NS: u64 = 100_000_000;
+/// A change of the rate that is too small to be sent, as a part of the rate.
+const LEAST_CHANGE: f64 = 2e-5;
+/// Seconds in which a small error is taken up, and an error above [`SMALL`].
+const TAKE_UP: f64 = 1.0;
+const TAKE_UP_FAST: f64 = 0.25;
+/// Errors that follow from jitter, seconds.
+const SMALL: f64 = 0.005;
+/// The distance from its place at which a paused show is moved there, seconds.
+const PLACE: f64 = 0.02;
+/// Seconds from a command to its effect, before the first answer.
+const LATENCY: f64 = 0.012;
+/// The time after which an unanswered command is given up, nanoseconds.
+const PATIENCE_NS: u64 = 2_000_000_000;
+
+/// The time that a show should have.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Goal {
+    /// Nothing is known: the show is left alone.
+    None,
+    /// Play, with this simulated time now.
+    Follow {
+        /// Simulated seconds.
+        time: f64,
+        /// Simulated seconds per second.
+        rate: f64,
+    },
+    /// Stand still, at a simulated time if there is one.
+    Stand(Option<f64>),
+}
+
+/// The reason why a chase waits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Waiting {
+    /// The show is held.
+    Held,
+    /// Another client, or a cue, has paused the show.
+    Paused,
+    /// Another client has sent the show to another time.
+    Sought,
+}
+
+/// The limits of the corrections.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// The greatest correction of the rate, simulated seconds per second.
+    pub take_up: f64,
+    /// The error above which the show is sent to its time, seconds.
+    pub seek_above: f64,
+    /// False if a playing show is never sent back.
+    pub seeks_back: bool,
+}
+
+/// A command that has been sent.
+#[derive(Debug, Clone, Copy)]
+struct Pending {
+    command: Command,
+    sent_ns: u64,
+}
+
+/// The steering of one show.
+#[derive(Debug, Clone)]
+pub struct Steering {
+    limits: Limits,
+    show: Option<Show>,
+    /// Simulated seconds at the end of the show.
+    end: f64,
+    /// Seconds from a command to its effect.
+    latency: f64,
+    waiting: Option<Waiting>,
+    rate_sent_ns: u64,
+}
+
+/// A run of a publisher.
+#[derive(Debug, Clone)]
+struct Show {
+    frame: FrameHeader,
+    /// The deadline of that frame on the clock of this process.
+    frame_ns: u64,
+    period: f64,
+    pending: Option<Pending>,
+    /// The tick from which frames show the latest command.
+    settled_tick: u64,
+    /// The state that the latest commands have led to.
+    plays: bool,
+    epoch: u32,
+    /// True until a show that was paused when it was found has been told to go on.
+    is_new: bool,
+    /// True if another client has made the show play while it should stand.
+    is_released: bool,
+}
+
+impl Steering {
+    /// Creates the steering of a show that has not been found.
+    pub fn new(limits: Limits) -> Self {
+        Self { limits, show: None, end: f64::INFINITY, latency: LATENCY, waiting: None, rate_sent_ns: 0 }
+    }
+
+    /// Sets the simulated time at which the show ends, seconds.
+    pub fn set_end(&mut self, end: f64) {
+        self.end = end;
+    }
+
+    /// Returns the reason why the chase waits.
+    pub fn waiting(&self) -> Option<Waiting> {
+        self.waiting
+    }
+
+    /// Returns the latest frame.
+    pub fn frame(&self) -> Option<&FrameHeader> {
+        self.show.as_ref().map(|show| &show.frame)
+    }
+
+    /// Handles the end of the publisher.
+    pub fn gone(&mut self) {
+        (self.show, self.waiting, self.end) = (None, None, f64::INFINITY);
+    }
+
+    /// Handles a frame with its deadline on the clock of this process, nanoseconds.
+    pub fn frame_came(&mut self, header: &FrameHeader, frame_ns: u64) {
+        let playback = header.playback_state();
+        let Some(show) = self.show.as_mut().filter(|show| show.frame.run_id == header.run_id) else {
+            let plays = !matches!(playback, Some(PlaybackState::Paused | PlaybackState::Held));
+            self.waiting = (playback == Some(PlaybackState::Held)).then_some(Waiting::Held);
+            self.show = Some(Show {
+                frame: *header,
+                frame_ns,
+                period: 1.0 / 60.0,
+                pending: None,
+                settled_tick: 0,
+                plays,
+                epoch: header.epoch,
+                is_new: !plays,
+                is_released: false,
+            });
+            return;
+        };
+        let ticks = header.tick.saturating_sub(show.frame.tick);
+        if ticks > 0 {
+            show.period = seconds_between(show.frame_ns, frame_ns) / ticks as f64;
+        }
+        (show.frame, show.frame_ns) = (*header, frame_ns);
+        if show.pending.is_some() || header.tick < show.settled_tick {
+            return;
+        }
+        let is_sought = header.epoch != show.epoch;
+        show.epoch = header.epoch;
+        match playback {
+            Some(PlaybackState::Held) => self.waiting = Some(Waiting::Held),
+            Some(PlaybackState::Paused) if show.is_new && self.waiting.is_none() => (),
+            Some(PlaybackState::Paused) if show.plays || self.waiting.is_some() => self.waiting = Some(Waiting::Paused),
+            Some(PlaybackState::Paused) if is_sought => self.waiting = Some(Waiting::Sought),
+            Some(PlaybackState::Playing | PlaybackState::Ended) if !show.plays => {
+                // Another client has resumed the show.
+                (self.waiting, show.is_released) = (None, true);
+            }
+            Some(PlaybackState::Playing | PlaybackState::Ended) => match self.waiting {
+                Some(Waiting::Held | Waiting::Paused) => self.waiting = None,
+                _ if is_sought => self.waiting = Some(Waiting::Sought),
+                _ => (),
+            },
+            _ => (),
+        }
+        show.plays = !matches!(playback, Some(PlaybackState::Paused | PlaybackState::Held));
+        show.is_new &= !show.plays;
+    }
+
+    /// Handles the answer to the pending command: its code and the tick at which it took hold; `None` if no answer comes.
+    pub fn answered(&mut self, answer: Option<(Code, u64)>) {
+        let Some(show) = &mut self.show else { return };
+        let Some(Pending { command, sent_ns }) = show.pending.take() else { return };
+        let Some((code, tick)) = answer else { return };
+        show.settled_tick = tick;
+        if matches!(code, Code::Done | Code::Already) {
+            match command {
+                Command::Pause => show.plays = false,
+                Command::Resume | Command::Go => show.plays = true,
+                Command::Seek(_) => show.epoch = show.epoch.wrapping_add(1),
+                _ => (),
+            }
+        } else if command == Command::Go {
+            // The show does not wait at its start: a client has paused it.
+            self.waiting = Some(Waiting::Paused);
+        }
+        if command != Command::State {
+            show.is_new = false;
+        }
+        // The moment of the tick, by the latest frame.
+        let ticks = tick as f64 - show.frame.tick as f64;
+        let took = seconds_between(sent_ns, show.frame_ns) + ticks * show.period;
+        if (0.0..0.25).contains(&took) {
+            self.latency += 0.2 * (took - self.latency);
+        }
+    }
+
+    /// Returns the simulated time of the show at a moment; `None` without a show.
+    pub fn show_time(&self, now_ns: u64) -> Option<f64> {
+        let Show { frame, frame_ns, .. } = self.show.as_ref()?;
+        let is_playing = frame.playback_state() == Some(PlaybackState::Playing);
+        let elapsed = if is_playing { seconds_between(*frame_ns, now_ns) } else { 0.0 };
+        Some((frame.sim_time + frame.time_scale * elapsed).min(self.end))
+    }
+
+    /// Returns the next command towards a goal, and counts it as sent.
+    pub fn command(&mut self, goal: Goal, now_ns: u64) -> Option<Command> {
+        let time = self.show_time(now_ns)?;
+        let (waiting, latency, limits, end) = (self.waiting, self.latency, self.limits, self.end);
+        let may_set_rate = now_ns.saturating_sub(self.rate_sent_ns) >= RATE_INTERVAL_NS;
+        let show = self.show.as_mut()?;
+        if let Some(Pending { sent_ns, .. }) = show.pending {
+            if now_ns.saturating_sub(sent_ns) > PATIENCE_NS {
+                show.pending = None;
+            }
+            return None;
+        }
+        if waiting.is_some() || show.frame.tick < show.settled_tick {
+            return None;
+        }
+        let command = match goal {
+            // Before its start and after its end the show stands there.
+            Goal::Follow { time: to, .. } if to < 0.0 => show.stand(time, Some(0.0)),
+            Goal::Follow { time: to, .. } if to >= end => show.stand(time, Some(end)),
+            Goal::Follow { time: to, rate } => {
+                show.is_released = false;
+                show.follow(to - time, rate, to + latency * rate, limits, may_set_rate, end)
+            }
+            Goal::Stand(_) if show.is_released => None,
+            Goal::Stand(place) => show.stand(time, place.map(|place| place.clamp(0.0, end))),
+            Goal::None => None,
+        }?;
+        if matches!(command, Command::Rate(_)) {
+            self.rate_sent_ns = now_ns;
+        }
+        show.pending = Some(Pending { command, sent_ns: now_ns });
+        Some(command)
+    }
+}
+
+impl Show {
+    fn stand(&self, time: f64, place: Option<f64>) -> Option<Command> {
+        if self.plays {
+            return Some(Command::Pause);
+        }
+        place.filter(|place| (time - place).abs() > PLACE).map(Command::Seek)
+    }
+
+    /// Returns the command for a show that is behind by `error`, and should be at `next` when a command takes hold.
+    fn follow(
+        &self,
+        error: f64,
+        rate: f64,
+        next: f64,
+        limits: Limits,
+        may_set_rate: bool,
+        end: f64,
+    ) -> Option<Command> {
+        let place = next.clamp(0.0, end);
+        if self.is_new {
+            return Some(Command::Go);
+        }
+        if !self.plays {
+            let is_there = error.abs() < limits.seek_above.min(0.1);
+            return Some(if is_there { Command::Resume } else { Command::Seek(place) });
+        }
+        if error.abs() > limits.seek_above && (error > 0.0 || limits.seeks_back) {
+            return Some(Command::Seek(place));
+        }
+        let within = if error.abs() > SMALL { TAKE_UP_FAST } else { TAKE_UP };
+        let correction = (error / within).clamp(-limits.take_up, limits.take_up);
+        let wanted = (rate + correction).clamp(*RATES.start(), *RATES.end());
+        let is_other = (wanted - self.frame.time_scale).abs() > LEAST_CHANGE * wanted;
+        (is_other && may_set_rate).then_some(Command::Rate(wanted))
+    }
+}

@@ -1,0 +1,249 @@
+//! `chase`: makes a running show follow timecode, or a performer with a tracker.
+
+use std::cell::RefCell;
+use std::net::{Ipv4Addr, SocketAddrV4};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Receiver;
+
+use bench_dragon::chase::artnet;
+use bench_dragon::chase::live::{Chase, ChaseError, Leader, Notice, TimecodeLeader, TrackerLeader};
+use bench_dragon::chase::psn::USUAL_GROUP;
+use bench_dragon::chase::schedule::Schedule;
+use bench_dragon::chase::sources::{self, Input, SourceError};
+use bench_dragon::chase::status::StatusError;
+use bench_dragon::chase::timecode::{FrameRate, Label};
+use bench_dragon::chase::track::Track;
+use bench_dragon::client::feed::Delivery;
+use bench_dragon::client::polling::poll_until;
+use bench_dragon::messages::ChaseStatus;
+use bench_dragon::messages::chase::{ChaseSource, ChaseState};
+use bench_dragon::messages::json::ChaseObject;
+use bench_dragon::messages::sentence::chase_sentence;
+use bench_dragon::outputs::send::axes::Axes;
+use bench_dragon::outputs::send::network::destination;
+use bench_dragon::proof::scene_hash;
+
+use super::{CommandError, Common, Output, expect_exact_motion, stop_on_signals, wall_seconds};
+
+/// Arguments of `chase`.
+#[derive(Debug, Clone, clap::Args)]
+pub struct ChaseArguments {
+    #[command(subcommand)]
+    kind: Kind,
+}
+
+#[derive(Debug, Clone, clap::Subcommand)]
+enum Kind {
+    /// Timecode over the network: ArtTimeCode of Art-Net
+    Artnet {
+        /// The address to listen at; other programs of this machine may listen too
+        #[arg(long, value_name = "ADDR:PORT", default_value_t = SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, artnet::PORT))]
+        listen: SocketAddrV4,
+        #[command(flatten)]
+        timecode: TimecodeArguments,
+    },
+    /// MIDI timecode: quarter frames and full frames
+    Mtc {
+        /// A raw MIDI device such as /dev/snd/midiC1D0, or - for standard input
+        device: PathBuf,
+        #[command(flatten)]
+        timecode: TimecodeArguments,
+    },
+    /// Linear timecode as sound, as arecord or a file has it
+    Ltc {
+        /// A WAV file, or - for standard input
+        file: PathBuf,
+        #[command(flatten)]
+        timecode: TimecodeArguments,
+    },
+    /// A performer with a tracker, by PosiStageNet; needs the scene of the show
+    Psn(PsnArguments),
+}
+
+/// The options of every timecode.
+#[derive(Debug, Clone, clap::Args)]
+struct TimecodeArguments {
+    /// The label of simulated time 0
+    #[arg(long, value_name = "HH:MM:SS:FF", default_value = "00:00:00:00")]
+    offset: Label,
+    /// Simulated seconds a second of timecode
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed, allow_negative_numbers = true)]
+    speed: f64,
+    /// How long to go on when timecode stops, before the show is paused
+    #[arg(long, value_name = "TIME", default_value = "2s", value_parser = wall_seconds)]
+    freewheel: f64,
+    /// The frame rate: auto, 24, 25, 29.97, 29.97df or 30
+    #[arg(long, value_name = "RATE", default_value = "auto", value_parser = fps)]
+    fps: Fps,
+}
+
+/// A frame rate, or that of the source.
+#[derive(Debug, Clone, Copy)]
+struct Fps(Option<FrameRate>);
+
+/// Arguments of `chase psn`.
+#[derive(Debug, Clone, clap::Args)]
+struct PsnArguments {
+    /// The number of the tracker that the head follows
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    tracker: u16,
+    /// The multicast group, or an address of this machine; the default port is 56565
+    #[arg(long, value_name = "ADDR[:PORT]", default_value_t = usual_group(), value_parser = group)]
+    group: SocketAddrV4,
+    /// The address of this machine's interface to listen at; without it, the machine's routes decide
+    #[arg(long, value_name = "IP")]
+    interface: Option<Ipv4Addr>,
+    /// The stage's axes that are the sender's x, y and z, as of `send psn`
+    #[arg(long, value_name = "X,Y,Z", default_value_t = Axes::default(), allow_hyphen_values = true)]
+    axes: Axes,
+    /// How long to go on when the tracker is not seen, before the show is paused
+    #[arg(long, value_name = "TIME", default_value = "2s", value_parser = wall_seconds)]
+    freewheel: f64,
+}
+
+fn usual_group() -> SocketAddrV4 {
+    SocketAddrV4::new(USUAL_GROUP.0, USUAL_GROUP.1)
+}
+
+fn group(text: &str) -> Result<SocketAddrV4, String> {
+    destination(text, Some(USUAL_GROUP.1))
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    let speed = text.trim().parse::<f64>().ok().filter(|speed| (1e-3..=1e3).contains(speed));
+    speed.ok_or_else(|| "expected simulated seconds a second of timecode, from 0.001 to 1000".to_owned())
+}
+
+fn fps(text: &str) -> Result<Fps, String> {
+    if text == "auto" { Ok(Fps(None)) } else { text.parse().map(|rate| Fps(Some(rate))) }
+}
+
+/// Chases until a signal comes, or until the source has ended.
+pub fn chase(common: &Common, arguments: &ChaseArguments) -> Result<(), CommandError> {
+    let stop = stop_on_signals()?;
+    match &arguments.kind {
+        Kind::Artnet { listen, timecode } => {
+            let inputs = sources::artnet(*listen, &stop)?;
+            let leader = timecode.leader(ChaseSource::ArtNet)?;
+            follow(common, &stop, ChaseSource::ArtNet, leader, inputs, &format!("ArtTimeCode at {listen}"))
+        }
+        Kind::Mtc { device, timecode } => {
+            let leader = timecode.leader(ChaseSource::Mtc)?;
+            let inputs = sources::mtc(device)?;
+            follow(common, &stop, ChaseSource::Mtc, leader, inputs, &format!("MIDI timecode of {}", device.display()))
+        }
+        Kind::Ltc { file, timecode } => {
+            let leader = timecode.leader(ChaseSource::Ltc)?;
+            let inputs = sources::ltc(file)?;
+            follow(common, &stop, ChaseSource::Ltc, leader, inputs, &format!("LTC of {}", file.display()))
+        }
+        Kind::Psn(arguments) => psn(common, arguments, &stop),
+    }
+}
+
+impl TimecodeArguments {
+    fn leader(&self, source: ChaseSource) -> Result<Leader, CommandError> {
+        let Self { offset, speed, freewheel, fps: Fps(rate) } = *self;
+        if let Some(rate) = rate.filter(|rate| rate.frame(offset).is_none()) {
+            let sentence =
+                format!("--offset {offset} is no label at {rate} frames per second, expected one that exists");
+            return Err(CommandError::BadInput(sentence));
+        }
+        Ok(Leader::Timecode(TimecodeLeader::new(source, Schedule { offset, speed }, rate, freewheel)))
+    }
+}
+
+fn psn(common: &Common, arguments: &PsnArguments, stop: &Arc<AtomicBool>) -> Result<(), CommandError> {
+    let PsnArguments { tracker, group, interface, axes, freewheel } = *arguments;
+    let text = common.scene_text()?;
+    let scene_hash = scene_hash(&text.text);
+    let scene = text.parse()?;
+    expect_exact_motion(&scene)?;
+    let inputs = sources::psn(group, interface, tracker, stop)?;
+    let to_stage = Box::new(move |position| {
+        let [x, y, _up] = axes.stage(position);
+        [x, y]
+    });
+    let leader = TrackerLeader { tracker, track: Track::new(scene.motion, freewheel), to_stage, scene_hash };
+    let what = format!("tracker {tracker} of PosiStageNet at {group}");
+    follow(common, stop, ChaseSource::Psn, Leader::Tracker(leader), inputs, &what)
+}
+
+fn follow(
+    common: &Common,
+    stop: &AtomicBool,
+    source: ChaseSource,
+    leader: Leader,
+    inputs: Receiver<Input>,
+    what: &str,
+) -> Result<(), CommandError> {
+    // The end of the source, the latest state, and the reason to end.
+    let state = RefCell::new((false, ChaseState::Silent));
+    let (mut printed, mut other_scene) = (Ok(()), false);
+    let mut notify = |notice: Notice| {
+        let (has_ended, latest) = &mut *state.borrow_mut();
+        match notice {
+            Notice::Changed(status) => {
+                *latest = status.chase_state().unwrap_or(ChaseState::Silent);
+                if printed.is_ok() {
+                    printed = print(common, &status);
+                }
+            }
+            Notice::End => *has_ended = true,
+            Notice::OtherScene => other_scene = true,
+        }
+        let is_over = *has_ended && matches!(latest, ChaseState::Silent | ChaseState::Locking | ChaseState::Lost);
+        stop.fetch_or(is_over || other_scene || printed.is_err(), Ordering::Relaxed);
+    };
+    let mut chase = Chase::new(common.name(), source, leader, inputs, &mut notify)?;
+    if !common.json {
+        let mut output = Output::standard();
+        output.line(&format!("\"{}\" follows {what}. Ctrl-C ends.", common.name()))?;
+        output.finish()?;
+    }
+    let polled = poll_until(stop, &common.names, Delivery::Newest, &mut chase);
+    let last = chase.finish();
+    polled?;
+    printed?;
+    if other_scene {
+        let sentence = format!(
+            "the show \"{}\" plays another scene than --scene, expected the scene of the show: its path is needed",
+            common.name()
+        );
+        return Err(CommandError::BadInput(sentence));
+    }
+    print(common, &last)
+}
+
+/// Prints a status.
+fn print(common: &Common, status: &ChaseStatus) -> Result<(), CommandError> {
+    let mut output = Output::standard();
+    if common.json {
+        output.json(&ChaseObject::from(status))?;
+    } else {
+        output.line(&chase_sentence(status))?;
+    }
+    output.finish()
+}
+
+impl From<SourceError> for CommandError {
+    fn from(error: SourceError) -> Self {
+        match error {
+            SourceError::Listen { ref source, .. } if source.kind() != std::io::ErrorKind::AddrNotAvailable => {
+                Self::Failed(error.to_string())
+            }
+            _ => Self::BadInput(error.to_string()),
+        }
+    }
+}
+
+impl From<ChaseError> for CommandError {
+    fn from(error: ChaseError) -> Self {
+        match error {
+            ChaseError::Status(StatusError::Open(error)) => error.into(),
+            other => Self::Failed(other.to_string()),
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! Bytes from outside that a chase decodes: datagrams of Art-Net and PosiStageNet, bytes of a MIDI device, sound. The
+//! first byte selects the decoder.
+
+use std::time::Duration;
+
+use bench_dragon::chase::timecode::{FrameRate, Label};
+use bench_dragon::chase::{artnet, ltc, mtc, psn};
+use fastrand::Rng;
+
+use super::Target;
+use super::bytes::changed;
+
+pub const TARGET: Target = Target { name: "timecode", run, seeds, mutate, cases: 20_000, hung: Duration::from_secs(5) };
+
+fn run(data: &[u8]) -> bool {
+    let Some((kind, bytes)) = data.split_first() else { return false };
+    match kind % 4 {
+        0 => artnet::decode(bytes).is_ok_and(|timecode| {
+            assert_eq!(artnet::decode(&artnet::encode(&timecode)), Ok(timecode));
+            names_a_frame(timecode.label, timecode.rate);
+            true
+        }),
+        1 => psn::decode(bytes).is_ok_and(|trackers| {
+            let most = bytes.len() / 20;
+            assert!(trackers.len() <= most, "{} trackers in {} bytes", trackers.len(), bytes.len());
+            assert!(trackers.iter().all(|tracker| tracker.position.iter().all(|part| part.is_finite())));
+            true
+        }),
+        2 => {
+            let mut decoder = mtc::Decoder::default();
+            let events: Vec<_> = bytes.iter().filter_map(|byte| decoder.push(*byte)).collect();
+            // A label takes sixteen bytes, a full frame ten.
+            assert!(events.len() <= bytes.len(), "{} events", events.len());
+            for event in &events {
+                if let mtc::Event::Running { label, rate } | mtc::Event::Located { label, rate } = *event {
+                    names_a_frame(label, rate);
+                }
+            }
+            !events.is_empty()
+        }
+        _ => sound(bytes),
+    }
+}
+
+/// Decodes sound with a header.
+fn sound(mut bytes: &[u8]) -> bool {
+    let Ok(format) = ltc::wave::Format::read(&mut bytes) else { return false };
+    assert!(format.block_bytes > 0 && format.sample_rate >= 8000);
+    let mut decoder = ltc::Decoder::new(f64::from(format.sample_rate));
+    let samples = bytes.len() / format.block_bytes;
+    for block in bytes.chunks_exact(format.block_bytes) {
+        let sample = format.sample(block);
+        assert!(sample.abs() <= 4.0, "{sample}");
+        if let Some(ltc::Event::Frame { label, rate, end }) = decoder.push(sample) {
+            names_a_frame(label, rate);
+            assert!((0.0..=samples as f64).contains(&end), "{end} of {samples}");
+        }
+    }
+    true
+}
+
+fn names_a_frame(label: Label, rate: FrameRate) {
+    let frame = rate.frame(label).unwrap();
+    assert!(frame < rate.frames_per_day() && rate.label(frame) == label, "{label} at {rate}");
+}
+
+fn seeds() -> Vec<Vec<u8>> {
+    let packet = b"\0Art-Net\0\x00\x97\x00\x0e\x00\x00\x04\x03\x02\x01\x01".to_vec();
+    let position = [&[0, 0, 12, 0][..], &[0; 12]].concat();
+    let tracker = [&[1, 0, 16, 0x80][..], &position].concat();
+    let list = [&[1, 0, 20, 0x80][..], &tracker].concat();
+    let trackers = [&[1, 0x55, 0x67, 24, 0x80][..], &list].concat();
+    let mut quarters = vec![2];
+    quarters.extend([0x04, 0x11, 0x23, 0x32, 0x4e, 0x51, 0x61, 0x76].iter().flat_map(|nibble| [0xf1, *nibble]));
+    let full = vec![2, 0xf0, 0x7f, 0x7f, 0x01, 0x01, 0x61, 0x1e, 0x23, 0x14, 0xf7];
+    let mut wave =
+        b"\x03RIFF\0\0\0\0WAVEfmt \x10\0\0\0\x01\0\x01\0\x40\x1f\0\0\x40\x1f\0\0\x01\0\x08\0data\0\0\0\0".to_vec();
+    // Two frames of zeros with their sync pattern, at 8,000 samples and 2,000 bits per second.
+    let mut high = false;
+    for bit in (0..160).map(|bit| matches!(bit % 80, 66..=77 | 79)) {
+        high = !high;
+        let second = high != bit;
+        wave.extend([high, high, second, second].map(|high| if high { 200 } else { 56 }));
+        high = second;
+    }
+    vec![packet, trackers, quarters, full, wave]
+}
+
+fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
+    let mut made = changed(data, random);
+    // Most changes keep the decoder.
+    if let (Some(kind), Some(first), true) = (data.first(), made.first_mut(), random.u8(..8) > 0) {
+        *first = *kind;
+    }
+    made
+}

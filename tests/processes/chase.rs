@@ -1,0 +1,211 @@
+//! `chase` with real processes: a publisher, a sender in Python, a subscriber that compares every frame. The figures of
+//! the contract are asserted on simulated time in the crate; here a busy machine may delay every process.
+
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+use serde_json::Value;
+
+use crate::harness::{Lines, Process, not_run, program, python, unique};
+use nix::sys::signal::Signal;
+
+/// Returns a port that no other test has.
+fn port() -> u16 {
+    let socket = std::net::UdpSocket::bind(("127.0.0.1", 0)).unwrap();
+    socket.local_addr().unwrap().port()
+}
+
+fn result_file(name: &str) -> PathBuf {
+    std::env::temp_dir().join(format!("{}.json", unique(name)))
+}
+
+/// Starts a paused publisher whose head starts at its beginning.
+fn publisher(name: &str, arguments: &[&str]) -> Process {
+    let mut process = Process::start(program(name).arg("run").args(arguments));
+    assert!(!process.first_line_within(60).is_empty());
+    process
+}
+
+fn chase(name: &str, arguments: &[&str]) -> (Process, Lines) {
+    let mut process = Process::start(program(name).args(["--json", "chase"]).args(arguments));
+    let lines = process.lines();
+    (process, lines)
+}
+
+fn sender(name: &str, arguments: &[&str]) -> Process {
+    let file = result_file(name);
+    let mut command = python();
+    command.args(["tests/python/chase_sender.py", "--name", &unique(name), "--result"]).arg(file).args(arguments);
+    Process::start(&mut command)
+}
+
+fn result(name: &str, sender: Process) -> Value {
+    let output = sender.output_within(120);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let file = result_file(name);
+    let result = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+    let _ = std::fs::remove_file(file);
+    println!("{name}: {result}");
+    result
+}
+
+fn state(lines: &Lines, state: &str) -> Value {
+    let line = lines.until(&format!("\"state\":\"{state}\""), 60);
+    serde_json::from_str(&line).unwrap()
+}
+
+fn control(name: &str, arguments: &[&str]) {
+    let output = Process::start(program(name).arg("control").args(arguments)).output_within(60);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn a_show_follows_art_net_timecode_with_jitter_loss_and_a_stall() {
+    let name = "chase_artnet";
+    let port = port().to_string();
+    let _publisher = publisher(name, &["--paused"]);
+    let (_chase, lines) = chase(name, &["artnet", "--listen", &format!("127.0.0.1:{port}")]);
+    let sender = sender(name, &["--port", &port, "--seconds", "12"]);
+    let locked = state(&lines, "locked");
+    assert_eq!((&locked["source"], &locked["frame_rate"]), (&"artnet".into(), &"25".into()));
+    let result = result(name, sender);
+    assert!(result["p99"].as_f64().unwrap() < 0.02 && result["frames"].as_u64().unwrap() > 300, "{result}");
+    assert_eq!(result["epochs"], 1, "{result}");
+    // The end of timecode: freewheel, then pause.
+    state(&lines, "freewheeling");
+    state(&lines, "lost");
+}
+
+#[test]
+fn a_jump_of_timecode_is_followed() {
+    let name = "chase_jump";
+    let port = port().to_string();
+    let _publisher = publisher(name, &[]);
+    let (_chase, lines) = chase(name, &["artnet", "--listen", &format!("127.0.0.1:{port}")]);
+    let sender = sender(name, &["--port", &port, "--seconds", "10", "--jump", "100"]);
+    state(&lines, "locked");
+    let result = result(name, sender);
+    assert!(result["frames_to_follow"].as_f64().unwrap() < 12.0, "{result}");
+    assert_eq!(result["epochs"], 2, "one jump: {result}");
+}
+
+/// Plays bytes of a sender into the standard input of a chase.
+fn piped(name: &str, kind: &str, option: &str) {
+    let _publisher = publisher(name, &["--paused"]);
+    let mut command = python();
+    command.args(["tests/python/chase_sender.py", option, "--seconds", "9", "--name", &unique(name), "--result"]);
+    let mut sender = command.arg(result_file(name)).stdout(Stdio::piped()).spawn().unwrap();
+    let mut command: Command = program(name);
+    command.args(["--json", "chase", kind, "-"]).stdin(sender.stdout.take().unwrap()).stdout(Stdio::piped());
+    let output = command.output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(sender.wait().unwrap().success() && output.status.success(), "{text}");
+    assert!(text.contains("\"state\":\"locked\"") && text.contains("\"frame_rate\":\"25\""), "{text}");
+    // The chase ends by itself after the end of its source, when the show is paused.
+    assert!(text.contains("\"state\":\"lost\"") && text.contains("\"state\":\"ended\""), "{text}");
+    let file = result_file(name);
+    let result: Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+    let _ = std::fs::remove_file(file);
+    println!("{name}: {result}");
+    assert!(result["mean"].as_f64().unwrap().abs() < 0.03 && result["frames"].as_u64().unwrap() > 200, "{result}");
+    assert_eq!(result["epochs"], 1, "{result}");
+}
+
+#[test]
+fn a_show_follows_midi_timecode_of_mido() {
+    piped("chase_mtc", "mtc", "--mtc");
+}
+
+#[test]
+fn a_show_follows_the_sound_of_libltc() {
+    let has_libltc = python().args(["-c", "import ctypes; ctypes.CDLL('libltc.so.11')"]).output().unwrap();
+    if !has_libltc.status.success() {
+        return not_run("libltc is not installed (Debian: libltc11)");
+    }
+    piped("chase_ltc", "ltc", "--ltc");
+}
+
+#[test]
+fn a_second_chase_is_refused_and_holds_and_deaths_are_told() {
+    let name = "chase_manners";
+    let port = port().to_string();
+    let at = format!("127.0.0.1:{port}");
+    let mut first = publisher(name, &["--paused"]);
+    let (chased, lines) = chase(name, &["artnet", "--listen", &at]);
+    let mut watch = Process::start(program(name).args(["--json", "watch"]));
+    let watched = watch.lines();
+    let sender = sender(name, &["--port", &port, "--seconds", "60"]);
+    state(&lines, "locked");
+    let second = Process::start(program(name).args(["chase", "artnet", "--listen", &at])).output_within(60);
+    assert_eq!(second.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&second.stderr).contains("another chase steers the show"));
+    control(name, &["hold"]);
+    state(&lines, "held");
+    control(name, &["release"]);
+    state(&lines, "paused");
+    control(name, &["resume"]);
+    state(&lines, "locked");
+    control(name, &["seek", "100"]);
+    state(&lines, "sought");
+    watched.until("\"state\":\"sought\"", 60);
+    control(name, &["pause"]);
+    control(name, &["resume"]);
+    state(&lines, "locked");
+    // The publisher dies and comes back: the same chase follows the next run.
+    first.signal(Signal::SIGKILL);
+    drop(std::mem::replace(&mut first, publisher(name, &["--paused"])));
+    watched.until("\"state\":\"moving\"", 60);
+    let is_locked = |line: &str| {
+        let line: Value = serde_json::from_str(line).unwrap();
+        line["chase"]["state"] == "locked" && line["chase"]["error"].as_f64().is_some_and(|error| error.abs() < 0.1)
+    };
+    watched.all_until_one(is_locked, "a locked chase", 60);
+    // A chase that is killed leaves the show at its last rate, and `watch` reports that.
+    chased.signal(Signal::SIGKILL);
+    let line: Value = serde_json::from_str(&watched.until("\"has_died\":true", 60)).unwrap();
+    assert_eq!(line["chase"]["state"], "locked");
+    drop(sender);
+}
+
+#[test]
+fn a_show_follows_the_tracker_of_another_one() {
+    let (leader, follower) = ("chase_leader", "chase_follower");
+    let (from, to) = (port().to_string(), port().to_string());
+    let _leading = publisher(leader, &["--start", "20"]);
+    let _following = publisher(follower, &["--paused", "--start", "20"]);
+    let address = format!("127.0.0.1:{from}");
+    let _sent = Process::start(program(leader).args(["send", "psn", "--trackers", "head", "--to", &address]));
+    let (_chase, lines) = chase(follower, &["psn", "--group", &format!("127.0.0.1:{to}")]);
+    let mut command = python();
+    command.args(["tests/python/chase_tracker.py", "--leader", &unique(leader), "--follower", &unique(follower)]);
+    command.args(["--from", &from, "--to", &to, "--seconds", "14", "--result"]).arg(result_file(follower));
+    let relay = Process::start(&mut command);
+    let locked = state(&lines, "locked");
+    assert_eq!((&locked["source"], &locked["tracker"]), (&"psn".into(), &1.into()));
+    let result = result(follower, relay);
+    assert!(result["p99"].as_f64().unwrap() < 0.1 && result["frames"].as_u64().unwrap() > 400, "{result}");
+    state(&lines, "lost");
+}
+
+#[test]
+fn bad_options_are_refused_with_one_sentence() {
+    let name = "chase_options";
+    for (arguments, expected) in [
+        (&["artnet", "--fps", "23"][..], "29.97df"),
+        (&["artnet", "--offset", "1:2:3"], "01:00:00:00"),
+        (&["artnet", "--offset", "00:01:00:00", "--fps", "29.97df"], "no label"),
+        (&["artnet", "--speed", "0"], "0.001 to 1000"),
+        (&["artnet", "--freewheel", "never"], "a time above 0"),
+        (&["mtc", "/nowhere/midi"], "a raw MIDI device"),
+        (&["ltc", "Cargo.toml"], "RIFF WAVE"),
+        (&["psn", "--tracker", "0"], "1..65535"),
+        (&["psn", "--axes", "x,y"], "once each"),
+    ] {
+        let mut command = program(name);
+        command.current_dir(env!("CARGO_MANIFEST_DIR")).arg("chase").args(arguments);
+        let output = Process::start(&mut command).output_within(60);
+        let sentence = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {sentence}");
+        assert!(sentence.contains(expected), "{arguments:?}: {sentence}");
+    }
+}
