@@ -204,7 +204,7 @@ def signs_have_contrast(page):
             assert spread(inside) >= 3, f"{deficiency}: {box['text']!r} has a contrast of {spread(inside):.2f}"
     vision.send("Emulation.setEmulatedVisionDeficiency", {"type": "none"})
     pixels = shot(page)
-    for name in ["#name", "#state", "#alert", "#metres", "#metre", "#scale", "#time", "#bench", "#follow", "#sound"]:
+    for name in ["#name", "#state", "#playback", "#alert", "#metres", "#metre", "#scale", "#time", "#bench", "#follow", "#sound"]:
         box = page.locator(name).bounding_box()
         inside = pixels[int(box["y"]) : int(box["y"] + box["height"]), int(box["x"]) : int(box["x"] + box["width"])]
         assert spread(inside) >= 4.5, f"{name} has a contrast of {spread(inside):.2f}"

@@ -222,6 +222,7 @@ fn router(server: Server, pages: Option<&Path>) -> Router {
         .route("/sound.js", file("text/javascript; charset=utf-8", include_str!("view/sound.js")))
         .route("/stage.js", file("text/javascript; charset=utf-8", include_str!("view/stage.js")))
         .route("/stream.js", file("text/javascript; charset=utf-8", include_str!("view/stream.js")))
+        .route("/transport.js", file("text/javascript; charset=utf-8", include_str!("view/transport.js")))
         .route("/words.js", file("text/javascript; charset=utf-8", include_str!("view/words.js")))
         .route("/style.css", file("text/css; charset=utf-8", include_str!("view/style.css")))
         .route("/conduct.js", file("text/javascript; charset=utf-8", include_str!("view/conduct.js")))

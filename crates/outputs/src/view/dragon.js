@@ -7,6 +7,7 @@ import { Overlap, marksOf } from "./marks.js";
 import { SpeedScale } from "./palette.js";
 import { Show } from "./show.js";
 import { Stream } from "./stream.js";
+import { Transport } from "./transport.js";
 import { benchesOf, nameOf, remaining, say } from "./words.js";
 
 /** The situation without anything to show. */
@@ -15,6 +16,8 @@ const WAITING = { name: "waiting", severity: "ok", happened: false, sentence: nu
 const UNKNOWN = { ...WAITING, name: "unknown" };
 /** The time without frames after which the page reports silence (ms). */
 const SILENCE = 2000;
+/** The number of `ended` among the states of playback. */
+const ENDED = 3;
 /** Milliseconds between the frames of the slowest publisher. */
 const LONGEST_PERIOD = 10_000;
 
@@ -50,6 +53,7 @@ export class Dragon {
     this.colours = new SpeedScale();
     this.show = show ? new Show(still) : null;
     this.overlap = new Overlap();
+    this.transport = new Transport();
     /** The handles at the moment of the picture, and the two frames around it. */
     this.places = this.shown = null;
     this.path = this.run = this.team = this.epoch = null;
@@ -81,19 +85,29 @@ export class Dragon {
     return this.several ? `${this.name}: ${words}` : words;
   }
 
-  /** Returns the situation: the state, the next event and the seconds of wall time until then. */
+  /**
+   * Returns the situation: the state, the next event, the seconds of wall time until then at the last known rate, and
+   * whether the show stands.
+   */
   situation(now) {
     const { playback, stage, alert, trouble } = this.stream, { newest } = playback;
     const silence = newest ? now - newest.at : 0;
     const silent = !trouble && newest && silence > Math.max(SILENCE, 3 * (playback.isPaced ? playback.interval : LONGEST_PERIOD)) ? Math.floor(silence / 1000) : null;
     const lost = trouble ?? (newest && stage ? null : "noStage");
     const current = lost ? WAITING : stage.states[newest.state] ?? UNKNOWN;
+    this.transport.look(now, newest, lost ?? (silent === null ? null : "silent"), (number) => this.cueOf(number));
     let [seconds, ahead] = [NaN, null];
-    if (!lost && silent === null && newest.playing && !current.happened) {
+    if (!lost && silent === null && newest.playback !== ENDED && !current.happened) {
       ahead = alert?.event ?? "path_end";
-      seconds = ((alert?.event_time ?? pathEnd(stage, alert)) - playback.time(now)) / newest.scale;
+      seconds = ((alert?.event_time ?? pathEnd(stage, alert)) - playback.time(now)) / this.transport.pace;
     }
-    return { state: current, alert, trouble: lost, silent, stale: Boolean(lost) || silent !== null, seconds, ahead, benches: stage?.benches, now: "" };
+    return { state: current, alert, trouble: lost, silent, stale: Boolean(lost) || silent !== null, seconds, ahead, stands: !newest?.playing, benches: stage?.benches, now: "" };
+  }
+
+  /** Returns a cue of the run by its number; null for one that is not known. The stage has the first cues only. */
+  cueOf(number) {
+    const { stage, cue } = this.stream;
+    return stage?.cues.find((one) => one.number === number) ?? (cue?.number === number ? { ...cue, time: cue.cue_time } : null);
   }
 
   /**

@@ -9,7 +9,7 @@ import { Dragon } from "./dragon.js";
 import { Ground, draw } from "./drawing.js";
 import { attach } from "./pointer_input.js";
 import { identityOf, paletteOf } from "./palette.js";
-import { element, put, showBench, showFigures, showNames, showProofs, showSituation } from "./panel.js";
+import { element, put, showBench, showFigures, showNames, showProofs, showSituation, showTransport } from "./panel.js";
 import { publishers } from "./publishers.js";
 import { Roster } from "./roster.js";
 import { Sound } from "./sound.js";
@@ -85,7 +85,7 @@ function pass() {
   camera.update(there, passed, there.includes(whose) ? whose : there[0]);
   camera.reach = Math.max(...there.map(({ path }) => path.reach));
   showText(now);
-  const soonest = dragons.map(({ state, sight }) => (state.severity === "ok" && !(sight.seconds < 10) ? NaN : sight.seconds)).filter((seconds) => seconds > -1);
+  const soonest = dragons.map(({ state, sight }) => (sight.stands || (state.severity === "ok" && !(sight.seconds < 10)) ? NaN : sight.seconds)).filter((seconds) => seconds > -1);
   sound.count(soonest.length ? Math.min(...soonest) : NaN);
   if (dragons.some(({ struck }) => struck)) sound.strike();
   paint(there);
@@ -132,7 +132,9 @@ function drawNothing() {
 let figuresAt = 0, countedAt = 0;
 function showText(now) {
   const first = foremost(), { sight } = first;
-  showSituation({ ...sight, stale: dragons.every((one) => one.sight.stale), of: several ? first.name : null });
+  const of = several ? first.name : null;
+  showSituation({ ...sight, stale: dragons.every((one) => one.sight.stale), of });
+  showTransport(first.transport, { now, of, keys: !element("conduct").hidden });
   roster?.show(first, selected);
   const notices = dragons.map((one) => one.notice()).filter(Boolean);
   // A page without the panel shows here why the picture is empty.
@@ -145,7 +147,7 @@ function showText(now) {
   // The rest changes too often to be readable at every pass.
   if (!shown.isThere || now - figuresAt < FIGURES_INTERVAL) return;
   figuresAt = now;
-  showNames(stage, several ? publishers : null);
+  showNames(stage, several ? publishers : null, first.transport.kind === "playing" ? "" : first.transport.sign);
   showFigures({ clearance: newest.clearance, colours, time: stream.playback.time(now), scale: newest.scale });
   showBench(whose === shown ? chosen : -1, newest.handles);
   if (now - countedAt < 1000) return;
