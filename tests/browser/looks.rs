@@ -1,10 +1,20 @@
-//! The page's header and its picture as an audience and a crew read them, in the browser: the transport state.
+//! The page's header and its picture as an audience and a crew read them, in the browser: the transport state, the show look.
 //!
-//! The tests are in `tests/python/stage_transport.py`. No test asserts a speed.
+//! The tests are in `tests/python/stage_transport.py` and `stage_show.py`. No test asserts a speed.
 
 use crate::view::run_scenario;
 
 #[test]
 fn header_says_what_the_show_does() {
     run_scenario("tests/python/stage_transport.py", "header_says_what_the_show_does");
+}
+
+#[test]
+fn show_is_locked() {
+    run_scenario("tests/python/stage_show.py", "show_is_locked");
+}
+
+#[test]
+fn coming_lanterns_burn_white() {
+    run_scenario("tests/python/stage_show.py", "coming_lanterns_burn_white");
 }

@@ -145,7 +145,11 @@ def frozen_before_it_was_seen():
         assert not complaints and not seen, complaints + seen
     with server() as url, browser() as (page, complaints):
         page.goto(f"{url}#show")
-        until(page, "document.getElementById('notice').checkVisibility() && document.getElementById('notice').innerText === 'Waiting for a publisher'", "words on an empty stage")
+        until(page, "document.body.dataset.transport === 'lost'", "no publisher")
+        assert (shot(page)[..., :3] == 0).all(), "something is shown before the doors open"
+        page.goto("about:blank")
+        page.goto(f"{url}#show,tell")
+        until(page, "document.getElementById('notice').checkVisibility() && document.getElementById('notice').innerText === 'Waiting for a publisher'", "words on an empty stage, on request")
         assert not complaints, complaints
 
 

@@ -65,7 +65,8 @@ function canPause(streams) {
 /** Returns true if a publisher can execute commands. */
 const isThere = ({ playback, stage, trouble }) => Boolean(playback.newest && stage && trouble === null);
 
-export function conduct(dragons) {
+/** `keysConduct`: true if keys conduct; in the show look only on request. */
+export function conduct(dragons, keysConduct) {
   const bar = document.getElementById("conduct"), main = bar.parentElement;
   bar.innerHTML = BAR;
   translate(bar);
@@ -292,7 +293,7 @@ export function conduct(dragons) {
     target.closest("select, input:not([type=range]), dialog") || (key === " " && target.closest("button")) || (key.startsWith("Arrow") && target.closest("canvas"));
   addEventListener("keydown", (event) => {
     const { key, target } = event;
-    if (bar.hidden || event.ctrlKey || event.metaKey || (event.altKey && !"[]".includes(key))) return;
+    if (bar.hidden || !keysConduct || event.ctrlKey || event.metaKey || (event.altKey && !"[]".includes(key))) return;
     const within = bar.contains(target);
     if (usedBy(target, key)) return within && event.stopPropagation();
     const act = keys[key.length === 1 ? key.toLowerCase() : key];

@@ -172,7 +172,7 @@ export class Ground {
 /**
  * Draws everything. `scene` has: ground, words (false: none are written), and dragons, each with stage, places (STRIDE
  * numbers a handle, as all handles here), colours (a SpeedScale), path, marks (see marks.js), chosen (a bench, or -1),
- * its chosenName, its endNames, show (a Show, or null), stale (true if it is stale beside live ones), and identity (see
+ * its chosenName, its endNames, stale (true if it is stale beside live ones), and identity (see
  * palette.js; null for a single dragon). Returns the words written, as boxes in pixels.
  */
 export function draw(context, camera, palette, { ground, dragons, words }) {
@@ -184,14 +184,14 @@ export function draw(context, camera, palette, { ground, dragons, words }) {
   if (!words) return [];
   const labels = new Labels(camera);
   label(labels, palette, dragons);
-  if (!dragons[0].show) labels.keep(scaleBar(context, camera, palette));
+  labels.keep(scaleBar(context, camera, palette));
   labels.write(context, palette);
   inMetres(context, camera);
   return labels.boxes;
 }
 
 function drawDragon(context, camera, palette, transparent, dragon) {
-  const { stage, places, marks, chosen, show, identity } = dragon, pixel = camera.unit / camera.scale;
+  const { stage, places, marks, chosen, identity } = dragon, pixel = camera.unit / camera.scale;
   inMetres(context, camera);
   context.lineJoin = "miter";
   const count = places.length / STRIDE - 1, board = (bench) => rectangle(stage, places, bench);
@@ -204,19 +204,15 @@ function drawDragon(context, camera, palette, transparent, dragon) {
     doubled(context, palette, pixel, ink, width, trace, dashes);
   };
   if (identity) casing(context, camera, palette, transparent, dragon);
-  if (show) show.draw(context, camera, palette, dragon, inSight(camera, stage, places));
-  else {
-    benches(context, camera, palette, dragon);
-    headSign(context, board(0), palette, pixel);
-    if (count > 1) tailSign(context, board(count - 1), palette, pixel);
-    mark(0, palette.ink, 2);
-    if (count > 1) mark(count - 1, palette.ink, 1);
-  }
+  benches(context, camera, palette, dragon);
+  headSign(context, board(0), palette, pixel);
+  if (count > 1) tailSign(context, board(count - 1), palette, pixel);
+  mark(0, palette.ink, 2);
+  if (count > 1) mark(count - 1, palette.ink, 1);
   // The first in the list lies on top.
   for (const { pair, ink, dashes } of marks.toReversed()) pair.filter((bench) => bench < count).forEach((bench) => mark(bench, palette[ink], 3.5, dashes));
   if (chosen >= 0 && chosen < count) mark(chosen, palette.ink, 3, [7, 4]);
   for (const { place, ink, ghost } of marks.toReversed()) if (place) target(context, place, palette, pixel, palette[ink], ghost);
-  show?.crown(context, camera, palette, dragon);
 }
 
 /**
@@ -250,7 +246,7 @@ function label(labels, palette, dragons) {
   each(({ marks }) => {
     for (const { place, ink, text } of marks) if (place && text) labels.add(text, place.x, place.y, palette[ink], 34, 1.25);
   });
-  each(({ marks, chosen, chosenName, endNames: [front, rear], show }, count, board) => {
+  each(({ marks, chosen, chosenName, endNames: [front, rear] }, count, board) => {
     const named = new Set();
     for (const { pair, ink, names } of marks) {
       pair.filter((bench) => bench < count).forEach((bench, k) => {
@@ -264,8 +260,7 @@ function label(labels, palette, dragons) {
       named.add(chosen);
     }
     const [head, tail] = [board(0), board(count - 1)];
-    // In the show look marked benches have no names; the dragon's name is not theirs.
-    if (front && (show || !named.has(0))) labels.add(front, head.x + head.l * head.c, head.y + head.l * head.s, palette.ink);
+    if (front && !named.has(0)) labels.add(front, head.x + head.l * head.c, head.y + head.l * head.s, palette.ink);
     if (rear && count > 1 && !named.has(count - 1)) labels.add(rear, tail.x - tail.l * tail.c, tail.y - tail.l * tail.s, palette.ink);
   });
 }

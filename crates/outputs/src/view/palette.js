@@ -1,4 +1,4 @@
-// The colours of the picture: those of the style sheet, the scale of speeds, and those of the show look.
+// The colours of the picture: those of the style sheet, and the scale of speeds.
 
 import { STRIDE, speedOf } from "./hermite.js";
 
@@ -45,8 +45,8 @@ export function paletteOf(element) {
   const shade = (part) => (part < 0.5 ? [slow, middle, 2 * part] : [middle, fast, 2 * part - 1]);
   const shades = Array.from({ length: SHADES }, (_, k) => mixed(...shade(k / (SHADES - 1))));
   const resting = shades.map((one) => mixed(ground, one.match(/\d+/g).map(Number), AT_REST));
-  const names = ["ground", "ink", "faint", "danger", "warning", "still", "near", "far", "wood", "rim", "gold", "lantern", "silk"];
-  return { shades, resting, night: colour(style, "--night") === "1", ...Object.fromEntries(names.map((name) => [name, colour(style, `--${name}`)])) };
+  const names = ["ground", "ink", "faint", "danger", "warning", "still", "near", "far"];
+  return { shades, resting, ...Object.fromEntries(names.map((name) => [name, colour(style, `--${name}`)])) };
 }
 
 /**

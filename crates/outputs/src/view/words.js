@@ -152,6 +152,8 @@ const WORDS = {
   endedSpoken: ["Ended.", "已结束。"],
   eventAhead: ["{kind} ahead", "{kind}：尚有"],
 
+  locked: ["locked", "已锁定画面"],
+
   // The state of the page, spoken once.
   server: ["waiting for the server", "等待服务器"],
   publisher: ["waiting for a publisher", "等待发布端"],
