@@ -18,3 +18,13 @@ fn show_is_locked() {
 fn coming_lanterns_burn_white() {
     run_scenario("tests/python/stage_show.py", "coming_lanterns_burn_white");
 }
+
+#[test]
+fn labels_point_at_their_boards() {
+    run_scenario("tests/python/stage_labels.py", "labels_point_at_their_boards");
+}
+
+#[test]
+fn labels_move_with_their_boards() {
+    run_scenario("tests/python/stage_labels.py", "labels_move_with_their_boards");
+}

@@ -94,7 +94,7 @@ def show_paints_nothing_but_the_picture():
             for bench in (3, 100, 221):
                 x, y = at(page, *((handles[bench] + handles[bench + 1]) / 2)).astype(int)
                 red, _, blue, _ = pixels[y, x].astype(int)
-                assert red > blue + 20, f"{width} x {height}: the lantern of bench {bench} (from 0) is {pixels[y, x]}"
+                assert red > 200 and red > blue + 10, f"{width} x {height}: the lantern of bench {bench} (from 0) is {pixels[y, x]}"
             black_beyond_the_light(page, pixels, handles)
         page.goto("about:blank")
         page.goto(f"{url}#show,transparent,nolabels")

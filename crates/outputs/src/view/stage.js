@@ -6,6 +6,7 @@ import { wordsOf } from "./address.js";
 import { benchAt } from "./boards.js";
 import { Camera } from "./camera.js";
 import { Dragon } from "./dragon.js";
+import { Labels } from "./labels.js";
 import { Lanterns } from "./lanterns.js";
 import { lock } from "./lock.js";
 import { Ground, draw } from "./drawing.js";
@@ -30,6 +31,7 @@ if (words.dark || words.light || words.show) root.dataset.theme = words.light ? 
 
 const canvas = element("stage"), context = canvas.getContext("2d", { alpha: "transparent" in words });
 const camera = new Camera(), ground = new Ground("transparent" in words), sound = new Sound();
+const labels = "nolabels" in words ? null : new Labels(stillness.matches);
 const lanterns = words.show ? new Lanterns({ transparent: words.transparent, moon: words.moon, day: words.light }) : null;
 const several = publishers.length > 1, dragons = publishers.map((name) => new Dragon(name, { several, show: words.show, still: stillness.matches }));
 root.toggleAttribute("data-several", several);
@@ -98,7 +100,7 @@ function pass() {
 /** Draws the picture, only if it has changed: a show that stands still costs nothing. */
 function paint(there) {
   if (lanterns) return light(there);
-  const look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y, camera.scale, camera.c, camera.s, chosen, whose.name, palette.ground].join();
+  const look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y, camera.scale, camera.c, camera.s, chosen, whose.name, palette.ground, labels?.settled === false && performance.now()].join();
   if (look === last) return;
   last = look;
   const allStale = there.every(({ sight }) => sight.stale);
@@ -106,9 +108,9 @@ function paint(there) {
     const { stage, places, colours, path, marks, sight } = dragon, own = dragon === whose ? chosen : -1;
     return { stage, places, colours, path: path.lines, marks, chosen: own, chosenName: dragon.own(nameOf(own)), endNames: dragon.endNames(), stale: sight.stale && !allStale, identity: several ? identityOf(dragons.indexOf(dragon)) : null };
   });
-  const labels = draw(context, camera, palette, { ground, dragons: scene, words: !words.nolabels });
+  const written = draw(context, camera, palette, { ground, dragons: scene, labels });
   picture.drawn++;
-  Object.assign(picture, { marks: there.flatMap(({ marks }) => marks), labels });
+  Object.assign(picture, { marks: there.flatMap(({ marks }) => marks), labels: written });
   // A dragon that has stopped is drawn again while another one moves: this is no latency of its frames.
   for (const dragon of there) if (!several || !dragon.sight.stale) dragon.drawn();
 }
