@@ -45,17 +45,19 @@ def labels_of(page):
             continue
         if label["end"]:
             points = numpy.array([[label["end"]["x"], label["end"]["y"]]])
+        elif label["isBadge"]:
+            points = numpy.array([[label["x"], label["y"]]])
         else:
             across, down = numpy.meshgrid(numpy.linspace(-1, 1, 21), numpy.linspace(-1, 1, 9))
             points = numpy.stack([label["x"] + across.ravel() * label["half"], label["y"] + down.ravel() * label["tall"]], axis=-1)
         away = distances(points, handles, scale).min(axis=0)
         # A line's end must lie on its board.
-        found.append((label, int(away.argmin()), away.min() if label["end"] else 0))
+        found.append((label, int(away.argmin()), away.min() if label["end"] else 0, away[label["bench"]], away.min()))
     return found
 
 
 def wrong(found):
-    return [(label["text"], near, away) for label, near, away in found if near != label["bench"] or away > 1.5]
+    return [(label, near, _) for label, near, away, *_ in found if near != label["bench"] or away > 1.5]
 
 
 def labels_point_at_their_boards():
@@ -70,8 +72,7 @@ def labels_point_at_their_boards():
             for moment in TIMES:
                 command("seek", moment)
                 until(page, f"Math.abs(picture.time - {moment}) < 0.01 && picture.shown && Math.abs(picture.shown.time - {moment}) < 0.01", f"the picture of {moment} s")
-                time.sleep(0.45)
-                found = labels_of(page)
+                found = steady(page)
                 assert not wrong(found), f"{width} x {height} at {moment} s: {wrong(found)}"
                 assert len(found) >= 2, f"{width} x {height} at {moment} s: {found}"
                 count += len(found)
@@ -81,6 +82,16 @@ def labels_point_at_their_boards():
         print(f"{count} labels, {bare} without a line; the ends of lines are {numpy.mean(lines):.0f} px from the words on average, at most {max(lines):.0f}")
         assert count >= 150, f"only {count} labels were measured"
         assert not complaints, complaints
+
+
+def steady(page):
+    """Returns the labels once the camera and the words stand still."""
+    deadline, before = time.monotonic() + 20, None
+    while (now := page.evaluate(LABELS)) != before:
+        assert time.monotonic() < deadline, "the words do not come to rest"
+        before = now
+        time.sleep(0.35)
+    return labels_of(page)
 
 
 def lines_are_drawn(page, found):

@@ -86,11 +86,13 @@ class BoardMap {
  * either `board` (an index among `boards`) or the place `x`, `y` of an event. `marked`: indices of outlined boards;
  * `rings`: { x, y, radius }; `keep`: boxes that are taken; `last`: the earlier offsets by key.
  *
- * Returns a label for each item: `box`, its `line` (null for a box that stands at its own board), the end `share` of the
- * line on the board; and `isBadge` for a label without room, whose number stands on the board itself.
+ * Returns a label for each item: `box`, its `line` (null for a badge), the end `share` of the line on the board, and
+ * `isBadge` for a label without room, whose number stands on the board itself.
  */
 export function layout({ boards, items, rings, marked, keep, width, height, unit, last }) {
   const map = new BoardMap(boards, width, height), boxes = [...keep], lines = [], placed = [];
+  // Words cover no board that other words need for the end of their line.
+  const uncovered = [...new Set([...marked, ...items.flatMap(({ board }) => board ?? [])])];
   const spine = (board) => ({ from: along(board, 1), to: along(board, -1) });
   for (const item of items) {
     const own = item.board === undefined ? null : boards[item.board], others = marked.filter((k) => k !== item.board).map((k) => boards[k]);
@@ -107,7 +109,7 @@ export function layout({ boards, items, rings, marked, keep, width, height, unit
       const short = own ? 0 : (RING * unit) / away, line = { from: { x: box.x + dx * out, y: box.y + dy * out }, to: { x: end.x - dx * short, y: end.y - dy * short } };
       const length = Math.hypot(line.from.x - line.to.x, line.from.y - line.to.y) / unit;
       if (best && length >= best.cost) return;
-      if (marked.some((k) => meetsBox(spine(boards[k]), box, boards[k].w))) return;
+      if (uncovered.some((k) => meetsBox(spine(boards[k]), box, boards[k].w))) return;
       if (lines.some((one) => cross(line, one) || meetsBox(one, box)) || boxes.some((one) => meetsBox(line, one))) return;
       if ((!relaxed || own) && others.some((board) => meetsBoard(line, board))) return;
       const onRing = foreign.some((ring) => meetsRing(line, ring)) || rings.some((ring) => coversRing(box, ring));
@@ -128,19 +130,21 @@ export function layout({ boards, items, rings, marked, keep, width, height, unit
     }
     const { box, line, share } = best;
     boxes.push(box);
-    const isBare = own && standsAtOwn(boards, item.board, box, unit);
-    if (!isBare) lines.push(line);
-    placed.push({ item, box, line: isBare ? null : line, share, isBadge: false });
+    if (!own || !standsAtOwn(own, boards, box, unit)) lines.push(line);
+    placed.push({ item, box, line, share, isBadge: false });
   }
   return placed.filter(Boolean);
 }
 
-/** Returns true if a box is at its own board, and more than twice as far from every other. */
-function standsAtOwn(boards, own, box, unit) {
-  const near = boardToBox(boards[own], box), centre = toBoard(boards[own], box.x, box.y);
+/** Returns the distance from the middle of a box from which a board is too far to be taken for the box's own. */
+export const beyond = ({ half, tall }, unit) => Math.hypot(half, tall) + 3 * AT_BOARD * unit;
+
+/** Returns true if a box is at its own board, and more than twice as far from every other: it then needs no line. */
+export function standsAtOwn(own, boards, box, unit) {
+  const near = boardToBox(own, box), centre = toBoard(own, box.x, box.y);
   if (near >= AT_BOARD * unit) return false;
-  return boards.every((board, k) => {
-    if (k === own || Math.hypot(board.x - box.x, board.y - box.y) > board.l + board.w + box.half + box.tall + 4 * AT_BOARD * unit) return true;
+  return boards.every((board) => {
+    if ((board.x === own.x && board.y === own.y) || toBoard(board, box.x, box.y) > beyond(box, unit)) return true;
     return toBoard(board, box.x, box.y) > centre && boardToBox(board, box) > 2 * near + 2;
   });
 }

@@ -3,7 +3,7 @@
 
 import { rectangle } from "./boards.js";
 import { STRIDE } from "./hermite.js";
-import { RING, along, layout } from "./label_layout.js";
+import { RING, along, beyond, layout, standsAtOwn } from "./label_layout.js";
 
 /** The least time between two layouts of the same labels, and the time in which words move to a new place (ms). */
 const INTERVAL = 250, EASING = 200;
@@ -44,7 +44,7 @@ export class Labels {
       this.placed = layout({ boards, items: all, rings: signs, marked: outlined, keep, width, height, unit, last });
       [this.key, this.laidAt] = [key, now];
     }
-    const labels = this.move(now, all, unit);
+    const labels = this.move(now, all, camera, dragons);
     for (const label of labels) if (label.line) this.leader(context, palette, unit, label);
     for (const label of labels) this.plate(context, palette, unit, label);
     context.lineCap = "butt";
@@ -68,10 +68,12 @@ export class Labels {
   }
 
   /** Moves the words of the last layout with their boards, and part of the way to a new place beside them. */
-  move(now, items, unit) {
+  move(now, items, camera, dragons) {
     const passed = Math.min(100, now - this.drawnAt), part = this.isStill ? 1 : 1 - Math.exp((-3 * passed) / EASING), kept = new Map();
     this.drawnAt = now;
-    this.settled = true;
+    // The layout is of an earlier picture: another one follows.
+    this.settled = this.laidAt === now;
+    const { unit } = camera;
     const labels = this.placed.flatMap(({ item: { key }, box, line, share, isBadge, goal }, index) => {
       const item = items.find((one) => one.key === key);
       if (!item) return [];
@@ -83,7 +85,8 @@ export class Labels {
       if (far >= 0.5) this.settled = false;
       kept.set(key, { ...offset, share });
       const at = { x: end.x + offset.x, y: end.y + offset.y, half: item.half, tall: item.tall };
-      return [{ item, box: at, line: line && lineOf(at, end, item.own ? 0 : RING * unit), isBadge }];
+      const isBare = !line || (item.own && standsAtOwn(item.own, boardsNear(dragons, camera, at, unit), at, unit));
+      return [{ item, box: at, line: isBare ? null : lineOf(at, end, item.own ? 0 : RING * unit), isBadge }];
     });
     this.shown = kept;
     return labels;
@@ -140,6 +143,19 @@ function lineOf({ x, y, half, tall }, end, short) {
 function boardOf({ stage, places }, bench, camera) {
   const { scale, c, s } = camera, board = rectangle(stage, places, bench), [x, y] = camera.toPixel(board.x, board.y);
   return { x, y, c: board.c * c - board.s * s, s: -(board.c * s + board.s * c), l: board.l * scale, w: board.w * scale, free: Math.max(0, FREE * (1 - (2 * stage.hole_inset) / board.l)) };
+}
+
+/** The boards that may be taken for that of a box. */
+function boardsNear(dragons, camera, box, unit) {
+  const [x, y] = camera.toStage(box.x, box.y), near = [];
+  for (const dragon of dragons) {
+    const { stage, places } = dragon, reach = beyond(box, unit) / camera.scale + Math.max(stage.head_length, stage.body_length);
+    for (let bench = 0; bench < places.length / STRIDE - 1; bench++) {
+      const k = STRIDE * bench;
+      if (Math.abs(places[k] - x) < reach && Math.abs(places[k + 1] - y) < reach) near.push(boardOf(dragon, bench, camera));
+    }
+  }
+  return near;
 }
 
 /** The index of each dragon's first board among those of all. */
