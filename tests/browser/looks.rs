@@ -28,3 +28,8 @@ fn labels_point_at_their_boards() {
 fn labels_move_with_their_boards() {
     run_scenario("tests/python/stage_labels.py", "labels_move_with_their_boards");
 }
+
+#[test]
+fn boards_keep_their_colour_in_a_turn() {
+    run_scenario("tests/python/stage_colours.py", "boards_keep_their_colour_in_a_turn");
+}

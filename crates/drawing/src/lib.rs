@@ -13,6 +13,7 @@ mod look;
 mod marks;
 pub mod palette;
 mod route;
+mod scale;
 mod sheet;
 
 use svg::Document;
@@ -25,11 +26,12 @@ use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::solve::Chain;
 use bench_dragon_motion::timeline::Timeline;
-use benches::{ColourScale, Speeds};
 use camera::{Camera, StageBox, Viewport};
 pub use look::{Framing, Length, Look, Surroundings, Theme};
 use marks::{Happened, Tense};
 use palette::Palette;
+pub use scale::mean_speeds;
+use scale::{ColourScale, Speeds};
 
 /// Width of a sheet in its own units, for any size in print or on a screen.
 const WIDTH: f64 = 960.0;

@@ -3,10 +3,10 @@
 
 use svg::node::element::{Definitions, Group, LinearGradient, Path, Rectangle, Stop, Text};
 
-use super::benches::ColourScale;
 use super::camera::{Camera, Viewport};
 use super::marks::Happened;
 use super::palette::Palette;
+use super::scale::ColourScale;
 use super::{FACE, WIDTH, rounded, text};
 
 const LEFT: f64 = 62.0;
@@ -180,12 +180,9 @@ impl Row {
 }
 
 fn speed_words(scale: &ColourScale) -> String {
-    let ColourScale { least, greatest, .. } = scale;
-    // As many digits as distinguish the two ends.
-    let decimals = (1.0 - (greatest - least).log10().floor()).clamp(0.0, 12.0) as usize;
-    let or = |beyond: bool, words: &'static str| if beyond { words } else { "" };
-    let (slow, fast) = (or(scale.some_below, " or less"), or(scale.some_above, " or more"));
-    format!("{least:.decimals$}{slow} to {greatest:.decimals$}{fast} m/s")
+    let (least, greatest) = scale.ends();
+    let [least, head, greatest] = [least, scale.head_speed, greatest].map(|speed| rounded(speed, 3));
+    format!("mean speed {least} to {greatest} m/s, finest at {head} m/s")
 }
 
 fn gradient(palette: &Palette) -> Definitions {
