@@ -193,17 +193,6 @@ fn gradient(palette: &Palette) -> Definitions {
     Definitions::new().add(gradient)
 }
 
-/// Returns text in the picture, with a rim in the ground's colour so that it can be read over boards.
-pub fn label(content: &str, (x, y): (f64, f64), colour: &str, camera: &Camera, palette: &Palette) -> Group {
-    let half = 0.5 * width_of(content, 16.0) + 6.0;
-    let Viewport { left, top, .. } = camera.viewport;
-    let x = x.min(camera.viewport.right() - half).max(left + half);
-    let y = y.min(camera.viewport.bottom() - 10.0).max(top + 20.0);
-    let place = |colour| words(content, (x, y + 5.0), 16, colour).set("text-anchor", "middle").set("font-weight", 600);
-    let rim = place(palette.ground).set("stroke", palette.ground).set("stroke-width", 5);
-    Group::new().add(rim.set("stroke-linejoin", "round")).add(place(colour))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -212,6 +212,8 @@ fn router(server: Server, pages: Option<&Path>) -> Router {
         .route("/dragon_head.js", file("text/javascript; charset=utf-8", include_str!("view/dragon_head.js")))
         .route("/drawing.js", file("text/javascript; charset=utf-8", include_str!("view/drawing.js")))
         .route("/hermite.js", file("text/javascript; charset=utf-8", include_str!("view/hermite.js")))
+        .route("/label_layout.js", file("text/javascript; charset=utf-8", include_str!("view/label_layout.js")))
+        .route("/labels.js", file("text/javascript; charset=utf-8", include_str!("view/labels.js")))
         .route("/lantern_view.js", file("text/javascript; charset=utf-8", include_str!("view/lantern_view.js")))
         .route("/lanterns.js", file("text/javascript; charset=utf-8", include_str!("view/lanterns.js")))
         .route("/lock.js", file("text/javascript; charset=utf-8", include_str!("view/lock.js")))

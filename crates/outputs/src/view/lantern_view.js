@@ -13,11 +13,11 @@ export function viewOf({ width, height }, camera) {
   return {
     width, height, pixels, c, s, matrix, key: [width, height, pixels, c, s, e, f].join(),
     place: (x, y) => [matrix.a * x + matrix.b * y + e, matrix.b * x - matrix.a * y + f],
-    /** The box of all boards and `metres` around it, at whole multiples of `grid` pixels, as x, y, width and height. */
+    /** The box of all boards and pearls and `metres` around it, at whole multiples of `grid` pixels, as x, y, width and height. */
     around(teams, metres, grid = 4) {
       let [left, top, right, bottom] = [Infinity, Infinity, -Infinity, -Infinity];
-      for (const { boards } of teams) {
-        for (const { x, y } of boards) {
+      for (const { boards, pearl } of teams) {
+        for (const { x, y } of pearl ? [...boards, pearl] : boards) {
           if (x < left) left = x;
           if (x > right) right = x;
           if (y < top) top = y;

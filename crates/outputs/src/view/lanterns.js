@@ -16,8 +16,10 @@ const GROUND = 8, AIR = 4;
 const FINE = 22, CLOSE = 16;
 /** The lanterns of a board, as shares of half its length: on the body's red, gold, red. */
 const ON_BODY = [-0.41, 0, 0.41], ON_HEAD = [-0.7, -0.44, -0.18, 0.09];
-/** Pictures from one ground to the next. */
-const GROUND_EVERY = 3;
+/** The reach of halos from the middle of a board. */
+const HALO_REACH = 1.6;
+/** Pictures from one ground to the next, and from one picture of the halos. */
+const GROUND_EVERY = 3, AIR_EVERY = 2;
 /** The step of the sizes in which sprites are cut. */
 const SIZES = 1.06;
 /** Handles of a line of light that is drawn at once. */
@@ -28,6 +30,12 @@ const MOON = [26, 34, 58], DAY = [214, 206, 192];
 const SPARKS = 46, SPARK_LIFE = 2.6;
 
 const step = (angle, count, span) => ((Math.round((angle * count) / span) % count) + count) % count;
+
+/** Returns the box around two boxes of x, y, width and height. */
+function union([x, y, width, height], [ox, oy, wide, high]) {
+  const left = Math.min(x, ox), top = Math.min(y, oy);
+  return [left, top, Math.max(x + width, ox + wide) - left, Math.max(y + height, oy + high) - top];
+}
 
 export class Lanterns {
   /** `ambient` is the light besides the lanterns', in red, green and blue; a `transparent` picture has no ground. */
@@ -40,18 +48,22 @@ export class Lanterns {
     this.white = halo("255,252,240", "255,214,150");
     [this.barrel, this.box, this.people] = [barrel(), box(), CLOTHES.map((one) => dancer(...one))];
     [this.head, this.tail, this.slabs] = [headPicture(), tailPicture(), paving()];
-    const layer = (options) => blank(1, 1, { willReadFrequently: true, ...options });
-    [this.light, this.air, this.floor, this.ground] = [layer({ alpha: false }), layer({}), blank(1, 1, { alpha: false }), layer({ alpha: false })];
+    this.air = blank(1, 1);
+    [this.light, this.floor, this.ground] = Array.from({ length: 3 }, () => blank(1, 1, { alpha: false }));
     this.picture = 0;
     this.paved = this.lighted = null;
+    /** The lit part of the last ground, and the part that differs from the canvas. */
+    this.part = this.renewed = [0, 0, 0, 0];
     this.cut = new Map();
   }
 
   /** Draws the dragons, each with `stage`, `places` and `show`. */
   draw(context, camera, dragons) {
     const view = viewOf(context.canvas, camera), teams = dragons.map((dragon) => boardsOf(view, dragon));
-    const isNew = this.picture++ % GROUND_EVERY === 0 || this.lighted !== view.key;
+    const isOther = this.lighted !== view.key, isNew = isOther || this.picture % GROUND_EVERY === 0;
+    const isAir = isOther || this.picture % (view.pixels >= FINE ? AIR_EVERY : GROUND_EVERY) === 0;
     this.lighted = view.key;
+    this.picture++;
     view.fine = view.pixels >= FINE;
     this.fit(view);
     context.setTransform(1, 0, 0, 1, 0, 0);
@@ -59,14 +71,12 @@ export class Lanterns {
     if (this.transparent) context.clearRect(0, 0, view.width, view.height);
     else {
       if (isNew) this.layGround(view, teams);
-      context.globalCompositeOperation = "copy";
-      context.drawImage(this.ground[0], 0, 0);
-      context.globalCompositeOperation = "source-over";
+      this.enlarge(context, this.ground[0], 1, this.renewed);
     }
-    if (view.fine || isNew) this.layAir(view, teams);
+    if (isAir) this.layAir(view, teams);
     for (const team of teams) this.boards(context, view, team);
     if (view.pixels >= CLOSE) for (const team of teams) this.dancers(context, view, team);
-    this.blend(context, "lighter", () => this.enlarge(context, this.air[0], AIR, view.around(teams, 2.9)));
+    this.blend(context, "lighter", () => this.enlarge(context, this.air[0], AIR, view.around(teams, HALO_REACH)));
     for (const team of teams) this.lamps(context, view, team);
     for (const team of teams) this.crown(context, view, team);
     this.blend(context, "lighter", () => teams.forEach((team) => this.sparks(context, view, team)));
@@ -118,9 +128,12 @@ export class Lanterns {
   layGround(view, teams) {
     this.pave(view);
     this.layLight(view, teams);
-    const [, context] = this.ground, part = this.ambient ? [0, 0, view.width, view.height] : view.around(teams, POOL_RADIUS + 1.2, GROUND);
+    const [, context] = this.ground, whole = [0, 0, view.width, view.height], part = this.ambient ? whole : view.around(teams, POOL_RADIUS + 1.2, GROUND);
+    // Beyond the light both are black already.
+    this.renewed = this.filled === view.key ? union(this.part, part) : whole;
+    [this.part, this.filled] = [part, view.key];
     context.fillStyle = "#000";
-    context.fillRect(0, 0, view.width, view.height);
+    context.fillRect(...this.renewed);
     this.enlarge(context, this.floor[0], 1, part);
     this.blend(context, "multiply", () => this.enlarge(context, this.light[0], GROUND, part));
   }
@@ -216,7 +229,7 @@ export class Lanterns {
   boards(context, view, { boards, dragon }) {
     const wide = dragon.stage.width * view.pixels, edge = Math.max(0.02 * view.pixels, 0.9);
     const coats = wide > 7 ? [["#7a3518", wide, 0], ["#1c0605", wide - 2 * edge, edge]] : [["#3d0f0a", wide, 0]];
-    if (wide > 12) coats.push(["#2c0a07", 0.46 * wide, edge + 0.02 * view.pixels]);
+    if (wide > 16) coats.push(["#2c0a07", 0.46 * wide, edge + 0.02 * view.pixels]);
     context.globalAlpha = Math.min(1, dragon.show.life * 1.5);
     for (const [strokeStyle, lineWidth, inset] of coats) {
       Object.assign(context, { strokeStyle, lineWidth });
