@@ -5,6 +5,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use bench_dragon::certify::{ClearanceEnclosure, MOST_CLEARANCE_STEPS, enclose_least_clearance};
+use bench_dragon::messages::sentence::rounded;
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::Motion;
 use bench_dragon::motion::model::path::{OutlineKind, SegmentOutline};
@@ -12,6 +13,7 @@ use bench_dragon::motion::model::spiral::Direction;
 use bench_dragon::motion::solve::Velocities;
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
 use bench_dragon::show::scene::{AtEnd, OnContact, Scene};
+use bench_dragon::show::timed_cues;
 use serde::Serialize;
 
 use super::events::{find_least_clearance, least_clearance, sentence};
@@ -148,6 +150,9 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     for timed in timeline.events() {
         output.line(&format!("  {}", sentence(&scene, timed)))?;
     }
+    for cue in cues(&scene, &timeline) {
+        output.line(&format!("  {cue}"))?;
+    }
     let (found, freeze) = find_least_clearance(&scene, &timeline, common);
     output.line(&format!("  {}", least_clearance(&scene, found)))?;
     if arguments.prove {
@@ -248,6 +253,24 @@ fn proved(scene: &str, file: &Path, common: &Common) -> Result<Vec<String>, Comm
     let proved = proved_of(scene, &shown, BufReader::new(opened), &mut |bytes| bar.set_position(bytes));
     bar.finish_and_clear();
     proved
+}
+
+/// Returns a sentence on each cue, in the order of their times; those that the show does not reach stand last.
+fn cues(scene: &Scene, timeline: &Timeline) -> Vec<String> {
+    let (cues, missing) = timed_cues(scene, timeline);
+    let end = timeline.freeze(scene.stops_at_contact()).time;
+    let told = cues.into_iter().map(|cue| {
+        let action = match (cue.time > end, cue.pauses) {
+            (true, _) => ", after the end of the show",
+            (false, true) => "; the show waits there for `go`",
+            (false, false) => "",
+        };
+        format!("Cue {}, \"{}\", at {} s{action}.", cue.number, cue.name, rounded(cue.time, 3))
+    });
+    let missing = missing.into_iter().map(|name| {
+        format!("Cue \"{name}\" has no time: its event does not happen, or the time would be before the start.")
+    });
+    told.chain(missing).collect()
 }
 
 /// Describes the path in words.

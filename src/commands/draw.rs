@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use bench_dragon::drawing::swept::SweptArea;
-use bench_dragon::drawing::{Drawing, Extent, Framing, Length, Look, Surroundings, Theme};
+use bench_dragon::drawing::{Drawing, Extent, Framing, Length, Look, Surroundings, Theme, mean_speeds};
 use bench_dragon::motion::model::Point;
 use bench_dragon::motion::solve::{Chain, Solver, Velocities};
 use bench_dragon::motion::timeline::Timeline;
@@ -166,6 +166,7 @@ struct Session<'a> {
     timeline: &'a Timeline,
     solver: Box<dyn Solver>,
     chain: Chain,
+    earlier: Chain,
     file: Option<&'a Path>,
     json: bool,
 }
@@ -174,13 +175,16 @@ impl<'a> Session<'a> {
     fn new(scene: &'a Scene, timeline: &'a Timeline, file: Option<&'a Path>, json: bool) -> Self {
         // Boards are coloured by speed, even if the scene publishes no speeds.
         let solver = scene.motion.solver(Velocities::Computed).solver;
-        Self { scene, timeline, solver, chain: Chain::new(scene.team().handles()), file, json }
+        let [chain, earlier] = [0, 1].map(|_| Chain::new(scene.team().handles()));
+        Self { scene, timeline, solver, chain, earlier, file, json }
     }
 
     fn solve(&mut self, time: f64) -> Result<(), CommandError> {
-        solve_at_or_just_before(self.solver.as_mut(), time, &mut self.chain)
-            .map(|_| ())
-            .map_err(|none| CommandError::Failed(format!("at {} s: {none}", figure(time))))
+        let solver = self.solver.as_mut();
+        let time = solve_at_or_just_before(solver, time, &mut self.chain)
+            .map_err(|none| CommandError::Failed(format!("at {} s: {none}", figure(time))))?;
+        mean_speeds(&self.scene.motion, solver, time, &mut self.chain, &mut self.earlier);
+        Ok(())
     }
 
     fn extent(&mut self, times: &[f64]) -> Result<Extent, CommandError> {

@@ -3,6 +3,7 @@
 mod conduct;
 #[path = "../harness/mod.rs"]
 mod harness;
+mod looks;
 mod proved;
 mod several;
 mod view;

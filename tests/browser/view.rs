@@ -258,7 +258,7 @@ fn in_place(scenario: &str) {
     run_scenario("tests/python/stage_places.py", scenario);
 }
 
-fn run_scenario(script: &str, scenario: &str) {
+pub(crate) fn run_scenario(script: &str, scenario: &str) {
     if !can_run(chromium().and_then(|()| python_modules(&["playwright", "numpy"]))) {
         return;
     }

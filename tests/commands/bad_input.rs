@@ -31,6 +31,11 @@ fn scene_refusal(from: &str, to: &str) -> String {
     printed
 }
 
+/// A cue whose name a message would cut in the middle of a word, and one of 23 Chinese characters.
+const LONG_CUE: &str =
+    "[[cues]]\nname = \"the coil closes; the drums stop; all wait for the old man's torch\"\nat = 300.0\n[team]";
+const CHINESE_CUE: &str = "[[cues]]\nname = \"龙头入阵全体停步等候长老点灯之后继续前行鼓声起\"\nat = 300.0\n[team]";
+
 #[test]
 fn scenes_that_cannot_be_played() {
     // (text of the paper's scene, its replacement, what the sentence must name)
@@ -38,6 +43,8 @@ fn scenes_that_cannot_be_played() {
         ("name = \"paper\"", "name = ", &["line 2"]),
         ("name = \"paper\"", "name = \"\"", &["line 2", "name"]),
         ("name = \"paper\"", "name = \"a\\u001bb\"", &["line 2", "name", "control character"]),
+        ("[team]", LONG_CUE, &["line 5", "cues.name", "65 bytes", "at most 64"]),
+        ("[team]", CHINESE_CUE, &["line 5", "cues.name", "69 bytes", "at most 64"]),
         ("name = \"paper\"", "name = 7", &["line 2", "name", "string"]),
         ("name = \"paper\"", "title = \"paper\"", &["line 2", "title", "unknown field"]),
         ("[team]", "[crew]", &["crew", "unknown field"]),

@@ -2,6 +2,7 @@
 //! words and marks at a time, sequences, and the colours against the page's style sheet.
 
 mod colours;
+mod labels;
 mod moving;
 use crate::harness;
 

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod certify;
+mod check_cues;
 mod draw;
 mod files;
 mod hard_scenes;

@@ -174,12 +174,11 @@ def keyboard(page):
     page.get_by_label("Speed").select_option("1 ×")
     seek(page, 149.8)
     page.get_by_role("button", name="Play").click()
-    until(lambda: page.evaluate("!document.getElementById('cue').hidden") and page.inner_text("#cue"), "the cue's name")
-    assert page.inner_text("#cue") == "1. lamps"
+    until(lambda: "cue 1 · lamps" in page.inner_text("#playback-detail"), "the cue's name")
     seek(page, 299.9)
     # The second cue pauses: Play continues from there.
     until(lambda: (now := state())["playback"] == "paused" and now["sim_time"] == 300.0, "the cue that pauses")
-    until(lambda: page.inner_text("#cue") == "2. coil (waiting for go)", "its name")
+    until(lambda: page.inner_text("#playback-detail").startswith("cue 2 · coil · waits 0:0"), "its name")
     page.get_by_role("button", name="Play").click()
     until(lambda: state()["playback"] == "playing", "on from the cue")
 

@@ -100,7 +100,7 @@ def two_on_one_stage():
         show, seen = opened(page.context.browser, viewport={"width": 1280, "height": 720})
         show.goto(f"{url}#show")
         both_drawn(show)
-        assert show.evaluate("picture.labels.map((one) => one.text)") == [A, B], "the names in the show look"
+        assert show.evaluate("picture.labels.length") == 0, "words in the show look"
         assert not complaints and not seen, complaints + seen
 
 
@@ -179,7 +179,7 @@ def one_dies_alone():
             notice = until(page, "!document.getElementById('notice').hidden && document.getElementById('notice').textContent", "a notice")
             assert notice == f"{B}: No publisher. The picture is from t = 20.0 s.", notice
             assert page.evaluate("document.body.dataset.stale") == "false", "the whole picture is dimmed"
-            assert "waiting for a publisher" in row(page, B).inner_text().lower() and "moving" in row(page, A).inner_text(), words(page)
+            assert "no publisher" in row(page, B).inner_text().lower() and "moving" in row(page, A).inner_text(), words(page)
             time.sleep(0.5)
             after = light(page, handles)
             assert after[B] > before[B] + 0.15, f"{B} is not dimmed: {before} became {after}"

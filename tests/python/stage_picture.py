@@ -245,7 +245,7 @@ def pinch(page, box):
 def fits(page):
     """Nothing is cut off at the sides, and the words stay in their boxes."""
     cut = page.evaluate(
-        """() => [...document.querySelectorAll("body, header, h1, #left, #alert, footer, nav")]
+        """() => [...document.querySelectorAll("body, header, h1, h2, #playback-detail, #left, #alert, footer, nav")]
             .filter((one) => one.scrollWidth > one.clientWidth + 1 && getComputedStyle(one).display !== "inline")
             .map((one) => one.id || one.tagName)"""
     )
@@ -339,11 +339,11 @@ def publishers_come_and_go():
                 drawn(page)
                 first = page.evaluate("picture.run")
             until(page, "document.body.dataset.level === 'waiting' && picture.head === null", "its death")
-            assert "publisher" in page.inner_text("#state"), words(page)
+            assert "NO PUBLISHER" in page.inner_text("#playback"), words(page)
             with publisher("--start", "200"):
                 until(page, f"picture.run !== null && picture.run !== '{first}' && picture.time >= 200", "its return")
             assert not complaints, complaints
-        until(page, "document.getElementById('state').textContent.includes('server')", "the server's death")
+        until(page, "document.getElementById('playback').textContent.includes('NO SERVER')", "the server's death")
         # From here on the browser itself reports each failed connection.
         with server(int(url.rstrip("/").rsplit(":", 1)[1])), publisher("--start", "150"):
             until(page, "picture.head !== null && picture.time >= 150", "the server's return")

@@ -24,7 +24,7 @@ APPROACH = ["--start", "410", "--time-scale", "0.01"]
 CUT = """() => {
     const nav = document.querySelector("nav").getBoundingClientRect();
     const place = (one) => [one, one.getBoundingClientRect()];
-    return [...document.querySelectorAll("#name, #state, #until, #left, #alert, #meter, #metres, #legend, #scale, #time, #full, #follow, #whole, #conduct:not([hidden]) :is(button, select, input)")]
+    return [...document.querySelectorAll("#name, #playback, #playback-detail, #state, #until, #left, #alert, #meter, #metres, #legend, #scale, #time, #full, #follow, #whole, #conduct:not([hidden]) :is(button, select, input)")]
         .map(place).filter(([one, {bottom, right}]) => !one.checkVisibility() || bottom > innerHeight + 1 || right > innerWidth + 1
             || (one.closest(".figure, #time") && bottom > nav.top + 1 && nav.top > one.getBoundingClientRect().top && nav.left < right))
         .map(([one]) => one.id || one.tagName);
@@ -145,7 +145,11 @@ def frozen_before_it_was_seen():
         assert not complaints and not seen, complaints + seen
     with server() as url, browser() as (page, complaints):
         page.goto(f"{url}#show")
-        until(page, "document.getElementById('notice').checkVisibility() && document.getElementById('notice').innerText === 'Waiting for a publisher'", "words on an empty stage")
+        until(page, "document.body.dataset.transport === 'lost'", "no publisher")
+        assert (shot(page)[..., :3] == 0).all(), "something is shown before the doors open"
+        page.goto("about:blank")
+        page.goto(f"{url}#show,tell")
+        until(page, "document.getElementById('notice').checkVisibility() && document.getElementById('notice').innerText === 'Waiting for a publisher'", "words on an empty stage, on request")
         assert not complaints, complaints
 
 

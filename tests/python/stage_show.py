@@ -15,7 +15,7 @@ import time
 
 import numpy
 
-from stage_picture import BODY_LENGTH, HEAD_LENGTH, PROGRAM, STILL, WIDTH, browser, drawn, opened, play, publisher, server, truth_at, until, words
+from stage_picture import BODY_LENGTH, HEAD_LENGTH, PROGRAM, STILL, WIDTH, browser, drawn, opened, play, publisher, server, started, truth_at, until, words
 
 SIZES = [(1280, 800), (3840, 2160), (390, 844)]
 # Place and time of the paper's contact, by the reference of 38 digits.
@@ -83,28 +83,47 @@ def show_paints_nothing_but_the_picture():
             page.locator("#stage").focus()
             page.keyboard.press("Tab")
             page.keyboard.press("Shift+Tab")
-            # A browser that falls behind reports for a moment that no frames come.
             until(page, f"({SEEN}).length === 0", f"{width} x {height}: nothing but the picture")
             box = page.locator("#stage").bounding_box()
             assert (box["x"], box["y"], box["width"], box["height"]) == (0, 0, width, height), box
+            risen(page)
             pixels = shot(page)
-            # Only the night, and a thin line of the path, are along every edge: no panel, no frame.
+            # Only light on stone is along every edge: no panel, no frame.
             for edge in (pixels[:6], pixels[-6:], pixels[:, :6], pixels[:, -6:]):
                 assert luminance(edge).max() < 0.04, f"{width} x {height}: something is painted along an edge"
             for bench in (3, 100, 221):
                 x, y = at(page, *((handles[bench] + handles[bench + 1]) / 2)).astype(int)
-                red, green, _, _ = pixels[y, x]
-                assert red > 2 * green and red > 60, f"{width} x {height}: bench {bench} (from 0) is {pixels[y, x]}"
+                red, _, blue, _ = pixels[y, x].astype(int)
+                assert red > 200 and red > blue + 10, f"{width} x {height}: the lantern of bench {bench} (from 0) is {pixels[y, x]}"
+            black_beyond_the_light(page, pixels, handles)
         page.goto("about:blank")
         page.goto(f"{url}#show,transparent,nolabels")
-        drawn(page)
-        # A picture that was dimmed before the first frame takes a moment to be bright.
-        until(page, "getComputedStyle(document.getElementById('stage')).opacity === '1'", "a picture that is not dimmed")
+        risen(page)
         pixels, (x, y) = shot(page, omit_background=True), at(page, *((handles[100] + handles[101]) / 2)).astype(int)
         assert (pixels[[2, 2, -3, -3], [2, -3, 2, -3], 3] == 0).all(), "a transparent picture has a ground"
         assert pixels[y, x, 3] == 255, "a board is transparent"
         fixed_views(page, url, handles)
         assert not complaints, complaints
+
+
+def risen(page):
+    drawn(page)
+    until(page, "picture.life === 1", "lanterns that are all lit")
+    time.sleep(0.3)
+
+
+def black_beyond_the_light(page, pixels, handles):
+    """Each pixel farther from every handle than light reaches is exactly black: pools reach 3.2 m, and 1.2 m beyond a
+    handle."""
+    to_pixel = projection(page)
+    corner, scale = to_pixel(0, 0), numpy.hypot(*(to_pixel(1, 0) - to_pixel(0, 0)))
+    ys, xs = numpy.mgrid[0 : pixels.shape[0] : 7, 0 : pixels.shape[1] : 7]
+    places = numpy.stack([(xs - corner[0]) / scale, (corner[1] - ys) / scale], axis=-1).reshape(-1, 2)
+    away = numpy.min([numpy.hypot(*(places - handle).T) for handle in handles], axis=0)
+    colours = pixels[ys.ravel(), xs.ravel(), :3]
+    dark = away > 4.8
+    assert dark.mean() > 0.05, f"light reaches {100 - 100 * dark.mean():.0f} % of the picture: nothing is tested"
+    assert (colours[dark] == 0).all(), f"{(colours[dark] != 0).any(axis=1).sum()} of {dark.sum()} pixels beyond the light are not black"
 
 
 def fixed_views(page, url, handles):
@@ -204,7 +223,7 @@ def signs_have_contrast(page):
             assert spread(inside) >= 3, f"{deficiency}: {box['text']!r} has a contrast of {spread(inside):.2f}"
     vision.send("Emulation.setEmulatedVisionDeficiency", {"type": "none"})
     pixels = shot(page)
-    for name in ["#name", "#state", "#alert", "#metres", "#metre", "#scale", "#time", "#bench", "#follow", "#sound"]:
+    for name in ["#name", "#playback", "#alert", "#metres", "#metre", "#scale", "#time", "#bench", "#follow", "#sound"]:
         box = page.locator(name).bounding_box()
         inside = pixels[int(box["y"]) : int(box["y"] + box["height"]), int(box["x"]) : int(box["x"] + box["width"])]
         assert spread(inside) >= 4.5, f"{name} has a contrast of {spread(inside):.2f}"
@@ -245,16 +264,20 @@ def the_last_picture_stays():
                     one.goto(f"{url}#{address}")
                     drawn(one)
                 places = numpy.array([at(page, *(handles[bench] + handles[bench + 1]) / 2).astype(int) for bench in range(5, 220)])
-                before, before_show = shot(page), shot(show)
+                risen(show)
+                before = shot(page)
             until(page, "document.getElementById('notice').textContent.includes('No publisher')", "the publisher's death")
             assert page.is_visible("#notice") and "t = 300.0 s" in page.inner_text("#notice"), words(page)
             until(page, "getComputedStyle(document.getElementById('stage')).opacity === '0.4'", "a dimmed picture")
             stays(before, shot(page), places)
-            until(show, "document.getElementById('notice').checkVisibility()", "words on the picture alone")
-            until(show, "getComputedStyle(document.getElementById('stage')).opacity === '0.4'", "a dimmed show")
-            # The notice is below this part.
-            now, then = (luminance(pixels[:450]).std() for pixels in (shot(show), before_show))
-            assert 0.1 * then < now < 0.6 * then, f"the lights of the show spread over {now}, after {then}"
+            until(show, "picture.life === 0", "lanterns that have died down")
+            time.sleep(0.3)
+            assert (shot(show)[..., :3] == 0).all() and show.evaluate(SEEN) == [], "an audience sees more than black"
+            with publisher(*STILL):
+                until(show, "picture.life > 0 && picture.life < 1", "lanterns that rise")
+                risen(show)
+                assert luminance(shot(show)).max() > 0.5, "the show does not come back"
+            until(page, "document.getElementById('notice').textContent.includes('No publisher')", "the second publisher's death")
             assert not complaints, complaints
         until(page, "document.getElementById('notice').textContent.includes('No server')", "the server's death")
         page.set_viewport_size({"width": 901, "height": 600})
@@ -270,6 +293,89 @@ def stays(before, after, places):
     then, now = (luminance(pixels[places[:, 1], places[:, 0]]) for pixels in (before, after))
     assert len(places) > 100 and (now > then + 0.1).mean() > 0.9, "it is not dimmed"
     assert (now < ground - 0.1).mean() > 0.9, "the picture is gone"
+
+
+def show_is_locked():
+    """No hand moves, marks or conducts the show, even with --control; `hands` and `desk` unlock camera and keys."""
+    with started("view", "--json", "--port", "0", "--control") as conducted, publisher("--start", "300", "--time-scale", "1e-3"), browser(has_touch=True, color_scheme="dark") as (page, complaints):
+        url = json.loads(conducted.stdout.readline())["url"]
+        page.goto(f"{url}#show")
+        risen(page)
+        hands(page)
+        assert page.evaluate("document.documentElement.dataset.theme") == "dark" and page.evaluate(SEEN) == []
+        unchanged(page, 300.0)
+        # The tag of a held Shift+L, for a while.
+        page.keyboard.down("Shift")
+        page.keyboard.down("L")
+        until(page, "document.getElementById('locked').checkVisibility() && document.getElementById('locked').textContent", "the tag")
+        assert "locked" in page.inner_text("#locked") and "t = 300" in page.inner_text("#locked")
+        page.keyboard.up("L")
+        page.keyboard.up("Shift")
+        until(page, "!document.getElementById('locked').checkVisibility()", "no tag")
+        page.goto("about:blank")
+        page.goto(f"{url}#show,hands")
+        risen(page)
+        before = at(page, 1, 0) - at(page, 0, 0)
+        page.mouse.move(300, 300)
+        page.mouse.wheel(0, -500)
+        until(page, f"picture.toPixel(1, 0)[0] - picture.toPixel(0, 0)[0] > 1.5 * {before[0]}", "a larger picture with #show,hands")
+        page.keyboard.press("Space")
+        unchanged(page, 300.0)
+        page.goto("about:blank")
+        page.goto(f"{url}#show,desk")
+        risen(page)
+        page.keyboard.press("Space")
+        until(page, "document.getElementById('playback').textContent.includes('PAUSED')", "a key that conducts with #show,desk")
+        assert not complaints, complaints
+
+
+def hands(page):
+    """Every gesture and key that does something on the page without #show."""
+    camera = "[picture.toPixel(0, 0), picture.toPixel(1, 1)].join()"
+    before = page.evaluate(camera)
+    page.mouse.move(400, 300)
+    page.mouse.wheel(0, -500)
+    page.mouse.down()
+    page.mouse.move(600, 350, steps=5)
+    page.mouse.up()
+    page.mouse.click(640, 100)
+    page.mouse.dblclick(640, 100)
+    page.touchscreen.tap(500, 300)
+    for key in ["Space", "h", "t", "s", "f", "0", "+", "-", "?", ".", "[", "]", "ArrowLeft", "ArrowRight", "ArrowUp", "Escape", "Tab", "Enter"]:
+        page.keyboard.press(key)
+    time.sleep(0.5)
+    assert page.evaluate(camera) == before, "a hand moves the camera"
+    assert page.evaluate("!document.querySelector('dialog[open]')"), "a dialog is open"
+
+
+def unchanged(page, moment):
+    assert "PLAYING" in page.evaluate("document.getElementById('playback').textContent"), "a key conducts"
+    assert abs(page.evaluate("picture.time") - moment) < 0.5, page.evaluate("picture.time")
+
+
+def coming_lanterns_burn_white():
+    """The lanterns of the two benches that will touch become white within the last ten seconds; no mark is drawn."""
+    with server() as url, publisher("--start", "412.3", "--time-scale", "1e-3") as _, browser(viewport={"width": 1280, "height": 800}, reduced_motion="reduce") as (page, complaints):
+        page.goto(f"{url}#show,view=1.5,2,6")
+        risen(page)
+        assert page.evaluate("picture.marks.length") == 0 and page.evaluate(SEEN) == []
+        handles, pixels = numpy.array(page.evaluate("[...picture.shown.handles]")).reshape(-1, 5)[:, :2], shot(page)
+        # Red lanterns at the front of a board: white ones are as blue as red.
+        def blue(bench):
+            middle, link = (handles[bench] + handles[bench + 1]) / 2, handles[bench] - handles[bench + 1]
+            x, y = at(page, *(middle + 0.45 * link / numpy.linalg.norm(link))).astype(int)
+            return pixels[y - 8 : y + 9, x - 8 : x + 9, 2].mean()
+        seconds = (CONTACT - page.evaluate("picture.time")) / 1e-3
+        assert seconds > 20, f"{seconds} s before the contact"
+        usual = blue(8)
+    with server() as url, publisher("--start", "412.3", "--time-scale", "0.05") as _, browser(viewport={"width": 1280, "height": 800}, reduced_motion="reduce") as (page, complaints):
+        page.goto(f"{url}#show,view=1.5,2,6")
+        risen(page)
+        until(page, f"picture.time > {CONTACT} - 0.05", "the last second")
+        handles, pixels = numpy.array(page.evaluate("[...picture.shown.handles]")).reshape(-1, 5)[:, :2], shot(page)
+        assert blue(8) > usual + 40, f"a lantern of bench 9 has blue {blue(8):.0f}, before {usual:.0f}"
+        assert blue(8) > blue(20) + 40, f"a lantern of bench 21 is as white as one of bench 9: {blue(20):.0f}, {blue(8):.0f}"
+        assert not complaints, complaints
 
 
 def colours_mean_the_same_all_along():
@@ -347,4 +453,4 @@ def heap(page):
 
 if __name__ == "__main__":
     scenarios = (show_paints_nothing_but_the_picture, what_is_coming_is_named_and_seen, the_last_picture_stays)
-    play(*scenarios, colours_mean_the_same_all_along, nothing_is_complained_about)
+    play(*scenarios, show_is_locked, coming_lanterns_burn_white, colours_mean_the_same_all_along, nothing_is_complained_about)

@@ -11,64 +11,6 @@ use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::model::{Point, Vector};
 use bench_dragon_motion::solve::Chain;
 
-/// The range of handle speeds, metres per second: the ends of the colour scale.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Speeds {
-    /// The least speed.
-    pub least: f64,
-    /// The greatest speed.
-    pub greatest: f64,
-}
-
-impl Speeds {
-    /// The range of no handle.
-    pub const NONE: Self = Self { least: f64::INFINITY, greatest: f64::NEG_INFINITY };
-
-    /// Extends the range to the handles of a chain.
-    pub fn include(&mut self, chain: &Chain) {
-        for speed in chain.speed.iter().filter(|speed| speed.is_finite()) {
-            (self.least, self.greatest) = (self.least.min(*speed), self.greatest.max(*speed));
-        }
-    }
-
-    /// Returns the colour scale, or `None` if no speed is known. It reaches at most from the negative head speed to
-    /// three times the head speed. It reaches at least a thousandth to either side of the head speed, so that rounding
-    /// has no colour.
-    pub fn scale(&self, head_speed: f64) -> Option<ColourScale> {
-        if self.least > self.greatest {
-            return None;
-        }
-        let [least, greatest] = [self.least, self.greatest].map(|speed| speed.clamp(-head_speed, 3.0 * head_speed));
-        let wider = (0.001 * head_speed - 0.5 * (greatest - least)).max(0.0);
-        Some(ColourScale {
-            least: least - wider,
-            greatest: greatest + wider,
-            some_below: self.least < least,
-            some_above: self.greatest > greatest,
-        })
-    }
-}
-
-/// The assignment of colours to speeds.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ColourScale {
-    /// The speed at the slow end, metres per second.
-    pub least: f64,
-    /// The speed at the fast end, metres per second.
-    pub greatest: f64,
-    /// True if some handles are slower than the slow end.
-    pub some_below: bool,
-    /// True if some handles are faster than the fast end.
-    pub some_above: bool,
-}
-
-impl ColourScale {
-    /// Returns the position of a speed on the scale, from 0 to 1.
-    pub fn part(&self, speed: f64) -> f64 {
-        (speed - self.least) / (self.greatest - self.least)
-    }
-}
-
 /// Returns the board of a bench. The heading keeps digits that the difference of two far handles has lost.
 pub fn board(team: &Team, chain: &Chain, bench: usize) -> Board {
     let (sine, cosine) = chain.heading[bench].sin_cos();
@@ -201,15 +143,5 @@ mod tests {
         let found = overlapping(&boards, 1e-9);
         assert_eq!(found.iter().map(|pair| (pair.0, pair.1)).collect::<Vec<_>>(), [(0, 2)]);
         assert!((found[0].2 - 0.25).abs() < 1e-12, "{found:?}");
-    }
-
-    #[test]
-    fn the_scale_has_a_least_width_and_ends_at_three_times_the_head() {
-        let scale = |least, greatest| Speeds { least, greatest }.scale(2.0).unwrap();
-        let whole = ColourScale { least: 1.998, greatest: 2.002, some_below: false, some_above: false };
-        assert_eq!(scale(2.0, 2.0), whole);
-        assert_eq!(scale(1.0, 1e9), ColourScale { least: 1.0, greatest: 6.0, some_above: true, ..whole });
-        assert_eq!(Speeds::NONE.scale(2.0), None);
-        assert_eq!(scale(1.0, 3.0).part(2.0), 0.5);
     }
 }

@@ -9,10 +9,12 @@
 pub mod animation;
 mod benches;
 pub mod camera;
+mod labels;
 mod look;
 mod marks;
 pub mod palette;
 mod route;
+mod scale;
 mod sheet;
 pub mod swept;
 
@@ -22,15 +24,16 @@ use svg::node::element::{ClipPath, Definitions, Description, Group, Path, Rectan
 use bench_dragon_messages::sentence::rounded;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::model::Point;
-use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::solve::Chain;
 use bench_dragon_motion::timeline::Timeline;
-use benches::{ColourScale, Speeds};
 use camera::{Camera, StageBox, Viewport};
+use labels::Name;
 pub use look::{Framing, Length, Look, Surroundings, Theme};
 use marks::{Happened, Tense};
 use palette::Palette;
+pub use scale::mean_speeds;
+use scale::{ColourScale, Speeds};
 use swept::SweptArea;
 
 /// Width of a sheet in its own units, for any size in print or on a screen.
@@ -139,7 +142,7 @@ impl<'a> Drawing<'a> {
             stage.add(benches::group(&boards, |bench| self.fill(chain.speed[bench], palette), &self.camera, palette));
         stage = stage.add(benches::handles(self.motion.team(), chain, &self.camera, palette));
         let benches = self.motion.team().benches;
-        let (mut marks, mut labels) = (Group::new().set("id", "marks"), Group::new().set("id", "labels"));
+        let mut marks = Group::new().set("id", "marks");
         let (mut events, mut places) = (Vec::new(), Vec::new());
         for past in &happened {
             if let Some(place) = past.place(&self.camera) {
@@ -149,7 +152,7 @@ impl<'a> Drawing<'a> {
                 events.push((*past, past.sentence("here", benches)));
             }
         }
-        let mut signs = (false, false);
+        let (mut signs, mut names) = ((false, false), Vec::new());
         for (bench, board) in boards.iter().rev() {
             if *bench + 1 == benches && benches > 1 {
                 stage = stage.add(benches::tail_sign(board, &self.camera, palette));
@@ -167,9 +170,11 @@ impl<'a> Drawing<'a> {
             }
             if let Some(name) = name(*bench, benches - 1, &outlined) {
                 let colour = if outlined.contains(bench) { palette.danger } else { palette.ink };
-                labels = labels.add(sheet::label(&name, self.beside(board, &places), colour, &self.camera, palette));
+                names.push(Name { words: name, number: bench + 1, board: *board, colour });
             }
         }
+        // Names of outlined boards are placed first.
+        names.sort_by_key(|name| !outlined.contains(&(name.number - 1)));
         let mut document = self.document(time, chain, palette);
         // The clip path is in sheet units, whatever the units of the group.
         document = document.add(Group::new().set("clip-path", "url(#frame)").add(stage).add(marks));
@@ -185,7 +190,7 @@ impl<'a> Drawing<'a> {
             };
             let (below, colour) = self.subtitle(time, &happened, &overlaps, palette);
             document = document
-                .add(labels)
+                .add(labels::labels(&names, &boards, &places, self.motion.team().hole_inset, &self.camera, palette))
                 .add(sheet::axes(&self.camera, palette))
                 .add(sheet::title(&self.title(time), &below, colour, palette))
                 .add(sheet::legend(&contents, &self.camera, palette));
@@ -238,24 +243,6 @@ impl<'a> Drawing<'a> {
             Some(scale) if speed.is_finite() => palette.shade(scale.part(speed)),
             _ => palette.still.to_owned(),
         }
-    }
-
-    /// Returns the position of a board's name: beside the board, away from the middle of the picture, unless a mark is
-    /// there.
-    fn beside(&self, board: &Board, marks: &[(f64, f64)]) -> (f64, f64) {
-        let (x, y) = self.camera.sheet(board.centre);
-        let across = board.across();
-        let outward = board.centre - self.camera.centre;
-        let side = if across.dot(&outward) < 0.0 { -across } else { across };
-        let away = board.half_width * self.camera.scale + 16.0;
-        let places = [1.0, -1.0].map(|sign| (x + sign * 2.2 * away * side.x, y - sign * away * side.y));
-        let viewport = self.camera.viewport;
-        let free = |(x, y): &(f64, f64)| {
-            (viewport.left + 30.0..viewport.right() - 30.0).contains(x)
-                && (viewport.top + 20.0..viewport.bottom() - 10.0).contains(y)
-                && marks.iter().all(|(a, b)| (x - a).abs() > 60.0 || (y - b).abs() > 34.0)
-        };
-        places.into_iter().find(free).unwrap_or(places[0])
     }
 
     fn overlaps(&self, chain: &Chain) -> Vec<(usize, usize, f64)> {

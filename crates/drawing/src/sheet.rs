@@ -3,10 +3,10 @@
 
 use svg::node::element::{Definitions, Group, LinearGradient, Path, Rectangle, Stop, Text};
 
-use super::benches::ColourScale;
 use super::camera::{Camera, Viewport};
 use super::marks::Happened;
 use super::palette::Palette;
+use super::scale::ColourScale;
 use super::{FACE, WIDTH, rounded, text};
 
 const LEFT: f64 = 62.0;
@@ -187,12 +187,9 @@ impl Row {
 }
 
 fn speed_words(scale: &ColourScale) -> String {
-    let ColourScale { least, greatest, .. } = scale;
-    // As many digits as distinguish the two ends.
-    let decimals = (1.0 - (greatest - least).log10().floor()).clamp(0.0, 12.0) as usize;
-    let or = |beyond: bool, words: &'static str| if beyond { words } else { "" };
-    let (slow, fast) = (or(scale.some_below, " or less"), or(scale.some_above, " or more"));
-    format!("{least:.decimals$}{slow} to {greatest:.decimals$}{fast} m/s")
+    let (least, greatest) = scale.ends();
+    let [least, head, greatest] = [least, scale.head_speed, greatest].map(|speed| rounded(speed, 3));
+    format!("mean speed {least} to {greatest} m/s, finest at {head} m/s")
 }
 
 fn gradient(palette: &Palette) -> Definitions {
@@ -201,17 +198,6 @@ fn gradient(palette: &Palette) -> Definitions {
         gradient.add(Stop::new().set("offset", at).set("stop-color", colour))
     });
     Definitions::new().add(gradient)
-}
-
-/// Returns text in the picture, with a rim in the ground's colour so that it can be read over boards.
-pub fn label(content: &str, (x, y): (f64, f64), colour: &str, camera: &Camera, palette: &Palette) -> Group {
-    let half = 0.5 * width_of(content, 16.0) + 6.0;
-    let Viewport { left, top, .. } = camera.viewport;
-    let x = x.min(camera.viewport.right() - half).max(left + half);
-    let y = y.min(camera.viewport.bottom() - 10.0).max(top + 20.0);
-    let place = |colour| words(content, (x, y + 5.0), 16, colour).set("text-anchor", "middle").set("font-weight", 600);
-    let rim = place(palette.ground).set("stroke", palette.ground).set("stroke-width", 5);
-    Group::new().add(rim.set("stroke-linejoin", "round")).add(place(colour))
 }
 
 #[cfg(test)]

@@ -251,6 +251,9 @@ const SCENE_NAME_BYTES: usize = 64;
 pub struct SceneName([u8; SCENE_NAME_BYTES]);
 
 impl SceneName {
+    /// The greatest length of a name, bytes in UTF-8.
+    pub const CAPACITY: usize = SCENE_NAME_BYTES;
+
     /// Creates a name, cut to the bytes that there is room for.
     pub fn new(name: &str) -> Self {
         let mut bytes = [0; SCENE_NAME_BYTES];

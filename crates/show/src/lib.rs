@@ -174,7 +174,7 @@ impl Show {
         let rounding = ROUNDING_OVERLAP * scene.team().longest_link() + choice.clearance_error(scene.team());
         let Choice { solver, reason, .. } = choice;
         let exact = !matches!(scene.motion.method(), Method::Paper(_));
-        let (cues, missing_cues) = cues(scene, &timeline);
+        let (cues, missing_cues) = timed_cues(scene, &timeline);
         let cue_times = cues.iter().map(|cue| CueTime { time: cue.time, pauses: cue.pauses }).collect();
         let frame = Frame { cues: Vec::with_capacity(2 * cues.len()), ..Frame::new(scene.team().handles()) };
         Ok(Self {
@@ -361,7 +361,7 @@ impl Show {
 }
 
 /// Returns the cues of a scene in the order of their times, and the names of the cues without a time.
-fn cues(scene: &Scene, timeline: &Timeline) -> (Vec<ReachedCue>, Vec<String>) {
+pub fn timed_cues(scene: &Scene, timeline: &Timeline) -> (Vec<ReachedCue>, Vec<String>) {
     let (mut cues, mut missing) = (Vec::new(), Vec::new());
     for cue in &scene.cues {
         match cue.time(&scene.motion, timeline) {

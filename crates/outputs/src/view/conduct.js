@@ -1,5 +1,4 @@
-// The transport bar: sends commands if the server allows this page to, and always shows the cues. In: the streams'
-// messages and frames. Out: commands over the same WebSockets. One of several dragons may be selected; a hold and its
+// The transport bar: sends commands if the server allows this page to. In: the streams' messages and frames. Out: commands over the same WebSockets. One of several dragons may be selected; a hold and its
 // release always go to all of them.
 
 import { answerTo, say, translate } from "./words.js";
@@ -12,8 +11,8 @@ const SEEK = 5;
 const SEEK_INTERVAL = 100;
 /** The time limit of an answer (ms). */
 const PATIENCE = 2000;
-/** The time for which a sentence and a cue's name are shown (ms). */
-const SENTENCE_TIME = 8000, CUE_TIME = 6000;
+/** The time for which a sentence is shown (ms). */
+const SENTENCE_TIME = 8000;
 /** Commands whose refusals are kept: more than a server leaves unanswered. */
 const KEPT_REFUSALS = 16;
 const RATES = [0.1, 0.25, 0.5, 1, 2, 4, 10];
@@ -66,21 +65,20 @@ function canPause(streams) {
 /** Returns true if a publisher can execute commands. */
 const isThere = ({ playback, stage, trouble }) => Boolean(playback.newest && stage && trouble === null);
 
-export function conduct(dragons) {
+/** `keysConduct`: true if keys conduct; in the show look only on request. */
+export function conduct(dragons, keysConduct) {
   const bar = document.getElementById("conduct"), main = bar.parentElement;
   bar.innerHTML = BAR;
   translate(bar);
   const part = (name) => document.getElementById(`conduct-${name}`);
   const line = part("seek"), rates = part("rate");
-  const cue = main.appendChild(Object.assign(document.createElement("p"), { id: "cue", hidden: true }));
-  cue.setAttribute("role", "status");
   const streams = dragons.map(({ stream }) => stream), several = dragons.length > 1, nameOf = (stream) => dragons[streams.indexOf(stream)].name;
   const greeted = new Map(), allowed = new Map();
   /** The refusals of the last commands, by the command's number: a sentence for each stream. */
   const refusals = new Map();
   /** The selected stream, null for all; the number of commands so far, and the command whose refusal is shown. */
   let chosen = null, numbered = 0, refused = 0;
-  let shownStages = [], shownRate, dragged = false, sentenceAt = 0, cueAt = 0;
+  let shownStages = [], shownRate, dragged = false, sentenceAt = 0;
   /** The target of an unanswered seek, and of a seek that waits for that answer; the time of the last seek sent. */
   let sought = null, wanted = null, soughtAt = -Infinity;
   /** The last answer to a seek: frames from before it are still on their way. */
@@ -203,7 +201,6 @@ export function conduct(dragons) {
   function show() {
     const at = performance.now(), all = there();
     if (at - sentenceAt > SENTENCE_TIME) put(part("answer"), "");
-    if (at - cueAt > CUE_TIME) cue.hidden = true;
     if (bar.hidden) return;
     main.style.setProperty("--conduct-height", `${bar.offsetHeight}px`);
     for (const control of bar.querySelectorAll("button, input, select:not(#conduct-whom)")) control.disabled = !all.length;
@@ -218,7 +215,8 @@ export function conduct(dragons) {
     showRate(rateOf(isThere(lead()) ? lead() : all[0]));
     put(part("toggle"), say(canPause(all) ? "pause" : "play"));
     const time = dragged || sought !== null || wanted !== null ? now() : playback.time(at);
-    if (!dragged) line.value = time;
+    // A screen reader reads the value: without digits beyond a tenth.
+    if (!dragged) line.value = Math.round(10 * time) / 10;
     line.setAttribute("aria-valuetext", seconds(time));
     put(part("time"), `${time.toFixed(1)} / ${seconds(Number(line.max))}`);
   }
@@ -244,12 +242,6 @@ export function conduct(dragons) {
         // One of several shows may execute an earlier command after a later command did not reach another one.
       } else if (message.code && (several ? message.id > refused : message.id !== refused)) put(part("answer"), "");
       sendSeek();
-    }
-    // A cue that passed before this page came is no news.
-    const { newest } = stream.playback, age = message.type === "cue" && newest ? Math.abs(newest.time - message.sim_time) : Infinity;
-    if (age <= (CUE_TIME / 1000) * (newest?.scale || 1)) {
-      cue.textContent = own(stream, `${message.number}. ${message.name}${message.pauses ? say("waitingForGo") : ""}`);
-      [cue.hidden, cueAt] = [false, performance.now()];
     }
   };
   for (const stream of streams) stream.onmessage = receive(stream);
@@ -301,7 +293,7 @@ export function conduct(dragons) {
     target.closest("select, input:not([type=range]), dialog") || (key === " " && target.closest("button")) || (key.startsWith("Arrow") && target.closest("canvas"));
   addEventListener("keydown", (event) => {
     const { key, target } = event;
-    if (bar.hidden || event.ctrlKey || event.metaKey || (event.altKey && !"[]".includes(key))) return;
+    if (bar.hidden || !keysConduct || event.ctrlKey || event.metaKey || (event.altKey && !"[]".includes(key))) return;
     const within = bar.contains(target);
     if (usedBy(target, key)) return within && event.stopPropagation();
     const act = keys[key.length === 1 ? key.toLowerCase() : key];

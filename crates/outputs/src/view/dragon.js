@@ -7,6 +7,7 @@ import { Overlap, marksOf } from "./marks.js";
 import { SpeedScale } from "./palette.js";
 import { Show } from "./show.js";
 import { Stream } from "./stream.js";
+import { Transport } from "./transport.js";
 import { benchesOf, nameOf, remaining, say } from "./words.js";
 
 /** The situation without anything to show. */
@@ -15,6 +16,8 @@ const WAITING = { name: "waiting", severity: "ok", happened: false, sentence: nu
 const UNKNOWN = { ...WAITING, name: "unknown" };
 /** The time without frames after which the page reports silence (ms). */
 const SILENCE = 2000;
+/** The number of `ended` among the states of playback. */
+const ENDED = 3;
 /** Milliseconds between the frames of the slowest publisher. */
 const LONGEST_PERIOD = 10_000;
 
@@ -50,6 +53,7 @@ export class Dragon {
     this.colours = new SpeedScale();
     this.show = show ? new Show(still) : null;
     this.overlap = new Overlap();
+    this.transport = new Transport();
     /** The handles at the moment of the picture, and the two frames around it. */
     this.places = this.shown = null;
     this.path = this.run = this.team = this.epoch = null;
@@ -81,19 +85,29 @@ export class Dragon {
     return this.several ? `${this.name}: ${words}` : words;
   }
 
-  /** Returns the situation: the state, the next event and the seconds of wall time until then. */
+  /**
+   * Returns the situation: the state, the next event, the seconds of wall time until then at the last known rate, and
+   * whether the show stands.
+   */
   situation(now) {
     const { playback, stage, alert, trouble } = this.stream, { newest } = playback;
     const silence = newest ? now - newest.at : 0;
     const silent = !trouble && newest && silence > Math.max(SILENCE, 3 * (playback.isPaced ? playback.interval : LONGEST_PERIOD)) ? Math.floor(silence / 1000) : null;
     const lost = trouble ?? (newest && stage ? null : "noStage");
     const current = lost ? WAITING : stage.states[newest.state] ?? UNKNOWN;
+    this.transport.look(now, newest, lost ?? (silent === null ? null : "silent"), (number) => this.cueOf(number));
     let [seconds, ahead] = [NaN, null];
-    if (!lost && silent === null && newest.playing && !current.happened) {
+    if (!lost && silent === null && newest.playback !== ENDED && !current.happened) {
       ahead = alert?.event ?? "path_end";
-      seconds = ((alert?.event_time ?? pathEnd(stage, alert)) - playback.time(now)) / newest.scale;
+      seconds = ((alert?.event_time ?? pathEnd(stage, alert)) - playback.time(now)) / this.transport.pace;
     }
-    return { state: current, alert, trouble: lost, silent, stale: Boolean(lost) || silent !== null, seconds, ahead, benches: stage?.benches, now: "" };
+    return { state: current, alert, trouble: lost, silent, stale: Boolean(lost) || silent !== null, seconds, ahead, stands: !newest?.playing, benches: stage?.benches, now: "" };
+  }
+
+  /** Returns a cue of the run by its number; null for one that is not known. The stage has the first cues only. */
+  cueOf(number) {
+    const { stage, cue } = this.stream;
+    return stage?.cues.find((one) => one.number === number) ?? (cue?.number === number ? { ...cue, time: cue.cue_time } : null);
   }
 
   /**
@@ -114,13 +128,18 @@ export class Dragon {
     const { alert } = this.stream, known = stage.states[newest.state] ?? UNKNOWN;
     const deepest = known.happened && known.severity !== "ok" ? this.overlap.look(stage, this.places, newest, this.reach, now) : null;
     const all = marksOf({ state: known, alert, stage, places: this.places, overlap: deepest });
-    // An audience sees the place of the next event, not the marks for the crew.
-    this.marks = this.named(this.show ? all.filter(({ kind }) => kind !== "now") : all, deepest);
+    // Marks are for the crew; an audience sees lanterns that burn white.
+    this.marks = this.show ? [] : this.named(all, deepest);
     this.sight.now = deepest && !this.sight.trouble ? overlapWords(deepest) : "";
     const happened = this.state.happened && this.state.severity === "error";
     this.struck = happened && before !== WAITING && before.name !== this.state.name;
     const { from } = this.shown;
-    this.show?.update(now, this.places, this.epoch !== from.epoch, happened ? { x: alert?.event_x ?? this.places[0], y: alert?.event_y ?? this.places[1] } : null);
+    this.show?.breathe(now, this.sight.stale);
+    this.show?.update({
+      time: this.shown.time, places: this.places, stands: this.sight.stands || this.sight.stale, jumped: this.epoch !== from.epoch,
+      coming: { benches: [alert?.event_bench_a, alert?.event_bench_b].filter((bench) => bench != null), seconds: this.sight.seconds },
+      happened: happened ? { x: alert?.event_x ?? this.places[0], y: alert?.event_y ?? this.places[1] } : null,
+    });
     this.epoch = from.epoch;
     return isOther;
   }
@@ -165,7 +184,7 @@ export class Dragon {
   named(marks, deepest) {
     const { seconds } = this.sight, time = seconds > -1 ? remaining(Math.max(0, seconds)).join(" ") : null;
     for (const mark of marks) {
-      mark.names = this.show ? [] : mark.pair.map((bench) => this.own(nameOf(bench)));
+      mark.names = mark.pair.map((bench) => this.own(nameOf(bench)));
       const benches = mark.pair.length ? benchesOf(mark.pair) : "", { alert } = this.stream;
       if (mark.kind === "coming") mark.text = this.own(say(time === null ? "comingStill" : "coming", { kind: say(alert.event), benches, time }));
       if (mark.kind === "overlap") mark.text = this.own(overlapWords(deepest));
@@ -173,12 +192,9 @@ export class Dragon {
     return marks;
   }
 
-  /**
-   * Returns the words at its ends: head and tail, with its name if there are several; in the show look only the name.
-   */
+  /** Returns the words at its ends: head and tail, with its name if there are several. */
   endNames() {
     const gone = this.several && this.sight.stale ? ` (${say(this.sight.trouble ?? "noFramesNow")})` : "";
-    if (this.show) return this.several ? [this.name + gone, null] : [null, null];
     return [this.own(say("head")) + gone, this.own(say("tail"))];
   }
 
@@ -199,8 +215,8 @@ export class Dragon {
   /** For tests and measurements; empty for a publisher that is gone. */
   report(camera) {
     const { newest } = this, there = this.isThere && !this.sight.trouble;
-    if (!there) return { name: this.name, state: null, run: null, sequence: null, head: null, shown: null, time: newest?.time ?? null };
+    if (!there) return { name: this.name, life: this.show?.life ?? null, state: null, run: null, sequence: null, head: null, shown: null, time: newest?.time ?? null };
     const head = camera.toPixel(this.places[0], this.places[1]);
-    return { name: this.name, state: newest.state, run: newest.run, sequence: newest.sequence, time: newest.time, head, shown: this.shown };
+    return { name: this.name, life: this.show?.life ?? null, state: newest.state, run: newest.run, sequence: newest.sequence, time: newest.time, head, shown: this.shown };
   }
 }

@@ -2,8 +2,9 @@
 
 import { rectangle } from "./boards.js";
 import { STRIDE } from "./hermite.js";
+import { NARROW } from "./labels.js";
 import { SHADES } from "./palette.js";
-import { Labels, doubled, scaleBar, target } from "./signs.js";
+import { doubled, scaleBar, target } from "./signs.js";
 
 /** Edges drawn at once: a path with thousands takes several times as long. */
 const BATCH = 100;
@@ -170,28 +171,24 @@ export class Ground {
 }
 
 /**
- * Draws everything. `scene` has: ground, words (false: none are written), and dragons, each with stage, places (STRIDE
+ * Draws everything. `scene` has: ground, labels (null: no words are written), and dragons, each with stage, places (STRIDE
  * numbers a handle, as all handles here), colours (a SpeedScale), path, marks (see marks.js), chosen (a bench, or -1),
- * its chosenName, its endNames, show (a Show, or null), stale (true if it is stale beside live ones), and identity (see
+ * its chosenName, its endNames, stale (true if it is stale beside live ones), and identity (see
  * palette.js; null for a single dragon). Returns the words written, as boxes in pixels.
  */
-export function draw(context, camera, palette, { ground, dragons, words }) {
+export function draw(context, camera, palette, { ground, dragons, labels }) {
   ground.cover(context, camera, palette, dragons.map(({ path, identity }) => ({ lines: path, dashes: identity?.dashes ?? [] })));
   const stale = dragons.filter((dragon) => dragon.stale);
   for (const dragon of stale) drawDragon(context, camera, palette, ground.transparent, dragon);
   if (stale.length) ground.dim(context, DIMMED);
   for (const dragon of dragons) if (!dragon.stale) drawDragon(context, camera, palette, ground.transparent, dragon);
-  if (!words) return [];
-  const labels = new Labels(camera);
-  label(labels, palette, dragons);
-  if (!dragons[0].show) labels.keep(scaleBar(context, camera, palette));
-  labels.write(context, palette);
-  inMetres(context, camera);
-  return labels.boxes;
+  if (!labels) return [];
+  const keep = [scaleBar(context, camera, palette)], { items, rings, marked } = wordsOf(dragons, palette, camera.width < NARROW);
+  return labels.draw(context, camera, palette, { dragons, items, rings: rings.map(({ x, y }) => camera.toPixel(x, y)), marked, keep });
 }
 
 function drawDragon(context, camera, palette, transparent, dragon) {
-  const { stage, places, marks, chosen, show, identity } = dragon, pixel = camera.unit / camera.scale;
+  const { stage, places, marks, chosen, identity } = dragon, pixel = camera.unit / camera.scale;
   inMetres(context, camera);
   context.lineJoin = "miter";
   const count = places.length / STRIDE - 1, board = (bench) => rectangle(stage, places, bench);
@@ -204,19 +201,15 @@ function drawDragon(context, camera, palette, transparent, dragon) {
     doubled(context, palette, pixel, ink, width, trace, dashes);
   };
   if (identity) casing(context, camera, palette, transparent, dragon);
-  if (show) show.draw(context, camera, palette, dragon, inSight(camera, stage, places));
-  else {
-    benches(context, camera, palette, dragon);
-    headSign(context, board(0), palette, pixel);
-    if (count > 1) tailSign(context, board(count - 1), palette, pixel);
-    mark(0, palette.ink, 2);
-    if (count > 1) mark(count - 1, palette.ink, 1);
-  }
+  benches(context, camera, palette, dragon);
+  headSign(context, board(0), palette, pixel);
+  if (count > 1) tailSign(context, board(count - 1), palette, pixel);
+  mark(0, palette.ink, 2);
+  if (count > 1) mark(count - 1, palette.ink, 1);
   // The first in the list lies on top.
   for (const { pair, ink, dashes } of marks.toReversed()) pair.filter((bench) => bench < count).forEach((bench) => mark(bench, palette[ink], 3.5, dashes));
   if (chosen >= 0 && chosen < count) mark(chosen, palette.ink, 3, [7, 4]);
   for (const { place, ink, ghost } of marks.toReversed()) if (place) target(context, place, palette, pixel, palette[ink], ghost);
-  show?.crown(context, camera, palette, dragon);
 }
 
 /**
@@ -241,33 +234,52 @@ function casing(context, camera, palette, transparent, { stage, places, identity
   context.lineJoin = "miter";
 }
 
-/** Words for all dragons; the most important ones are placed first. */
-function label(labels, palette, dragons) {
-  const each = (write) => dragons.forEach((dragon) => write(dragon, dragon.places.length / STRIDE - 1, (bench) => rectangle(dragon.stage, dragon.places, bench)));
+/**
+ * The words of all dragons, the most important first; the signs that they leave free, and the outlined boards. On a
+ * narrow picture sentences have two lines.
+ */
+function wordsOf(dragons, palette, isNarrow) {
+  const items = [], rings = [], marked = [], named = new Set();
+  const name = (dragon, bench, text, ink) => {
+    const key = `${dragons.indexOf(dragon)} ${bench}`;
+    if (text && !named.has(key)) items.push({ key, text, ink, dragon, bench });
+    named.add(key);
+  };
+  const each = (write) => dragons.forEach((dragon) => write(dragon, dragon.places.length / STRIDE - 1));
   each(({ marks }) => {
-    for (const { place } of marks) if (place) labels.ring(place.x, place.y);
+    for (const { place } of marks) if (place) rings.push(place);
   });
-  each(({ marks }) => {
-    for (const { place, ink, text } of marks) if (place && text) labels.add(text, place.x, place.y, palette[ink], 34, 1.25);
+  each(({ marks }, _) => {
+    for (const { kind, place, ink, text } of marks) if (place && text) items.push({ key: `${kind} ${items.length}`, text: isNarrow ? halved(text) : text, ink: palette[ink], large: 1.25, ...place });
   });
-  each(({ marks, chosen, chosenName, endNames: [front, rear], show }, count, board) => {
-    const named = new Set();
-    for (const { pair, ink, names } of marks) {
-      pair.filter((bench) => bench < count).forEach((bench, k) => {
-        const { x, y, c, s, l } = board(bench);
-        if (!named.has(bench) && names[k]) labels.add(names[k], x - 0.6 * l * c, y - 0.6 * l * s, palette[ink], 30);
-        named.add(bench);
+  each((dragon, count) => {
+    for (const { pair, ink, names } of dragon.marks) {
+      pair.forEach((bench, k) => {
+        if (bench >= count) return;
+        marked.push({ dragon, bench });
+        name(dragon, bench, names[k], palette[ink]);
       });
     }
-    if (chosen >= 0 && chosen < count && !named.has(chosen)) {
-      labels.add(chosenName, board(chosen).x, board(chosen).y, palette.ink, 30);
-      named.add(chosen);
-    }
-    const [head, tail] = [board(0), board(count - 1)];
-    // In the show look marked benches have no names; the dragon's name is not theirs.
-    if (front && (show || !named.has(0))) labels.add(front, head.x + head.l * head.c, head.y + head.l * head.s, palette.ink);
-    if (rear && count > 1 && !named.has(count - 1)) labels.add(rear, tail.x - tail.l * tail.c, tail.y - tail.l * tail.s, palette.ink);
   });
+  each((dragon, count) => {
+    const { chosen, chosenName, endNames: [front, rear] } = dragon;
+    if (chosen >= 0 && chosen < count) {
+      marked.push({ dragon, bench: chosen });
+      name(dragon, chosen, chosenName, palette.ink);
+    }
+    name(dragon, 0, front, palette.ink);
+    if (count > 1) name(dragon, count - 1, rear, palette.ink);
+  });
+  return { items, rings, marked };
+}
+
+/** A sentence in two lines, divided at the comma or space nearest to its middle. */
+function halved(text) {
+  const places = [...text.matchAll(/[,，] ?| /g)].map(({ index, 0: gap }) => index + gap.length);
+  if (!places.length) return text;
+  const cost = (at) => Math.abs(at - text.length / 2) - (/[,，]/.test(text.slice(at - 2, at)) ? text.length / 6 : 0);
+  const at = places.reduce((best, one) => (cost(one) < cost(best) ? one : best));
+  return `${text.slice(0, at).trim()}\n${text.slice(at)}`;
 }
 
 /** The benches that are in the picture. */

@@ -1,4 +1,4 @@
-// The colours of the picture: those of the style sheet, the scale of speeds, and those of the show look.
+// The colours of the picture: those of the style sheet, and the scale of speeds.
 
 import { STRIDE, speedOf } from "./hermite.js";
 
@@ -9,6 +9,8 @@ export const SHADES = 32;
  * used.
  */
 const WIDTHS = [1, 10, 100, 1000];
+/** Samples of the mean speed over one link passage. */
+const SAMPLES = 64;
 /** Differences from the head's speed that are far smaller than this share of it have no separate colour. */
 const FINEST = 0.001;
 /** The opacity of colours while the dragon rests. */
@@ -45,14 +47,49 @@ export function paletteOf(element) {
   const shade = (part) => (part < 0.5 ? [slow, middle, 2 * part] : [middle, fast, 2 * part - 1]);
   const shades = Array.from({ length: SHADES }, (_, k) => mixed(...shade(k / (SHADES - 1))));
   const resting = shades.map((one) => mixed(ground, one.match(/\d+/g).map(Number), AT_REST));
-  const names = ["ground", "ink", "faint", "danger", "warning", "still", "near", "far", "wood", "rim", "gold", "lantern", "silk"];
-  return { shades, resting, night: colour(style, "--night") === "1", ...Object.fromEntries(names.map((name) => [name, colour(style, `--${name}`)])) };
+  const names = ["ground", "ink", "faint", "danger", "warning", "still", "near", "far"];
+  return { shades, resting, ...Object.fromEntries(names.map((name) => [name, colour(style, `--${name}`)])) };
+}
+
+/**
+ * The mean speed of every handle over the last link passage: the show time in which the head travels one link. Behind a
+ * bend speeds pulse with that period, which the mean leaves out.
+ */
+class MeanSpeeds {
+  constructor() {
+    this.frame = null;
+    this.clear();
+  }
+
+  clear() {
+    /** The travelled metres of each handle since the first frame, and earlier ones with their times. */
+    this.travelled = null;
+    this.earlier = [];
+  }
+
+  /** Adds a frame of a show that plays, and returns the mean speeds. */
+  take(frame) {
+    const { frame: last } = this, { handles, time } = frame, count = handles.length / STRIDE, next = Float64Array.from({ length: count }, (_, k) => speedOf(handles, k));
+    this.frame = frame;
+    if (!(last?.run === frame.run && last.epoch === frame.epoch && last.handles.length === handles.length && time >= last.time)) this.clear();
+    if (!this.travelled) this.travelled = new Float64Array(count);
+    else for (let k = 0; k < count; k++) this.travelled[k] += 0.5 * (time - last.time) * (next[k] + speedOf(last.handles, k));
+    const k = STRIDE * Math.max(0, count - 2), passage = Math.hypot(handles[k] - handles[k + STRIDE], handles[k + 1] - handles[k + STRIDE + 1]) / next[0];
+    if (!(time - this.earlier.at(-1)?.time < passage / SAMPLES)) this.earlier.push({ time, travelled: this.travelled.slice() });
+    while (this.earlier.length > 1 && time - this.earlier[1].time >= passage) this.earlier.shift();
+    // The beginning of the passage lies between two earlier frames.
+    const [first, second = first] = this.earlier, begin = Math.max(first.time, time - passage);
+    const share = second.time > first.time ? Math.min(1, (begin - first.time) / (second.time - first.time)) : 0;
+    if (!(time > begin)) return next;
+    return this.travelled.map((metres, k) => (metres - first.travelled[k] - share * (second.travelled[k] - first.travelled[k])) / (time - begin));
+  }
 }
 
 /**
  * The scale of the colours for a run: from rest to twice the head's speed, logarithmic in the difference from it, since
  * most shows have differences of a thousandth for minutes and of a half for seconds. It is only widened, so that a
- * colour keeps its meaning within a run. It keeps the speeds of the last moving frame.
+ * colour keeps its meaning within a run. A bench has the colour of its mean speed over one link passage. The scale keeps
+ * the speeds of the last moving frame. The crate `drawing` has the same scale.
  */
 export class SpeedScale {
   constructor() {
@@ -62,8 +99,9 @@ export class SpeedScale {
   clear() {
     this.head = NaN;
     this.step = 0;
-    /** Of the last moving frame. */
-    this.handles = null;
+    /** The mean speeds at the last moving frame. */
+    this.speeds = null;
+    this.means = new MeanSpeeds();
     this.unsent = false;
     this.resting = false;
     this.frame = null;
@@ -77,11 +115,11 @@ export class SpeedScale {
     this.unsent = Number.isNaN(head);
     this.resting = !(head > 0);
     if (this.resting) return;
-    this.handles = handles;
+    this.speeds = this.means.take(frame);
     // Each frame rounds it again.
     if (!(Math.abs(this.head - head) < 1e-4 * head)) this.head = head;
     let most = 0;
-    for (let handle = 1; handle < handles.length / STRIDE; handle++) most = Math.max(most, Math.abs(speedOf(handles, handle) / head - 1));
+    for (const speed of this.speeds) most = Math.max(most, Math.abs(speed / head - 1));
     while (this.step < WIDTHS.length - 1 && most > WIDTHS[this.step]) this.step++;
   }
 
@@ -100,13 +138,13 @@ export class SpeedScale {
    * Returns true if the show was at rest before the first moving frame: then colours distinguish head, body and tail.
    */
   get unseen() {
-    return this.resting && !this.unsent && !this.handles;
+    return this.resting && !this.unsent && !this.speeds;
   }
 
   /** Returns the shade of a bench; SHADES if its speed is not sent. */
   shade(bench) {
     if (this.unseen) return bench === 0 ? SHADES - 1 : bench === this.frame.handles.length / STRIDE - 2 ? 0 : SHADES >> 1;
-    const speed = this.handles ? speedOf(this.handles, bench) : NaN;
+    const speed = this.speeds ? this.speeds[bench] : NaN;
     if (Number.isNaN(speed)) return SHADES;
     return Math.min(SHADES - 1, Math.floor(this.place(speed / this.head - 1) * SHADES));
   }

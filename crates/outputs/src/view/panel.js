@@ -20,39 +20,61 @@ const spokenOf = new Map();
 /**
  * The state, the sentence and the countdown of a situation: `state`, `alert`, `trouble` (the reason why nothing comes,
  * or null), `silent` (seconds without a frame, or null), `stale` (true if the whole picture is stale), `of` (the dragon
- * of the situation, or null for a single dragon), `seconds` until the event `ahead` (NaN without a countdown),
- * `benches`, and `now` (the present state in words).
+ * of the situation, or null for a single dragon), `seconds` until the event `ahead` (NaN without a countdown), `stands`
+ * (true if the show stands still), `benches`, and `now` (the present state in words).
  */
-export function showSituation({ state, alert, trouble, silent, stale, of, seconds, ahead, benches, now }) {
+export function showSituation({ state, alert, trouble, silent, stale, of, seconds, ahead, stands, benches, now }) {
   const { dataset } = document.body, calm = state.severity === "ok" && !state.happened;
   const changed = dataset.level !== state.name;
   if (changed) Object.assign(dataset, { level: state.name, severity: state.severity, happened: state.happened });
   dataset.stale = String(stale);
-  const words = trouble ? say(trouble) : silent === null ? say(state.name) : say("noFrames", { seconds: silent });
-  put("state", `${trouble ? "○" : silent === null ? SIGNS[state.severity] : "…"} ${trouble ? words : capital(words)}`);
+  // The motion of a picture that no frame confirms, or of a show that stands, is not stated.
+  element("state").hidden = Boolean(trouble) || silent !== null || (calm && stands);
+  put("state", `${SIGNS[state.severity]} ${capital(say(state.name))}`);
   const sentence = trouble ? "" : sentenceOf(state, alert, benches);
   put("alert", of && sentence ? `${of}: ${sentence}` : sentence);
   put("now", capital(now));
   element("now").hidden = !now;
   if (!spokenOf.has(of)) spokenOf.set(of, { state: null, mark: Infinity });
   const last = spokenOf.get(of), isNews = last.state !== state.name, own = (words) => (of ? `${of}: ${words}` : words);
-  countdown(state, seconds, ahead, last, own);
-  if (trouble) put("spoken", say(trouble));
+  countdown({ state, seconds, ahead, stands }, last, own);
+  if (trouble) last.mark = Infinity;
   else if (isNews && calm) put("spoken", own(say(last.state === null ? "dragonMoves" : "clearAgain")));
   else if (isNews && !state.happened) put("spoken", own(`${capital(say(state.name))}.`));
   last.state = trouble ? null : state.name;
 }
 
+/** The last spoken transport state of each dragon that the header has shown. */
+const spokenTransport = new Map();
+
 /**
- * Shows the countdown, and speaks it at its marks. `last` has this dragon's last spoken words, `own` adds its name to
- * words.
+ * The transport state at a moment: its sign and word, and its detail, in which `keys` lets keys be named. Each change is
+ * spoken once; a hold, at once.
  */
-function countdown(state, seconds, ahead, last, own) {
+export function showTransport(transport, { now, of, keys }) {
+  document.body.dataset.transport = transport.kind;
+  put("playback", `${transport.sign} ${transport.word}`);
+  put("playback-detail", transport.detail(now, keys));
+  const last = spokenTransport.get(of);
+  if (last === transport.key) return;
+  spokenTransport.set(of, transport.key);
+  // Frames of a show that plays are announced by the motion's sentence.
+  if (transport.kind === "playing" && (last === undefined || last.startsWith("lost"))) return;
+  put(transport.kind === "held" ? "spoken-at-once" : "spoken", of ? `${of}: ${transport.sentence}` : transport.sentence);
+  if (transport.kind !== "held") put("spoken-at-once", "");
+}
+
+/**
+ * Shows the countdown, and speaks it at its marks while the show plays. `last` has this dragon's last spoken words,
+ * `own` adds its name to words.
+ */
+function countdown({ state, seconds, ahead, stands }, last, own) {
   const counting = seconds > -1, near = counting && (state.severity !== "ok" || seconds < 10);
   const [number, unit] = counting ? remaining(Math.max(0, seconds)) : ["", ""];
   element("countdown").hidden = !counting;
   document.body.dataset.near = String(near);
-  put("until", counting ? capital(say(near ? "in" : "next", { kind: say(ahead) })) : "");
+  document.body.dataset.stands = String(counting && stands);
+  put("until", counting ? capital(say(stands ? "eventAhead" : near ? "in" : "next", { kind: say(ahead) })) : "");
   if (element("left").dataset.text !== number + unit) {
     element("left").dataset.text = number + unit;
     // The number is made as large as the panel is wide.
@@ -61,7 +83,7 @@ function countdown(state, seconds, ahead, last, own) {
     element("left").append(Object.assign(document.createElement("small"), { textContent: unit }));
   }
   const mark = near ? ([10, 5, 3].findLast((mark) => seconds <= mark) ?? Infinity) : Infinity;
-  if (mark < last.mark && state.severity !== "ok") put("spoken", own(say("seconds", { seconds: Math.ceil(seconds) })));
+  if (mark < last.mark && state.severity !== "ok" && !stands) put("spoken", own(say("seconds", { seconds: Math.ceil(seconds) })));
   last.mark = mark;
 }
 
@@ -77,7 +99,7 @@ export function showFigures({ clearance, colours, time, scale }) {
   bar.setAttribute("aria-valuetext", element("metres").textContent);
   put("speeds", colours.unsent ? say("notSent") : colours.resting ? say("rest") : "");
   showScale(colours);
-  const rate = scale === 1 ? "" : say("rate", { rate: +scale.toPrecision(3) });
+  const rate = scale === 1 || scale === 0 ? "" : say("rate", { rate: +scale.toPrecision(3) });
   put("time", say("time", { time: time.toFixed(1), rate }));
 }
 
@@ -133,9 +155,13 @@ export function showBench(chosen, handles) {
   put("bench", say("detail", values));
 }
 
-/** The show's name, on the page and in the title; with `several`, the title has the names of all publishers. */
-export function showNames({ scene, publisher }, several) {
-  const title = several ? say("titleSeveral", { publishers: several.join(", ") }) : scene ? say("title", { scene, publisher }) : say("stage");
+/**
+ * The show's name, on the page and in the title; with `several`, the title has the names of all publishers. `sign` is
+ * the sign of a show that does not play, or empty.
+ */
+export function showNames({ scene, publisher }, several, sign) {
+  const name = several ? say("titleSeveral", { publishers: several.join(", ") }) : scene ? say("title", { scene, publisher }) : say("stage");
+  const title = [sign, name].filter(Boolean).join(" ");
   if (document.title !== title) document.title = title;
   put("name", [scene, publisher].filter(Boolean).join(" · "));
 }

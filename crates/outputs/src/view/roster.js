@@ -1,4 +1,4 @@
-// The list of several dragons beside the picture: the sign, name, state, countdown and sentence of each. A single
+// The list of several dragons beside the picture: the transport's sign, name, state, countdown and sentence of each. A single
 // dragon has no list.
 
 import { identityOf } from "./palette.js";
@@ -25,12 +25,12 @@ export class Roster {
   constructor(dragons, select) {
     this.selected = null;
     this.rows = dragons.map((dragon, place) => {
-      const [item, button, name, state, sentence] = [made("li", ""), made("button", ""), made("b", "whose"), made("span", "state"), made("p", "sentence")];
+      const [item, button, sign, name, state, sentence] = [made("li", ""), made("button", ""), made("span", "sign"), made("b", "whose"), made("span", "state"), made("p", "sentence")];
       name.textContent = dragon.name;
-      button.append(swatch(identityOf(place)), name, state);
+      button.append(swatch(identityOf(place)), sign, name, state);
       button.onclick = () => select(this.selected === dragon ? null : dragon);
       item.append(button, sentence);
-      return { dragon, item, button, state, sentence };
+      return { dragon, item, button, sign, state, sentence };
     });
     element("dragons").replaceChildren(...this.rows.map(({ item }) => item));
     element("dragons").hidden = false;
@@ -42,8 +42,11 @@ export class Roster {
    */
   show(first, selected) {
     this.selected = selected;
-    for (const { dragon, item, button, state, sentence } of this.rows) {
-      const { sight } = dragon, words = sight.stale ? this.lost(sight) : `${SIGNS[sight.state.severity]} ${say(sight.state.name)}`;
+    for (const { dragon, item, button, sign, state, sentence } of this.rows) {
+      const { sight, transport } = dragon, stands = !["playing", "lost"].includes(transport.kind);
+      const words = [stands || sight.stale ? capital(transport.word.toLowerCase()) : "", sight.stale ? "" : `${SIGNS[sight.state.severity]} ${say(sight.state.name)}`].filter(Boolean).join(" ");
+      if (sign.textContent !== transport.sign) sign.textContent = transport.sign;
+      item.dataset.transport = transport.kind;
       const left = sight.seconds > -1 ? `, ${say(sight.ahead)} ${remaining(Math.max(0, sight.seconds)).join(" ")}` : "";
       const text = dragon === first || sight.stale ? "" : sentenceOf(sight.state, sight.alert, sight.benches);
       if (state.textContent !== words + left) state.textContent = words + left;
@@ -51,10 +54,5 @@ export class Roster {
       item.dataset.severity = sight.stale ? "lost" : sight.state.severity;
       button.setAttribute("aria-pressed", dragon === selected);
     }
-  }
-
-  /** The reason why nothing comes. */
-  lost({ trouble, silent }) {
-    return trouble ? `○ ${capital(say(trouble))}` : `… ${capital(say("noFrames", { seconds: silent }))}`;
   }
 }

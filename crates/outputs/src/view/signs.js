@@ -1,4 +1,4 @@
-// Signs and words on the picture: outlines visible on any colour, rings, labels that do not overlap, the scale bar.
+// Signs on the picture: outlines visible on any colour, rings, the scale bar.
 
 /**
  * Strokes a line in a colour with a light and a dark edge, one of which is visible on every ground, with any colour
@@ -32,73 +32,6 @@ export function target(context, { x, y }, palette, pixel, ink, ghost) {
   };
   doubled(context, palette, pixel, ink, 3, cross);
   doubled(context, palette, pixel, ink, 3, ring, ghost ? [9, 5] : []);
-}
-
-/** Directions in which a label tries to stand, after outward from the middle of the picture: turns. */
-const TURNS = [0, 0.5, 0.125, -0.125, 0.25, -0.25, 0.375, -0.375];
-
-/** Words at places, each where it covers no other. */
-export class Labels {
-  constructor(camera) {
-    this.camera = camera;
-    this.all = [];
-    this.boxes = [];
-    this.signs = [];
-  }
-
-  /** Words at a distance in pixels from a place of the stage, `large` times the usual size. */
-  add(text, x, y, ink, away = 22, large = 1) {
-    const [px, py] = this.camera.toPixel(x, y);
-    if (px < 0 || py < 0 || px > this.camera.width || py > this.camera.height) return;
-    this.all.push({ text, px, py, ink, away, large });
-  }
-
-  /** A box that words may not cover. */
-  keep(box) {
-    this.boxes.push(box);
-  }
-
-  /** A ring around a place of the stage, which words leave free if they can. */
-  ring(x, y) {
-    const [px, py] = this.camera.toPixel(x, y), reach = 29 * this.camera.unit;
-    this.signs.push({ x: px, y: py, half: reach, tall: reach });
-  }
-
-  write(context, palette) {
-    const { width, height, ratio, unit } = this.camera;
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.textAlign = "center";
-    context.textBaseline = "middle";
-    context.lineJoin = "round";
-    for (const { text, px, py, ink, away, large: wanted } of this.all) {
-      const font = (size) => (context.font = `600 ${15 * unit * size}px system-ui, sans-serif`);
-      font(wanted);
-      // On a phone a long sentence is smaller.
-      const large = wanted * Math.min(1, (width - 24 * unit) / context.measureText(text).width);
-      font(large);
-      const half = context.measureText(text).width / 2 + 6 * unit, tall = 12 * unit * large;
-      const within = (at, least, most) => Math.min(Math.max(at, least), Math.max(least, most));
-      const outward = Math.atan2(py - height / 2, px - width / 2);
-      const boxes = TURNS.flatMap((turn) => [1, 2, 3.5].map((far) => {
-        const angle = outward + 2 * Math.PI * turn, dx = Math.cos(angle), dy = Math.sin(angle);
-        // A wide label is further away at the side than above.
-        const x = within(px + dx * (away * unit * far + half * Math.abs(dx)), half, width - half);
-        return { x, y: within(py + dy * away * unit * far, tall, height - tall), half, tall, text };
-      }));
-      const off = (box, all) => !all.some((other) => Math.abs(other.x - box.x) < other.half + box.half && Math.abs(other.y - box.y) < other.tall + box.tall);
-      const free = (box) => off(box, this.boxes);
-      const clear = (box) => Math.abs(px - box.x) > half || Math.abs(py - box.y) > tall + 10 * unit;
-      const apart = boxes.filter((box) => free(box) && clear(box));
-      const box = apart.find((box) => off(box, this.signs)) ?? apart[0] ?? boxes.find(free);
-      if (!box) continue;
-      this.boxes.push(box);
-      context.lineWidth = 5 * unit * large;
-      context.strokeStyle = palette.near;
-      context.strokeText(text, box.x, box.y);
-      context.fillStyle = ink;
-      context.fillText(text, box.x, box.y);
-    }
-  }
 }
 
 /** Draws the length of a round number of metres in the lower right corner; returns its box. */

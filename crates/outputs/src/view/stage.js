@@ -6,10 +6,13 @@ import { wordsOf } from "./address.js";
 import { benchAt } from "./boards.js";
 import { Camera } from "./camera.js";
 import { Dragon } from "./dragon.js";
+import { Labels } from "./labels.js";
+import { Lanterns } from "./lanterns.js";
+import { lock } from "./lock.js";
 import { Ground, draw } from "./drawing.js";
 import { attach } from "./pointer_input.js";
 import { identityOf, paletteOf } from "./palette.js";
-import { element, put, showBench, showFigures, showNames, showProofs, showSituation } from "./panel.js";
+import { element, put, showBench, showFigures, showNames, showProofs, showSituation, showTransport } from "./panel.js";
 import { publishers } from "./publishers.js";
 import { Roster } from "./roster.js";
 import { Sound } from "./sound.js";
@@ -23,11 +26,13 @@ const HEADER_LEAD = 1;
 const words = wordsOf(location.hash), root = document.documentElement, stillness = matchMedia("(prefers-reduced-motion: reduce)");
 setLanguage(words.lang);
 translate(document);
-for (const word of ["show", "transparent"]) root.toggleAttribute(`data-${word}`, word in words);
+for (const word of ["show", "transparent", "tell"]) root.toggleAttribute(`data-${word}`, word in words);
 if (words.dark || words.light || words.show) root.dataset.theme = words.light ? "light" : "dark";
 
 const canvas = element("stage"), context = canvas.getContext("2d", { alpha: "transparent" in words });
 const camera = new Camera(), ground = new Ground("transparent" in words), sound = new Sound();
+const labels = "nolabels" in words ? null : new Labels(stillness.matches);
+const lanterns = words.show ? new Lanterns({ transparent: words.transparent, moon: words.moon, day: words.light }) : null;
 const several = publishers.length > 1, dragons = publishers.map((name) => new Dragon(name, { several, show: words.show, still: stillness.matches }));
 root.toggleAttribute("data-several", several);
 const roster = several ? new Roster(dragons, select) : null;
@@ -85,7 +90,7 @@ function pass() {
   camera.update(there, passed, there.includes(whose) ? whose : there[0]);
   camera.reach = Math.max(...there.map(({ path }) => path.reach));
   showText(now);
-  const soonest = dragons.map(({ state, sight }) => (state.severity === "ok" && !(sight.seconds < 10) ? NaN : sight.seconds)).filter((seconds) => seconds > -1);
+  const soonest = dragons.map(({ state, sight }) => (sight.stands || (state.severity === "ok" && !(sight.seconds < 10)) ? NaN : sight.seconds)).filter((seconds) => seconds > -1);
   sound.count(soonest.length ? Math.min(...soonest) : NaN);
   if (dragons.some(({ struck }) => struck)) sound.strike();
   paint(there);
@@ -94,19 +99,30 @@ function pass() {
 
 /** Draws the picture, only if it has changed: a show that stands still costs nothing. */
 function paint(there) {
-  const look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y, camera.scale, camera.c, camera.s, chosen, whose.name, palette.ground].join();
+  if (lanterns) return light(there);
+  const look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y, camera.scale, camera.c, camera.s, chosen, whose.name, palette.ground, labels?.settled === false && performance.now()].join();
   if (look === last) return;
   last = look;
   const allStale = there.every(({ sight }) => sight.stale);
   const scene = there.map((dragon) => {
-    const { stage, places, colours, path, marks, show, sight } = dragon, own = dragon === whose ? chosen : -1;
-    return { stage, places, colours, path: path.lines, marks, show, chosen: own, chosenName: dragon.own(nameOf(own)), endNames: dragon.endNames(), stale: sight.stale && !allStale, identity: several ? identityOf(dragons.indexOf(dragon)) : null };
+    const { stage, places, colours, path, marks, sight } = dragon, own = dragon === whose ? chosen : -1;
+    return { stage, places, colours, path: path.lines, marks, chosen: own, chosenName: dragon.own(nameOf(own)), endNames: dragon.endNames(), stale: sight.stale && !allStale, identity: several ? identityOf(dragons.indexOf(dragon)) : null };
   });
-  const labels = draw(context, camera, palette, { ground, dragons: scene, words: !words.nolabels });
+  const written = draw(context, camera, palette, { ground, dragons: scene, labels });
   picture.drawn++;
-  Object.assign(picture, { marks: there.flatMap(({ marks }) => marks), labels });
+  Object.assign(picture, { marks: there.flatMap(({ marks }) => marks), labels: written });
   // A dragon that has stopped is drawn again while another one moves: this is no latency of its frames.
   for (const dragon of there) if (!several || !dragon.sight.stale) dragon.drawn();
+}
+
+/** Draws the show look. */
+function light(there) {
+  const look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y, camera.scale, camera.c, camera.s].join();
+  if (look === last) return;
+  last = look;
+  lanterns.draw(context, camera, there);
+  picture.drawn++;
+  for (const dragon of there) if (!dragon.sight.stale) dragon.drawn();
 }
 
 /** The picture stays; the data for tests of a publisher that is gone does not. */
@@ -132,20 +148,22 @@ function drawNothing() {
 let figuresAt = 0, countedAt = 0;
 function showText(now) {
   const first = foremost(), { sight } = first;
-  showSituation({ ...sight, stale: dragons.every((one) => one.sight.stale), of: several ? first.name : null });
+  const of = several ? first.name : null;
+  showSituation({ ...sight, stale: dragons.every((one) => one.sight.stale), of });
+  showTransport(first.transport, { now, of, keys: !element("conduct").hidden });
   roster?.show(first, selected);
   const notices = dragons.map((one) => one.notice()).filter(Boolean);
-  // A page without the panel shows here why the picture is empty.
-  const empty = words.show && !notices.length && sight.trouble;
-  element("notice").hidden = !(notices.length || empty) || "nolabels" in words;
-  put("notice", notices.length ? notices.join("\n") : empty ? capital(say(sight.trouble)) : "");
+  // The style sheet shows them in the show look only on request.
+  if (words.show && !notices.length && sight.trouble) notices.push(capital(say(sight.trouble)));
+  element("notice").hidden = !notices.length || "nolabels" in words;
+  put("notice", notices.join("\n"));
   const shown = selected ?? first, { newest, stage, colours, stream } = shown;
   // The scene of a picture that stays may no longer be played.
   showProofs(shown.isThere && !shown.sight.trouble ? stage : null);
   // The rest changes too often to be readable at every pass.
   if (!shown.isThere || now - figuresAt < FIGURES_INTERVAL) return;
   figuresAt = now;
-  showNames(stage, several ? publishers : null);
+  showNames(stage, several ? publishers : null, first.transport.kind === "playing" ? "" : first.transport.sign);
   showFigures({ clearance: newest.clearance, colours, time: stream.playback.time(now), scale: newest.scale });
   showBench(whose === shown ? chosen : -1, newest.handles);
   if (now - countedAt < 1000) return;
@@ -225,7 +243,10 @@ function tap(x, y) {
   }
   choose(-1);
 }
-attach(canvas, { pan, tap, keys, zoomAt: (...to) => (camera.zoomAt(...to), showFollow()), isFree: () => camera.mode !== "bench" });
+// An audience's picture obeys no hand that happens to touch it.
+if (words.show) lock(() => `${say("locked")} · ${element("time").textContent} · ${element("playback").textContent}`);
+if (words.show) keys["?"] = () => null;
+if (!words.show || words.hands) attach(canvas, { pan, tap: words.show ? () => null : tap, keys, zoomAt: (...to) => (camera.zoomAt(...to), showFollow()), isFree: () => camera.mode !== "bench" });
 element("pick").oninput = ({ target }) => {
   chosen = target.value === "" ? -1 : Math.floor(target.value) - 1;
   if (several && chosen >= 0) [whose, selected] = [selected ?? foremost(), selected ?? foremost()];
@@ -247,5 +268,5 @@ if (words.follow) camera.follow(words.follow === true ? 0 : words.follow[0] - 1)
 if (words.unknown.length) put("address", say("address", { words: words.unknown.join(", ") }));
 element("address").hidden = !words.unknown.length;
 showFollow();
-conduct(dragons);
+conduct(dragons, !words.show || words.desk);
 pass();

@@ -35,6 +35,7 @@ function frameOf(data, at) {
     tick: Number(bytes.getBigUint64(48, true)),
     clearance: bytes.getFloat32(56, true),
     epoch: bytes.getUint32(60, true),
+    cue: bytes.getUint32(64, true),
     handles: new Float32Array(data, HEADER_BYTES),
   };
 }
@@ -112,7 +113,7 @@ export class Stream {
   constructor(name = null) {
     this.name = name;
     this.playback = new Playback();
-    this.messages = { stage: {}, alert: {} };
+    this.messages = { stage: {}, alert: {}, cue: {} };
     /** The reason why no frames come: a key of the page's words, or the server's reason; null while they come. */
     this.trouble = "server";
     this.received = 0;
@@ -218,6 +219,11 @@ export class Stream {
   /** The latest alert of that run, or null. */
   get alert() {
     return this.ofRun("alert");
+  }
+
+  /** The latest cue of that run, or null. */
+  get cue() {
+    return this.ofRun("cue");
   }
 
   /** Messages of the next run may come before its first frame: until then those of the last run are kept. */

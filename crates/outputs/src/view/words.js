@@ -111,7 +111,6 @@ const WORDS = {
   markProved: [", proved", "，已证明"],
   cueMark: ["cue \"{name}\", {time} s{waits}", "提示点“{name}”，{time} 秒{waits}"],
   waitsThere: [", waits there", "，在此等待"],
-  waitingForGo: [" (waiting for go)", "（等待继续）"],
   between: ["; ", "；"],
   nothingSent: ["The server is not there: nothing was sent.", "服务器不在：命令未发送。"],
   playing: ["playing", "播放中"],
@@ -128,13 +127,39 @@ const WORDS = {
   all: ["All", "全部"],
   refusedBy: ["{name}: {sentence}", "{name}：{sentence}"],
 
+  // The transport state in the header: its word, its detail, and its sentence for a screen reader.
+  playingWord: ["PLAYING", "播放中"],
+  pausedWord: ["PAUSED", "已暂停"],
+  heldWord: ["HELD", "已锁定"],
+  goWord: ["GO?", "等待继续"],
+  endedWord: ["ENDED", "已结束"],
+  noPublisher: ["NO PUBLISHER", "没有发布端"],
+  noServer: ["NO SERVER", "没有服务器"],
+  noFrames: ["NO FRAMES", "没有新帧"],
+  noStageYet: ["NO STAGE", "没有舞台数据"],
+  otherVersion: ["OTHER VERSION", "版本不符"],
+  sinceThen: ["for {passed}", "已 {passed}"],
+  heldFor: ["for {passed} · release: H", "已 {passed} · 按 H 解除"],
+  goDetail: ["{cue} · waits {passed}", "{cue} · 已等待 {passed}"],
+  endedAt: ["at {time} s", "停于 {time} 秒"],
+  times: ["× {rate}", "× {rate}"],
+  cueNamed: ["cue {number} · {name}", "提示点 {number} · {name}"],
+  pictureFrom: ["picture from t = {time} s, {ago} ago", "画面停在 t = {time} 秒，{ago} 之前"],
+  playingSpoken: ["Playing.", "播放中。"],
+  pausedSpoken: ["Paused.", "已暂停。"],
+  heldSpoken: ["Held.", "已锁定。"],
+  goSpoken: ["Waiting for go: {cue}.", "等待继续：{cue}。"],
+  endedSpoken: ["Ended.", "已结束。"],
+  eventAhead: ["{kind} ahead", "{kind}：尚有"],
+
+  locked: ["locked", "已锁定画面"],
+
   // The state of the page, spoken once.
   server: ["waiting for the server", "等待服务器"],
   publisher: ["waiting for a publisher", "等待发布端"],
   noStage: ["waiting for the stage", "等待舞台数据"],
   version: ["this page is for another version of the server: load it again", "本页面与服务器版本不符：请重新载入"],
   noFramesNow: ["no frames", "没有新帧"],
-  noFrames: ["no frames for {seconds} s", "已有 {seconds} 秒没有新帧"],
   dragonMoves: ["The dragon moves.", "龙在行进。"],
   clearAgain: ["Clear again.", "警报解除。"],
   address: ["“{words}” after # is not understood.", "无法理解 # 之后的“{words}”。"],
@@ -177,6 +202,12 @@ export function remaining(seconds) {
   const whole = Math.floor(seconds), pad = (number) => String(number).padStart(2, "0");
   const hours = Math.floor(whole / 3600), minutes = Math.floor(whole / 60) % 60;
   return hours ? [`${hours}:${pad(minutes)}:${pad(whole % 60)}`, say("h")] : [`${minutes}:${pad(whole % 60)}`, say("min")];
+}
+
+/** Returns seconds as minutes and seconds. */
+export function minutes(seconds) {
+  const whole = Math.max(0, Math.floor(seconds));
+  return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
 }
 
 /** One or two benches (from 0) by their numbers from 1. */

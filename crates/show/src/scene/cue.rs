@@ -6,6 +6,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::{Accepted, SceneError, Source};
+use bench_dragon_messages::SceneName;
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::timeline::Timeline;
@@ -89,6 +90,12 @@ impl RawCue {
             return Err(source.field_error(&self.name, "cues.name is empty, expected a name"));
         }
         source.printable("cues.name", &self.name)?;
+        if name.len() > SceneName::CAPACITY {
+            let (bytes, most) = (name.len(), SceneName::CAPACITY);
+            let sentence =
+                format!("cues.name has {bytes} bytes, expected at most {most}: messages hold no longer name");
+            return Err(source.field_error(&self.name, &sentence));
+        }
         let moment = match (&self.at, &self.before, &self.travelled) {
             (Some(at), None, None) => CueMoment::At(source.check("cues.at", at, Accepted::CUE)?),
             (None, Some(before), None) => self.before_event(before, source, alerts)?,

@@ -1,0 +1,82 @@
+// The transport state of one publisher: playing, paused, held, waiting for go, ended, or disconnected. In: the newest
+// frame and the reason why none comes. Out: a sign, a word and a detail in the page's language. Draws nothing.
+
+import { minutes, say } from "./words.js";
+
+/** The states of playback by their numbers in a frame. */
+const KINDS = ["playing", "paused", "held", "ended"];
+const SIGNS = { playing: "▶", paused: "❚❚", held: "■", go: "▷❙", ended: "▣", lost: "◌" };
+/** The words of a publisher that does not deliver, by the reason. */
+const LOST = { server: "noServer", silent: "noFrames", noStage: "noStageYet", version: "otherVersion" };
+/** The difference between a cue's time and that of a show that waits there, s. */
+const AT_CUE = 1e-6;
+/** The time for which the name of a passed cue is shown while the show plays (ms). */
+const CUE_TIME = 6000;
+
+export class Transport {
+  constructor() {
+    this.kind = null;
+    /** The reason of a disconnection: a key of the words, or the server's sentence; null while frames come. */
+    this.reason = null;
+    /** The cue at which the show waits, or the cue that it has just passed. */
+    this.cue = null;
+    /** The moments of the latest change and of the latest passed cue, as this page saw them (ms). */
+    this.since = this.cueAt = -Infinity;
+    /** The last known rate of the run; 1 before the show has played. */
+    this.pace = 1;
+    this.frame = null;
+  }
+
+  /** Updates the state at a moment. `lost` is the reason why nothing comes, or null; `cueOf` finds a cue by its number. */
+  look(now, newest, lost, cueOf) {
+    const before = this.key;
+    if (newest && newest.run !== this.frame?.run) this.pace = 1;
+    if (newest?.scale > 0) this.pace = newest.scale;
+    if (newest && !lost) this.pass(now, newest, cueOf);
+    this.reason = lost;
+    this.frame = newest;
+    const waits = this.cue?.pauses && newest?.playback === 1 && Math.abs(newest.time - this.cue.time) < AT_CUE;
+    this.kind = lost ? "lost" : waits ? "go" : KINDS[newest.playback] ?? "playing";
+    if (this.key !== before) this.since = now;
+  }
+
+  /** Keeps the cue of a frame. A cue that passed before this page came, or in another epoch, is not announced. */
+  pass(now, newest, cueOf) {
+    const { frame } = this, isNext = frame?.run === newest.run && frame.epoch === newest.epoch;
+    if (isNext && frame.cue === newest.cue && (this.cue || !newest.cue)) return;
+    this.cue = newest.cue ? cueOf(newest.cue) : null;
+    this.cueAt = isNext && newest.cue > frame.cue ? now : -Infinity;
+  }
+
+  /** Returns a value that changes with the state. */
+  get key() {
+    return [this.kind, this.reason, this.kind === "go" ? this.cue.number : ""].join();
+  }
+
+  get sign() {
+    return SIGNS[this.kind];
+  }
+
+  get word() {
+    return say(this.kind === "lost" ? LOST[this.reason] ?? "noPublisher" : `${this.kind}Word`);
+  }
+
+  /** Returns the detail at a moment. `keys`: true if the keys of the transport bar work here. */
+  detail(now, keys) {
+    const { kind, reason, frame, cue } = this, passed = minutes((now - this.since) / 1000), named = cue && say("cueNamed", cue);
+    if (kind === "lost") return frame ? say("pictureFrom", { time: frame.time.toFixed(1), ago: minutes((now - frame.at) / 1000) }) : say(reason);
+    if (kind === "held") return say(keys ? "heldFor" : "sinceThen", { passed });
+    if (kind === "go") return say("goDetail", { cue: named, passed });
+    if (kind === "paused") return say("sinceThen", { passed });
+    if (kind === "ended") return say("endedAt", { time: frame.time.toFixed(1) });
+    const rate = frame.scale === 1 ? "" : say("times", { rate: +frame.scale.toPrecision(3) });
+    return [rate, cue && now - this.cueAt < CUE_TIME ? named : ""].filter(Boolean).join(" · ");
+  }
+
+  /** Returns the sentence for a screen reader. */
+  get sentence() {
+    if (this.kind === "lost") return say(this.reason === "silent" ? "noFramesNow" : this.reason);
+    if (this.kind === "go") return say("goSpoken", { cue: say("cueNamed", this.cue) });
+    return say(`${this.kind}Spoken`);
+  }
+}

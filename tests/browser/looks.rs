@@ -1,0 +1,35 @@
+//! The page's header and its picture as an audience and a crew read them, in the browser: the transport state, the show look.
+//!
+//! The tests are in `tests/python/stage_transport.py` and `stage_show.py`. No test asserts a speed.
+
+use crate::view::run_scenario;
+
+#[test]
+fn header_says_what_the_show_does() {
+    run_scenario("tests/python/stage_transport.py", "header_says_what_the_show_does");
+}
+
+#[test]
+fn show_is_locked() {
+    run_scenario("tests/python/stage_show.py", "show_is_locked");
+}
+
+#[test]
+fn coming_lanterns_burn_white() {
+    run_scenario("tests/python/stage_show.py", "coming_lanterns_burn_white");
+}
+
+#[test]
+fn labels_point_at_their_boards() {
+    run_scenario("tests/python/stage_labels.py", "labels_point_at_their_boards");
+}
+
+#[test]
+fn labels_move_with_their_boards() {
+    run_scenario("tests/python/stage_labels.py", "labels_move_with_their_boards");
+}
+
+#[test]
+fn boards_keep_their_colour_in_a_turn() {
+    run_scenario("tests/python/stage_colours.py", "boards_keep_their_colour_in_a_turn");
+}
