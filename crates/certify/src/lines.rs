@@ -33,6 +33,9 @@ pub enum CertificateLine<'a> {
         format: u32,
         /// The version of the program.
         version: &'a str,
+        /// The question; `None` for events.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        about: Option<About>,
         /// The text of the scene.
         scene: &'a str,
     },
@@ -50,6 +53,21 @@ pub enum CertificateLine<'a> {
         spans: Vec<Span>,
         /// The point, metres.
         point: [f64; 2],
+    },
+    /// Two boards are no further apart than a number of metres.
+    Near {
+        /// The two benches, counted from 0, the one nearer the head first.
+        benches: [usize; 2],
+        /// The first place of the head.
+        from: Place,
+        /// The last place of the head.
+        to: Place,
+        /// The spans of the handles from 1 on.
+        spans: Vec<Span>,
+        /// A place of each of these spans, the head's first.
+        at: Vec<Place>,
+        /// Metres.
+        most: f64,
     },
     /// The front product of a link is negative.
     Stall {
@@ -84,6 +102,46 @@ pub enum CertificateLine<'a> {
     PathEnd,
     /// The result for one kind of event.
     Result(CertifiedEvent),
+    /// The result for the least clearance.
+    LeastClearance(CertifiedClearance),
+}
+
+/// The question of a certificate that is not about events.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum About {
+    /// The least clearance.
+    LeastClearance,
+}
+
+/// The end of the stretch for which a least clearance is certified.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Until {
+    /// The path's end.
+    PathEnd,
+    /// The first contact.
+    Contact,
+    /// A time.
+    Time,
+}
+
+/// The certified least clearance, from the scene's start on.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CertifiedClearance {
+    /// Metres: no two boards that share no handle are nearer.
+    pub lo: Option<f64>,
+    /// Metres: at one place the two benches are no further apart.
+    pub hi: Option<f64>,
+    /// The end of the stretch.
+    pub until: Until,
+    /// Simulated seconds of that end, for [`Until::Time`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_until: Option<f64>,
+    /// The bench of the two that is nearer the head, counted from 0.
+    pub bench_a: Option<usize>,
+    /// The other bench.
+    pub bench_b: Option<usize>,
 }
 
 /// A step of the head, and the statements that hold throughout it.
@@ -101,6 +159,12 @@ pub struct Step {
     pub clear: bool,
     /// The spans of the handles from 1 on.
     pub spans: Vec<Span>,
+    /// Metres that boards are further apart in this step.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub apart: Option<f64>,
+    /// A place of each span, the head's first, for `apart`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub at: Vec<Place>,
 }
 
 /// The proved result for one kind of event.

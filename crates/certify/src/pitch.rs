@@ -142,6 +142,6 @@ pub(crate) fn reaches(team: &Team, pitch: f64, radius: f64, most_steps: u64, pro
     let theta = Interval::point(radius).over(a).lo;
     let end = GridPoint::at(Place(0, theta, 0.0), exact.travelled(Place(0, theta, 0.0)).middle());
     let travelled = end.travelled;
-    let descent = Descent::new(Chain::new(&path, exact, team), travelled, most_steps).after_all_further_out();
+    let descent = Descent::new(Chain::new(&path, exact, team), travelled, most_steps, None).after_all_further_out();
     begin <= (a * descent.head().1).lo && descent.stays_clear_to(&end, progress)
 }

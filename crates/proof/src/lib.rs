@@ -1,14 +1,16 @@
-//! The checker of certificates of events: the rules of docs/proofs.md, and nothing else. `verify`, `check
+//! The checker of certificates: the rules of docs/proofs.md, and nothing else. `verify`, `check
 //! --certificate` and `view --certificate` call it.
 //!
-//! In: the lines of a certificate. Out: its proved events, or the first line that does not follow. It depends on no
+//! In: the lines of a certificate. Out: its proved claims, or the first line that does not follow. It depends on no
 //! other crate of this workspace: it shares neither geometry, parsing nor solver with the search, only that page.
 
+mod apart;
 mod boards;
 mod capsule;
 mod chain;
 mod elementary;
 mod events;
+mod first_order;
 mod interval;
 mod lines;
 mod link;
@@ -16,6 +18,7 @@ mod number;
 mod path;
 mod results;
 mod scene;
+mod sides;
 mod steps;
 
 #[cfg(test)]
@@ -26,8 +29,8 @@ use std::io::{self, BufRead, Read};
 use serde::Serialize;
 
 use self::events::{Events, LockShown};
-use self::lines::ParsedLine;
-pub use self::lines::{EventKind, ProvedEvent, Status};
+use self::lines::{About, ParsedLine};
+pub use self::lines::{EventKind, ProvedClearance, ProvedEvent, Status, Until};
 use self::path::Span;
 use self::scene::Scene;
 use self::steps::{Step, Steps};
@@ -44,8 +47,11 @@ pub struct Proved {
     pub scene: String,
     /// The version of the program that wrote the certificate.
     pub version: String,
-    /// The results for contact, stall, lock and path end, in this order.
+    /// The results for contact, stall, lock and path end, in this order; none in a certificate of another question.
     pub results: Vec<ProvedEvent>,
+    /// The least clearance, in a certificate of that question.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub least_clearance: Option<ProvedClearance>,
     /// Number of steps checked.
     pub steps: u64,
     /// Number of links checked, in all steps.
@@ -118,14 +124,18 @@ pub fn verify(mut lines: impl BufRead, progress: &mut dyn FnMut(u64)) -> Result<
         }
     }
     match checker {
-        Some(checker) if checker.proved.results.len() == 4 => Ok(checker.finished()),
-        Some(_) => Err(Refused::Form { line: 1, problem: "the file ends before its four results".to_owned() }),
+        Some(checker) if checker.is_complete() => Ok(checker.finished()),
+        Some(Checker { about: About::Events, .. }) => {
+            Err(Refused::Form { line: 1, problem: "the file ends before its four results".to_owned() })
+        }
+        Some(_) => Err(Refused::Form { line: 1, problem: "the file ends before its result".to_owned() }),
         None => Err(Refused::Form { line: 1, problem: "the file is empty".to_owned() }),
     }
 }
 
 /// The state of the check.
 struct Checker {
+    about: About,
     scene: Scene,
     steps: Steps,
     events: Events,
@@ -134,27 +144,49 @@ struct Checker {
 
 impl Checker {
     fn begin(first: ParsedLine) -> Result<Self, String> {
-        let ParsedLine::Certificate { format, version, scene: text } = first else {
+        let ParsedLine::Certificate { format, version, about, scene: text } = first else {
             return Err("the first line is not that of a certificate".to_owned());
         };
         if format != FORMAT {
             return Err(format!("a certificate of format {format}, expected {FORMAT}"));
         }
         let scene = Scene::read(&text).map_err(|problem| format!("the scene: {problem}"))?;
-        let proved = Proved { scene: text, version, results: Vec::new(), steps: 0, links: 0, pairs: 0 };
-        Ok(Self { scene, steps: Steps::new(), events: Events::default(), proved })
+        let results = Vec::new();
+        let proved = Proved { scene: text, version, results, least_clearance: None, steps: 0, links: 0, pairs: 0 };
+        Ok(Self { about, scene, steps: Steps::new(), events: Events::default(), proved })
+    }
+
+    /// Returns true if all results of the question are there.
+    fn is_complete(&self) -> bool {
+        match self.about {
+            About::Events => self.proved.results.len() == 4,
+            About::LeastClearance => self.proved.least_clearance.is_some(),
+        }
     }
 
     fn add(&mut self, line: ParsedLine) -> Result<(), String> {
-        let Self { scene, steps, events, proved } = self;
-        let is_result = matches!(line, ParsedLine::Result(_));
-        if !is_result && (events.finish.is_some() || !proved.results.is_empty()) {
+        let Self { about, scene, steps, events, proved } = self;
+        let question = match line {
+            ParsedLine::Result(_) => Some(About::Events),
+            ParsedLine::LeastClearance(_) => Some(About::LeastClearance),
+            _ => None,
+        };
+        if question.is_some_and(|question| question != *about) {
+            return Err("it is a result of another question".to_owned());
+        }
+        if proved.least_clearance.is_some() {
+            return Err("nothing can follow the result".to_owned());
+        }
+        if question.is_none() && (events.finish.is_some() || !proved.results.is_empty()) {
             return Err("nothing but results can follow a lock, the path's end or a result".to_owned());
         }
         match line {
             ParsedLine::Certificate { .. } => Err("a second first line".to_owned()),
-            ParsedLine::Step { links, from, to, moving, clear, spans } => {
-                steps.add(scene, Step { links, head: Span(from, to), moving, clear, spans })
+            ParsedLine::Step { links, from, to, moving, clear, spans, apart, at } => {
+                steps.add(scene, Step { links, head: Span(from, to), moving, clear, spans, apart, at })
+            }
+            ParsedLine::Near { benches, from, to, spans, at, most } => {
+                events.add_near(scene, steps, benches, Span(from, to), (&spans, &at), most)
             }
             ParsedLine::Contact { benches, from, to, spans, point } => {
                 events.add_contact(scene, steps, benches, Span(from, to), &spans, point)
@@ -172,6 +204,11 @@ impl Checker {
             ParsedLine::Result(outcome) => {
                 results::check(scene, steps, events, &outcome, &proved.results)?;
                 proved.results.push(outcome);
+                Ok(())
+            }
+            ParsedLine::LeastClearance(outcome) => {
+                results::check_clearance(scene, steps, events, &outcome)?;
+                proved.least_clearance = Some(outcome);
                 Ok(())
             }
         }

@@ -11,6 +11,8 @@ pub(super) enum ParsedLine {
     Certificate {
         format: u32,
         version: String,
+        #[serde(default)]
+        about: About,
         scene: String,
     },
     Step {
@@ -20,6 +22,18 @@ pub(super) enum ParsedLine {
         moving: bool,
         clear: bool,
         spans: Vec<Span>,
+        #[serde(default)]
+        apart: Option<f64>,
+        #[serde(default)]
+        at: Vec<Place>,
+    },
+    Near {
+        benches: [usize; 2],
+        from: Place,
+        to: Place,
+        spans: Vec<Span>,
+        at: Vec<Place>,
+        most: f64,
     },
     Contact {
         benches: [usize; 2],
@@ -46,6 +60,16 @@ pub(super) enum ParsedLine {
     },
     PathEnd {},
     Result(ProvedEvent),
+    LeastClearance(ProvedClearance),
+}
+
+/// The question that a certificate answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum About {
+    #[default]
+    Events,
+    LeastClearance,
 }
 
 /// The links that a step shows.
@@ -105,4 +129,39 @@ pub struct ProvedEvent {
     /// The reason for `undecided`, or for times far apart, from the program that wrote the certificate. It is not checked.
     #[serde(default)]
     pub because: Option<String>,
+}
+
+/// The end of the stretch for which a least clearance is proved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Until {
+    /// The path's end.
+    PathEnd,
+    /// The first contact.
+    Contact,
+    /// A time.
+    Time,
+}
+
+/// The proved least clearance, from the scene's start on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProvedClearance {
+    /// Metres: no two boards that share no handle are nearer.
+    #[serde(default)]
+    pub lo: Option<f64>,
+    /// Metres: at one place the two benches are no further apart.
+    #[serde(default)]
+    pub hi: Option<f64>,
+    /// The end of the stretch.
+    pub until: Until,
+    /// Seconds of that end, for [`Until::Time`].
+    #[serde(default)]
+    pub time_until: Option<f64>,
+    /// The bench of the two that is nearer the head, counted from 0.
+    #[serde(default)]
+    pub bench_a: Option<usize>,
+    /// The other bench.
+    #[serde(default)]
+    pub bench_b: Option<usize>,
 }

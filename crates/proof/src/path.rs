@@ -286,6 +286,11 @@ impl Path {
         matches!(self.segments[segment].curve, Curve::Line { .. })
     }
 
+    /// Returns true if the segment is an arc.
+    pub fn is_arc(&self, segment: usize) -> bool {
+        matches!(self.segments[segment].curve, Curve::Arc { .. })
+    }
+
     /// Returns the metres from the centre at a place of an inward spiral.
     pub fn spiral_radius(&self, place: Place) -> Option<Interval> {
         match &self.segments[place.0].curve {

@@ -1,9 +1,9 @@
-//! The report of `verify` on a certificate of events.
+//! The report of `verify` on a certificate.
 
 use std::io::BufRead;
 
 use bench_dragon::messages::hexadecimal;
-use bench_dragon::proof::{EventKind, Proved, ProvedEvent, Refused, Status, scene_hash};
+use bench_dragon::proof::{EventKind, Proved, ProvedClearance, ProvedEvent, Refused, Status, Until, scene_hash};
 use bench_dragon::show::scene::printable;
 use serde::Serialize;
 use serde_json::json;
@@ -37,8 +37,8 @@ pub(super) fn print(common: &Common, shown: &str, checked: Result<Proved, Refuse
         return output.finish();
     }
     output.line(&format!("BLAKE3 of the scene's text: {scene_hash}"))?;
-    for outcome in &proved.results {
-        output.line(&sentence(outcome))?;
+    for sentence in sentences(&proved) {
+        output.line(&sentence)?;
     }
     let Proved { steps, links, pairs, .. } = proved;
     output.line(&format!("{steps} steps, {links} links over spans and {pairs} pairs of boards were checked."))?;
@@ -46,7 +46,7 @@ pub(super) fn print(common: &Common, shown: &str, checked: Result<Proved, Refuse
 }
 
 /// Checks that a certificate is of the scene with this text; `shown` is the file's name in sentences. Returns a
-/// sentence for each kind of event.
+/// sentence for each result.
 pub fn proved_of(
     scene: &str,
     shown: &str,
@@ -58,7 +58,13 @@ pub fn proved_of(
         let sentence = format!("{shown} is the certificate of a scene with another text, expected one of this scene");
         return Err(CommandError::BadInput(sentence));
     }
-    Ok(proved.results.iter().map(sentence).collect())
+    Ok(sentences(&proved))
+}
+
+/// Returns a sentence for each result.
+fn sentences(proved: &Proved) -> Vec<String> {
+    let Proved { results, least_clearance, .. } = proved;
+    results.iter().map(sentence).chain(least_clearance.as_ref().map(clearance_sentence)).collect()
 }
 
 /// Returns the error for a refused certificate.
@@ -109,5 +115,24 @@ fn sentence(outcome: &ProvedEvent) -> String {
                 outcome.because.as_deref().map_or(String::new(), |because| format!(": {}", printable(because)));
             format!("{event}: undecided, but not before {lo}{because}")
         }
+    }
+}
+
+/// Returns a sentence on a proved least clearance.
+fn clearance_sentence(outcome: &ProvedClearance) -> String {
+    let ProvedClearance { lo, hi, until, time_until, bench_a, bench_b } = *outcome;
+    let until = match (until, time_until) {
+        (Until::PathEnd, _) => "from the start to the path's end".to_owned(),
+        (Until::Contact, _) => "from the start to the first contact".to_owned(),
+        (Until::Time, time) => format!("from the start to {} s", time.unwrap_or(0.0)),
+    };
+    let below = lo.map(|lo| format!("no two boards that share no handle are nearer than {lo} m"));
+    let above = hi.zip(bench_a.zip(bench_b)).map(|(hi, (a, b))| {
+        format!("benches {} and {} (counting from 1) are no further apart than {hi} m at one moment", a + 1, b + 1)
+    });
+    let claims: Vec<String> = below.into_iter().chain(above).collect();
+    match claims.is_empty() {
+        true => format!("least clearance {until}: undecided"),
+        false => format!("least clearance {until}: proved that {}", claims.join(", and that ")),
     }
 }
