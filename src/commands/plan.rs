@@ -1,9 +1,15 @@
 //! `plan`: answers for a choreographer, with the place that decides them.
 
-use bench_dragon::certify::plan::{GreatestSpeed, LeastPitch, Overlap, PlanError, greatest_speed, least_pitch};
+use std::path::{Path, PathBuf};
+
+use bench_dragon::certify::CertificateLine;
+use bench_dragon::certify::plan::{
+    GreatestSpeed, LeastPitch, Overlap, PlanError, certify_greatest_speed, greatest_speed, least_pitch,
+};
 use bench_dragon::show::scene::Accepted;
 use serde::Serialize;
 
+use super::certificate_file::CertificateFile;
 use super::events::bench_name;
 use super::{CommandError, Common, Output, expect_exact_motion, number, progress_bar, search_timeline};
 
@@ -27,6 +33,9 @@ enum Question {
         /// Metres per second that no handle may exceed
         #[arg(long, value_name = "M/S", allow_negative_numbers = true)]
         max_handle_speed: f64,
+        /// Write the certificate of the proof to this file, for `verify`
+        #[arg(long, value_name = "FILE")]
+        certify: Option<PathBuf>,
     },
 }
 
@@ -60,9 +69,9 @@ struct SpeedLine {
 
 /// Plans the pitch or the speed.
 pub fn plan(common: &Common, arguments: &PlanArguments) -> Result<(), CommandError> {
-    match arguments.question {
-        Question::Pitch { reach_radius } => plan_pitch(common, reach_radius),
-        Question::Speed { max_handle_speed } => plan_speed(common, max_handle_speed),
+    match &arguments.question {
+        Question::Pitch { reach_radius } => plan_pitch(common, *reach_radius),
+        Question::Speed { max_handle_speed, certify } => plan_speed(common, *max_handle_speed, certify.as_deref()),
     }
 }
 
@@ -124,15 +133,25 @@ fn plan_pitch(common: &Common, radius: f64) -> Result<(), CommandError> {
     output.finish()
 }
 
-fn plan_speed(common: &Common, limit: f64) -> Result<(), CommandError> {
+fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), CommandError> {
     Accepted::SPEED.check("--max-handle-speed", limit).map_err(CommandError::BadInput)?;
-    let scene = common.load_scene()?;
+    let text = common.scene_text()?;
+    let scene = text.parse()?;
     expect_exact_motion(&scene)?;
     let timeline = search_timeline(&scene, common);
     let bar = progress_bar(1000, common).with_message("searching for the fastest handle");
-    let found = greatest_speed(&scene, &timeline, limit, &mut |share| bar.set_position((1000.0 * share) as u64));
+    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+    let found = if let Some(file) = file {
+        let mut certificate = CertificateFile::create(file)?;
+        let mut write = |line: &CertificateLine| certificate.write(line);
+        let found = certify_greatest_speed(&scene, &timeline, limit, &text.text, &mut write, &mut progress)??;
+        certificate.finish()?;
+        found
+    } else {
+        greatest_speed(&scene, &timeline, limit, &mut progress)?
+    };
     bar.finish_and_clear();
-    let GreatestSpeed { value_lo, value_hi, time, handle, ratio, proved, steps } = found?;
+    let GreatestSpeed { value_lo, value_hi, time, handle, ratio, proved, steps } = found;
     let mut output = Output::standard();
     if common.json {
         let status = if proved { "proved" } else { "given_up" };

@@ -1,4 +1,4 @@
-//! Every certificate of events and of the least clearance that is written is accepted by the checker: on tight routes, full turns, S-bends near a lock,
+//! Every certificate of events, of the least clearance and of the greatest speed that is written is accepted by the checker: on tight routes, full turns, S-bends near a lock,
 //! and on the random scenes of the oracle.
 //!
 //! `BENCH_DRAGON_LONG=1` makes 100,000 scenes in place of 400, `BENCH_DRAGON_CASES=few` 40.
@@ -9,6 +9,7 @@ use std::io;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use bench_dragon::certify::plan::certify_greatest_speed;
 use bench_dragon::certify::{CertificateLine, certify, certify_least_clearance};
 use bench_dragon::proof::{Proved, Status, Until, verify};
 use bench_dragon::show::scene::Scene;
@@ -132,6 +133,29 @@ fn clearance_certified(text: &str) -> Option<Until> {
     Some(claim.until)
 }
 
+/// Writes the certificate of the greatest speed and has it checked. Returns false for a show without such a speed, or
+/// one that is not decided.
+fn speed_certified(text: &str) -> bool {
+    let Ok(scene) = Scene::parse(text, "tight", "tight") else { return false };
+    let timeline = scene.motion.timeline(&mut |_| ());
+    let mut found = None;
+    let mut lines = Vec::new();
+    let mut write = |line: &CertificateLine| {
+        serde_json::to_writer(&mut lines, line).map_err(io::Error::other)?;
+        lines.push(b'\n');
+        Ok(())
+    };
+    if let Ok(Ok(speed)) = certify_greatest_speed(&scene, &timeline, 2.0, text, &mut write, &mut |_| ()) {
+        found = Some(speed);
+    }
+    let Some(speed) = found else { return false };
+    let proved = verify(lines.as_slice(), &mut |_| ()).unwrap_or_else(|refused| panic!("{refused}\n{text}"));
+    let claim = proved.greatest_speed.unwrap();
+    assert_eq!((claim.value_lo, claim.value_hi), (speed.value_lo, speed.value_hi), "{text}");
+    assert!(claim.value_hi - claim.value_lo <= 1e-9, "{claim:?}\n{text}");
+    true
+}
+
 #[test]
 fn every_certificate_of_a_tight_route_is_accepted() {
     let is_short = std::env::var_os("BENCH_DRAGON_CASES").is_some_and(|cases| cases == "few");
@@ -149,7 +173,10 @@ fn every_certificate_of_a_tight_route_is_accepted() {
                     let text = scene(index, &mut Rng::with_seed(0x7163 + index as u64));
                     let results = certified(&text).unwrap_or_default();
                     let until = clearance_certified(&text);
+                    // The search of a greatest speed takes seconds.
+                    let has_speed = index.is_multiple_of(10) && speed_certified(&text);
                     let mut statuses = statuses.lock().unwrap();
+                    *statuses.entry("speeds".to_owned()).or_default() += usize::from(has_speed);
                     if let Some(until) = until {
                         *statuses.entry(format!("clearance to {until:?}")).or_default() += 1;
                     }
@@ -166,7 +193,7 @@ fn every_certificate_of_a_tight_route_is_accepted() {
         ["Proved", "None", "Undecided"].map(|status| statuses.get(status).copied().unwrap_or(0));
     // Most scenes are legal, and most of those are decided.
     let to_end = statuses.get("clearance to PathEnd").copied().unwrap_or(0);
-    assert!(to_end * 10 > count, "{statuses:?}");
+    assert!(to_end * 10 > count && statuses["speeds"] * 100 > count, "{statuses:?}");
     assert!(proved > count && none > count / 2 && undecided * 10 < proved + none, "{statuses:?}");
 }
 

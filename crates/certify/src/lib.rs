@@ -30,7 +30,10 @@ pub use capsule::Span;
 pub use clearance::{
     ClearanceEnclosure, MOST_CLEARANCE_STEPS, Write, certify_least_clearance, enclose_least_clearance,
 };
-pub use lines::{About, CertificateLine, CertifiedClearance, CertifiedEvent, FORMAT, Links, Status, Step, Until, WIDE};
+pub use lines::{
+    About, CertificateLine, CertifiedClearance, CertifiedEvent, CertifiedSpeed, FORMAT, Links, Status, Step, Until,
+    WIDE,
+};
 pub use path::Place;
 
 use bench_dragon_motion::Motion;

@@ -104,6 +104,28 @@ pub enum CertificateLine<'a> {
     Result(CertifiedEvent),
     /// The result for the least clearance.
     LeastClearance(CertifiedClearance),
+    /// The speeds of all handles over a step of the head.
+    Speeds {
+        /// The first place of the head.
+        from: Place,
+        /// The last place of the head.
+        to: Place,
+        /// The spans of the handles from 1 on.
+        spans: Vec<Span>,
+        /// A place of each span, the head's first.
+        at: Vec<Place>,
+    },
+    /// The speed of a handle with the head at the first place of `at`.
+    Fast {
+        /// The handle, counted from 0.
+        handle: usize,
+        /// The spans of the handles from 1 on.
+        spans: Vec<Span>,
+        /// A place of each span, the head's first.
+        at: Vec<Place>,
+    },
+    /// The result for the greatest speed.
+    GreatestSpeed(CertifiedSpeed),
 }
 
 /// The question of a certificate that is not about events.
@@ -112,6 +134,27 @@ pub enum CertificateLine<'a> {
 pub enum About {
     /// The least clearance.
     LeastClearance,
+    /// The greatest speed.
+    GreatestSpeed,
+}
+
+/// The certified greatest speed of the head at which no handle exceeds a limit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CertifiedSpeed {
+    /// Metres per second that no handle may exceed.
+    pub limit: f64,
+    /// Metres per second: with the head no faster, no handle exceeds the limit.
+    pub value_lo: f64,
+    /// Metres per second: with the head any faster, the handle exceeds the limit.
+    pub value_hi: f64,
+    /// The handle has at least this ratio to the head's speed at one place.
+    pub ratio_lo: f64,
+    /// No handle has a greater ratio to the head's speed.
+    pub ratio_hi: f64,
+    /// The handle, counted from 0.
+    pub handle: usize,
+    /// Simulated seconds up to which this holds, from the start on.
+    pub time_until: f64,
 }
 
 /// The end of the stretch for which a least clearance is certified.

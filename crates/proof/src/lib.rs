@@ -11,6 +11,7 @@ mod chain;
 mod elementary;
 mod events;
 mod first_order;
+mod greatest;
 mod interval;
 mod lines;
 mod link;
@@ -19,6 +20,7 @@ mod path;
 mod results;
 mod scene;
 mod sides;
+mod speeds;
 mod steps;
 
 #[cfg(test)]
@@ -29,8 +31,9 @@ use std::io::{self, BufRead, Read};
 use serde::Serialize;
 
 use self::events::{Events, LockShown};
+use self::greatest::Greatest;
 use self::lines::{About, ParsedLine};
-pub use self::lines::{EventKind, ProvedClearance, ProvedEvent, Status, Until};
+pub use self::lines::{EventKind, ProvedClearance, ProvedEvent, ProvedSpeed, Status, Until};
 use self::path::Span;
 use self::scene::Scene;
 use self::steps::{Step, Steps};
@@ -52,6 +55,9 @@ pub struct Proved {
     /// The least clearance, in a certificate of that question.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least_clearance: Option<ProvedClearance>,
+    /// The greatest speed, in a certificate of that question.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub greatest_speed: Option<ProvedSpeed>,
     /// Number of steps checked.
     pub steps: u64,
     /// Number of links checked, in all steps.
@@ -139,6 +145,7 @@ struct Checker {
     scene: Scene,
     steps: Steps,
     events: Events,
+    greatest: Greatest,
     proved: Proved,
 }
 
@@ -151,9 +158,11 @@ impl Checker {
             return Err(format!("a certificate of format {format}, expected {FORMAT}"));
         }
         let scene = Scene::read(&text).map_err(|problem| format!("the scene: {problem}"))?;
-        let results = Vec::new();
-        let proved = Proved { scene: text, version, results, least_clearance: None, steps: 0, links: 0, pairs: 0 };
-        Ok(Self { about, scene, steps: Steps::new(), events: Events::default(), proved })
+        let (results, steps, links, pairs) = (Vec::new(), 0, 0, 0);
+        let (least_clearance, greatest_speed) = (None, None);
+        let proved = Proved { scene: text, version, results, least_clearance, greatest_speed, steps, links, pairs };
+        let (steps, events, greatest) = (Steps::new(), Events::default(), Greatest::default());
+        Ok(Self { about, scene, steps, events, greatest, proved })
     }
 
     /// Returns true if all results of the question are there.
@@ -161,20 +170,22 @@ impl Checker {
         match self.about {
             About::Events => self.proved.results.len() == 4,
             About::LeastClearance => self.proved.least_clearance.is_some(),
+            About::GreatestSpeed => self.proved.greatest_speed.is_some(),
         }
     }
 
     fn add(&mut self, line: ParsedLine) -> Result<(), String> {
-        let Self { about, scene, steps, events, proved } = self;
+        let Self { about, scene, steps, events, greatest, proved } = self;
         let question = match line {
             ParsedLine::Result(_) => Some(About::Events),
             ParsedLine::LeastClearance(_) => Some(About::LeastClearance),
+            ParsedLine::GreatestSpeed(_) => Some(About::GreatestSpeed),
             _ => None,
         };
         if question.is_some_and(|question| question != *about) {
             return Err("it is a result of another question".to_owned());
         }
-        if proved.least_clearance.is_some() {
+        if proved.least_clearance.is_some() || proved.greatest_speed.is_some() {
             return Err("nothing can follow the result".to_owned());
         }
         if question.is_none() && (events.finish.is_some() || !proved.results.is_empty()) {
@@ -211,11 +222,19 @@ impl Checker {
                 proved.least_clearance = Some(outcome);
                 Ok(())
             }
+            ParsedLine::Speeds { from, to, spans, at } => greatest.add_step(scene, Span(from, to), &spans, &at),
+            ParsedLine::Fast { handle, spans, at } => greatest.add_fast(scene, handle, &spans, &at),
+            ParsedLine::GreatestSpeed(outcome) => {
+                greatest.check(scene, &outcome)?;
+                proved.greatest_speed = Some(outcome);
+                Ok(())
+            }
         }
     }
 
     fn finished(self) -> Proved {
         let Steps { steps, links, pairs, .. } = self.steps;
+        let (steps, links) = (steps + self.greatest.steps, links + self.greatest.links);
         Proved { steps, links, pairs, ..self.proved }
     }
 }

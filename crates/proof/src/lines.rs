@@ -61,6 +61,18 @@ pub(super) enum ParsedLine {
     PathEnd {},
     Result(ProvedEvent),
     LeastClearance(ProvedClearance),
+    Speeds {
+        from: Place,
+        to: Place,
+        spans: Vec<Span>,
+        at: Vec<Place>,
+    },
+    Fast {
+        handle: usize,
+        spans: Vec<Span>,
+        at: Vec<Place>,
+    },
+    GreatestSpeed(ProvedSpeed),
 }
 
 /// The question that a certificate answers.
@@ -70,6 +82,7 @@ pub(super) enum About {
     #[default]
     Events,
     LeastClearance,
+    GreatestSpeed,
 }
 
 /// The links that a step shows.
@@ -164,4 +177,24 @@ pub struct ProvedClearance {
     /// The other bench.
     #[serde(default)]
     pub bench_b: Option<usize>,
+}
+
+/// The proved greatest speed of the head at which no handle exceeds a limit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProvedSpeed {
+    /// Metres per second that no handle may exceed.
+    pub limit: f64,
+    /// Metres per second: with the head no faster, no handle exceeds the limit.
+    pub value_lo: f64,
+    /// Metres per second: with the head any faster, the handle exceeds the limit.
+    pub value_hi: f64,
+    /// The handle has at least this ratio to the head's speed at one place.
+    pub ratio_lo: f64,
+    /// No handle has a greater ratio to the head's speed.
+    pub ratio_hi: f64,
+    /// The handle, counted from 0.
+    pub handle: usize,
+    /// Seconds at the scene's own speed up to which this holds, from its start on.
+    pub time_until: f64,
 }

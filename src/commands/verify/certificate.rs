@@ -3,7 +3,9 @@
 use std::io::BufRead;
 
 use bench_dragon::messages::hexadecimal;
-use bench_dragon::proof::{EventKind, Proved, ProvedClearance, ProvedEvent, Refused, Status, Until, scene_hash};
+use bench_dragon::proof::{
+    EventKind, Proved, ProvedClearance, ProvedEvent, ProvedSpeed, Refused, Status, Until, scene_hash,
+};
 use bench_dragon::show::scene::printable;
 use serde::Serialize;
 use serde_json::json;
@@ -63,8 +65,9 @@ pub fn proved_of(
 
 /// Returns a sentence for each result.
 fn sentences(proved: &Proved) -> Vec<String> {
-    let Proved { results, least_clearance, .. } = proved;
-    results.iter().map(sentence).chain(least_clearance.as_ref().map(clearance_sentence)).collect()
+    let Proved { results, least_clearance, greatest_speed, .. } = proved;
+    let others = [least_clearance.as_ref().map(clearance_sentence), greatest_speed.as_ref().map(speed_sentence)];
+    results.iter().map(sentence).chain(others.into_iter().flatten()).collect()
 }
 
 /// Returns the error for a refused certificate.
@@ -135,4 +138,15 @@ fn clearance_sentence(outcome: &ProvedClearance) -> String {
         true => format!("least clearance {until}: undecided"),
         false => format!("least clearance {until}: proved that {}", claims.join(", and that ")),
     }
+}
+
+/// Returns a sentence on a proved greatest speed.
+fn speed_sentence(outcome: &ProvedSpeed) -> String {
+    let ProvedSpeed { limit, value_lo, value_hi, ratio_lo, ratio_hi, handle, time_until } = *outcome;
+    let handle = handle + 1;
+    format!(
+        "greatest speed from the start to {time_until} s of the scene: proved that no handle exceeds {limit} m/s with the \
+         head at {value_lo} m/s, and that handle {handle} (counting from 1) does with the head faster than {value_hi} \
+         m/s; the greatest ratio is between {ratio_lo} and {ratio_hi}"
+    )
 }
